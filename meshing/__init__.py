@@ -1,0 +1,1 @@
+"""Geometry and meshes: Gmsh assembly, closed joint surfaces, swept joint hexahedra."""

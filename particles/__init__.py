@@ -1,0 +1,1 @@
+"""Molten solder: ISPG particles with surface tension, wetting and gravity."""

@@ -1,0 +1,51 @@
+"""Parameters of the molten solder and of the ISPG solver.
+
+All values are SI floats; see ``meshing.parameters`` for what the unit strings mean.
+"""
+
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+Switch = Literal["auto", "on", "off"]
+
+
+class Parameters(BaseModel):
+    """Base of all parameter models: immutable, unknown keys are errors."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class SolderNumerics(Parameters):
+    """How the reflow is computed."""
+
+    spacing: Annotated[float, "mm"] = Field(5.0e-5, gt=0)
+    basis: Literal["linear", "quadratic"] = "quadratic"
+    time_step_limit: float = Field(20.0, gt=0, le=100)
+    tolerance: float = Field(1.0e-6, gt=0, lt=1)
+    max_steps: int = Field(400, ge=1)
+
+
+class SolderEffects(Parameters):
+    """Effects of the reflow: decided from dimensionless numbers (auto), or by the user."""
+
+    gravity: Switch = "auto"
+    inertia: Switch = "auto"
+    viscosity: Switch = "auto"
+    surface_tension: Switch = "auto"
+    wall_adhesion: Switch = "auto"
+
+
+class Solder(Parameters):
+    """Molten solder: volume of a ball, fluid properties, contact angles, process."""
+
+    volume: Annotated[float, "mm^3"] = Field(gt=0)
+    density: Annotated[float, "kg/m^3"] = Field(8930.0, gt=0)
+    surface_tension: Annotated[float, "N/m"] = Field(0.4985, gt=0)
+    viscosity: Annotated[float, "Pa*s"] = Field(2.27e-3, gt=0)
+    pad_contact_angle: Annotated[float, "deg"] = Field(0.0872664626, gt=0, lt=3.14159265)
+    mask_contact_angle: Annotated[float, "deg"] = Field(2.5830872929, gt=0, lt=3.14159265)
+    gravity: Annotated[float, "m/s^2"] = Field(9.81, ge=0)
+    process_time: Annotated[float, "s"] = Field(60.0, gt=0)
+    effects: SolderEffects = SolderEffects()
+    numerics: SolderNumerics = SolderNumerics()

@@ -1,0 +1,3 @@
+"""The pipeline: case file, command line, stages, report."""
+
+__version__ = "0.1.0"
