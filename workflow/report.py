@@ -1,0 +1,131 @@
+"""report.html: one self-contained page from the products of a run. Nothing is computed here that a product holds."""
+
+import base64
+import json
+import tempfile
+from pathlib import Path
+
+import jinja2
+import numpy as np
+
+from workflow import report_tables as tables
+from workflow.summary import collect_summary, write_summary
+
+TEMPLATES = Path(__file__).parent / "templates"
+
+
+def write_report(run_folder: Path, case) -> dict:
+    """Write ``report.html`` and ``summary.json`` at the top of a run folder.
+
+    Args:
+        run_folder: folder of the run; stages that have not run are left out of the page.
+        case: the resolved case (``workflow.case.Case``).
+
+    Returns:
+        The summary.
+    """
+    summary = collect_summary(run_folder, case.case.name)
+    write_summary(run_folder, summary)
+    page = _render(_context(run_folder, case, summary))
+    partial = run_folder / ".report.html.partial"
+    partial.write_text(page)
+    partial.rename(run_folder / "report.html")
+    return summary
+
+
+def _render(context: dict) -> str:
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(TEMPLATES),
+        autoescape=jinja2.select_autoescape(["html", "j2"]),
+        undefined=jinja2.ChainableUndefined,
+    )
+    return environment.get_template("report.html.j2").render(context)
+
+
+def _context(run_folder: Path, case, summary: dict) -> dict:
+    context = {
+        "case": case.case,
+        "version": summary["version"],
+        "inputs_sha256": summary["inputs_sha256"],
+        "healthy": all(check["ok"] for check in summary["health"].values()),
+        "headline": tables.headline(summary["metrics"]),
+        "health": tables.health_rows(summary["health"]),
+        "tables": {
+            "parameters": tables.parameters(case),
+            "effects": tables.effects(summary["effects"]),
+            "versions": tables.versions(),
+        },
+        "curves": {},
+        "pictures": {},
+    }
+    if summary["timings"]:
+        from workflow.report_curves import timing_bars
+
+        context["curves"]["timings"] = timing_bars(summary["timings"])
+    _add_preview(run_folder, context)
+    _add_joints(run_folder, context)
+    _add_shock(run_folder, context, summary)
+    return context
+
+
+def _add_preview(run_folder: Path, context: dict) -> None:
+    preview = run_folder / "geometry" / "preview.png"
+    if preview.exists():
+        context["pictures"]["preview"] = _base64(preview)
+
+
+def _add_joints(run_folder: Path, context: dict) -> None:
+    path = run_folder / "solder_mesh" / "quality.json"
+    if not path.exists():
+        return
+    from workflow.report_curves import array_map
+    from workflow.report_pictures import render_shapes
+
+    joints = tables.joint_records(run_folder)
+    context["tables"]["shapes"] = tables.shapes(joints)
+    context["curves"]["map"] = array_map(joints)
+    with tempfile.TemporaryDirectory() as folder:
+        picture = Path(folder) / "shapes.png"
+        render_shapes(run_folder / "surface", joints, picture)
+        context["pictures"]["shapes"] = _base64(picture)
+
+
+def _add_shock(run_folder: Path, context: dict, summary: dict) -> None:
+    histories, results = {}, {}
+    for mode in ("two_scale", "dns"):
+        folder = run_folder / "shock" / mode
+        if (folder / "history.npz").exists():
+            with np.load(folder / "history.npz") as arrays:
+                histories[mode] = dict(arrays)
+            results[mode] = json.loads((folder / "result.json").read_text())
+    if not histories:
+        return
+    from workflow.report_curves import energy_curves, history_curves
+
+    main_mode = next(iter(histories))
+    critical_joint = summary["metrics"]["critical_joint"]["value"]
+    context["curves"]["histories"] = history_curves(histories, critical_joint)
+    context["curves"]["energy"] = energy_curves(histories[main_mode])
+    context["tables"].update(
+        model=tables.models(results),
+        comparison=tables.comparison(summary["metrics"]),
+        joints=tables.ranked_joints(histories[main_mode], tables.joint_records(run_folder)),
+        energy=tables.energies(histories),
+        cost=tables.costs(results),
+    )
+    _add_shock_pictures(run_folder / "shock" / main_mode, histories[main_mode], context)
+
+
+def _add_shock_pictures(folder: Path, history: dict, context: dict) -> None:
+    from workflow.report_pictures import render_board, render_joints
+
+    with tempfile.TemporaryDirectory() as temporary:
+        joints, board = Path(temporary) / "joints.png", Path(temporary) / "board.png"
+        context["joints_caption"] = render_joints(folder, history, joints)
+        context["board_caption"] = render_board(folder, history, board)
+        context["pictures"]["joints"] = _base64(joints)
+        context["pictures"]["board"] = _base64(board)
+
+
+def _base64(path: Path) -> str:
+    return base64.b64encode(path.read_bytes()).decode()

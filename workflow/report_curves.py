@@ -1,0 +1,136 @@
+"""Curves and maps of the report, as inline SVG."""
+
+import io
+
+import matplotlib
+import numpy as np
+
+matplotlib.use("Agg")
+from matplotlib import pyplot  # noqa: E402  (the backend must be chosen first)
+
+MODE_STYLE = {
+    "two_scale": {"color": "#0b5fa5", "linestyle": "-", "linewidth": 1.6, "label": "two-scale"},
+    "dns": {"color": "#d1495b", "linestyle": "--", "linewidth": 1.3, "label": "DNS"},
+}
+STYLE = {
+    "font.size": 9,
+    "axes.grid": True,
+    "grid.alpha": 0.25,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "svg.fonttype": "none",
+    "font.family": "sans-serif",
+}
+MILLI, MICRO = 1.0e-3, 1.0e-6
+
+
+def array_map(joints: list[dict]) -> str:
+    """Draw standoff and width of every joint at its place in the array.
+
+    Args:
+        joints: records with name, x, y [m], standoff [m], max_width [m].
+
+    Returns:
+        An SVG element.
+    """
+    with pyplot.rc_context(STYLE):
+        figure, axes = pyplot.subplots(1, 2, figsize=(9.2, 3.9), constrained_layout=True)
+        _map_panel(axes[0], joints, "standoff", "standoff [µm]")
+        _map_panel(axes[1], joints, "max_width", "maximum width [µm]")
+        return _svg(figure)
+
+
+def history_curves(histories: dict[str, dict], critical_joint: str) -> str:
+    """Draw pulse, board and die displacement, board strain and the critical joint's stress of every mode.
+
+    Args:
+        histories: mode -> arrays of ``history.npz``.
+        critical_joint: name of the joint whose stress is drawn.
+
+    Returns:
+        An SVG element.
+    """
+    with pyplot.rc_context(STYLE):
+        figure, axes = pyplot.subplots(2, 2, figsize=(9.2, 5.6), sharex=True, constrained_layout=True)
+        for mode, history in histories.items():
+            _draw_histories(axes, mode, history, critical_joint)
+        any_history = next(iter(histories.values()))
+        pulse = axes[0, 0].twinx()
+        pulse.fill_between(
+            any_history["time"] / MILLI, any_history["base_acceleration"] / 9.80665, color="#888888", alpha=0.18, lw=0
+        )
+        pulse.set_ylabel("input acceleration [G]", color="#777777")
+        pulse.grid(False)
+        pulse.spines["right"].set_visible(True)
+        axes[0, 0].legend(frameon=False)
+        for axis in axes[1]:
+            axis.set_xlabel("time [ms]")
+        return _svg(figure)
+
+
+def energy_curves(history: dict) -> str:
+    """Draw the energy ledger of one run: its terms, and the balance relative to the largest energy."""
+    time = history["time"] / MILLI
+    with pyplot.rc_context(STYLE):
+        figure, (left, right) = pyplot.subplots(1, 2, figsize=(9.2, 3.1), constrained_layout=True)
+        for name, color in (("external", "#333333"), ("kinetic", "#0b5fa5"), ("internal", "#e09f3e")):
+            left.plot(time, history[name] / MILLI, label=name, color=color)
+        left.set(xlabel="time [ms]", ylabel="energy [mJ]")
+        left.legend(frameon=False)
+        largest = max(float(np.max(np.abs(history[name]))) for name in ("external", "kinetic", "internal"))
+        right.plot(time, 100.0 * history["balance"] / largest, color="#d1495b", label="balance")
+        right.plot(time, 100.0 * history["interface"] / largest, color="#5f6c7b", label="interface")
+        right.set(xlabel="time [ms]", ylabel="share of the largest energy [%]")
+        right.legend(frameon=False)
+        return _svg(figure)
+
+
+def timing_bars(timings: dict[str, float]) -> str:
+    """Draw the wall time of every stage."""
+    names = list(timings)
+    with pyplot.rc_context(STYLE):
+        figure, axis = pyplot.subplots(figsize=(9.2, 0.35 * len(names) + 0.8), constrained_layout=True)
+        bars = axis.barh(names, [timings[name] for name in names], color="#0b5fa5")
+        axis.bar_label(bars, fmt="%.1f s", padding=3)
+        axis.invert_yaxis()
+        axis.set_xlabel("wall time [s]")
+        axis.grid(axis="y", visible=False)
+        return _svg(figure)
+
+
+def _map_panel(axis, joints: list[dict], key: str, label: str) -> None:
+    values = np.array([joint[key] for joint in joints]) / MICRO
+    x = np.array([joint["x"] for joint in joints]) / MILLI
+    y = np.array([joint["y"] for joint in joints]) / MILLI
+    marks = axis.scatter(x, y, c=values, s=620, cmap="viridis", edgecolors="white")
+    middle = 0.5 * (values.min() + values.max())
+    for joint, value, px, py in zip(joints, values, x, y, strict=True):
+        color = "white" if value <= middle else "black"
+        axis.annotate(
+            f"{joint['name']}\n{value:.0f}", (px, py), ha="center", va="center", fontsize=6.5, color=color
+        )
+    axis.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal")
+    axis.margins(0.14)
+    axis.figure.colorbar(marks, ax=axis, label=label)
+
+
+def _draw_histories(axes, mode: str, history: dict, critical_joint: str) -> None:
+    time, style = history["time"] / MILLI, MODE_STYLE[mode]
+    column = list(history["joints"]).index(critical_joint)
+    axes[0, 0].plot(time, history["board_centre"][:, 2] / MILLI, **style)
+    axes[0, 0].set_ylabel("board centre, relative to table [mm]")
+    axes[0, 1].plot(time, history["die_centre"][:, 2] / MILLI, **style)
+    axes[0, 1].set_ylabel("die centre, relative to table [mm]")
+    axes[1, 0].plot(time, 1.0e3 * history["board_strain"], **style)
+    axes[1, 0].set_ylabel("board strain under the package [1e-3]")
+    stress = np.maximum(history["von_mises_board"][:, column], history["von_mises_package"][:, column])
+    axes[1, 1].plot(time, stress / 1.0e6, **style)
+    axes[1, 1].set_ylabel(f"von Mises at the pads of {critical_joint} [MPa]")
+
+
+def _svg(figure) -> str:
+    stream = io.StringIO()
+    figure.savefig(stream, format="svg")
+    pyplot.close(figure)
+    text = stream.getvalue()
+    return text[text.index("<svg") :]

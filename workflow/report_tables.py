@@ -1,0 +1,203 @@
+"""Tables of the report: products turned into rows of text with units."""
+
+import json
+from importlib import metadata
+from pathlib import Path
+
+import numpy as np
+
+HEADLINE = (
+    ("critical_joint", "critical joint"),
+    ("peak_von_mises", "peak von Mises at its pads"),
+    ("peak_board_strain", "peak board strain under the package"),
+    ("critical_joint_stress_error", "stress history, two-scale against DNS"),
+    ("two_scale_dns_time_ratio", "wall time, two-scale over DNS"),
+    ("energy_balance_error", "largest energy imbalance"),
+    ("joint_width_error_max", "joint width against Young-Laplace, worst"),
+    ("joint_volume_error_max", "joint volume lost in meshing, worst"),
+)
+COMPARISON = (
+    ("critical_joint_stress_error", "von Mises history of the critical joint, relative L2"),
+    ("die_displacement_error", "die centre displacement, relative L2"),
+    ("board_displacement_error", "board centre displacement, relative L2"),
+    ("two_scale_dns_time_ratio", "wall time, two-scale over DNS on as many ranks"),
+)
+PACKAGES = (
+    "numpy", "scipy", "numba", "gmsh", "meshio", "pyvista", "fenics-dolfinx", "petsc4py", "mpi4py", "pydantic", "pint", "snakemake",
+)  # fmt: skip
+
+
+def headline(metrics: dict) -> list[dict]:
+    """The figures at the top of the page: those of ``HEADLINE`` that the run has."""
+    return [{"label": label, "value": quantity(metrics[name])} for name, label in HEADLINE if name in metrics]
+
+
+def health_rows(health: dict) -> list[dict]:
+    """One record a check: name, value, limit (texts) and ok."""
+    return [
+        {"name": name.replace("_", " "), "value": number(check["value"]), "limit": number(check["limit"]), "ok": check["ok"]}
+        for name, check in health.items()
+    ]
+
+
+def parameters(case) -> dict:
+    """All resolved parameters of the case, as dotted keys with values in the user's units."""
+    from workflow.case import display_values
+
+    return {"head": ["key", "value"], "rows": [[key, value] for key, value in display_values(case).items()]}
+
+
+def effects(records: dict) -> dict:
+    """Which effects were simulated, and why."""
+    rows = [[name.replace("_", " "), "on" if record["on"] else "off", record["why"]] for name, record in records.items()]
+    return {"head": ["effect", "state", "why"], "rows": rows}
+
+
+def versions() -> dict:
+    """Installed versions of the libraries that the results depend on."""
+    rows = []
+    for name in PACKAGES:
+        try:
+            rows.append([name, metadata.version(name)])
+        except metadata.PackageNotFoundError:
+            rows.append([name, "not found"])
+    return {"head": ["library", "version"], "rows": rows}
+
+
+def joint_records(run_folder: Path) -> list[dict]:
+    """Join pad table, reflow metrics and mesh quality: one flat record a joint, SI units."""
+    pads = json.loads((run_folder / "geometry" / "pads.json").read_text())
+    reflow = json.loads((run_folder / "reflow" / "joints.json").read_text())
+    quality = json.loads((run_folder / "solder_mesh" / "quality.json").read_text())
+    records = []
+    for pad in pads:
+        joint = reflow[pad["name"]]
+        metrics = {name: metric["value"] for name, metric in joint["metrics"].items()}
+        records.append({**pad, "shape": joint["shape"], **metrics, **quality[pad["name"]]})
+    return records
+
+
+def shapes(joints: list[dict]) -> dict:
+    """One row a distinct shape, by increasing standoff."""
+    head = [
+        "joints", "standoff [µm]", "max. width [µm]", "width error", "axial force [mN]", "volume drift", "mesh volume error", "min. scaled Jacobian",
+    ]  # fmt: skip
+    names: dict[str, list[str]] = {}
+    for joint in joints:
+        names.setdefault(joint["shape"], []).append(joint["name"])
+    firsts = {joint["shape"]: joint for joint in reversed(joints)}
+    rows = [
+        [
+            " ".join(names[shape]), micro(joint["standoff"]), micro(joint["max_width"]), percent(joint["width_error"]),
+            f"{1e3 * joint['axial_force']:+.3f}", percent(joint["volume_drift"], 4), percent(joint["volume_error"], 3),
+            f"{joint['minimum_scaled_jacobian']:.2f}",
+        ]
+        for shape, joint in sorted(firsts.items(), key=lambda item: item[1]["standoff"])
+    ]  # fmt: skip
+    return {"head": head, "rows": rows}
+
+
+def ranked_joints(history: dict, joints: list[dict]) -> dict:
+    """Joints ranked by peak von Mises stress at their pads."""
+    shape = {joint["name"]: joint for joint in joints}
+    at_pads = np.maximum(history["von_mises_board"], history["von_mises_package"])
+    peel = np.maximum(history["peel_board"], history["peel_package"])
+    rows = []
+    for column in np.argsort(-at_pads.max(axis=0)):
+        name, row = str(history["joints"][column]), int(np.argmax(at_pads[:, column]))
+        side = "board" if history["von_mises_board"][row, column] == at_pads[row, column] else "package"
+        rows.append(
+            [
+                name, mega(at_pads[row, column]), side, f"{1e3 * history['time'][row]:.3f}", mega(peel[:, column].max()),
+                mega(history["von_mises_max"][:, column].max()), micro(shape[name]["standoff"]), micro(shape[name]["max_width"]),
+            ]
+        )  # fmt: skip
+    head = [
+        "joint", "von Mises at pad [MPa]", "pad", "time [ms]", "peel stress [MPa]", "largest in an element [MPa]", "standoff [µm]", "width [µm]",
+    ]  # fmt: skip
+    return {"head": head, "rows": rows}
+
+
+def comparison(metrics: dict) -> dict | None:
+    """Two-scale against DNS, if both were run."""
+    rows = [[label, quantity(metrics[name])] for name, label in COMPARISON if name in metrics]
+    return {"head": ["two-scale against DNS", "value"], "rows": rows} if rows else None
+
+
+def energies(histories: dict[str, dict]) -> dict:
+    """Largest value of every term of the ledger, each mode a column."""
+    terms = ("kinetic", "internal", "external", "interface", "balance")
+    rows = [
+        [term, *(f"{1e3 * np.max(np.abs(history[term])):.4g} mJ" for history in histories.values())] for term in terms
+    ]
+    return {"head": ["largest magnitude", *(_mode(mode) for mode in histories)], "rows": rows}
+
+
+def models(results: dict[str, dict]) -> dict:
+    """What was computed: each entry of ``result.json``'s model record, each mode a column."""
+    return _side_by_side(results, "model", "model")
+
+
+def costs(results: dict[str, dict]) -> dict:
+    """Where the time of each shock run went."""
+    return _side_by_side(results, "timings", "seconds")
+
+
+def _side_by_side(results: dict[str, dict], section: str, title: str) -> dict:
+    keys = list(dict.fromkeys(key for result in results.values() for key in _flat(result[section])))
+    flat = [_flat(result[section]) for result in results.values()]
+    rows = [[key.replace("_", " "), *(_cell(record.get(key)) for record in flat)] for key in keys]
+    return {"head": [title, *(_mode(mode) for mode in results)], "rows": rows}
+
+
+def _flat(record: dict, prefix: str = "") -> dict:
+    flat: dict = {}
+    for key, value in record.items():
+        if isinstance(value, dict) and not {"value", "unit"} <= value.keys():
+            flat.update(_flat(value, f"{prefix}{key}: "))
+        else:
+            flat[prefix + key] = value
+    return flat
+
+
+def _cell(value) -> str:
+    if value is None:
+        return "–"
+    return quantity(value) if isinstance(value, dict) else number(value)
+
+
+def _mode(mode: str) -> str:
+    return {"two_scale": "two-scale", "dns": "DNS"}[mode]
+
+
+def quantity(metric: dict) -> str:
+    """Text of a metric record: fractions as per cent, stresses in MPa, lengths in mm."""
+    value, unit = metric["value"], metric["unit"]
+    if isinstance(value, str):
+        return value
+    factor, shown = {"Pa": (1e-6, "MPa"), "m": (1e3, "mm"), "J": (1e3, "mJ"), "kg": (1e6, "mg")}.get(unit, (1.0, unit))
+    return f"{number(factor * value)} {shown}".strip()
+
+
+def number(value) -> str:
+    """Four significant digits, without a needless exponent."""
+    if isinstance(value, bool | str) or value is None:
+        return str(value)
+    if isinstance(value, int):
+        return f"{value:,}".replace(",", " ")
+    return f"{value:.4g}"
+
+
+def micro(value: float) -> str:
+    """Metres as micrometres."""
+    return f"{1e6 * value:.1f}"
+
+
+def mega(value: float) -> str:
+    """Pascals as megapascals."""
+    return f"{1e-6 * value:.1f}"
+
+
+def percent(value: float, digits: int = 2) -> str:
+    """A fraction as per cent."""
+    return f"{100.0 * value:.{digits}f} %"
