@@ -1,0 +1,165 @@
+"""Body-fitted initial clouds: particles of which the first ones are the vertices of a triangulated free surface."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+
+from particles.geometry import JointGeometry
+from particles.surface_measure import enclosed_volume
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.int32]
+
+
+@dataclass(frozen=True, slots=True)
+class Cloud:
+    """Particles that fill a liquid body, its free surface and its contact lines.
+
+    Attributes:
+        points: `(n, 3)` [m]; the first `surface_count` are the vertices of the free surface.
+        surface_count: number of surface particles, rings included.
+        triangles: `(t, 3)` free surface, outward oriented, open at the walls.
+        rings: one or two contact lines, each `(k,)` ordered counter-clockwise seen from +z.
+        ring_heights: z of the wall under each ring [m].
+        wall: `(n,)` index of the wall that a particle slides on, -1 off the walls (rings are on their wall).
+        spacing: mean distance of neighbours [m].
+    """
+
+    points: Floats
+    surface_count: int
+    triangles: Indices
+    rings: tuple[Indices, ...]
+    ring_heights: tuple[float, ...]
+    wall: NDArray[np.int8]
+    spacing: float
+
+
+def equal_area_radius(radius: float, corners: int) -> float:
+    """Radius of the corners of a regular polygon that has the area of the disc [m]."""
+    return radius * np.sqrt(2.0 * np.pi / (corners * np.sin(2.0 * np.pi / corners)))
+
+
+def joint_counts(geometry: JointGeometry, volume: float, spacing: float) -> tuple[int, int]:
+    """Concentric rings in a layer and layers of a joint's cloud.
+
+    Layers are sqrt(3)/2 spacings apart, so that the surface triangles are nearly equilateral.
+    """
+    mean_radius = np.sqrt(volume / (np.pi * geometry.gap))
+    rings = max(3, int(np.ceil(mean_radius / spacing)))
+    layers = max(4, 1 + round(geometry.gap / (0.5 * np.sqrt(3.0) * spacing)))
+    return rings, layers
+
+
+def joint_cloud(geometry: JointGeometry, volume: float, spacing: float) -> Cloud:
+    """Fill a double cone of a given volume between two discs.
+
+    The radius changes linearly from the board's disc to the middle and on to the package's disc: a shape that
+    meets both contact lines and has the right volume, but is no equilibrium.
+
+    Args:
+        geometry: gap and radii of the wetted discs.
+        volume: volume of the polyhedron that the surface and the walls enclose [m^3].
+        spacing: particle spacing [m].
+
+    Raises:
+        ValueError: the volume is too small for a double cone that does not rupture.
+    """
+    ring_count, layer_count = joint_counts(geometry, volume, spacing)
+
+    def place(bulge: float) -> Cloud:
+        return _stack(geometry, (ring_count, layer_count), bulge, spacing)
+
+    def excess(bulge: float) -> float:
+        return _volume(place(bulge)) - volume
+
+    lowest = -0.95 * min(geometry.radius_board, geometry.radius_package)
+    if excess(lowest) > 0.0:
+        raise ValueError(f"solder.volume = {volume:.4g} m^3 is too small for the gap {geometry.gap:.4g} m: it ruptures")
+    highest = np.sqrt(3.0 * volume / (np.pi * geometry.gap)) * 2.0
+    return place(brentq(excess, lowest, highest, rtol=1e-13))
+
+
+def _volume(cloud: Cloud) -> float:
+    return enclosed_volume(cloud.points, cloud.triangles, cloud.rings, cloud.ring_heights)
+
+
+def _stack(geometry: JointGeometry, counts: tuple[int, int], bulge: float, spacing: float) -> Cloud:
+    """Stack layers of concentric rings; ring j of a layer has 6 j particles, odd layers are turned by half a step."""
+    ring_count, layer_count = counts
+    corners = 6 * ring_count
+    height = np.linspace(0.0, geometry.gap, layer_count)
+    fraction = height / geometry.gap
+    rim = (1.0 - fraction) * geometry.radius_board + fraction * geometry.radius_package
+    radius = equal_area_radius(1.0, corners) * rim + bulge * (1.0 - np.abs(2.0 * fraction - 1.0))
+    shells, interior = [], []
+    for layer in range(layer_count):
+        turn = np.pi / corners * (layer % 2)
+        for ring in range(ring_count, -1, -1):
+            points = _circle(radius[layer] * ring / ring_count, height[layer], 6 * ring, turn)
+            (shells if ring == ring_count else interior).append(points)
+    points = np.concatenate(shells + interior)
+    surface_count = corners * layer_count
+    wall = np.full(len(points), -1, np.int8)
+    wall[points[:, 2] == height[0]] = 0
+    wall[points[:, 2] == height[-1]] = 1
+    first = np.arange(corners, dtype=np.int32)
+    rings = (first, first + corners * (layer_count - 1))
+    triangles = _band_triangles(corners, layer_count)
+    return Cloud(points, surface_count, triangles, rings, (0.0, geometry.gap), wall, spacing)
+
+
+def _circle(radius: float, height: float, count: int, turn: float) -> Floats:
+    angle = turn + 2.0 * np.pi * np.arange(max(count, 1)) / max(count, 1)
+    return np.column_stack((radius * np.cos(angle), radius * np.sin(angle), np.full(len(angle), height)))
+
+
+def _band_triangles(corners: int, layers: int) -> Indices:
+    """Triangles between stacked rings, of which the odd ones are turned by half a step; outward oriented."""
+    k = np.arange(corners)
+    after = (k + 1) % corners
+    triangles = []
+    for layer in range(layers - 1):
+        low, high = layer * corners, (layer + 1) * corners
+        if layer % 2 == 0:
+            triangles += [np.column_stack((low + k, low + after, high + k))]
+            triangles += [np.column_stack((low + after, high + after, high + k))]
+        else:
+            triangles += [np.column_stack((low + k, high + after, high + k))]
+            triangles += [np.column_stack((low + k, low + after, high + after))]
+    return np.concatenate(triangles).astype(np.int32)
+
+
+def box_cloud(edge: float, count: int) -> Cloud:
+    """Fill a cube that stands on the wall z = 0 with a lattice (Hu et al., section 4.1).
+
+    Args:
+        edge: length of an edge [m].
+        count: particles along an edge.
+    """
+    axis = np.arange(count)
+    lattice = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1).reshape(-1, 3)
+    last = count - 1
+    side = ((lattice[:, :2] == 0) | (lattice[:, :2] == last)).any(axis=1)
+    surface = side | (lattice[:, 2] == last)
+    lattice = np.concatenate((lattice[surface], lattice[~surface]))
+    number = np.empty((count,) * 3, np.int64)
+    number[tuple(lattice.T)] = np.arange(len(lattice))
+    top = _grid_triangles(number[:, :, last])
+    sheets = [number[:, 0, :], number[last, :, :], number[::-1, last, :], number[0, ::-1, :]]
+    triangles = np.concatenate([top] + [_grid_triangles(sheet) for sheet in sheets]).astype(np.int32)
+    ring = np.concatenate([sheet[:-1, 0] for sheet in sheets]).astype(np.int32)
+    points = lattice * (edge / last) - np.array([0.5 * edge, 0.5 * edge, 0.0])
+    wall = np.where(lattice[:, 2] == 0, 0, -1).astype(np.int8)
+    return Cloud(points, int(surface.sum()), triangles, (ring,), (0.0,), wall, edge / last)
+
+
+def _grid_triangles(sheet: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Split the quadrilaterals of a sheet of vertex numbers, with alternating diagonals; normal = axis 0 x axis 1."""
+    a, b = sheet[:-1, :-1], sheet[1:, :-1]
+    c, d = sheet[1:, 1:], sheet[:-1, 1:]
+    even = (np.add.outer(np.arange(a.shape[0]), np.arange(a.shape[1])) % 2 == 0)[..., None]
+    first = np.where(even, np.stack((a, b, c), -1), np.stack((a, b, d), -1))
+    second = np.where(even, np.stack((a, c, d), -1), np.stack((b, c, d), -1))
+    return np.concatenate((first.reshape(-1, 3), second.reshape(-1, 3)))

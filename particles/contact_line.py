@@ -1,0 +1,78 @@
+"""Contact lines: each vertex is pinned at the edge of its wetted disc, or free on the pad, or free on the mask."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from particles.body import Body
+
+Floats = NDArray[np.float64]
+
+PINNED, ON_PAD, ON_MASK = 0, 1, 2
+RELEASE_MARGIN = 0.02
+
+
+class ContactLine:
+    """The contact line on one wall.
+
+    A line at the edge of the pad stays there while pad angle < contact angle < mask angle (Gibbs' condition);
+    a vertex is released when the pad's force pulls it inward or the mask's force pulls it outward, and caught
+    again when it returns to the edge.
+    """
+
+    def __init__(self, wall: int, edge_radius: float, pad_angle: float, mask_angle: float, corners: int) -> None:
+        """Pin all vertices.
+
+        Args:
+            wall: index of the wall and of the ring.
+            edge_radius: radius of the vertices on the edge of the wetted disc [m]; infinite on a uniform wall.
+            pad_angle: contact angle inside the edge [rad].
+            mask_angle: contact angle outside it [rad].
+            corners: number of vertices.
+        """
+        self.wall = wall
+        self.edge_radius = edge_radius
+        self._cosine = np.array([0.0, np.cos(pad_angle), np.cos(mask_angle)])
+        self.state = np.full(corners, PINNED if np.isfinite(edge_radius) else ON_PAD, np.int8)
+
+    def cosine(self) -> Floats:
+        """Cosine of the contact angle that acts on each vertex `(k,)`; zero where the edge holds it."""
+        return self._cosine[self.state]
+
+    def pinned(self, body: Body) -> NDArray[np.int32]:
+        """The pinned vertices."""
+        return body.cloud.rings[self.wall][self.state == PINNED]
+
+    def outward(self, body: Body) -> tuple[Floats, Floats]:
+        """Unit radial direction `(k, 3)` and length of line that each vertex stands for `(k,)` [m]."""
+        points = body.points[body.cloud.rings[self.wall]]
+        radial = points * np.array([1.0, 1.0, 0.0])
+        radial /= np.linalg.norm(radial, axis=1)[:, None]
+        step = np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1)
+        return radial, 0.5 * (step + np.roll(step, 1))
+
+    def contact_cosine(self, body: Body, tension_force: Floats, coefficient: float) -> Floats:
+        """Cosine of the contact angle at each vertex `(k,)` from the balance of forces on it.
+
+        The free surface pulls with -gamma cos(theta) a unit length; the pressure on the vertex' share of the
+        surface is part of the balance, so that the angle is that of the wall, not of the first triangle.
+        """
+        ring = body.cloud.rings[self.wall]
+        radial, length = self.outward(body)
+        load = tension_force[ring] + body.surface_pressure * body.volume()[1][ring]
+        return -(load * radial).sum(axis=1) / (coefficient * length)
+
+    def update(self, body: Body, tension_force: Floats, coefficient: float) -> None:
+        """Release the vertices that the edge no longer holds, catch those that returned to it (moves these)."""
+        if not np.isfinite(self.edge_radius):
+            return
+        ring = body.cloud.rings[self.wall]
+        radius = np.linalg.norm(body.points[ring, :2], axis=1)
+        caught = ((self.state == ON_PAD) & (radius >= self.edge_radius)) | (
+            (self.state == ON_MASK) & (radius <= self.edge_radius)
+        )
+        body.points[ring[caught], :2] *= (self.edge_radius / radius[caught])[:, None]
+        cosine = self.contact_cosine(body, tension_force, coefficient)
+        held = (self.state == PINNED) & ~caught
+        self.state[held & (cosine > self._cosine[ON_PAD] + RELEASE_MARGIN)] = ON_PAD
+        self.state[held & (cosine < self._cosine[ON_MASK] - RELEASE_MARGIN)] = ON_MASK
+        self.state[caught] = PINNED

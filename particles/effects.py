@@ -1,0 +1,91 @@
+"""Which effects a reflow calls for, decided from dimensionless numbers. No numerical library is loaded here."""
+
+from dataclasses import dataclass
+from math import pi, sqrt
+from typing import TypedDict
+
+from particles.geometry import JointGeometry
+from particles.parameters import Solder
+
+# Height of a drop changes by about 0.08 Bo (Bashforth-Adams table); an effect below 0.1 % of the shape is left out.
+SHAPE_CHANGE_BY_BOND = 0.08
+NEGLIGIBLE_SHAPE_CHANGE = 1e-3
+# A motion has died out when the process is so many times longer than its slowest time.
+PROCESS_TIME_RATIO = 20.0
+# Below this Bond number surface tension decides the shape; above 100 it is a boundary layer of gravity.
+LARGEST_BOND = 100.0
+
+
+class Decision(TypedDict):
+    """Whether an effect acts, and why."""
+
+    on: bool
+    why: str
+
+
+@dataclass(frozen=True, slots=True)
+class Numbers:
+    """Dimensionless numbers and times of a joint.
+
+    Attributes:
+        bond: rho g L H / gamma, weight over surface tension.
+        ohnesorge: mu / sqrt(rho gamma L).
+        capillary_time: sqrt(rho L^3 / gamma) [s].
+        viscous_time: rho L^2 / mu [s], in which oscillations decay.
+    """
+
+    bond: float
+    ohnesorge: float
+    capillary_time: float
+    viscous_time: float
+
+
+def dimensionless_numbers(geometry: JointGeometry, solder: Solder) -> Numbers:
+    """Numbers of a joint; L is the radius of a cylinder of the joint's volume and gap, H the gap."""
+    length = sqrt(solder.volume / (pi * geometry.gap))
+    density, tension = solder.density, solder.surface_tension
+    return Numbers(
+        bond=density * solder.gravity * length * geometry.gap / tension,
+        ohnesorge=solder.viscosity / sqrt(density * tension * length),
+        capillary_time=sqrt(density * length**3 / tension),
+        viscous_time=density * length**2 / solder.viscosity,
+    )
+
+
+def _by_switch(switch: str, auto: Decision) -> Decision:
+    if switch == "auto":
+        return auto
+    return {"on": switch == "on", "why": f"set to {switch} by the user ({auto['why']})"}
+
+
+def decide_effects(geometry: JointGeometry, solder: Solder) -> dict[str, Decision]:
+    """Decide each effect of a joint's reflow.
+
+    Returns:
+        For gravity, inertia, viscosity, surface_tension and wall_adhesion: on or off, and the reason with its number.
+    """
+    numbers = dimensionless_numbers(geometry, solder)
+    change = SHAPE_CHANGE_BY_BOND * numbers.bond
+    slowest = max(numbers.capillary_time, numbers.viscous_time)
+    ratio = solder.process_time / slowest
+    transient = ratio < PROCESS_TIME_RATIO
+    times = f"process time {solder.process_time:.3g} s is {ratio:.3g} times the slowest time {slowest:.3g} s"
+    rest = f"{times}: " + ("the motion matters" if transient else "quasi-static, only the shape at rest matters")
+    auto: dict[str, Decision] = {
+        "gravity": {
+            "on": change > NEGLIGIBLE_SHAPE_CHANGE,
+            "why": f"Bond number {numbers.bond:.3g}: changes the shape by about {100 * change:.2g} %",
+        },
+        "inertia": {"on": transient, "why": rest},
+        "viscosity": {"on": transient, "why": f"Ohnesorge number {numbers.ohnesorge:.2g}; {rest}"},
+        "surface_tension": {
+            "on": numbers.bond < LARGEST_BOND,
+            "why": f"Bond number {numbers.bond:.3g} (off above {LARGEST_BOND:g})",
+        },
+        "wall_adhesion": {
+            "on": numbers.bond < LARGEST_BOND,
+            "why": "contact angles of pad and mask hold or move the contact lines wherever surface tension acts",
+        },
+    }
+    switches = solder.effects.model_dump()
+    return {name: _by_switch(switches[name], decision) for name, decision in auto.items()}

@@ -1,0 +1,35 @@
+"""Surface tension as the energy gradient of the tracked surface, with its semi-implicit stiffness."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from particles.body import Body
+from particles.surface_measure import cotangent_laplacian, surface_area
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class SurfaceTension:
+    """Energy E = gamma A of the free surface.
+
+    Attributes:
+        coefficient: surface tension gamma [N/m].
+    """
+
+    coefficient: float
+
+    def energy(self, body: Body) -> float:
+        """Surface energy [J]."""
+        return self.coefficient * surface_area(body.points, body.triangles)
+
+    def stiffness(self, body: Body) -> sparse.csr_matrix:
+        """Stiffness gamma K of one component, `(n, n)` [N/m]: the force after a step is f - dt gamma K v."""
+        return self.coefficient * cotangent_laplacian(body.points, body.triangles, len(body.points))
+
+    def force(self, body: Body) -> Floats:
+        """Force -dE/dx = -gamma K x, `(n, 3)` [N]."""
+        return -(self.stiffness(body) @ body.points)

@@ -1,0 +1,143 @@
+"""Velocity and pressure of one implicit step: a saddle-point problem with incompressible particles and body.
+
+    A v - C^T p = f,     C v = g
+
+A is the mass over the time step plus implicit viscosity and surface tension, symmetric and positive definite. The rows of C
+are the divergence of every particle below the surface, times its volume, and one global row a . v = dV/dt, a the gradient of
+the enclosed volume: without it every local operator loses volume. The unknowns p are pressures; at rest they are
+the capillary pressure, and f = -p a is exactly the stationarity of the discrete energy.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from petsc4py import PETSc
+from scipy import sparse
+
+Floats = NDArray[np.float64]
+
+RELATIVE_TOLERANCE = 1e-9
+RESIDUAL_LIMIT = 1e-6
+MAX_ITERATIONS = 200
+
+
+class SolveFailed(RuntimeError):
+    """A linear solve did not reach its tolerance."""
+
+
+@dataclass(frozen=True, slots=True)
+class SaddlePoint:
+    """The reduced problem: fixed degrees of freedom are left out.
+
+    Attributes:
+        operator: A, `(d, d)` [kg/s].
+        constraint: C, `(m, d)` [m^2].
+        load: f, `(d,)` [N].
+        rate: g, `(m,)` [m^3/s].
+    """
+
+    operator: sparse.csr_matrix
+    constraint: sparse.csr_matrix
+    load: Floats
+    rate: Floats
+
+
+@dataclass(frozen=True, slots=True)
+class Flow:
+    """Solution of a saddle-point problem.
+
+    Attributes:
+        velocity: `(d,)` [m/s].
+        pressure: `(m,)` [Pa].
+        iterations: conjugate gradient steps on the pressure.
+    """
+
+    velocity: Floats
+    pressure: Floats
+    iterations: int
+
+
+def _petsc(matrix: sparse.csr_matrix) -> PETSc.Mat:
+    matrix.sort_indices()
+    parts = (matrix.indptr.astype(PETSc.IntType), matrix.indices.astype(PETSc.IntType), matrix.data)
+    return PETSc.Mat().createAIJ(matrix.shape, csr=parts, comm=PETSc.COMM_SELF)
+
+
+def _cholesky(matrix: sparse.csr_matrix) -> PETSc.KSP:
+    """Factor a symmetric positive definite matrix with MUMPS."""
+    factored = _petsc(matrix)
+    factored.setOption(PETSc.Mat.Option.SPD, True)
+    solver = PETSc.KSP().create(PETSc.COMM_SELF)
+    solver.setOperators(factored)
+    solver.setType(PETSc.KSP.Type.PREONLY)
+    solver.getPC().setType(PETSc.PC.Type.CHOLESKY)
+    solver.getPC().setFactorSolverType("mumps")
+    solver.setUp()
+    return solver
+
+
+class _Inverse:
+    """x -> A^-1 x on NumPy vectors."""
+
+    def __init__(self, matrix: sparse.csr_matrix) -> None:
+        self._solver = _cholesky(matrix)
+        self._solution, self._right = self._solver.getOperators()[0].createVecs()
+
+    def __call__(self, right: Floats) -> Floats:
+        self._right.setArray(right)
+        self._solver.solve(self._right, self._solution)
+        return self._solution.getArray().copy()
+
+
+class _Schur:
+    """PETSc shell of S = C A^-1 C^T."""
+
+    def __init__(self, constraint: sparse.csr_matrix, inverse: _Inverse) -> None:
+        self._constraint, self._transposed, self._inverse = constraint, constraint.T.tocsr(), inverse
+
+    def mult(self, _matrix: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        y.setArray(self._constraint @ self._inverse(self._transposed @ x.getArray(readonly=True)))
+
+
+def solve(problem: SaddlePoint) -> Flow:
+    """Solve by conjugate gradients on the Schur complement, preconditioned with C diag(A)^-1 C^T.
+
+    Raises:
+        SolveFailed: the true residual of either equation stays above the limit.
+    """
+    operator, constraint = problem.operator, problem.constraint
+    inverse = _Inverse(operator)
+    lumped = constraint @ sparse.diags(1.0 / operator.diagonal()) @ constraint.T
+    count = constraint.shape[0]
+    shell = PETSc.Mat().createPython([count, count], _Schur(constraint, inverse), comm=PETSc.COMM_SELF)
+    shell.setUp()
+    solver = PETSc.KSP().create(PETSc.COMM_SELF)
+    preconditioner = _petsc(lumped.tocsr())
+    preconditioner.setOption(PETSc.Mat.Option.SPD, True)
+    solver.setOperators(shell, preconditioner)
+    solver.setType(PETSc.KSP.Type.CG)
+    solver.setTolerances(rtol=RELATIVE_TOLERANCE, max_it=MAX_ITERATIONS)
+    solver.getPC().setType(PETSc.PC.Type.CHOLESKY)
+    solver.getPC().setFactorSolverType("mumps")
+    unconstrained = inverse(problem.load)
+    pressure, right = shell.createVecs()
+    right.setArray(problem.rate - constraint @ unconstrained)
+    solver.solve(right, pressure)
+    velocity = inverse(problem.load + constraint.T @ pressure.getArray())
+    flow = Flow(velocity, pressure.getArray().copy(), solver.getIterationNumber())
+    _check(problem, flow, solver.getConvergedReason(), float(np.linalg.norm(right.getArray())))
+    return flow
+
+
+def _check(problem: SaddlePoint, flow: Flow, reason: int, scale: float) -> None:
+    """Compare the true residuals, not the solver's word, with the limit."""
+    momentum = problem.operator @ flow.velocity - problem.constraint.T @ flow.pressure - problem.load
+    force = max(float(np.linalg.norm(problem.load)), np.finfo(float).tiny)
+    continuity = problem.constraint @ flow.velocity - problem.rate
+    relative = (float(np.linalg.norm(momentum)) / force, float(np.linalg.norm(continuity)) / max(scale, 1e-300))
+    if not (reason > 0 and max(relative) < RESIDUAL_LIMIT):
+        raise SolveFailed(
+            f"pressure solve: relative residuals {relative[0]:.2e} (momentum), {relative[1]:.2e} (continuity) above "
+            f"{RESIDUAL_LIMIT:g} after {flow.iterations} iterations (PETSc reason {reason})"
+        )

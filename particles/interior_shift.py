@@ -1,0 +1,66 @@
+"""Shifting of the particles below the surface: even spacing, and none pierces the surface."""
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from particles.body import Body
+from particles.neighbours import NeighbourList
+from particles.surface_quality import vertex_normals
+
+Floats = NDArray[np.float64]
+
+REPULSION_RANGE = 1.1
+REPULSION_STRENGTH = 0.15
+LARGEST_SHIFT = 0.1
+SMALLEST_DEPTH = 0.4
+
+
+@njit(cache=True)
+def _repulsion(rows, points, offsets, indices, reach):
+    """Sum of unit vectors away from the neighbours, weighed by 1 - r/reach, `(m, 3)`."""
+    result = np.zeros((rows.shape[0], 3))
+    for r in range(rows.shape[0]):
+        i = rows[r]
+        for k in range(offsets[i], offsets[i + 1]):
+            d = points[i] - points[indices[k]]
+            distance = np.sqrt((d * d).sum())
+            if distance < reach:
+                result[r] += d * ((1.0 - distance / reach) / distance)
+    return result
+
+
+@njit(cache=True)
+def _penetration(rows, points, offsets, indices, normals, depth):
+    """Displacement that puts a particle a depth below the tangent plane of its nearest surface vertex, `(m, 3)`."""
+    result = np.zeros((rows.shape[0], 3))
+    for r in range(rows.shape[0]):
+        i = rows[r]
+        nearest, smallest = -1, np.inf
+        for k in range(offsets[i], offsets[i + 1]):
+            j = indices[k]
+            square = ((points[i] - points[j]) ** 2).sum()
+            if j < normals.shape[0] and square < smallest:
+                nearest, smallest = j, square
+        if nearest >= 0:
+            below = ((points[nearest] - points[i]) * normals[nearest]).sum()
+            result[r] = -max(depth - below, 0.0) * normals[nearest]
+    return result
+
+
+def interior_shift(body: Body, neighbours: NeighbourList) -> Floats:
+    """Displacements of the particles below the surface, `(m, 3)` [m]; on a wall within the wall.
+
+    Args:
+        body: the liquid body.
+        neighbours: a valid list that reaches at least 1.1 spacings.
+    """
+    cloud, rows = body.cloud, body.interior
+    lists = (rows, body.points, neighbours.offsets, neighbours.indices)
+    shift = _repulsion(*lists, REPULSION_RANGE * cloud.spacing) * (REPULSION_STRENGTH * cloud.spacing)
+    length = np.linalg.norm(shift, axis=1)
+    shift *= np.minimum(1.0, LARGEST_SHIFT * cloud.spacing / np.maximum(length, 1e-300))[:, None]
+    normals = vertex_normals(body.points, body.triangles, cloud.surface_count)
+    shift += _penetration(*lists, normals, SMALLEST_DEPTH * cloud.spacing)
+    shift[cloud.wall[rows] >= 0, 2] = 0.0
+    return shift

@@ -1,0 +1,114 @@
+"""Neighbour lists: cell grid, compressed rows, Verlet skin.
+
+Kernels run on one thread: a joint has about a thousand particles, and joints run beside each other in processes.
+"""
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+Points = NDArray[np.float64]
+Indices = NDArray[np.int32]
+
+
+@njit(cache=True)
+def _sort_into_cells(points, origin, size, shape):
+    """Counting sort of the points into cells: first index of each cell, points in cell order, cell of each point."""
+    count = points.shape[0]
+    cell = np.empty((count, 3), np.int32)
+    start = np.zeros(shape[0] * shape[1] * shape[2] + 1, np.int32)
+    for i in range(count):
+        for d in range(3):
+            cell[i, d] = min(max(int((points[i, d] - origin[d]) / size), 0), shape[d] - 1)
+        start[(cell[i, 0] * shape[1] + cell[i, 1]) * shape[2] + cell[i, 2] + 1] += 1
+    for c in range(1, start.shape[0]):
+        start[c] += start[c - 1]
+    order = np.empty(count, np.int32)
+    fill = start.copy()
+    for i in range(count):
+        c = (cell[i, 0] * shape[1] + cell[i, 1]) * shape[2] + cell[i, 2]
+        order[fill[c]] = i
+        fill[c] += 1
+    return start, order, cell
+
+
+@njit(cache=True)
+def _visit_row(i, points, radius, cells, found):
+    """Write the neighbours of point i into found (unless it is empty) and return their number."""
+    start, order, cell, shape = cells
+    count = 0
+    for cx in range(max(cell[i, 0] - 1, 0), min(cell[i, 0] + 2, shape[0])):
+        for cy in range(max(cell[i, 1] - 1, 0), min(cell[i, 1] + 2, shape[1])):
+            for cz in range(max(cell[i, 2] - 1, 0), min(cell[i, 2] + 2, shape[2])):
+                c = (cx * shape[1] + cy) * shape[2] + cz
+                for k in range(start[c], start[c + 1]):
+                    j = order[k]
+                    dx = points[i, 0] - points[j, 0]
+                    dy = points[i, 1] - points[j, 1]
+                    dz = points[i, 2] - points[j, 2]
+                    if j != i and dx * dx + dy * dy + dz * dz < radius * radius:
+                        if found.shape[0] > 0:
+                            found[count] = j
+                        count += 1
+    return count
+
+
+@njit(cache=True)
+def _rows(points, radius, cells):
+    """Compressed rows: one pass counts, the other writes."""
+    count = points.shape[0]
+    nothing = np.empty(0, np.int32)
+    offsets = np.zeros(count + 1, np.int32)
+    for i in range(count):
+        offsets[i + 1] = offsets[i] + _visit_row(i, points, radius, cells, nothing)
+    indices = np.empty(offsets[count], np.int32)
+    for i in range(count):
+        _visit_row(i, points, radius, cells, indices[offsets[i] : offsets[i + 1]])
+    return offsets, indices
+
+
+def find_neighbours(points: Points, radius: float) -> tuple[Indices, Indices]:
+    """Find all pairs closer than a radius.
+
+    Args:
+        points: `(n, 3)` [m], finite.
+        radius: search radius [m].
+
+    Returns:
+        offsets `(n + 1,)` and indices: row i lists the neighbours of point i, itself left out.
+
+    Raises:
+        FloatingPointError: a coordinate is not finite.
+    """
+    if not np.isfinite(points).all():
+        raise FloatingPointError("find_neighbours: a particle position is not finite")
+    origin = points.min(axis=0)
+    shape = np.maximum(((points.max(axis=0) - origin) / radius).astype(np.int64) + 1, 1)
+    cells = (*_sort_into_cells(points, origin, radius, shape), shape)
+    return _rows(points, radius, cells)
+
+
+class NeighbourList:
+    """Neighbours within a radius plus a skin, rebuilt when a particle has moved half the skin (Verlet 1967).
+
+    The rows may hold pairs up to `radius + skin` apart: every kernel weighs a pair beyond `radius` with zero.
+    """
+
+    def __init__(self, radius: float, skin: float) -> None:
+        """Set the radius and the skin [m]; the first `update` builds the list."""
+        self.radius = radius
+        self.skin = skin
+        self.builds = 0
+        self._built_at: Points = np.empty((0, 3))
+        self.offsets: Indices = np.zeros(1, np.int32)
+        self.indices: Indices = np.empty(0, np.int32)
+
+    def update(self, points: Points) -> None:
+        """Make the list valid for these points `(n, 3)` [m]."""
+        if len(points) == len(self._built_at):
+            moved = np.sqrt(((points - self._built_at) ** 2).sum(axis=1).max())
+            if moved <= 0.5 * self.skin:
+                return
+        self.offsets, self.indices = find_neighbours(points, self.radius + self.skin)
+        self._built_at = points.copy()
+        self.builds += 1

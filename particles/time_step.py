@@ -1,0 +1,46 @@
+"""Adaptive time step: bounded by the displacement in a step and by a multiple of the capillary limit."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+LARGEST_DISPLACEMENT = 0.25
+GROWTH = 1.15
+
+
+def capillary_limit(density: float, spacing: float, surface_tension: float) -> float:
+    """Largest stable step of an explicit surface tension, 0.25 sqrt(rho h^3 / (2 pi gamma)) [s]."""
+    return float(0.25 * np.sqrt(density * spacing**3 / (2.0 * np.pi * surface_tension)))
+
+
+@dataclass(slots=True)
+class TimeStep:
+    """The step size and what binds it.
+
+    Attributes:
+        largest: upper bound, a multiple of the capillary limit [s].
+        spacing: particle spacing [m].
+        size: current step [s].
+        binding: "capillary multiple", "growth" or "displacement".
+    """
+
+    largest: float
+    spacing: float
+    size: float
+    binding: str = "capillary multiple"
+
+    def accepts(self, speed: float) -> bool:
+        """Whether a largest particle speed [m/s] moves no particle too far; else the step is cut."""
+        displacement = speed * self.size
+        if displacement <= LARGEST_DISPLACEMENT * self.spacing:
+            return True
+        self.size *= max(0.25, 0.8 * LARGEST_DISPLACEMENT * self.spacing / displacement)
+        self.binding = "displacement"
+        return False
+
+    def grow(self) -> None:
+        """Grow after an accepted step, up to the bound."""
+        if GROWTH * self.size >= self.largest:
+            self.size, self.binding = self.largest, "capillary multiple"
+        else:
+            self.size, self.binding = GROWTH * self.size, "growth"

@@ -1,0 +1,178 @@
+"""Young-Laplace meridians: the independent reference for joints and sessile drops (scipy only).
+
+An axisymmetric surface at rest, s the arc length and psi the slope of the meridian against the outward radius:
+    r' = cos psi,  z' = sin psi,  psi' = (p - w z) / gamma - sin(psi) / r,  V' = pi r^2 sin psi,
+p the pressure at z = 0, w = rho g the weight of the unit volume.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.integrate import solve_bvp, solve_ivp
+from scipy.optimize import brentq
+
+Floats = NDArray[np.float64]
+
+TOLERANCE = 1e-8
+SAMPLES = 401
+
+
+class NoMeridian(ValueError):
+    """There is no smooth equilibrium meridian for these parameters, or it was not found."""
+
+
+@dataclass(frozen=True, slots=True)
+class Meridian:
+    """An equilibrium meridian, from the board upwards.
+
+    Attributes:
+        r, z: `(k,)` coordinates [m].
+        pressure: above ambient at z = 0 [Pa].
+        axial_force: force of the liquid on the package along +z [N]: positive pushes the plates apart.
+        angle_board: contact angle at the board, measured inside the liquid [rad].
+        angle_package: the same at the package; nan for a drop.
+    """
+
+    r: Floats
+    z: Floats
+    pressure: float
+    axial_force: float
+    angle_board: float
+    angle_package: float
+
+    @property
+    def max_width(self) -> float:
+        """Largest diameter [m]."""
+        return 2.0 * float(self.r.max())
+
+    @property
+    def waist(self) -> float:
+        """Smallest diameter [m]."""
+        return 2.0 * float(self.r.min())
+
+    @property
+    def height(self) -> float:
+        """Height [m]."""
+        return float(self.z.max())
+
+
+def joint_meridian(
+    volume: float,
+    radius_board: float,
+    radius_package: float,
+    gap: float,
+    surface_tension: float,
+    weight: float = 0.0,
+) -> Meridian:
+    """Find the meridian of a joint that is pinned at the edges of both discs.
+
+    Solved in lengths of the gap: psi turns from the board's rim to the package's; the length of the meridian and
+    the pressure are unknown parameters of the boundary value problem, the volume is one of its conditions.
+
+    Args:
+        volume: [m^3].
+        radius_board: radius of the lower disc [m].
+        radius_package: radius of the upper disc [m].
+        gap: distance of the discs [m].
+        surface_tension: gamma [N/m].
+        weight: rho g [N/m^3].
+
+    Raises:
+        NoMeridian: the boundary value problem has no solution near the family of smooth barrels.
+    """
+    a, b = radius_board / gap, radius_package / gap
+    target = volume / gap**3
+    bond = weight * gap**2 / surface_tension
+
+    def slopes(s: Floats, y: Floats, unknown: Floats) -> Floats:
+        length, pressure = unknown
+        r, z, psi = np.maximum(y[0], 1e-6), y[1], y[2]
+        turning = pressure - bond * z - np.sin(psi) / r
+        return length * np.stack((np.cos(psi), np.sin(psi), turning, np.pi * r**2 * np.sin(psi)))
+
+    def conditions(low: Floats, high: Floats, _: Floats) -> Floats:
+        return np.array([low[0] - a, low[1], low[3], high[0] - b, high[1] - 1.0, high[3] - target])
+
+    s, guess, unknown = _barrel(a, b, target)
+    found = solve_bvp(slopes, conditions, s, guess, p=unknown, tol=TOLERANCE, max_nodes=20000)
+    if not found.success or found.y[0].min() <= 1e-3:
+        raise NoMeridian(
+            f"no equilibrium joint of volume {volume:.4g} m^3 between discs of {radius_board:.4g} and "
+            f"{radius_package:.4g} m at gap {gap:.4g} m: {found.message}"
+        )
+    y = found.sol(np.linspace(0.0, 1.0, SAMPLES))
+    r, z, psi = y[0] * gap, y[1] * gap, y[2]
+    pressure = found.p[1] * surface_tension / gap
+    at_top = pressure - weight * gap
+    force = np.pi * radius_package**2 * at_top - 2.0 * np.pi * radius_package * surface_tension * np.sin(psi[-1])
+    return Meridian(r, z, float(pressure), float(force), float(np.pi - psi[0]), float(psi[-1]))
+
+
+def _barrel(a: float, b: float, target: float) -> tuple[Floats, Floats, Floats]:
+    """Parabolic barrel of the right volume as a first guess: arc fractions, states and unknowns."""
+    z = np.linspace(0.0, 1.0, 101)
+    rim, hump = a + (b - a) * z, 4.0 * z * (1.0 - z)
+
+    def excess(bulge: float) -> float:
+        return float(np.pi * np.trapz(np.maximum(rim + bulge * hump, 0.02) ** 2, z) - target)
+
+    bulge = brentq(excess, -max(a, b), 2.0 * np.sqrt(target) + max(a, b))
+    r = np.maximum(rim + bulge * hump, 0.02)
+    arc = np.concatenate(([0.0], np.cumsum(np.hypot(np.diff(r), np.diff(z)))))
+    psi = np.unwrap(np.arctan2(np.gradient(z, arc), np.gradient(r, arc)))
+    volume = np.concatenate(([0.0], np.cumsum(0.5 * np.pi * (r[1:] ** 2 + r[:-1] ** 2) * np.diff(z))))
+    middle = len(z) // 2
+    curvature = 8.0 * bulge / (1.0 + (b - a) ** 2) ** 1.5 + 1.0 / r[middle]
+    return arc / arc[-1], np.stack((r, z, psi, volume)), np.array([arc[-1], curvature])
+
+
+def sessile_meridian(volume: float, contact_angle: float, surface_tension: float, weight: float = 0.0) -> Meridian:
+    """Find the meridian of a drop on a uniform wall (Bashforth & Adams), from the wall to the apex.
+
+    Shoots from the apex with a given curvature until the meridian has turned by the contact angle; the curvature
+    is the root of the volume.
+
+    Args:
+        volume: [m^3].
+        contact_angle: [rad], in (0, pi).
+        surface_tension: gamma [N/m].
+        weight: rho g [N/m^3].
+    """
+    length = np.cbrt(volume)
+    bond = weight * length**2 / surface_tension
+
+    def shoot(curvature: float) -> Floats:
+        return _from_apex(curvature, bond, contact_angle)
+
+    def excess(logarithm: float) -> float:
+        return float(shoot(np.exp(logarithm))[2, -1] - 1.0)
+
+    cap = (np.pi / 3.0 * (1.0 - np.cos(contact_angle)) ** 2 * (2.0 + np.cos(contact_angle))) ** (1.0 / 3.0)
+    highest = np.log(cap) + 2.0
+    curvature = np.exp(brentq(excess, np.log(cap) - 6.0, highest, xtol=1e-13))
+    r, depth, _ = shoot(curvature)
+    height = depth[-1]
+    pressure = (2.0 * curvature + bond * height) * surface_tension / length
+    return Meridian(
+        r[::-1] * length, (height - depth[::-1]) * length, float(pressure), 0.0, contact_angle, float("nan")
+    )
+
+
+def _from_apex(curvature: float, bond: float, contact_angle: float) -> Floats:
+    """Radius, depth below the apex and volume along the meridian, `(3, k)`, in lengths of V^(1/3)."""
+
+    def slopes(_: float, y: Floats) -> list[float]:
+        r, depth, psi, _volume = y
+        ratio = np.sin(psi) / r if r > 1e-9 else curvature
+        turning = 2.0 * curvature + bond * depth - ratio
+        return [np.cos(psi), np.sin(psi), turning, np.pi * r * r * np.sin(psi)]
+
+    def reached(_: float, y: Floats) -> float:
+        return float(y[2] - contact_angle)
+
+    reached.terminal = True  # type: ignore[attr-defined]
+    end = 4.0 * np.pi / curvature
+    path = solve_ivp(slopes, (0.0, end), [0.0, 0.0, 0.0, 0.0], events=reached, rtol=1e-10, atol=1e-12, dense_output=True)
+    y = path.sol(np.linspace(0.0, path.t[-1], SAMPLES))
+    return np.stack((y[0], y[1], y[3]))
