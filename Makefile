@@ -1,0 +1,33 @@
+# `make demo` and `make test` install what is missing first (.ci/setup); the second time that takes no time.
+export OMP_NUM_THREADS = 1
+
+PYTHON := .venv/bin/python
+CASE := cases/bga_drop/case.toml
+
+help:  ## this list
+	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 12
+
+setup:  ## install what is missing: Debian packages, .venv
+	@.ci/setup
+
+demo: setup  ## run the default case from case file to report
+	$(PYTHON) -m workflow run $(CASE)
+
+test: setup  ## run every check and test
+	$(PYTHON) -m pytest
+
+test-mpi: setup  ## run the tests that start several MPI ranks
+	$(PYTHON) -m pytest tests/mpi
+
+lint: setup  ## ruff, mypy, import rules
+	$(PYTHON) -m pytest tests/unit/test_code.py
+
+bench: setup  ## run the benchmarks; JSON in benchmarks/results
+	@for script in benchmarks/bench_*.py; do [ -e "$$script" ] || continue; echo "$$script"; $(PYTHON) "$$script" || exit 1; done
+
+clean:  ## remove runs and caches (keeps .venv)
+	rm -rf runs build *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache benchmarks/results
+	find . -name __pycache__ -not -path './.venv/*' -prune -exec rm -rf {} +
+
+.PHONY: help setup demo test test-mpi lint bench clean
+.DEFAULT_GOAL := help
