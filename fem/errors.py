@@ -1,0 +1,25 @@
+"""Errors of the shock stage. Input errors are ``ValueError``; a run that goes wrong is a ``RuntimeError``."""
+
+
+class MeshError(ValueError):
+    """A mesh file, a part or a facet set that the program cannot use."""
+
+
+class TieError(ValueError):
+    """A joint node that has no facet to be tied to."""
+
+
+class CutError(ValueError):
+    """A cut between macro and meso model that does not fit or is not stable."""
+
+
+class RankError(ValueError):
+    """A number of MPI ranks that does not fit the input."""
+
+
+class MassError(ValueError):
+    """Lumped masses that do not add up to density times volume."""
+
+
+class EnergyError(RuntimeError):
+    """A run whose energies do not balance, or are not numbers."""
