@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from particles.geometry import JointGeometry
+from particles.geometry import JointGeometry, joint_counts
 from particles.surface_measure import enclosed_volume
 
 Floats = NDArray[np.float64]
@@ -39,17 +39,6 @@ class Cloud:
 def equal_area_radius(radius: float, corners: int) -> float:
     """Radius of the corners of a regular polygon that has the area of the disc [m]."""
     return radius * np.sqrt(2.0 * np.pi / (corners * np.sin(2.0 * np.pi / corners)))
-
-
-def joint_counts(geometry: JointGeometry, volume: float, spacing: float) -> tuple[int, int]:
-    """Concentric rings in a layer and layers of a joint's cloud.
-
-    Layers are sqrt(3)/2 spacings apart, so that the surface triangles are nearly equilateral.
-    """
-    mean_radius = np.sqrt(volume / (np.pi * geometry.gap))
-    rings = max(3, int(np.ceil(mean_radius / spacing)))
-    layers = max(4, 1 + round(geometry.gap / (0.5 * np.sqrt(3.0) * spacing)))
-    return rings, layers
 
 
 def joint_cloud(geometry: JointGeometry, volume: float, spacing: float) -> Cloud:

@@ -50,29 +50,34 @@ class ContactLine:
         step = np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1)
         return radial, 0.5 * (step + np.roll(step, 1))
 
-    def contact_cosine(self, body: Body, tension_force: Floats, coefficient: float) -> Floats:
+    def contact_cosine(self, body: Body, load: Floats, coefficient: float) -> Floats:
         """Cosine of the contact angle at each vertex `(k,)` from the balance of forces on it.
 
-        The free surface pulls with -gamma cos(theta) a unit length; the pressure on the vertex' share of the
-        surface is part of the balance, so that the angle is that of the wall, not of the first triangle.
-        """
-        ring = body.cloud.rings[self.wall]
-        radial, length = self.outward(body)
-        load = tension_force[ring] + body.surface_pressure * body.volume()[1][ring]
-        return -(load * radial).sum(axis=1) / (coefficient * length)
+        The free surface pulls with -gamma cos(theta) a unit length. The load holds the pressure on the vertex' share
+        of the surface, too, so that the angle is that of the wall, not of the first triangle.
 
-    def update(self, body: Body, tension_force: Floats, coefficient: float) -> None:
-        """Release the vertices that the edge no longer holds, catch those that returned to it (moves these)."""
+        Args:
+            body: the liquid body.
+            load: `(n, 3)` all forces but the wall's, with the pressure [N].
+            coefficient: surface tension [N/m].
+        """
+        radial, length = self.outward(body)
+        return -(load[body.cloud.rings[self.wall]] * radial).sum(axis=1) / (coefficient * length)
+
+    def update(self, body: Body, load: Floats, coefficient: float) -> None:
+        """Release the vertices that the edge no longer holds, catch those that returned to it (moves these).
+
+        Args: as `contact_cosine`.
+        """
         if not np.isfinite(self.edge_radius):
             return
         ring = body.cloud.rings[self.wall]
+        cosine = self.contact_cosine(body, load, coefficient)
         radius = np.linalg.norm(body.points[ring, :2], axis=1)
-        caught = ((self.state == ON_PAD) & (radius >= self.edge_radius)) | (
-            (self.state == ON_MASK) & (radius <= self.edge_radius)
-        )
-        body.points[ring[caught], :2] *= (self.edge_radius / radius[caught])[:, None]
-        cosine = self.contact_cosine(body, tension_force, coefficient)
-        held = (self.state == PINNED) & ~caught
+        inside, outside = radius < self.edge_radius, radius > self.edge_radius
+        caught = ((self.state == ON_PAD) & ~inside) | ((self.state == ON_MASK) & ~outside)
+        held = self.state == PINNED
         self.state[held & (cosine > self._cosine[ON_PAD] + RELEASE_MARGIN)] = ON_PAD
         self.state[held & (cosine < self._cosine[ON_MASK] - RELEASE_MARGIN)] = ON_MASK
         self.state[caught] = PINNED
+        body.points[ring[caught], :2] *= (self.edge_radius / radius[caught])[:, None]

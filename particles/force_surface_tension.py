@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from particles.body import Body
+from particles.mls import Derivatives
 from particles.surface_measure import cotangent_laplacian, surface_area
 
 Floats = NDArray[np.float64]
@@ -26,10 +27,13 @@ class SurfaceTension:
         """Surface energy [J]."""
         return self.coefficient * surface_area(body.points, body.triangles)
 
-    def stiffness(self, body: Body) -> sparse.csr_matrix:
-        """Stiffness gamma K of one component, `(n, n)` [N/m]: the force after a step is f - dt gamma K v."""
+    def _stiffness(self, body: Body) -> sparse.csr_matrix:
         return self.coefficient * cotangent_laplacian(body.points, body.triangles, len(body.points))
 
     def force(self, body: Body) -> Floats:
         """Force -dE/dx = -gamma K x, `(n, 3)` [N]."""
-        return -(self.stiffness(body) @ body.points)
+        return -(self._stiffness(body) @ body.points)
+
+    def matrix(self, body: Body, _stencils: Derivatives, time_step: float) -> sparse.csr_matrix:
+        """Semi-implicit part dt gamma K, `(3 n, 3 n)` [kg/s]: the force at the end of the step is f - dt gamma K v."""
+        return sparse.kron(sparse.identity(3), time_step * self._stiffness(body), format="csr")

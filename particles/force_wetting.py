@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from particles.body import Body
 from particles.contact_line import ContactLine
+from particles.physics import Force
 from particles.surface_measure import ring_area, ring_area_gradient
 
 Floats = NDArray[np.float64]
@@ -20,10 +21,12 @@ class Wetting:
     Attributes:
         coefficient: surface tension gamma [N/m].
         lines: contact lines with the angle that acts on each vertex.
+        others: all other forces on the surface; with them a pinned vertex knows its contact angle.
     """
 
     coefficient: float
     lines: Sequence[ContactLine]
+    others: Sequence[Force]
 
     def energy(self, body: Body) -> float:
         """Energy of the walls [J]; a mean angle where the line lies on pad and mask."""
@@ -38,3 +41,14 @@ class Wetting:
             ring = body.cloud.rings[line.wall]
             force[ring] += self.coefficient * line.cosine()[:, None] * ring_area_gradient(body.points, ring)
         return force
+
+    def contact_cosines(self, body: Body) -> list[Floats]:
+        """Cosines of the contact angles at the vertices of each contact line, from the balance of forces."""
+        load = body.surface_pressure * body.volume()[1] + sum(force.force(body) for force in self.others)
+        return [line.contact_cosine(body, load, self.coefficient) for line in self.lines]
+
+    def update(self, body: Body) -> None:
+        """Release and catch vertices at the edges of the wetted discs."""
+        load = body.surface_pressure * body.volume()[1] + sum(force.force(body) for force in self.others)
+        for line in self.lines:
+            line.update(body, load, self.coefficient)

@@ -1,6 +1,7 @@
-"""Geometry of one joint: two coaxial wetted discs a gap apart. Plain data, no solver."""
+"""Geometry of one joint: two coaxial wetted discs a gap apart, and the counts of its particle cloud. Plain data."""
 
 from dataclasses import dataclass
+from math import ceil, pi, sqrt
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,8 +18,18 @@ class JointGeometry:
     radius_board: float
     radius_package: float
 
-    @property
-    def mean_area(self) -> float:
-        """Mean cross-section of the frustum between the discs [m^2], over pi: (a^2 + ab + b^2) / 3."""
-        a, b = self.radius_board, self.radius_package
-        return (a * a + a * b + b * b) / 3.0
+
+def joint_counts(geometry: JointGeometry, volume: float, spacing: float) -> tuple[int, int]:
+    """Concentric rings in a layer and layers of a joint's cloud.
+
+    Layers are sqrt(3)/2 spacings apart, so that the surface triangles are nearly equilateral.
+
+    Args:
+        geometry: gap and radii.
+        volume: [m^3].
+        spacing: particle spacing [m].
+    """
+    mean_radius = sqrt(volume / (pi * geometry.gap))
+    rings = max(3, ceil(mean_radius / spacing))
+    layers = max(4, 1 + round(geometry.gap / (0.5 * sqrt(3.0) * spacing)))
+    return rings, layers

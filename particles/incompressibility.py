@@ -44,7 +44,7 @@ class SaddlePoint:
 
 
 @dataclass(frozen=True, slots=True)
-class Flow:
+class Solution:
     """Solution of a saddle-point problem.
 
     Attributes:
@@ -100,7 +100,7 @@ class _Schur:
         y.setArray(self._constraint @ self._inverse(self._transposed @ x.getArray(readonly=True)))
 
 
-def solve(problem: SaddlePoint) -> Flow:
+def solve(problem: SaddlePoint) -> Solution:
     """Solve by conjugate gradients on the Schur complement, preconditioned with C diag(A)^-1 C^T.
 
     Raises:
@@ -125,19 +125,19 @@ def solve(problem: SaddlePoint) -> Flow:
     right.setArray(problem.rate - constraint @ unconstrained)
     solver.solve(right, pressure)
     velocity = inverse(problem.load + constraint.T @ pressure.getArray())
-    flow = Flow(velocity, pressure.getArray().copy(), solver.getIterationNumber())
-    _check(problem, flow, solver.getConvergedReason(), float(np.linalg.norm(right.getArray())))
-    return flow
+    solution = Solution(velocity, pressure.getArray().copy(), solver.getIterationNumber())
+    _check(problem, solution, solver.getConvergedReason(), float(np.linalg.norm(right.getArray())))
+    return solution
 
 
-def _check(problem: SaddlePoint, flow: Flow, reason: int, scale: float) -> None:
+def _check(problem: SaddlePoint, solution: Solution, reason: int, scale: float) -> None:
     """Compare the true residuals, not the solver's word, with the limit."""
-    momentum = problem.operator @ flow.velocity - problem.constraint.T @ flow.pressure - problem.load
+    momentum = problem.operator @ solution.velocity - problem.constraint.T @ solution.pressure - problem.load
     force = max(float(np.linalg.norm(problem.load)), np.finfo(float).tiny)
-    continuity = problem.constraint @ flow.velocity - problem.rate
+    continuity = problem.constraint @ solution.velocity - problem.rate
     relative = (float(np.linalg.norm(momentum)) / force, float(np.linalg.norm(continuity)) / max(scale, 1e-300))
     if not (reason > 0 and max(relative) < RESIDUAL_LIMIT):
         raise SolveFailed(
             f"pressure solve: relative residuals {relative[0]:.2e} (momentum), {relative[1]:.2e} (continuity) above "
-            f"{RESIDUAL_LIMIT:g} after {flow.iterations} iterations (PETSc reason {reason})"
+            f"{RESIDUAL_LIMIT:g} after {solution.iterations} iterations (PETSc reason {reason})"
         )

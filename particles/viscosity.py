@@ -18,7 +18,7 @@ class Viscosity:
 
     coefficient: float
 
-    def matrix(self, body: Body, stencils: Derivatives) -> sparse.csr_matrix:
+    def matrix(self, body: Body, stencils: Derivatives, _time_step: float) -> sparse.csr_matrix:
         """Matrix of the virtual power, `(3 n, 3 n)` [kg/s], components one after the other.
 
         With D = (grad v + grad v^T) / 2 and particle volumes as weights:

@@ -5,6 +5,7 @@ An axisymmetric surface at rest, s the arc length and psi the slope of the merid
 p the pressure at z = 0, w = rho g the weight of the unit volume.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +17,7 @@ Floats = NDArray[np.float64]
 
 TOLERANCE = 1e-8
 SAMPLES = 401
+SMALLEST_RADIUS = 1e-3
 
 
 class NoMeridian(ValueError):
@@ -64,11 +66,10 @@ def joint_meridian(
     gap: float,
     surface_tension: float,
     weight: float = 0.0,
+    *,
+    angle_limits: tuple[float, float] = (0.0, 2.0 * np.pi),
 ) -> Meridian:
     """Find the meridian of a joint that is pinned at the edges of both discs.
-
-    Solved in lengths of the gap: psi turns from the board's rim to the package's; the length of the meridian and
-    the pressure are unknown parameters of the boundary value problem, the volume is one of its conditions.
 
     Args:
         volume: [m^3].
@@ -77,40 +78,84 @@ def joint_meridian(
         gap: distance of the discs [m].
         surface_tension: gamma [N/m].
         weight: rho g [N/m^3].
+        angle_limits: contact angles of pad and mask [rad]: an end whose angle would leave them leaves its edge, and
+            has this angle instead of the radius (Gibbs). By default edges hold always.
 
     Raises:
         NoMeridian: the boundary value problem has no solution near the family of smooth barrels.
     """
-    a, b = radius_board / gap, radius_package / gap
-    target = volume / gap**3
+    a, b, target = radius_board / gap, radius_package / gap, volume / gap**3
     bond = weight * gap**2 / surface_tension
+    board, package = _End(radius=a), _End(radius=b)
+    state = _barrel(a, b, target)
+    while True:
+        state = _solve_joint_meridian(state, (board, package), target, bond)
+        angles = float(np.pi - state.y[2, 0]), float(state.y[2, -1])
+        released = board.released(angles[0], angle_limits), package.released(angles[1], angle_limits)
+        if released == (board, package):
+            break
+        board, package = released
+    y = state.sample(np.linspace(0.0, 1.0, SAMPLES))
+    r, z, psi = y[0] * gap, y[1] * gap, y[2]
+    pressure = state.unknown[1] * surface_tension / gap
+    top = r[-1]
+    force = np.pi * top**2 * (pressure - weight * gap) - 2.0 * np.pi * top * surface_tension * np.sin(psi[-1])
+    return Meridian(r, z, float(pressure), float(force), *angles)
 
-    def slopes(s: Floats, y: Floats, unknown: Floats) -> Floats:
+
+@dataclass(frozen=True, slots=True)
+class _End:
+    """Condition at one end of the meridian: a radius (in gaps), or a contact angle [rad]."""
+
+    radius: float = float("nan")
+    angle: float = float("nan")
+
+    def residual(self, radius: float, angle: float) -> float:
+        return radius - self.radius if np.isfinite(self.radius) else angle - self.angle
+
+    def released(self, angle: float, limits: tuple[float, float]) -> "_End":
+        """This end, or the end that slides with the limit that the angle exceeds."""
+        allowed = min(max(angle, limits[0]), limits[1])
+        return self if allowed == angle or np.isfinite(self.angle) else _End(angle=allowed)
+
+
+@dataclass(frozen=True, slots=True)
+class _State:
+    """Nodes, states r, z, psi, V there, unknowns (length of the meridian, pressure); in lengths of the gap.
+
+    `sample` interpolates the states.
+    """
+
+    s: Floats
+    y: Floats
+    unknown: Floats
+    sample: Callable[[Floats], Floats]
+
+
+def _solve_joint_meridian(guess: _State, ends: tuple[_End, _End], target: float, bond: float) -> _State:
+    """Solve the boundary value problem: two ends, the gap, and the volume fix the length and the pressure."""
+
+    def slopes(_: Floats, y: Floats, unknown: Floats) -> Floats:
         length, pressure = unknown
-        r, z, psi = np.maximum(y[0], 1e-6), y[1], y[2]
+        r, z, psi = np.maximum(y[0], SMALLEST_RADIUS), y[1], y[2]
         turning = pressure - bond * z - np.sin(psi) / r
         return length * np.stack((np.cos(psi), np.sin(psi), turning, np.pi * r**2 * np.sin(psi)))
 
     def conditions(low: Floats, high: Floats, _: Floats) -> Floats:
-        return np.array([low[0] - a, low[1], low[3], high[0] - b, high[1] - 1.0, high[3] - target])
+        board = ends[0].residual(low[0], np.pi - low[2])
+        package = ends[1].residual(high[0], high[2])
+        return np.array([board, low[1], low[3], package, high[1] - 1.0, high[3] - target])
 
-    s, guess, unknown = _barrel(a, b, target)
-    found = solve_bvp(slopes, conditions, s, guess, p=unknown, tol=TOLERANCE, max_nodes=20000)
-    if not found.success or found.y[0].min() <= 1e-3:
+    found = solve_bvp(slopes, conditions, guess.s, guess.y, p=guess.unknown, tol=TOLERANCE, max_nodes=20000)
+    if not found.success or found.y[0].min() <= SMALLEST_RADIUS:
         raise NoMeridian(
-            f"no equilibrium joint of volume {volume:.4g} m^3 between discs of {radius_board:.4g} and "
-            f"{radius_package:.4g} m at gap {gap:.4g} m: {found.message}"
+            f"no equilibrium joint of volume {target:.4g} and ends {ends} (in gaps): {found.message.lower()}"
         )
-    y = found.sol(np.linspace(0.0, 1.0, SAMPLES))
-    r, z, psi = y[0] * gap, y[1] * gap, y[2]
-    pressure = found.p[1] * surface_tension / gap
-    at_top = pressure - weight * gap
-    force = np.pi * radius_package**2 * at_top - 2.0 * np.pi * radius_package * surface_tension * np.sin(psi[-1])
-    return Meridian(r, z, float(pressure), float(force), float(np.pi - psi[0]), float(psi[-1]))
+    return _State(found.x, found.y, found.p, found.sol)
 
 
-def _barrel(a: float, b: float, target: float) -> tuple[Floats, Floats, Floats]:
-    """Parabolic barrel of the right volume as a first guess: arc fractions, states and unknowns."""
+def _barrel(a: float, b: float, target: float) -> _State:
+    """Parabolic barrel of the right volume as a first guess."""
     z = np.linspace(0.0, 1.0, 101)
     rim, hump = a + (b - a) * z, 4.0 * z * (1.0 - z)
 
@@ -124,7 +169,7 @@ def _barrel(a: float, b: float, target: float) -> tuple[Floats, Floats, Floats]:
     volume = np.concatenate(([0.0], np.cumsum(0.5 * np.pi * (r[1:] ** 2 + r[:-1] ** 2) * np.diff(z))))
     middle = len(z) // 2
     curvature = 8.0 * bulge / (1.0 + (b - a) ** 2) ** 1.5 + 1.0 / r[middle]
-    return arc / arc[-1], np.stack((r, z, psi, volume)), np.array([arc[-1], curvature])
+    return _State(arc / arc[-1], np.stack((r, z, psi, volume)), np.array([arc[-1], curvature]), np.asarray)
 
 
 def sessile_meridian(volume: float, contact_angle: float, surface_tension: float, weight: float = 0.0) -> Meridian:

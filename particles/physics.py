@@ -1,0 +1,81 @@
+"""What acts on a liquid body: lists of effects. An effect that is off is absent from its list."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from particles.body import Body
+from particles.contact_line import ContactLine
+from particles.mls import Derivatives
+
+Floats = NDArray[np.float64]
+
+
+class Force(Protocol):
+    """A conservative force on the surface."""
+
+    def energy(self, body: Body) -> float:
+        """Energy [J]."""
+
+    def force(self, body: Body) -> Floats:
+        """Force -dE/dx, `(n, 3)` [N]."""
+
+
+class Operator(Protocol):
+    """A part of the implicit step: a symmetric matrix that multiplies the new velocity."""
+
+    def matrix(self, body: Body, stencils: Derivatives, time_step: float) -> sparse.csr_matrix:
+        """Matrix `(3 n, 3 n)` [kg/s], components one after the other."""
+
+
+class Momentum(Protocol):
+    """What is left of the last step's velocity."""
+
+    def load(self, body: Body, time_step: float) -> Floats:
+        """Momentum over the time step, `(n, 3)` [N]."""
+
+
+class Event(Protocol):
+    """A discrete change before a step."""
+
+    def update(self, body: Body) -> None:
+        """Change the state of the body's boundary."""
+
+
+@dataclass(frozen=True, slots=True)
+class Physics:
+    """Everything that acts on a body.
+
+    Attributes:
+        forces: conservative forces.
+        operators: parts of the implicit matrix; the mass is one of them.
+        momenta: empty in the quasi-static mode, where each step relaxes towards rest.
+        events: changes before a step.
+        lines: contact lines, which hold their pinned vertices.
+    """
+
+    forces: Sequence[Force]
+    operators: Sequence[Operator]
+    momenta: Sequence[Momentum]
+    events: Sequence[Event]
+    lines: Sequence[ContactLine]
+
+    def force(self, body: Body) -> Floats:
+        """Sum of the forces `(n, 3)` [N]."""
+        return sum((force.force(body) for force in self.forces), np.zeros_like(body.points))
+
+    def energy(self, body: Body) -> float:
+        """Sum of the energies [J]."""
+        return sum(force.energy(body) for force in self.forces)
+
+    def free(self, body: Body) -> NDArray[np.bool_]:
+        """Degrees of freedom that move, `(n, 3)`: walls hold z (free slip), edges hold their pinned vertices."""
+        free = np.ones(body.points.shape, bool)
+        free[body.cloud.wall >= 0, 2] = False
+        for line in self.lines:
+            free[line.pinned(body)] = False
+        return free

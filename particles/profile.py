@@ -1,0 +1,91 @@
+"""Cross-sections of the tracked surface: equivalent radius against height, width and waist.
+
+The area A(z) of the polygonal cross-sections is fitted by a polynomial. The integral of A is the volume, which the flow
+keeps exactly, so the fit is free of the bias of single vertices (outside the smooth surface) and chords (inside it).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.polynomial import Legendre
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.int32]
+
+SLICES = 64
+DEGREE = 6
+SAMPLES = 401
+
+
+@dataclass(frozen=True, slots=True)
+class Profile:
+    """Equivalent radius of the cross-sections.
+
+    Attributes:
+        z: `(k,)` heights from foot to head [m].
+        radius: `(k,)` radius of the disc of equal area [m].
+    """
+
+    z: Floats
+    radius: Floats
+
+    @property
+    def max_width(self) -> float:
+        """Largest diameter [m]."""
+        return 2.0 * float(self.radius.max())
+
+    @property
+    def waist(self) -> float:
+        """Smallest diameter [m]."""
+        return 2.0 * float(self.radius.min())
+
+
+def section_areas(points: Floats, triangles: Indices, heights: Floats) -> Floats:
+    """Areas of the cross-sections of a surface that is open at walls z = constant only.
+
+    Args:
+        points: `(n, 3)` [m].
+        triangles: `(t, 3)` outward oriented.
+        heights: `(k,)` of the planes, at no vertex [m].
+
+    Returns:
+        `(k,)` [m^2], by the shoelace formula on the cut segments.
+    """
+    corner = points[triangles]
+    areas = np.empty(len(heights))
+    for k, height in enumerate(heights):
+        above = corner[:, :, 2] > height
+        cut = corner[above.any(axis=1) & ~above.all(axis=1)]
+        ends = _segments(cut, height)
+        areas[k] = 0.5 * (ends[:, 0, 0] * ends[:, 1, 1] - ends[:, 0, 1] * ends[:, 1, 0]).sum()
+    return areas
+
+
+def _segments(corner: Floats, height: float) -> Floats:
+    """Segments `(c, 2, 2)` in which a plane cuts triangles, the liquid on their left seen from +z."""
+    above = corner[:, :, 2] > height
+    lone = np.where(above.sum(axis=1) == 1, above.argmax(axis=1), (~above).argmax(axis=1))
+    row = np.arange(len(corner))
+    apex = corner[row, lone]
+    ends = []
+    for turn in (1, 2):
+        other = corner[row, (lone + turn) % 3]
+        part = (height - apex[:, 2]) / (other[:, 2] - apex[:, 2])
+        ends.append(apex[:, :2] + part[:, None] * (other - apex)[:, :2])
+    segment = np.stack(ends, axis=1)
+    single_above = above[row, lone]
+    segment[~single_above] = segment[~single_above][:, ::-1]
+    return segment
+
+
+def fit_profile(points: Floats, triangles: Indices) -> Profile:
+    """Fit the equivalent radius of a free surface between its lowest and its highest point."""
+    z = points[np.unique(triangles), 2]
+    low, high = float(z.min()), float(z.max())
+    nodes, _ = np.polynomial.legendre.leggauss(SLICES)
+    heights = 0.5 * (low + high) + 0.5 * (high - low) * nodes
+    areas = section_areas(points, triangles, heights)
+    fit = Legendre.fit(heights, areas, DEGREE, domain=[low, high])
+    sample = np.linspace(low, high, SAMPLES)
+    return Profile(sample, np.sqrt(np.maximum(fit(sample), 0.0) / np.pi))

@@ -1,0 +1,119 @@
+"""Reflow of one joint: from the wetted discs, the gap and the solder to the shape at rest."""
+
+from collections.abc import Callable
+
+from particles.body import Body
+from particles.cloud import Cloud, equal_area_radius, joint_cloud
+from particles.contact_line import ContactLine
+from particles.effects import decide_effects
+from particles.flow import LiquidFlow
+from particles.force_gravity import Gravity
+from particles.force_surface_tension import SurfaceTension
+from particles.force_wetting import Wetting
+from particles.geometry import JointGeometry
+from particles.mass import Inertia, Mass
+from particles.metrics import joint_metrics, particle_pressure, verdict
+from particles.parameters import Solder
+from particles.physics import Event, Force, Momentum, Operator, Physics
+from particles.rest import Run, StopRule, run_to_rest
+from particles.shape import JointShape, Snapshot
+from particles.time_step import TimeStep, capillary_limit
+from particles.viscosity import Viscosity
+
+__all__ = ["JointGeometry", "JointShape", "solve_joint"]
+
+
+def solve_joint(
+    geometry: JointGeometry,
+    solder: Solder,
+    progress: Callable[[float], None] | None = None,
+    on_snapshot: Callable[[Snapshot], None] | None = None,
+) -> JointShape:
+    """Let molten solder flow between two wetted discs until it is at rest.
+
+    The solder starts as a double cone of its volume on both discs and flows by its effects (`decide_effects`).
+
+    Args:
+        geometry: gap and radii of the discs [m].
+        solder: volume, fluid and process.
+        progress: called with the fraction done.
+        on_snapshot: called with each snapshot.
+
+    Raises:
+        ValueError: the volume does not fit between the discs.
+        NoRest: no rest within `solder.numerics.max_steps`.
+        SolveFailed: a linear solve failed.
+    """
+    cloud = joint_cloud(geometry, solder.volume, solder.numerics.spacing)
+    effects = {name: decision["on"] for name, decision in decide_effects(geometry, solder).items()}
+    radii = (geometry.radius_board, geometry.radius_package)
+    lines = tuple(
+        ContactLine(
+            wall, equal_area_radius(radius, len(ring)), solder.pad_contact_angle, solder.mask_contact_angle, len(ring)
+        )
+        for wall, (radius, ring) in enumerate(zip(radii, cloud.rings, strict=True))
+    )
+    flow = start_flow(cloud, solder, effects, lines)
+    end_time = solder.process_time if effects["inertia"] else float("inf")
+    run = run_to_rest(
+        flow, StopRule(solder.numerics.max_steps, solder.numerics.tolerance, end_time), progress, on_snapshot
+    )
+    return _shape(geometry, solder, flow, run)
+
+
+def start_flow(
+    cloud: Cloud, solder: Solder, effects: dict[str, bool], lines: tuple[ContactLine, ...]
+) -> LiquidFlow:
+    """Set up a flow from rest, with only the effects that are on."""
+    limit = capillary_limit(solder.density, cloud.spacing, solder.surface_tension)
+    largest = solder.numerics.time_step_limit * limit
+    physics = build_physics(solder, effects, lines)
+    return LiquidFlow(Body.at_rest(cloud), physics, TimeStep(largest, cloud.spacing, largest), solder.numerics.basis)
+
+
+def build_physics(solder: Solder, effects: dict[str, bool], lines: tuple[ContactLine, ...]) -> Physics:
+    """Collect the effects that are on.
+
+    Args:
+        solder: fluid properties.
+        effects: name to on or off, as `decide_effects` decides.
+        lines: contact lines.
+    """
+    forces: list[Force] = []
+    operators: list[Operator] = [Mass(solder.density)]
+    momenta: list[Momentum] = []
+    events: list[Event] = []
+    if effects["surface_tension"]:
+        tension = SurfaceTension(solder.surface_tension)
+        forces.append(tension)
+        operators.append(tension)
+    if effects["gravity"]:
+        forces.append(Gravity(solder.density * solder.gravity))
+    if effects["wall_adhesion"]:
+        wetting = Wetting(solder.surface_tension, lines, tuple(forces))
+        forces.append(wetting)
+        events.append(wetting)
+    if effects["viscosity"]:
+        operators.append(Viscosity(solder.viscosity))
+    if effects["inertia"]:
+        momenta.append(Inertia(solder.density))
+    return Physics(tuple(forces), tuple(operators), tuple(momenta), tuple(events), lines)
+
+
+def _shape(geometry: JointGeometry, solder: Solder, flow: LiquidFlow, run: Run) -> JointShape:
+    """Collect the result."""
+    body, cloud = flow.body, flow.body.cloud
+    metrics = joint_metrics(geometry, solder, flow, run)
+    return JointShape(
+        points=body.points,
+        velocity=body.velocity,
+        pressure=particle_pressure(flow),
+        surface_points=body.points[: cloud.surface_count],
+        triangles=body.triangles,
+        ring_board=cloud.rings[0],
+        ring_package=cloud.rings[1],
+        history=run.history(solder.viscosity / solder.surface_tension),
+        snapshots=run.snapshots,
+        metrics=metrics,
+        verdict=verdict(flow.physics.lines, run.ruptured),
+    )

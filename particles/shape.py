@@ -1,0 +1,55 @@
+"""The result of a reflow: one joint's shape and how it came about. Plain data."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.int32]
+
+
+@dataclass(frozen=True, slots=True)
+class Snapshot:
+    """Particles and surface at one time.
+
+    Attributes:
+        time: [s].
+        points: `(n, 3)` [m].
+        triangles: `(t, 3)` of the free surface, indices of `points`.
+    """
+
+    time: float
+    points: Floats
+    triangles: Indices
+
+
+@dataclass(frozen=True, slots=True)
+class JointShape:
+    """A joint at the end of its reflow, in its own frame: origin at the centre of the board's disc, z up.
+
+    Attributes:
+        points: `(n, 3)` particles [m], the first `s` are the vertices of the free surface.
+        velocity: `(n, 3)` [m/s].
+        pressure: `(n,)` above ambient [Pa].
+        surface_points: `(s, 3)` vertices of the tracked free surface [m].
+        triangles: `(t, 3)` of the free surface, outward oriented, open at both walls.
+        ring_board, ring_package: `(k,)` contact lines as vertices of the surface, counter-clockwise seen from +z.
+        history: arrays of equal length: step, time, time_step, binding, height, width, volume, energy,
+            capillary_number, displacement, iterations.
+        snapshots: the first, the last and some states between.
+        metrics: name to value and unit.
+        verdict: "ok", "overflow" (solder on the mask), "dewetted" (left the pad's edge), "open" (neck ruptured).
+    """
+
+    points: Floats
+    velocity: Floats
+    pressure: Floats
+    surface_points: Floats
+    triangles: Indices
+    ring_board: Indices
+    ring_package: Indices
+    history: dict[str, NDArray]
+    snapshots: list[Snapshot]
+    metrics: dict[str, tuple[float, str]]
+    verdict: str

@@ -1,0 +1,58 @@
+"""The linear equations of one step: forces, implicit operators and constraints, without the fixed degrees of freedom."""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from particles.body import Body
+from particles.incompressibility import SaddlePoint
+from particles.mls import derivatives
+from particles.neighbours import NeighbourList
+from particles.physics import Physics
+
+Floats = NDArray[np.float64]
+
+
+class StepEquations:
+    """Equations of a body at its current positions, for any time step.
+
+    Degrees of freedom are stored by component: all x, all y, all z.
+    """
+
+    def __init__(self, body: Body, physics: Physics, neighbours: NeighbourList, basis: str) -> None:
+        """Fit the stencils and build what does not depend on the time step.
+
+        Args:
+            body: the liquid body.
+            physics: what acts on it.
+            neighbours: a valid list with the support radius of the basis.
+            basis: "linear" or "quadratic".
+
+        Raises:
+            DegenerateStencil: the divergence of a particle cannot be fitted.
+        """
+        self._body, self._physics = body, physics
+        self._free = physics.free(body).T.ravel()
+        self._stencils = derivatives(body.points, body.interior, neighbours, basis)
+        self._volume, gradient = body.volume()
+        share = sparse.diags(body.volumes[body.interior])
+        divergence = sparse.hstack([share @ component for component in self._stencils.gradient])
+        rows = sparse.vstack((divergence, sparse.csr_matrix(gradient.T.ravel())), format="csr")
+        self._constraint = rows[:, self._free]
+        self._force = physics.force(body)
+
+    def problem(self, time_step: float, volume: float) -> SaddlePoint:
+        """Build the saddle-point problem for a time step [s] that ends at a volume [m^3]."""
+        body, physics = self._body, self._physics
+        operator = sum(part.matrix(body, self._stencils, time_step) for part in physics.operators)
+        load = self._force + sum(momentum.load(body, time_step) for momentum in physics.momenta)
+        rate = np.zeros(self._constraint.shape[0])
+        rate[-1] = (volume - self._volume) / time_step
+        reduced = operator.tocsr()[self._free][:, self._free]
+        return SaddlePoint(reduced, self._constraint, load.T.ravel()[self._free], rate)
+
+    def expand(self, velocity: Floats) -> Floats:
+        """Put the free degrees of freedom `(d,)` into velocities `(n, 3)`, zero where they are fixed."""
+        full = np.zeros(self._free.shape)
+        full[self._free] = velocity
+        return np.ascontiguousarray(full.reshape(3, -1).T)
