@@ -1,0 +1,46 @@
+"""The rules that the code itself keeps: style, types, who may import whom, size of files."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+PACKAGES = ("workflow", "meshing", "particles", "fem")
+LONGEST_FILE = 400
+
+
+def run_tool(*arguments: str) -> None:
+    result = subprocess.run(
+        [sys.executable, *arguments], cwd=ROOT, capture_output=True, text=True, timeout=300, check=False
+    )
+    assert result.returncode == 0, result.stdout + result.stderr
+
+
+def test_ruff():
+    run_tool("-m", "ruff", "check", *PACKAGES, "tests", "benchmarks")
+
+
+def test_types():
+    run_tool("-m", "mypy")
+
+
+def test_import_rules():
+    run_tool("-c", "from importlinter.cli import lint_imports_command as main; main()")
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_files_are_short(package):
+    long = {
+        path.name: lines
+        for path in (ROOT / package).rglob("*.py")
+        if (lines := len(path.read_text().splitlines())) > LONGEST_FILE
+    }
+    assert not long
+
+
+@pytest.mark.parametrize("module", ["workflow", "workflow.cli", "workflow.case", "workflow.stages", "workflow.plan"])
+def test_import_is_light(module):
+    heavy = "{'gmsh', 'numba', 'dolfinx', 'petsc4py', 'mpi4py', 'pyvista', 'matplotlib', 'vtkmodules'}"
+    run_tool("-c", f"import sys, {module}; loaded = {heavy} & set(sys.modules); assert not loaded, loaded")

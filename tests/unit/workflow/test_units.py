@@ -1,0 +1,73 @@
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from workflow.units import UnitError, dimension, from_si, to_si
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "value"),
+    [
+        ("0.48 mm", "mm", 4.8e-4),
+        ("480 um", "mm", 4.8e-4),
+        ("480 µm", "mm", 4.8e-4),
+        ("1e-3mm", "mm", 1e-6),
+        ("1500 G", "G", 1500 * 9.80665),
+        ("9.81 m/s^2", "G", 9.81),
+        ("60 deg", "deg", math.pi / 3),
+        ("1.5 rad", "deg", 1.5),
+        ("132.46 GPa", "GPa", 132.46e9),
+        ("1910 kg/m^3", "kg/m^3", 1910.0),
+        ("2.33 g/cm^3", "kg/m^3", 2330.0),
+        ("0.0724 mm^3", "mm^3", 7.24e-11),
+        ("2.27 mPa*s", "Pa*s", 2.27e-3),
+        ("498.5 mJ/m**2", "N/m", 0.4985),
+        ("25 degC", "K", 298.15),
+        ("175 delta_degC", "K", 175.0),
+    ],
+)
+def test_quantities_become_si(text, unit, value):
+    assert to_si(text, unit) == pytest.approx(value, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (0.48, 'needs a unit, as a string such as "0.48 mm"'),
+        (True, "needs a unit"),
+        ("0.48", 'needs a unit, such as "0.48 mm"'),
+        ("mm", "is not a number and a unit"),
+        ("inf mm", "is not a number and a unit"),
+        ("nan mm", "is not a number and a unit"),
+        ("1e999 mm", "is not finite"),
+        ("1 kg", "is a mass; wanted is a length, e.g. in mm"),
+        ("1 deg", "is an angle; wanted is a length"),
+        ("1 mmm", '"mmm" is not a known unit'),
+        ("1 2 mm", '"2 mm" is not a unit'),
+        ("1 mm/", '"mm/" is not a unit'),
+        ("1 mm^1e9", "is not a unit"),
+        ("1 __import__('os')", "is not a unit"),
+    ],
+)
+def test_what_is_no_length_is_refused(text, words):
+    with pytest.raises(UnitError) as caught:
+        to_si(text, "mm")
+    assert words in str(caught.value)
+
+
+def test_an_angle_needs_its_unit():
+    with pytest.raises(UnitError, match="is a pure number; wanted is an angle"):
+        to_si("1 dimensionless", "deg")
+
+
+@given(st.floats(1e-6, 1e6), st.sampled_from(["mm", "G", "ms", "GPa", "kg/m^3", "deg", "mm^3", "N/m"]))
+def test_what_is_written_reads_the_same(value, unit):
+    assert to_si(from_si(value, unit, 17), unit) == pytest.approx(value, rel=1e-12)
+
+
+def test_dimensions_have_names():
+    assert [dimension(unit) for unit in ("mm", "G", "deg", "GPa", "mm^3")] == [
+        "length", "acceleration", "angle", "pressure", "volume",
+    ]  # fmt: skip

@@ -1,0 +1,90 @@
+"""Writing a case file: every parameter, its value, its default and its range."""
+
+import textwrap
+from pathlib import Path
+
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+
+from workflow.case import Case, Title, read_case
+from workflow.fields import allowed, display, unit_of
+from workflow.problems import CaseError, Problem, as_toml, nearest
+
+CASES = Path(__file__).resolve().parent.parent / "cases"
+COMMENT_COLUMN = 44
+HEADER = """\
+# Case "{name}", from the template "{template}".
+# Every parameter is here. A quantity is a string with a unit, which may be any of its dimension ("0.48 mm", "480 um").
+# Tables named "numerics" say how something is computed, all others what. A line that only repeats the default can go.
+"""
+
+
+def templates() -> dict[str, Path]:
+    """Return the cases that a new one can start from: name -> case file."""
+    return {path.parent.name: path for path in sorted(CASES.glob("*/case.toml"))}
+
+
+def write_new_case(name: str, template: str, folder: Path = Path()) -> Path:
+    """Write ``<folder>/<name>.toml``, complete and commented.
+
+    Args:
+        name: name of the case.
+        template: name of the case whose values are taken.
+        folder: where to write.
+
+    Returns:
+        The path of the file.
+
+    Raises:
+        CaseError: the name is no name, the template does not exist, or the file does.
+    """
+    known = templates()
+    if template not in known:
+        hint = nearest(template, known)
+        raise CaseError("new", [Problem("--template", "unknown template", template, "one of " + ", ".join(known), hint)])
+    path = folder / f"{name}.toml"
+    if path.exists():
+        raise CaseError("new", [Problem("NAME", f"{path} exists already", name)])
+    case = read_case(known[template], [f"case.name='{name}'"], oversubscribe=True)
+    path.write_text(case_text(case, template))
+    return path
+
+
+def case_text(case: Case, template: str) -> str:
+    """Write a case as TOML with comments."""
+    blocks = [HEADER.format(name=case.case.name, template=template)]
+    _add_table(blocks, "", case)
+    return "\n".join(blocks)
+
+
+def _add_table(blocks: list[str], key: str, parameters: BaseModel) -> None:
+    """Append a table's block, then those of the tables in it."""
+    lines, tables = [], []
+    for name, field in type(parameters).model_fields.items():
+        value = getattr(parameters, name)
+        if isinstance(value, BaseModel):
+            tables.append((f"{key}.{name}".lstrip("."), value))
+        else:
+            lines.append(_line(name, value, field))
+    if lines:
+        blocks.append("\n".join([*_describe(parameters), f"[{key}]", *lines, ""]))
+    for name, table in tables:
+        _add_table(blocks, name, table)
+
+
+def _line(name: str, value: object, field: FieldInfo) -> str:
+    text = f'"{display(value, field)}"' if unit_of(field) else as_toml(value)
+    comment = allowed(field)
+    if not field.is_required():
+        default = f"default {display(field.default, field)}"
+        comment = f"{comment}; {default}" if comment else default
+    line = f"{name} = {text}"
+    return f"{line:<{COMMENT_COLUMN}} # {comment}" if comment else line
+
+
+def _describe(parameters: BaseModel) -> list[str]:
+    """Comment lines from a model's docstring, ReST marks taken out."""
+    if isinstance(parameters, Title):
+        return []
+    text = " ".join((type(parameters).__doc__ or "").replace("``", "").split())
+    return textwrap.wrap(text, 118, initial_indent="# ", subsequent_indent="# ")

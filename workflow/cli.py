@@ -1,0 +1,180 @@
+"""Command line: new, plan, run, status, report, clean, schema."""
+
+import json
+import shutil
+import signal
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from workflow import __version__
+from workflow.case import Case, available_cores, read_case
+from workflow.inputs import examine, write_inputs
+from workflow.problems import CaseError
+from workflow.stage_table import NAMES
+from workflow.terminal import console, print_error
+
+app = typer.Typer(
+    name="reflowshock",
+    help="From a case file to a drop-shock report: solder reflow by particles, two-scale explicit dynamics.",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    add_completion=False,
+)
+
+CasePath = Annotated[Path, typer.Argument(metavar="CASE", help="case file (TOML)")]
+Settings = Annotated[
+    list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help='override, e.g. "shock.peak_acceleration=1000 G"')
+]
+Out = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="run folder [default: runs/<case name>]")]
+Oversubscribe = Annotated[bool, typer.Option("--oversubscribe", help="allow more MPI ranks than cores")]
+
+
+@app.command()
+def new(
+    name: Annotated[str, typer.Argument(help="name of the case; the file is NAME.toml")],
+    template: Annotated[str, typer.Option(help="case to start from")] = "bga_drop",
+) -> None:
+    """Write a complete, commented case file."""
+    from workflow.case_text import write_new_case
+
+    path = write_new_case(name, template)
+    console.print(f"wrote {path}; next: reflowshock plan {path}")
+
+
+@app.command()
+def plan(case: CasePath, settings: Settings = None, out: Out = None, oversubscribe: Oversubscribe = False) -> None:
+    """Show what a run would do and cost; runs nothing."""
+    from workflow.plan import show_plan
+
+    resolved, folder = _load(case, settings, out, oversubscribe)
+    show_plan(resolved, folder, console)
+
+
+@app.command()
+def run(
+    case: CasePath,
+    settings: Settings = None,
+    until: Annotated[str, typer.Option(metavar="STAGE", help="last stage: " + ", ".join(NAMES))] = NAMES[-1],
+    cores: Annotated[int | None, typer.Option("-j", "--cores", min=1, help="cores to use [default: all]")] = None,
+    out: Out = None,
+    oversubscribe: Oversubscribe = False,
+) -> None:
+    """Run what is stale."""
+    from workflow.pipeline import drive, failed_checks
+
+    if until not in NAMES:
+        raise typer.BadParameter(f"'{until}' is no stage; allowed: {', '.join(NAMES)}", param_hint="--until")
+    resolved, folder = _load(case, settings, out, oversubscribe)
+    write_inputs(folder, resolved)
+    if not _has_work(folder, resolved, until):
+        console.print(f"nothing to do: {folder} is up to date")
+    elif not drive(folder, until, cores or available_cores(), oversubscribe):
+        raise typer.Exit(1)
+    failures = failed_checks(folder, until)
+    for failure in failures:
+        print_error(failure)
+    if until == NAMES[-1]:
+        console.print(f"report: {folder / 'report.html'}")
+    raise typer.Exit(1 if failures else 0)
+
+
+@app.command()
+def status(case: CasePath, settings: Settings = None, out: Out = None) -> None:
+    """Show what a run folder holds: stages done, stale or missing, their times and main figures."""
+    from workflow.status import show_status
+
+    resolved, folder = _load(case, settings, out, True)
+    show_status(resolved, folder, console)
+
+
+@app.command()
+def report(case: CasePath, settings: Settings = None, out: Out = None) -> None:
+    """Write the report again, from the products that are there."""
+    from workflow.report import write_report
+
+    resolved, folder = _load(case, settings, out, True)
+    if not folder.is_dir():
+        print_error(f"{folder} does not exist: nothing was run")
+        raise typer.Exit(1)
+    write_report(folder, resolved)
+    console.print(f"report: {folder / 'report.html'}")
+
+
+@app.command()
+def clean(case: CasePath, settings: Settings = None, out: Out = None) -> None:
+    """Remove a case's run folder."""
+    from workflow.pipeline import locked
+
+    _, folder = _load(case, settings, out, True)
+    if not (folder / "inputs").is_dir():
+        console.print(f"nothing to remove: {folder} is no run folder")
+        return
+    with locked(folder):
+        shutil.rmtree(folder)
+    console.print(f"removed {folder}")
+
+
+@app.command()
+def schema() -> None:
+    """Print the JSON schema of a case file."""
+    from workflow.schema import case_schema
+
+    print(json.dumps(case_schema(), indent=2))
+
+
+@app.command(hidden=True)
+def stage(
+    name: str,
+    folder: Path,
+    cores: Annotated[int, typer.Option("--cores")] = 1,
+    oversubscribe: Oversubscribe = False,
+) -> None:
+    """Run one stage; Snakemake calls this."""
+    from workflow.stages import execute
+
+    if not execute(name, folder, cores, oversubscribe):
+        raise typer.Exit(1)
+
+
+def main() -> None:
+    """Run the command line; exit codes: 0 done and healthy, 1 failed, 2 bad input."""
+    signal.signal(signal.SIGTERM, _interrupt)
+    try:
+        app()
+    except CaseError as error:
+        for line in error.lines():
+            print_error(line)
+        sys.exit(2)
+    except KeyboardInterrupt:
+        print_error("interrupted; stages that were complete are kept")
+        sys.exit(1)
+
+
+def _interrupt(*_: object) -> None:
+    raise KeyboardInterrupt
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        console.print(f"reflowshock {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    version: Annotated[bool, typer.Option("--version", callback=_version, is_eager=True, help="show the version")] = False,
+) -> None:
+    pass
+
+
+def _load(path: Path, settings: list[str] | None, out: Path | None, oversubscribe: bool) -> tuple[Case, Path]:
+    case = read_case(path, settings or [], oversubscribe)
+    return case, out or Path("runs") / case.case.name
+
+
+def _has_work(folder: Path, case: Case, until: str) -> bool:
+    verdicts = examine(folder, case)
+    return any(verdicts[name].stale for name in NAMES[: NAMES.index(until) + 1])

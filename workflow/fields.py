@@ -1,0 +1,127 @@
+"""Fields of parameter models: their units, ranges, nested models, and values in either form (text, SI)."""
+
+import math
+import types
+import typing
+from collections.abc import Iterator
+
+import annotated_types
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+
+from workflow.problems import Problem
+from workflow.units import UnitError, dimension, from_si, to_si
+
+BOUNDS: tuple[tuple[type, str, str], ...] = (
+    (annotated_types.Gt, "gt", ">"),
+    (annotated_types.Ge, "ge", ">="),
+    (annotated_types.Lt, "lt", "<"),
+    (annotated_types.Le, "le", "<="),
+)
+
+
+def unit_of(field: FieldInfo) -> str | None:
+    """Return the display unit of a field, e.g. "mm"; None for pure numbers, names and tables."""
+    return next((item for item in field.metadata if isinstance(item, str)), None)
+
+
+def models_of(field: FieldInfo) -> tuple[type[BaseModel], ...]:
+    """Return the parameter models that a field's table may follow; empty where it is no table."""
+    annotation = field.annotation
+    members = typing.get_args(annotation) if _is_union(annotation) else (annotation,)
+    return tuple(member for member in members if isinstance(member, type) and issubclass(member, BaseModel))
+
+
+def model_of(field: FieldInfo, table: dict) -> type[BaseModel] | None:
+    """Return the model that a given table follows: where there are several, the one of its ``kind``."""
+    models = models_of(field)
+    if len(models) < 2:
+        return models[0] if models else None
+    kind = table.get("kind", getattr(field.default, "kind", None))
+    return next((model for model in models if model.model_fields["kind"].default == kind), None)
+
+
+def allowed(field: FieldInfo) -> str:
+    """Describe what a field takes: names, or a range in the user's unit."""
+    names = literal_names(field)
+    if names:
+        return "one of " + ", ".join(names)
+    unit = unit_of(field)
+    bounds = [
+        f"{sign} {from_si(getattr(item, attribute), unit, 6) if unit else f'{getattr(item, attribute):g}'}"
+        for item in field.metadata
+        for kind, attribute, sign in BOUNDS
+        if isinstance(item, kind)
+    ]
+    if bounds:
+        return " and ".join(bounds)
+    return f"any {dimension(unit)}, e.g. in {unit}" if unit else ""
+
+
+def literal_names(field: FieldInfo) -> tuple[str, ...]:
+    """Return the names that a field, or each item of its list, may take; empty where it is not so limited."""
+    annotation = field.annotation
+    if typing.get_origin(annotation) is tuple:
+        annotation = typing.get_args(annotation)[0]
+    return typing.get_args(annotation) if typing.get_origin(annotation) is typing.Literal else ()
+
+
+def to_si_table(model: type[BaseModel], table: dict, prefix: str, problems: list[Problem]) -> dict:
+    """Convert a table of a case file to SI floats, field by field.
+
+    Args:
+        model: model that the table follows; keys that it does not know are left for it to refuse.
+        table: the table as TOML gives it.
+        prefix: dotted key of the table with its dot, or empty.
+        problems: list to which unit errors are added; their values become nan.
+
+    Returns:
+        The table in SI values. Tables with a default are completed by it, if they are of its kind.
+    """
+    return {
+        name: _to_si_value(model.model_fields[name], value, prefix + name, problems)
+        if name in model.model_fields
+        else value
+        for name, value in table.items()
+    }
+
+
+def _to_si_value(field: FieldInfo, value: object, key: str, problems: list[Problem]) -> object:
+    unit = unit_of(field)
+    if unit is not None:
+        try:
+            return to_si(value, unit)
+        except UnitError as error:
+            problems.append(Problem(key, str(error), value, allowed(field)))
+            return math.nan
+    if isinstance(value, dict):
+        model = model_of(field, value)
+        if model is None:
+            return value
+        defaults = field.default.model_dump() if isinstance(field.default, model) else {}
+        return defaults | to_si_table(model, value, key + ".", problems)
+    return tuple(value) if isinstance(value, list) else value
+
+
+def leaves(parameters: BaseModel, prefix: str = "") -> Iterator[tuple[str, object, FieldInfo]]:
+    """Yield dotted key, SI value and field of every parameter, in the order of the models."""
+    for name, field in type(parameters).model_fields.items():
+        value = getattr(parameters, name)
+        if isinstance(value, BaseModel):
+            yield from leaves(value, f"{prefix}{name}.")
+        else:
+            yield prefix + name, value, field
+
+
+def display(value: object, field: FieldInfo) -> str:
+    """Write an SI value as a user would in a case file, without quotes."""
+    unit = unit_of(field)
+    if unit is not None and isinstance(value, float):
+        return from_si(value, unit)
+    if isinstance(value, tuple):
+        return "[" + ", ".join(str(item) for item in value) + "]"
+    return f"{value:.10g}" if isinstance(value, float) else str(value)
+
+
+def _is_union(annotation: object) -> bool:
+    return typing.get_origin(annotation) in (typing.Union, types.UnionType)

@@ -1,0 +1,70 @@
+"""What is wrong with a case: records that name the key, the value and what is allowed."""
+
+import difflib
+import json
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """One mistake in a case file or on the command line.
+
+    Attributes:
+        key: dotted key, e.g. "package.pitch"; empty where the file as a whole is meant.
+        message: what is wrong.
+        value: the value as the user wrote it; None where a value is missing.
+        allowed: allowed range or dimension, or empty.
+        hint: the nearest valid name, or empty.
+    """
+
+    key: str
+    message: str
+    value: object = None
+    allowed: str = ""
+    hint: str = ""
+
+    def __str__(self) -> str:
+        place = self.key if self.value is None else f"{self.key} = {as_toml(self.value)}"
+        parts = [": ".join(part for part in (place, self.message) if part)]
+        if self.allowed:
+            parts.append(f"allowed: {self.allowed}")
+        if self.hint:
+            parts.append(f"did you mean {self.hint}?")
+        return "; ".join(parts)
+
+
+class CaseError(ValueError):
+    """A case that must not run, with everything that is wrong with it."""
+
+    def __init__(self, source: str, problems: list[Problem], overridden: Iterable[str] = ()) -> None:
+        self.source = source
+        self.problems = problems
+        self.overridden = frozenset(overridden)
+        super().__init__("\n".join(self.lines()))
+
+    def lines(self) -> list[str]:
+        """One line a problem, each beginning with where the value was given."""
+        return [f"{self._place(problem)}: {problem}" for problem in self.problems]
+
+    def _place(self, problem: Problem) -> str:
+        return "--set" if problem.key in self.overridden else self.source
+
+
+def nearest(name: str, names: Iterable[str]) -> str:
+    """Return the valid name most like a wrong one, or an empty string."""
+    matches = difflib.get_close_matches(name, list(names), n=1, cutoff=0.6)
+    return matches[0] if matches else ""
+
+
+def as_toml(value: object) -> str:
+    """Write a value as a user wrote it in TOML, shortened to fit a line."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False)
+    if isinstance(value, dict):
+        return "{ … }"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(as_toml(item) for item in value) + "]"
+    return str(value)

@@ -1,0 +1,103 @@
+"""Reflow of many joints: those that are alike once, several at a time, each in a process of its own."""
+
+import multiprocessing
+import queue
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from typing import TYPE_CHECKING, Any
+
+from particles.parameters import Solder
+
+if TYPE_CHECKING:
+    from particles.geometry import JointGeometry
+    from particles.shape import JointShape
+
+ALIKE = 12  # decimals of a metre to which gaps and radii of joints are compared: a picometre
+POLL = 0.2  # seconds between two looks at the progress
+
+_progress: Any = None  # the queue of a worker process, set once when it starts
+
+
+class ReflowError(RuntimeError):
+    """The reflow of a joint failed; the message names the joint."""
+
+
+def distinct_geometries(
+    geometries: "Mapping[str, JointGeometry]",
+) -> "dict[tuple[str, ...], JointGeometry]":
+    """Group joints whose gap and radii are equal.
+
+    Args:
+        geometries: joint name -> gap and radii [m].
+
+    Returns:
+        Names of the joints that are alike -> their geometry.
+    """
+    groups: dict[tuple[float, ...], list[str]] = {}
+    for name, geometry in geometries.items():
+        sizes = (geometry.gap, geometry.radius_board, geometry.radius_package)
+        groups.setdefault(tuple(round(size, ALIKE) for size in sizes), []).append(name)
+    return {tuple(names): geometries[names[0]] for names in groups.values()}
+
+
+def solve_joints(
+    geometries: "Mapping[str, JointGeometry]", solder: Solder, cores: int, progress: Callable[[float], None]
+) -> "dict[str, JointShape]":
+    """Solve the reflow of each geometry.
+
+    Args:
+        geometries: name of a joint -> gap and radii [m].
+        solder: volume, fluid and process.
+        cores: number of processes.
+        progress: called with the share of the whole that is done, 0 to 1.
+
+    Returns:
+        Name -> shape, in the given order.
+
+    Raises:
+        ReflowError: names the first joint that failed, and how.
+    """
+    context = multiprocessing.get_context("spawn")
+    reports = context.Queue()
+    workers = min(cores, len(geometries))
+    with ProcessPoolExecutor(workers, context, _start_worker, (reports,)) as pool:
+        jobs = {pool.submit(_solve, name, geometry, solder): name for name, geometry in geometries.items()}
+        try:
+            _wait_for(jobs, reports, progress)
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            for process in multiprocessing.active_children():
+                process.terminate()
+            raise
+    return {name: job.result() for job, name in jobs.items()}
+
+
+def _wait_for(jobs: "Mapping[Future[JointShape], str]", reports: Any, progress: Callable[[float], None]) -> None:
+    """Wait for all jobs, passing on how far they are; raise as soon as one fails."""
+    done = dict.fromkeys(jobs.values(), 0.0)
+    pending: Sequence[Future] | set[Future] = set(jobs)
+    while pending:
+        finished, pending = wait(pending, POLL, FIRST_COMPLETED)
+        while True:
+            try:
+                name, fraction = reports.get_nowait()
+            except queue.Empty:
+                break
+            done[name] = max(done[name], fraction)
+        for job in finished:
+            error = job.exception()
+            if error is not None:
+                raise ReflowError(f"joint {jobs[job]}: {type(error).__name__}: {error}") from error
+            done[jobs[job]] = 1.0
+        progress(sum(done.values()) / len(done))
+
+
+def _start_worker(reports: Any) -> None:
+    global _progress  # noqa: PLW0603  (a process pool gives its workers no other place for shared state)
+    _progress = reports
+
+
+def _solve(name: str, geometry: "JointGeometry", solder: Solder) -> "JointShape":
+    from particles.reflow import solve_joint
+
+    return solve_joint(geometry, solder, progress=lambda fraction: _progress.put((name, fraction)))

@@ -1,0 +1,81 @@
+"""Running one stage: a fresh partial folder, a record of what was used and found, a rename when all is there."""
+
+import json
+import shutil
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from workflow.case import Case
+from workflow.inputs import stage_inputs
+from workflow.stage_table import BY_NAME
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """What a stage works with.
+
+    Attributes:
+        folder: the run folder, with the products of earlier stages.
+        case: the resolved case.
+        cores: number of cores that a stage may use.
+        oversubscribe: whether MPI may have more ranks than cores.
+    """
+
+    folder: Path
+    case: Case
+    cores: int
+    oversubscribe: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Findings:
+    """What a stage found, in the form of ``summary.json``.
+
+    Attributes:
+        metrics: name -> {"value", "unit"}.
+        health: check -> {"value", "limit", "ok"}.
+        effects: effect -> {"on", "why"}.
+    """
+
+    metrics: dict = field(default_factory=dict)
+    health: dict = field(default_factory=dict)
+    effects: dict = field(default_factory=dict)
+
+
+StageFunction = Callable[[Run, Path], Findings]
+
+
+def run_stage(name: str, function: StageFunction, run: Run) -> dict:
+    """Run a stage; its folder appears at once and complete, or not at all.
+
+    Args:
+        name: name of the stage.
+        function: writes products into the given folder and returns what it found.
+        run: what the stage works with.
+
+    Returns:
+        The record written to ``stage.json``: seconds, metrics, health, effects, inputs.
+    """
+    folder, partial = run.folder / name, run.folder / f".{name}.partial"
+    _remove(partial)
+    partial.mkdir(parents=True)
+    start = time.perf_counter()
+    findings = function(run, partial)
+    record = {
+        "seconds": round(time.perf_counter() - start, 3),
+        "metrics": findings.metrics,
+        "health": findings.health,
+        "effects": findings.effects,
+        "inputs": stage_inputs(run.case, BY_NAME[name]),
+    }
+    (partial / "stage.json").write_text(json.dumps(record, indent=1) + "\n")
+    _remove(folder)
+    partial.rename(folder)
+    return record
+
+
+def _remove(folder: Path) -> None:
+    if folder.exists():
+        shutil.rmtree(folder)

@@ -1,0 +1,51 @@
+"""What a run folder holds, stage by stage."""
+
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+
+from workflow.case import Case
+from workflow.inputs import Verdict, examine, read_record
+from workflow.stage_table import BY_NAME
+from workflow.units import from_si
+
+SHOWN_UNITS = {"m": "mm", "m^3": "mm^3", "Pa": "MPa", "J": "mJ", "kg": "mg"}
+FIGURES = 5
+
+
+def show_status(case: Case, run_folder: Path, console: Console) -> None:
+    """Print for each stage whether its product is up to date, the time it took and its main figures."""
+    table = Table(title=f"{case.case.name} in {run_folder}", title_justify="left", expand=True)
+    table.add_column("stage", no_wrap=True)
+    table.add_column("state", no_wrap=True)
+    table.add_column("time", justify="right", no_wrap=True)
+    table.add_column("figures", ratio=1)
+    for name, verdict in examine(run_folder, case).items():
+        record = read_record(run_folder, BY_NAME[name]) or {"metrics": {}, "health": {}}
+        seconds = f"{record['seconds']:.1f} s" if "seconds" in record else ""
+        table.add_row(name, _state(verdict, record["health"]), seconds, _figures(record["metrics"]))
+    console.print(table)
+
+
+def metric_text(metric: dict) -> str:
+    """Write a metric in a unit that engineers read."""
+    value, unit = metric["value"], metric["unit"]
+    if isinstance(value, str | bool | int) or value is None:
+        return f"{value} {unit}".strip()
+    return from_si(value, SHOWN_UNITS[unit], 4) if unit in SHOWN_UNITS else f"{value:.4g} {unit}".strip()
+
+
+def _state(verdict: Verdict, health: dict) -> str:
+    if verdict.missing:
+        return "[dim]missing[/]"
+    if verdict.stale:
+        return "[yellow]stale[/]"
+    if not all(check["ok"] for check in health.values()):
+        return "[bold red]unhealthy[/]"
+    return "[green]done[/]"
+
+
+def _figures(metrics: dict) -> str:
+    shown = list(metrics.items())[:FIGURES]
+    return ", ".join(f"{name.replace('_', ' ')} {metric_text(metric)}" for name, metric in shown)

@@ -1,0 +1,98 @@
+"""Validation errors of pydantic, said in the words of a case file."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+from pydantic.fields import FieldInfo
+
+from workflow import fields
+from workflow.problems import Problem, nearest
+
+RANGES = ("greater_than", "greater_than_equal", "less_than", "less_than_equal", "finite_number")
+
+
+def translate(model: type[BaseModel], error: ValidationError, table: dict, known: set[str]) -> list[Problem]:
+    """Translate validation errors.
+
+    Args:
+        model: the validated model.
+        error: what pydantic found.
+        table: what the user wrote.
+        known: keys of which a problem is already known; those are left out.
+
+    Returns:
+        One problem an error.
+    """
+    found = []
+    for record in error.errors():
+        names = _names(model, record["loc"])
+        key = ".".join(names)
+        if key not in known:
+            found.append(_problem(model, names, record["type"], record["msg"], table))
+    return found
+
+
+def _problem(root: type[BaseModel], names: list[str], kind: str, text: str, table: dict) -> Problem:
+    key, value = ".".join(names), _value(table, names)
+    model, field = _field(root, names, table)
+    if kind == "extra_forbidden":
+        siblings = list(model.model_fields) if model else []
+        hint = nearest(names[-1], siblings)
+        prefix = "".join(name + "." for name in names[:-1])
+        return Problem(key, "unknown key", value, "one of " + ", ".join(siblings), hint and prefix + hint)
+    if field is None:
+        return Problem(key, text, value)
+    if kind == "missing":
+        return Problem(key, "is missing", None, fields.allowed(field))
+    if fields.models_of(field) and kind.startswith("union_tag"):
+        kinds = [candidate.model_fields["kind"].default for candidate in fields.models_of(field)]
+        given = value.get("kind", "") if isinstance(value, dict) else ""
+        return Problem(f"{key}.kind", "unknown kind", given, "one of " + ", ".join(kinds), nearest(given, kinds))
+    if fields.models_of(field):
+        return Problem(key, "must be a table", value)
+    if kind == "literal_error":
+        names_allowed = fields.literal_names(field)
+        return Problem(key, "unknown name", value, fields.allowed(field), nearest(str(value), names_allowed))
+    if kind in RANGES:
+        return Problem(key, "is out of range", value, fields.allowed(field))
+    return Problem(key, text[0].lower() + text[1:], value, fields.allowed(field))
+
+
+def _names(model: type[BaseModel], location: Sequence[int | str]) -> list[str]:
+    """Drop from a pydantic location what is no key: tags of unions and positions in lists."""
+    names: list[str] = []
+    candidates: tuple[type[BaseModel], ...] = (model,)
+    for part in location:
+        if isinstance(part, int) or (len(candidates) > 1 and _is_tag(candidates, part)):
+            continue
+        names.append(part)
+        field = next((c.model_fields[part] for c in candidates if part in c.model_fields), None)
+        candidates = fields.models_of(field) if field else ()
+    return names
+
+
+def _is_tag(candidates: tuple[type[BaseModel], ...], part: str) -> bool:
+    return part in [candidate.model_fields["kind"].default for candidate in candidates]
+
+
+def _field(root: type[BaseModel], names: list[str], table: dict) -> tuple[type[BaseModel] | None, FieldInfo | None]:
+    """Return the model that a key's table follows, and the key's field in it."""
+    model: type[BaseModel] | None = root
+    field = None
+    given: Any = table
+    for position, name in enumerate(names):
+        field = model.model_fields.get(name) if model else None
+        given = given.get(name, {}) if isinstance(given, dict) else {}
+        if field is not None and position < len(names) - 1:
+            model = fields.model_of(field, given if isinstance(given, dict) else {})
+    return model, field
+
+
+def _value(table: dict, names: list[str]) -> Any:
+    value: Any = table
+    for name in names:
+        if not isinstance(value, dict) or name not in value:
+            return None
+        value = value[name]
+    return value
