@@ -1,0 +1,91 @@
+"""The pad table: where every joint sits, what solder can wet, and the gap that it bridges."""
+
+import json
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from meshing.parameters import Board, Package, Warpage
+
+# JEDEC JEP95 design guide 4.5: row letters skip those that look like digits or other letters.
+ROW_LETTERS = "ABCDEFGHJKLMNPRTUVWY"
+
+
+@dataclass(frozen=True, slots=True)
+class PadSite:
+    """One joint's place: axis (x, y), copper-to-copper gap and radii, all in metres; row and column from 0."""
+
+    name: str
+    row: int
+    column: int
+    x: float
+    y: float
+    gap: float
+    wetted_radius_board: float
+    wetted_radius_package: float
+    pad_radius_board: float
+    pad_radius_package: float
+    z_board: float
+
+
+def row_name(row: int) -> str:
+    """Return the JEDEC letters of a row counted from 0: A ... Y, AA ... AY, BA ..."""
+    count = len(ROW_LETTERS)
+    prefix = "" if row < count else ROW_LETTERS[row // count - 1]
+    return prefix + ROW_LETTERS[row % count]
+
+
+def joint_name(row: int, column: int) -> str:
+    """Return the ball name of a row and column counted from 0, e.g. A1."""
+    return f"{row_name(row)}{column + 1}"
+
+
+def corner_axis(package: Package) -> tuple[float, float]:
+    """Return (x, y) of the outermost joint axis [m]."""
+    return 0.5 * (package.columns - 1) * package.pitch, 0.5 * (package.rows - 1) * package.pitch
+
+
+def pad_table(package: Package, board: Board, warpage: Warpage) -> list[PadSite]:
+    """List the joints of the array, row by row.
+
+    Args:
+        package: array, pads, standoff.
+        board: its symmetry decides whether only x > 0, y > 0 is kept.
+        warpage: lift of the package, which widens or narrows each gap.
+    """
+    corner = corner_axis(package)
+    sites = []
+    for row in range(package.rows):
+        for column in range(package.columns):
+            x = column * package.pitch - corner[0]
+            y = corner[1] - row * package.pitch
+            name = joint_name(row, column)
+            if name in package.depopulated or (board.symmetry == "quarter" and (x < 0 or y < 0)):
+                continue
+            gap = package.standoff + float(lift(package, warpage, x, y))
+            sites.append(
+                PadSite(
+                    name, row, column, x, y, gap,
+                    package.board_pad.wetted_radius, package.package_pad.wetted_radius,
+                    0.5 * package.board_pad.diameter, 0.5 * package.package_pad.diameter,
+                    package.copper.thickness,
+                )  # fmt: skip
+            )
+    return sites
+
+
+def lift(package: Package, warpage: Warpage, x, y):
+    """Return the warpage of the package at (x, y) [m]; a single joint has none."""
+    corner_x, corner_y = corner_axis(package)
+    if corner_x == corner_y == 0.0:
+        return 0.0 * x
+    return warpage.height(x, y, corner_x, corner_y)
+
+
+def write_pads(path: Path, sites: list[PadSite]) -> None:
+    """Write the pad table as JSON."""
+    path.write_text(json.dumps([asdict(site) for site in sites], indent=1) + "\n")
+
+
+def read_pads(path: Path) -> list[PadSite]:
+    """Read a pad table written by ``write_pads``."""
+    return [PadSite(**record) for record in json.loads(path.read_text())]

@@ -1,0 +1,129 @@
+"""Plan view of board and package: intervals along x and y, shared by the mesh and by its estimate."""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from meshing.parameters import Board, BoardNumerics, Package
+
+
+@dataclass(frozen=True, slots=True)
+class Interval:
+    """A piece [start, end] [m] of an axis in ``cells``, each ``ratio`` times as long as the one before."""
+
+    start: float
+    end: float
+    cells: int
+    ratio: float = 1.0
+
+    def smallest(self) -> float:
+        """Length of the shortest cell [m]."""
+        lengths = self.ratio ** np.arange(self.cells)
+        return float((self.end - self.start) * lengths.min() / lengths.sum())
+
+    def mirrored(self) -> "Interval":
+        """The interval reflected at the origin."""
+        return Interval(-self.end, -self.start, self.cells, 1.0 / self.ratio)
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """Intervals along both axes; ``hole_x`` and ``hole_y`` name those that the mounting holes occupy.
+
+    ``fine`` is how many intervals from the package's axis outwards are under the package or its margin.
+    """
+
+    x: tuple[Interval, ...]
+    y: tuple[Interval, ...]
+    hole_x: frozenset[int] = frozenset()
+    hole_y: frozenset[int] = frozenset()
+
+
+def board_plan(package: Package, board: Board) -> Plan:
+    """Cut the board: footprint, margin, graded, coarse, around the holes.
+
+    The footprint of the package lies on grid lines, and the margin of the meso model's patch on the next ones.
+    """
+    holes, numerics = board.holes, board.numerics
+    half = (0.5 * package.substrate.length, 0.5 * package.substrate.width)
+    ends = (0.5 * board.length, 0.5 * board.width)
+    insets = (holes.inset_x, holes.inset_y)
+    axes = []
+    for footprint, end, inset in zip(half, ends, insets, strict=True):
+        axes.append(_board_axis(footprint, end, end - inset, hole_square(board), numerics))
+    x, y = (tuple(axis) for axis in axes)
+    plan = Plan(x, y, frozenset({len(x) - 2}), frozenset({len(y) - 2}))
+    return plan if board.symmetry == "quarter" else _mirrored(plan)
+
+
+def package_plan(package: Package, board: Board) -> Plan:
+    """Cut the package: intervals under the die, then those of the substrate that it leaves free."""
+    size = package.numerics.element_size
+    axes = []
+    for die, substrate in ((package.die.length, package.substrate.length), (package.die.width, package.substrate.width)):
+        axis = [uniform(0.0, 0.5 * die, size)]
+        if substrate > die:
+            axis.append(uniform(0.5 * die, 0.5 * substrate, size))
+        axes.append(tuple(axis))
+    plan = Plan(*axes)
+    return plan if board.symmetry == "quarter" else _mirrored(plan)
+
+
+def hole_square(board: Board) -> float:
+    """Side of the square around a mounting hole that is meshed as an O-grid [m]: twice the diameter, if it fits."""
+    holes = board.holes
+    return min(2.0 * holes.diameter, 1.6 * min(holes.inset_x, holes.inset_y))
+
+
+def uniform(start: float, end: float, size: float) -> Interval:
+    """An interval of equal cells, as near to ``size`` as divides it."""
+    return Interval(start, end, max(1, round((end - start) / size)))
+
+
+def under_package(plan: Plan, package: Package) -> tuple[set[int], set[int]]:
+    """Indices of the x and y intervals that lie under the package."""
+    half = (0.5 * package.substrate.length, 0.5 * package.substrate.width)
+    return tuple(
+        {index for index, part in enumerate(axis) if max(abs(part.start), abs(part.end)) <= limit * (1 + 1e-9)}
+        for axis, limit in zip((plan.x, plan.y), half, strict=True)
+    )  # type: ignore[return-value]
+
+
+def in_patch(plan: Plan, package: Package) -> tuple[set[int], set[int]]:
+    """Indices of the x and y intervals that lie under the package or in the margin around it."""
+    inside = under_package(plan, package)
+    return tuple(set(range(min(part) - (min(part) > 0), max(part) + 2)) for part in inside)  # type: ignore[return-value]
+
+
+def _board_axis(footprint: float, end: float, hole: float, square: float, numerics: BoardNumerics) -> list[Interval]:
+    inner = uniform(0.0, footprint, numerics.element_size)
+    size = footprint / inner.cells
+    margin = Interval(footprint, footprint + numerics.patch_margin * size, numerics.patch_margin)
+    axis = [inner, margin, *_outward(margin.end, hole - 0.5 * square, size, numerics)]
+    axis.append(uniform(hole - 0.5 * square, hole + 0.5 * square, numerics.coarse_size))
+    axis[-1] = replace(axis[-1], cells=max(2, axis[-1].cells))
+    axis.append(uniform(hole + 0.5 * square, end, numerics.coarse_size))
+    return axis
+
+
+def _outward(start: float, end: float, size: float, numerics: BoardNumerics) -> list[Interval]:
+    """Grow the cells from ``size`` to the coarse size, then keep it."""
+    coarse, ratio = numerics.coarse_size, numerics.growth
+    cells = max(1, math.ceil(math.log(coarse / size) / math.log(ratio)))
+    grown = size * sum(ratio**k for k in range(1, cells + 1))
+    if start + grown >= end - coarse:
+        fitting = max(1, math.floor(math.log(1.0 + (end - start) * (ratio - 1.0) / (size * ratio)) / math.log(ratio)))
+        return [Interval(start, end, fitting, ratio)]
+    return [Interval(start, start + grown, cells, ratio), uniform(start + grown, end, coarse)]
+
+
+def _mirrored(plan: Plan) -> Plan:
+    def both(axis: tuple[Interval, ...]) -> tuple[Interval, ...]:
+        return tuple(part.mirrored() for part in reversed(axis)) + axis
+
+    def holes(axis: tuple[Interval, ...], indices: frozenset[int]) -> frozenset[int]:
+        count = len(axis)
+        return frozenset({count + index for index in indices} | {count - 1 - index for index in indices})
+
+    return Plan(both(plan.x), both(plan.y), holes(plan.x, plan.hole_x), holes(plan.y, plan.hole_y))
