@@ -13,7 +13,7 @@ import numpy as np
 from meshing.blocks import MILLI, RoundHole, Surfaces, extrude, plan_surfaces
 from meshing.pads import lift
 from meshing.parameters import Board, Package, Warpage
-from meshing.plan import Plan, board_plan, hole_square, in_patch, package_plan, under_package
+from meshing.plan import blocks_within, board_plan, footprint, hole_rings, package_plan, patch
 
 HEXAHEDRON = 5
 TOLERANCE = 1.0e-6  # mm, far below any length of a package
@@ -37,7 +37,7 @@ def write_assembly(package: Package, board: Board, warpage: Warpage, path: Path)
     with _gmsh_model("assembly"):
         parts = _board_parts(package, board)
         first_of_package = gmsh.model.geo.getMaxTag(3) + 1
-        parts |= _package_parts(package, board, parts)
+        parts |= _package_parts(package, board)
         gmsh.model.geo.synchronize()
         facets = {name: tags for name, tags in parts.items() if name.endswith("_side") or name == "board_bottom"}
         volumes = {name: tags for name, tags in parts.items() if name not in facets}
@@ -54,26 +54,23 @@ def write_assembly(package: Package, board: Board, warpage: Warpage, path: Path)
 def _board_parts(package: Package, board: Board) -> dict[str, list[int]]:
     """Extrude the board from its lower face; its uppermost layers around the package are the meso model's patch."""
     plan, numerics = board_plan(package, board), board.numerics
-    ring = 0.5 * (hole_square(board) - board.holes.diameter)
-    hole = RoundHole(0.5 * board.holes.diameter, max(1, round(ring / numerics.coarse_size)))
+    hole = RoundHole(0.5 * board.holes.diameter, hole_rings(board))
     layer = board.thickness / numerics.layers
     bottom = plan_surfaces(plan, -board.thickness, hole)
     deep = numerics.layers - numerics.patch_layers
     lower, middle = extrude(bottom, deep * layer, deep)
     upper, top = extrude(middle, numerics.patch_layers * layer, numerics.patch_layers)
-    inside = _selection(*in_patch(plan, package))
-    patch = {block: tags for block, tags in upper.items() if block in inside}
-    rest = {block: tags for block, tags in upper.items() if block not in inside}
-    parts = {"board": _flat(lower) + _flat(rest), "board_patch": _flat(patch), "board_bottom": _flat(bottom)}
-    footprint = _selection(*under_package(plan, package))
-    seat = {block: tags for block, tags in top.items() if block in footprint}
+    meso = patch(plan, package)
+    rest = _select(upper, upper.keys() - meso)
+    parts = {"board": _flat(lower) + _flat(rest), "board_patch": _flat(_select(upper, meso)), "board_bottom": _flat(bottom)}
+    seat = _select(top, footprint(plan, package))
     if package.copper.layout == "plate":
         plate, seat = extrude(seat, package.copper.thickness, 1)
         parts["copper_board"] = _flat(plate)
     return parts | {"board_side": _flat(seat)}
 
 
-def _package_parts(package: Package, board: Board, board_parts: dict[str, list[int]]) -> dict[str, list[int]]:
+def _package_parts(package: Package, board: Board) -> dict[str, list[int]]:
     """Extrude copper plate (if any), substrate and die upwards from the package's underside."""
     plan, copper = package_plan(package, board), package.copper
     plate = copper.layout == "plate"
@@ -85,18 +82,9 @@ def _package_parts(package: Package, board: Board, board_parts: dict[str, list[i
         parts["copper_package"] = _flat(volumes)
     volumes, top = extrude(seat, package.substrate.thickness, package.substrate.elements)
     parts["substrate"] = _flat(volumes)
-    under_die = _selection(*_die_intervals(plan, package))
-    volumes, _ = extrude(
-        {block: tags for block, tags in top.items() if block in under_die}, package.die.thickness, package.die.elements
-    )
+    under_die = _select(top, blocks_within(plan, package.die.length, package.die.width))
+    volumes, _ = extrude(under_die, package.die.thickness, package.die.elements)
     return parts | {"die": _flat(volumes)}
-
-
-def _die_intervals(plan: Plan, package: Package) -> tuple[set[int], set[int]]:
-    return tuple(
-        {index for index, part in enumerate(axis) if max(abs(part.start), abs(part.end)) <= 0.5 * size * (1 + 1e-9)}
-        for axis, size in zip((plan.x, plan.y), (package.die.length, package.die.width), strict=True)
-    )  # type: ignore[return-value]
 
 
 def _planes_and_holes(board: Board) -> dict[str, list[int]]:
@@ -119,14 +107,12 @@ def _planes_and_holes(board: Board) -> dict[str, list[int]]:
 
 
 def _lift_package(package: Package, warpage: Warpage, volumes: list[int]) -> None:
-    tags, coordinates, _ = gmsh.model.mesh.getNodes()
-    points = dict(zip(tags, coordinates.reshape(-1, 3), strict=True))
-    of_package: set[int] = set()
-    for volume in volumes:
-        of_package.update(gmsh.model.mesh.getNodes(3, volume, includeBoundary=True)[0])
-    for tag in of_package:
-        x, y, z = points[tag]
-        gmsh.model.mesh.setNode(tag, [x, y, z + lift(package, warpage, x * MILLI, y * MILLI) / MILLI], [])
+    nodes = [gmsh.model.mesh.getNodes(3, volume, includeBoundary=True)[:2] for volume in volumes]
+    tags, first = np.unique(np.concatenate([part[0] for part in nodes]), return_index=True)
+    points = np.concatenate([part[1] for part in nodes]).reshape(-1, 3)[first]
+    points[:, 2] += lift(package, warpage, points[:, 0] * MILLI, points[:, 1] * MILLI) / MILLI
+    for tag, point in zip(tags, points, strict=True):
+        gmsh.model.mesh.setNode(tag, point, [])
 
 
 def _check_elements() -> None:
@@ -136,8 +122,8 @@ def _check_elements() -> None:
         raise ValueError(f"assembly: smallest scaled Jacobian {worst:.3g}, allowed > 0")
 
 
-def _selection(columns: set[int], rows: set[int]) -> set[tuple[int, int]]:
-    return {(i, j) for i in columns for j in rows}
+def _select(surfaces: Surfaces, blocks) -> Surfaces:
+    return {block: surfaces[block] for block in sorted(blocks)}
 
 
 def _flat(surfaces: Surfaces) -> list[int]:

@@ -29,10 +29,7 @@ class Interval:
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """Intervals along both axes; ``hole_x`` and ``hole_y`` name those that the mounting holes occupy.
-
-    ``fine`` is how many intervals from the package's axis outwards are under the package or its margin.
-    """
+    """Intervals along both axes; ``hole_x`` and ``hole_y`` name those that the mounting holes occupy."""
 
     x: tuple[Interval, ...]
     y: tuple[Interval, ...]
@@ -81,19 +78,37 @@ def uniform(start: float, end: float, size: float) -> Interval:
     return Interval(start, end, max(1, round((end - start) / size)))
 
 
-def under_package(plan: Plan, package: Package) -> tuple[set[int], set[int]]:
-    """Indices of the x and y intervals that lie under the package."""
-    half = (0.5 * package.substrate.length, 0.5 * package.substrate.width)
-    return tuple(
-        {index for index, part in enumerate(axis) if max(abs(part.start), abs(part.end)) <= limit * (1 + 1e-9)}
-        for axis, limit in zip((plan.x, plan.y), half, strict=True)
-    )  # type: ignore[return-value]
+def hole_rings(board: Board) -> int:
+    """Number of cells between a mounting hole and the edge of its square."""
+    ring = 0.5 * (hole_square(board) - board.holes.diameter)
+    return max(1, round(ring / board.numerics.coarse_size))
 
 
-def in_patch(plan: Plan, package: Package) -> tuple[set[int], set[int]]:
-    """Indices of the x and y intervals that lie under the package or in the margin around it."""
-    inside = under_package(plan, package)
-    return tuple(set(range(min(part) - (min(part) > 0), max(part) + 2)) for part in inside)  # type: ignore[return-value]
+def blocks_within(plan: Plan, length: float, width: float) -> set[tuple[int, int]]:
+    """Blocks (i, j) of the plan that lie inside a centred rectangle [m]."""
+    columns = _within(plan.x, 0.5 * length)
+    rows = _within(plan.y, 0.5 * width)
+    return {(i, j) for i in columns for j in rows}
+
+
+def footprint(plan: Plan, package: Package) -> set[tuple[int, int]]:
+    """Blocks of the board's plan that lie under the package."""
+    return blocks_within(plan, package.substrate.length, package.substrate.width)
+
+
+def patch(plan: Plan, package: Package) -> set[tuple[int, int]]:
+    """Blocks of the board's plan that lie under the package or in the margin around it."""
+    inside = footprint(plan, package)
+    columns, rows = ({block[axis] for block in inside} for axis in (0, 1))
+    return {(i, j) for i in _widened(columns) for j in _widened(rows)}
+
+
+def _within(axis: tuple[Interval, ...], limit: float) -> set[int]:
+    return {index for index, part in enumerate(axis) if max(abs(part.start), abs(part.end)) <= limit * (1.0 + 1e-9)}
+
+
+def _widened(indices: set[int]) -> range:
+    return range(max(min(indices) - 1, 0), max(indices) + 2)
 
 
 def _board_axis(footprint: float, end: float, hole: float, square: float, numerics: BoardNumerics) -> list[Interval]:

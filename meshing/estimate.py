@@ -1,0 +1,84 @@
+"""Element counts and smallest lengths of the meshes, from parameters alone (for ``plan``)."""
+
+from dataclasses import dataclass
+
+from meshing.pads import pad_table
+from meshing.parameters import Board, Package, Warpage
+from meshing.plan import Interval, Plan, blocks_within, board_plan, footprint, hole_rings, package_plan, patch
+
+
+@dataclass(frozen=True, slots=True)
+class PartEstimate:
+    """Number of hexahedra of a part and the edge lengths (x, y, z) of its smallest one [m]."""
+
+    elements: int
+    smallest: tuple[float, float, float]
+
+
+def count_elements(package: Package, board: Board) -> dict[str, PartEstimate]:
+    """Count the hexahedra of every part; the joints' ``solder`` and ``copper`` are summed over the array.
+
+    The counts are exact; lengths of joint elements are those of a cylinder of the wetted radius.
+    """
+    parts = _board_estimates(package, board) | _package_estimates(package, board) | _joint_estimates(package, board)
+    return {name: part for name, part in parts.items() if part.elements}
+
+
+def _board_estimates(package: Package, board: Board) -> dict[str, PartEstimate]:
+    plan, numerics = board_plan(package, board), board.numerics
+    patch_cells, all_cells = _cells(plan, patch(plan, package)), _cells(plan, _all_blocks(plan))
+    holes = {(i, j) for i in plan.hole_x for j in plan.hole_y}
+    all_cells += sum(2 * (plan.x[i].cells + plan.y[j].cells) * hole_rings(board) for i, j in holes) - _cells(plan, holes)
+    layer = board.thickness / numerics.layers
+    size = (_smallest(plan.x), _smallest(plan.y), layer)
+    in_patch = patch_cells * numerics.patch_layers
+    return {
+        "board": PartEstimate(all_cells * numerics.layers - in_patch, size),
+        "board_patch": PartEstimate(in_patch, size),
+        "copper_board": _plate(package, plan, footprint(plan, package)),
+    }
+
+
+def _package_estimates(package: Package, board: Board) -> dict[str, PartEstimate]:
+    plan = package_plan(package, board)
+    substrate, die = package.substrate, package.die
+    blocks, size = _all_blocks(plan), (_smallest(plan.x), _smallest(plan.y))
+    under_die = blocks_within(plan, die.length, die.width)
+    return {
+        "copper_package": _plate(package, plan, blocks),
+        "substrate": PartEstimate(
+            _cells(plan, blocks) * substrate.elements, (*size, substrate.thickness / substrate.elements)
+        ),
+        "die": PartEstimate(_cells(plan, under_die) * die.elements, (*size, die.thickness / die.elements)),
+    }
+
+
+def _joint_estimates(package: Package, board: Board) -> dict[str, PartEstimate]:
+    joints = len(pad_table(package, board, Warpage()))
+    numerics = package.joint_numerics
+    section = numerics.core**2 + 4 * numerics.core * numerics.rings
+    radius = min(package.board_pad.wetted_radius, package.package_pad.wetted_radius)
+    edge = radius / (0.5 * numerics.core + numerics.rings)
+    parts = {"solder": PartEstimate(joints * section * numerics.layers, (edge, edge, package.standoff / numerics.layers))}
+    if package.copper.layout == "pads":
+        rims = sum(pad.diameter > pad.mask_opening for pad in (package.board_pad, package.package_pad))
+        cells = joints * (2 * section + rims * 4 * numerics.core)
+        parts["copper"] = PartEstimate(cells, (edge, edge, package.copper.thickness))
+    return parts
+
+
+def _plate(package: Package, plan: Plan, blocks) -> PartEstimate:
+    cells = _cells(plan, blocks) if package.copper.layout == "plate" else 0
+    return PartEstimate(cells, (_smallest(plan.x), _smallest(plan.y), package.copper.thickness))
+
+
+def _cells(plan: Plan, blocks) -> int:
+    return sum(plan.x[i].cells * plan.y[j].cells for i, j in blocks)
+
+
+def _all_blocks(plan: Plan) -> list[tuple[int, int]]:
+    return [(i, j) for i in range(len(plan.x)) for j in range(len(plan.y))]
+
+
+def _smallest(axis: tuple[Interval, ...]) -> float:
+    return min(part.smallest() for part in axis)
