@@ -1,0 +1,51 @@
+"""Butterfly (O-grid) cross-section: a square core inside rings, on the unit disc."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+# Half-diagonal and half-side of the core on the unit disc: between a circle (equal) and a square (ratio sqrt 2).
+CORE_DIAGONAL, CORE_SIDE = 0.60, 0.50
+
+
+@dataclass(frozen=True, slots=True)
+class Butterfly:
+    """A section of the unit disc: points (n, 2), quads (q, 4) counter-clockwise, rim (4 core,) nodes of the outline."""
+
+    points: np.ndarray
+    quads: np.ndarray
+    rim: np.ndarray
+
+
+def butterfly(core: int, rings: int) -> Butterfly:
+    """Build the section with core x core quads inside ``rings`` rings of 4 core quads each."""
+    outline = _core_outline(core)
+    inner = _core_points(core)
+    angles = -0.75 * np.pi + 0.5 * np.pi * np.arange(4 * core) / core
+    circle = np.column_stack([np.cos(angles), np.sin(angles)])
+    layers = [inner[outline] + share * (circle - inner[outline]) for share in np.arange(1, rings + 1) / rings]
+    ids = [outline] + [len(inner) + ring * len(outline) + np.arange(len(outline)) for ring in range(rings)]
+    quads = [_core_quads(core)] + [
+        np.column_stack([low, high, np.roll(high, -1), np.roll(low, -1)]) for low, high in zip(ids, ids[1:], strict=False)
+    ]
+    return Butterfly(np.vstack([inner, *layers]), np.vstack(quads), ids[-1])
+
+
+def _core_points(core: int) -> np.ndarray:
+    """Square grid, its sides bent outwards so that they bulge towards the circle."""
+    steps = np.linspace(-1.0, 1.0, core + 1)
+    x, y = np.meshgrid(steps, steps)
+    corner = CORE_DIAGONAL / np.sqrt(2.0)
+    bend = CORE_SIDE - corner
+    return np.column_stack([(x * (corner + bend * (1.0 - y**2))).ravel(), (y * (corner + bend * (1.0 - x**2))).ravel()])
+
+
+def _core_outline(core: int) -> np.ndarray:
+    """Outline nodes of the core, counter-clockwise from the corner at (-1, -1)."""
+    grid = np.arange((core + 1) ** 2).reshape(core + 1, core + 1)
+    return np.concatenate([grid[0, :-1], grid[:-1, -1], grid[-1, :0:-1], grid[:0:-1, 0]])
+
+
+def _core_quads(core: int) -> np.ndarray:
+    grid = np.arange((core + 1) ** 2).reshape(core + 1, core + 1)
+    return np.column_stack([grid[:-1, :-1].ravel(), grid[:-1, 1:].ravel(), grid[1:, 1:].ravel(), grid[1:, :-1].ravel()])
