@@ -23,3 +23,7 @@ class MassError(ValueError):
 
 class EnergyError(RuntimeError):
     """A run whose energies do not balance, or are not numbers."""
+
+
+class AgreedError(RuntimeError):
+    """An error of one rank, raised on all ranks of the run."""

@@ -30,10 +30,8 @@ def holders(comm: MPI.Comm, nodes: NDArray[np.integer]) -> list[NDArray[np.int64
     order = np.lexsort((rank, number))
     number, rank = number[order], rank[order]
     pairs = [np.empty((0, 3), np.int64)]
-    for distance in range(1, comm.size):  # holders of a node are neighbours in the sorted table
-        same = np.flatnonzero(number[distance:] == number[: len(number) - distance])
-        if not len(same):
-            break
+    for distance in range(1, min(comm.size, len(number))):  # holders of a node are neighbours in the sorted table
+        same = np.flatnonzero(number[distance:] == number[:-distance])
         pairs.append(np.column_stack([number[same], rank[same], rank[same + distance]]))
         pairs.append(np.column_stack([number[same], rank[same + distance], rank[same]]))
     table = np.concatenate(pairs)

@@ -128,12 +128,15 @@ def select(data: MeshData, accept: Callable[[str], bool]) -> tuple[MeshData, NDA
     )
 
 
-def merge_nodes(data: MeshData, duplicates: NDArray[np.int32], originals: NDArray[np.int32]) -> MeshData:
-    """Return the mesh in which each node of ``duplicates`` is replaced by the one of ``originals`` beside it."""
+def merge_nodes(
+    data: MeshData, duplicates: NDArray[np.int32], originals: NDArray[np.int32]
+) -> tuple[MeshData, NDArray[np.int32]]:
+    """Replace each node of ``duplicates`` by the one of ``originals`` beside it; returns as ``without_unused_nodes``."""
     number = np.arange(len(data.points), dtype=np.int32)
     number[duplicates] = originals
     facets = {name: number[quads] for name, quads in data.facets.items()}
-    return without_unused_nodes(MeshData(data.points, number[data.cells], data.part, data.part_names, facets))[0]
+    merged, kept = without_unused_nodes(MeshData(data.points, number[data.cells], data.part, data.part_names, facets))
+    return merged, kept[number]
 
 
 def boundary_facets(cells: NDArray[np.int32]) -> NDArray[np.int32]:

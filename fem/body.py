@@ -1,0 +1,143 @@
+"""One model on one rank: elements, masses, force terms, tie. All that a substep needs."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from fem.element import Elements, Geometry, critical_steps, element_geometry, lumped_mass
+from fem.errors import MassError
+from fem.exchange import SharedNodes
+from fem.force import ForceTerm, elastic_terms
+from fem.local_mesh import LocalMesh
+from fem.materials import elasticity_matrix, material_of_part, role_of_part
+from fem.parameters import Materials
+from fem.scene import Tables
+from fem.tie import Tie
+
+MASS_TOLERANCE = 1e-10
+
+
+@dataclass(frozen=True, slots=True)
+class Pieces:
+    """The elements of one rank before their masses are fixed.
+
+    Attributes:
+        local: The rank's mesh.
+        elements: Its elements with the density of their material.
+        geometry: Their volumes and mean gradients.
+        steps: ``(ne,)`` critical step of each element [s].
+        roles: ``(ne,)`` material role of each element.
+        parts: ``(ne,)`` part of each element.
+    """
+
+    local: LocalMesh
+    elements: Elements
+    geometry: Geometry
+    steps: NDArray[np.float64]
+    roles: NDArray[np.str_]
+    parts: NDArray[np.int32]
+
+
+@dataclass(frozen=True, slots=True)
+class Body:
+    """One model on one rank, ready to move.
+
+    Attributes:
+        local: The rank's mesh.
+        elements: Its elements with their density, mass scaling included.
+        geometry: Their volumes and mean gradients.
+        terms: Force terms.
+        tie: Slaves and masters, local numbers.
+        shared: Nodes that several ranks hold.
+        cut: ``(nc,)`` local number of each cut node, -1 where another rank has it.
+        mass: ``(n,)`` [kg] lumped mass, of slaves moved to their masters.
+        free: ``(n, 3)`` whether a displacement component follows from forces.
+    """
+
+    local: LocalMesh
+    elements: Elements
+    geometry: Geometry
+    terms: list[ForceTerm]
+    tie: Tie
+    shared: SharedNodes
+    cut: NDArray[np.int32]
+    mass: NDArray[np.float64]
+    free: NDArray[np.bool_]
+
+
+def make_pieces(local: LocalMesh, tables: Tables, materials: Materials) -> Pieces:
+    """Give the local elements their materials, and find their critical steps."""
+    local = local.with_nodes(*masters_of(local, tables))
+    number = tables.part[local.cell_numbers]
+    assigned = [material_of_part(name, materials) for name in tables.part_names]
+    elements = Elements(
+        points=local.points,
+        cells=local.cells,
+        material=number,
+        elasticity=np.array([elasticity_matrix(material) for material in assigned]),
+        density=np.array([material.density for material in assigned])[number],
+    )
+    geometry = element_geometry(elements.points, elements.cells)
+    steps = critical_steps(elements, geometry.nodal_volume)
+    roles = np.array([role_of_part(name) for name in tables.part_names])[number]
+    return Pieces(local, elements, geometry, steps, roles, number)
+
+
+def masters_of(local: LocalMesh, tables: Tables) -> tuple[NDArray[np.integer], NDArray[np.float64]]:
+    """Return the masters of this rank's slaves: nodes ``(k,)``, points ``(k, 3)`` [m]."""
+    here = local.locate(tables.tie.slave) >= 0
+    return tables.tie.master[here].ravel(), tables.master_points[here].reshape(-1, 3)
+
+
+def local_tie(local: LocalMesh, tie: Tie) -> Tie:
+    """Return the rows of a tie that belong to this rank's nodes, in local numbers."""
+    slave = local.locate(tie.slave)
+    here = slave >= 0
+    return Tie(slave[here], local.locate(tie.master[here].ravel()).reshape(-1, 4), tie.weight[here])
+
+
+def make_body(comm: MPI.Comm, pieces: Pieces, tables: Tables, mass_factor: NDArray[np.float64]) -> Body:
+    """Assemble masses and forces of a model; collective.
+
+    Args:
+        comm: Communicator of the model.
+        pieces: The rank's elements.
+        tables: The model's tables.
+        mass_factor: ``(ne,)`` factor on the density of each element.
+    """
+    local = pieces.local
+    plain = pieces.elements
+    elements = Elements(plain.points, plain.cells, plain.material, plain.elasticity, plain.density * mass_factor)
+    shared = SharedNodes(comm, local.nodes)
+    tie = local_tie(local, tables.tie)
+    mass = assembled_mass(elements, pieces.geometry, tie, shared)
+    check_mass(comm, float(mass[shared.owned].sum()), float(elements.density @ pieces.geometry.volume))
+    free = np.ones((len(local.nodes), 3), dtype=bool)
+    held = local.locate(tables.held_nodes)
+    free[held[held >= 0]] = ~tables.held[held >= 0]
+    free[tie.slave] = False
+    terms = elastic_terms(elements)
+    return Body(
+        local, elements, pieces.geometry, terms, tie, shared, local.locate(tables.cut).astype(np.int32), mass, free
+    )
+
+
+def assembled_mass(elements: Elements, geometry: Geometry, tie: Tie, shared: SharedNodes) -> NDArray[np.float64]:
+    """Return the lumped mass ``(n,)`` [kg] summed over ranks, the slaves' moved to their masters: rowsum(N^T M N)."""
+    column = np.repeat(lumped_mass(elements, geometry.nodal_volume)[:, None], 3, axis=1)
+    tie.gather(column)
+    shared.add(column)
+    return np.ascontiguousarray(column[:, 0])
+
+
+def check_mass(comm: MPI.Comm, lumped: float, integrated: float) -> None:
+    """Compare the sum of lumped masses with density times volume over all ranks.
+
+    Raises:
+        MassError: They differ by more than 1e-10.
+    """
+    lumped, integrated = comm.allreduce(lumped), comm.allreduce(integrated)
+    if abs(lumped - integrated) > MASS_TOLERANCE * integrated:
+        raise MassError(f"lumped masses add up to {lumped:.12e} kg, density times volume to {integrated:.12e} kg")

@@ -1,0 +1,89 @@
+"""The cut between the macro model (``board``) and the meso model: node-matching, inside the board."""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from fem.errors import CutError
+from fem.mesh import MeshData, boundary_facets, cells_of_facets
+
+MATCH = 1e-6  # of the shortest edge of the cut
+MACRO, PATCH = "board", "board_patch"
+
+
+def find_cut(mesh: MeshData) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """Match the patch's faces inside the board with the board's nodes.
+
+    Returns:
+        Node numbers of the macro side and of the meso side, ``(nc,)`` each; equal where the parts share nodes, empty
+        where the mesh has only one of the two parts.
+
+    Raises:
+        CutError: A node of the patch has no partner in the board.
+    """
+    board, patch = mesh.cells[mesh.in_parts(MACRO.__eq__)], mesh.cells[mesh.in_parts(PATCH.__eq__)]
+    if not len(board) or not len(patch):
+        return np.empty(0, np.int32), np.empty(0, np.int32)
+    facets = inner_facets(mesh.points, board, patch)
+    meso = np.unique(facets).astype(np.int32)
+    edges = mesh.points[facets[:, [1, 2]]] - mesh.points[facets[:, [0, 0]]]
+    tolerance = MATCH * float(np.linalg.norm(edges, axis=2).min())
+    candidates = np.unique(boundary_facets(board)).astype(np.int32)
+    distance, nearest = cKDTree(mesh.points[candidates]).query(mesh.points[meso])
+    if distance.max() > tolerance:
+        position = ", ".join(f"{value:.6g}" for value in mesh.points[meso[np.argmax(distance)]])
+        raise CutError(
+            f"{np.sum(distance > tolerance)} of {len(meso)} nodes of {PATCH} on the cut have no partner in {MACRO}: the one"
+            f" at ({position}) m is {distance.max():.3e} m away, allowed are {tolerance:.3e} m"
+        )
+    return candidates[nearest], meso
+
+
+def inner_facets(
+    points: NDArray[np.float64], board: NDArray[np.int32], patch: NDArray[np.int32]
+) -> NDArray[np.int32]:
+    """Return the boundary facets of the patch that are not on a plane that bounds board and patch together.
+
+    Raises:
+        CutError: There is none: board and patch do not touch.
+    """
+    both = points[np.unique(np.concatenate([board.ravel(), patch.ravel()]))]
+    low, high = both.min(axis=0), both.max(axis=0)
+    facets = boundary_facets(patch)
+    corners = points[facets]
+    off = MATCH * (high - low).min()
+    outer = (np.abs(corners - low) < off).all(axis=1) | (np.abs(corners - high) < off).all(axis=1)
+    inner = facets[~outer.any(axis=1)]
+    if not len(inner):
+        raise CutError(f"no face of {PATCH} lies inside the board: there is no cut")
+    return inner
+
+
+def check_buffer(mesh: MeshData, cut: NDArray[np.int32]) -> None:
+    """Check that two layers of board elements lie between the cut and whatever the patch carries.
+
+    A joint on an element that touches the cut makes the window unstable (``tests/stability/fem_window.py``); the element
+    critical step of those that touch it bounds the window.
+
+    Raises:
+        CutError: An element at the cut is not of the patch, or carries a facet of ``board_side``.
+    """
+    touching = np.isin(mesh.cells, cut).any(axis=1)
+    foreign = {mesh.part_names[part] for part in np.unique(mesh.part[touching])} - {PATCH}
+    if foreign:
+        raise CutError(f"elements that touch the cut must belong to {PATCH}, found {', '.join(sorted(foreign))}")
+    tied = [quads for name, quads in mesh.facets.items() if name.startswith("foot@")]
+    if not tied:
+        return
+    feet = mesh.points[np.unique(np.concatenate(tied))]
+    low, high = feet[:, :2].min(axis=0), feet[:, :2].max(axis=0)
+    side = mesh.facets["board_side"]
+    corners = mesh.points[side][:, :, :2]
+    below = ((corners.max(axis=1) > low) & (corners.min(axis=1) < high)).all(axis=1)
+    owner = cells_of_facets(mesh.cells, side[below])
+    close = int(np.sum(touching[owner[owner >= 0]]))
+    if close:
+        raise CutError(
+            f"{close} elements under the joints touch the cut: at least two layers of board elements must lie between"
+            " (board.numerics.patch_layers >= 2, patch_margin >= 2)"
+        )

@@ -1,0 +1,97 @@
+"""The only place that knows versions of DOLFINx: 0.5 (Debian 12) and 0.9 (Debian 13)."""
+
+from pathlib import Path
+
+import dolfinx
+import dolfinx.fem
+import dolfinx.io
+import dolfinx.mesh
+import numpy as np
+import ufl
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+OLD = tuple(int(part) for part in dolfinx.__version__.split(".")[:2]) < (0, 8)
+
+
+def hexahedral_mesh(comm: MPI.Comm, points: NDArray[np.float64], cells: NDArray[np.integer]) -> dolfinx.mesh.Mesh:
+    """Create a distributed mesh without ghost cells; the arrays of all ranks together are the input.
+
+    Args:
+        comm: Communicator of the model.
+        points: ``(n, 3)`` [m], this rank's share of the nodes in input order.
+        cells: ``(ne, 8)`` input node numbers in tensor order.
+    """
+    cells = np.ascontiguousarray(cells, np.int64)
+    if OLD:
+        domain = ufl.Mesh(ufl.VectorElement("Lagrange", "hexahedron", 1))
+        partitioner = dolfinx.cpp.mesh.create_cell_partitioner()
+        ghosts = dolfinx.mesh.GhostMode.none
+        return dolfinx.mesh.create_mesh(comm, cells, points, domain, ghost_mode=ghosts, partitioner=partitioner)
+    import basix.ufl
+
+    domain = ufl.Mesh(basix.ufl.element("Lagrange", "hexahedron", 1, shape=(3,)))
+    partitioner = dolfinx.mesh.create_cell_partitioner(dolfinx.mesh.GhostMode.none)
+    return dolfinx.mesh.create_mesh(comm, cells, points, domain, partitioner=partitioner)
+
+
+def cell_nodes(mesh: dolfinx.mesh.Mesh) -> NDArray[np.int32]:
+    """Return the local geometry nodes of the local cells, tensor order: ``(ne, 8)``."""
+    dofmap = mesh.geometry.dofmap
+    return np.asarray(dofmap.array if OLD else dofmap, np.int32).reshape(-1, 8)
+
+
+def input_nodes(mesh: dolfinx.mesh.Mesh) -> NDArray[np.int64]:
+    """Return the input number of each local geometry node: ``(n,)``."""
+    return np.asarray(mesh.geometry.input_global_indices, np.int64)
+
+
+def input_cells(mesh: dolfinx.mesh.Mesh) -> NDArray[np.int64]:
+    """Return the input number of each local cell: ``(ne,)``."""
+    return np.asarray(mesh.topology.original_cell_index, np.int64)
+
+
+def vector_space(mesh: dolfinx.mesh.Mesh) -> dolfinx.fem.FunctionSpace:
+    """Return the space of trilinear vector fields."""
+    if OLD:
+        return dolfinx.fem.VectorFunctionSpace(mesh, ("Lagrange", 1))
+    return dolfinx.fem.functionspace(mesh, ("Lagrange", 1, (3,)))
+
+
+def cell_space(mesh: dolfinx.mesh.Mesh) -> dolfinx.fem.FunctionSpace:
+    """Return the space of fields that are constant in each cell; degree of freedom i belongs to local cell i."""
+    return dolfinx.fem.FunctionSpace(mesh, ("DG", 0)) if OLD else dolfinx.fem.functionspace(mesh, ("DG", 0))
+
+
+def cell_dofs(space: dolfinx.fem.FunctionSpace) -> NDArray[np.int32]:
+    """Return the (blocked) degrees of freedom of the local cells: ``(ne, k)``."""
+    dofs = space.dofmap.list
+    cells = space.mesh.topology.index_map(3)
+    array = np.asarray(dofs.array if OLD else dofs, np.int32)
+    return array.reshape(cells.size_local + cells.num_ghosts, -1)
+
+
+def compile_ahead(comm: MPI.Comm) -> None:
+    """Let one rank compile the elements of the output, before two communicators wait for the same cache entry."""
+    if comm.rank == 0:
+        corners = np.array([[float(a >> d & 1) for d in range(3)] for a in range(8)])
+        cube = hexahedral_mesh(MPI.COMM_SELF, corners, np.arange(8)[None, :])
+        vector_space(cube)
+        cell_space(cube)
+    comm.Barrier()
+
+
+class FieldFile:
+    """A time series of functions for ParaView (PVD with pieces per rank)."""
+
+    def __init__(self, comm: MPI.Comm, path: Path) -> None:
+        """Open ``path`` (``.pvd``); collective."""
+        self._file = dolfinx.io.VTKFile(comm, str(path), "w")
+
+    def write(self, functions: list[dolfinx.fem.Function], time: float) -> None:
+        """Append functions of one mesh at a time [s]; collective."""
+        self._file.write_function(functions, time)
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()

@@ -1,0 +1,90 @@
+"""Steps and cost before anything is meshed: plain NumPy, for ``plan`` and for the run itself."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem.materials import elasticity_matrix
+from fem.parameters import Material
+
+# Element updates per second and core of the whole substep (force, update, tie), from benchmarks/internal_force.py and the
+# bga_drop case on one core of an AMD EPYC (AVX-512) at 2 ranks.
+UPDATES_PER_SECOND = 1.0e7
+WINDOW_OVERHEAD = 3.0e-5  # [s] messages and interpreter per window, same source
+
+
+@dataclass(frozen=True, slots=True)
+class WindowPlan:
+    """The time steps of a run.
+
+    Attributes:
+        window: Coupling interval DT [s], the step of the macro model.
+        substeps: m, meso steps per window.
+        windows: Number of windows.
+        stride: Windows between two history samples.
+    """
+
+    window: float
+    substeps: int
+    windows: int
+    stride: int
+
+    @property
+    def step(self) -> float:
+        """Return dt = DT / m [s]."""
+        return self.window / self.substeps
+
+
+def box_critical_step(material: Material, size: NDArray[np.float64]) -> float:
+    """Return the critical step [s] of a box element with edges ``size (3,)`` [m] along the material's axes.
+
+    With the lumped mass the stiffest modes are the uniform strains: omega^2 is the largest eigenvalue of
+    4 C_ij / (density h_i h_j) over the normal strains, and 4 G_ij (1/h_i^2 + 1/h_j^2) / density in shear. Incompatible
+    modes soften bending below both.
+    """
+    elasticity = elasticity_matrix(material)
+    normal = np.linalg.eigvalsh(elasticity[:3, :3] / np.outer(size, size))[-1]
+    pairs = ((3, 0, 1), (4, 1, 2), (5, 0, 2))
+    shear = max(elasticity[k, k] * (size[i] ** -2.0 + size[j] ** -2.0) for k, i, j in pairs)
+    return 1.0 / math.sqrt(max(float(normal), float(shear)) / material.density)
+
+
+def window_plan(macro_step: float, meso_step: float, fraction: float, duration: float, samples: int) -> WindowPlan:
+    """Choose window and substeps from critical steps.
+
+    Args:
+        macro_step: Smallest element critical step of the macro model and of the elements that touch the cut [s].
+        meso_step: Smallest element critical step of the meso model [s].
+        fraction: Of the critical step that is used.
+        duration: Simulated time [s]; a whole number of windows.
+        samples: History samples wanted.
+    """
+    windows = math.ceil(duration / (fraction * macro_step))
+    window = duration / windows
+    substeps = math.ceil(window / (fraction * meso_step))
+    return WindowPlan(window, substeps, windows, max(1, windows // samples))
+
+
+def predict_seconds(
+    macro_elements: int, meso_elements: int, plan: WindowPlan, ranks: tuple[int, int], rate: float = UPDATES_PER_SECOND
+) -> tuple[float, float]:
+    """Predict the wall time of a two-scale and of a DNS run.
+
+    Args:
+        macro_elements: Elements of the macro model.
+        meso_elements: Elements of the meso model.
+        plan: Time steps.
+        ranks: Macro and meso ranks; DNS uses their sum.
+        rate: Element updates per second and rank.
+
+    Returns:
+        Seconds of ``two_scale`` and of ``dns``.
+    """
+    macro, meso = macro_elements / ranks[0], plan.substeps * meso_elements / ranks[1]
+    everything = plan.substeps * (macro_elements + meso_elements) / sum(ranks)
+    return (
+        plan.windows * (max(macro, meso) / rate + WINDOW_OVERHEAD),
+        plan.windows * (everything / rate + WINDOW_OVERHEAD),
+    )

@@ -1,0 +1,152 @@
+"""The participants of a run: macro and meso model of the two-scale scheme, or one model alone.
+
+A window of the held-velocity scheme (held cut velocity; the cut lies two layers of elements inside the board):
+macro: a_n = (F_ext + F_c - F_int) / (M + M_interface) -> v^{n+1/2}, U^{n+1}; the cut's v^{n+1/2} goes to the meso model,
+which takes m substeps with it WHILE the macro model computes F_int(U^{n+1}); F_c = -(K u)_cut comes back at the end.
+Each participant's window is one method, its messages go through two ``Channel`` objects and nothing else.
+"""
+
+from typing import Protocol
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from fem.body import Body
+from fem.estimate import WindowPlan
+from fem.exchange import Channel, Port
+from fem.kernels_motion import add_impulse
+from fem.loads import Load
+from fem.motion import Motion
+from fem.steps import Steps
+
+
+class Participant(Protocol):
+    """One model on one rank.
+
+    Attributes:
+        motion: Its state.
+        plan: Window and substeps.
+        interface_work: Work [J] of this rank's share across the cut: put in by the macro model, received by the meso model.
+    """
+
+    motion: Motion
+    plan: WindowPlan
+    interface_work: float
+
+    def run_window(self) -> None:
+        """Advance by one window."""
+
+    def cut_force(self) -> NDArray[np.float64]:
+        """Return the forces ``(n, 3)`` [N] across the cut as this participant knows them, zero elsewhere."""
+
+    def foreign_force(self) -> NDArray[np.float64]:
+        """Return the part ``(n, 3)`` [N] of ``motion.force`` that belongs to the other model."""
+
+
+class Alone:
+    """A DNS: one model, all steps small."""
+
+    def __init__(self, body: Body, loads: list[Load], steps: Steps) -> None:
+        """Start at rest."""
+        none = np.empty(0, np.int32)
+        self.motion = Motion(body, loads, steps.plan.step, none, np.zeros(len(body.mass)))
+        self.interface_work = 0.0
+        self.plan = steps.plan
+        self._zero = np.zeros_like(self.motion.force)
+
+    def run_window(self) -> None:
+        """Take m substeps."""
+        for _ in range(self.plan.substeps):
+            self.motion.advance()
+            self.motion.update_force()
+
+    def cut_force(self) -> NDArray[np.float64]:
+        """Return zero: there is no cut."""
+        return self._zero
+
+    def foreign_force(self) -> NDArray[np.float64]:
+        """Return zero: all forces are this model's."""
+        return self._zero
+
+
+class Macro:
+    """The board: one step a window."""
+
+    def __init__(self, body: Body, loads: list[Load], steps: Steps, world: MPI.Comm) -> None:
+        """Receive the interface mass and start at rest; collective with ``Meso``."""
+        self._velocities = Channel(world, Port(body.cut, sends=True))
+        self._forces = Channel(world, Port(body.cut, sends=False))
+        self._received = np.zeros((len(body.mass), 3))
+        self._forces.receive(self._received)
+        self.motion = Motion(body, loads, steps.plan.window, np.empty(0, np.int32), self._received[:, 0].copy())
+        self._received[:] = 0.0
+        self.plan = steps.plan
+        self._counted = counted_cut(body)
+        self.interface_work = 0.0
+
+    def run_window(self) -> None:
+        """Take one step: send the cut's velocity, compute the force, receive the meso model's."""
+        motion = self.motion
+        motion.advance()
+        self._velocities.send(motion.velocity)
+        motion.update_force()
+        before = self._received[self._counted]
+        self._forces.receive(self._received)
+        motion.force += self._received
+        impulse = 0.5 * motion.step * (before + self._received[self._counted])
+        self.interface_work -= float(np.sum(impulse * motion.velocity[self._counted]))
+
+    def cut_force(self) -> NDArray[np.float64]:
+        """Return the received force at the cut."""
+        return self._received
+
+    def foreign_force(self) -> NDArray[np.float64]:
+        """Return the received force: it is in ``motion.force``."""
+        return self._received
+
+
+class Meso:
+    """Joints, package and the uppermost board layers: m substeps a window."""
+
+    def __init__(self, body: Body, loads: list[Load], steps: Steps, world: MPI.Comm) -> None:
+        """Send the interface mass and start at rest; collective with ``Macro``."""
+        self._velocities = Channel(world, Port(body.cut, sends=False))
+        self._forces = Channel(world, Port(body.cut, sends=True))
+        self._forces.send(np.repeat(body.mass[:, None], 3, axis=1))
+        held = body.cut[body.cut >= 0]
+        self.motion = Motion(body, loads, steps.plan.step, held, np.zeros(len(body.mass)))
+        self.plan = steps.plan
+        self._counted = counted_cut(body)
+        self._cut_force = np.zeros((len(body.mass), 3))
+        self._zero = np.zeros_like(self._cut_force)
+        self.interface_work = 0.0
+
+    def run_window(self) -> None:
+        """Take m substeps at the received velocity of the cut, then send its force."""
+        motion = self.motion
+        self._velocities.receive(motion.velocity)
+        impulse = np.zeros((len(self._counted), 3))
+        add_impulse(self._counted, motion.force, 0.5 * motion.step, impulse)
+        for _ in range(self.plan.substeps):
+            motion.advance()
+            motion.update_force()
+            add_impulse(self._counted, motion.force, motion.step, impulse)
+        add_impulse(self._counted, motion.force, -0.5 * motion.step, impulse)
+        self._forces.send(motion.force)
+        self.interface_work -= float(np.sum(impulse * motion.velocity[self._counted]))
+
+    def cut_force(self) -> NDArray[np.float64]:
+        """Return the force that was sent."""
+        self._cut_force[self._counted] = self.motion.force[self._counted]
+        return self._cut_force
+
+    def foreign_force(self) -> NDArray[np.float64]:
+        """Return zero: all forces are this model's."""
+        return self._zero
+
+
+def counted_cut(body: Body) -> NDArray[np.int32]:
+    """Return the local cut nodes that count on this rank: those that it owns."""
+    here = body.cut[body.cut >= 0]
+    return here[body.shared.owned[here]]

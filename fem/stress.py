@@ -1,0 +1,61 @@
+"""Stress and strain from displacements, consistent with the element: mean gradients give its average strain."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem.element import Elements
+
+
+def element_stress(
+    gradient: NDArray[np.float64], elasticity: NDArray[np.float64], displacement: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return the average stress of elements ``(m, 6)`` [Pa].
+
+    Args:
+        gradient: ``(m, 8, 3)`` [1/m] mean gradients.
+        elasticity: ``(m, 6, 6)`` [Pa].
+        displacement: ``(m, 8, 3)`` [m] at the nodes.
+    """
+    h = np.einsum("mai,maj->mij", displacement, gradient)
+    strain = np.stack(
+        [h[:, 0, 0], h[:, 1, 1], h[:, 2, 2], h[:, 0, 1] + h[:, 1, 0], h[:, 1, 2] + h[:, 2, 1], h[:, 0, 2] + h[:, 2, 0]],
+        axis=1,
+    )
+    return np.einsum("mij,mj->mi", elasticity, strain)
+
+
+def von_mises(stress: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the von Mises stress ``(m,)`` [Pa] of stresses ``(m, 6)``."""
+    xx, yy, zz, xy, yz, xz = stress.T
+    return np.sqrt(0.5 * ((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2) + 3.0 * (xy**2 + yz**2 + xz**2))
+
+
+def principal_strain(corners: NDArray[np.float64], displacement: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the largest and the smallest in-plane principal strain at the centres of facets normal to z: ``(2, f)``.
+
+    Args:
+        corners: ``(f, 4, 2)`` [m], cyclic.
+        displacement: ``(f, 4, 2)`` [m].
+    """
+    tangent = np.array([[-0.25, -0.25], [0.25, -0.25], [0.25, 0.25], [-0.25, 0.25]])
+    jacobian = np.einsum("fai,ad->fid", corners, tangent)
+    gradient = np.einsum("fai,ad->fid", displacement, tangent) @ np.linalg.inv(jacobian)
+    mean = 0.5 * (gradient[:, 0, 0] + gradient[:, 1, 1])
+    radius = np.hypot(
+        0.5 * (gradient[:, 0, 0] - gradient[:, 1, 1]), 0.5 * (gradient[:, 0, 1] + gradient[:, 1, 0])
+    )
+    return np.array([mean + radius, mean - radius])
+
+
+class StressRecovery:
+    """Average stresses of some elements of a rank."""
+
+    def __init__(self, elements: Elements, gradient: NDArray[np.float64]) -> None:
+        """Keep what the stresses of ``elements`` with mean gradients ``(ne, 8, 3)`` [1/m] need."""
+        self._cells = elements.cells
+        self._gradient = gradient
+        self._elasticity = elements.elasticity[elements.material]
+
+    def stress(self, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the stresses ``(ne, 6)`` [Pa] at a displacement ``(n, 3)`` [m]."""
+        return element_stress(self._gradient, self._elasticity, displacement[self._cells])

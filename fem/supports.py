@@ -1,0 +1,17 @@
+"""Supports in the frame of the drop table: which displacement components are held at zero."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem.mesh import MeshData
+
+# Facet set -> components held: bolted mounting holes; symmetry planes normal to x and y.
+HELD = {"mounting_holes": (0, 1, 2), "symmetry_x": (0,), "symmetry_y": (1,)}
+
+
+def held_components(mesh: MeshData) -> NDArray[np.bool_]:
+    """Return ``(n, 3)``: whether a node's displacement component is held."""
+    held = np.zeros((len(mesh.points), 3), dtype=bool)
+    for name, components in HELD.items():
+        held[np.ix_(mesh.facet_nodes(name), components)] = True
+    return held

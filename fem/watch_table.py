@@ -1,0 +1,122 @@
+"""Watch points as tables in input numbers: centres, joints, board strain."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem.element import element_geometry
+from fem.errors import MeshError
+from fem.mesh import MeshData, cells_of_facets
+
+
+@dataclass(frozen=True, slots=True)
+class WatchTable:
+    """Watch points in input numbers.
+
+    Attributes:
+        joints: Names of the joints, the same for all models of a run.
+        centres: ``(2,)`` node of the board's and of the die's centre, -1 where another model has it.
+        layer_cells: ``(k,)`` solder elements at the pads.
+        layer_end: ``(k,)`` 0 at the board, 1 at the package.
+        layer_joint: ``(k,)`` joint of each.
+        layer_volume: ``(k,)`` share of the layer's volume.
+        layer_area: ``(k,)`` share of the layer's pad area.
+        solder_cells: ``(s,)`` all solder elements.
+        solder_joint: ``(s,)`` joint of each.
+        strain_facets: ``(f, 4)`` nodes of the board's lower face around the package.
+        strain_cells: ``(f,)`` the element of each.
+    """
+
+    joints: tuple[str, ...]
+    centres: NDArray[np.integer]
+    layer_cells: NDArray[np.int64]
+    layer_end: NDArray[np.int64]
+    layer_joint: NDArray[np.int64]
+    layer_volume: NDArray[np.float64]
+    layer_area: NDArray[np.float64]
+    solder_cells: NDArray[np.int64]
+    solder_joint: NDArray[np.int64]
+    strain_facets: NDArray[np.int32]
+    strain_cells: NDArray[np.int64]
+
+
+def joint_names(mesh: MeshData) -> tuple[str, ...]:
+    """Return the names of the joints, in the order of the mesh."""
+    return tuple(name.split("@")[1] for name in mesh.part_names if name.startswith("solder@"))
+
+
+def footprint(mesh: MeshData) -> NDArray[np.float64]:
+    """Return the corners ``(2, 2)`` [m] in x, y of the package and its margin: of the patch, or of all where none is."""
+    patch = mesh.in_parts("board_patch".__eq__)
+    points = mesh.points[mesh.cells[patch if patch.any() else slice(None)]][:, :, :2]
+    return np.array([points.min(axis=(0, 1)), points.max(axis=(0, 1))])
+
+
+def centre_nodes(mesh: MeshData) -> NDArray[np.int64]:
+    """Return the nodes nearest to the axis x = y = 0 on the board's lower face and on the die's upper face, or -1."""
+    board = mesh.facet_nodes("board_bottom")
+    die = np.unique(mesh.cells[mesh.in_parts("die".__eq__)])
+    if len(die):
+        height = mesh.points[die, 2]
+        die = die[height > height.max() - 1e-6 * np.ptp(mesh.points[die], axis=0).max()]
+    return np.array([nearest_to_axis(mesh.points, nodes) for nodes in (board, die)])
+
+
+def nearest_to_axis(points: NDArray[np.float64], nodes: NDArray[np.integer]) -> int:
+    """Return the one of some nodes that is nearest to x = y = 0, -1 where there is none."""
+    return int(nodes[np.argmin(np.sum(points[nodes, :2] ** 2, axis=1))]) if len(nodes) else -1
+
+
+def watch_table(
+    mesh: MeshData, joints: tuple[str, ...], corners: NDArray[np.float64], centres: NDArray[np.integer]
+) -> WatchTable:
+    """Build the table of one model, whose mesh may hold none of the joints.
+
+    Args:
+        mesh: The model's mesh.
+        joints: Names of the joints of all models.
+        corners: ``(2, 2)`` [m] footprint inside which the board's strain is watched.
+        centres: ``(2,)`` nodes of the board's and the die's centre.
+
+    Raises:
+        MeshError: A pad of a joint has no solder element.
+    """
+    solder = [(j, mesh.in_parts(f"solder@{name}".__eq__).nonzero()[0]) for j, name in enumerate(joints)]
+    solder = [(j, cells) for j, cells in solder if len(cells)]
+    layers = [pad_layer(mesh, joints[j], cells, end) for j, cells in solder for end in (0, 1)]
+    facets = mesh.facets.get("board_bottom", np.empty((0, 4), np.int32))
+    low, high = corners
+    inside = ((mesh.points[facets][:, :, :2] >= low) & (mesh.points[facets][:, :, :2] <= high)).all(axis=(1, 2))
+    facets = facets[inside]
+    empty, lengths = np.empty(0, np.int64), [len(layer[0]) for layer in layers]
+    return WatchTable(
+        joints=joints,
+        centres=centres,
+        layer_cells=np.concatenate([layer[0] for layer in layers] or [empty]),
+        layer_end=np.repeat(np.tile([0, 1], len(solder)), lengths),
+        layer_joint=np.repeat([j for j, _ in solder for _ in (0, 1)], lengths).astype(np.int64),
+        layer_volume=np.concatenate([layer[1] for layer in layers] or [np.empty(0)]),
+        layer_area=np.concatenate([layer[2] for layer in layers] or [np.empty(0)]),
+        solder_cells=np.concatenate([cells for _, cells in solder] or [empty]),
+        solder_joint=np.repeat([j for j, _ in solder], [len(cells) for _, cells in solder]).astype(np.int64),
+        strain_facets=facets,
+        strain_cells=cells_of_facets(mesh.cells, facets),
+    )
+
+
+def pad_layer(
+    mesh: MeshData, joint: str, solder: NDArray[np.int64], end: int
+) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+    """Return the solder elements at one pad of a joint with their shares of the layer's volume and pad area."""
+    name = (f"pad_board@{joint}", f"pad_package@{joint}")[end]
+    facets = mesh.facets.get(name, np.empty((0, 4), np.int32))
+    owner = cells_of_facets(mesh.cells[solder], facets)
+    if not len(facets) or (owner < 0).any():
+        raise MeshError(f"{name}: {np.sum(owner < 0)} of {len(facets)} facets belong to no element of solder@{joint}")
+    corners = mesh.points[facets]
+    area = 0.5 * np.linalg.norm(np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]), axis=1)
+    cells, index = np.unique(solder[owner], return_inverse=True)
+    area = np.bincount(index.reshape(-1), area)
+    volume = element_geometry(mesh.points, mesh.cells[cells]).volume
+    return cells, volume / volume.sum(), area / area.sum()

@@ -1,0 +1,137 @@
+"""Small meshes for the shock tests: bars, boards, and a package of box joints that match nothing."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import gmsh
+import numpy as np
+
+from fem.mesh import TENSOR_ORDER, MeshData, boundary_facets, without_unused_nodes
+
+CYCLIC = [0, 1, 3, 2]
+FACET_SETS = Callable[[np.ndarray], np.ndarray]
+
+
+def grid(x: Sequence[float], y: Sequence[float], z: Sequence[float]) -> tuple[np.ndarray, np.ndarray]:
+    """Return points (n, 3) and hexahedra (ne, 8) in tensor order of a structured box."""
+    zz, yy, xx = np.meshgrid(np.asarray(z, float), np.asarray(y, float), np.asarray(x, float), indexing="ij")
+    points = np.column_stack([xx.ravel(), yy.ravel(), zz.ravel()])
+    number = np.arange(len(points), dtype=np.int32).reshape(zz.shape)
+    shift = [slice(None, -1), slice(1, None)]
+    cells = np.stack([number[shift[a >> 2], shift[a >> 1 & 1], shift[a & 1]].ravel() for a in range(8)], axis=1)
+    return points, cells
+
+
+def mesh_of(points: np.ndarray, cells: np.ndarray, part: str | np.ndarray, facets: dict[str, FACET_SETS]) -> MeshData:
+    """Return a mesh; ``facets`` maps a name to a test of boundary facet centres (nf, 3) -> (nf,)."""
+    names = np.full(len(cells), part) if isinstance(part, str) else part
+    part_names, number = np.unique(names, return_inverse=True)
+    quads = boundary_facets(cells)[:, CYCLIC]
+    centres = points[quads].mean(axis=1)
+    sets = {name: quads[test(centres)] for name, test in facets.items()}
+    return MeshData(points, cells, number.astype(np.int32), tuple(str(name) for name in part_names), sets)
+
+
+def on(axis: int, value: float, tolerance: float = 1e-9) -> FACET_SETS:
+    """Return the test of facets on a plane."""
+    return lambda centres: np.abs(centres[:, axis] - value) < tolerance
+
+
+def bar(length: float, elements: int, width: float, part: str = "board") -> MeshData:
+    """Return a bar along x, one element thick, held at x = 0 across (set ``end``)."""
+    points, cells = grid(np.linspace(0, length, elements + 1), [0, width], [0, width])
+    return mesh_of(points, cells, part, {"low": on(0, 0.0), "high": on(0, length)})
+
+
+BOARD_X, BOARD_Y, BOARD_Z = 12e-3, 8e-3, 1e-3
+PATCH, PACKAGE, GAP, COPPER = 3.5e-3, 2.5e-3, 0.3e-3, 2e-5
+
+
+def board_mesh(size: float = 0.5e-3, layers: int = 4, patch_layers: int = 2) -> MeshData:
+    """Return a quarter board with its patch under the package, held at its far corner."""
+    x, y = np.arange(0, BOARD_X + size / 2, size), np.arange(0, BOARD_Y + size / 2, size)
+    points, cells = grid(x, y, np.linspace(-BOARD_Z, 0, layers + 1))
+    centre = points[cells].mean(axis=1)
+    bottom = -BOARD_Z * patch_layers / layers
+    patch = (centre[:, 0] < PATCH) & (centre[:, 1] < PATCH) & (centre[:, 2] > bottom)
+    facets = {
+        "symmetry_x": on(0, 0.0),
+        "symmetry_y": on(1, 0.0),
+        "mounting_holes": lambda c: (np.abs(c[:, 0] - BOARD_X) < 1e-9) & (c[:, 1] > BOARD_Y - 2e-3),
+        "board_side": lambda c: (np.abs(c[:, 2]) < 1e-9) & (c[:, 0] < PATCH) & (c[:, 1] < PATCH),
+        "board_bottom": on(2, -BOARD_Z),
+    }
+    return mesh_of(points, cells, np.where(patch, "board_patch", "board"), facets)
+
+
+def package_mesh(size: float = 0.5e-3) -> MeshData:
+    """Return substrate and die above the joints."""
+    low = GAP + 2 * COPPER
+    x = np.arange(0, PACKAGE + size / 2, size)
+    points, cells = grid(x, x, low + np.array([0.0, 0.2e-3, 0.4e-3, 0.6e-3, 0.8e-3]))
+    centre = points[cells].mean(axis=1)
+    die = centre[:, 2] > low + 0.4e-3
+    kept = ~die | ((centre[:, 0] < 2e-3) & (centre[:, 1] < 2e-3))
+    facets = {"symmetry_x": on(0, 0.0), "symmetry_y": on(1, 0.0), "package_side": on(2, low)}
+    mesh = mesh_of(points, cells[kept], np.where(die, "die", "substrate")[kept], facets)
+    return without_unused_nodes(mesh)[0]
+
+
+def joint_mesh(name: str, x: float, y: float, layers: int = 4) -> MeshData:
+    """Return a box joint of solder between two copper pads, centred on (x, y)."""
+    side = np.linspace(-0.2e-3, 0.2e-3, 4)
+    height = np.concatenate([[0.0], COPPER + np.linspace(0, GAP, layers + 1), [GAP + 2 * COPPER]])
+    points, cells = grid(x + side, y + side, height)
+    level = np.repeat(np.arange(layers + 2), 9)
+    part = np.array(["solder"] * (layers + 2), dtype=object)
+    part[0], part[-1] = "copper_board", "copper_package"
+    ends = {f"foot@{name}": on(2, 0.0), f"head@{name}": on(2, height[-1])}
+    mesh = mesh_of(points, cells, np.array([f"{part[k]}@{name}" for k in level]), ends)
+    solder = cells[np.isin(level, np.arange(1, layers + 1))]
+    inner = boundary_facets(solder)[:, CYCLIC]
+    for end, z in (("board", COPPER), ("package", COPPER + GAP)):
+        mesh.facets[f"pad_{end}@{name}"] = inner[on(2, z)(points[inner].mean(axis=1))]
+    return mesh
+
+
+SITES = {"B2": (0.5e-3, 0.5e-3), "B3": (1.5e-3, 0.5e-3), "A2": (0.5e-3, 1.5e-3), "A3": (1.5e-3, 1.5e-3)}
+
+
+def small_assembly(joints: int = 4, **board: float) -> list[MeshData]:
+    """Return board, package and some joints as meshes that share no node."""
+    sites = list(SITES.items())[-joints:]
+    return [board_mesh(**board), package_mesh(), *(joint_mesh(name, x, y) for name, (x, y) in sites)]
+
+
+def write_msh(mesh: MeshData, path: Path) -> None:
+    """Write a mesh as Gmsh 4.1 with physical names."""
+    gmsh.initialize(interruptible=False)
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        gmsh.model.add("test")
+        parts = [
+            (3, 5, name, mesh.cells[mesh.part == part][:, np.argsort(TENSOR_ORDER)])
+            for part, name in enumerate(mesh.part_names)
+        ]
+        parts += [(2, 3, name, quads) for name, quads in mesh.facets.items() if len(quads)]
+        entities = [gmsh.model.addDiscreteEntity(dimension) for dimension, *_ in parts]
+        gmsh.model.mesh.addNodes(3, entities[0], np.arange(1, len(mesh.points) + 1), mesh.points.ravel())
+        for entity, (dimension, kind, name, nodes) in zip(entities, parts):
+            gmsh.model.mesh.addElementsByType(entity, kind, [], (nodes + 1).ravel())
+            gmsh.model.addPhysicalGroup(dimension, [entity], name=name)
+        gmsh.option.setNumber("Mesh.MshFileVersion", 4.1)
+        gmsh.option.setNumber("Mesh.SaveAll", 0)
+        gmsh.write(str(path))
+    finally:
+        gmsh.finalize()
+
+
+def write_small_assembly(directory: Path, joints: int = 4, **board: float) -> list[Path]:
+    """Write ``assembly.msh`` and ``joints.msh``; return their paths."""
+    from fem.mesh import append
+
+    board_part, package, *others = small_assembly(joints, **board)
+    paths = [directory / "assembly.msh", directory / "joints.msh"]
+    write_msh(append([board_part, package]), paths[0])
+    write_msh(append(others), paths[1])
+    return paths
