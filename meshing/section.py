@@ -22,7 +22,7 @@ def cut_segments(points: np.ndarray, triangles: np.ndarray, height: float) -> np
         lone = np.argmax(above[chosen] == lone_above, axis=1)
         apex, following, preceding = (chosen[np.arange(len(chosen)), (lone + k) % 3] for k in range(3))
         first, second = _crossing(points, apex, following, height), _crossing(points, apex, preceding, height)
-        segments.append(np.stack((second, first) if lone_above else (first, second), axis=1))
+        segments.append(np.stack((first, second) if lone_above else (second, first), axis=1))
     return np.concatenate(segments)
 
 
