@@ -3,7 +3,6 @@
 Joints are not in it: they are meshed after reflow and tied to ``board_side`` and ``package_side``.
 """
 
-from contextlib import contextmanager
 from itertools import chain
 from pathlib import Path
 
@@ -11,11 +10,11 @@ import gmsh
 import numpy as np
 
 from meshing.blocks import MILLI, RoundHole, Surfaces, extrude, plan_surfaces
+from meshing.gmsh_session import gmsh_model, name_groups, write_msh
 from meshing.pads import lift
 from meshing.parameters import Board, Package, Warpage
 from meshing.plan import blocks_within, board_plan, footprint, hole_rings, package_plan, patch
 
-HEXAHEDRON = 5
 TOLERANCE = 1.0e-6  # mm, far below any length of a package
 
 
@@ -34,7 +33,7 @@ def write_assembly(package: Package, board: Board, warpage: Warpage, path: Path)
     Raises:
         ValueError: an element is inside out.
     """
-    with _gmsh_model("assembly"):
+    with gmsh_model("assembly"):
         parts = _board_parts(package, board)
         first_of_package = gmsh.model.geo.getMaxTag(3) + 1
         parts |= _package_parts(package, board)
@@ -42,12 +41,12 @@ def write_assembly(package: Package, board: Board, warpage: Warpage, path: Path)
         facets = {name: tags for name, tags in parts.items() if name.endswith("_side") or name == "board_bottom"}
         volumes = {name: tags for name, tags in parts.items() if name not in facets}
         facets |= _planes_and_holes(board)
-        _name(3, volumes)
-        _name(2, facets)
+        name_groups(3, volumes)
+        name_groups(2, facets)
         gmsh.model.mesh.generate(3)
         _lift_package(package, warpage, [tag for _, tag in gmsh.model.getEntities(3) if tag >= first_of_package])
         _check_elements()
-        _write(path)
+        write_msh(path, MILLI)
         return {name: sum(_count(tag) for tag in tags) for name, tags in volumes.items()}
 
 
@@ -132,27 +131,3 @@ def _flat(surfaces: Surfaces) -> list[int]:
 
 def _count(volume: int) -> int:
     return sum(len(tags) for tags in gmsh.model.mesh.getElements(3, volume)[1])
-
-
-def _name(dimension: int, groups: dict[str, list[int]]) -> None:
-    for name, tags in groups.items():
-        gmsh.model.addPhysicalGroup(dimension, tags, name=name)
-
-
-def _write(path: Path) -> None:
-    gmsh.option.setNumber("Mesh.ScalingFactor", MILLI)
-    gmsh.option.setNumber("Mesh.MshFileVersion", 4.1)
-    gmsh.option.setNumber("Mesh.Binary", 1)
-    gmsh.write(str(path))
-
-
-@contextmanager
-def _gmsh_model(name: str):
-    """A fresh, silent Gmsh session that is closed whatever happens."""
-    gmsh.initialize(interruptible=False)
-    try:
-        gmsh.option.setNumber("General.Terminal", 0)
-        gmsh.model.add(name)
-        yield
-    finally:
-        gmsh.finalize()
