@@ -82,7 +82,8 @@ def _stack(geometry: JointGeometry, counts: tuple[int, int], bulge: float, spaci
     fraction = height / geometry.gap
     rim = (1.0 - fraction) * geometry.radius_board + fraction * geometry.radius_package
     radius = equal_area_radius(1.0, corners) * rim + bulge * (1.0 - np.abs(2.0 * fraction - 1.0))
-    shells, interior = [], []
+    shells: list[Floats] = []
+    interior: list[Floats] = []
     for layer in range(layer_count):
         turn = np.pi / corners * (layer % 2)
         for ring in range(ring_count, -1, -1):

@@ -69,7 +69,6 @@ class LiquidFlow:
         self.volume = body.volume()[0]
         self.neighbours = NeighbourList(SUPPORT[basis] * spacing, SKIN * spacing)
         self.time, self.steps = 0.0, 0
-        body.surface_pressure = self._mean_capillary_pressure()
 
     def step(self) -> StepRecord:
         """Advance one time step.
@@ -92,14 +91,6 @@ class LiquidFlow:
         record = self._record(before, flips, iterations)
         self.time_step.grow()
         return record
-
-    def _mean_capillary_pressure(self) -> float:
-        """Least-squares pressure p of f + p a = 0 over the free vertices of the surface [Pa]."""
-        surface = slice(self.body.cloud.surface_count)
-        free = self.physics.free(self.body)[surface]
-        load = self.physics.force(self.body)[surface][free]
-        gradient = self.body.volume()[1][surface][free]
-        return -float((load * gradient).sum() / (gradient**2).sum())
 
     def _accelerate(self) -> int:
         """Solve for velocity and pressure, again with a smaller step where a particle would move too far.

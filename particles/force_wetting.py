@@ -44,11 +44,25 @@ class Wetting:
 
     def contact_cosines(self, body: Body) -> list[Floats]:
         """Cosines of the contact angles at the vertices of each contact line, from the balance of forces."""
-        load = body.surface_pressure * body.volume()[1] + sum(force.force(body) for force in self.others)
+        load = self._load(body)
         return [line.contact_cosine(body, load, self.coefficient) for line in self.lines]
 
     def update(self, body: Body) -> None:
         """Release and catch vertices at the edges of the wetted discs."""
-        load = body.surface_pressure * body.volume()[1] + sum(force.force(body) for force in self.others)
+        load = self._load(body)
         for line in self.lines:
             line.update(body, load, self.coefficient)
+
+    def _load(self, body: Body) -> Floats:
+        """All forces but the walls', `(n, 3)` [N], with the mean capillary pressure of the surface.
+
+        The pressure p is the least-squares solution of f + p a = 0 over the vertices off the contact lines; the
+        pressure of the solve would bring the accelerations of a violent start into the contact angle.
+        """
+        force = sum((other.force(body) for other in self.others), np.zeros_like(body.points))
+        gradient = body.volume()[1]
+        off_lines = np.arange(len(body.points)) < body.cloud.surface_count
+        off_lines[body.cloud.wall >= 0] = False
+        a = gradient[off_lines]
+        pressure = -float((force[off_lines] * a).sum() / (a**2).sum())
+        return force + pressure * gradient

@@ -2,10 +2,10 @@
 
     A v - C^T p = f,     C v = g
 
-A is the mass over the time step plus implicit viscosity and surface tension, symmetric and positive definite. The rows of C
-are the divergence of every particle below the surface, times its volume, and one global row a . v = dV/dt, a the gradient of
-the enclosed volume: without it every local operator loses volume. The unknowns p are pressures; at rest they are
-the capillary pressure, and f = -p a is exactly the stationarity of the discrete energy.
+A is the mass over the time step plus implicit viscosity and surface tension, symmetric and positive definite. The rows
+of C are the divergence of every particle below the surface, times its volume, and one global row a . v = dV/dt, a the
+gradient of the enclosed volume: without it every local operator loses volume. The unknowns p are pressures; at rest
+the local ones vanish, the global one is the capillary pressure, and f = -p a makes the discrete energy stationary.
 """
 
 from dataclasses import dataclass
@@ -132,10 +132,10 @@ def solve(problem: SaddlePoint) -> Solution:
 
 def _check(problem: SaddlePoint, solution: Solution, reason: int, scale: float) -> None:
     """Compare the true residuals, not the solver's word, with the limit."""
+    force = float(np.linalg.norm(problem.load)) or 1.0
     momentum = problem.operator @ solution.velocity - problem.constraint.T @ solution.pressure - problem.load
-    force = max(float(np.linalg.norm(problem.load)), np.finfo(float).tiny)
     continuity = problem.constraint @ solution.velocity - problem.rate
-    relative = (float(np.linalg.norm(momentum)) / force, float(np.linalg.norm(continuity)) / max(scale, 1e-300))
+    relative = (float(np.linalg.norm(momentum)) / force, float(np.linalg.norm(continuity)) / (scale or 1.0))
     if not (reason > 0 and max(relative) < RESIDUAL_LIMIT):
         raise SolveFailed(
             f"pressure solve: relative residuals {relative[0]:.2e} (momentum), {relative[1]:.2e} (continuity) above "

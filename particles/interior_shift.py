@@ -17,8 +17,9 @@ SMALLEST_DEPTH = 0.4
 
 
 @njit(cache=True)
-def _repulsion(rows, points, offsets, indices, reach):
+def _repulsion(rows, points, lists, reach):
     """Sum of unit vectors away from the neighbours, weighed by 1 - r/reach, `(m, 3)`."""
+    offsets, indices = lists
     result = np.zeros((rows.shape[0], 3))
     for r in range(rows.shape[0]):
         i = rows[r]
@@ -31,8 +32,9 @@ def _repulsion(rows, points, offsets, indices, reach):
 
 
 @njit(cache=True)
-def _penetration(rows, points, offsets, indices, normals, depth):
+def _penetration(rows, points, lists, normals, depth):
     """Displacement that puts a particle a depth below the tangent plane of its nearest surface vertex, `(m, 3)`."""
+    offsets, indices = lists
     result = np.zeros((rows.shape[0], 3))
     for r in range(rows.shape[0]):
         i = rows[r]
@@ -56,11 +58,11 @@ def interior_shift(body: Body, neighbours: NeighbourList) -> Floats:
         neighbours: a valid list that reaches at least 1.1 spacings.
     """
     cloud, rows = body.cloud, body.interior
-    lists = (rows, body.points, neighbours.offsets, neighbours.indices)
-    shift = _repulsion(*lists, REPULSION_RANGE * cloud.spacing) * (REPULSION_STRENGTH * cloud.spacing)
+    lists = (neighbours.offsets, neighbours.indices)
+    shift = _repulsion(rows, body.points, lists, REPULSION_RANGE * cloud.spacing) * (REPULSION_STRENGTH * cloud.spacing)
     length = np.linalg.norm(shift, axis=1)
     shift *= np.minimum(1.0, LARGEST_SHIFT * cloud.spacing / np.maximum(length, 1e-300))[:, None]
     normals = vertex_normals(body.points, body.triangles, cloud.surface_count)
-    shift += _penetration(*lists, normals, SMALLEST_DEPTH * cloud.spacing)
+    shift += _penetration(rows, body.points, lists, normals, SMALLEST_DEPTH * cloud.spacing)
     shift[cloud.wall[rows] >= 0, 2] = 0.0
     return shift

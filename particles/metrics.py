@@ -23,11 +23,15 @@ Metrics = dict[str, tuple[float, str]]
 
 
 def joint_metrics(geometry: JointGeometry, solder: Solder, flow: LiquidFlow, run: Run) -> Metrics:
-    """Collect the numbers of a joint at the end of its run: name to SI value and unit."""
+    """Collect the numbers of a joint at the end of its run: name to SI value and unit.
+
+    The scatter of the pressure is its standard deviation over the capillary pressure of a sphere of the joint's width.
+    """
     below = particle_pressure(flow)[flow.body.cloud.surface_count :]
+    capillary = 4.0 * solder.surface_tension / run.profiles[-1].max_width
     pressure: Metrics = {
         "mean_pressure": (float(below.mean()), "Pa"),
-        "pressure_scatter": (float(below.std() / abs(below.mean())), ""),
+        "pressure_scatter": (float(below.std() / capillary), ""),
     }
     return _shape_at_rest(geometry, solder, flow, run) | pressure | _cost_and_rest(solder, flow, run)
 

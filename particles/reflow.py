@@ -22,6 +22,8 @@ from particles.viscosity import Viscosity
 
 __all__ = ["JointGeometry", "JointShape", "solve_joint"]
 
+CALM_CAPILLARY_TIMES = 20.0
+
 
 def solve_joint(
     geometry: JointGeometry,
@@ -54,10 +56,7 @@ def solve_joint(
         for wall, (radius, ring) in enumerate(zip(radii, cloud.rings, strict=True))
     )
     flow = start_flow(cloud, solder, effects, lines)
-    end_time = solder.process_time if effects["inertia"] else float("inf")
-    run = run_to_rest(
-        flow, StopRule(solder.numerics.max_steps, solder.numerics.tolerance, end_time), progress, on_snapshot
-    )
+    run = run_to_rest(flow, stop_rule(cloud, solder, effects), progress, on_snapshot)
     return _shape(geometry, solder, flow, run)
 
 
@@ -69,6 +68,13 @@ def start_flow(
     largest = solder.numerics.time_step_limit * limit
     physics = build_physics(solder, effects, lines)
     return LiquidFlow(Body.at_rest(cloud), physics, TimeStep(largest, cloud.spacing, largest), solder.numerics.basis)
+
+
+def stop_rule(cloud: Cloud, solder: Solder, effects: dict[str, bool]) -> StopRule:
+    """When a reflow ends: at rest, or with inertia at the end of the process at the latest."""
+    calm_time = CALM_CAPILLARY_TIMES * capillary_limit(solder.density, cloud.spacing, solder.surface_tension)
+    end_time = solder.process_time if effects["inertia"] else float("inf")
+    return StopRule(solder.numerics.max_steps, solder.numerics.tolerance, calm_time, end_time)
 
 
 def build_physics(solder: Solder, effects: dict[str, bool], lines: tuple[ContactLine, ...]) -> Physics:

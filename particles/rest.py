@@ -29,11 +29,13 @@ class StopRule:
     Attributes:
         max_steps: steps after which it has failed.
         tolerance: relative change of energy in a step below which a body is at rest.
+        calm_time: time in which the surface of a body at rest moves less than 1e-4 spacings [s].
         end_time: physical end of the process [s]; infinite in the quasi-static mode.
     """
 
     max_steps: int
     tolerance: float
+    calm_time: float
     end_time: float = float("inf")
 
 
@@ -81,10 +83,11 @@ def run_to_rest(
             last = run.records[-1]
             raise NoRest(
                 f"no rest after {last.step} steps (solder.numerics.max_steps) at time {last.time:.3g} s: the surface "
-                f"still moves {last.displacement:.2e} spacings a step, allowed {CALM_DISPLACEMENT:g}"
+                f"still moves {_motion(last, rule):.2e} spacings in {rule.calm_time:.3g} s, at rest it would be "
+                f"{CALM_DISPLACEMENT:g}; more steps or a larger solder.numerics.time_step_limit help"
             )
         record = _advance(run, flow)
-        calm = calm + 1 if _is_calm(run, rule.tolerance) else 0
+        calm = calm + 1 if _is_calm(run, rule) else 0
         moved += record.displacement
         if moved > SNAPSHOT_DISPLACEMENT:
             _snap(run, flow, on_snapshot)
@@ -105,22 +108,32 @@ def _advance(run: Run, flow: LiquidFlow) -> StepRecord:
     profile = fit_profile(flow.body.points, flow.body.triangles)
     run.records.append(record)
     run.profiles.append(profile)
-    bridges = len(flow.body.cloud.rings) == 2
-    run.ruptured = bridges and profile.waist < RUPTURE_SPACINGS * flow.body.cloud.spacing
+    run.ruptured = len(flow.body.cloud.rings) == 2 and _ruptures(run.profiles, flow.body.cloud.spacing)
     return record
 
 
-def _is_calm(run: Run, tolerance: float) -> bool:
+def _ruptures(profiles: list[Profile], spacing: float) -> bool:
+    """Whether a neck of less than two spacings gets thinner still: the particles cannot follow it any further."""
+    thin = profiles[-1].waist < RUPTURE_SPACINGS * spacing
+    return thin and len(profiles) > 1 and profiles[-1].waist < profiles[-2].waist
+
+
+def _motion(record: StepRecord, rule: StopRule) -> float:
+    """Displacement of the surface in the calm time, over the spacing."""
+    return record.displacement * rule.calm_time / record.time_step
+
+
+def _is_calm(run: Run, rule: StopRule) -> bool:
     if len(run.records) < 2:
         return False
     before, last = run.records[-2:]
     change = abs(last.energy - before.energy)
-    return last.displacement < CALM_DISPLACEMENT and change < tolerance * abs(last.energy)
+    return _motion(last, rule) < CALM_DISPLACEMENT and change < rule.tolerance * abs(last.energy)
 
 
 def _fraction(run: Run, rule: StopRule) -> float:
-    """Share of the way to rest: the displacement falls exponentially; or share of the process time."""
-    first, last = run.records[0].displacement, run.records[-1].displacement
+    """Share of the way to rest: the motion dies out exponentially; or share of the process time."""
+    first, last = _motion(run.records[0], rule), _motion(run.records[-1], rule)
     if first <= CALM_DISPLACEMENT:
         return 1.0
     settled = log(first / max(last, CALM_DISPLACEMENT)) / log(first / CALM_DISPLACEMENT)

@@ -1,4 +1,4 @@
-"""The linear equations of one step: forces, implicit operators and constraints, without the fixed degrees of freedom."""
+"""The linear equations of one step: forces, implicit operators, constraints; fixed degrees of freedom left out."""
 
 import numpy as np
 from numpy.typing import NDArray

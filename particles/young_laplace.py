@@ -59,7 +59,7 @@ class Meridian:
         return float(self.z.max())
 
 
-def joint_meridian(
+def joint_meridian(  # noqa: PLR0913 - six physical numbers define a joint
     volume: float,
     radius_board: float,
     radius_package: float,
@@ -159,10 +159,10 @@ def _barrel(a: float, b: float, target: float) -> _State:
     z = np.linspace(0.0, 1.0, 101)
     rim, hump = a + (b - a) * z, 4.0 * z * (1.0 - z)
 
-    def excess(bulge: float) -> float:
-        return float(np.pi * np.trapz(np.maximum(rim + bulge * hump, 0.02) ** 2, z) - target)
-
-    bulge = brentq(excess, -max(a, b), 2.0 * np.sqrt(target) + max(a, b))
+    # The mean of (rim + bulge hump)^2 is target / pi; the means of rim^2, rim hump, hump^2 are known.
+    square, product, hump_square = (a * a + a * b + b * b) / 3.0, (a + b) / 3.0, 8.0 / 15.0
+    discriminant = product**2 - hump_square * (square - target / np.pi)
+    bulge = (np.sqrt(max(discriminant, 0.0)) - product) / hump_square
     r = np.maximum(rim + bulge * hump, 0.02)
     arc = np.concatenate(([0.0], np.cumsum(np.hypot(np.diff(r), np.diff(z)))))
     psi = np.unwrap(np.arctan2(np.gradient(z, arc), np.gradient(r, arc)))
@@ -218,6 +218,7 @@ def _from_apex(curvature: float, bond: float, contact_angle: float) -> Floats:
 
     reached.terminal = True  # type: ignore[attr-defined]
     end = 4.0 * np.pi / curvature
-    path = solve_ivp(slopes, (0.0, end), [0.0, 0.0, 0.0, 0.0], events=reached, rtol=1e-10, atol=1e-12, dense_output=True)
+    apex, accuracy = [0.0, 0.0, 0.0, 0.0], {"rtol": 1e-10, "atol": 1e-12}
+    path = solve_ivp(slopes, (0.0, end), apex, events=reached, dense_output=True, **accuracy)
     y = path.sol(np.linspace(0.0, path.t[-1], SAMPLES))
     return np.stack((y[0], y[1], y[3]))

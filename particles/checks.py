@@ -1,0 +1,135 @@
+"""Parameters of the solder that are each allowed but make no joint together. Loads neither numba nor PETSc."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from math import degrees, pi, sqrt
+
+from particles.geometry import JointGeometry
+from particles.parameters import Solder
+from particles.young_laplace import NoMeridian, joint_meridian
+
+SPACINGS_IN_NECK = 2.0
+SPACINGS_IN_GAP = 3.0
+SPACINGS_IN_RADIUS = 2.0
+BISECTIONS = 8
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """One impossible value.
+
+    Attributes:
+        key: dotted key as in the case file.
+        value: the value with its unit.
+        allowed: the allowed range.
+        message: what is wrong, and at which joint.
+    """
+
+    key: str
+    value: str
+    allowed: str
+    message: str
+
+
+def problems(solder: Solder, geometries: Mapping[str, JointGeometry], pitch: float) -> list[Problem]:
+    """Find what cannot work before anything runs.
+
+    Joints widen with their volume and thin with their gap: of joints with equal discs only those with the smallest and
+    the largest gap are examined.
+
+    Args:
+        solder: the solder.
+        geometries: joint name to geometry.
+        pitch: distance of neighbouring joints [m].
+    """
+    found = _angle_problems(solder)
+    if found:
+        return found
+    by_discs: dict[tuple[float, float], list[str]] = {}
+    for name, geometry in geometries.items():
+        by_discs.setdefault((geometry.radius_board, geometry.radius_package), []).append(name)
+    for names in by_discs.values():
+        names.sort(key=lambda name: geometries[name].gap)
+        low, high = names[0], names[-1]
+        found += _spacing_problems(solder, low, geometries[low])
+        found += _too_much(solder, low, geometries[low], pitch)
+        found += _too_little(solder, high, geometries[high])
+    return list({problem.key: problem for problem in found}.values())
+
+
+def _angle_problems(solder: Solder) -> list[Problem]:
+    pad, mask = degrees(solder.pad_contact_angle), degrees(solder.mask_contact_angle)
+    if pad < mask:
+        return []
+    message = "the pad must be wetted better than the solder mask"
+    return [Problem("solder.pad_contact_angle", f"{pad:.4g} deg", f"< {mask:.4g} deg", message)]
+
+
+def _spacing_problems(solder: Solder, name: str, geometry: JointGeometry) -> list[Problem]:
+    spacing = solder.numerics.spacing
+    smallest_radius = min(geometry.radius_board, geometry.radius_package)
+    limit = min(geometry.gap / SPACINGS_IN_GAP, smallest_radius / SPACINGS_IN_RADIUS)
+    if spacing <= limit:
+        return []
+    message = f"too coarse for joint {name}: gap {_mm(geometry.gap)}, smallest radius {_mm(smallest_radius)}"
+    return [Problem("solder.numerics.spacing", _mm(spacing), f"<= {_mm(limit)}", message)]
+
+
+def _too_much(solder: Solder, name: str, geometry: JointGeometry, pitch: float) -> list[Problem]:
+    """The joint would touch its neighbour."""
+
+    def fits(volume: float) -> bool:
+        if 2.0 * sqrt(volume / (pi * geometry.gap)) >= pitch:
+            return False
+        width = _width_and_waist(solder, geometry, volume)
+        return width is None or width[0] < pitch
+
+    if fits(solder.volume):
+        return []
+    smallest = pi * geometry.gap * min(geometry.radius_board, geometry.radius_package) ** 2
+    limit = _bisect(fits, smallest, solder.volume)
+    message = f"joint {name} (gap {_mm(geometry.gap)}) would touch its neighbour at the pitch of {_mm(pitch)}"
+    return [Problem("solder.volume", _mm3(solder.volume), f"<= {_mm3(limit)}", message)]
+
+
+def _too_little(solder: Solder, name: str, geometry: JointGeometry) -> list[Problem]:
+    """The neck would rupture: no equilibrium between both pads, or one too thin for the particles."""
+
+    def fits(volume: float) -> bool:
+        width = _width_and_waist(solder, geometry, volume)
+        return width is not None and width[1] > SPACINGS_IN_NECK * solder.numerics.spacing
+
+    full = pi * geometry.gap * max(geometry.radius_board, geometry.radius_package) ** 2
+    if solder.volume >= full or fits(solder.volume):
+        return []
+    limit = _bisect(fits, full, solder.volume)
+    message = f"joint {name} would rupture: too little solder to span its gap of {_mm(geometry.gap)}"
+    return [Problem("solder.volume", _mm3(solder.volume), f">= {_mm3(limit)}", message)]
+
+
+def _width_and_waist(solder: Solder, geometry: JointGeometry, volume: float) -> tuple[float, float] | None:
+    """Largest and smallest diameter of the Young-Laplace joint [m]; none without equilibrium."""
+    discs = (geometry.radius_board, geometry.radius_package, geometry.gap)
+    limits = (solder.pad_contact_angle, solder.mask_contact_angle)
+    weight = solder.density * solder.gravity
+    try:
+        meridian = joint_meridian(volume, *discs, solder.surface_tension, weight, angle_limits=limits)
+    except NoMeridian:
+        return None
+    return meridian.max_width, meridian.waist
+
+
+def _bisect(fits: Callable[[float], bool], good: float, bad: float) -> float:
+    """A volume near the limit between one that fits and one that does not, on the side that fits [m^3]."""
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (good + bad)
+        good, bad = (middle, bad) if fits(middle) else (good, middle)
+    return good
+
+
+def _mm(length: float) -> str:
+    return f"{1e3 * length:.4g} mm"
+
+
+def _mm3(volume: float) -> str:
+    return f"{1e9 * volume:.3g} mm^3"

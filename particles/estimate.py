@@ -1,0 +1,21 @@
+"""Particle count and cost of a reflow before it runs. Loads neither numba nor PETSc."""
+
+from particles.geometry import JointGeometry, joint_counts
+from particles.parameters import Solder
+
+# Measured by benchmarks/reflow.py on one core of a 2-core x86-64 machine, quadratic basis.
+SECONDS_PER_STEP_OF_THOUSAND = 0.11
+COST_EXPONENT = 1.8
+TYPICAL_STEPS = 12
+
+
+def particle_count(solder: Solder, geometry: JointGeometry) -> int:
+    """Number of particles of a joint: layers of concentric rings of 6 j particles."""
+    rings, layers = joint_counts(geometry, solder.volume, solder.numerics.spacing)
+    return layers * (1 + 3 * rings * (rings + 1))
+
+
+def reflow_seconds(solder: Solder, geometry: JointGeometry) -> float:
+    """Expected time of `solve_joint` on one core [s], from the measured cost of a step."""
+    thousands = particle_count(solder, geometry) / 1000.0
+    return TYPICAL_STEPS * SECONDS_PER_STEP_OF_THOUSAND * thousands**COST_EXPONENT

@@ -1,0 +1,78 @@
+"""Files of the reflow: the shapes as HDF5, and one joint's particles for ParaView. Nothing else here knows files."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import h5py
+import meshio
+import numpy as np
+
+from particles.shape import JointShape, Snapshot
+
+ARRAYS = ("points", "velocity", "pressure", "triangles", "ring_board", "ring_package")
+
+
+def write_shapes(path: Path | str, shapes: Mapping[str, JointShape]) -> None:
+    """Write shapes, one group each, with history, snapshots and metrics.
+
+    Args:
+        path: HDF5 file; replaced if it exists.
+        shapes: name to shape.
+    """
+    with h5py.File(path, "w") as file:
+        for name, shape in shapes.items():
+            _write_shape(file.create_group(name), shape)
+
+
+def _write_shape(group: h5py.Group, shape: JointShape) -> None:
+    group.attrs["verdict"] = shape.verdict
+    group.attrs["surface_count"] = len(shape.surface_points)
+    for name in ARRAYS:
+        group[name] = getattr(shape, name)
+    for name, column in shape.history.items():
+        text = column.dtype.kind == "U"
+        group[f"history/{name}"] = column.astype(h5py.string_dtype()) if text else column
+    for number, snapshot in enumerate(shape.snapshots):
+        place = group.create_group(f"snapshots/{number:04d}")
+        place.attrs["time"] = snapshot.time
+        place["points"], place["triangles"] = snapshot.points, snapshot.triangles
+    for name, (value, unit) in shape.metrics.items():
+        place = group.create_group(f"metrics/{name}")
+        place.attrs["value"], place.attrs["unit"] = value, unit
+
+
+def read_shapes(path: Path | str) -> dict[str, JointShape]:
+    """Read what `write_shapes` wrote."""
+    with h5py.File(path, "r") as file:
+        return {name: _read_shape(group) for name, group in file.items()}
+
+
+def _read_shape(group: h5py.Group) -> JointShape:
+    arrays = {name: group[name][()] for name in ARRAYS}
+    history = {}
+    for name, column in group["history"].items():
+        history[name] = column.asstr()[()].astype(str) if h5py.check_string_dtype(column.dtype) else column[()]
+    snapshots = [
+        Snapshot(float(place.attrs["time"]), place["points"][()], place["triangles"][()])
+        for _, place in sorted(group["snapshots"].items())
+    ]
+    metrics = {
+        name: (float(place.attrs["value"]), str(place.attrs["unit"])) for name, place in group["metrics"].items()
+    }
+    return JointShape(
+        **arrays,
+        surface_points=arrays["points"][: group.attrs["surface_count"]],
+        history=history,
+        snapshots=snapshots,
+        metrics=metrics,
+        verdict=str(group.attrs["verdict"]),
+    )
+
+
+def write_particles(path: Path | str, shape: JointShape) -> None:
+    """Write the particles at rest and the free surface as VTU: velocity, pressure, `surface` 1 on the free surface."""
+    count = len(shape.points)
+    cells = [("vertex", np.arange(count).reshape(-1, 1)), ("triangle", shape.triangles)]
+    surface = (np.arange(count) < len(shape.surface_points)).astype(float)
+    data = {"velocity": shape.velocity, "pressure": shape.pressure, "surface": surface}
+    meshio.Mesh(shape.points, cells, point_data=data).write(path, file_format="vtu")
