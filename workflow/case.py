@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic.fields import FieldInfo
 
 from fem.parameters import Materials, Shock
 from meshing.parameters import Board, Package, Warpage
@@ -79,16 +80,18 @@ def impossible(case: Case) -> list[Problem]:
     from meshing import checks as meshing_checks
     from meshing.pads import pad_table
     from particles import checks as particles_checks
-    from particles.geometry import JointGeometry
+    from workflow.reflow_pool import joint_geometries
 
-    found = list(meshing_checks.problems(case.package, case.board, case.warpage))
-    if not found:
-        pads = pad_table(case.package, case.board, case.warpage)
-        geometries = {
-            pad.name: JointGeometry(pad.gap, pad.wetted_radius_board, pad.wetted_radius_package) for pad in pads
-        }
-        found += particles_checks.problems(case.solder, geometries, case.package.pitch)
-    return [Problem(record.key, record.message, record.value, record.allowed) for record in found]
+    contradictions = meshing_checks.problems(case.package, case.board, case.warpage)
+    if contradictions:
+        known = {key: field for key, _, field in fields.leaves(case)}
+        return [
+            Problem(found.key, "contradicts other values", _shown(found.value, known.get(found.key)), found.allowed)
+            for found in contradictions
+        ]
+    geometries = joint_geometries(pad_table(case.package, case.board, case.warpage))
+    impossible_joints = particles_checks.problems(case.solder, geometries, case.package.pitch)
+    return [Problem(found.key, found.message, found.value, found.allowed) for found in impossible_joints]
 
 
 def too_many_ranks(case: Case, oversubscribe: bool) -> list[Problem]:
@@ -103,6 +106,11 @@ def too_many_ranks(case: Case, oversubscribe: bool) -> list[Problem]:
 def available_cores() -> int:
     """Return the number of cores that this process may use."""
     return len(os.sched_getaffinity(0))
+
+
+def _shown(value: object, field: FieldInfo | None) -> object:
+    """Write an SI value as its field is shown to users."""
+    return fields.display(value, field) if field is not None and fields.unit_of(field) else value
 
 
 def _read_toml(path: Path) -> dict:

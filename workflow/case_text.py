@@ -5,9 +5,10 @@ from pathlib import Path
 
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
+from pydantic_core import PydanticUndefined
 
 from workflow.case import Case, Title, read_case
-from workflow.fields import allowed, display, unit_of
+from workflow.fields import allowed, display, literal_names, unit_of
 from workflow.problems import CaseError, Problem, as_toml, nearest
 
 CASES = Path(__file__).resolve().parent.parent / "cases"
@@ -40,8 +41,8 @@ def write_new_case(name: str, template: str, folder: Path = Path()) -> Path:
     """
     known = templates()
     if template not in known:
-        hint = nearest(template, known)
-        raise CaseError("new", [Problem("--template", "unknown template", template, "one of " + ", ".join(known), hint)])
+        choice, hint = "one of " + ", ".join(known), nearest(template, known)
+        raise CaseError("new", [Problem("--template", "unknown template", template, choice, hint)])
     path = folder / f"{name}.toml"
     if path.exists():
         raise CaseError("new", [Problem("NAME", f"{path} exists already", name)])
@@ -74,10 +75,10 @@ def _add_table(blocks: list[str], key: str, parameters: BaseModel) -> None:
 
 def _line(name: str, value: object, field: FieldInfo) -> str:
     text = f'"{display(value, field)}"' if unit_of(field) else as_toml(value)
-    comment = allowed(field)
-    if not field.is_required():
-        default = f"default {display(field.default, field)}"
-        comment = f"{comment}; {default}" if comment else default
+    remarks = [allowed(field)] if len(literal_names(field)) != 1 else []
+    if field.default not in (PydanticUndefined, ""):
+        remarks.append(f"default {display(field.default, field)}")
+    comment = "; ".join(remark for remark in remarks if remark)
     line = f"{name} = {text}"
     return f"{line:<{COMMENT_COLUMN}} # {comment}" if comment else line
 

@@ -63,7 +63,7 @@ def run(
     oversubscribe: Oversubscribe = False,
 ) -> None:
     """Run what is stale."""
-    from workflow.pipeline import drive, failed_checks
+    from workflow.pipeline import failed_checks
 
     if until not in NAMES:
         raise typer.BadParameter(f"'{until}' is no stage; allowed: {', '.join(NAMES)}", param_hint="--until")
@@ -71,7 +71,7 @@ def run(
     write_inputs(folder, resolved)
     if not _has_work(folder, resolved, until):
         console.print(f"nothing to do: {folder} is up to date")
-    elif not drive(folder, until, cores or available_cores(), oversubscribe):
+    elif not _drive(folder, until, cores or available_cores(), oversubscribe):
         raise typer.Exit(1)
     failures = failed_checks(folder, until)
     for failure in failures:
@@ -133,9 +133,12 @@ def stage(
     oversubscribe: Oversubscribe = False,
 ) -> None:
     """Run one stage; Snakemake calls this."""
-    from workflow.stages import execute
+    from workflow.inputs import read_case_of_run
+    from workflow.stage_runner import Run, execute
+    from workflow.stages import STAGE_FUNCTIONS
 
-    if not execute(name, folder, cores, oversubscribe):
+    run = Run(folder, read_case_of_run(folder), cores, oversubscribe)
+    if not execute(name, STAGE_FUNCTIONS[name], run):
         raise typer.Exit(1)
 
 
@@ -148,9 +151,18 @@ def main() -> None:
         for line in error.lines():
             print_error(line)
         sys.exit(2)
+
+
+def _drive(folder: Path, until: str, cores: int, oversubscribe: bool) -> bool:
+    from workflow.pipeline import RunFolderBusy, drive
+
+    try:
+        return drive(folder, until, cores, oversubscribe)
+    except RunFolderBusy as error:
+        print_error(str(error))
     except KeyboardInterrupt:
         print_error("interrupted; stages that were complete are kept")
-        sys.exit(1)
+    return False
 
 
 def _interrupt(*_: object) -> None:
@@ -165,7 +177,9 @@ def _version(wanted: bool) -> None:
 
 @app.callback()
 def _options(
-    version: Annotated[bool, typer.Option("--version", callback=_version, is_eager=True, help="show the version")] = False,
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="show the version")
+    ] = False,
 ) -> None:
     pass
 

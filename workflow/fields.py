@@ -45,7 +45,7 @@ def allowed(field: FieldInfo) -> str:
     """Describe what a field takes: names, or a range in the user's unit."""
     names = literal_names(field)
     if names:
-        return "one of " + ", ".join(names)
+        return _choice(field) + ", ".join(names)
     unit = unit_of(field)
     bounds = [
         f"{sign} {from_si(getattr(item, attribute), unit, 6) if unit else f'{getattr(item, attribute):g}'}"
@@ -121,6 +121,10 @@ def display(value: object, field: FieldInfo) -> str:
     if isinstance(value, tuple):
         return "[" + ", ".join(str(item) for item in value) + "]"
     return f"{value:.10g}" if isinstance(value, float) else str(value)
+
+
+def _choice(field: FieldInfo) -> str:
+    return "any of " if typing.get_origin(field.annotation) is tuple else "one of "
 
 
 def _is_union(annotation: object) -> bool:

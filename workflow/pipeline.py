@@ -32,10 +32,11 @@ def locked(run_folder: Path) -> Iterator[int]:
     run_folder.mkdir(parents=True, exist_ok=True)
     descriptor = os.open(run_folder / ".lock", os.O_RDWR | os.O_CREAT, 0o644)
     try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            raise RunFolderBusy(f"another run is at work in {run_folder}") from error
         yield descriptor
-    except BlockingIOError as error:
-        raise RunFolderBusy(f"another run is at work in {run_folder}") from error
     finally:
         os.close(descriptor)
 

@@ -5,11 +5,11 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from workflow.case import Case
+from workflow.case import Case, available_cores
 from workflow.fields import display, leaves, unit_of
-from workflow.forecast import Forecast, forecast
+from workflow.forecast import MACRO, Forecast, forecast
 from workflow.inputs import Change, Verdict, examine
-from workflow.units import from_si, in_unit
+from workflow.units import from_si
 
 LONGEST_LIST = 4
 
@@ -20,9 +20,10 @@ def show_plan(case: Case, run_folder: Path, console: Console) -> None:
     console.print(f"[bold]{case.case.name}[/]  {case.case.title}\n")
     console.print(_stages(case, run_folder, outlook))
     console.print(_effects(outlook))
-    console.print(_sizes(outlook))
+    console.print(_sizes(case, outlook))
     console.print(_shock(case, outlook))
-    console.print(f"[dim]{outlook.source}[/]", soft_wrap=False)
+    rate = f"{outlook.shock.updates_per_second:.1e} element updates per second and rank (fem/estimate.py)"
+    console.print(f"\n[dim]Costs assume {rate} and the reflow speed in particles/estimate.py, as benchmarks/ measured.[/]")
 
 
 def change_text(change: Change, case: Case) -> str:
@@ -80,11 +81,44 @@ def _effects(outlook: Forecast) -> Table:
     return table
 
 
+def _sizes(case: Case, outlook: Forecast) -> Table:
+    smallest, largest = outlook.particles
+    particles = f"{smallest}" if smallest == largest else f"{smallest} to {largest}"
+    table = _table("\nSizes and critical time steps", "part", "hexahedra", "critical step", "belongs to")
+    for name, part in outlook.parts.items():
+        remark = "macro model" if name == MACRO else "meso model"
+        if part.mass_scaled:
+            remark += "; mass scaled to the smallest step of the others"
+        table.add_row(name, f"{part.elements}", nano(part.critical_step), remark)
+    total = sum(part.elements for part in outlook.parts.values())
+    table.add_row("all", f"{total}", "", "", style="bold")
+    table.caption = f"{outlook.joints} joints, {outlook.distinct} of them distinct, {particles} particles each"
+    table.caption_justify = "left"
+    return table
+
+
+def _shock(case: Case, outlook: Forecast) -> Table:
+    shock, ranks = outlook.shock, case.shock.ranks
+    every = ranks.macro + ranks.meso
+    table = _table("\nShock", "what", "value", "remark")
+    table.add_row("window", nano(shock.window), f"step of the macro model, {shock.windows} windows")
+    table.add_row("step ratio m", f"{shock.substeps}", f"meso step {nano(shock.window / shock.substeps)}")
+    places = f"ranks 0-{ranks.macro - 1} macro, {ranks.macro}-{every - 1} meso, on {available_cores()} cores"
+    table.add_row("two-scale", f"about {duration(shock.two_scale)}", places + _absent("two_scale", case))
+    table.add_row("DNS", f"about {duration(shock.dns)}", f"all {every} ranks on one model" + _absent("dns", case))
+    table.add_row("two-scale / DNS", f"{shock.two_scale / shock.dns:.2f}", "predicted ratio of wall times")
+    return table
+
+
+def _absent(mode: str, case: Case) -> str:
+    return "" if mode in case.shock.numerics.modes else "; not in shock.numerics.modes"
+
+
 def duration(seconds: float) -> str:
     """Write a wall time with two digits."""
     return f"{seconds:.2g} s" if seconds < 100 else f"{seconds / 60:.2g} min"
 
 
-def micro(seconds: float) -> str:
+def nano(seconds: float) -> str:
     """Write a time step."""
-    return f"{in_unit(seconds, 'ns'):.3g} ns"
+    return f"{1e9 * seconds:.3g} ns"

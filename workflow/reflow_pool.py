@@ -9,22 +9,28 @@ from typing import TYPE_CHECKING, Any
 from particles.parameters import Solder
 
 if TYPE_CHECKING:
+    from meshing.pads import PadSite
     from particles.geometry import JointGeometry
     from particles.shape import JointShape
 
 ALIKE = 12  # decimals of a metre to which gaps and radii of joints are compared: a picometre
 POLL = 0.2  # seconds between two looks at the progress
 
-_progress: Any = None  # the queue of a worker process, set once when it starts
+_progress: Any = None  # the queue of a worker process: a pool has no other place for it
 
 
 class ReflowError(RuntimeError):
     """The reflow of a joint failed; the message names the joint."""
 
 
-def distinct_geometries(
-    geometries: "Mapping[str, JointGeometry]",
-) -> "dict[tuple[str, ...], JointGeometry]":
+def joint_geometries(pads: "Sequence[PadSite]") -> "dict[str, JointGeometry]":
+    """Return the geometry of each joint of a pad table, by name."""
+    from particles.geometry import JointGeometry
+
+    return {pad.name: JointGeometry(pad.gap, pad.wetted_radius_board, pad.wetted_radius_package) for pad in pads}
+
+
+def distinct_geometries(geometries: "Mapping[str, JointGeometry]") -> "dict[tuple[str, ...], JointGeometry]":
     """Group joints whose gap and radii are equal.
 
     Args:
@@ -38,6 +44,16 @@ def distinct_geometries(
         sizes = (geometry.gap, geometry.radius_board, geometry.radius_package)
         groups.setdefault(tuple(round(size, ALIKE) for size in sizes), []).append(name)
     return {tuple(names): geometries[names[0]] for names in groups.values()}
+
+
+def joint_records(groups: "Mapping[tuple[str, ...], JointGeometry]", shapes: "Mapping[str, JointShape]") -> dict:
+    """Return per joint the name of its shape, the verdict on it and its metrics."""
+    records = {}
+    for names in groups:
+        shape = shapes[names[0]]
+        metrics = {key: {"value": value, "unit": unit} for key, (value, unit) in shape.metrics.items()}
+        records |= {name: {"shape": names[0], "verdict": shape.verdict, "metrics": metrics} for name in names}
+    return records
 
 
 def solve_joints(
@@ -93,7 +109,7 @@ def _wait_for(jobs: "Mapping[Future[JointShape], str]", reports: Any, progress: 
 
 
 def _start_worker(reports: Any) -> None:
-    global _progress  # noqa: PLW0603  (a process pool gives its workers no other place for shared state)
+    global _progress
     _progress = reports
 
 

@@ -1,5 +1,6 @@
 """JSON schema of the case file, in which a quantity is a string with its unit."""
 
+import re
 from collections.abc import Iterator
 
 from pydantic import BaseModel
@@ -7,6 +8,8 @@ from pydantic import BaseModel
 from workflow.case import Case
 from workflow.fields import allowed, display, models_of, unit_of
 from workflow.units import QUANTITY, dimension
+
+PATTERN = re.sub(r"\?P<\w+>", "", f"^{QUANTITY.pattern}$")
 
 
 def case_schema() -> dict:
@@ -21,7 +24,7 @@ def case_schema() -> dict:
             if unit is not None:
                 properties["properties"][name] = {
                     "type": "string",
-                    "pattern": f"^{QUANTITY.pattern.replace('?P', '?')}$",
+                    "pattern": PATTERN,
                     "description": f"{dimension(unit)}, e.g. in {unit}; {allowed(field)}",
                     "x-unit": unit,
                     **({} if field.is_required() else {"default": display(field.default, field)}),

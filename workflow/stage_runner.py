@@ -3,6 +3,7 @@
 import json
 import shutil
 import time
+import traceback
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -10,6 +11,7 @@ from pathlib import Path
 from workflow.case import Case
 from workflow.inputs import stage_inputs
 from workflow.stage_table import BY_NAME
+from workflow.terminal import health_line, print_error
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,6 +76,23 @@ def run_stage(name: str, function: StageFunction, run: Run) -> dict:
     _remove(folder)
     partial.rename(folder)
     return record
+
+
+def execute(name: str, function: StageFunction, run: Run) -> bool:
+    """Run a stage and tell the user how it ended.
+
+    Returns:
+        Whether it completed. If not, the traceback is in ``.<stage>.partial/error.txt`` of the run folder.
+    """
+    try:
+        record = run_stage(name, function, run)
+    except Exception as error:  # the boundary of a stage: whatever went wrong is told with the stage's name
+        log = run.folder / f".{name}.partial" / "error.txt"
+        log.write_text(traceback.format_exc())
+        print_error(f"stage {name} failed: {type(error).__name__}: {error}\ntraceback: {log}")
+        return False
+    health_line(name, record["seconds"], record["health"])
+    return True
 
 
 def _remove(folder: Path) -> None:

@@ -56,7 +56,7 @@ STAGES = (
     Stage("surface", (), ("reflow",), ("surface/surfaces.json",)),
     Stage(
         "solder_mesh",
-        (*ARRAY, "package.copper", "package.joint_numerics"),
+        (*ARRAY, "package.copper", "package.joint_numerics", "materials.copper", "materials.solder"),
         ("surface",),
         ("solder_mesh/joints.msh", "solder_mesh/quality.json"),
         pads=True,

@@ -1,28 +1,14 @@
-"""What the user sees: one console, progress bars, one health line a stage."""
+"""What the user sees: one console, errors, one health line a stage."""
 
 import os
 
 from rich.console import Console
 from rich.markup import escape
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 # A terminal has its own width; a file or a pipe gets lines that a report or a log can hold.
 WIDTH = None if os.isatty(1) else 100
 console = Console(width=WIDTH, highlight=False)
 errors = Console(stderr=True, width=None if os.isatty(2) else 200, highlight=False)
-
-
-def progress_bar() -> Progress:
-    """Return a progress bar: what is done now, share, time spent and left. It vanishes when it ends."""
-    return Progress(
-        TextColumn("  {task.description}"),
-        BarColumn(bar_width=30),
-        TaskProgressColumn(),
-        TimeElapsedColumn(),
-        TimeRemainingColumn(),
-        console=console,
-        transient=True,
-    )
 
 
 def print_error(text: str) -> None:

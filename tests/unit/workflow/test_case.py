@@ -1,0 +1,124 @@
+"""Reading a case, and refusing what is no case: each message names place, key, value, range and nearest name."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+from workflow.case import available_cores, display_values, read_case
+from workflow.problems import CaseError
+
+CASE = Path(__file__).resolve().parents[3] / "cases" / "bga_drop" / "case.toml"
+BAD_VALUES = {
+    "unknown key": (
+        "package.pich=1 mm",
+        ["package.pich", '"1 mm"', "unknown key", "did you mean package.pitch?"],
+    ),
+    "unknown table": ("pakage.rows=3", ["pakage", "unknown key", "did you mean package?"]),
+    "unit missing": ("package.pitch=1.0", ["package.pitch = 1.0", 'such as "1 mm"', "allowed: > 0 mm"]),
+    "unit missing in text": ('package.pitch="1.0"', ['package.pitch = "1.0"', "needs a unit"]),
+    "wrong dimension": ("board.thickness=1 kg", ['board.thickness = "1 kg"', "is a mass; wanted is a length"]),
+    "unknown unit": ("board.thickness=1 mmm", ["board.thickness", '"mmm" is not a known unit']),
+    "negative length": ("package.standoff=-0.3 mm", ['package.standoff = "-0.3 mm"', "out of range", "> 0 mm"]),
+    "too large": ("package.rows=101", ["package.rows = 101", "allowed: >= 1 and <= 100"]),
+    "no integer": ("package.rows=2.5", ["package.rows = 2.5", "valid integer"]),
+    "text for a number": ('package.rows="10"', ['package.rows = "10"', "valid integer"]),
+    "unknown name": (
+        "package.board_pad.definition=SDM",
+        ["package.board_pad.definition", "one of SMD, NSMD", "did you mean SMD?"],
+    ),
+    "unknown name in a list": ('shock.numerics.modes=["tow_scale"]', ["shock.numerics.modes", "two_scale?"]),
+    "unknown kind of material": (
+        "materials.solder.kind=isotopic",
+        ["materials.solder.kind", "one of isotropic, orthotropic", "did you mean isotropic?"],
+    ),
+    "value for a table": ("materials.solder=1 GPa", ["materials.solder", "must be a table"]),
+    "table below a value": ("package.rows.all=1", ["package.rows.all", "lies below a value"]),
+    "no setting": ("package.rows", ["package.rows", "is no setting", "dotted.key=value"]),
+    "more ranks than cores": ("shock.ranks.meso=4096", ["shock.ranks", "4097 MPI ranks", "--oversubscribe"]),
+    "pads overlapping": ("package.pitch=0.5 mm", ["package.board_pad.mask_opening", '"0.58 mm"', "0.5 mm, the pitch"]),
+    "volume that cannot fit its gap": ("solder.volume=5 mm^3", ["solder.volume", '"5 mm^3"', "would touch its neighbour", "<= 0.2"]),
+    "package larger than the board": ("package.substrate.length=250 mm", ["package.substrate.length", '"250 mm"', "200 mm, the board"]),
+}
+
+
+def problems_of(*settings: str, path: Path = CASE) -> list[str]:
+    with pytest.raises(CaseError) as caught:
+        read_case(path, settings)
+    return caught.value.lines()
+
+
+@pytest.mark.parametrize(("setting", "words"), BAD_VALUES.values(), ids=BAD_VALUES.keys())
+def test_bad_values_are_named(setting, words):
+    text = "\n".join(problems_of(setting))
+    assert [word for word in words if word not in text] == []
+
+
+def test_all_problems_are_reported_at_once():
+    lines = problems_of("package.pich=1 mm", "board.thickness=1 kg", "package.standoff=-1 mm")
+    assert len(lines) == 3
+    assert all(line.startswith("--set: ") for line in lines)
+
+
+def test_problems_of_the_file_name_the_file(tmp_path):
+    path = tmp_path / "case.toml"
+    path.write_text(CASE.read_text().replace('standoff = "0.31 mm"', "standoff = 0.31"))
+    assert problems_of(path=path) == [
+        f'{path}: package.standoff = 0.31: needs a unit, as a string such as "0.31 mm"; allowed: > 0 mm'
+    ]
+
+
+def test_missing_values_are_named(tmp_path):
+    path = tmp_path / "case.toml"
+    path.write_text(CASE.read_text().replace('pitch = "1 mm"', ""))
+    assert problems_of(path=path) == [f"{path}: package.pitch: is missing; allowed: > 0 mm"]
+
+
+@pytest.mark.parametrize(("text", "words"), [("package = [", "is not TOML"), ("a = 1\na = 2", "is not TOML")])
+def test_broken_files(tmp_path, text, words):
+    path = tmp_path / "case.toml"
+    path.write_text(text)
+    assert words in problems_of(path=path)[0]
+
+
+def test_absent_file(tmp_path):
+    assert "no such case file" in problems_of(path=tmp_path / "absent.toml")[0]
+
+
+def test_overrides_are_toml_or_bare_text():
+    case = read_case(
+        CASE, ["shock.peak_acceleration=1000 G", 'shock.pulse_duration="0.4 ms"', "package.rows=8"]
+    )
+    assert case.shock.peak_acceleration == pytest.approx(9806.65)
+    assert case.shock.pulse_duration == pytest.approx(4e-4)
+    assert case.package.rows == 8
+
+
+def test_one_property_of_a_default_material_can_change():
+    case = read_case(CASE, ["materials.solder.young_modulus=40 GPa"])
+    assert case.materials.solder.young_modulus == pytest.approx(40e9)
+    assert case.materials.solder.density == 7440.0
+
+
+def test_another_kind_of_material_needs_all_its_properties():
+    lines = problems_of("materials.board.kind=isotropic")
+    assert [line.split(": ")[1] for line in lines] == [
+        "materials.board.density", "materials.board.young_modulus", "materials.board.poisson_ratio",
+    ]  # fmt: skip
+
+
+def test_more_ranks_are_welcome_with_oversubscribe():
+    ranks = available_cores() + 1
+    assert read_case(CASE, [f"shock.ranks.meso={ranks}"], oversubscribe=True).shock.ranks.meso == ranks
+
+
+def test_values_are_shown_in_the_units_of_users():
+    shown = display_values(read_case(CASE))
+    assert shown["package.pitch"] == "1 mm"
+    assert shown["shock.peak_acceleration"] == "1500 G"
+    assert shown["solder.mask_contact_angle"] == "148 deg"
+    assert shown["shock.numerics.modes"] == "[two_scale, dns]"
+
+
+def test_cores_are_those_of_this_process():
+    assert available_cores() == len(os.sched_getaffinity(0))

@@ -1,0 +1,70 @@
+"""Launching programs: their words, their errors, and that nothing stays behind."""
+
+import os
+import signal
+import sys
+import time
+
+import psutil
+import pytest
+
+from workflow.launch import LaunchError, launch, mpi_command
+
+
+def test_mpi_command(monkeypatch):
+    monkeypatch.setattr(os, "geteuid", lambda: 1000)
+    assert mpi_command(2, ["program"], oversubscribe=False) == ["mpirun", "-n", "2", "program"]
+    monkeypatch.setattr(os, "geteuid", lambda: 0)
+    assert mpi_command(3, ["program"], oversubscribe=True) == [
+        "mpirun", "-n", "3", "--allow-run-as-root", "--oversubscribe", "program",
+    ]  # fmt: skip
+
+
+def test_lines_are_passed_on_as_they_come(tmp_path):
+    lines: list[str] = []
+    launch([sys.executable, "-c", "print('a'); print('b')"], lines.append, tmp_path / "log.txt")
+    assert lines == ["a", "b"]
+
+
+def test_threads_are_one(tmp_path):
+    lines: list[str] = []
+    program = "import os; print(os.environ['OMP_NUM_THREADS'])"
+    launch([sys.executable, "-c", program], lines.append, tmp_path / "log.txt")
+    assert lines == ["1"]
+
+
+def test_the_last_words_of_a_failure_are_kept(tmp_path):
+    with pytest.raises(LaunchError, match="exit code 3\nno equilibrium at step 7"):
+        launch(
+            [sys.executable, "-c", "import sys; print('no equilibrium at step 7', file=sys.stderr); sys.exit(3)"],
+            print,
+            tmp_path / "log.txt",
+        )
+
+
+def test_a_program_that_is_not_there(tmp_path):
+    with pytest.raises(LaunchError, match="no-such-program is not installed"):
+        launch(["no-such-program"], print, tmp_path / "log.txt")
+
+
+def test_an_interruption_ends_the_program_and_its_children(tmp_path):
+    program = "import subprocess, sys, time; subprocess.Popen(['sleep', '60']); print('up', flush=True); time.sleep(60)"
+
+    def interrupt(_line: str) -> None:
+        raise KeyboardInterrupt
+
+    children: list[psutil.Process] = []
+
+    def look_then_interrupt(line: str) -> None:
+        children.extend(psutil.Process().children(recursive=True))
+        interrupt(line)
+
+    start = time.perf_counter()
+    with pytest.raises(KeyboardInterrupt):
+        launch([sys.executable, "-c", program], look_then_interrupt, tmp_path / "log.txt")
+    assert len(children) == 2
+    assert time.perf_counter() - start < 30
+    _, alive = psutil.wait_procs(children, timeout=5)
+    for process in alive:
+        process.send_signal(signal.SIGKILL)
+    assert alive == []

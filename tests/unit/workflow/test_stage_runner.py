@@ -1,0 +1,66 @@
+"""A stage's folder appears complete, or not at all; a run folder has one user at a time."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from workflow.case import read_case
+from workflow.pipeline import RunFolderBusy, failed_checks, locked
+from workflow.stage_runner import Findings, Run, run_stage
+
+CASE = Path(__file__).resolve().parents[3] / "cases" / "bga_drop" / "case.toml"
+
+
+@pytest.fixture
+def run(tmp_path):
+    return Run(tmp_path, read_case(CASE), cores=1)
+
+
+def write_surfaces(_run: Run, folder: Path) -> Findings:
+    (folder / "surfaces.json").write_text("{}")
+    return Findings(
+        metrics={"volume": {"value": 1.0, "unit": "m^3"}},
+        health={"volume_error": {"value": 0.2, "limit": 0.1, "ok": False}},
+    )
+
+
+def fail(_run: Run, folder: Path) -> Findings:
+    (folder / "surfaces.json").write_text("half")
+    raise ValueError("no surface")
+
+
+def test_a_stage_leaves_products_and_a_record(run):
+    record = run_stage("surface", write_surfaces, run)
+    written = json.loads((run.folder / "surface/stage.json").read_text())
+    assert written == record
+    assert written["metrics"]["volume"] == {"value": 1.0, "unit": "m^3"}
+    assert written["seconds"] >= 0.0
+    assert sorted(path.name for path in run.folder.iterdir()) == ["surface"]
+
+
+def test_a_failed_stage_leaves_no_product(run):
+    with pytest.raises(ValueError, match="no surface"):
+        run_stage("surface", fail, run)
+    assert not (run.folder / "surface").exists()
+
+
+def test_a_rerun_replaces_all_of_a_product(run):
+    run_stage("surface", write_surfaces, run)
+    (run.folder / "surface/old.vtu").write_text("old")
+    (run.folder / ".surface.partial").mkdir()
+    run_stage("surface", write_surfaces, run)
+    assert not (run.folder / "surface/old.vtu").exists()
+
+
+def test_a_check_that_failed_is_named(run):
+    run_stage("surface", write_surfaces, run)
+    assert failed_checks(run.folder, "report") == ["surface: volume error 0.2 exceeds 0.1"]
+    assert failed_checks(run.folder, "reflow") == []
+
+
+def test_a_run_folder_has_one_user(tmp_path):
+    with locked(tmp_path), pytest.raises(RunFolderBusy, match="another run is at work"), locked(tmp_path):
+        pass
+    with locked(tmp_path):
+        pass

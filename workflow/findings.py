@@ -1,0 +1,123 @@
+"""What stages found: metrics and health checks in the form of ``summary.json``, with the limits of health."""
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from workflow.stage_runner import Findings
+
+WIDTH_ERROR = 0.05  # of a joint's width, against the Young-Laplace shape of its volume, pads and gap
+VOLUME_DRIFT = 1.0e-3  # of a joint's volume during its reflow
+SURFACE_VOLUME_ERROR = 1.0e-3  # of a closed surface, against the particles' own volume
+VOLUME_ERROR = 0.005  # of a joint's hexahedra, against its closed surface
+SCALED_JACOBIAN = 0.2
+STRESS_ERROR = 0.10  # of the critical joint's von Mises history, two-scale against DNS, relative L2
+
+Records = Mapping[str, Mapping[str, Any]]
+
+
+def metric(value: float | str, unit: str = "") -> dict:
+    """Return a metric; its unit is SI."""
+    return {"value": value, "unit": unit}
+
+
+def at_most(value: float, limit: float) -> dict:
+    """Return a health check that holds where the value is within its limit; nan never is."""
+    return {"value": value, "limit": limit, "ok": bool(value <= limit)}
+
+
+def at_least(value: float, limit: float) -> dict:
+    """Return a health check that holds where the value reaches its limit; nan never does."""
+    return {"value": value, "limit": limit, "ok": bool(value >= limit)}
+
+
+def worst(values: Iterable[float]) -> float:
+    """Return the largest magnitude; nan if any value is."""
+    magnitudes = [abs(value) for value in values]
+    return float("nan") if any(value != value for value in magnitudes) else max(magnitudes)
+
+
+def of_geometry(joints: int, elements: Mapping[str, int]) -> Findings:
+    """Judge the assembly: how many joints, how many hexahedra in each part."""
+    counts = {f"elements_{part}": metric(count) for part, count in elements.items()}
+    return Findings(metrics={"joint_count": metric(joints), **counts})
+
+
+def of_reflow(joints: Records, effects: Mapping[str, Any]) -> Findings:
+    """Judge the joints' shapes by volume, by the Young-Laplace shape and by their verdicts."""
+
+    def values(name: str) -> list[float]:
+        return [joint["metrics"][name]["value"] for joint in joints.values()]
+
+    width_error, drift = worst(values("width_error")), worst(values("volume_drift"))
+    imperfect = sum(joint["verdict"] != "ok" for joint in joints.values())
+    return Findings(
+        metrics={
+            "distinct_shapes": metric(len({joint["shape"] for joint in joints.values()})),
+            "joint_width_min": metric(min(values("max_width")), "m"),
+            "joint_width_max": metric(max(values("max_width")), "m"),
+            "joint_width_error_max": metric(width_error),
+            "joint_volume_drift_max": metric(drift),
+        },
+        health={
+            "joint_width_error_max": at_most(width_error, WIDTH_ERROR),
+            "joint_volume_drift_max": at_most(drift, VOLUME_DRIFT),
+            "joints_not_ok": at_most(imperfect, 0),
+        },
+        effects=dict(effects),
+    )
+
+
+def of_surface(surfaces: Records) -> Findings:
+    """Judge the closed surfaces by the volume that the reflow ended with."""
+    error = worst(surface["volume_error"] for surface in surfaces.values())
+    return Findings(
+        metrics={"surface_volume_error_max": metric(error)},
+        health={"surface_volume_error_max": at_most(error, SURFACE_VOLUME_ERROR)},
+    )
+
+
+def of_solder_mesh(quality: Records) -> Findings:
+    """Judge the joints' hexahedra."""
+    volume_error = worst(joint["volume_error"] for joint in quality.values())
+    jacobian = min(joint["minimum_scaled_jacobian"] for joint in quality.values())
+    step = min(joint["critical_time_step"] for joint in quality.values())
+    return Findings(
+        metrics={
+            "joint_volume_error_max": metric(volume_error),
+            "joint_scaled_jacobian_min": metric(jacobian),
+            "joint_critical_time_step": metric(step, "s"),
+        },
+        health={
+            "joint_volume_error_max": at_most(volume_error, VOLUME_ERROR),
+            "joint_scaled_jacobian_min": at_least(jacobian, SCALED_JACOBIAN),
+        },
+    )
+
+
+def of_shock(results: Mapping[str, dict], folder: Path) -> Findings:
+    """Judge the shock: the two-scale run by itself, and by the DNS where both were run.
+
+    Args:
+        results: ``result.json`` of each mode, the one whose figures count first.
+        folder: where each mode's history is.
+    """
+    first = next(iter(results))
+    metrics, health = dict(results[first]["metrics"]), dict(results[first]["health"])
+    for mode, result in results.items():
+        if mode != first:
+            health |= {f"{mode}_{name}": value for name, value in result["health"].items()}
+    if len(results) == 2:
+        metrics |= _comparison(results, folder)
+        health["critical_joint_stress_error"] = at_most(metrics["critical_joint_stress_error"]["value"], STRESS_ERROR)
+    return Findings(metrics, health, dict(results[first]["effects"]))
+
+
+def _comparison(results: Mapping[str, dict], folder: Path) -> dict:
+    """Compare both modes: errors of histories, and the ratio of the wall times of their windows."""
+    from fem.compare import compare_histories
+
+    errors = compare_histories(folder / "two_scale/history.npz", folder / "dns/history.npz")
+    seconds = {mode: result["timings"]["windows"] for mode, result in results.items()}
+    ratio = {"two_scale_dns_time_ratio": metric(seconds["two_scale"] / seconds["dns"])}
+    return {name: metric(value) for name, value in errors.items()} | ratio

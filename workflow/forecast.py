@@ -1,0 +1,145 @@
+"""Sizes, time steps and cost of a run, from its parameters alone."""
+
+from dataclasses import dataclass
+
+from fem.parameters import Material, Materials
+from workflow.case import Case, available_cores
+from workflow.reflow_pool import distinct_geometries, joint_geometries
+
+MACRO = "board"  # the part of the macro model; all others belong to the meso model
+
+
+@dataclass(frozen=True, slots=True)
+class PartForecast:
+    """A part of the mesh: its hexahedra, the critical time step of the smallest [s], whether its mass is scaled."""
+
+    elements: int
+    critical_step: float
+    mass_scaled: bool
+
+
+@dataclass(frozen=True, slots=True)
+class ShockForecast:
+    """Time steps and wall time of the shock.
+
+    Attributes:
+        window: step of the macro model [s].
+        substeps: m, meso steps a window.
+        windows: number of windows.
+        two_scale: predicted wall time of the two-scale run [s].
+        dns: predicted wall time of the DNS [s].
+        updates_per_second: element updates per second and rank that the prediction assumes.
+    """
+
+    window: float
+    substeps: int
+    windows: int
+    two_scale: float
+    dns: float
+    updates_per_second: float
+
+
+@dataclass(frozen=True, slots=True)
+class Forecast:
+    """What a run will be like.
+
+    Attributes:
+        effects: effect of the reflow -> {"on", "why"}, at the joint with the largest gap.
+        joints: number of joints.
+        distinct: number of joints that have to be computed.
+        particles: smallest and largest number of particles of a joint.
+        parts: part of the mesh -> its size and step.
+        shock: time steps and wall time.
+        seconds: stage -> predicted wall time [s], where there is a prediction.
+    """
+
+    effects: dict
+    joints: int
+    distinct: int
+    particles: tuple[int, int]
+    parts: dict[str, PartForecast]
+    shock: ShockForecast
+    seconds: dict[str, float]
+
+
+def forecast(case: Case) -> Forecast:
+    """Predict sizes, time steps and cost of a run."""
+    from meshing.pads import pad_table
+    from particles.effects import decide_effects
+    from particles.estimate import particle_count, reflow_seconds
+
+    geometries = joint_geometries(pad_table(case.package, case.board, case.warpage))
+    distinct = list(distinct_geometries(geometries).values())
+    counts = [particle_count(case.solder, geometry) for geometry in distinct]
+    workers = min(available_cores(), len(distinct))
+    reflow = sum(reflow_seconds(case.solder, geometry) for geometry in distinct) / workers
+    parts = forecast_parts(case)
+    shock = forecast_shock(case, parts)
+    modes = case.shock.numerics.modes
+    wall = sum(seconds for mode, seconds in (("two_scale", shock.two_scale), ("dns", shock.dns)) if mode in modes)
+    return Forecast(
+        effects=decide_effects(max(distinct, key=lambda geometry: geometry.gap), case.solder),
+        joints=len(geometries),
+        distinct=len(distinct),
+        particles=(min(counts), max(counts)),
+        parts=parts,
+        shock=shock,
+        seconds={"reflow": reflow, "shock": wall},
+    )
+
+
+def forecast_parts(case: Case) -> dict[str, PartForecast]:
+    """Predict size and critical time step of every part of the mesh."""
+    import numpy as np
+
+    from fem.estimate import box_critical_step
+    from meshing.estimate import count_elements
+
+    scaled = case.shock.numerics.mass_scaled
+    return {
+        name: PartForecast(
+            part.elements, box_critical_step(material_of(case, name), np.array(part.smallest)), role_of(name) in scaled
+        )
+        for name, part in count_elements(case.package, case.board).items()
+    }
+
+
+def forecast_shock(case: Case, parts: dict[str, PartForecast]) -> ShockForecast:
+    """Predict the time steps and the wall time of the shock.
+
+    Scaled masses follow the smallest step of the others, so they do not limit it. The board's patch touches the cut: it
+    limits the window, as the board does.
+    """
+    from fem.estimate import UPDATES_PER_SECOND, predict_seconds, window_plan
+
+    shock, numerics = case.shock, case.shock.numerics
+    macro = min(part.critical_step for name, part in parts.items() if role_of(name) == MACRO)
+    limiting = [part.critical_step for part in parts.values() if not part.mass_scaled]
+    meso_step = min(limiting, default=macro)
+    plan = window_plan(macro, meso_step, numerics.step_fraction, shock.duration, numerics.history_samples)
+    meso = sum(part.elements for name, part in parts.items() if name != MACRO)
+    two_scale, dns = predict_seconds(parts[MACRO].elements, meso, plan, (shock.ranks.macro, shock.ranks.meso))
+    return ShockForecast(plan.window, plan.substeps, plan.windows, two_scale, dns, UPDATES_PER_SECOND)
+
+
+def with_critical_step(quality: dict, materials: Materials) -> dict:
+    """Add the critical time step [s] to the quality of a joint mesh, from the shortest length in each material."""
+    import numpy as np
+
+    from fem.estimate import box_critical_step
+
+    steps = {
+        role: box_critical_step(getattr(materials, role), np.full(3, length))
+        for role, length in quality["smallest_length"].items()
+    }
+    return {**quality, "critical_time_step": min(steps.values()), "critical_time_steps": steps}
+
+
+def role_of(part: str) -> str:
+    """Return the material role of a part: its name up to "@", then up to "_"."""
+    return part.split("@")[0].split("_")[0]
+
+
+def material_of(case: Case, part: str) -> Material:
+    """Return the material of a part."""
+    return getattr(case.materials, role_of(part))

@@ -1,0 +1,14 @@
+"""JSON products."""
+
+import json
+from pathlib import Path
+
+
+def read_json(path: Path) -> dict:
+    """Read a JSON product."""
+    return json.loads(path.read_text())
+
+
+def write_json(path: Path, content: dict) -> None:
+    """Write a JSON product, one value a line."""
+    path.write_text(json.dumps(content, indent=1) + "\n")

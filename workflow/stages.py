@@ -1,0 +1,101 @@
+"""The pipeline: geometry -> reflow -> surface -> solder_mesh -> shock -> report, one function a stage.
+
+Each reads products of earlier stages from ``run.folder``, writes its own into ``folder``, and returns what it found.
+Packages are imported inside the functions, so that a stage loads only what it uses.
+"""
+
+from pathlib import Path
+
+from workflow import findings
+from workflow.products import read_json, write_json
+from workflow.progress import progress_bar
+from workflow.stage_runner import Findings, Run, StageFunction
+
+
+def geometry(run: Run, folder: Path) -> Findings:
+    """Mesh board and package; tabulate the pads."""
+    from meshing.assembly import write_assembly
+    from meshing.pads import pad_table, write_pads
+    from meshing.preview import write_preview
+
+    case = run.case
+    pads = pad_table(case.package, case.board, case.warpage)
+    write_pads(folder / "pads.json", pads)
+    counts = write_assembly(case.package, case.board, case.warpage, folder / "assembly.msh")
+    write_preview([folder / "assembly.msh"], folder / "preview.png")
+    return findings.of_geometry(len(pads), counts)
+
+
+def reflow(run: Run, folder: Path) -> Findings:
+    """Melt the solder of each distinct joint between its pads."""
+    from meshing.pads import read_pads
+    from particles.effects import decide_effects
+    from particles.products import write_shapes
+    from workflow.reflow_pool import distinct_geometries, joint_geometries, joint_records, solve_joints
+
+    groups = distinct_geometries(joint_geometries(read_pads(run.folder / "geometry/pads.json")))
+    distinct = {names[0]: geometry for names, geometry in groups.items()}
+    with progress_bar(f"reflow of {len(distinct)} distinct joints") as progress:
+        shapes = solve_joints(distinct, run.case.solder, run.cores, progress)
+    write_shapes(folder / "shapes.h5", shapes)
+    joints = joint_records(groups, shapes)
+    write_json(folder / "joints.json", joints)
+    return findings.of_reflow(joints, decide_effects(next(iter(distinct.values())), run.case.solder))
+
+
+def surface(run: Run, folder: Path) -> Findings:
+    """Close the surface of each distinct joint and measure it."""
+    from meshing.surface import close_surface, measure, write_surface
+    from particles.products import read_shapes
+
+    surfaces = {}
+    for name, shape in read_shapes(run.folder / "reflow/shapes.h5").items():
+        closed = close_surface(shape.surface_points, shape.triangles, shape.ring_board, shape.ring_package)
+        write_surface(folder / f"{name}.vtu", closed)
+        measures = measure(closed)
+        surfaces[name] = {**measures, "volume_error": measures["volume"] / shape.metrics["volume"][0] - 1.0}
+    write_json(folder / "surfaces.json", surfaces)
+    return findings.of_surface(surfaces)
+
+
+def solder_mesh(run: Run, folder: Path) -> Findings:
+    """Mesh every joint in its place with hexahedra."""
+    from meshing.joints_file import write_joints
+    from meshing.pads import read_pads
+    from meshing.solder_mesh import joint_quality, mesh_joint
+    from meshing.surface import read_surface
+    from workflow.forecast import with_critical_step
+
+    case, shape_of = run.case, read_json(run.folder / "reflow/joints.json")
+    meshes = [
+        mesh_joint(
+            read_surface(run.folder / f"surface/{shape_of[site.name]['shape']}.vtu"), site, case.package, case.warpage
+        )
+        for site in read_pads(run.folder / "geometry/pads.json")
+    ]
+    write_joints(meshes, folder / "joints.msh")
+    quality = {mesh.name: with_critical_step(joint_quality(mesh), case.materials) for mesh in meshes}
+    write_json(folder / "quality.json", quality)
+    return findings.of_solder_mesh(quality)
+
+
+def shock(run: Run, folder: Path) -> Findings:
+    """Drop the board: each mode is one MPI run of the package fem; two modes are compared."""
+    from workflow.shock_launch import read_results, run_mode
+
+    for mode in run.case.shock.numerics.modes:
+        run_mode(run, folder / mode, mode)
+    return findings.of_shock(read_results(folder), folder)
+
+
+def report(run: Run, folder: Path) -> Findings:
+    """Write report.html and summary.json from the products."""
+    from workflow.report import write_report
+
+    write_report(run.folder, run.case)
+    return Findings()
+
+
+STAGE_FUNCTIONS: dict[str, StageFunction] = {
+    function.__name__: function for function in (geometry, reflow, surface, solder_mesh, shock, report)
+}
