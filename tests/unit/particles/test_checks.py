@@ -1,0 +1,42 @@
+import pytest
+
+from particles.checks import problems
+from particles.geometry import JointGeometry
+from particles.parameters import Solder, SolderNumerics
+
+GEOMETRIES = {f"A{k}": JointGeometry(gap * 1e-3, 0.24e-3, 0.24e-3) for k, gap in enumerate((0.31, 0.325, 0.34), 1)}
+PITCH = 1e-3
+
+
+def keys(solder, geometries=GEOMETRIES):
+    return [problem.key for problem in problems(solder, geometries, PITCH)]
+
+
+@pytest.mark.parametrize("volume", [0.05, 0.0724, 0.1])
+def test_sound_volumes_pass(volume):
+    assert keys(Solder(volume=volume * 1e-9)) == []
+
+
+@pytest.mark.parametrize("volume", [0.26, 5.0])
+def test_too_much_solder_touches_the_neighbour(volume):
+    (problem,) = problems(Solder(volume=volume * 1e-9), GEOMETRIES, PITCH)
+    assert problem.key == "solder.volume"
+    assert problem.value == f"{volume:.3g} mm^3"
+    assert problem.allowed.startswith("<= 0.2")
+    assert "A1" in problem.message
+
+
+def test_too_little_solder_ruptures_at_the_widest_gap():
+    (problem,) = problems(Solder(volume=0.012e-9), GEOMETRIES, PITCH)
+    assert problem.key == "solder.volume"
+    assert problem.allowed.startswith(">= 0.02")
+    assert "A3" in problem.message
+
+
+def test_spacing_must_resolve_the_joint():
+    (problem,) = problems(Solder(volume=0.0724e-9, numerics=SolderNumerics(spacing=0.15e-3)), GEOMETRIES, PITCH)
+    assert (problem.key, problem.value, problem.allowed) == ("solder.numerics.spacing", "0.15 mm", "<= 0.1033 mm")
+
+
+def test_the_pad_must_be_wetted_better_than_the_mask():
+    assert keys(Solder(volume=0.0724e-9, pad_contact_angle=2.0, mask_contact_angle=1.0)) == ["solder.pad_contact_angle"]

@@ -1,0 +1,74 @@
+import numpy as np
+import pytest
+
+from particles.body import Body
+from particles.cloud import box_cloud, equal_area_radius, joint_cloud
+from particles.contact_line import ON_MASK, ON_PAD, PINNED, ContactLine
+from particles.force_wetting import Wetting
+from particles.geometry import JointGeometry
+from particles.surface_measure import ring_area
+
+PAD, MASK = np.radians(5.0), np.radians(148.0)
+
+
+@pytest.fixture
+def body():
+    return Body.at_rest(joint_cloud(JointGeometry(1.0, 0.8, 0.8), 2.2, 0.2))
+
+
+def line_on(body, state=PINNED):
+    corners = len(body.cloud.rings[0])
+    line = ContactLine(0, equal_area_radius(0.8, corners), PAD, MASK, corners)
+    line.state[:] = state
+    return line
+
+
+def load_of_angle(body, line, angle):
+    """Forces with which a surface at this contact angle pulls on the line, gamma = 1."""
+    load = np.zeros_like(body.points)
+    radial, length = line.outward(body)
+    load[body.cloud.rings[0]] = -np.cos(angle) * length[:, None] * radial
+    return load
+
+
+@pytest.mark.parametrize(("degrees", "state"), [(2.0, PINNED), (60.0, PINNED), (140.0, PINNED), (155.0, ON_MASK)])
+def test_gibbs_condition_at_the_edge(body, degrees, state):
+    line = line_on(body)
+    line.update(body, load_of_angle(body, line, np.radians(degrees)), 1.0)
+    assert (line.state == state).all()
+
+
+def test_line_recedes_below_the_angle_of_the_pad(body):
+    corners = len(body.cloud.rings[0])
+    line = ContactLine(0, equal_area_radius(0.8, corners), np.radians(40.0), MASK, corners)
+    line.update(body, load_of_angle(body, line, np.radians(30.0)), 1.0)
+    assert (line.state == ON_PAD).all()
+
+
+@pytest.mark.parametrize(("state", "factor"), [(ON_PAD, 1.01), (ON_MASK, 0.99)])
+def test_a_vertex_that_crosses_the_edge_is_caught_there(body, state, factor):
+    line, vertex = line_on(body, state), body.cloud.rings[0][4]
+    away = 2.0 - factor
+    body.points[body.cloud.rings[0], :2] *= away
+    body.points[vertex, :2] *= factor / away
+    line.update(body, load_of_angle(body, line, np.radians(90.0)), 1.0)
+    assert line.state[4] == PINNED
+    assert (np.delete(line.state, 4) == state).all()
+    assert np.linalg.norm(body.points[vertex]) == pytest.approx(line.edge_radius)
+
+
+def test_contact_cosine_inverts_the_pull(body):
+    line = line_on(body)
+    cosine = line.contact_cosine(body, load_of_angle(body, line, np.radians(70.0)), 1.0)
+    assert np.degrees(np.arccos(cosine)) == pytest.approx(70.0)
+
+
+def test_wetting_force_is_the_gradient_of_its_energy_and_vanishes_at_right_angles():
+    body = Body.at_rest(box_cloud(1.0, 5))
+    ring = body.cloud.rings[0]
+    for degrees, pull in ((60.0, 0.5), (90.0, 0.0)):
+        line = ContactLine(0, np.inf, np.radians(degrees), np.radians(degrees), len(ring))
+        wetting = Wetting(2.0, (line,), ())
+        assert wetting.energy(body) == pytest.approx(-2.0 * pull * ring_area(body.points, ring))
+        # Widening the square by a factor 1 + e gains 2 e gamma cos(theta) A.
+        assert float((wetting.force(body) * body.points).sum()) == pytest.approx(2.0 * 2.0 * pull, abs=1e-12)

@@ -1,0 +1,85 @@
+import numpy as np
+import pytest
+
+from particles.mls import SUPPORT, DegenerateStencil, derivatives
+from particles.neighbours import NeighbourList
+
+
+@pytest.fixture
+def cloud():
+    axis = np.arange(7.0)
+    points = np.stack(np.meshgrid(axis, axis, axis), axis=-1).reshape(-1, 3)
+    return points + np.random.default_rng(4).uniform(-0.15, 0.15, points.shape)
+
+
+def fit(points, rows, basis):
+    neighbours = NeighbourList(SUPPORT[basis], skin=0.3)
+    neighbours.update(points)
+    return derivatives(points, np.asarray(rows, np.int32), neighbours, basis)
+
+
+def weights(offsets, support):
+    return np.maximum(1.0 - (offsets**2).sum(axis=1) / support**2, 0.0) ** 3
+
+
+@pytest.mark.parametrize("row", [171, 0])
+def test_quadratic_weights_equal_a_dense_least_squares_fit(cloud, row):
+    """Twin: NumPy's lstsq on the weighted Taylor expansion, inside and at a corner."""
+    found = fit(cloud, [row], "quadratic")
+    d = np.delete(cloud, row, axis=0) - cloud[row]
+    x, y, z = d.T
+    taylor = np.column_stack((x, y, z, x * x / 2, y * y / 2, z * z / 2, x * y, x * z, y * z))
+    root = np.sqrt(weights(d, SUPPORT["quadratic"]))[:, None]
+    fitted = np.linalg.pinv(taylor * root) * root.T
+    expected = np.vstack((fitted[:3], fitted[3:6].sum(axis=0)))
+    operators = np.vstack([m.toarray() for m in (*found.gradient, found.laplacian)])
+    assert found.order[0] == 2
+    assert np.delete(operators, row, axis=1) == pytest.approx(expected, abs=1e-9)
+    assert operators.sum(axis=1) == pytest.approx(0.0, abs=1e-10)
+
+
+def mls_value(cloud, values, at):
+    """Twin: value of the linear MLS approximation at a point."""
+    basis = np.column_stack((np.ones(len(cloud)), cloud - at))
+    w = weights(cloud - at, SUPPORT["linear"])
+    return np.linalg.solve(basis.T @ (w[:, None] * basis), basis.T @ (w * values))[0]
+
+
+def test_linear_derivatives_equal_differences_of_the_mls_approximation(cloud):
+    values = np.random.default_rng(5).normal(size=len(cloud))
+    row, step = 171, 1e-3
+    found = fit(cloud, [row], "linear")
+    centre = mls_value(cloud, values, cloud[row])
+    laplacian = 0.0
+    for c in range(3):
+        shift = step * np.eye(3)[c]
+        right, left = (mls_value(cloud, values, cloud[row] + s) for s in (shift, -shift))
+        assert (found.gradient[c] @ values)[0] == pytest.approx((right - left) / (2 * step), rel=1e-4)
+        laplacian += (right - 2 * centre + left) / step**2
+    assert (found.laplacian @ values)[0] == pytest.approx(laplacian, rel=1e-3)
+
+
+def test_quadratic_basis_reproduces_quadratic_fields_everywhere(cloud):
+    x, y, z = cloud.T
+    found = fit(cloud, np.arange(len(cloud)), "quadratic")
+    assert found.gradient[0] @ (x * x - y * z + 3 * x) == pytest.approx(2 * x + 3, abs=1e-8)
+    assert found.laplacian @ (x * x + 2 * y * y - z * z + x * y) == pytest.approx(4.0, abs=1e-8)
+
+
+def test_linear_basis_reproduces_linear_fields_everywhere(cloud):
+    found = fit(cloud, np.arange(len(cloud)), "linear")
+    assert found.gradient[1] @ (cloud @ [1.0, 2.0, 3.0]) == pytest.approx(2.0, abs=1e-9)
+
+
+def test_too_few_neighbours_fall_back_to_the_linear_terms():
+    points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 0.0]])
+    found = fit(points, [0], "quadratic")
+    assert found.order[0] == 1
+    assert (found.gradient[2] @ points)[0] == pytest.approx([0.0, 0.0, 1.0])
+
+
+def test_a_planar_neighbourhood_is_an_error():
+    axis = np.arange(4.0)
+    points = np.stack(np.meshgrid(axis, axis, [0.0]), axis=-1).reshape(-1, 3)
+    with pytest.raises(DegenerateStencil, match="particle 5"):
+        fit(points, [5], "quadratic")

@@ -1,0 +1,100 @@
+"""Operators of the implicit step and small parts of it."""
+
+import numpy as np
+import pytest
+
+from particles.body import Body
+from particles.cloud import box_cloud
+from particles.force_surface_tension import SurfaceTension
+from particles.interior_shift import SMALLEST_DEPTH, interior_shift
+from particles.mass import Inertia, Mass
+from particles.mls import SUPPORT, derivatives
+from particles.neighbours import NeighbourList
+from particles.time_step import TimeStep, capillary_limit
+from particles.viscosity import Viscosity
+
+
+@pytest.fixture
+def body():
+    return Body.at_rest(box_cloud(1.0, 6))
+
+
+def stencils(body):
+    neighbours = NeighbourList(SUPPORT["quadratic"] * body.cloud.spacing, 0.0)
+    neighbours.update(body.points)
+    return derivatives(body.points, body.interior, neighbours, "quadratic")
+
+
+def power(matrix, field):
+    vector = field.T.ravel()
+    return float(vector @ (matrix @ vector))
+
+
+def test_viscous_power_of_simple_flows(body):
+    """2 mu D : D over the volume of the particles below the surface: shear mu V, extension 4 mu V, rotation none."""
+    matrix = Viscosity(2.0).matrix(body, stencils(body), 1.0)
+    x, y, z = body.points.T
+    below = body.volumes[body.interior].sum()
+    assert power(matrix, np.column_stack((z, 0 * x, 0 * x))) == pytest.approx(2.0 * below)
+    assert power(matrix, np.column_stack((x, -y, 0 * x))) == pytest.approx(2.0 * 4.0 * below)
+    assert power(matrix, np.column_stack((-y, x, 0 * x))) == pytest.approx(0.0, abs=1e-12)
+    assert abs(matrix - matrix.T).max() < 1e-12
+
+
+def test_surface_tension_matrix_is_the_time_step_times_the_stiffness(body):
+    tension = SurfaceTension(0.5)
+    matrix = tension.matrix(body, stencils(body), 0.1)
+    pulled = (matrix @ body.points.T.ravel()).reshape(3, -1).T
+    assert pulled == pytest.approx(-0.1 * tension.force(body), abs=1e-12)
+
+
+def test_mass_and_momentum(body):
+    body.velocity[:] = [1.0, 2.0, 3.0]
+    assert Mass(5.0).matrix(body, stencils(body), 0.5).sum() == pytest.approx(3 * 5.0 * 1.0 / 0.5)
+    assert Inertia(5.0).load(body, 0.5).sum(axis=0) == pytest.approx([10.0, 20.0, 30.0])
+
+
+def test_shift_keeps_particles_below_the_surface_and_on_their_wall(body):
+    spacing, count = body.cloud.spacing, body.cloud.surface_count
+    near_top = count + int(np.argmax(body.points[count:, 2]))
+    body.points[near_top, 2] = 1.0 + 0.1 * spacing
+    neighbours = NeighbourList(2.4 * spacing, 0.0)
+    neighbours.update(body.points)
+    shift = interior_shift(body, neighbours)
+    assert body.points[near_top, 2] + shift[near_top - count, 2] < 1.0 - (SMALLEST_DEPTH - 0.11) * spacing
+    assert (shift[body.cloud.wall[body.interior] >= 0, 2] == 0.0).all()
+
+
+def test_shift_equals_numpy_twin(body):
+    """Twin of the repulsion, for particles deep inside."""
+    rng, spacing = np.random.default_rng(12), body.cloud.spacing
+    body.points[body.interior] += 0.1 * spacing * rng.uniform(-1, 1, (len(body.interior), 3))
+    neighbours = NeighbourList(2.4 * spacing, 0.0)
+    neighbours.update(body.points)
+    found = interior_shift(body, neighbours)
+    for k, i in enumerate(body.interior):
+        if not (np.abs(body.points[i] - [0, 0, 0.5]) < 0.25).all():
+            continue
+        d = body.points[i] - np.delete(body.points, i, axis=0)
+        r = np.linalg.norm(d, axis=1)
+        expected = 0.15 * spacing * (np.maximum(1 - r / (1.1 * spacing), 0) / r) @ d
+        expected *= min(1.0, 0.1 * spacing / np.linalg.norm(expected))
+        assert found[k] == pytest.approx(expected, abs=1e-12)
+
+
+def test_time_step_is_cut_by_the_displacement_and_grows_back():
+    step = TimeStep(largest=1.0, spacing=0.1, size=1.0)
+    assert not step.accepts(speed=0.05)
+    assert step.binding == "displacement"
+    assert step.size == pytest.approx(0.8 * 0.25 * 0.1 / 0.05)
+    assert step.accepts(speed=0.05)
+    step.grow()
+    assert (step.binding, step.size) == ("growth", pytest.approx(1.15 * 0.4))
+    for _ in range(10):
+        step.grow()
+    assert (step.binding, step.size) == ("capillary multiple", 1.0)
+
+
+def test_capillary_limit_of_solder():
+    """0.25 sqrt(rho h^3 / (2 pi gamma)): 4.72 us at 0.05 mm."""
+    assert capillary_limit(8930.0, 5e-5, 0.4985) == pytest.approx(4.72e-6, rel=1e-3)

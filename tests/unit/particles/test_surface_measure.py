@@ -1,0 +1,98 @@
+import numpy as np
+import pytest
+
+from particles.body import Body
+from particles.cloud import box_cloud, joint_cloud
+from particles.force_gravity import Gravity
+from particles.geometry import JointGeometry
+from particles.surface_measure import (
+    cotangent_laplacian,
+    enclosed_volume,
+    ring_area,
+    ring_area_gradient,
+    surface_area,
+    volume_and_gradient,
+)
+
+CLOUDS = [box_cloud(1.0, 5), joint_cloud(JointGeometry(1.0, 0.8, 0.6), 1.9, 0.25)]
+
+
+def shaken(cloud, seed=6):
+    """Points moved at random, on the walls within them."""
+    move = 0.05 * cloud.spacing * np.random.default_rng(seed).normal(size=cloud.points.shape)
+    move[cloud.wall >= 0, 2] = 0.0
+    return cloud.points + move
+
+
+def slope(function, points, direction, step=1e-6):
+    return (function(points + step * direction) - function(points - step * direction)) / (2 * step)
+
+
+def test_box_has_the_area_and_volume_of_a_cube():
+    cloud = CLOUDS[0]
+    assert surface_area(cloud.points, cloud.triangles) == pytest.approx(5.0)
+    assert enclosed_volume(cloud.points, cloud.triangles, cloud.rings, cloud.ring_heights) == pytest.approx(1.0)
+    assert ring_area(cloud.points, cloud.rings[0]) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("cloud", CLOUDS, ids=["drop", "joint"])
+def test_area_equals_numpy_twin(cloud):
+    points = shaken(cloud)
+    a, b, c = (points[cloud.triangles[:, k]] for k in range(3))
+    assert surface_area(points, cloud.triangles) == pytest.approx(
+        0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()
+    )
+
+
+@pytest.mark.parametrize("cloud", CLOUDS, ids=["drop", "joint"])
+def test_stiffness_times_position_is_the_gradient_of_the_area(cloud):
+    points = shaken(cloud)
+    stiffness = cotangent_laplacian(points, cloud.triangles, len(points))
+    direction = np.random.default_rng(7).normal(size=points.shape)
+    expected = slope(lambda x: surface_area(x, cloud.triangles), points, direction)
+    assert float(((stiffness @ points) * direction).sum()) == pytest.approx(expected, rel=1e-7)
+    assert abs(stiffness - stiffness.T).max() < 1e-12
+    assert np.linalg.eigvalsh(stiffness.toarray()).min() > -1e-10
+
+
+@pytest.mark.parametrize("cloud", CLOUDS, ids=["drop", "joint"])
+def test_gradient_of_the_volume(cloud):
+    points = shaken(cloud)
+    direction = np.random.default_rng(8).normal(size=points.shape)
+    direction[cloud.wall >= 0, 2] = 0.0
+    gradient = volume_and_gradient(points, cloud.triangles, cloud.rings, cloud.ring_heights)[1]
+    expected = slope(
+        lambda x: enclosed_volume(x, cloud.triangles, cloud.rings, cloud.ring_heights), points, direction
+    )
+    assert float((gradient * direction).sum()) == pytest.approx(expected, rel=1e-7)
+
+
+def test_gradient_of_the_wetted_area():
+    cloud = CLOUDS[0]
+    points, ring = shaken(cloud), cloud.rings[0]
+    direction = np.zeros_like(points)
+    direction[ring] = np.random.default_rng(9).normal(size=(len(ring), 3))
+    expected = slope(lambda x: ring_area(x, ring), points, direction)
+    assert float((ring_area_gradient(points, ring) * direction[ring]).sum()) == pytest.approx(expected, rel=1e-7)
+
+
+def test_potential_energy_is_weight_times_height_of_the_centroid():
+    body = Body.at_rest(CLOUDS[0])
+    assert Gravity(3.0).energy(body) == pytest.approx(3.0 * 0.5)
+
+
+def test_hydrostatic_force_is_the_gradient_of_the_potential_energy_at_constant_volume():
+    """-rho g z dV/dx is exact in the limit of fine triangles; here the error is that of one triangle's size."""
+    errors = []
+    for count in (5, 9):
+        cloud = box_cloud(1.0, count)
+        body, gravity = Body.at_rest(cloud), Gravity(1.0)
+        field = np.column_stack((body.points[:, 0] * body.points[:, 2], np.zeros((len(body.points), 2))))
+
+        def energy(x, body=body, gravity=gravity):
+            body.points = x
+            return gravity.energy(body)
+
+        power = float((gravity.force(body) * field).sum())
+        errors.append(abs(power + slope(energy, body.points, field)))
+    assert errors[1] < 0.35 * errors[0]
