@@ -3,7 +3,6 @@
 import meshio
 import numpy as np
 import pytest
-from conftest import revolve
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -13,6 +12,7 @@ from meshing.pads import pad_table
 from meshing.parameters import Copper, JointNumerics
 from meshing.solder_mesh import JointMeshError, joint_quality, mesh_joint
 from meshing.surface import close_surface
+from tests.support.joint_surfaces import revolve
 
 
 def barrel(gap: float, bulge: float, lower: float = 0.24e-3, upper: float = 0.24e-3, offset: float = 0.0):

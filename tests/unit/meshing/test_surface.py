@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from conftest import revolve
 
 from meshing.section import cut_segments, radius_by_angle, section_area, section_centroid
 from meshing.surface import close_surface, measure, read_surface, write_surface
+from tests.support.joint_surfaces import revolve
 
 
 def truncated_sphere(around: int, levels: int):
