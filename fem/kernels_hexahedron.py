@@ -78,11 +78,47 @@ def condense(full, kept):
 
 
 @njit(cache=True)
+def orthonormal_linear(weights, basis):
+    """Write 1, xi, eta, zeta at the Gauss points, orthonormal under ``weights (8,)``: ``basis (4, 8)``."""
+    for k in range(4):
+        for g in range(8):
+            basis[k, g] = 1.0 if k == 0 else GAUSS[g, k - 1]
+        for m in range(k):
+            product = 0.0
+            for g in range(8):
+                product += weights[g] * basis[k, g] * basis[m, g]
+            for g in range(8):
+                basis[k, g] -= product * basis[m, g]
+        square = 0.0
+        for g in range(8):
+            square += weights[g] * basis[k, g] ** 2
+        for g in range(8):
+            basis[k, g] /= np.sqrt(square)
+
+
+@njit(cache=True)
+def linear_divergence(weights, gradient, basis, result):
+    """Write the least-squares linear part of each shape function's gradient: ``(8, 8, 3)`` per Gauss point and node."""
+    orthonormal_linear(weights, basis)
+    result[:] = 0.0
+    for a in range(8):
+        for i in range(3):
+            for k in range(4):
+                coefficient = 0.0
+                for g in range(8):
+                    coefficient += weights[g] * basis[k, g] * gradient[g, a, i]
+                for g in range(8):
+                    result[g, a, i] += coefficient * basis[k, g]
+
+
+@njit(cache=True)
 def stiffness(points, elasticity, material, result):
     """Write the stiffness of hexahedra with Taylor-modified Wilson modes, 2 x 2 x 2 Gauss points.
 
     The gradients of the modes 1 - xi_k^2 use the Jacobian at the centre, scaled by det J_0 / det J, so that the patch
     test holds on distorted shapes (Taylor, Beresford & Wilson, IJNME 10, 1976); the nine internal unknowns are condensed.
+    No mode balances the bilinear part of the compatible dilatation, which locks nearly incompressible beams under shear;
+    only its linear part is kept (B-bar; least squares with the weights det J keeps the patch test).
 
     Args:
         points: ``(ne, 8, 3)`` [m].
@@ -90,25 +126,31 @@ def stiffness(points, elasticity, material, result):
         material: ``(ne,)`` index into ``elasticity``.
         result: ``(ne, 24, 24)`` [N/m].
     """
-    jacobian, inverse, centre, gradient = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)), np.empty((8, 3))
+    jacobian, inverse, centre = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
+    gradient, divergence, weights, basis = np.empty((8, 8, 3)), np.empty((8, 8, 3)), np.empty(8), np.empty((4, 8))
     strain, stress, full = np.empty((6, 33)), np.empty((6, 33)), np.empty((33, 33))
     for e in range(len(points)):
         full[:] = 0.0
+        gradient[:] = 0.0
         centre_determinant = invert_jacobian(points[e], CENTRE_DERIVATIVES, jacobian, centre)
         for g in range(8):
-            determinant = invert_jacobian(points[e], GAUSS_DERIVATIVES[g], jacobian, inverse)
-            gradient[:] = 0.0
-            add_product(GAUSS_DERIVATIVES[g], inverse, 1.0, gradient)
+            weights[g] = invert_jacobian(points[e], GAUSS_DERIVATIVES[g], jacobian, inverse)
+            add_product(GAUSS_DERIVATIVES[g], inverse, 1.0, gradient[g])
+        linear_divergence(weights, gradient, basis, divergence)
+        for g in range(8):
             for a in range(8):
-                write_strain_columns(strain, 3 * a, gradient[a, 0], gradient[a, 1], gradient[a, 2])
+                write_strain_columns(strain, 3 * a, gradient[g, a, 0], gradient[g, a, 1], gradient[g, a, 2])
+                for i in range(3):
+                    for row in range(3):
+                        strain[row, 3 * a + i] += (divergence[g, a, i] - gradient[g, a, i]) / 3.0
             for k in range(3):
-                scale = -2.0 * GAUSS[g, k] * centre_determinant / determinant
+                scale = -2.0 * GAUSS[g, k] * centre_determinant / weights[g]
                 write_strain_columns(
                     strain, 24 + 3 * k, scale * centre[k, 0], scale * centre[k, 1], scale * centre[k, 2]
                 )
             stress[:] = 0.0
             add_product(elasticity[material[e]], strain, 1.0, stress)
-            add_product(strain.T, stress, determinant, full)
+            add_product(strain.T, stress, weights[g], full)
         condense(full, 24)
         result[e] = full[:24, :24]
 
