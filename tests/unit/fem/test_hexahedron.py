@@ -38,14 +38,20 @@ def strain_matrix(gradient: np.ndarray) -> np.ndarray:
 
 
 def stiffness_twin(corners: np.ndarray, elasticity: np.ndarray) -> np.ndarray:
-    """Taylor-modified Wilson element in plain NumPy."""
+    """Taylor-modified Wilson element with linear dilatation, in plain NumPy."""
+    jacobians = np.array([corners.T @ derivatives for derivatives in shape_derivatives(GAUSS)])
+    weights = np.linalg.det(jacobians)
+    gradients = shape_derivatives(GAUSS) @ np.linalg.inv(jacobians)
+    basis = np.column_stack([np.ones(8), GAUSS])
+    root = np.sqrt(weights)[:, None]
+    linear = basis @ np.linalg.lstsq(basis * root, gradients.reshape(8, 24) * root, rcond=None)[0]
     centre = corners.T @ shape_derivatives(np.zeros((1, 3)))[0]
     full = np.zeros((33, 33))
-    for xi, derivatives in zip(GAUSS, shape_derivatives(GAUSS), strict=True):
-        jacobian = corners.T @ derivatives
-        modes = -2.0 * np.diag(xi) @ np.linalg.inv(centre) * np.linalg.det(centre) / np.linalg.det(jacobian)
-        strain = strain_matrix(np.concatenate([derivatives @ np.linalg.inv(jacobian), modes]))
-        full += np.linalg.det(jacobian) * strain.T @ elasticity @ strain
+    for g, xi in enumerate(GAUSS):
+        modes = -2.0 * np.diag(xi) @ np.linalg.inv(centre) * np.linalg.det(centre) / weights[g]
+        strain = strain_matrix(np.concatenate([gradients[g], modes]))
+        strain[:3, :24] += (linear[g] - strain[:3, :24].sum(axis=0)) / 3.0
+        full += weights[g] * strain.T @ elasticity @ strain
     return full[:24, :24] - full[:24, 24:] @ np.linalg.solve(full[24:, 24:], full[24:, :24])
 
 
