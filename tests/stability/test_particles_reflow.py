@@ -1,0 +1,87 @@
+"""Hard reflows: they must end at rest, with the volume kept and the energy falling, and say what happened."""
+
+import numpy as np
+import pytest
+
+from particles.geometry import JointGeometry
+from particles.parameters import Solder, SolderEffects, SolderNumerics
+from particles.reflow import solve_joint
+from particles.sessile import solve_drop
+
+BALL, RADIUS = 0.0724e-9, 0.24e-3
+MM = 1e-3
+
+
+def cylinder(fill, gap, radius=RADIUS):
+    return fill * np.pi * radius**2 * gap
+
+
+def check_energy_falls(energy):
+    assert np.diff(energy).max() < 1e-4 * abs(energy[0])
+
+
+def check(shape, verdict):
+    assert shape.verdict == verdict
+    assert abs(shape.metrics["volume_drift"][0]) < 1e-6
+    assert np.isfinite(shape.points).all()
+    assert abs(shape.metrics["width_error"][0]) < 0.01
+
+
+@pytest.mark.parametrize(
+    ("gap", "board", "package", "volume", "verdict"),
+    [
+        (0.22, 0.24, 0.24, BALL, "overflow"),
+        (0.45, 0.24, 0.24, BALL, "ok"),
+        (0.45, 0.24, 0.24, cylinder(0.5, 0.45e-3), "ok"),
+        (0.80, 0.24, 0.24, cylinder(1.3, 0.80e-3), "ok"),
+        (0.31, 0.30, 0.20, BALL, "ok"),
+        (0.31, 0.12, 0.24, BALL, "overflow"),
+        (0.31, 0.24, 0.24, cylinder(3.0, 0.31e-3), "overflow"),
+    ],
+    ids=["squeezed", "stretched", "deep neck", "slender", "unequal discs", "tiny disc", "three times too much"],
+)
+def test_extreme_joints(gap, board, package, volume, verdict):
+    numerics = SolderNumerics(spacing=7e-5)
+    solder = Solder(volume=volume, numerics=numerics)
+    shape = solve_joint(JointGeometry(gap * MM, board * MM, package * MM), solder)
+    check(shape, verdict)
+    check_energy_falls(shape.history["energy"])
+
+
+@pytest.mark.parametrize("limit", [5.0, 20.0, 100.0])
+@pytest.mark.parametrize("spacing", [1e-4, 5e-5])
+def test_time_steps_far_beyond_the_capillary_limit(limit, spacing):
+    """An explicit surface tension breaks at 4 times the limit."""
+    numerics = SolderNumerics(spacing=spacing, time_step_limit=limit)
+    shape = solve_joint(JointGeometry(0.31e-3, RADIUS, RADIUS), Solder(volume=BALL, numerics=numerics))
+    check(shape, "ok")
+    check_energy_falls(shape.history["energy"])
+    assert shape.metrics["time_step_over_capillary_limit"][0] > 0.5 * limit
+
+
+def test_a_joint_without_equilibrium_opens():
+    gap = 0.6e-3
+    shape = solve_joint(JointGeometry(gap, RADIUS, RADIUS), Solder(volume=cylinder(0.4, gap)))
+    assert shape.verdict == "open"
+
+
+@pytest.mark.parametrize("properties", ["physical", "paper"])
+def test_inertia_never_gains_energy(properties):
+    """With inertia and no viscosity from a violent start: the potential energy swings, but below its first value."""
+    values = {"physical": {}, "paper": {"surface_tension": 4.985, "viscosity": 0.227}}[properties]
+    numerics = SolderNumerics(spacing=7e-5, time_step_limit=5)
+    solder = Solder(volume=BALL, numerics=numerics, effects=SolderEffects(inertia="on"), **values)
+    shape = solve_joint(JointGeometry(0.31e-3, RADIUS, RADIUS), solder)
+    check(shape, "ok")
+    energy = shape.history["energy"]
+    assert energy.argmax() == 0
+    assert energy[-1] == pytest.approx(energy.min(), rel=1e-4)
+
+
+@pytest.mark.parametrize("degrees", [30, 148])
+def test_extreme_contact_angles(degrees):
+    """A cube that spreads to a film of a third of its height, and one that almost rolls off its wall."""
+    numerics = SolderNumerics(time_step_limit=100)
+    flow, run = solve_drop(Solder(volume=1e-9, numerics=numerics), np.radians(degrees), 7)
+    check_energy_falls(np.array([record.energy for record in run.records]))
+    assert flow.body.volume()[0] == pytest.approx(1e-9, rel=1e-6)
