@@ -1,6 +1,7 @@
 """Command line: new, plan, run, status, report, clean, schema."""
 
 import json
+import os
 import shutil
 import signal
 import sys
@@ -145,6 +146,9 @@ def stage(
 def main() -> None:
     """Run the command line; exit codes: 0 done and healthy, 1 failed, 2 bad input."""
     signal.signal(signal.SIGTERM, _interrupt)
+    if "DISPLAY" not in os.environ:
+        # VTK would look for an X server first, and complain.
+        os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
     try:
         app()
     except CaseError as error:

@@ -23,7 +23,8 @@ def show_plan(case: Case, run_folder: Path, console: Console) -> None:
     console.print(_sizes(case, outlook))
     console.print(_shock(case, outlook))
     rate = f"{outlook.shock.updates_per_second:.1e} element updates per second and rank (fem/estimate.py)"
-    console.print(f"\n[dim]Costs assume {rate} and the reflow speed in particles/estimate.py, as benchmarks/ measured.[/]")
+    console.print(f"\n[dim]Costs assume {rate}")
+    console.print("[dim]and the reflow speed in particles/estimate.py, both as benchmarks/ measured them.")
 
 
 def change_text(change: Change, case: Case) -> str:

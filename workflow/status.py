@@ -10,8 +10,18 @@ from workflow.inputs import Verdict, examine, read_record
 from workflow.stage_table import BY_NAME
 from workflow.units import from_si
 
-SHOWN_UNITS = {"m": "mm", "m^3": "mm^3", "Pa": "MPa", "J": "mJ", "kg": "mg"}
-FIGURES = 5
+SHOWN_UNITS = {"m": "mm", "m^3": "mm^3", "Pa": "MPa", "J": "mJ", "kg": "mg", "s": "ns"}
+FIGURES = {
+    "geometry": ("joint_count", "elements_board", "elements_board_patch"),
+    "reflow": ("distinct_shapes", "joint_width_min", "joint_width_max", "joint_width_error_max"),
+    "surface": ("surface_volume_error_max",),
+    "solder_mesh": ("joint_volume_error_max", "joint_scaled_jacobian_min", "joint_critical_time_step"),
+    "shock": (
+        "critical_joint", "peak_von_mises", "peak_board_strain", "step_ratio", "critical_joint_stress_error",
+        "two_scale_dns_time_ratio", "energy_balance_error",
+    ),
+    "report": (),
+}  # fmt: skip
 
 
 def show_status(case: Case, run_folder: Path, console: Console) -> None:
@@ -24,7 +34,7 @@ def show_status(case: Case, run_folder: Path, console: Console) -> None:
     for name, verdict in examine(run_folder, case).items():
         record = read_record(run_folder, BY_NAME[name]) or {"metrics": {}, "health": {}}
         seconds = f"{record['seconds']:.1f} s" if "seconds" in record else ""
-        table.add_row(name, _state(verdict, record["health"]), seconds, _figures(record["metrics"]))
+        table.add_row(name, _state(verdict, record["health"]), seconds, _figures(name, record["metrics"]))
     console.print(table)
 
 
@@ -46,6 +56,6 @@ def _state(verdict: Verdict, health: dict) -> str:
     return "[green]done[/]"
 
 
-def _figures(metrics: dict) -> str:
-    shown = list(metrics.items())[:FIGURES]
-    return ", ".join(f"{name.replace('_', ' ')} {metric_text(metric)}" for name, metric in shown)
+def _figures(stage: str, metrics: dict) -> str:
+    shown = [name for name in FIGURES[stage] if name in metrics]
+    return ", ".join(f"{name.replace('_', ' ')} {metric_text(metrics[name])}" for name in shown)

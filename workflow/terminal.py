@@ -20,13 +20,25 @@ def print_error(text: str) -> None:
 
 
 def health_line(stage: str, seconds: float, health: dict) -> None:
-    """Print how a stage ended: its time, and each health check against its limit."""
-    good = all(check["ok"] for check in health.values())
-    mark = "[green]ok[/]    " if good else "[bold red]FAILED[/]"
-    checks = ", ".join(
-        f"{name.replace('_', ' ')} {check['value']:.2g} ({'ok' if check['ok'] else 'NOT'} within {check['limit']:.2g})"
-        if not isinstance(check["value"], str)
-        else f"{name.replace('_', ' ')} {check['value']}"
-        for name, check in health.items()
-    )
-    console.print(f"{mark} [bold]{stage:<11}[/] {seconds:7.1f} s  {escape(checks)}", soft_wrap=True)
+    """Print how a stage ended: its time, the checks that did not hold, or else the one closest to its limit."""
+    failed = [name for name, result in health.items() if not result["ok"]]
+    mark = "[bold red]FAILED[/]" if failed else "[green]ok[/]    "
+    if failed:
+        text = ", ".join(_against_limit(name, health[name]) for name in failed)
+    elif health:
+        closest = max(health, key=lambda name: _closeness(health[name]))
+        checks = f"{len(health)} checks hold" if len(health) > 1 else "1 check holds"
+        text = f"{checks}; closest: {_against_limit(closest, health[closest])}"
+    else:
+        text = "done"
+    console.print(f"{mark} [bold]{stage:<11}[/] {seconds:6.1f} s  {escape(text)}", soft_wrap=True)
+
+
+def _against_limit(name: str, result: dict) -> str:
+    return f"{name.replace('_', ' ')} {result['value']:.2g} (limit {result['limit']:.2g})"
+
+
+def _closeness(result: dict) -> float:
+    """How near a value that holds is to its limit, which it may exceed or fall below: 1 is at the limit."""
+    smaller, larger = sorted((abs(result["value"]), abs(result["limit"])))
+    return smaller / larger if larger > 0.0 else 0.0

@@ -36,9 +36,18 @@ BAD_VALUES = {
     "table below a value": ("package.rows.all=1", ["package.rows.all", "lies below a value"]),
     "no setting": ("package.rows", ["package.rows", "is no setting", "dotted.key=value"]),
     "more ranks than cores": ("shock.ranks.meso=4096", ["shock.ranks", "4097 MPI ranks", "--oversubscribe"]),
-    "pads overlapping": ("package.pitch=0.5 mm", ["package.board_pad.mask_opening", '"0.58 mm"', "0.5 mm, the pitch"]),
-    "volume that cannot fit its gap": ("solder.volume=5 mm^3", ["solder.volume", '"5 mm^3"', "would touch its neighbour", "<= 0.2"]),
-    "package larger than the board": ("package.substrate.length=250 mm", ["package.substrate.length", '"250 mm"', "200 mm, the board"]),
+    "pads overlapping": (
+        "package.pitch=0.5 mm",
+        ["package.board_pad.mask_opening", '"0.58 mm"', "0.5 mm, the pitch"],
+    ),
+    "volume that cannot fit its gap": (
+        "solder.volume=5 mm^3",
+        ["solder.volume", '"5 mm^3"', "would touch its neighbour", "<= 0.2"],
+    ),
+    "package larger than the board": (
+        "package.substrate.length=250 mm",
+        ["package.substrate.length", '"250 mm"', "200 mm, the board"],
+    ),
 }
 
 

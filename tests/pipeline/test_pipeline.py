@@ -1,0 +1,162 @@
+"""From case file to report, on a shortened case; then again, changed, broken off."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import psutil
+import pytest
+
+from tests.support.workflow_command import SMALL_CASE, command_line, reflowshock
+from workflow.stage_table import BY_NAME, NAMES, STAGES
+
+SNAKEFILE = Path(__file__).resolve().parents[2] / "workflow" / "Snakefile"
+
+
+def times(folder: Path) -> dict[str, int]:
+    return {name: (folder / BY_NAME[name].record).stat().st_mtime_ns for name in NAMES}
+
+
+def planned(text: str) -> set[str]:
+    """Stages that `plan` says will run."""
+    rows = [line.split("│") for line in text.splitlines() if line.count("│") == 3]
+    return {row[0].strip() for row in rows if row[1].strip() == "run"}
+
+
+def start(folder: Path, setting: str) -> subprocess.Popen:
+    line = command_line("run", folder, settings=(setting,))
+    return subprocess.Popen(line, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+
+
+def wait_until(condition, seconds: float = 60.0) -> None:
+    deadline = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < deadline, "waited too long"
+        time.sleep(0.05)
+
+
+def test_the_whole_path(first_run):
+    folder, result = first_run
+    assert result.returncode == 0, result.stdout + result.stderr
+    for stage in STAGES:
+        assert all((folder / product).stat().st_size for product in (*stage.products, stage.record))
+    assert not list(folder.glob("*.partial")) + list(folder.glob(".*.partial"))
+    assert [name for name in NAMES if name in result.stdout] == list(NAMES)
+
+
+def test_the_summary_has_what_scripts_read(first_run):
+    summary = json.loads((first_run[0] / "summary.json").read_text())
+    metrics = {name: metric["value"] for name, metric in summary["metrics"].items()}
+    assert metrics["joint_count"] == 4
+    assert metrics["joint_volume_error_max"] <= 0.005
+    assert metrics["joint_width_error_max"] <= 0.05
+    assert metrics["energy_balance_error"] <= 0.02
+    assert metrics["interface_force_residual"] <= 1e-10
+    assert metrics["critical_joint"] in {"A3", "A4", "B3", "B4"}
+    assert set(metrics) >= {
+        "critical_joint_stress_error", "two_scale_dns_time_ratio", "peak_board_strain", "peak_von_mises",
+    }  # fmt: skip
+    assert all(check["ok"] for check in summary["health"].values())
+    assert set(summary["timings"]) == set(NAMES) - {"report"}
+    assert len(summary["inputs_sha256"]) == 64
+
+
+def test_the_second_run_does_nothing(first_run):
+    folder, _ = first_run
+    before, begin = times(folder), time.perf_counter()
+    result = reflowshock("run", folder)
+    assert result.returncode == 0
+    assert "nothing to do" in result.stdout
+    assert time.perf_counter() - begin < 10.0
+    assert times(folder) == before
+
+
+def test_plan_says_which_value_changed_and_what_reruns(first_run):
+    result = reflowshock("plan", first_run[0], settings=("shock.peak_acceleration=1000 G",))
+    assert result.returncode == 0, result.stderr
+    assert "shock.peak_acceleration: 1500 G -> 1000 G" in result.stdout
+    assert planned(result.stdout) == {"shock", "report"}
+
+
+def test_only_what_depends_on_a_value_is_rerun(run_folder):
+    before = times(run_folder)
+    result = reflowshock("run", run_folder, settings=("shock.peak_acceleration=1000 G",))
+    assert result.returncode == 0, result.stderr
+    after = times(run_folder)
+    assert {name for name in NAMES if after[name] != before[name]} == {"shock", "report"}
+
+
+@pytest.mark.parametrize(
+    "setting",
+    [
+        "shock.pulse_duration=0.01 ms",
+        "package.joint_numerics.layers=5",
+        "board.thickness=1.1 mm",
+        "solder.gravity=0 m/s^2",
+    ],
+)
+def test_plain_snakemake_agrees_with_plan(run_folder, setting):
+    wanted = planned(reflowshock("plan", run_folder, settings=(setting,)).stdout)
+    result = subprocess.run(
+        [
+            sys.executable, "-m", "snakemake", "-n", "-s", str(SNAKEFILE), "--rerun-triggers", "mtime", "--directory",
+            str(run_folder), "--config", f"case={SMALL_CASE}", f"out={run_folder}", f'set=["{setting}"]',
+        ],
+        capture_output=True, text=True, timeout=60, check=False,
+    )  # fmt: skip
+    assert result.returncode == 0, result.stderr
+    words = [line.split() for line in (result.stdout + result.stderr).splitlines()]
+    rules = {line[1].rstrip(":") for line in words if len(line) == 2 and line[0] in ("rule", "localrule")}
+    assert rules - {"all"} == wanted
+
+
+def test_a_stage_that_is_broken_off_leaves_nothing_and_is_redone(run_folder):
+    before = times(run_folder)
+    process = start(run_folder, "solder.gravity=0 m/s^2")
+    wait_until(lambda: (run_folder / ".reflow.partial").exists())
+    children = psutil.Process(process.pid).children(recursive=True)
+    process.send_signal(signal.SIGTERM)
+    _, errors = process.communicate(timeout=30)
+    assert process.returncode == 1
+    assert b"interrupted" in errors
+    _, alive = psutil.wait_procs(children, timeout=15)
+    assert alive == []
+    assert not (run_folder / BY_NAME["reflow"].record).exists()
+    result = reflowshock("run", run_folder, "--until", "reflow", settings=("solder.gravity=0 m/s^2",))
+    assert result.returncode == 0, result.stderr
+    after = times(run_folder)
+    assert after["geometry"] == before["geometry"]
+    assert after["reflow"] > before["reflow"]
+
+
+def test_a_killed_stage_leaves_nothing(run_folder):
+    process = start(run_folder, "shock.peak_acceleration=1000 G")
+    wait_until(lambda: (run_folder / ".shock.partial" / "two_scale" / "input.json").exists())
+    stages = [child for child in psutil.Process(process.pid).children(recursive=True) if "stage" in child.cmdline()]
+    for stage in stages:
+        os.kill(stage.pid, signal.SIGKILL)
+    process.communicate(timeout=60)
+    assert process.returncode == 1
+    assert not (run_folder / BY_NAME["shock"].record).exists()
+    assert (run_folder / BY_NAME["solder_mesh"].record).exists()
+
+
+def test_a_failure_names_stage_and_joint(tmp_path):
+    result = reflowshock("run", tmp_path, "--until", "reflow", settings=("solder.numerics.max_steps=1",))
+    assert result.returncode == 1
+    assert "stage reflow failed" in result.stderr
+    assert "joint " in result.stderr
+    assert not (tmp_path / "reflow").exists()
+    assert (tmp_path / "geometry").exists()
+
+
+@pytest.mark.parametrize("command", ["run", "plan", "status"])
+def test_bad_input_is_refused_before_anything_runs(tmp_path, command):
+    result = reflowshock(command, tmp_path / "run", settings=("package.standoff=-1 mm",))
+    assert result.returncode == 2
+    assert 'package.standoff = "-1 mm"' in result.stderr
+    assert not (tmp_path / "run").exists()
