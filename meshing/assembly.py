@@ -15,7 +15,7 @@ from meshing.pads import lift
 from meshing.parameters import Board, Package, Warpage
 from meshing.plan import blocks_within, board_plan, footprint, hole_rings, package_plan, patch
 
-TOLERANCE = 1.0e-6  # mm, far below any length of a package
+TOLERANCE = 1.0e-9  # m, far below any length of a package
 
 
 def write_assembly(package: Package, board: Board, warpage: Warpage, path: Path) -> dict[str, int]:
@@ -61,7 +61,11 @@ def _board_parts(package: Package, board: Board) -> dict[str, list[int]]:
     upper, top = extrude(middle, numerics.patch_layers * layer, numerics.patch_layers)
     meso = patch(plan, package)
     rest = _select(upper, upper.keys() - meso)
-    parts = {"board": _flat(lower) + _flat(rest), "board_patch": _flat(_select(upper, meso)), "board_bottom": _flat(bottom)}
+    parts = {
+        "board": _flat(lower) + _flat(rest),
+        "board_patch": _flat(_select(upper, meso)),
+        "board_bottom": _flat(bottom),
+    }
     seat = _select(top, footprint(plan, package))
     if package.copper.layout == "plate":
         plate, seat = extrude(seat, package.copper.thickness, 1)
@@ -91,18 +95,22 @@ def _planes_and_holes(board: Board) -> dict[str, list[int]]:
     names: dict[str, list[int]] = {"mounting_holes": []}
     if board.symmetry == "quarter":
         names |= {"symmetry_x": [], "symmetry_y": []}
-    holes, radius = board.holes, 0.5 * board.holes.diameter / MILLI
-    centre = (0.5 * board.length - holes.inset_x) / MILLI, (0.5 * board.width - holes.inset_y) / MILLI
     for _, tag in gmsh.model.getEntities(2):
-        x0, y0, _, x1, y1, _ = gmsh.model.getBoundingBox(2, tag)
-        off_centre = max(abs(abs(value) - c) for value, c in ((x0, centre[0]), (x1, centre[0]), (y0, centre[1]), (y1, centre[1])))
+        x0, y0, _, x1, y1, _ = (value * MILLI for value in gmsh.model.getBoundingBox(2, tag))
         if board.symmetry == "quarter" and max(abs(x0), abs(x1)) < TOLERANCE:
             names["symmetry_x"].append(tag)
         elif board.symmetry == "quarter" and max(abs(y0), abs(y1)) < TOLERANCE:
             names["symmetry_y"].append(tag)
-        elif off_centre <= radius + TOLERANCE:
+        elif _at_hole(board, (x0, x1), (y0, y1)):
             names["mounting_holes"].append(tag)
     return names
+
+
+def _at_hole(board: Board, x: tuple[float, float], y: tuple[float, float]) -> bool:
+    """Whether a surface within these limits [m] lies within the circle of one of the four holes."""
+    centre_x, centre_y = 0.5 * board.length - board.holes.inset_x, 0.5 * board.width - board.holes.inset_y
+    off_centre = [abs(value) - centre_x for value in x] + [abs(value) - centre_y for value in y]
+    return max(map(abs, off_centre)) <= 0.5 * board.holes.diameter + TOLERANCE
 
 
 def _lift_package(package: Package, warpage: Warpage, volumes: list[int]) -> None:

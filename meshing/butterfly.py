@@ -1,6 +1,7 @@
 """Butterfly (O-grid) cross-section: a square core inside rings, on the unit disc."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -26,7 +27,7 @@ def butterfly(core: int, rings: int) -> Butterfly:
     layers = [inner[outline] + share * (circle - inner[outline]) for share in np.arange(1, rings + 1) / rings]
     ids = [outline] + [len(inner) + ring * len(outline) + np.arange(len(outline)) for ring in range(rings)]
     quads = [_core_quads(core)] + [
-        np.column_stack([low, high, np.roll(high, -1), np.roll(low, -1)]) for low, high in zip(ids, ids[1:], strict=False)
+        np.column_stack([low, high, np.roll(high, -1), np.roll(low, -1)]) for low, high in pairwise(ids)
     ]
     return Butterfly(np.vstack([inner, *layers]), np.vstack(quads), ids[-1])
 

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from meshing.pads import pad_table
+from meshing.pads import has_rim, pad_table
 from meshing.parameters import Board, Package, Warpage
 from meshing.plan import Interval, Plan, blocks_within, board_plan, footprint, hole_rings, package_plan, patch
 
@@ -28,7 +28,8 @@ def _board_estimates(package: Package, board: Board) -> dict[str, PartEstimate]:
     plan, numerics = board_plan(package, board), board.numerics
     patch_cells, all_cells = _cells(plan, patch(plan, package)), _cells(plan, _all_blocks(plan))
     holes = {(i, j) for i in plan.hole_x for j in plan.hole_y}
-    all_cells += sum(2 * (plan.x[i].cells + plan.y[j].cells) * hole_rings(board) for i, j in holes) - _cells(plan, holes)
+    around_holes = sum(2 * (plan.x[i].cells + plan.y[j].cells) * hole_rings(board) for i, j in holes)
+    all_cells += around_holes - _cells(plan, holes)
     layer = board.thickness / numerics.layers
     size = (_smallest(plan.x), _smallest(plan.y), layer)
     in_patch = patch_cells * numerics.patch_layers
@@ -57,11 +58,12 @@ def _joint_estimates(package: Package, board: Board) -> dict[str, PartEstimate]:
     joints = len(pad_table(package, board, Warpage()))
     numerics = package.joint_numerics
     section = numerics.core**2 + 4 * numerics.core * numerics.rings
-    radius = min(package.board_pad.wetted_radius, package.package_pad.wetted_radius)
-    edge = radius / (0.5 * numerics.core + numerics.rings)
-    parts = {"solder": PartEstimate(joints * section * numerics.layers, (edge, edge, package.standoff / numerics.layers))}
+    pads = (package.board_pad, package.package_pad)
+    edge = min(pad.wetted_radius for pad in pads) / (0.5 * numerics.core + numerics.rings)
+    height = package.standoff / numerics.layers
+    parts = {"solder": PartEstimate(joints * section * numerics.layers, (edge, edge, height))}
     if package.copper.layout == "pads":
-        rims = sum(pad.diameter > pad.mask_opening for pad in (package.board_pad, package.package_pad))
+        rims = sum(has_rim(0.5 * pad.diameter, pad.wetted_radius) for pad in pads)
         cells = joints * (2 * section + rims * 4 * numerics.core)
         parts["copper"] = PartEstimate(cells, (edge, edge, package.copper.thickness))
     return parts

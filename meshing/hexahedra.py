@@ -32,7 +32,11 @@ def scaled_jacobian(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
 
 def shortest_lengths(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
     """Volume over the largest face (c,) [m]: the length that, over the wave speed, estimates the critical time step."""
-    corners = points[cells][:, FACES]
-    diagonals = corners[:, :, 2] - corners[:, :, 0], corners[:, :, 3] - corners[:, :, 1]
-    areas = 0.5 * np.linalg.norm(np.cross(*diagonals), axis=-1)
-    return volumes(points, cells) / areas.max(axis=1)
+    faces = cells[:, FACES].reshape(-1, 4)
+    return volumes(points, cells) / quad_areas(points, faces).reshape(-1, len(FACES)).max(axis=1)
+
+
+def quad_areas(points: np.ndarray, quads: np.ndarray) -> np.ndarray:
+    """Area of each flat quadrilateral (q,) [m^2]: half the cross product of its diagonals."""
+    corners = points[quads]
+    return 0.5 * np.linalg.norm(np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]), axis=-1)

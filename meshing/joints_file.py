@@ -9,7 +9,7 @@ from meshing.gmsh_session import HEXAHEDRON, QUADRANGLE, gmsh_model, name_groups
 from meshing.solder_mesh import JointMesh
 
 
-def write_joints(meshes: list[JointMesh], path: Path) -> int:
+def write_joints(meshes: list[JointMesh], path: Path) -> dict[str, float]:
     """Write joints as discrete Gmsh volumes in metres.
 
     Args:
@@ -17,43 +17,33 @@ def write_joints(meshes: list[JointMesh], path: Path) -> int:
         path: the ``.msh`` file to write.
 
     Returns:
-        Number of hexahedra.
+        Joint name -> smallest scaled Jacobian by Gmsh's own measure.
     """
-    counter = _TagCounter()
     with gmsh_model("joints"):
+        nodes = elements = 1
+        worst = {}
         for mesh in meshes:
-            _add_joint(mesh, counter)
+            first = elements
+            elements = _add_joint(mesh, nodes, elements)
+            nodes += len(mesh.points)
+            hexahedra = first + np.arange(sum(len(cells) for cells in mesh.cells.values()))
+            worst[mesh.name] = float(gmsh.model.mesh.getElementQualities(hexahedra, "minSJ").min())
         write_msh(path)
-    return sum(len(cells) for mesh in meshes for cells in mesh.cells.values())
+    return worst
 
 
-class _TagCounter:
-    """Contiguous node and element tags over all joints."""
-
-    def __init__(self) -> None:
-        self.nodes, self.elements = 0, 0
-
-    def take_nodes(self, count: int) -> int:
-        first, self.nodes = self.nodes + 1, self.nodes + count
-        return first
-
-    def take_elements(self, count: int) -> np.ndarray:
-        first, self.elements = self.elements + 1, self.elements + count
-        return np.arange(first, first + count)
-
-
-def _add_joint(mesh: JointMesh, counter: _TagCounter) -> None:
-    first_node = counter.take_nodes(len(mesh.points))
+def _add_joint(mesh: JointMesh, first_node: int, first_element: int) -> int:
+    """Add one joint with contiguous tags, hexahedra before facets; return the next free element tag."""
     node_tags = first_node + np.arange(len(mesh.points))
-    owner: int | None = None
-    for name, cells in mesh.cells.items():
-        volume = gmsh.model.addDiscreteEntity(3)
-        if owner is None:
-            owner = volume
-            gmsh.model.mesh.addNodes(3, volume, node_tags, mesh.points.ravel())
-        gmsh.model.mesh.addElementsByType(volume, HEXAHEDRON, counter.take_elements(len(cells)), node_tags[cells].ravel())
-        name_groups(3, {name: [volume]})
-    for name, quads in mesh.facets.items():
-        surface = gmsh.model.addDiscreteEntity(2)
-        gmsh.model.mesh.addElementsByType(surface, QUADRANGLE, counter.take_elements(len(quads)), node_tags[quads].ravel())
-        name_groups(2, {name: [surface]})
+    owner = None
+    for dimension, kind, groups in ((3, HEXAHEDRON, mesh.cells), (2, QUADRANGLE, mesh.facets)):
+        for name, connectivity in groups.items():
+            entity = gmsh.model.addDiscreteEntity(dimension)
+            if owner is None:
+                owner = entity
+                gmsh.model.mesh.addNodes(dimension, owner, node_tags, mesh.points.ravel())
+            tags = first_element + np.arange(len(connectivity))
+            gmsh.model.mesh.addElementsByType(entity, kind, tags, node_tags[connectivity].ravel())
+            name_groups(dimension, {name: [entity]})
+            first_element += len(connectivity)
+    return first_element

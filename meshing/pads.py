@@ -8,6 +8,7 @@ from meshing.parameters import Board, Package, Warpage
 
 # JEDEC JEP95 design guide 4.5: row letters skip those that look like digits or other letters.
 ROW_LETTERS = "ABCDEFGHJKLMNPRTUVWY"
+SMALLEST_RIM = 1.02  # pad over wetted radius; a thinner rim counts as wetted, its slivers would rule the time step
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,15 +63,23 @@ def pad_table(package: Package, board: Board, warpage: Warpage) -> list[PadSite]
             if name in package.depopulated or (board.symmetry == "quarter" and (x < 0 or y < 0)):
                 continue
             gap = package.standoff + float(lift(package, warpage, x, y))
-            sites.append(
-                PadSite(
-                    name, row, column, x, y, gap,
-                    package.board_pad.wetted_radius, package.package_pad.wetted_radius,
-                    0.5 * package.board_pad.diameter, 0.5 * package.package_pad.diameter,
-                    package.copper.thickness,
-                )  # fmt: skip
-            )
+            sites.append(PadSite(name, row, column, x, y, gap, **_pad_sizes(package)))
     return sites
+
+
+def _pad_sizes(package: Package) -> dict[str, float]:
+    return {
+        "wetted_radius_board": package.board_pad.wetted_radius,
+        "wetted_radius_package": package.package_pad.wetted_radius,
+        "pad_radius_board": 0.5 * package.board_pad.diameter,
+        "pad_radius_package": 0.5 * package.package_pad.diameter,
+        "z_board": package.copper.thickness,
+    }
+
+
+def has_rim(pad_radius: float, wetted_radius: float) -> bool:
+    """Whether a copper pad is wide enough beyond the wetted disc for a ring of elements of its own."""
+    return pad_radius > SMALLEST_RIM * wetted_radius
 
 
 def lift(package: Package, warpage: Warpage, x, y):

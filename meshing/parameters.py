@@ -116,7 +116,7 @@ class Board(Parameters):
 
 
 class Warpage(Parameters):
-    """Prescribed warpage of the package: z(x, y) = corner (x^2 + y^2) / (x_c^2 + y_c^2), (x_c, y_c) the corner joint."""
+    """Prescribed warpage of the package: w(x, y) = corner (x^2 + y^2) / (x_c^2 + y_c^2), corner joint at (x_c, y_c)."""
 
     corner: Length = 0.0
 

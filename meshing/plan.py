@@ -19,8 +19,12 @@ class Interval:
 
     def smallest(self) -> float:
         """Length of the shortest cell [m]."""
+        return float(np.diff(self.lines()).min())
+
+    def lines(self) -> np.ndarray:
+        """Grid lines from start to end, (cells + 1,) [m]."""
         lengths = self.ratio ** np.arange(self.cells)
-        return float((self.end - self.start) * lengths.min() / lengths.sum())
+        return self.start + (self.end - self.start) * np.concatenate([[0.0], lengths.cumsum()]) / lengths.sum()
 
     def mirrored(self) -> "Interval":
         """The interval reflected at the origin."""
@@ -55,16 +59,18 @@ def board_plan(package: Package, board: Board) -> Plan:
 
 
 def package_plan(package: Package, board: Board) -> Plan:
-    """Cut the package: intervals under the die, then those of the substrate that it leaves free."""
-    size = package.numerics.element_size
-    axes = []
-    for die, substrate in ((package.die.length, package.substrate.length), (package.die.width, package.substrate.width)):
-        axis = [uniform(0.0, 0.5 * die, size)]
-        if substrate > die:
-            axis.append(uniform(0.5 * die, 0.5 * substrate, size))
-        axes.append(tuple(axis))
-    plan = Plan(*axes)
+    """Cut the package so that the edges of the die lie on grid lines."""
+    plan = Plan(*package_axes(package))
     return plan if board.symmetry == "quarter" else _mirrored(plan)
+
+
+def package_axes(package: Package) -> tuple[tuple[Interval, ...], tuple[Interval, ...]]:
+    """Cut the positive halves of the package's axes: under the die, and what of the substrate it leaves free."""
+    size, die, substrate = package.numerics.element_size, package.die, package.substrate
+    return (
+        _package_axis(0.5 * die.length, 0.5 * substrate.length, size),
+        _package_axis(0.5 * die.width, 0.5 * substrate.width, size),
+    )
 
 
 def hole_square(board: Board) -> float:
@@ -109,6 +115,11 @@ def _within(axis: tuple[Interval, ...], limit: float) -> set[int]:
 
 def _widened(indices: set[int]) -> range:
     return range(max(min(indices) - 1, 0), max(indices) + 2)
+
+
+def _package_axis(die: float, substrate: float, size: float) -> tuple[Interval, ...]:
+    under_die = uniform(0.0, die, size)
+    return (under_die, uniform(die, substrate, size)) if substrate > die else (under_die,)
 
 
 def _board_axis(footprint: float, end: float, hole: float, square: float, numerics: BoardNumerics) -> list[Interval]:

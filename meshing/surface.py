@@ -1,15 +1,22 @@
 """Closed surface of a joint: the particles' free surface and the two wetted discs, checked and measured."""
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 
 import meshio
 import numpy as np
+from numpy.polynomial import Legendre
 
 from meshing.section import cut_segments, section_area
 
 FREE, BOARD_PAD, PACKAGE_PAD = 0, 1, 2
-SECTIONS = 41
+SMALLEST_TRIANGLE = 1.0e-8  # of the mean area
+SECTIONS, DEGREE, SAMPLES = 64, 6, 401
+
+
+class SurfaceError(ValueError):
+    """A triangulation that encloses no body; says where and why."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,7 +31,9 @@ class ClosedSurface:
     boundary: np.ndarray
 
 
-def close_surface(points: np.ndarray, triangles: np.ndarray, ring_board: np.ndarray, ring_package: np.ndarray) -> ClosedSurface:
+def close_surface(
+    points: np.ndarray, triangles: np.ndarray, ring_board: np.ndarray, ring_package: np.ndarray
+) -> ClosedSurface:
     """Close a free surface with a disc on each pad.
 
     Args:
@@ -34,9 +43,9 @@ def close_surface(points: np.ndarray, triangles: np.ndarray, ring_board: np.ndar
         ring_package: likewise on the package side.
 
     Raises:
-        ValueError: the result is not watertight, not outward oriented, or has a degenerate triangle.
+        SurfaceError: the result is not watertight, not outward oriented, or has a degenerate triangle.
     """
-    caps = [_cap(points, ring, len(points) + k, up) for k, (ring, up) in enumerate(((ring_board, -1), (ring_package, 1)))]
+    caps = [_cap(points, ring_board, len(points), -1), _cap(points, ring_package, len(points) + 1, 1)]
     vertices = np.vstack([points, *(cap[0] for cap in caps)])
     faces = np.vstack([triangles, *(cap[1] for cap in caps)])
     boundary = np.repeat([FREE, BOARD_PAD, PACKAGE_PAD], [len(triangles), *(len(cap[1]) for cap in caps)])
@@ -47,17 +56,23 @@ def close_surface(points: np.ndarray, triangles: np.ndarray, ring_board: np.ndar
 
 
 def check_surface(surface: ClosedSurface) -> None:
-    """Raise ValueError unless the surface is watertight, outward oriented and without degenerate triangles."""
+    """Raise SurfaceError unless the surface is watertight, outward oriented and without degenerate triangles."""
     edges = np.vstack([surface.triangles[:, [k, (k + 1) % 3]] for k in range(3)])
     ordered = np.unique(edges, axis=0)
-    if len(ordered) != len(edges) or not _same_rows(ordered, np.unique(edges[:, ::-1], axis=0)):
-        raise ValueError("joint surface is not watertight: an edge is not shared by exactly two triangles")
-    corners = surface.points[surface.triangles]
-    areas = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-    if areas.min() < 1e-8 * areas.mean():
-        raise ValueError(f"joint surface: triangle {int(areas.argmin())} is degenerate (area {areas.min():.3g} m^2)")
-    if enclosed_volume(surface) <= 0.0:
-        raise ValueError("joint surface is oriented inwards (negative volume)")
+    if len(ordered) != len(edges) or not np.array_equal(ordered, np.unique(edges[:, ::-1], axis=0)):
+        raise SurfaceError("surface is not watertight: an edge is not shared by two triangles of opposite direction")
+    areas = _area_vectors(surface)
+    sizes = np.linalg.norm(areas, axis=1)
+    smallest = int(sizes.argmin())
+    if sizes[smallest] < SMALLEST_TRIANGLE * sizes.mean():
+        limit = SMALLEST_TRIANGLE * sizes.mean()
+        raise SurfaceError(f"triangle {smallest} is degenerate: area {sizes[smallest]:.3g} m^2, allowed >= {limit:.3g}")
+    volume = enclosed_volume(surface)
+    if volume <= 0.0:
+        raise SurfaceError(f"surface is oriented inwards: volume {volume:.3g} m^3, allowed > 0")
+    facing = np.select([surface.boundary == BOARD_PAD, surface.boundary == PACKAGE_PAD], [-1.0, 1.0]) * areas[:, 2]
+    if facing.min() < 0.0:
+        raise SurfaceError(f"triangle {int(facing.argmin())} on a pad faces the joint: a contact line crosses itself")
 
 
 def enclosed_volume(surface: ClosedSurface) -> float:
@@ -69,23 +84,28 @@ def enclosed_volume(surface: ClosedSurface) -> float:
 def measure(surface: ClosedSurface) -> dict[str, float]:
     """Measure a closed surface.
 
+    Width and angles are those of the disc of equal area at every height, a polynomial fitted to the areas A(z) of
+    sections: vertices lie outside the smooth shape and chords inside it, but the integral of A is the volume.
+
     Returns:
-        volume [m^3], standoff [m], max_width [m] (diameter of the circle of the largest section's area),
-        contact_radius_board and _package [m] (likewise), contact_angle_board and _package [rad] (mean slope of
-        the free triangles on the contact line, measured inside the solder).
+        volume [m^3], standoff [m], max_width [m], contact_radius_board and _package [m], contact_angle_board and
+        _package [rad] (inside the solder, mean over the contact line).
     """
-    bottom, top = surface.points[:, 2].min(), surface.points[:, 2].max()
+    bottom, top = float(surface.points[:, 2].min()), float(surface.points[:, 2].max())
     heights = bottom + (top - bottom) * (np.arange(SECTIONS) + 0.5) / SECTIONS
     areas = [section_area(cut_segments(surface.points, surface.triangles, height)) for height in heights]
-    pads = [_disc_area(surface, pad) for pad in (BOARD_PAD, PACKAGE_PAD)]
+    profile = Legendre.fit(heights, areas, DEGREE, domain=[bottom, top])
+    largest = max(profile(np.linspace(bottom, top, SAMPLES)))
+    radii = [math.sqrt(_disc_area(surface, pad) / math.pi) for pad in (BOARD_PAD, PACKAGE_PAD)]
+    slopes = [float(profile.deriv()(end)) / (2.0 * math.pi * r) for end, r in zip((bottom, top), radii, strict=True)]
     return {
         "volume": enclosed_volume(surface),
-        "standoff": float(top - bottom),
-        "max_width": 2.0 * float(np.sqrt(max(*areas, *pads) / np.pi)),
-        "contact_radius_board": float(np.sqrt(pads[0] / np.pi)),
-        "contact_radius_package": float(np.sqrt(pads[1] / np.pi)),
-        "contact_angle_board": _contact_angle(surface, BOARD_PAD),
-        "contact_angle_package": _contact_angle(surface, PACKAGE_PAD),
+        "standoff": top - bottom,
+        "max_width": 2.0 * max(math.sqrt(largest / math.pi), *radii),
+        "contact_radius_board": radii[0],
+        "contact_radius_package": radii[1],
+        "contact_angle_board": 0.5 * math.pi + math.atan(slopes[0]),
+        "contact_angle_package": 0.5 * math.pi - math.atan(slopes[1]),
     }
 
 
@@ -109,26 +129,11 @@ def _cap(points: np.ndarray, ring: np.ndarray, centre: int, upward: int) -> tupl
     return points[ring].mean(axis=0)[None, :], np.column_stack([first, second, np.full(len(ring), centre)])
 
 
-def _same_rows(first: np.ndarray, second: np.ndarray) -> bool:
-    return first.shape == second.shape and bool(np.array_equal(first, second))
-
-
-def _normals(surface: ClosedSurface) -> np.ndarray:
+def _area_vectors(surface: ClosedSurface) -> np.ndarray:
     """Area vectors (t, 3) [m^2]."""
     first, second, third = np.moveaxis(surface.points[surface.triangles], 1, 0)
     return 0.5 * np.cross(second - first, third - first)
 
 
 def _disc_area(surface: ClosedSurface, pad: int) -> float:
-    return float(np.abs(_normals(surface)[surface.boundary == pad, 2].sum()))
-
-
-def _contact_angle(surface: ClosedSurface, pad: int) -> float:
-    """Mean angle between pad and free surface over the triangles that have an edge on the contact line."""
-    on_pad = np.zeros(len(surface.points), dtype=bool)
-    on_pad[surface.triangles[surface.boundary == pad]] = True
-    at_line = (surface.boundary == FREE) & (on_pad[surface.triangles].sum(axis=1) == 2)
-    normals = _normals(surface)[at_line]
-    facing = 1.0 if pad == BOARD_PAD else -1.0
-    angles = np.arccos(np.clip(facing * normals[:, 2] / np.linalg.norm(normals, axis=1), -1.0, 1.0))
-    return float(angles.mean())
+    return float(np.abs(_area_vectors(surface)[surface.boundary == pad, 2].sum()))
