@@ -48,7 +48,7 @@ def distinct_geometries(geometries: "Mapping[str, JointGeometry]") -> "dict[tupl
 
 def joint_records(groups: "Mapping[tuple[str, ...], JointGeometry]", shapes: "Mapping[str, JointShape]") -> dict:
     """Return per joint the name of its shape, the verdict on it and its metrics."""
-    records = {}
+    records: dict[str, dict] = {}
     for names in groups:
         shape = shapes[names[0]]
         metrics = {key: {"value": value, "unit": unit} for key, (value, unit) in shape.metrics.items()}

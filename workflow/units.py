@@ -18,7 +18,7 @@ class UnitError(ValueError):
 @cache
 def registry() -> pint.UnitRegistry:
     """Return the unit registry; G is the standard acceleration of gravity, as in shock specifications."""
-    units = pint.UnitRegistry(on_redefinition="ignore", autoconvert_offset_to_baseunit=True)
+    units: pint.UnitRegistry = pint.UnitRegistry(on_redefinition="ignore", autoconvert_offset_to_baseunit=True)
     units.define("standard_gravity = 9.80665 * meter / second**2 = G")
     return units
 
