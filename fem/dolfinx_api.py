@@ -86,6 +86,7 @@ class FieldFile:
 
     def __init__(self, comm: MPI.Comm, path: Path) -> None:
         """Open ``path`` (``.pvd``); collective."""
+        self._comm, self._path = comm, path
         self._file = dolfinx.io.VTKFile(comm, str(path), "w")
 
     def write(self, functions: list[dolfinx.fem.Function], time: float) -> None:
@@ -93,5 +94,17 @@ class FieldFile:
         self._file.write_function(functions, time)
 
     def close(self) -> None:
-        """Close the file."""
+        """Close the file; collective."""
         self._file.close()
+        self._comm.Barrier()
+        if self._comm.rank == 0:
+            for parallel_file in self._path.parent.glob(f"{self._path.stem}[0-9]*.pvtu"):
+                _name_each_piece_once(parallel_file)
+
+
+def _name_each_piece_once(parallel_file: Path) -> None:
+    """Drop repeated pieces: dolfinx 0.5 lists each piece once a function, and readers show as many copies of the mesh."""
+    lines = parallel_file.read_text().splitlines()
+    pieces: set[str] = set()
+    kept = [line for line in lines if "<Piece " not in line or not (line in pieces or pieces.add(line))]
+    parallel_file.write_text("\n".join(kept) + "\n")

@@ -37,6 +37,7 @@ def write_result(comms: Communicators, request: RunInput, model: Model, history:
             "effects": effects(request, summary),
             "timings": asdict(timings),
             "model": summary,
+            "parts": list(model.tables.part_names),
         }
         (request.output / "result.json").write_text(json.dumps(result, indent=1))
 

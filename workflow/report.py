@@ -113,15 +113,16 @@ def _add_shock(run_folder: Path, context: dict, summary: dict) -> None:
         energy=tables.energies(histories),
         cost=tables.costs(results),
     )
-    _add_shock_pictures(run_folder / "shock" / main_mode, histories[main_mode], context)
+    solder = [number for number, part in enumerate(results[main_mode]["parts"]) if part.startswith("solder")]
+    _add_shock_pictures(run_folder / "shock" / main_mode, histories[main_mode], solder, context)
 
 
-def _add_shock_pictures(folder: Path, history: dict, context: dict) -> None:
+def _add_shock_pictures(folder: Path, history: dict, solder_parts: list[int], context: dict) -> None:
     from workflow.report_pictures import render_board, render_joints
 
     with tempfile.TemporaryDirectory() as temporary:
         joints, board = Path(temporary) / "joints.png", Path(temporary) / "board.png"
-        context["joints_caption"] = render_joints(folder, history, joints)
+        context["joints_caption"] = render_joints(folder, history, solder_parts, joints)
         context["board_caption"] = render_board(folder, history, board)
         context["pictures"]["joints"] = _base64(joints)
         context["pictures"]["board"] = _base64(board)
