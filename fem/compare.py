@@ -18,9 +18,9 @@ def compare_histories(two_scale: Path, dns: Path) -> dict[str, float | str]:
     """Compare two ``history.npz``.
 
     Returns:
-        ``critical_joint`` (largest interface-averaged von Mises of the DNS), relative L2 errors
-        ``critical_joint_stress_error`` (its board and package side), ``worst_joint_stress_error``, and one ``<name>_error``
-        per centre and the board strain.
+        ``critical_joint`` (largest interface-averaged von Mises of the DNS); relative L2 errors:
+        ``critical_joint_stress_error`` (its board and package side), ``worst_joint_stress_error``, and ``<name>_error``
+        for both centres and the board strain.
 
     Raises:
         ValueError: The files have different sample times or joints.

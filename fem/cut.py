@@ -33,8 +33,8 @@ def find_cut(mesh: MeshData) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
     if distance.max() > tolerance:
         position = ", ".join(f"{value:.6g}" for value in mesh.points[meso[np.argmax(distance)]])
         raise CutError(
-            f"{np.sum(distance > tolerance)} of {len(meso)} nodes of {PATCH} on the cut have no partner in {MACRO}: the one"
-            f" at ({position}) m is {distance.max():.3e} m away, allowed are {tolerance:.3e} m"
+            f"{np.sum(distance > tolerance)} of {len(meso)} nodes of {PATCH} on the cut have no partner in {MACRO}: the"
+            f" one at ({position}) m is {distance.max():.3e} m away, allowed are {tolerance:.3e} m"
         )
     return candidates[nearest], meso
 
@@ -59,28 +59,24 @@ def inner_facets(
     return inner
 
 
-def check_buffer(mesh: MeshData, cut: NDArray[np.int32]) -> None:
-    """Check that two layers of board elements lie between the cut and whatever the patch carries.
+def check_buffer(mesh: MeshData, cut: NDArray[np.int32], tied: NDArray[np.int32]) -> None:
+    """Check that two layers of board elements lie between the cut and whatever is tied to the patch.
 
-    A joint on an element that touches the cut makes the window unstable (``tests/stability/fem_window.py``); the element
-    critical step of those that touch it bounds the window.
+    A joint on an element that touches the cut makes the window unstable (tests/stability/test_fem_window.py).
+
+    Args:
+        mesh: The meso model.
+        cut: ``(nc,)`` nodes of the cut.
+        tied: ``(nf, 4)`` nodes of the facets that carry joints.
 
     Raises:
-        CutError: An element at the cut is not of the patch, or carries a facet of ``board_side``.
+        CutError: An element at the cut is not of the patch, or carries a joint.
     """
     touching = np.isin(mesh.cells, cut).any(axis=1)
     foreign = {mesh.part_names[part] for part in np.unique(mesh.part[touching])} - {PATCH}
     if foreign:
         raise CutError(f"elements that touch the cut must belong to {PATCH}, found {', '.join(sorted(foreign))}")
-    tied = [quads for name, quads in mesh.facets.items() if name.startswith("foot@")]
-    if not tied:
-        return
-    feet = mesh.points[np.unique(np.concatenate(tied))]
-    low, high = feet[:, :2].min(axis=0), feet[:, :2].max(axis=0)
-    side = mesh.facets["board_side"]
-    corners = mesh.points[side][:, :, :2]
-    below = ((corners.max(axis=1) > low) & (corners.min(axis=1) < high)).all(axis=1)
-    owner = cells_of_facets(mesh.cells, side[below])
+    owner = np.unique(cells_of_facets(mesh.cells, tied))
     close = int(np.sum(touching[owner[owner >= 0]]))
     if close:
         raise CutError(

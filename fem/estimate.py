@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from fem.materials import elasticity_matrix
 from fem.parameters import Material
 
-# Element updates per second and core of the whole substep (force, update, tie), from benchmarks/internal_force.py and the
-# bga_drop case on one core of an AMD EPYC (AVX-512) at 2 ranks.
+# Element updates per second and core of the whole substep (force, update, tie), from benchmarks/internal_force.py and
+# the bga_drop case on one core of an AMD EPYC (AVX-512) at 2 ranks.
 UPDATES_PER_SECOND = 1.0e7
 WINDOW_OVERHEAD = 3.0e-5  # [s] messages and interpreter per window, same source
 

@@ -104,55 +104,85 @@ def rank_order(
     return nodes.astype(np.int32), pointer.astype(np.int32), source[order].astype(np.int32)
 
 
-@dataclass(frozen=True, slots=True)
-class Port:
-    """What one rank knows about the cut: local node ``(k,)`` of each cut node, -1 where it has none."""
-
-    local: NDArray[np.int32]
-    sends: bool
-
-
 class Channel:
-    """One-way messages of cut values ``(., 3)`` from the ranks of one model to those of the other.
+    """Messages of cut values ``(., 3)`` from the ranks of one model to those of another.
 
-    The lowest sending rank that holds a cut node sends it to every receiving rank that holds it.
+    A rank may carry one model or both; what it can copy from itself is no message. Else the lowest rank that holds a
+    cut node of the source sends it to every rank that holds it of the target.
     """
 
-    def __init__(self, comm: MPI.Comm, port: Port) -> None:
-        """Agree on who sends what; collective over both models."""
-        ports: list[Port] = comm.allgather(port)
-        held = np.array([item.local >= 0 for item in ports]).reshape(comm.size, -1)
-        sends = np.array([item.sends for item in ports])
-        sender = np.argmax(held & sends[:, None], axis=0)
-        parts = []
-        for other in range(comm.size):
-            source, target = (comm.rank, other) if port.sends else (other, comm.rank)
-            if sends[source] and not sends[target]:
-                cut = np.flatnonzero((sender == source) & held[source] & held[target])
-                if len(cut):
-                    parts.append((other, port.local[cut]))
-        self._rows = np.concatenate([rows for _, rows in parts] or [np.empty(0, np.int32)])
-        self._buffer = np.empty((len(self._rows), 3))
-        start = comm.Send_init if port.sends else comm.Recv_init
-        ends = np.cumsum([len(rows) for _, rows in parts])
-        self._requests = [
-            start(self._buffer[end - len(rows) : end], other, CHANNEL_TAG) for (other, rows), end in zip(parts, ends)
-        ]
+    def __init__(self, comm: MPI.Comm, source: NDArray[np.int32], target: NDArray[np.int32]) -> None:
+        """Agree on who sends what; collective over all models.
+
+        Args:
+            comm: Communicator of all models.
+            source: ``(nc,)`` local node of each cut node in the sending model, -1 where this rank has none.
+            target: The same in the receiving model.
+        """
+        sources = np.array(comm.allgather(source >= 0)).reshape(comm.size, -1)
+        targets = np.array(comm.allgather(target >= 0)).reshape(comm.size, -1)
+        sender = np.where(sources, np.arange(comm.size)[:, None], np.argmax(sources, axis=0))
+        out = [np.flatnonzero(targets[other] & (sender[other] == comm.rank)) for other in range(comm.size)]
+        into = [np.flatnonzero(targets[comm.rank] & (sender[comm.rank] == other)) for other in range(comm.size)]
+        self._out_rows, self._in_rows = source[np.concatenate(out)], target[np.concatenate(into)]
+        self._sent, self._received = np.empty((len(self._out_rows), 3)), np.empty((len(self._in_rows), 3))
+        sent, received = split_rows(self._sent, out), split_rows(self._received, into)
+        self._own = sent[comm.rank], received[comm.rank]
+        others = [other for other in range(comm.size) if other != comm.rank]
+        self._sends = [comm.Send_init(sent[k], k, CHANNEL_TAG) for k in others if len(sent[k])]
+        self._receives = [comm.Recv_init(received[k], k, CHANNEL_TAG) for k in others if len(received[k])]
 
     def send(self, values: NDArray[np.float64]) -> None:
-        """Send the cut rows of ``values (n, 3)``; the receiver waits for them, so this returns at once."""
-        pack(values, self._rows, self._buffer)
-        MPI.Prequest.Startall(self._requests)
-        MPI.Prequest.Waitall(self._requests)
+        """Send the cut rows of ``values (n, 3)``.
+
+        Where this rank receives nothing, the receiver already waits and the wait is short: a large message makes no
+        progress while its sender computes.
+        """
+        pack(values, self._out_rows, self._sent)
+        MPI.Prequest.Startall(self._sends)
+        if not len(self._in_rows):
+            MPI.Prequest.Waitall(self._sends)
 
     def receive(self, values: NDArray[np.float64]) -> None:
         """Receive the cut rows of ``values (n, 3)``."""
-        MPI.Prequest.Startall(self._requests)
-        MPI.Prequest.Waitall(self._requests)
-        unpack(self._buffer, self._rows, values)
+        MPI.Prequest.Startall(self._receives)
+        self._own[1][:] = self._own[0]
+        MPI.Prequest.Waitall(self._receives)
+        MPI.Prequest.Waitall(self._sends)
+        unpack(self._received, self._in_rows, values)
 
     def free(self) -> None:
         """Free the persistent requests."""
-        for request in self._requests:
+        for request in self._sends + self._receives:
             request.Free()
-        self._requests = []
+        self._sends, self._receives = [], []
+
+
+def split_rows(buffer: NDArray[np.float64], parts: list[NDArray[np.int64]]) -> list[NDArray[np.float64]]:
+    """Return the consecutive rows of a buffer that belong to each part, as views."""
+    ends = np.cumsum([len(part) for part in parts])
+    return [buffer[end - len(part) : end] for part, end in zip(parts, ends, strict=True)]
+
+
+@dataclass(frozen=True, slots=True)
+class CutChannels:
+    """The two channels of a window: velocities to the meso model, forces to the macro model."""
+
+    velocities: Channel
+    forces: Channel
+
+    @classmethod
+    def open(cls, comm: MPI.Comm, macro: NDArray[np.int32], meso: NDArray[np.int32]) -> "CutChannels":
+        """Open both; collective over all models.
+
+        Args:
+            comm: Communicator of all models.
+            macro: ``(nc,)`` local node of each cut node in this rank's macro model, -1 where it has none.
+            meso: The same in its meso model.
+        """
+        return cls(Channel(comm, macro, meso), Channel(comm, meso, macro))
+
+    def free(self) -> None:
+        """Free both."""
+        self.velocities.free()
+        self.forces.free()

@@ -3,22 +3,21 @@
 A window of the held-velocity scheme (held cut velocity; the cut lies two layers of elements inside the board):
 macro: a_n = (F_ext + F_c - F_int) / (M + M_interface) -> v^{n+1/2}, U^{n+1}; the cut's v^{n+1/2} goes to the meso model,
 which takes m substeps with it WHILE the macro model computes F_int(U^{n+1}); F_c = -(K u)_cut comes back at the end.
-Each participant's window is one method, its messages go through two ``Channel`` objects and nothing else.
+Messages go through two channels and nothing else; ``Macro.begin_window`` and ``finish_window`` are apart, so that one rank
+can also carry both models and take turns.
 """
 
 from typing import Protocol
 
 import numpy as np
-from mpi4py import MPI
 from numpy.typing import NDArray
 
 from fem.body import Body
 from fem.estimate import WindowPlan
-from fem.exchange import Channel, Port
+from fem.exchange import CutChannels
 from fem.kernels_motion import add_impulse
 from fem.loads import Load
 from fem.motion import Motion
-from fem.steps import Steps
 
 
 class Participant(Protocol):
@@ -47,12 +46,12 @@ class Participant(Protocol):
 class Alone:
     """A DNS: one model, all steps small."""
 
-    def __init__(self, body: Body, loads: list[Load], steps: Steps) -> None:
+    def __init__(self, body: Body, loads: list[Load], plan: WindowPlan) -> None:
         """Start at rest."""
         none = np.empty(0, np.int32)
-        self.motion = Motion(body, loads, steps.plan.step, none, np.zeros(len(body.mass)))
+        self.motion = Motion(body, loads, plan.step, none, np.zeros(len(body.mass)))
         self.interface_work = 0.0
-        self.plan = steps.plan
+        self.plan = plan
         self._zero = np.zeros_like(self.motion.force)
 
     def run_window(self) -> None:
@@ -73,26 +72,33 @@ class Alone:
 class Macro:
     """The board: one step a window."""
 
-    def __init__(self, body: Body, loads: list[Load], steps: Steps, world: MPI.Comm) -> None:
-        """Receive the interface mass and start at rest; collective with ``Meso``."""
-        self._velocities = Channel(world, Port(body.cut, sends=True))
-        self._forces = Channel(world, Port(body.cut, sends=False))
+    def __init__(self, body: Body, loads: list[Load], plan: WindowPlan, channels: CutChannels) -> None:
+        """Receive the interface mass and start at rest; a ``Meso`` must have sent it."""
+        self._channels = channels
         self._received = np.zeros((len(body.mass), 3))
-        self._forces.receive(self._received)
-        self.motion = Motion(body, loads, steps.plan.window, np.empty(0, np.int32), self._received[:, 0].copy())
+        channels.forces.receive(self._received)
+        self.motion = Motion(body, loads, plan.window, np.empty(0, np.int32), self._received[:, 0].copy())
         self._received[:] = 0.0
-        self.plan = steps.plan
+        self.plan = plan
         self._counted = counted_cut(body)
         self.interface_work = 0.0
 
     def run_window(self) -> None:
-        """Take one step: send the cut's velocity, compute the force, receive the meso model's."""
+        """Take one step while the meso model takes its substeps."""
+        self.begin_window()
+        self.finish_window()
+
+    def begin_window(self) -> None:
+        """Move, and send the cut's velocity."""
+        self.motion.advance()
+        self._channels.velocities.send(self.motion.velocity)
+
+    def finish_window(self) -> None:
+        """Compute the force, and receive the meso model's."""
         motion = self.motion
-        motion.advance()
-        self._velocities.send(motion.velocity)
         motion.update_force()
         before = self._received[self._counted]
-        self._forces.receive(self._received)
+        self._channels.forces.receive(self._received)
         motion.force += self._received
         impulse = 0.5 * motion.step * (before + self._received[self._counted])
         self.interface_work -= float(np.sum(impulse * motion.velocity[self._counted]))
@@ -109,14 +115,13 @@ class Macro:
 class Meso:
     """Joints, package and the uppermost board layers: m substeps a window."""
 
-    def __init__(self, body: Body, loads: list[Load], steps: Steps, world: MPI.Comm) -> None:
-        """Send the interface mass and start at rest; collective with ``Macro``."""
-        self._velocities = Channel(world, Port(body.cut, sends=False))
-        self._forces = Channel(world, Port(body.cut, sends=True))
-        self._forces.send(np.repeat(body.mass[:, None], 3, axis=1))
+    def __init__(self, body: Body, loads: list[Load], plan: WindowPlan, channels: CutChannels) -> None:
+        """Send the interface mass and start at rest."""
+        self._channels = channels
+        channels.forces.send(np.repeat(body.mass[:, None], 3, axis=1))
         held = body.cut[body.cut >= 0]
-        self.motion = Motion(body, loads, steps.plan.step, held, np.zeros(len(body.mass)))
-        self.plan = steps.plan
+        self.motion = Motion(body, loads, plan.step, held, np.zeros(len(body.mass)))
+        self.plan = plan
         self._counted = counted_cut(body)
         self._cut_force = np.zeros((len(body.mass), 3))
         self._zero = np.zeros_like(self._cut_force)
@@ -125,7 +130,7 @@ class Meso:
     def run_window(self) -> None:
         """Take m substeps at the received velocity of the cut, then send its force."""
         motion = self.motion
-        self._velocities.receive(motion.velocity)
+        self._channels.velocities.receive(motion.velocity)
         impulse = np.zeros((len(self._counted), 3))
         add_impulse(self._counted, motion.force, 0.5 * motion.step, impulse)
         for _ in range(self.plan.substeps):
@@ -133,7 +138,7 @@ class Meso:
             motion.update_force()
             add_impulse(self._counted, motion.force, motion.step, impulse)
         add_impulse(self._counted, motion.force, -0.5 * motion.step, impulse)
-        self._forces.send(motion.force)
+        self._channels.forces.send(motion.force)
         self.interface_work -= float(np.sum(impulse * motion.velocity[self._counted]))
 
     def cut_force(self) -> NDArray[np.float64]:

@@ -8,6 +8,7 @@ from mpi4py import MPI
 
 from fem.agreement import agreed
 from fem.communicators import Communicators
+from fem.exchange import CutChannels
 from fem.fields import Fields
 from fem.history import History
 from fem.inputs import RunInput
@@ -49,10 +50,13 @@ def run(world: MPI.Comm, request: RunInput) -> None:
 
 def make_participant(comms: Communicators, model: Model, load: HalfSineDrop) -> Participant:
     """Return the participant of this rank; collective."""
+    body, plan = model.body, model.steps.plan
     if comms.role == "dns":
-        return Alone(model.body, [load], model.steps)
-    side = Macro if comms.role == "macro" else Meso
-    return side(model.body, [load], model.steps, comms.world)
+        return Alone(body, [load], plan)
+    absent = np.full_like(body.cut, -1)
+    if comms.role == "macro":
+        return Macro(body, [load], plan, CutChannels.open(comms.world, body.cut, absent))
+    return Meso(body, [load], plan, CutChannels.open(comms.world, absent, body.cut))
 
 
 def make_history(comms: Communicators, model: Model, load: HalfSineDrop, request: RunInput) -> History:

@@ -71,13 +71,15 @@ def prepare(data: MeshData, mode: Literal["two_scale", "dns"]) -> dict[str, Mode
     scene, centres = watch_scene(data), centre_nodes(data)
     macro, macro_number = select(data, MACRO.__eq__)
     meso, meso_number = select(data, MACRO.__ne__)
-    check_buffer(meso, meso_number[meso_nodes])
     macro_centres = np.where(centres >= 0, macro_number[centres], -1)
     meso_centres = np.where((centres >= 0) & (macro_centres < 0), meso_number[centres], -1)
-    return {
+    result = {
         "macro": model_input(macro, macro_number[macro_nodes], scene, macro_centres),
         "meso": model_input(meso, meso_number[meso_nodes], scene, meso_centres),
     }
+    tables = result["meso"].tables
+    check_buffer(meso, tables.cut, np.unique(tables.tie.master, axis=0))
+    return result
 
 
 def watch_scene(data: MeshData) -> tuple[tuple[str, ...], NDArray[np.float64]]:

@@ -6,7 +6,7 @@ from pathlib import Path
 import gmsh
 import numpy as np
 
-from fem.mesh import TENSOR_ORDER, MeshData, boundary_facets, without_unused_nodes
+from fem.mesh import TENSOR_ORDER, MeshData, append, boundary_facets, without_unused_nodes
 
 CYCLIC = [0, 1, 3, 2]
 FACET_SETS = Callable[[np.ndarray], np.ndarray]
@@ -116,7 +116,7 @@ def write_msh(mesh: MeshData, path: Path) -> None:
         parts += [(2, 3, name, quads) for name, quads in mesh.facets.items() if len(quads)]
         entities = [gmsh.model.addDiscreteEntity(dimension) for dimension, *_ in parts]
         gmsh.model.mesh.addNodes(3, entities[0], np.arange(1, len(mesh.points) + 1), mesh.points.ravel())
-        for entity, (dimension, kind, name, nodes) in zip(entities, parts):
+        for entity, (dimension, kind, name, nodes) in zip(entities, parts, strict=True):
             gmsh.model.mesh.addElementsByType(entity, kind, [], (nodes + 1).ravel())
             gmsh.model.addPhysicalGroup(dimension, [entity], name=name)
         gmsh.option.setNumber("Mesh.MshFileVersion", 4.1)
@@ -128,8 +128,6 @@ def write_msh(mesh: MeshData, path: Path) -> None:
 
 def write_small_assembly(directory: Path, joints: int = 4, **board: float) -> list[Path]:
     """Write ``assembly.msh`` and ``joints.msh``; return their paths."""
-    from fem.mesh import append
-
     board_part, package, *others = small_assembly(joints, **board)
     paths = [directory / "assembly.msh", directory / "joints.msh"]
     write_msh(append([board_part, package]), paths[0])

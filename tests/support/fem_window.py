@@ -1,0 +1,84 @@
+"""One window of the two-scale scheme as a linear operator: both participants of the program on one rank."""
+
+import numpy as np
+from mpi4py import MPI
+
+from fem.body import Pieces, make_body, make_pieces
+from fem.estimate import WindowPlan, window_plan
+from fem.exchange import CutChannels
+from fem.local_mesh import distribute
+from fem.mesh import MeshData
+from fem.parameters import Materials
+from fem.participant import Macro, Meso
+from fem.scene import Tables, prepare
+from fem.steps import is_macro
+
+
+class Window:
+    """Macro and meso model on one rank, taking turns."""
+
+    def __init__(self, mesh: MeshData, materials: Materials, fraction: float, watch_cut: bool = True) -> None:
+        """Build both; ``watch_cut`` False takes the window from the macro elements alone, as a naive scheme would."""
+        pieces, tables = {}, {}
+        for role, item in prepare(mesh, "two_scale").items():
+            tables[role] = item.tables
+            pieces[role] = make_pieces(distribute(MPI.COMM_SELF, item.mesh), item.tables, materials)
+        self.plan = choose_plan(pieces, tables, fraction, watch_cut)
+        bodies = {
+            role: make_body(MPI.COMM_SELF, pieces[role], tables[role], np.ones(len(pieces[role].steps)))
+            for role in pieces
+        }
+        channels = CutChannels.open(MPI.COMM_SELF, bodies["macro"].cut, bodies["meso"].cut)
+        self.meso = Meso(bodies["meso"], [], self.plan, channels)
+        self.macro = Macro(bodies["macro"], [], self.plan, channels)
+        self._channels = channels
+        self._macro_free = bodies["macro"].free
+        self._meso_free = bodies["meso"].free.copy()
+        self._meso_free[bodies["meso"].cut] = False
+
+    @property
+    def size(self) -> int:
+        return 2 * int(self._macro_free.sum() + self._meso_free.sum())
+
+    def run(self) -> None:
+        self.macro.begin_window()
+        self.meso.run_window()
+        self.macro.finish_window()
+
+    def apply(self, state: np.ndarray) -> np.ndarray:
+        """Return the state (displacements, then velocities times DT) one window later."""
+        displacement, velocity = np.split(state, 2)
+        count = int(self._macro_free.sum())
+        for part, values in ((self.macro, slice(0, count)), (self.meso, slice(count, None))):
+            free = self._macro_free if part is self.macro else self._meso_free
+            part.motion.displacement[:], part.motion.velocity[:] = 0.0, 0.0
+            part.motion.displacement[free] = displacement[values]
+            part.motion.velocity[free] = velocity[values] / self.plan.window
+        macro, meso = self.macro.motion, self.meso.motion
+        meso.displacement[meso.body.cut] = macro.displacement[macro.body.cut]
+        meso.body.tie.spread(meso.displacement)
+        macro.update_force()
+        meso.update_force()
+        self._channels.forces.send(meso.force)
+        self._channels.forces.receive(self.macro.foreign_force())
+        macro.force += self.macro.foreign_force()
+        self.run()
+        return np.concatenate(
+            [macro.displacement[self._macro_free], meso.displacement[self._meso_free]]
+            + [self.plan.window * macro.velocity[self._macro_free], self.plan.window * meso.velocity[self._meso_free]]
+        )
+
+    def spectral_radius(self) -> float:
+        """Return the largest magnitude of an eigenvalue of the window's amplification matrix."""
+        columns = np.empty((self.size, self.size))
+        for k, unit in enumerate(np.eye(self.size)):
+            columns[:, k] = self.apply(unit)
+        return float(np.abs(np.linalg.eigvals(columns)).max())
+
+
+def choose_plan(pieces: dict[str, Pieces], tables: dict[str, Tables], fraction: float, watch_cut: bool) -> WindowPlan:
+    meso = is_macro(pieces["meso"], tables["meso"]) & watch_cut
+    macro_step = min(pieces["macro"].steps.min(), pieces["meso"].steps[meso].min(initial=np.inf))
+    smallest = min(macro_step, pieces["meso"].steps.min())
+    window = fraction * macro_step
+    return window_plan(macro_step, smallest, fraction, 10 * window, 1)
