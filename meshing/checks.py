@@ -111,19 +111,26 @@ def _layers(package: Package, board: Board) -> Iterator[Problem]:
 
 def _holes(package: Package, board: Board) -> Iterator[Problem]:
     """Holes lie inside the board, and the blocks around them beyond the package along both axes."""
-    size, margin, square = board.numerics.element_size, board.numerics.patch_margin, hole_square(board)
     smallest = SMALLEST_INSET * board.holes.diameter
     for axis, side in (("x", "length"), ("y", "width")):
-        inset, half = getattr(board.holes, f"inset_{axis}"), 0.5 * getattr(board, side)
-        footprint = 0.5 * getattr(package.substrate, side)
-        cell = footprint / uniform(0.0, footprint, size).cells
-        largest = half - 0.5 * square - footprint - (margin + 1) * cell
+        inset, whole = getattr(board.holes, f"inset_{axis}"), getattr(board, side)
+        taken = _taken_by_package(getattr(package.substrate, side), board) + 0.5 * hole_square(board)
+        largest = 0.5 * whole - taken
         key, allowed = f"board.holes.inset_{axis}", f"{_mm(smallest)} to {_mm(largest)}"
         if inset < smallest:
             yield Problem(key, _mm(inset), allowed, "a mounting hole reaches beyond the board")
-        elif inset > largest and footprint < half:
+        elif largest < smallest:
+            message = "too small for the package, its patch and the mounting holes beside each other"
+            yield Problem(f"board.{side}", _mm(whole), f">= {_mm(2.0 * (taken + inset))}", message)
+        elif inset > largest:
             message = "a mounting hole lies under or beside the package: it needs strips of the board of its own"
             yield Problem(key, _mm(inset), allowed, message)
+
+
+def _taken_by_package(side: float, board: Board) -> float:
+    """Half of the strip of the board that the package, its patch and one more element take [m]."""
+    size, margin = board.numerics.element_size, board.numerics.patch_margin
+    return 0.5 * side * (1.0 + (margin + 1) / uniform(0.0, 0.5 * side, size).cells)
 
 
 def _gaps(package: Package, board: Board, warpage: Warpage) -> Iterator[Problem]:

@@ -1,75 +1,132 @@
-"""The assembly: names, counts, volumes, coincident and warped nodes, read back from the file."""
-
 import meshio
 import numpy as np
 import pytest
 
 from meshing.assembly import write_assembly
 from meshing.estimate import count_elements
-from meshing.hexahedra import scaled_jacobian, volumes
-from meshing.parameters import Copper
+from meshing.hexahedra import quad_areas, scaled_jacobian, volumes
+from meshing.pads import lift
+from meshing.parameters import Warpage
+from tests.support.meshing_models import MM, PLATE, board, package
 
 
-def parts_of(path):
-    """Points [m] and cells of every named set of a Gmsh file."""
-    mesh = meshio.read(path)
-    sets = {name: [] for name in mesh.field_data}
-    for block, tags in zip(mesh.cells, mesh.cell_data["gmsh:physical"], strict=True):
-        for name, (tag, dimension) in mesh.field_data.items():
-            if dimension == block.dim:
-                sets[name].append(block.data[tags == tag].reshape(-1, block.data.shape[1]))
-    return mesh.points, {name: np.vstack([a for a in arrays if len(a)]) for name, arrays in sets.items()}
+class Assembly:
+    """An assembly as a reader of the file sees it."""
+
+    def __init__(self, folder, *parameters):
+        path = folder / "assembly.msh"
+        self.counts = write_assembly(*parameters, path)
+        self.mesh = meshio.read(path)
+        self.points = self.mesh.points
+
+    def cells(self, name, kind="hexahedron"):
+        """Cells of a physical group, by meshio's cell sets."""
+        blocks = zip(self.mesh.cells, self.mesh.cell_sets[name], strict=True)
+        return np.vstack([block.data[chosen] for block, chosen in blocks if block.type == kind and len(chosen)])
+
+    def volume(self, name):
+        return volumes(self.points, self.cells(name)).sum()
+
+    def area(self, name):
+        return quad_areas(self.points, self.cells(name, "quad")).sum()
 
 
-@pytest.mark.parametrize("layout", ["pads", "plate"])
-@pytest.mark.parametrize("symmetry", ["quarter", "full"])
-def test_counts_equal_the_estimate(package, board, warpage, tmp_path, layout, symmetry):
-    package = package.model_copy(update={"copper": Copper(layout=layout)})
-    board = board.model_copy(update={"symmetry": symmetry})
-    counts = write_assembly(package, board, warpage, tmp_path / "assembly.msh")
-    estimate = {name: part.elements for name, part in count_elements(package, board).items()}
-    assert counts == {name: estimate[name] for name in counts}
-    _, sets = parts_of(tmp_path / "assembly.msh")
-    assert {name: len(sets[name]) for name in counts} == counts
+@pytest.fixture(scope="module")
+def quarter(tmp_path_factory):
+    return Assembly(tmp_path_factory.mktemp("quarter"), package(), board(), Warpage())
 
 
-def test_volume_is_that_of_the_drawing(package, board, warpage, tmp_path):
-    write_assembly(package, board, warpage, tmp_path / "assembly.msh")
-    points, sets = parts_of(tmp_path / "assembly.msh")
-    measured = {name: volumes(points, sets[name]).sum() for name in ("board", "board_patch", "substrate", "die")}
+def test_every_hexahedron_is_in_one_part(quarter):
+    hexahedra = [block for block in quarter.mesh.cells if block.dim == 3]
+    assert {block.type for block in hexahedra} == {"hexahedron"}
+    assert sum(len(block.data) for block in hexahedra) == sum(quarter.counts.values())
+    assert set(quarter.counts) == {"board", "board_patch", "substrate", "die"}
+    assert {name: len(quarter.cells(name)) for name in quarter.counts} == quarter.counts
+
+
+def test_hexahedra_are_upright(quarter):
+    assert min(scaled_jacobian(quarter.points, quarter.cells(part)).min() for part in quarter.counts) > 0.3
+
+
+@pytest.mark.parametrize("parts", [("board", "board_patch"), ("substrate", "die")])
+def test_no_node_twice_in_a_body(quarter, parts):
+    used = np.unique(np.concatenate([quarter.cells(part).ravel() for part in parts]))
+    rounded = np.round(quarter.points[used] / 1e-9).astype(np.int64)
+    assert len(np.unique(rounded, axis=0)) == len(used)
+
+
+def test_patch_shares_with_the_board_all_nodes_inside_it(quarter):
+    shared = np.intersect1d(quarter.cells("board"), quarter.cells("board_patch"))
+    patch = quarter.points[np.unique(quarter.cells("board_patch"))]
+    inside = (patch[:, 2] < -0.5 * MM + 1e-9) | (patch[:, :2].max(axis=1) > 3.5 * MM - 1e-9)
+    assert len(shared) == inside.sum()
+
+
+def test_volumes_are_those_of_the_drawing(quarter):
+    assert quarter.volume("substrate") == pytest.approx((2.5 * MM) ** 2 * 0.4 * MM)
+    assert quarter.volume("die") == pytest.approx((1.5 * MM) ** 2 * 0.4 * MM)
+    assert quarter.volume("board_patch") == pytest.approx((3.5 * MM) ** 2 * 0.5 * MM)
     sides = 4 * 2  # the hole's circle is a polygon of two cells on each of its four blocks
-    hole = 0.5 * sides * (1e-3) ** 2 * np.sin(2 * np.pi / sides)
-    assert measured["board"] + measured["board_patch"] == pytest.approx((20e-3 * 15e-3 - hole) * 1e-3, rel=1e-9)
-    assert measured["substrate"] == pytest.approx(2.5e-3**2 * 0.4e-3, rel=1e-9)
-    assert measured["die"] == pytest.approx(1.5e-3**2 * 0.4e-3, rel=1e-9)
-    assert min(scaled_jacobian(points, sets[name]).min() for name in measured) > 0.2
+    hole = 0.5 * sides * MM**2 * np.sin(2.0 * np.pi / sides)
+    assert quarter.volume("board") + quarter.volume("board_patch") == pytest.approx((20 * 15 * MM**2 - hole) * MM)
 
 
-def test_patch_and_board_share_their_nodes_and_reach_the_right_depth(package, board, warpage, tmp_path):
-    write_assembly(package, board, warpage, tmp_path / "assembly.msh")
-    points, sets = parts_of(tmp_path / "assembly.msh")
-    shared = np.intersect1d(sets["board"], sets["board_patch"])
-    assert points[sets["board_patch"].ravel(), 2].min() == pytest.approx(-0.5e-3)
-    assert len(shared) > 0
-    reach = 2.5e-3 + 2 * 0.5e-3
-    on_cut = points[shared]
-    distance = np.min([abs(on_cut[:, 2] + 0.5e-3), abs(on_cut[:, 0] - reach), abs(on_cut[:, 1] - reach)], axis=0)
-    assert distance.max() < 1e-12
+@pytest.mark.parametrize(("name", "axis", "value"), [("symmetry_x", 0, 0.0), ("symmetry_y", 1, 0.0)])
+def test_symmetry_planes(quarter, name, axis, value):
+    assert quarter.points[quarter.cells(name, "quad")][:, :, axis] == pytest.approx(value, abs=1e-12)
+    length = (15.0, 20.0)[axis]
+    assert quarter.area(name) / MM**2 == pytest.approx(length * 1.0 + 2.5 * 0.4 + 1.5 * 0.4)
 
 
-def test_underside_follows_the_warpage(package, board, warpage, tmp_path):
-    write_assembly(package, board, warpage, tmp_path / "assembly.msh")
-    points, sets = parts_of(tmp_path / "assembly.msh")
-    nodes = points[np.unique(sets["package_side"])]
-    expected = 2 * 0.02e-3 + 0.3e-3 + warpage.height(nodes[:, 0], nodes[:, 1], 1.5e-3, 1.5e-3)
-    assert np.abs(nodes[:, 2] - expected).max() < 1e-12
+@pytest.mark.parametrize(
+    ("name", "height", "area"),
+    [("board_side", 0.0, 2.5**2), ("package_side", 0.35, 2.5**2), ("board_bottom", -1.0, 20 * 15 - 2 * np.sqrt(2))],
+)
+def test_level_facet_sets(quarter, name, height, area):
+    assert quarter.points[quarter.cells(name, "quad")][:, :, 2] == pytest.approx(height * MM, abs=1e-12)
+    assert quarter.area(name) / MM**2 == pytest.approx(area)
 
 
-def test_symmetry_planes_and_holes_are_where_they_should_be(package, board, warpage, tmp_path):
-    write_assembly(package, board, warpage, tmp_path / "assembly.msh")
-    points, sets = parts_of(tmp_path / "assembly.msh")
-    assert np.abs(points[np.unique(sets["symmetry_x"]), 0]).max() < 1e-12
-    assert np.abs(points[np.unique(sets["symmetry_y"]), 1]).max() < 1e-12
-    rim = points[np.unique(sets["mounting_holes"])]
-    assert np.hypot(rim[:, 0] - 16e-3, rim[:, 1] - 11e-3) == pytest.approx(1e-3, rel=1e-9)
-    assert np.ptp(rim[:, 2]) == pytest.approx(1e-3)
+def test_holes_are_round(quarter):
+    walls = quarter.points[quarter.cells("mounting_holes", "quad")]
+    assert np.linalg.norm(walls[:, :, :2] - np.array([17.0, 12.0]) * MM, axis=2) == pytest.approx(1.0 * MM)
+    assert np.ptp(walls[:, :, 2]) == pytest.approx(1.0 * MM)
+
+
+def test_warpage_lifts_the_package_only(tmp_path):
+    warpage = Warpage(corner=0.2 * MM)
+    warped = Assembly(tmp_path, package(), board(), warpage)
+    under = warped.points[np.unique(warped.cells("package_side", "quad"))]
+    expected = 0.35 * MM + lift(package(), warpage, under[:, 0], under[:, 1])
+    assert under[:, 2] == pytest.approx(expected, rel=1e-9)
+    assert warped.points[np.unique(warped.cells("board"))][:, 2].max() < 1e-12
+    assert warped.volume("substrate") == pytest.approx((2.5 * MM) ** 2 * 0.4 * MM)
+
+
+def test_full_model_is_four_quarters(tmp_path, quarter):
+    full = Assembly(tmp_path, package(), board(symmetry="full"), Warpage())
+    assert full.counts == {name: 4 * count for name, count in quarter.counts.items()}
+    assert not {"symmetry_x", "symmetry_y"} & set(full.mesh.field_data)
+    assert len(full.cells("mounting_holes", "quad")) == 4 * len(quarter.cells("mounting_holes", "quad"))
+    assert full.points.mean(axis=0)[:2] == pytest.approx([0.0, 0.0], abs=1e-9)
+    for part in full.counts:
+        assert full.volume(part) == pytest.approx(4.0 * quarter.volume(part))
+
+
+def test_copper_plates_lie_under_and_above_the_joints(tmp_path):
+    plates = Assembly(tmp_path, package(copper=PLATE), board(), Warpage())
+    for part, low in (("copper_board", 0.0), ("copper_package", 0.33)):
+        heights = plates.points[np.unique(plates.cells(part))][:, 2] / MM
+        assert (heights.min(), heights.max()) == pytest.approx((low, low + 0.02), abs=1e-9)
+    assert plates.points[plates.cells("board_side", "quad")][:, :, 2] == pytest.approx(0.02 * MM)
+    assert plates.points[plates.cells("package_side", "quad")][:, :, 2] == pytest.approx(0.33 * MM)
+
+
+@pytest.mark.parametrize("symmetry", ["quarter", "full"])
+@pytest.mark.parametrize("copper", [PLATE, {"layout": "pads"}])
+def test_estimate_counts_what_is_meshed(tmp_path, symmetry, copper):
+    odd = {"length": 3.3 * MM, "width": 5.0 * MM, "thickness": 0.4 * MM, "elements": 1}
+    the_package, the_board = package(copper=copper, die=odd), board(symmetry=symmetry)
+    estimate = count_elements(the_package, the_board)
+    counts = write_assembly(the_package, the_board, Warpage(), tmp_path / "assembly.msh")
+    assert {name: estimate[name].elements for name in counts} == counts

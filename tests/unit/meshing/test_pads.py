@@ -1,29 +1,56 @@
-"""Joint names and the pad table."""
-
 import pytest
 
-from meshing.pads import joint_name, pad_table, read_pads, row_name, write_pads
+from meshing.pads import has_rim, joint_name, pad_table, read_pads, row_name, write_pads
+from meshing.parameters import Warpage
+from tests.support.meshing_models import MM, board, package
 
 
-def test_rows_skip_the_letters_that_jedec_skips():
-    assert [row_name(row) for row in (0, 7, 8, 13, 19, 20, 40)] == ["A", "H", "J", "P", "Y", "AA", "BA"]
-    assert joint_name(0, 9) == "A10"
+@pytest.mark.parametrize(
+    ("row", "letters"), [(0, "A"), (7, "H"), (8, "J"), (13, "P"), (14, "R"), (19, "Y"), (20, "AA"), (40, "BA")]
+)
+def test_row_letters_are_jedec(row, letters):
+    assert row_name(row) == letters
 
 
-def test_quarter_keeps_the_upper_right_joints(package, board, warpage):
-    names = [site.name for site in pad_table(package, board, warpage)]
-    assert names == ["A3", "A4", "B3", "B4"]
+def test_no_row_has_an_ambiguous_letter():
+    assert not set("".join(row_name(row) for row in range(100))) & set("IOQSXZ")
 
 
-def test_full_array_without_depopulated_joints(package, board, warpage):
-    package = package.model_copy(update={"depopulated": ("B2", "B3", "C2", "C3")})
-    sites = pad_table(package, board.model_copy(update={"symmetry": "full"}), warpage)
-    assert len(sites) == 12
-    assert sum(site.x for site in sites) == pytest.approx(0.0, abs=1e-15)
+def test_quarter_of_ten_by_ten_has_corner_a10():
+    sites = {site.name: site for site in pad_table(package(rows=10, columns=10), board(), Warpage(corner=0.03 * MM))}
+    assert len(sites) == 25
+    assert {name[0] for name in sites} == set("ABCDE")
+    corner = sites["A10"]
+    assert (corner.x, corner.y) == pytest.approx((4.5 * MM, 4.5 * MM))
+    assert corner.gap == pytest.approx(0.34 * MM)
+    assert sites["E6"].gap == pytest.approx((0.31 + 0.03 / 81.0) * MM)
 
 
-def test_gap_follows_the_warpage_and_the_file_keeps_every_digit(package, board, warpage, tmp_path):
-    sites = pad_table(package, board, warpage)
-    assert {site.name: site.gap for site in sites}["A4"] == pytest.approx(0.33e-3)
+def test_full_array_leaves_out_depopulated():
+    sites = pad_table(package(rows=3, columns=5, depopulated=("B3",)), board(symmetry="full"), Warpage())
+    assert len(sites) == 14
+    assert "B3" not in {site.name for site in sites}
+    first = sites[0]
+    assert (first.name, first.x, first.y) == ("A1", pytest.approx(-2.0 * MM), pytest.approx(1.0 * MM))
+
+
+def test_radii_follow_the_definitions():
+    site = pad_table(package(), board(), Warpage())[0]
+    assert site.wetted_radius_board == pytest.approx(0.24 * MM)
+    assert site.wetted_radius_package == pytest.approx(0.24 * MM)
+    assert site.pad_radius_package == pytest.approx(0.29 * MM)
+    assert site.z_board == pytest.approx(0.02 * MM)
+    assert has_rim(site.pad_radius_package, site.wetted_radius_package)
+    assert not has_rim(site.pad_radius_board, site.wetted_radius_board)
+
+
+def test_single_joint_has_no_warpage():
+    (site,) = pad_table(package(rows=1, columns=1), board(symmetry="full"), Warpage(corner=0.1 * MM))
+    assert site.gap == 0.31 * MM
+    assert site.name == joint_name(0, 0) == "A1"
+
+
+def test_table_survives_its_file(tmp_path):
+    sites = pad_table(package(), board(), Warpage(corner=0.03 * MM))
     write_pads(tmp_path / "pads.json", sites)
     assert read_pads(tmp_path / "pads.json") == sites

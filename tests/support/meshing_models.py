@@ -1,0 +1,32 @@
+"""A small package on a small board, to be varied."""
+
+from meshing.parameters import Board, Package
+
+MM = 1.0e-3
+PLATE = {"thickness": 0.02 * MM, "layout": "plate"}
+
+
+def package(**changes) -> Package:
+    """A 4 x 4 array at 1 mm under a package of 5 mm with a die of 3 mm; fields as keywords."""
+    values = {
+        "rows": 4,
+        "columns": 4,
+        "pitch": 1.0 * MM,
+        "standoff": 0.31 * MM,
+        "board_pad": {"diameter": 0.48 * MM, "mask_opening": 0.58 * MM, "definition": "NSMD"},
+        "package_pad": {"diameter": 0.58 * MM, "mask_opening": 0.48 * MM, "definition": "SMD"},
+        "substrate": {"length": 5.0 * MM, "width": 5.0 * MM, "thickness": 0.4 * MM},
+        "die": {"length": 3.0 * MM, "width": 3.0 * MM, "thickness": 0.4 * MM},
+    }
+    return Package.model_validate(values | changes)
+
+
+def board(**changes) -> Board:
+    """A board of 40 x 30 x 1 mm, quarter symmetry, holes of 2 mm 3 mm from its edges; fields as keywords."""
+    values = {
+        "length": 40.0 * MM,
+        "width": 30.0 * MM,
+        "thickness": 1.0 * MM,
+        "holes": {"diameter": 2.0 * MM, "inset_x": 3.0 * MM, "inset_y": 3.0 * MM},
+    }
+    return Board.model_validate(values | changes)
