@@ -9,6 +9,7 @@ Floats = NDArray[np.float64]
 
 PINNED, ON_PAD, ON_MASK = 0, 1, 2
 RELEASE_MARGIN = 0.02
+CATCH_DISTANCE = 0.05
 
 
 class ContactLine:
@@ -19,20 +20,21 @@ class ContactLine:
     again when it returns to the edge.
     """
 
-    def __init__(self, wall: int, edge_radius: float, pad_angle: float, mask_angle: float, corners: int) -> None:
-        """Pin all vertices.
+    def __init__(self, wall: int, edge_radius: float, pad_angle: float, mask_angle: float, radii: Floats) -> None:
+        """Let each vertex start where it is: at the edge, inside or outside.
 
         Args:
             wall: index of the wall and of the ring.
             edge_radius: radius of the vertices on the edge of the wetted disc [m]; infinite on a uniform wall.
             pad_angle: contact angle inside the edge [rad].
             mask_angle: contact angle outside it [rad].
-            corners: number of vertices.
+            radii: `(k,)` distances of the vertices from the axis [m].
         """
         self.wall = wall
         self.edge_radius = edge_radius
         self._cosine = np.array([0.0, np.cos(pad_angle), np.cos(mask_angle)])
-        self.state = np.full(corners, PINNED if np.isfinite(edge_radius) else ON_PAD, np.int8)
+        self.state = np.where(radii < edge_radius, ON_PAD, ON_MASK).astype(np.int8)
+        self.state[np.isclose(radii, edge_radius, rtol=1e-9)] = PINNED
 
     def cosine(self) -> Floats:
         """Cosine of the contact angle that acts on each vertex `(k,)`; zero where the edge holds it."""
@@ -54,7 +56,8 @@ class ContactLine:
         """Cosine of the contact angle at each vertex `(k,)` from the balance of forces on it.
 
         The free surface pulls with -gamma cos(theta) a unit length. The load holds the pressure on the vertex' share
-        of the surface, too, so that the angle is that of the wall, not of the first triangle.
+        of the surface, too, so that the angle is that of the wall, not of the first triangle. It is averaged with
+        the neighbours' (1/4, 1/2, 1/4), since vertices with few and with many triangles take turns along a line.
 
         Args:
             body: the liquid body.
@@ -62,21 +65,22 @@ class ContactLine:
             coefficient: surface tension [N/m].
         """
         radial, length = self.outward(body)
-        return -(load[body.cloud.rings[self.wall]] * radial).sum(axis=1) / (coefficient * length)
+        cosine = -(load[body.cloud.rings[self.wall]] * radial).sum(axis=1) / (coefficient * length)
+        return 0.5 * cosine + 0.25 * (np.roll(cosine, 1) + np.roll(cosine, -1))
 
     def update(self, body: Body, load: Floats, coefficient: float) -> None:
         """Release the vertices that the edge no longer holds, catch those that returned to it (moves these).
 
         Args: as `contact_cosine`.
         """
-        if not np.isfinite(self.edge_radius):
-            return
         ring = body.cloud.rings[self.wall]
         cosine = self.contact_cosine(body, load, coefficient)
         radius = np.linalg.norm(body.points[ring, :2], axis=1)
-        inside, outside = radius < self.edge_radius, radius > self.edge_radius
-        caught = ((self.state == ON_PAD) & ~inside) | ((self.state == ON_MASK) & ~outside)
-        held = self.state == PINNED
+        near = np.abs(radius - self.edge_radius) < CATCH_DISTANCE * body.cloud.spacing
+        holds = near & (cosine < self._cosine[ON_PAD]) & (cosine > self._cosine[ON_MASK])
+        returned_outward = (self.state == ON_PAD) & (holds | (radius >= self.edge_radius))
+        returned_inward = (self.state == ON_MASK) & (holds | (radius <= self.edge_radius))
+        held, caught = self.state == PINNED, returned_outward | returned_inward
         self.state[held & (cosine > self._cosine[ON_PAD] + RELEASE_MARGIN)] = ON_PAD
         self.state[held & (cosine < self._cosine[ON_MASK] - RELEASE_MARGIN)] = ON_MASK
         self.state[caught] = PINNED

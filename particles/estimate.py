@@ -3,10 +3,10 @@
 from particles.geometry import JointGeometry, joint_counts
 from particles.parameters import Solder
 
-# Measured by benchmarks/reflow.py on one core of a 2-core x86-64 machine, quadratic basis.
-SECONDS_PER_STEP_OF_THOUSAND = 0.11
+# Measured by benchmarks/bench_reflow.py on one core of a 2-core x86-64 machine, quadratic basis.
+SECONDS_PER_STEP_OF_THOUSAND = 0.12
 COST_EXPONENT = 1.8
-TYPICAL_STEPS = 12
+TYPICAL_STEPS = 8
 
 
 def particle_count(solder: Solder, geometry: JointGeometry) -> int:

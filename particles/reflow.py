@@ -2,6 +2,8 @@
 
 from collections.abc import Callable
 
+import numpy as np
+
 from particles.body import Body
 from particles.cloud import Cloud, equal_area_radius, joint_cloud
 from particles.contact_line import ContactLine
@@ -49,20 +51,21 @@ def solve_joint(
     cloud = joint_cloud(geometry, solder.volume, solder.numerics.spacing)
     effects = {name: decision["on"] for name, decision in decide_effects(geometry, solder).items()}
     radii = (geometry.radius_board, geometry.radius_package)
-    lines = tuple(
-        ContactLine(
-            wall, equal_area_radius(radius, len(ring)), solder.pad_contact_angle, solder.mask_contact_angle, len(ring)
-        )
-        for wall, (radius, ring) in enumerate(zip(radii, cloud.rings, strict=True))
-    )
+    lines = tuple(contact_line(cloud, wall, radius, solder) for wall, radius in enumerate(radii))
     flow = start_flow(cloud, solder, effects, lines)
     run = run_to_rest(flow, stop_rule(cloud, solder, effects), progress, on_snapshot)
     return _shape(geometry, solder, flow, run)
 
 
-def start_flow(
-    cloud: Cloud, solder: Solder, effects: dict[str, bool], lines: tuple[ContactLine, ...]
-) -> LiquidFlow:
+def contact_line(cloud: Cloud, wall: int, radius: float, solder: Solder) -> ContactLine:
+    """Set up the contact line on one wall, whose edge is the polygon of the wetted disc's area [m]."""
+    ring = cloud.rings[wall]
+    edge = equal_area_radius(radius, len(ring))
+    distance = np.hypot(*cloud.points[ring, :2].T)
+    return ContactLine(wall, edge, solder.pad_contact_angle, solder.mask_contact_angle, distance)
+
+
+def start_flow(cloud: Cloud, solder: Solder, effects: dict[str, bool], lines: tuple[ContactLine, ...]) -> LiquidFlow:
     """Set up a flow from rest, with only the effects that are on."""
     limit = capillary_limit(solder.density, cloud.spacing, solder.surface_tension)
     largest = solder.numerics.time_step_limit * limit

@@ -82,6 +82,6 @@ def test_inertia_never_gains_energy(properties):
 def test_extreme_contact_angles(degrees):
     """A cube that spreads to a film of a third of its height, and one that almost rolls off its wall."""
     numerics = SolderNumerics(time_step_limit=100)
-    flow, run = solve_drop(Solder(volume=1e-9, numerics=numerics), np.radians(degrees), 7)
+    flow, run = solve_drop(Solder(volume=1e-9, pad_contact_angle=np.radians(degrees), numerics=numerics), 7)
     check_energy_falls(np.array([record.energy for record in run.records]))
     assert flow.body.volume()[0] == pytest.approx(1e-9, rel=1e-6)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from particles.geometry import JointGeometry
+from particles.metrics import mean_angle, verdict
 from particles.parameters import Solder, SolderEffects, SolderNumerics
 from particles.profile import fit_profile
 from particles.reflow import solve_joint
@@ -54,9 +55,10 @@ def test_width_converges_with_the_spacing():
 def test_a_cube_becomes_a_spherical_cap(degrees):
     """Hu et al. 4.1 (their errors: 0.9-3.3 %) with 343 particles; free contact line, quasi-static."""
     numerics = SolderNumerics(time_step_limit=100)
-    solder = Solder(volume=1e-9, effects=SolderEffects(gravity="off"), numerics=numerics)
-    flow, run = solve_drop(solder, np.radians(degrees), 7)
-    exact = sessile_meridian(1e-9, np.radians(degrees), GAMMA)
+    angle = np.radians(degrees)
+    solder = Solder(volume=1e-9, pad_contact_angle=angle, effects=SolderEffects(gravity="off"), numerics=numerics)
+    flow, run = solve_drop(solder, 7)
+    exact = sessile_meridian(1e-9, angle, GAMMA)
     assert abs(error(run.records[-1].height, exact.height)) < 0.01
     assert abs(error(run.profiles[-1].max_width, exact.max_width)) < 0.01
     assert flow.body.volume()[0] == pytest.approx(1e-9, rel=1e-6)
@@ -64,10 +66,36 @@ def test_a_cube_becomes_a_spherical_cap(degrees):
 
 def test_a_heavy_drop_sags():
     """Bond number 0.1757 (1 mm^3 of solder) at 120 degrees: Bashforth-Adams."""
-    flow, run = solve_drop(Solder(volume=1e-9, numerics=SolderNumerics(time_step_limit=100)), np.radians(120), 7)
+    numerics = SolderNumerics(time_step_limit=100)
+    flow, run = solve_drop(Solder(volume=1e-9, pad_contact_angle=np.radians(120), numerics=numerics), 7)
     exact = sessile_meridian(1e-9, np.radians(120), GAMMA, WEIGHT)
     assert abs(error(run.records[-1].height, exact.height)) < 0.01
     assert abs(error(fit_profile(flow.body.points, flow.body.triangles).max_width, exact.max_width)) < 0.01
+
+
+@pytest.mark.parametrize(
+    ("volume", "height", "width", "degrees"),
+    [
+        (0.0141, 0.178, 0.400, 83),
+        (0.0564, 0.393, 0.495, 126),
+        (0.1077, 0.523, 0.599, 138),
+        (0.1218, 0.550, 0.623, 140),
+        (0.2298, 0.707, 0.764, 148),
+    ],
+)
+def test_five_volumes_on_a_pad(volume, height, width, degrees):
+    """Hu et al. 4.2, pad radius 0.2 mm: caps pinned at the pad's edge, the largest on the mask (closed form).
+
+    The cube starts with its corners on the mask; the contact line is caught by the edge, or passes it.
+    """
+    numerics = SolderNumerics(time_step_limit=100)
+    solder = Solder(volume=volume * 1e-9, effects=SolderEffects(gravity="off"), numerics=numerics)
+    flow, run = solve_drop(solder, 7, pad_radius=0.2e-3)
+    assert run.records[-1].height == pytest.approx(height * 1e-3, rel=0.01)
+    assert run.profiles[-1].max_width == pytest.approx(width * 1e-3, rel=5e-3)
+    (wetting,) = flow.physics.events
+    assert mean_angle(wetting.contact_cosines(flow.body)[0]) == pytest.approx(degrees, abs=2.0)
+    assert verdict(flow.physics.lines, run.ruptured) == ("overflow" if degrees == 148 else "ok")
 
 
 def test_solder_on_the_mask_meets_it_at_its_angle():

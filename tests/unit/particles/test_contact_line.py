@@ -16,9 +16,11 @@ def body():
     return Body.at_rest(joint_cloud(JointGeometry(1.0, 0.8, 0.8), 2.2, 0.2))
 
 
-def line_on(body, state=PINNED):
-    corners = len(body.cloud.rings[0])
-    line = ContactLine(0, equal_area_radius(0.8, corners), PAD, MASK, corners)
+def line_on(body, state=PINNED, pad=PAD):
+    ring = body.cloud.rings[0]
+    radii = np.linalg.norm(body.points[ring, :2], axis=1)
+    line = ContactLine(0, equal_area_radius(0.8, len(ring)), pad, MASK, radii)
+    assert (line.state == PINNED).all()
     line.state[:] = state
     return line
 
@@ -39,13 +41,12 @@ def test_gibbs_condition_at_the_edge(body, degrees, state):
 
 
 def test_line_recedes_below_the_angle_of_the_pad(body):
-    corners = len(body.cloud.rings[0])
-    line = ContactLine(0, equal_area_radius(0.8, corners), np.radians(40.0), MASK, corners)
+    line = line_on(body, pad=np.radians(40.0))
     line.update(body, load_of_angle(body, line, np.radians(30.0)), 1.0)
     assert (line.state == ON_PAD).all()
 
 
-@pytest.mark.parametrize(("state", "factor"), [(ON_PAD, 1.01), (ON_MASK, 0.99)])
+@pytest.mark.parametrize(("state", "factor"), [(ON_PAD, 1.03), (ON_MASK, 0.97)])
 def test_a_vertex_that_crosses_the_edge_is_caught_there(body, state, factor):
     line, vertex = line_on(body, state), body.cloud.rings[0][4]
     away = 2.0 - factor
@@ -55,6 +56,15 @@ def test_a_vertex_that_crosses_the_edge_is_caught_there(body, state, factor):
     assert line.state[4] == PINNED
     assert (np.delete(line.state, 4) == state).all()
     assert np.linalg.norm(body.points[vertex]) == pytest.approx(line.edge_radius)
+
+
+def test_a_vertex_near_the_edge_is_caught_where_the_edge_would_hold_it(body):
+    line, ring = line_on(body, ON_MASK), body.cloud.rings[0]
+    body.points[ring, :2] *= 1.005
+    line.update(body, load_of_angle(body, line, np.radians(150.0)), 1.0)
+    assert (line.state == ON_MASK).all()
+    line.update(body, load_of_angle(body, line, np.radians(140.0)), 1.0)
+    assert (line.state == PINNED).all()
 
 
 def test_contact_cosine_inverts_the_pull(body):
@@ -67,7 +77,7 @@ def test_wetting_force_is_the_gradient_of_its_energy_and_vanishes_at_right_angle
     body = Body.at_rest(box_cloud(1.0, 5))
     ring = body.cloud.rings[0]
     for degrees, pull in ((60.0, 0.5), (90.0, 0.0)):
-        line = ContactLine(0, np.inf, np.radians(degrees), np.radians(degrees), len(ring))
+        line = ContactLine(0, np.inf, np.radians(degrees), np.radians(degrees), np.ones(len(ring)))
         wetting = Wetting(2.0, (line,), ())
         assert wetting.energy(body) == pytest.approx(-2.0 * pull * ring_area(body.points, ring))
         # Widening the square by a factor 1 + e gains 2 e gamma cos(theta) A.

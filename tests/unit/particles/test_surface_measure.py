@@ -61,9 +61,7 @@ def test_gradient_of_the_volume(cloud):
     direction = np.random.default_rng(8).normal(size=points.shape)
     direction[cloud.wall >= 0, 2] = 0.0
     gradient = volume_and_gradient(points, cloud.triangles, cloud.rings, cloud.ring_heights)[1]
-    expected = slope(
-        lambda x: enclosed_volume(x, cloud.triangles, cloud.rings, cloud.ring_heights), points, direction
-    )
+    expected = slope(lambda x: enclosed_volume(x, cloud.triangles, cloud.rings, cloud.ring_heights), points, direction)
     assert float((gradient * direction).sum()) == pytest.approx(expected, rel=1e-7)
 
 
