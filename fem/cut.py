@@ -39,9 +39,7 @@ def find_cut(mesh: MeshData) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
     return candidates[nearest], meso
 
 
-def inner_facets(
-    points: NDArray[np.float64], board: NDArray[np.int32], patch: NDArray[np.int32]
-) -> NDArray[np.int32]:
+def inner_facets(points: NDArray[np.float64], board: NDArray[np.int32], patch: NDArray[np.int32]) -> NDArray[np.int32]:
     """Return the boundary facets of the patch that are not on a plane that bounds board and patch together.
 
     Raises:

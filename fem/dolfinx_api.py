@@ -72,7 +72,7 @@ def cell_dofs(space: dolfinx.fem.FunctionSpace) -> NDArray[np.int32]:
 
 
 def compile_ahead(comm: MPI.Comm) -> None:
-    """Let one rank compile the elements of the output, before two communicators wait for the same cache entry."""
+    """Let one rank compile the elements of the output before two communicators wait for one cache entry."""
     if comm.rank == 0:
         corners = np.array([[float(a >> d & 1) for d in range(3)] for a in range(8)])
         cube = hexahedral_mesh(MPI.COMM_SELF, corners, np.arange(8)[None, :])
@@ -103,8 +103,8 @@ class FieldFile:
 
 
 def _name_each_piece_once(parallel_file: Path) -> None:
-    """Drop repeated pieces: dolfinx 0.5 lists each piece once a function, and readers show as many copies of the mesh."""
+    """Drop repeated pieces: dolfinx 0.5 lists a piece once a function, and readers show as many copies of the mesh."""
     lines = parallel_file.read_text().splitlines()
-    pieces: set[str] = set()
-    kept = [line for line in lines if "<Piece " not in line or not (line in pieces or pieces.add(line))]
+    first = {line: k for k, line in reversed(list(enumerate(lines)))}
+    kept = [line for k, line in enumerate(lines) if "<Piece " not in line or first[line] == k]
     parallel_file.write_text("\n".join(kept) + "\n")

@@ -1,8 +1,8 @@
 """Internal force of boxes: one stiffness per shape and material, diagonalised by symmetry.
 
-A box of a material whose axes it shares has three mirror planes. In the Walsh-Hadamard basis of its eight nodes the
-24 x 24 stiffness falls into eight blocks of 3 x 3, one per parity: the modes of component c with parity p have the index
-p XOR 2^c. A product costs 216 multiplications and additions instead of 1152, with one small table per shape.
+A box of a material whose axes it shares has three mirror planes. In the Walsh-Hadamard basis of its eight nodes
+the 24 x 24 stiffness falls into eight blocks of 3 x 3, one per parity: the modes of component c with parity p have
+the index p XOR 2^c. A product costs 216 multiplications and additions instead of 1152, with one small table per shape.
 """
 
 from dataclasses import dataclass

@@ -43,7 +43,7 @@ class History:
         self._world.Allreduce(maxima, largest, MPI.MAX)
         energies = self.ledger.judge(total[:LEDGER_SIZE], motion.time)
         if self._world.rank == 0:
-            self._rows.append(self._row(motion.time, total[LEDGER_SIZE:], largest) | energies)
+            self._rows.append({**self._row(motion.time, total[LEDGER_SIZE:], largest), **energies})
 
     def _row(
         self, time: float, watched: NDArray[np.float64], maxima: NDArray[np.float64]
@@ -57,7 +57,7 @@ class History:
             "von_mises_max": maxima[:-2],
             "board_strain": high if high >= -low else low,
         }
-        return row | dict(zip(LAYERS, watched[6:].reshape(len(LAYERS), -1)))
+        return row | dict(zip(LAYERS, watched[6:].reshape(len(LAYERS), -1), strict=True))
 
     def arrays(self) -> dict[str, NDArray]:
         """Return all samples as arrays, by name; on rank 0."""

@@ -116,9 +116,9 @@ def stiffness(points, elasticity, material, result):
     """Write the stiffness of hexahedra with Taylor-modified Wilson modes, 2 x 2 x 2 Gauss points.
 
     The gradients of the modes 1 - xi_k^2 use the Jacobian at the centre, scaled by det J_0 / det J, so that the patch
-    test holds on distorted shapes (Taylor, Beresford & Wilson, IJNME 10, 1976); the nine internal unknowns are condensed.
-    No mode balances the bilinear part of the compatible dilatation, which locks nearly incompressible beams under shear;
-    only its linear part is kept (B-bar; least squares with the weights det J keeps the patch test).
+    test holds on distorted shapes (Taylor, Beresford & Wilson, IJNME 10, 1976); the nine internal unknowns are
+    condensed. No mode balances the bilinear part of the compatible dilatation, which locks nearly incompressible beams
+    under shear; only its linear part is kept (B-bar; least squares with the weights det J keeps the patch test).
 
     Args:
         points: ``(ne, 8, 3)`` [m].

@@ -11,8 +11,8 @@ def advance(state, masses, acceleration, step):
 
     Args:
         state: ``(3, n, 3)``: displacement [m], velocity half a step back [m/s], force [N].
-        masses: ``(n, 4)``: inverse mass per direction [1/kg], zero where the velocity is prescribed; mass that counts in
-            the energy ledger of this rank [kg].
+        masses: ``(n, 4)``: inverse mass per direction [1/kg], zero where the velocity is prescribed; mass that counts
+            in the energy ledger of this rank [kg].
         acceleration: ``(3,)`` [m/s^2], of the body force.
         step: dt [s].
 

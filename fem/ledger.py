@@ -96,4 +96,4 @@ class Ledger:
             scale = np.repeat(load[6:8], 3)
             ratio = np.divide(np.abs(load[:6]), scale, out=np.zeros(6), where=scale > 0.0)
             self.force_residual = max(self.force_residual, float(ratio.max()))
-        return dict(zip(ENERGIES, (kinetic, internal, external, interface, balance)))
+        return dict(zip(ENERGIES, (kinetic, internal, external, interface, balance), strict=True))

@@ -18,8 +18,8 @@ class Load(Protocol):
 class HalfSineDrop:
     """Input-G at the mounting holes as direct acceleration input (JESD22-B111, package facing down).
 
-    The package looks towards the ground, so the table's upward acceleration points along -z and the board, seen from the
-    table, is pushed along +z. Displacements are relative to the table.
+    The package looks towards the ground, so the table's upward acceleration points along -z and the board, seen from
+    the table, is pushed along +z. Displacements are relative to the table.
 
     Attributes:
         peak: Peak acceleration A [m/s^2].

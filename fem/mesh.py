@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from fem.errors import MeshError
 
-# Gmsh and VTK number a hexahedron around its faces; here, as in DOLFINx, bit d of the local index is the side in direction d.
+# Gmsh and VTK number a hexahedron around its faces; here, as in DOLFINx, bit d of a local index is the side in
+# direction d.
 TENSOR_ORDER = np.array([0, 1, 3, 2, 4, 5, 7, 6])
 FACES = np.array([[0, 1, 2, 3], [4, 5, 6, 7], [0, 1, 4, 5], [2, 3, 6, 7], [0, 2, 4, 6], [1, 3, 5, 7]])
 
@@ -53,7 +54,7 @@ def read_mesh(path: Path) -> MeshData:
     Raises:
         MeshError: The file has no hexahedra, other cells of dimension three, or a hexahedron in no or several volumes.
     """
-    mesh = meshio.read(path)
+    mesh = meshio.read(path, file_format="gmsh")
     foreign = {block.type for block in mesh.cells if block.dim == 3 and block.type != "hexahedron"}
     blocks = [index for index, block in enumerate(mesh.cells) if block.type == "hexahedron"]
     if foreign or not blocks:
@@ -89,12 +90,16 @@ def append(pieces: Sequence[MeshData]) -> MeshData:
     facet_names = dict.fromkeys(name for piece in pieces for name in piece.facets)
     return MeshData(
         points=np.concatenate([piece.points for piece in pieces]),
-        cells=np.concatenate([piece.cells + offset for piece, offset in zip(pieces, offsets)]),
-        part=np.concatenate([numbers[piece.part] for numbers, piece in zip(number, pieces)]),
+        cells=np.concatenate([piece.cells + offset for piece, offset in zip(pieces, offsets[:-1], strict=True)]),
+        part=np.concatenate([numbers[piece.part] for numbers, piece in zip(number, pieces, strict=True)]),
         part_names=names,
         facets={
             name: np.concatenate(
-                [piece.facets[name] + offset for piece, offset in zip(pieces, offsets) if name in piece.facets]
+                [
+                    piece.facets[name] + offset
+                    for piece, offset in zip(pieces, offsets[:-1], strict=True)
+                    if name in piece.facets
+                ]
             )
             for name in facet_names
         },
@@ -131,7 +136,7 @@ def select(data: MeshData, accept: Callable[[str], bool]) -> tuple[MeshData, NDA
 def merge_nodes(
     data: MeshData, duplicates: NDArray[np.int32], originals: NDArray[np.int32]
 ) -> tuple[MeshData, NDArray[np.int32]]:
-    """Replace each node of ``duplicates`` by the one of ``originals`` beside it; returns as ``without_unused_nodes``."""
+    """Replace each node of ``duplicates`` by the one of ``originals``; returns as ``without_unused_nodes``."""
     number = np.arange(len(data.points), dtype=np.int32)
     number[duplicates] = originals
     facets = {name: number[quads] for name, quads in data.facets.items()}

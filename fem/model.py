@@ -40,9 +40,7 @@ def read_model(comms: Communicators, request: RunInput) -> tuple[MeshData | None
         The model's mesh on the first of its ranks, None on the others; its tables.
     """
     world = comms.world
-    inputs = agreed(
-        world, lambda: prepare(read_meshes(request.meshes), request.mode) if world.rank == 0 else None
-    )
+    inputs = agreed(world, lambda: prepare(read_meshes(request.meshes), request.mode) if world.rank == 0 else None)
     tables = world.bcast({role: item.tables for role, item in inputs.items()} if inputs else None)
     first = {"macro": 0, "meso": request.shock.ranks.macro, "dns": 0}
     if inputs and "meso" in inputs:

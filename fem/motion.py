@@ -13,8 +13,8 @@ from fem.loads import Load
 class Motion:
     """The state of one model on one rank, and its step.
 
-    Half-kick, drift, force, half-kick, written with the velocity half a step back: v += dt (f / m + g), u += dt v. Nodes
-    that several ranks hold are updated by each of them, from equal sums of forces.
+    Half-kick, drift, force, half-kick, written with the velocity half a step back: v += dt (f / m + g), u += dt v.
+    Nodes that several ranks hold are updated by each of them, from equal sums of forces.
 
     Attributes:
         displacement: ``(n, 3)`` [m] at ``time``.

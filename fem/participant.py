@@ -1,10 +1,10 @@
 """The participants of a run: macro and meso model of the two-scale scheme, or one model alone.
 
 A window of the held-velocity scheme (held cut velocity; the cut lies two layers of elements inside the board):
-macro: a_n = (F_ext + F_c - F_int) / (M + M_interface) -> v^{n+1/2}, U^{n+1}; the cut's v^{n+1/2} goes to the meso model,
-which takes m substeps with it WHILE the macro model computes F_int(U^{n+1}); F_c = -(K u)_cut comes back at the end.
-Messages go through two channels and nothing else; ``Macro.begin_window`` and ``finish_window`` are apart, so that one rank
-can also carry both models and take turns.
+macro: a_n = (F_ext + F_c - F_int) / (M + M_interface) -> v^{n+1/2}, U^{n+1}; the cut's v^{n+1/2} goes to the meso
+model, which takes m substeps with it WHILE the macro model computes F_int(U^{n+1}); F_c = -(K u)_cut comes back at the
+end. Messages go through two channels and nothing else; ``Macro.begin_window`` and ``finish_window`` are apart, so that
+one rank can also carry both models and take turns.
 """
 
 from typing import Protocol
@@ -26,7 +26,7 @@ class Participant(Protocol):
     Attributes:
         motion: Its state.
         plan: Window and substeps.
-        interface_work: Work [J] of this rank's share across the cut: put in by the macro model, received by the meso model.
+        interface_work: Work [J] of this rank's share across the cut: put in by the macro, received by the meso model.
     """
 
     motion: Motion

@@ -39,7 +39,10 @@ def run(world: MPI.Comm, request: RunInput) -> None:
         participant = make_participant(comms, model, load)
         history = make_history(comms, model, load, request)
         fields = Fields(
-            comms.model, model.body, model.tables.part[model.body.local.cell_numbers], request.output / f"{comms.role}.pvd"
+            comms.model,
+            model.body,
+            model.tables.part[model.body.local.cell_numbers],
+            request.output / f"{comms.role}.pvd",
         )
         ready = time.perf_counter()
         output_seconds = march(comms, participant, history, fields, request)
@@ -67,9 +70,7 @@ def make_history(comms: Communicators, model: Model, load: HalfSineDrop, request
     return History(comms.world, Watch(model.tables.watch, model.body), ledger, load)
 
 
-def march(
-    comms: Communicators, participant: Participant, history: History, fields: Fields, request: RunInput
-) -> float:
+def march(comms: Communicators, participant: Participant, history: History, fields: Fields, request: RunInput) -> float:
     """Run all windows with their samples; return the seconds spent on fields."""
     plan = participant.plan
     field_windows = set(np.linspace(0, plan.windows, request.shock.numerics.field_samples).round().astype(int).tolist())

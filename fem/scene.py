@@ -65,9 +65,7 @@ def prepare(data: MeshData, mode: Literal["two_scale", "dns"]) -> dict[str, Mode
         merged, number = merge_nodes(data, meso_nodes, macro_nodes)
         return {"dns": model_input(merged, number[macro_nodes], watch_scene(merged), centre_nodes(merged))}
     if not len(macro_nodes):
-        raise MeshError(
-            f"two_scale needs the parts {MACRO} and board_patch; the mesh has {', '.join(data.part_names)}"
-        )
+        raise MeshError(f"two_scale needs the parts {MACRO} and board_patch; the mesh has {', '.join(data.part_names)}")
     scene, centres = watch_scene(data), centre_nodes(data)
     macro, macro_number = select(data, MACRO.__eq__)
     meso, meso_number = select(data, MACRO.__ne__)

@@ -7,6 +7,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from fem.body import Pieces
+from fem.errors import AgreedError
 from fem.estimate import WindowPlan, window_plan
 from fem.parameters import Materials, Shock
 from fem.scene import Tables
@@ -36,17 +37,17 @@ class Steps:
 def choose_steps(world: MPI.Comm, pieces: Pieces, tables: Tables, shock: Shock) -> Steps:
     """Agree on steps and mass scaling over all models; collective.
 
-    In a DNS run the elements of ``board`` take the place of the macro model, so that both modes use the same dt and sample
-    at the same times.
+    In a DNS run the elements of ``board`` take the place of the macro model, so that both modes use the same dt and
+    sample at the same times.
 
     Raises:
-        ValueError: Every role is mass scaled.
+        AgreedError: Every role is mass scaled.
     """
     numerics = shock.numerics
     scaled = np.isin(pieces.roles, numerics.mass_scaled)
     target = world.allreduce(float(pieces.steps[~scaled].min(initial=np.inf)), MPI.MIN)
     if not np.isfinite(target):
-        raise ValueError(f"shock.numerics.mass_scaled = {numerics.mass_scaled} leaves no role to take the time step from")
+        raise AgreedError(f"shock.numerics.mass_scaled = {numerics.mass_scaled} leaves no role to take the step from")
     factor = np.where(scaled, np.maximum(1.0, (target / pieces.steps) ** 2), 1.0)
     steps = pieces.steps * np.sqrt(factor)
     slow = steps[is_macro(pieces, tables)].min(initial=np.inf)

@@ -41,9 +41,7 @@ def principal_strain(corners: NDArray[np.float64], displacement: NDArray[np.floa
     jacobian = np.einsum("fai,ad->fid", corners, tangent)
     gradient = np.einsum("fai,ad->fid", displacement, tangent) @ np.linalg.inv(jacobian)
     mean = 0.5 * (gradient[:, 0, 0] + gradient[:, 1, 1])
-    radius = np.hypot(
-        0.5 * (gradient[:, 0, 0] - gradient[:, 1, 1]), 0.5 * (gradient[:, 0, 1] + gradient[:, 1, 0])
-    )
+    radius = np.hypot(0.5 * (gradient[:, 0, 0] - gradient[:, 1, 1]), 0.5 * (gradient[:, 0, 1] + gradient[:, 1, 0]))
     return np.array([mean + radius, mean - radius])
 
 

@@ -13,5 +13,5 @@ def held_components(mesh: MeshData) -> NDArray[np.bool_]:
     """Return ``(n, 3)``: whether a node's displacement component is held."""
     held = np.zeros((len(mesh.points), 3), dtype=bool)
     for name, components in HELD.items():
-        held[np.ix_(mesh.facet_nodes(name), components)] = True
+        held[np.ix_(mesh.facet_nodes(name), np.array(components))] = True
     return held

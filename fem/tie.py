@@ -60,7 +60,9 @@ def tie_joints(mesh: MeshData) -> tuple[MeshData, Tie, float]:
     tie = Tie(*(np.concatenate([getattr(item, name) for item in ties]) for name in ("slave", "master", "weight")))
     both = np.intersect1d(tie.slave, tie.master)
     if len(both) or len(np.unique(tie.slave)) < len(tie.slave):
-        raise TieError(f"{len(both)} nodes are slave and master of ties, or a node is tied twice; each end needs its own")
+        raise TieError(
+            f"{len(both)} nodes are slave and master of ties, or a node is tied twice; each end needs its own"
+        )
     points = mesh.points.copy()
     tie.spread(points)
     moved = float(np.linalg.norm(points - mesh.points, axis=1).max())

@@ -47,7 +47,7 @@ def joint_names(mesh: MeshData) -> tuple[str, ...]:
 
 
 def footprint(mesh: MeshData) -> NDArray[np.float64]:
-    """Return the corners ``(2, 2)`` [m] in x, y of the package and its margin: of the patch, or of all where none is."""
+    """Return the corners ``(2, 2)`` [m] in x, y of the package and its margin: the patch, or all where none is."""
     patch = mesh.in_parts("board_patch".__eq__)
     points = mesh.points[mesh.cells[patch if patch.any() else slice(None)]][:, :, :2]
     return np.array([points.min(axis=(0, 1)), points.max(axis=(0, 1))])

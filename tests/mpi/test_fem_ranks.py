@@ -28,7 +28,16 @@ def start(directory: Path, ranks: int, **changes) -> subprocess.CompletedProcess
     request = {"mode": "dns", "meshes": meshes, "shock": SHOCK, "output": str(directory / "out")} | changes
     path = directory / "input.json"
     path.write_text(json.dumps(request))
-    command = ["mpirun", "--allow-run-as-root", "--oversubscribe", "--mca", "mpi_yield_when_idle", "1", "-n", str(ranks)]
+    command = [
+        "mpirun",
+        "--allow-run-as-root",
+        "--oversubscribe",
+        "--mca",
+        "mpi_yield_when_idle",
+        "1",
+        "-n",
+        str(ranks),
+    ]
     return subprocess.run(
         [*command, sys.executable, "-m", "fem", str(path)],
         cwd=ROOT,

@@ -1,6 +1,6 @@
 """The window of the two-scale scheme must not grow: spectral radii of the program's own operator, not movies.
 
-Bars from PHYSICS 4: radius <= 1 + 1e-8 at 0.9 of the element step with two layers of board between cut and joint; the naive
+At 0.9 of the element step, with two layers of board between cut and joint, the radius is at most 1 + 1e-8; the naive
 scheme, fine elements at the cut, must be seen to fail by the same measure.
 """
 
