@@ -104,6 +104,7 @@ def _add_shock(run_folder: Path, context: dict, summary: dict) -> None:
 
     main_mode = next(iter(histories))
     critical_joint = summary["metrics"]["critical_joint"]["value"]
+    context["late_peak"] = tables.late_peak(histories[main_mode])
     context["curves"]["histories"] = history_curves(histories, critical_joint)
     context["curves"]["energy"] = energy_curves(histories[main_mode])
     context["tables"].update(
@@ -113,16 +114,15 @@ def _add_shock(run_folder: Path, context: dict, summary: dict) -> None:
         energy=tables.energies(histories),
         cost=tables.costs(results),
     )
-    solder = [number for number, part in enumerate(results[main_mode]["parts"]) if part.startswith("solder")]
-    _add_shock_pictures(run_folder / "shock" / main_mode, histories[main_mode], solder, context)
+    _add_shock_pictures(run_folder / "shock" / main_mode, histories[main_mode], results[main_mode]["parts"], context)
 
 
-def _add_shock_pictures(folder: Path, history: dict, solder_parts: list[int], context: dict) -> None:
+def _add_shock_pictures(folder: Path, history: dict, parts: list[str], context: dict) -> None:
     from workflow.report_pictures import render_board, render_joints
 
     with tempfile.TemporaryDirectory() as temporary:
         joints, board = Path(temporary) / "joints.png", Path(temporary) / "board.png"
-        context["joints_caption"] = render_joints(folder, history, solder_parts, joints)
+        context["joints_caption"] = render_joints(folder, history, parts, joints)
         context["board_caption"] = render_board(folder, history, board)
         context["pictures"]["joints"] = _base64(joints)
         context["pictures"]["board"] = _base64(board)

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pyvista
+from matplotlib import pyplot
 
 MILLI = 1.0e-3
 MEGA = 1.0e6
@@ -11,90 +12,128 @@ WINDOW = (1600, 800)
 
 
 def render_shapes(surface_folder: Path, joints: list[dict], picture: Path) -> None:
-    """Render every distinct joint shape in a row, by increasing standoff.
+    """Render every distinct joint shape in rows, by increasing standoff.
 
     Args:
         surface_folder: folder of the closed surfaces, one VTU file a shape.
-        joints: records with shape, name, standoff [m].
+        joints: records with shape, name, standoff, max_width [m].
         picture: PNG file to write.
     """
     firsts = {joint["shape"]: joint for joint in reversed(joints)}
     ordered = sorted(firsts.values(), key=lambda joint: joint["standoff"])
-    columns = min(len(ordered), 8)
-    plotter = _plotter((1600, 260 * -(-len(ordered) // columns)))
-    spacing = 1.35 * max(joint["max_width"] for joint in ordered) / MILLI
+    columns = min(len(ordered), 7)
+    rows = -(-len(ordered) // columns)
+    spacing = 1.3 * max(joint["max_width"] for joint in ordered) / MILLI
+    plotter = _plotter((1800, 110 + round(1800 * rows / columns)))
+    limits = _radius_limits(ordered)
     for index, joint in enumerate(ordered):
-        surface = pyvista.read(surface_folder / f"{joint['shape']}.vtu")
-        surface.points = surface.points / MILLI
-        surface["radius"] = 1.0e3 * np.hypot(surface.points[:, 0], surface.points[:, 1])
         row, column = divmod(index, columns)
-        surface.translate((column * spacing, 0.0, -0.9 * row * spacing), inplace=True)
-        plotter.add_mesh(
-            surface, scalars="radius", cmap="viridis", smooth_shading=True, split_sharp_edges=True,
-            scalar_bar_args={"title": "radius [um]", "n_labels": 3, "vertical": False, "position_x": 0.4, "position_y": 0.01, "height": 0.06},
-        )  # fmt: skip
-        top = surface.points[:, 2].max()
-        label = f"{joint['name']}: {1e6 * joint['standoff']:.0f} um"
-        plotter.add_point_labels(
-            [(column * spacing, 0.0, top + 0.1)], [label], shape=None, font_size=16, text_color="black",
-            show_points=False, always_visible=True, justification_horizontal="center",
-        )  # fmt: skip
-    plotter.view_xz()
+        surface = pyvista.read(surface_folder / f"{joint['shape']}.vtu")
+        _add_shape(plotter, surface, joint, (column * spacing, 0.0, -row * spacing), limits)
+    plotter.add_scalar_bar(
+        title="radius [um]", n_labels=3, fmt="%.0f", vertical=False, position_x=0.36, position_y=0.01, width=0.28,
+        height=70 / plotter.window_size[1], color="black",
+    )  # fmt: skip
+    centre = (0.5 * (columns - 1) * spacing, 0.0, -0.5 * (rows - 1) * spacing)
+    plotter.camera_position = [(centre[0], -100.0, centre[2] + 14.0), centre, (0.0, 0.0, 1.0)]
     plotter.enable_parallel_projection()
-    plotter.camera.elevation = 12
-    plotter.camera.zoom(1.25)
+    plotter.camera.parallel_scale = 0.5 * columns * spacing * plotter.window_size[1] / plotter.window_size[0]
     _save(plotter, picture)
 
 
-def render_joints(folder: Path, history: dict, solder_parts: list[int], picture: Path) -> str:
-    """Render the solder of all joints in place, coloured by von Mises stress, when the worst joint is stressed most.
+def render_joints(folder: Path, history: dict, parts: list[str], picture: Path) -> str:
+    """Render all joints under their package, coloured by von Mises stress, when the worst one is stressed most.
 
     Args:
         folder: folder of the shock run with its PVD files.
         history: arrays of ``history.npz``.
-        solder_parts: numbers of the parts that are solder, in the field ``part``.
+        parts: names of the parts, in the order of the field ``part``.
         picture: PNG file to write.
 
     Returns:
         A caption.
     """
-    stress = np.maximum(history["von_mises_board"], history["von_mises_package"]).max(axis=1)
-    grid, time = _fields_near(folder, ("meso", "dns"), float(history["time"][np.argmax(stress)]))
-    solder = grid.extract_cells(np.isin(grid.cell_data["part"].astype(int), solder_parts))
-    solder.points = solder.points / MILLI
-    solder["von Mises [MPa]"] = solder.cell_data["von_mises"] / MEGA
-    plotter = _plotter((1600, 820))
+    stress = np.maximum(history["von_mises_board"], history["von_mises_package"])
+    row, column = np.unravel_index(np.argmax(stress), stress.shape)
+    critical = str(history["joints"][column])
+    grid, time = _fields_near(folder, ("meso", "dns"), float(history["time"][row]))
+    grid.points = grid.points / MILLI
+    grid["von Mises [MPa]"] = grid.cell_data["von_mises"] / MEGA
+    plotter = _plotter((1800, 1000))
     plotter.add_mesh(
-        solder, scalars="von Mises [MPa]", cmap="inferno", show_edges=True, edge_color="#404a55", line_width=0.6,
-        scalar_bar_args={"vertical": True, "position_x": 0.9, "position_y": 0.2, "height": 0.6, "color": "black", "n_labels": 4},
+        _of_role(grid, parts, "solder"), scalars="von Mises [MPa]", cmap="turbo", clim=(0.0, float(1.0e-6 * stress.max())),
+        scalar_bar_args={"vertical": True, "position_x": 0.88, "position_y": 0.3, "height": 0.5, "color": "black", "n_labels": 4, "fmt": "%.0f"},
     )  # fmt: skip
-    plotter.camera_position = [(-0.9, -1.6, 1.0), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)]
+    plotter.add_mesh(_of_role(grid, parts, "copper"), color="#b87333")
+    plotter.add_mesh(_of_role(grid, parts, "board_patch"), color="#9cc9a7", show_edges=True, edge_color="#5d8f6b", line_width=0.5)
+    for role, colour in (("substrate", "#c9a227"), ("die", "#5b6770")):
+        outline = _of_role(grid, parts, role).extract_surface(algorithm="dataset_surface").extract_feature_edges(60)
+        plotter.add_mesh(outline, color=colour, line_width=3)
+    mark = _of_role(grid, parts, f"solder@{critical}")
+    plotter.add_point_labels(
+        [(mark.center[0], mark.center[1], mark.bounds[5] + 0.05)], [critical], font_size=26, text_color="#b3261e",
+        shape=None, show_points=False, always_visible=True,
+    )  # fmt: skip
+    plotter.camera_position = [(1.5, 1.15, 0.75), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)]
     plotter.reset_camera()
-    plotter.camera.zoom(1.35)
+    plotter.camera.zoom(1.4)
     _save(plotter, picture)
-    return f"Von Mises stress in the solder of every joint at {1e3 * time:.3f} ms, seen from the package's axis outwards."
+    return (
+        f"Von Mises stress in the joints at {1e3 * time:.3f} ms, seen from the package's corner; the package is drawn as "
+        f"an outline. The scale ends at {critical}'s average at its worse pad; single elements reach more."
+    )
 
 
 def render_board(folder: Path, history: dict, picture: Path) -> str:
     """Render the board at its largest deflection, exaggerated, coloured by displacement; return a caption."""
     deflection = np.abs(history["board_centre"][:, 2])
     grid, time = _fields_near(folder, ("macro", "dns"), float(history["time"][np.argmax(deflection)]))
-    largest = float(np.abs(grid.point_data["displacement"][:, 2]).max())
+    grid["deflection [mm]"] = grid.point_data["displacement"][:, 2] / MILLI
     length = max(grid.bounds[1] - grid.bounds[0], grid.bounds[3] - grid.bounds[2])
-    factor = _round_down(0.12 * length / largest)
+    factor = _round_down(0.12 * length / float(np.abs(grid.point_data["displacement"][:, 2]).max()))
     bent = grid.warp_by_vector("displacement", factor=factor)
-    bent["deflection [mm]"] = grid.point_data["displacement"][:, 2] / MILLI
     bent.points = bent.points / MILLI
-    plotter = _plotter((1600, 760))
+    plotter = _plotter((1800, 900))
     plotter.add_mesh(
         bent, scalars="deflection [mm]", cmap="coolwarm", show_edges=True, edge_color="#55606b", line_width=0.4,
-        scalar_bar_args={"vertical": True, "position_x": 0.9, "position_y": 0.2, "height": 0.6, "color": "black", "n_labels": 4},
+        scalar_bar_args={"vertical": True, "position_x": 0.88, "position_y": 0.3, "height": 0.5, "color": "black", "n_labels": 4, "fmt": "%.1f"},
     )  # fmt: skip
-    plotter.camera_position = [(-0.8, -1.8, 0.8), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)]
+    flat = grid.copy()
+    flat.points = flat.points / MILLI
+    plotter.add_mesh(flat.extract_surface(algorithm="dataset_surface").extract_feature_edges(60), color="#8a949e", line_width=1.5)
+    plotter.camera_position = [(-0.8, -1.8, 0.7), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)]
     plotter.reset_camera()
-    plotter.camera.zoom(1.4)
+    plotter.camera.zoom(1.5)
     _save(plotter, picture)
-    return f"The board at {1e3 * time:.3f} ms, its deflection drawn {factor:g} times as large."
+    return f"The board at {1e3 * time:.3f} ms, deflection drawn {factor:g} times as large; grey: at rest."
+
+
+def _add_shape(plotter: pyvista.Plotter, surface, joint: dict, place: tuple, limits: tuple[float, float]) -> None:
+    """Add one closed joint surface at a place [mm] of the gallery: wetted discs, free surface by radius, label."""
+    surface["radius [um]"] = 1.0e6 * np.hypot(surface.points[:, 0], surface.points[:, 1])
+    surface.points = surface.points / MILLI + np.array(place)
+    boundary = surface.cell_data["boundary"]
+    plotter.add_mesh(surface.extract_cells(boundary != 0), color="#b87333")
+    plotter.add_mesh(
+        surface.extract_cells(boundary == 0), scalars="radius [um]", cmap="viridis", clim=limits, show_scalar_bar=False
+    )
+    label = f"{joint['name']}  {1e6 * joint['standoff']:.0f} x {1e6 * joint['max_width']:.0f} um"
+    plotter.add_point_labels(
+        [(place[0], 0.0, surface.points[:, 2].max() + 0.12)], [label], shape=None, font_size=17, text_color="black",
+        show_points=False, always_visible=True, justification_horizontal="center",
+    )  # fmt: skip
+
+
+def _of_role(grid: pyvista.UnstructuredGrid, parts: list[str], role: str) -> pyvista.UnstructuredGrid:
+    """Cells of the parts whose names start with ``role``."""
+    chosen = [number for number, name in enumerate(parts) if name.startswith(role)]
+    return grid.extract_cells(np.isin(grid.cell_data["part"].astype(int), chosen))
+
+
+def _radius_limits(joints: list[dict]) -> tuple[float, float]:
+    """Colour range [um] from the narrowest contact to the widest joint, the same for all."""
+    narrow = min(min(joint["contact_radius_board"], joint["contact_radius_package"], 0.5 * joint["waist"]) for joint in joints)
+    return 1.0e6 * narrow, 0.5e6 * max(joint["max_width"] for joint in joints)
 
 
 def _fields_near(folder: Path, names: tuple[str, ...], time: float) -> tuple[pyvista.UnstructuredGrid, float]:
@@ -103,7 +142,16 @@ def _fields_near(folder: Path, names: tuple[str, ...], time: float) -> tuple[pyv
     reader = pyvista.get_reader(path)
     stored = min(reader.time_values, key=lambda value: abs(value - time))
     reader.set_active_time_value(stored)
-    return reader.read().combine(), stored
+    return _linear(reader.read().combine()), stored
+
+
+def _linear(grid: pyvista.UnstructuredGrid) -> pyvista.UnstructuredGrid:
+    """The same cells as plain hexahedra: first-order Lagrange cells are drawn with the edges of their tessellation."""
+    cells = grid.cell_connectivity.reshape(-1, 8)
+    plain = pyvista.UnstructuredGrid({pyvista.CellType.HEXAHEDRON: cells}, grid.points)
+    plain.point_data.update({"displacement": grid.point_data["displacement"]})
+    plain.cell_data.update({name: grid.cell_data[name] for name in ("von_mises", "part")})
+    return plain
 
 
 def _round_down(factor: float) -> float:
@@ -120,5 +168,11 @@ def _plotter(size=WINDOW) -> pyvista.Plotter:
 
 
 def _save(plotter: pyvista.Plotter, picture: Path) -> None:
-    plotter.screenshot(picture)
+    """Write the view without the white around it."""
+    image = plotter.screenshot(return_img=True)
     plotter.close()
+    drawn = np.any(image < 250, axis=2)
+    rows, columns = np.flatnonzero(drawn.any(axis=1)), np.flatnonzero(drawn.any(axis=0))
+    margin = 12
+    box = image[max(rows[0] - margin, 0) : rows[-1] + margin, max(columns[0] - margin, 0) : columns[-1] + margin]
+    pyplot.imsave(picture, box)

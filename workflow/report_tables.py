@@ -27,9 +27,23 @@ PACKAGES = (
 )  # fmt: skip
 
 
+MODEL_ROWS = (
+    ("hexahedra", lambda model: " + ".join(f"{number(count)} {role}" for role, count in model["elements"].items())),
+    ("nodes", lambda model: " + ".join(f"{number(count)} {role}" for role, count in model["nodes"].items())),
+    ("MPI ranks", lambda model: number(model["ranks"])),
+    ("joint nodes tied to facets that do not match", lambda model: number(model["tied_nodes"])),
+    ("time step of the macro model", lambda model: nano(model["window"]) if model["mode"] == "two_scale" else "–"),
+    ("time step of the meso model (DNS: of all)", lambda model: nano(model["step"])),
+    ("step ratio m", lambda model: number(model["substeps"]) if model["mode"] == "two_scale" else "–"),
+    ("steps", lambda model: number(model["windows"] * model["substeps"])),
+    ("mass of the model", lambda model: quantity({"value": model["model_mass"], "unit": "kg"})),
+    ("mass added by mass scaling", lambda model: quantity({"value": model["added_mass"], "unit": "kg"})),
+)
+
+
 def headline(metrics: dict) -> list[dict]:
     """The figures at the top of the page: those of ``HEADLINE`` that the run has."""
-    return [{"label": label, "value": quantity(metrics[name])} for name, label in HEADLINE if name in metrics]
+    return [{"label": label, "value": named_quantity(metrics, name)} for name, label in HEADLINE if name in metrics]
 
 
 def health_rows(health: dict) -> list[dict]:
@@ -118,9 +132,18 @@ def ranked_joints(history: dict, joints: list[dict]) -> dict:
     return {"head": head, "rows": rows}
 
 
+def late_peak(history: dict) -> str:
+    """A warning if the worst joint's stress is largest at the end of the simulated time; empty if it is not."""
+    at_pads = np.maximum(history["von_mises_board"], history["von_mises_package"]).max(axis=1)
+    if np.argmax(at_pads) < len(at_pads) - max(2, len(at_pads) // 50):
+        return ""
+    end = 1e3 * history["time"][-1]
+    return f"The stress is still rising when the simulated time ends ({end:.3g} ms): a longer shock.duration gives a higher peak."
+
+
 def comparison(metrics: dict) -> dict | None:
     """Two-scale against DNS, if both were run."""
-    rows = [[label, quantity(metrics[name])] for name, label in COMPARISON if name in metrics]
+    rows = [[label, named_quantity(metrics, name)] for name, label in COMPARISON if name in metrics]
     return {"head": ["two-scale against DNS", "value"], "rows": rows} if rows else None
 
 
@@ -134,8 +157,14 @@ def energies(histories: dict[str, dict]) -> dict:
 
 
 def models(results: dict[str, dict]) -> dict:
-    """What was computed: each entry of ``result.json``'s model record, each mode a column."""
-    return _side_by_side(results, "model", "model")
+    """What was computed, each mode a column."""
+    records = [result["model"] for result in results.values()]
+    rows = [[label, *(text(record) for record in records)] for label, text in MODEL_ROWS]
+    roles = dict.fromkeys(role for record in records for role in record["critical_steps"])
+    rows += [
+        [f"critical time step, {role}", *(nano(record["critical_steps"].get(role)) for record in records)] for role in roles
+    ]
+    return {"head": ["model", *(_mode(mode) for mode in results)], "rows": rows}
 
 
 def costs(results: dict[str, dict]) -> dict:
@@ -170,6 +199,15 @@ def _mode(mode: str) -> str:
     return {"two_scale": "two-scale", "dns": "DNS"}[mode]
 
 
+def named_quantity(metrics: dict, name: str) -> str:
+    """Text of a metric: errors as per cent, strains in microstrain, others as ``quantity``."""
+    if "_error" in name:
+        return f"{100.0 * metrics[name]['value']:.2g} %"
+    if name.endswith("_strain"):
+        return f"{1e6 * metrics[name]['value']:.0f} µm/m"
+    return quantity(metrics[name])
+
+
 def quantity(metric: dict) -> str:
     """Text of a metric record: fractions as per cent, stresses in MPa, lengths in mm."""
     value, unit = metric["value"], metric["unit"]
@@ -186,6 +224,11 @@ def number(value) -> str:
     if isinstance(value, int):
         return f"{value:,}".replace(",", " ")
     return f"{value:.4g}"
+
+
+def nano(seconds: float | None) -> str:
+    """Seconds as nanoseconds."""
+    return "–" if seconds is None else f"{1e9 * seconds:.3g} ns"
 
 
 def micro(value: float) -> str:
