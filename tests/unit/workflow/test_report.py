@@ -1,0 +1,86 @@
+"""Tables, curves and the summary of the report from small made-up products."""
+
+import json
+
+import numpy as np
+import pytest
+
+from workflow import report_tables as tables
+from workflow.report_curves import array_map, energy_curves, history_curves
+from workflow.summary import collect_summary, inputs_digest, write_summary
+
+JOINT = {"standoff": 3.2e-4, "max_width": 5.5e-4}
+
+
+@pytest.fixture
+def history():
+    time = np.linspace(0.0, 1e-3, 101)
+    wave = np.sin(np.pi * time / 1e-3)
+    zero = np.zeros_like(time)
+    return {
+        "time": time,
+        "joints": np.array(["A9", "A10"]),
+        "base_acceleration": 9.80665 * 1500 * wave,
+        "board_centre": np.outer(wave, [0, 0, 1e-3]),
+        "die_centre": np.outer(wave, [0, 0, 1e-3]),
+        "board_strain": 1e-3 * wave,
+        "von_mises_board": np.outer(wave, [50e6, 100e6]),
+        "von_mises_package": np.outer(wave, [60e6, 90e6]),
+        "von_mises_max": np.outer(wave, [70e6, 150e6]),
+        "peel_board": np.outer(wave, [5e6, 9e6]),
+        "peel_package": np.outer(wave, [4e6, 8e6]),
+        "kinetic": 1e-3 * wave, "internal": 2e-3 * wave, "external": 3e-3 * wave, "interface": zero, "balance": zero,
+    }  # fmt: skip
+
+
+def test_joints_are_ranked_by_their_worse_pad(history):
+    table = tables.ranked_joints(history, [{"name": name, **JOINT} for name in ("A9", "A10")])
+    assert [row[0] for row in table["rows"]] == ["A10", "A9"]
+    assert table["rows"][0][1:6] == ["100.0", "board", "0.500", "9.0", "150.0"]
+    assert table["rows"][1][2] == "package"
+
+
+def test_a_peak_at_the_end_is_said(history):
+    assert tables.late_peak(history) == ""
+    rising = {**history, "von_mises_board": np.outer(history["time"], [1e11, 2e11])}
+    assert "still rising when the simulated time ends (1 ms)" in tables.late_peak(rising)
+
+
+@pytest.mark.parametrize(
+    ("name", "metric", "text"),
+    [
+        ("peak_von_mises", {"value": 1.571e8, "unit": "Pa"}, "157.1 MPa"),
+        ("added_mass", {"value": 2.0e-5, "unit": "kg"}, "20 mg"),
+        ("critical_joint", {"value": "A10", "unit": ""}, "A10"),
+        ("joint_width_error_max", {"value": 6.354e-4, "unit": ""}, "0.064 %"),
+        ("peak_board_strain", {"value": 2.25e-3, "unit": ""}, "2250 µm/m"),
+    ],
+)
+def test_quantities_read_as_an_engineer_writes_them(name, metric, text):
+    assert tables.named_quantity({name: metric}, name) == text
+
+
+def test_curves_are_inline_svg(history):
+    joints = [{"name": "A10", "x": 4.5e-3, "y": 4.5e-3, **JOINT}, {"name": "A9", "x": 3.5e-3, "y": 4.5e-3, **JOINT}]
+    for drawing in (array_map(joints), history_curves({"two_scale": history, "dns": history}, "A10"), energy_curves(history)):
+        assert drawing.startswith("<svg") and drawing.rstrip().endswith("</svg>")
+
+
+def test_summary_merges_the_stages_that_have_run(tmp_path):
+    for stage, value in (("geometry", 25), ("shock", 1e8)):
+        (tmp_path / stage).mkdir()
+        record = {"seconds": 1.5, "metrics": {stage: {"value": value, "unit": ""}}, "health": {}, "effects": {}}
+        (tmp_path / stage / "stage.json").write_text(json.dumps(record))
+    summary = collect_summary(tmp_path, "small")
+    assert summary["timings"] == {"geometry": 1.5, "shock": 1.5}
+    assert set(summary["metrics"]) == {"geometry", "shock"}
+    write_summary(tmp_path, summary)
+    assert json.loads((tmp_path / "summary.json").read_text()) == summary
+
+
+def test_digest_changes_with_any_input(tmp_path):
+    (tmp_path / "inputs").mkdir()
+    (tmp_path / "inputs/shock.json").write_text("{}")
+    before = inputs_digest(tmp_path)
+    (tmp_path / "inputs/shock.json").write_text('{"a": 1}')
+    assert inputs_digest(tmp_path) != before
