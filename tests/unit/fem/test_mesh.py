@@ -1,0 +1,92 @@
+"""Reading, selecting, merging meshes; finding the cut."""
+
+import numpy as np
+import pytest
+
+from fem.cut import find_cut
+from fem.errors import CutError, MeshError
+from fem.mesh import MeshData, append, boundary_facets, cells_of_facets, merge_nodes, read_mesh, select
+from fem.scene import prepare
+from tests.support.fem_models import board_mesh, grid, mesh_of, small_assembly, write_msh
+
+
+def test_file_comes_back_as_it_was_written(tmp_path):
+    mesh = append(small_assembly(1))
+    write_msh(mesh, tmp_path / "mesh.msh")
+    read = read_mesh(tmp_path / "mesh.msh")
+    assert len(read.points) == len(mesh.points)
+    assert set(read.part_names) == set(mesh.part_names)
+    for name in mesh.part_names:
+        ours = mesh.points[mesh.cells[mesh.in_parts(name.__eq__)]]
+        theirs = read.points[read.cells[read.in_parts(name.__eq__)]]
+        assert np.allclose(ours, theirs, atol=1e-15)
+    for name, quads in mesh.facets.items():
+        assert np.allclose(mesh.points[quads], read.points[read.facets[name]], atol=1e-15), name
+
+
+def test_file_without_hexahedra_is_an_error(tmp_path):
+    path = tmp_path / "points.msh"
+    path.write_text("$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Nodes\n0 0 0 0\n$EndNodes\n$Elements\n0 0 0 0\n$EndElements\n")
+    with pytest.raises((MeshError, ValueError)):
+        read_mesh(path)
+
+
+def test_selection_keeps_facets_whose_nodes_are_all_left():
+    board, number = select(board_mesh(), "board".__eq__)
+    assert set(board.facets["mounting_holes"].ravel()) <= set(range(len(board.points)))
+    assert not len(board.facets["board_side"])
+    assert (number >= 0).sum() == len(board.points)
+
+
+def test_empty_selection_is_an_error_that_lists_the_parts():
+    with pytest.raises(MeshError, match="the mesh has board, board_patch"):
+        select(board_mesh(), "die".__eq__)
+
+
+def test_boundary_and_owners_of_a_block():
+    _, cells = grid(*[np.arange(4.0)] * 3)
+    faces = boundary_facets(cells)
+    assert len(faces) == 6 * 9
+    owners = cells_of_facets(cells, faces)
+    assert all(set(face) <= set(cells[owner]) for face, owner in zip(faces, owners, strict=True))
+    assert cells_of_facets(cells, np.array([[0, 1, 2, 3]], np.int32)).tolist() == [-1]
+
+
+def apart(mesh: MeshData) -> MeshData:
+    """The same board, but patch and rest share no node."""
+    return append([select(mesh, name.__eq__)[0] for name in ("board", "board_patch")])
+
+
+def test_cut_is_found_whether_nodes_are_shared_or_not():
+    shared, twice = find_cut(board_mesh()), find_cut(apart(board_mesh()))
+    assert np.array_equal(*shared)
+    assert len(shared[0]) == len(twice[0]) > 0
+    assert not np.array_equal(*twice)
+
+
+def test_dns_joins_what_the_files_keep_apart():
+    together, parted = board_mesh(), apart(board_mesh())
+    assert len(prepare(parted, "dns")["dns"].mesh.points) == len(together.points)
+
+
+def test_merging_removes_the_duplicates():
+    points, cells = grid([0, 1], [0, 1], [0, 1])
+    pair = append([mesh_of(points, cells, "a", {}), mesh_of(points + [1, 0, 0], cells, "b", {})])
+    merged, number = merge_nodes(pair, np.array([8, 10, 12, 14]), np.array([1, 3, 5, 7]))
+    assert len(merged.points) == 12
+    assert number[8] == number[1]
+
+
+def test_patch_that_does_not_match_is_an_error_with_a_place():
+    mesh = apart(board_mesh())
+    patch = np.unique(mesh.cells[mesh.in_parts("board_patch".__eq__)])
+    inner = patch[np.argmin(mesh.points[patch, 2])]
+    mesh.points[inner, 2] -= 1e-6
+    with pytest.raises(CutError, match=r"1 of \d+ nodes of board_patch on the cut have no partner"):
+        find_cut(mesh)
+
+
+def test_two_scale_without_a_patch_is_an_error():
+    points, cells = grid([0, 1], [0, 1], [0, 1])
+    with pytest.raises(MeshError, match="needs the parts board and board_patch"):
+        prepare(mesh_of(points, cells, "board", {}), "two_scale")
