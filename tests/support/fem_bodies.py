@@ -19,9 +19,9 @@ def dns_pieces(mesh: MeshData, materials: Materials) -> tuple[Pieces, Tables]:
     return make_pieces(distribute(MPI.COMM_SELF, item.mesh), item.tables, materials), item.tables
 
 
-def dns_body(mesh: MeshData, board=FR4) -> tuple[Body, float]:
-    """Return a body of all parts, and its smallest element critical step [s]."""
-    pieces, tables = dns_pieces(mesh, Materials(board=board))
+def dns_body(mesh: MeshData, board=FR4, materials: Materials | None = None) -> tuple[Body, float]:
+    """Return a body of all parts, and its smallest element critical step [s]; ``materials`` go before ``board``."""
+    pieces, tables = dns_pieces(mesh, materials or Materials(board=board))
     return make_body(MPI.COMM_SELF, pieces, tables, np.ones(len(pieces.steps))), float(pieces.steps.min())
 
 

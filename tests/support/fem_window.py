@@ -1,11 +1,14 @@
 """One window of the two-scale scheme as a linear operator: both participants of the program on one rank."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from mpi4py import MPI
 
 from fem.body import Pieces, make_body, make_pieces
 from fem.estimate import WindowPlan, window_plan
 from fem.exchange import CutChannels
+from fem.loads import Load
 from fem.local_mesh import distribute
 from fem.mesh import MeshData
 from fem.parameters import Materials
@@ -17,7 +20,9 @@ from fem.steps import is_macro
 class Window:
     """Macro and meso model on one rank, taking turns."""
 
-    def __init__(self, mesh: MeshData, materials: Materials, fraction: float, watch_cut: bool = True) -> None:
+    def __init__(
+        self, mesh: MeshData, materials: Materials, fraction: float, watch_cut: bool = True, loads: Sequence[Load] = ()
+    ) -> None:
         """Build both; ``watch_cut`` False takes the window from the macro elements alone, as a naive scheme would."""
         pieces, tables = {}, {}
         for role, item in prepare(mesh, "two_scale").items():
@@ -29,8 +34,8 @@ class Window:
             for role in pieces
         }
         channels = CutChannels.open(MPI.COMM_SELF, bodies["macro"].cut, bodies["meso"].cut)
-        self.meso = Meso(bodies["meso"], [], self.plan, channels)
-        self.macro = Macro(bodies["macro"], [], self.plan, channels)
+        self.meso = Meso(bodies["meso"], list(loads), self.plan, channels)
+        self.macro = Macro(bodies["macro"], list(loads), self.plan, channels)
         self._channels = channels
         self._macro_free = bodies["macro"].free
         self._meso_free = bodies["meso"].free.copy()
