@@ -17,12 +17,15 @@ from workflow.problems import CaseError, Problem
 from workflow.validation import translate
 
 
+NAME = r"^[A-Za-z0-9][A-Za-z0-9_.-]*$"
+
+
 class Title(BaseModel):
     """Name and title of a case; the name is also that of its run folder."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")]
+    name: Annotated[str, Field(pattern=NAME)]
     title: str = ""
 
 

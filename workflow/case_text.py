@@ -1,5 +1,6 @@
 """Writing a case file: every parameter, its value, its default and its range."""
 
+import re
 import textwrap
 from pathlib import Path
 
@@ -7,7 +8,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
-from workflow.case import Case, Title, read_case
+from workflow.case import NAME, Case, Title, read_case
 from workflow.fields import allowed, display, literal_names, unit_of
 from workflow.problems import CaseError, Problem, as_toml, nearest
 
@@ -43,6 +44,8 @@ def write_new_case(name: str, template: str, folder: Path = Path()) -> Path:
     if template not in known:
         choice, hint = "one of " + ", ".join(known), nearest(template, known)
         raise CaseError("new", [Problem("--template", "unknown template", template, choice, hint)])
+    if not re.match(NAME, name):
+        raise CaseError("new", [Problem("NAME", "is no name", name, "letters, digits, _ . -")])
     path = folder / f"{name}.toml"
     if path.exists():
         raise CaseError("new", [Problem("NAME", f"{path} exists already", name)])

@@ -12,7 +12,7 @@ import typer
 
 from workflow import __version__
 from workflow.case import Case, available_cores, read_case
-from workflow.inputs import examine, write_inputs
+from workflow.inputs import CASE, examine, write_inputs
 from workflow.problems import CaseError
 from workflow.stage_table import NAMES
 from workflow.terminal import console, print_error
@@ -110,7 +110,7 @@ def clean(case: CasePath, settings: Settings = None, out: Out = None) -> None:
     from workflow.pipeline import locked
 
     _, folder = _load(case, settings, out, True)
-    if not (folder / "inputs").is_dir():
+    if not (folder / CASE).is_file():
         console.print(f"nothing to remove: {folder} is no run folder")
         return
     with locked(folder):

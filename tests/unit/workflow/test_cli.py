@@ -1,0 +1,125 @@
+"""Commands that run nothing, and exit codes."""
+
+import json
+import tomllib
+from pathlib import Path
+
+import jsonschema
+import pytest
+
+from workflow import cli
+from workflow.case import display_values, read_case
+from workflow.schema import case_schema
+
+CASE = Path(__file__).resolve().parents[3] / "cases" / "bga_drop" / "case.toml"
+
+
+@pytest.fixture
+def call(monkeypatch, capsys, tmp_path):
+    """Call the command line in an empty folder; return exit code, output, errors."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(*arguments: str) -> tuple[int, str, str]:
+        monkeypatch.setattr("sys.argv", ["reflowshock", *arguments])
+        with pytest.raises(SystemExit) as ended:
+            cli.main()
+        written = capsys.readouterr()
+        return int(ended.value.code or 0), written.out, written.err
+
+    return run
+
+
+def test_a_new_case_is_complete_and_equal_to_its_template(call, tmp_path):
+    code, _, _ = call("new", "mine")
+    assert code == 0
+    path = tmp_path / "mine.toml"
+    mine, template = display_values(read_case(path)), display_values(read_case(CASE))
+    assert mine == template | {"case.name": "mine"}
+    given = dict(flat(tomllib.loads(path.read_text())))
+    assert set(given) == set(mine)
+
+
+def flat(table: dict, prefix: str = ""):
+    for key, value in table.items():
+        if isinstance(value, dict):
+            yield from flat(value, f"{prefix}{key}.")
+        else:
+            yield prefix + key, value
+
+
+def test_a_new_case_passes_plan(call):
+    call("new", "mine")
+    code, output, _ = call("plan", "mine.toml")
+    assert code == 0
+    for words in ("no product yet", "Bond number", "hexahedra", "step ratio m", "two-scale / DNS", "25 joints"):
+        assert words in output
+
+
+def test_a_new_case_overwrites_nothing(call):
+    call("new", "mine")
+    code, _, errors = call("new", "mine")
+    assert (code, "exists already" in errors) == (2, True)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("new", "mine", "--template", "bga_dorp"), "did you mean bga_drop?"),
+        (("new", "no name"), "is no name"),
+        (("run", str(CASE), "--until", "shok"), "is no stage"),
+        (("run", str(CASE), "--set", "shock.duration=1"), 'such as "1 ms"'),
+        (("run", "absent.toml"), "no such case file"),
+        (("plan", str(CASE), "--set", "shock.ranks.meso=1000"), "--oversubscribe"),
+        (("fly",), "No such command"),
+    ],
+)
+def test_bad_input_has_exit_code_2(call, arguments, words, tmp_path):
+    code, output, errors = call(*arguments)
+    assert code == 2
+    assert words in output + errors
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_plan_writes_nothing(call, tmp_path):
+    assert call("plan", str(CASE))[0] == 0
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_status_of_nothing(call):
+    code, output, _ = call("status", str(CASE))
+    assert code == 0
+    assert output.count("missing") == 6
+
+
+def test_a_report_of_nothing_fails(call):
+    code, _, errors = call("report", str(CASE))
+    assert (code, "nothing was run" in errors) == (1, True)
+
+
+def test_clean_removes_run_folders_only(call, tmp_path):
+    precious = tmp_path / "precious"
+    precious.mkdir()
+    assert "nothing to remove" in call("clean", str(CASE), "--out", str(precious))[1]
+    assert precious.exists()
+    (precious / "inputs").mkdir()
+    (precious / "inputs/case.json").write_text("{}")
+    assert call("clean", str(CASE), "--out", str(precious))[0] == 0
+    assert not precious.exists()
+
+
+def test_the_schema_accepts_cases_and_refuses_bare_numbers(call):
+    code, output, _ = call("schema")
+    assert code == 0
+    schema = json.loads(output)
+    assert schema == case_schema()
+    table = tomllib.loads(CASE.read_text())
+    jsonschema.Draft202012Validator.check_schema(schema)
+    jsonschema.validate(table, schema)
+    table["package"]["pitch"] = 1.0
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.validate(table, schema)
+
+
+def test_the_version(call):
+    code, output, _ = call("--version")
+    assert (code, output.startswith("reflowshock ")) == (0, True)
