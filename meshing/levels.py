@@ -1,5 +1,6 @@
 """From a closed surface to the nodes of a swept butterfly: one section a level, areas and volume kept."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +12,8 @@ from meshing.surface import ClosedSurface, enclosed_volume
 
 END = 1.0e-9  # of the height: how far inside the end sections are cut, where the plane still crosses the triangles
 LARGEST_CORRECTION = 0.1
+VOLUME_TOLERANCE = 1.0e-12
+SECANT_STEPS = 20
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,11 +29,20 @@ class Levels:
     scale: float
 
 
-def solder_levels(surface: ClosedSurface, section: Butterfly, layers: int) -> Levels:
+def solder_levels(
+    surface: ClosedSurface, section: Butterfly, layers: int, place: Callable[[np.ndarray], np.ndarray]
+) -> Levels:
     """Cut a body into sections of equal distance and lay the butterfly into each.
 
     A polygon of few sides encloses less than the section that it follows, and straight layers less than a bulge: each
     outline is scaled to its section's area, then those between the ends by one common factor to the body's volume.
+
+    Args:
+        surface: the body in its own frame.
+        section: the butterfly.
+        layers: number of layers.
+        place: moves points (n, 3) [m] to where the joint will be, where its volume is kept: a tilted or curved package
+            makes a joint higher here, lower there, and its mean gap another than that on its axis.
 
     Raises:
         ValueError: a section is not star-shaped, or the layers are too few to keep the volume.
@@ -42,7 +54,12 @@ def solder_levels(surface: ClosedSurface, section: Butterfly, layers: int) -> Le
     for level, cut in enumerate(cuts):
         points[level, :, :2] = _section_nodes(surface, section, cut)
     points[:, :, 2] = heights[:, None]
-    scale = _volume_keeping_scale(points, section, enclosed_volume(surface))
+    cells = layer_cells(section.quads, len(section.points), layers)
+
+    def swept_volume(scale: float) -> float:
+        return float(volumes(place(_scaled(points, section, scale).reshape(-1, 3)), cells).sum())
+
+    scale = _volume_keeping_scale(swept_volume, enclosed_volume(surface))
     return Levels(_scaled(points, section, scale), scale)
 
 
@@ -64,18 +81,18 @@ def _section_nodes(surface: ClosedSurface, section: Butterfly, height: float) ->
     return centre + np.sqrt(area / polygon) * stretch[:, None] * section.points
 
 
-def _volume_keeping_scale(points: np.ndarray, section: Butterfly, volume: float) -> float:
-    """Scale of the inner outlines at which the swept hexahedra have the volume: root of an exact quadratic."""
-    cells = layer_cells(section.quads, points.shape[1], len(points) - 1)
-    samples = np.array([0.0, 1.0, 2.0])
-    swept = [volumes(_scaled(points, section, scale).reshape(-1, 3), cells).sum() / volume for scale in samples]
-    quadratic = np.polyfit(samples, np.array(swept) - 1.0, 2)
-    roots = np.roots(quadratic)
-    scale = float(roots[np.argmin(np.abs(roots - 1.0))].real)
-    if np.iscomplex(roots).any() or abs(scale - 1.0) > LARGEST_CORRECTION:
+def _volume_keeping_scale(swept_volume: Callable[[float], float], volume: float) -> float:
+    """Find the scale of the inner outlines at which the swept hexahedra have the volume (secant method)."""
+    before, scale = 1.0 - LARGEST_CORRECTION, 1.0
+    errors = [swept_volume(value) / volume - 1.0 for value in (before, scale)]
+    held, steps = 1.0 + errors[1], 0
+    while abs(errors[1]) > VOLUME_TOLERANCE and abs(scale - 1.0) <= LARGEST_CORRECTION and steps < SECANT_STEPS:
+        before, scale = scale, scale - errors[1] * (scale - before) / (errors[1] - errors[0])
+        errors, steps = [errors[1], swept_volume(scale) / volume - 1.0], steps + 1
+    if abs(errors[1]) > VOLUME_TOLERANCE or abs(scale - 1.0) > LARGEST_CORRECTION:
         raise ValueError(
-            f"{len(points) - 1} layers hold {swept[1]:.3f} of its volume, allowed is a correction of the inner sections"
-            f" by {LARGEST_CORRECTION:g}; use more layers"
+            f"its layers hold {held:.3f} of its volume, allowed is what a scaling of the inner sections by"
+            f" 1 +- {LARGEST_CORRECTION:g} corrects; use more layers"
         )
     return scale
 

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -60,12 +61,13 @@ def mesh_joint(surface: ClosedSurface, site: PadSite, package: Package, warpage:
     _check_gap(surface, site)
     numerics, copper = package.joint_numerics, package.copper
     section = butterfly(numerics.core, numerics.rings)
+    place = partial(_placed, site=site, package=package, warpage=warpage)
     try:
-        levels = solder_levels(surface, section, numerics.layers)
+        levels = solder_levels(surface, section, numerics.layers, place)
     except ValueError as error:
         raise JointMeshError(f"joint {site.name}: {error}") from error
     stack = _stack(levels, section, site, copper.thickness if copper.layout == "pads" else None)
-    points = _placed(stack.points, site, package, warpage)
+    points = place(stack.points)
     _check_quality(points, stack.cells)
     head = points[np.unique(stack.facets[f"head@{site.name}"])]
     x, y = head[:, 0], head[:, 1]

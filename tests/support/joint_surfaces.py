@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from meshing.surface import ClosedSurface, close_surface
+
 
 def revolve(profile: np.ndarray, gap: float, around: int = 48, offset: float = 0.0):
     """Triangulate a body of revolution.
@@ -17,13 +19,37 @@ def revolve(profile: np.ndarray, gap: float, around: int = 48, offset: float = 0
     """
     angles = 2.0 * np.pi * np.arange(around) / around
     shares = np.linspace(0.0, 1.0, len(profile))
-    points = np.array(
-        [(offset * s + r * np.cos(a), r * np.sin(a), gap * s) for s, r in zip(shares, profile, strict=True) for a in angles]
-    )
-    first = (np.arange(len(profile) - 1)[:, None] * around + np.arange(around)).ravel()
-    second = (np.arange(len(profile) - 1)[:, None] * around + np.roll(np.arange(around), -1)).ravel()
+    x = offset * shares[:, None] + profile[:, None] * np.cos(angles)
+    y = profile[:, None] * np.sin(angles)
+    points = np.stack([x, y, np.broadcast_to(gap * shares[:, None], x.shape)], axis=-1).reshape(-1, 3)
+    lower = np.arange(len(profile) - 1)[:, None] * around
+    ring = np.arange(around)
+    first, second = (lower + ring).ravel(), (lower + np.roll(ring, -1)).ravel()
     triangles = np.vstack(
         [np.column_stack([first, second, second + around]), np.column_stack([first, second + around, first + around])]
     )
-    ring = np.arange(around)
     return points, triangles, ring, (len(profile) - 1) * around + ring
+
+
+def barrel(
+    gap: float, bulge: float, lower: float = 0.24e-3, upper: float = 0.24e-3, offset: float = 0.0
+) -> ClosedSurface:
+    """A parabolic barrel (bulge > 0) or hourglass (bulge < 0) between discs of two radii [m]."""
+    share = np.linspace(0.0, 1.0, 25)
+    profile = lower + (upper - lower) * share + 4.0 * bulge * share * (1.0 - share)
+    return close_surface(*revolve(profile, gap, offset=offset))
+
+
+def truncated_sphere(radius: float, half_gap: float, around: int, levels: int):
+    """Sphere between two planes at equal distance from its centre, as ``revolve``, and its exact measures."""
+    heights = np.linspace(-half_gap, half_gap, levels)
+    contact = np.sqrt(radius**2 - half_gap**2)
+    exact = {
+        "volume": 2.0 * np.pi * (radius**2 * half_gap - half_gap**3 / 3.0),
+        "max_width": 2.0 * radius,
+        "contact_radius_board": contact,
+        "contact_radius_package": contact,
+        "contact_angle_board": 0.5 * np.pi + np.arcsin(half_gap / radius),
+        "contact_angle_package": 0.5 * np.pi + np.arcsin(half_gap / radius),
+    }
+    return revolve(np.sqrt(radius**2 - heights**2), 2.0 * half_gap, around), exact

@@ -1,50 +1,55 @@
-"""Closed surfaces against bodies whose volume, width and angle are exact."""
-
 import numpy as np
 import pytest
 
-from meshing.section import cut_segments, radius_by_angle, section_area, section_centroid
-from meshing.surface import close_surface, measure, read_surface, write_surface
-from tests.support.joint_surfaces import revolve
+from meshing.surface import (
+    BOARD_PAD,
+    FREE,
+    PACKAGE_PAD,
+    SurfaceError,
+    close_surface,
+    enclosed_volume,
+    measure,
+    read_surface,
+    write_surface,
+)
+from tests.support.joint_surfaces import barrel, truncated_sphere
+from tests.support.meshing_models import MM
 
 
-def truncated_sphere(around: int, levels: int):
-    """Sphere of radius 0.3 mm between planes 0.15 mm from its centre; exact volume, width, contact radius, angle."""
-    radius, half = 0.3e-3, 0.15e-3
-    heights = np.linspace(-half, half, levels)
-    exact = {
-        "volume": 2 * np.pi * (radius**2 * half - half**3 / 3),
-        "max_width": 2 * radius,
-        "contact_radius_board": np.sqrt(radius**2 - half**2),
-        "contact_angle_board": np.pi / 2 + np.arcsin(half / radius),
-        "contact_angle_package": np.pi / 2 + np.arcsin(half / radius),
-    }
-    return revolve(np.sqrt(radius**2 - heights**2), 2 * half, around), exact
+@pytest.fixture
+def arrays():
+    return truncated_sphere(0.3 * MM, 0.15 * MM, 24, 9)[0]
 
 
-def test_measures_converge_to_the_sphere():
-    errors = []
-    for refinement in (1, 2, 4):
-        surface_arrays, exact = truncated_sphere(24 * refinement, 12 * refinement + 1)
-        measured = measure(close_surface(*surface_arrays))
-        errors.append([abs(measured[name] / exact[name] - 1) for name in exact])
-    orders = np.log2(np.array(errors[0]) / np.array(errors[2])) / 2
-    assert orders[:3] == pytest.approx(2.0, abs=0.35)  # volume, width, radius
-    assert (orders[3:] > 0.8).all()  # angle: slope of one triangle
-    assert max(errors[2]) < 0.02
+def test_every_edge_has_two_triangles(arrays):
+    surface = close_surface(*arrays)
+    edges = np.sort(np.vstack([surface.triangles[:, [k, (k + 1) % 3]] for k in range(3)]), axis=1)
+    assert (np.unique(edges, axis=0, return_counts=True)[1] == 2).all()
+    assert [np.sum(surface.boundary == label) for label in (FREE, BOARD_PAD, PACKAGE_PAD)] == [2 * 24 * 8, 24, 24]
 
 
-def test_section_of_a_cylinder_is_its_polygon():
-    points, triangles, *_ = revolve(np.full(9, 1e-3), 1e-3, around=24, offset=0.2e-3)
-    segments = cut_segments(points, triangles, 0.4e-3)
-    assert section_area(segments) == pytest.approx(0.5 * 24 * 1e-6 * np.sin(2 * np.pi / 24), rel=1e-12)
-    assert section_centroid(segments) == pytest.approx([0.08e-3, 0.0], abs=1e-15)
-    radii = radius_by_angle(segments, section_centroid(segments), 2 * np.pi * np.arange(24) / 24)
-    assert radii == pytest.approx(1e-3, rel=1e-6)
+def test_particles_inside_and_the_direction_of_rings_do_not_matter(arrays):
+    points, triangles, lower, upper = arrays
+    with_inside = np.vstack([points, np.zeros((5, 3))])
+    surface = close_surface(with_inside, triangles, lower[::-1], upper[::-1])
+    assert len(surface.points) == len(points) + 2
+    assert enclosed_volume(surface) == pytest.approx(enclosed_volume(close_surface(*arrays)))
 
 
-def test_file_keeps_surface_and_labels(tmp_path):
-    surface = close_surface(*truncated_sphere(24, 9)[0])
+def test_tilted_joint_has_the_volume_of_the_straight_one():
+    straight, tilted = (enclosed_volume(barrel(0.3 * MM, 0.05 * MM, offset=shift)) for shift in (0.0, 0.1 * MM))
+    assert tilted == pytest.approx(straight)
+
+
+def test_contact_angle_of_an_hourglass_is_sharp():
+    # The parabola r(z) = r0 - 4 b s (1 - s), s = z / gap, leaves the pad with slope -4 b / gap.
+    measured = measure(barrel(0.3 * MM, -0.05 * MM))
+    assert measured["contact_angle_board"] == pytest.approx(np.pi / 2 - np.arctan(4 * 0.05 / 0.3), rel=0.01)
+    assert measured["max_width"] == pytest.approx(0.48 * MM, rel=0.01)
+
+
+def test_file_keeps_surface_and_labels(tmp_path, arrays):
+    surface = close_surface(*arrays)
     write_surface(tmp_path / "s.vtu", surface)
     again = read_surface(tmp_path / "s.vtu")
     assert np.array_equal(again.points, surface.points)
@@ -52,20 +57,35 @@ def test_file_keeps_surface_and_labels(tmp_path):
     assert np.array_equal(again.boundary, surface.boundary)
 
 
-def test_torn_surface_is_refused():
-    points, triangles, lower, upper = truncated_sphere(24, 9)[0]
-    with pytest.raises(ValueError, match="not watertight"):
+def test_stereolithography_file_holds_the_triangles(tmp_path, arrays):
+    import meshio
+
+    surface = close_surface(*arrays)
+    write_surface(tmp_path / "s.stl", surface)
+    assert len(meshio.read(tmp_path / "s.stl").cells_dict["triangle"]) == len(surface.triangles)
+
+
+def test_torn_surface_is_refused(arrays):
+    points, triangles, lower, upper = arrays
+    with pytest.raises(SurfaceError, match="not watertight"):
         close_surface(points, triangles[1:], lower, upper)
 
 
-def test_inward_surface_is_refused():
-    points, triangles, lower, upper = truncated_sphere(24, 9)[0]
-    with pytest.raises(ValueError, match=r"not watertight|inwards"):
+def test_inward_surface_is_refused(arrays):
+    points, triangles, lower, upper = arrays
+    with pytest.raises(SurfaceError, match="not watertight"):  # its edges run against those of the discs
         close_surface(points, triangles[:, ::-1], lower, upper)
 
 
-def test_degenerate_triangle_is_refused():
-    points, triangles, lower, upper = truncated_sphere(24, 9)[0]
+def test_degenerate_triangle_is_refused(arrays):
+    points, triangles, lower, upper = arrays
     points[30] = points[31]
-    with pytest.raises(ValueError, match="degenerate"):
+    with pytest.raises(SurfaceError, match="degenerate"):
+        close_surface(points, triangles, lower, upper)
+
+
+def test_contact_line_that_folds_over_is_refused(arrays):
+    points, triangles, lower, upper = arrays
+    points[lower[0], :2] = 0.6 * points[lower[12], :2]
+    with pytest.raises(SurfaceError, match="contact line crosses itself"):
         close_surface(points, triangles, lower, upper)

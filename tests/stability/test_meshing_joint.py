@@ -1,0 +1,136 @@
+"""Shapes, arrays and warpages that break a sweep: each keeps its volume, upright elements and its place."""
+
+import dataclasses
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from meshing.assembly import write_assembly
+from meshing.checks import problems
+from meshing.estimate import count_elements
+from meshing.joints_file import write_joints
+from meshing.pads import pad_table
+from meshing.parameters import Warpage
+from meshing.solder_mesh import joint_quality, mesh_joint
+from tests.support.joint_surfaces import barrel
+from tests.support.meshing_models import MM, board, package
+
+HARD = {
+    "strongly bulged": {"bulge": 0.20 * MM},
+    "thin neck": {"bulge": -0.15 * MM},
+    "pads of ratio two": {"lower": 0.30 * MM, "upper": 0.15 * MM},
+    "bulged between pads of ratio two": {"lower": 0.15 * MM, "upper": 0.30 * MM, "bulge": 0.10 * MM},
+    "slanted by half a radius": {"offset": 0.12 * MM},
+    "slanted hourglass": {"offset": 0.12 * MM, "bulge": -0.10 * MM},
+}
+
+
+def quality_of(warpage=None, **shape):
+    """Mesh the corner joint of the small package in a shape of its own."""
+    warpage = warpage or Warpage()
+    site = {site.name: site for site in pad_table(package(), board(), warpage)}["A4"]
+    lower, upper = shape.get("lower", 0.24 * MM), shape.get("upper", 0.24 * MM)
+    wetted = {"wetted_radius_board": lower, "wetted_radius_package": upper}
+    site = dataclasses.replace(site, **wetted, pad_radius_board=lower, pad_radius_package=0.32 * MM)
+    surface = barrel(site.gap, **({"bulge": 0.0} | shape))
+    return joint_quality(mesh_joint(surface, site, package(), warpage))
+
+
+@pytest.mark.parametrize("shape", HARD.values(), ids=HARD.keys())
+def test_hard_shapes(shape):
+    quality = quality_of(**shape)
+    assert quality["volume_error"] < 1e-12
+    assert quality["minimum_scaled_jacobian"] > 0.3
+
+
+@pytest.mark.parametrize("corner", [-0.12 * MM, 0.5 * MM])
+def test_thick_warpage(corner):
+    quality = quality_of(Warpage(corner=corner), bulge=0.05 * MM)
+    assert quality["volume_error"] < 1e-12
+    assert quality["minimum_scaled_jacobian"] > 0.3
+
+
+SHAPES = st.fixed_dictionaries(
+    {
+        "bulge": st.floats(-0.06 * MM, 0.12 * MM),
+        "lower": st.floats(0.16 * MM, 0.30 * MM),
+        "upper": st.floats(0.16 * MM, 0.30 * MM),
+        "offset": st.floats(0.0, 0.1 * MM),
+    }
+)
+
+
+@settings(max_examples=40, deadline=None)
+@given(SHAPES, st.floats(-0.1 * MM, 0.1 * MM))
+def test_random_joints(shape, corner):
+    quality = quality_of(Warpage(corner=corner), **shape)
+    assert quality["volume_error"] < 1e-12
+    assert quality["minimum_scaled_jacobian"] > 0.2
+
+
+def write_whole(folder, the_package, the_board, warpage):
+    """Mesh assembly and joints; return their element counts."""
+    counts = write_assembly(the_package, the_board, warpage, folder / "assembly.msh")
+    meshes = [
+        mesh_joint(barrel(site.gap, 0.02 * MM), site, the_package, warpage)
+        for site in pad_table(the_package, the_board, warpage)
+    ]
+    assert min(write_joints(meshes, folder / "joints.msh").values()) > 0.2
+    for mesh in meshes:
+        for part, cells in mesh.cells.items():
+            role = part.split("@")[0].split("_")[0]
+            counts[role] = counts.get(role, 0) + len(cells)
+    return counts
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"rows": 1, "columns": 1},
+        {"rows": 3, "columns": 3, "depopulated": ("B2",)},
+        {"rows": 1, "columns": 4, "joint_numerics": {"layers": 2}},
+    ],
+    ids=["one joint", "centre depopulated", "one row, two layers"],
+)
+def test_odd_arrays_in_full(tmp_path, changes):
+    the_package, the_board, warpage = package(**changes), board(symmetry="full"), Warpage(corner=0.02 * MM)
+    assert not problems(the_package, the_board, warpage)
+    estimate = count_elements(the_package, the_board)
+    counts = write_whole(tmp_path, the_package, the_board, warpage)
+    assert counts == {name: part.elements for name, part in estimate.items()}
+
+
+def test_single_layers_everywhere(tmp_path):
+    flat = {"length": 5.0 * MM, "width": 5.0 * MM, "thickness": 0.4 * MM, "elements": 1}
+    the_package = package(substrate=flat, die=flat)
+    the_board = board(numerics={"layers": 2, "patch_layers": 1, "patch_margin": 1})
+    assert not problems(the_package, the_board, Warpage())
+    counts = write_assembly(the_package, the_board, Warpage(), tmp_path / "assembly.msh")
+    assert counts["die"] == counts["substrate"] == 25
+
+
+@st.composite
+def assemblies(draw):
+    """A package and a board that may or may not fit each other."""
+    side, hole = draw(st.floats(4.2, 9.0)) * MM, draw(st.floats(0.8, 4.0)) * MM
+    layer = {"length": side, "width": 5 * MM, "thickness": 0.4 * MM}
+    the_package = package(substrate=layer, die=layer | {"length": draw(st.floats(0.2, 1.0)) * side})
+    the_board = board(
+        length=draw(st.floats(20.0, 60.0)) * MM,
+        holes={"diameter": hole, "inset_x": 1.2 * hole, "inset_y": hole},
+        numerics={"element_size": draw(st.floats(0.35, 1.0)) * MM, "growth": draw(st.floats(1.1, 1.8))},
+        symmetry=draw(st.sampled_from(["quarter", "full"])),
+    )
+    return the_package, the_board
+
+
+@settings(max_examples=6, deadline=None)
+@given(assemblies())
+def test_random_assemblies_are_refused_or_upright(tmp_path_factory, parameters):
+    the_package, the_board = parameters
+    if problems(the_package, the_board, Warpage()):
+        return
+    counts = write_assembly(the_package, the_board, Warpage(), tmp_path_factory.mktemp("random") / "assembly.msh")
+    estimate = count_elements(the_package, the_board)
+    assert counts == {name: estimate[name].elements for name in counts}
