@@ -16,7 +16,6 @@ from workflow import fields
 from workflow.problems import CaseError, Problem
 from workflow.validation import translate
 
-
 NAME = r"^[A-Za-z0-9][A-Za-z0-9_.-]*$"
 
 

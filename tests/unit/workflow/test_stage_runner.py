@@ -5,16 +5,15 @@ from pathlib import Path
 
 import pytest
 
+from tests.support.workflow_command import SMALL_CASE
 from workflow.case import read_case
 from workflow.pipeline import RunFolderBusy, failed_checks, locked
 from workflow.stage_runner import Findings, Run, run_stage
 
-CASE = Path(__file__).resolve().parents[3] / "cases" / "bga_drop" / "case.toml"
-
 
 @pytest.fixture
 def run(tmp_path):
-    return Run(tmp_path, read_case(CASE), cores=1)
+    return Run(tmp_path, read_case(SMALL_CASE), cores=1)
 
 
 def write_surfaces(_run: Run, folder: Path) -> Findings:
