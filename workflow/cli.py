@@ -13,6 +13,7 @@ import typer
 from workflow import __version__
 from workflow.case import Case, available_cores, read_case
 from workflow.inputs import CASE, examine, write_inputs
+from workflow.pipeline import RunFolderBusy, drive, failed_checks, locked
 from workflow.problems import CaseError
 from workflow.stage_table import NAMES
 from workflow.terminal import console, print_error
@@ -64,16 +65,19 @@ def run(
     oversubscribe: Oversubscribe = False,
 ) -> None:
     """Run what is stale."""
-    from workflow.pipeline import failed_checks
-
     if until not in NAMES:
         raise typer.BadParameter(f"'{until}' is no stage; allowed: {', '.join(NAMES)}", param_hint="--until")
     resolved, folder = _load(case, settings, out, oversubscribe)
-    write_inputs(folder, resolved)
-    if not _has_work(folder, resolved, until):
-        console.print(f"nothing to do: {folder} is up to date")
-    elif not _drive(folder, until, cores or available_cores(), oversubscribe):
-        raise typer.Exit(1)
+    try:
+        with locked(folder) as lock:
+            write_inputs(folder, resolved)
+            if not _has_work(folder, resolved, until):
+                console.print(f"nothing to do: {folder} is up to date")
+            elif not drive(folder, until, cores or available_cores(), oversubscribe, lock):
+                raise typer.Exit(1)
+    except KeyboardInterrupt as error:
+        print_error("interrupted; stages that were complete are kept")
+        raise typer.Exit(1) from error
     failures = failed_checks(folder, until)
     for failure in failures:
         print_error(failure)
@@ -107,8 +111,6 @@ def report(case: CasePath, settings: Settings = None, out: Out = None) -> None:
 @app.command()
 def clean(case: CasePath, settings: Settings = None, out: Out = None) -> None:
     """Remove a case's run folder."""
-    from workflow.pipeline import locked
-
     _, folder = _load(case, settings, out, True)
     if not (folder / CASE).is_file():
         console.print(f"nothing to remove: {folder} is no run folder")
@@ -155,18 +157,9 @@ def main() -> None:
         for line in error.lines():
             print_error(line)
         sys.exit(2)
-
-
-def _drive(folder: Path, until: str, cores: int, oversubscribe: bool) -> bool:
-    from workflow.pipeline import RunFolderBusy, drive
-
-    try:
-        return drive(folder, until, cores, oversubscribe)
     except RunFolderBusy as error:
         print_error(str(error))
-    except KeyboardInterrupt:
-        print_error("interrupted; stages that were complete are kept")
-    return False
+        sys.exit(1)
 
 
 def _interrupt(*_: object) -> None:

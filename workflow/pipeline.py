@@ -41,7 +41,7 @@ def locked(run_folder: Path) -> Iterator[int]:
         os.close(descriptor)
 
 
-def drive(run_folder: Path, until: str, cores: int, oversubscribe: bool) -> bool:
+def drive(run_folder: Path, until: str, cores: int, oversubscribe: bool, lock: int) -> bool:
     """Run every stale stage up to one; the inputs must have been written.
 
     Args:
@@ -49,25 +49,25 @@ def drive(run_folder: Path, until: str, cores: int, oversubscribe: bool) -> bool
         until: name of the last stage.
         cores: number of cores that may be used.
         oversubscribe: whether MPI may have more ranks than cores.
+        lock: what ``locked`` yields; Snakemake keeps it should this process be killed.
 
     Returns:
         Whether all went well; a stage that failed has said why.
     """
     run_folder = run_folder.resolve()
-    with locked(run_folder) as lock:
-        command = [
-            sys.executable, "-m", "snakemake", "--snakefile", str(SNAKEFILE), "--directory", str(run_folder),
-            "--cores", str(cores), "--rerun-triggers", "mtime", "--rerun-incomplete", "--nolock", "--quiet", "all",
-            "--config", f"run={run_folder}", f"oversubscribe={int(oversubscribe)}",
-            "--", str(run_folder / BY_NAME[until].record),
-        ]  # fmt: skip
-        environment = os.environ | {"OMP_NUM_THREADS": "1"}
-        process = subprocess.Popen(command, env=environment, start_new_session=True, pass_fds=(lock,))
-        try:
-            return process.wait() == 0
-        except BaseException:
-            end_group(process)
-            raise
+    command = [
+        sys.executable, "-m", "snakemake", "--snakefile", str(SNAKEFILE), "--directory", str(run_folder),
+        "--cores", str(cores), "--rerun-triggers", "mtime", "--rerun-incomplete", "--nolock", "--quiet", "all",
+        "--config", f"run={run_folder}", f"oversubscribe={int(oversubscribe)}",
+        "--", str(run_folder / BY_NAME[until].record),
+    ]  # fmt: skip
+    environment = os.environ | {"OMP_NUM_THREADS": "1"}
+    process = subprocess.Popen(command, env=environment, start_new_session=True, pass_fds=(lock,))
+    try:
+        return process.wait() == 0
+    except BaseException:
+        end_group(process)
+        raise
 
 
 def failed_checks(run_folder: Path, until: str) -> list[str]:

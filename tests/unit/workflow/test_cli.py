@@ -9,6 +9,7 @@ import pytest
 
 from workflow import cli
 from workflow.case import display_values, read_case
+from workflow.pipeline import locked
 from workflow.schema import case_schema
 
 CASE = Path(__file__).resolve().parents[3] / "cases" / "bga_drop" / "case.toml"
@@ -105,6 +106,13 @@ def test_clean_removes_run_folders_only(call, tmp_path):
     (precious / "inputs/case.json").write_text("{}")
     assert call("clean", str(CASE), "--out", str(precious))[0] == 0
     assert not precious.exists()
+
+
+def test_a_run_folder_in_use_is_left_alone(call, tmp_path):
+    with locked(tmp_path / "busy"):
+        code, _, errors = call("run", str(CASE), "--out", str(tmp_path / "busy"))
+    assert (code, "another run is at work" in errors) == (1, True)
+    assert [path.name for path in (tmp_path / "busy").iterdir()] == [".lock"]
 
 
 def test_the_schema_accepts_cases_and_refuses_bare_numbers(call):
