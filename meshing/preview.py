@@ -1,4 +1,4 @@
-"""A picture of the meshed board and package, in seconds."""
+"""A picture of the meshed board and package, in seconds, without a screen."""
 
 from pathlib import Path
 
@@ -8,42 +8,44 @@ import pyvista
 
 MILLI = 1.0e-3
 COLOURS = {
-    "board": "#3d7d4d",
-    "board_patch": "#6fb07f",
-    "substrate": "#c9a227",
-    "die": "#5b6770",
-    "copper": "#b87333",
-    "solder": "#c9ced6",
+    "board": "#2f7d46",
+    "board_patch": "#62a876",
+    "substrate": "#c2971c",
+    "die": "#56626e",
+    "copper": "#b5622d",
+    "solder": "#98a2af",
 }
+SIZE = (1800, 680)  # pixels; two views side by side
+FROM_ABOVE, FROM_THE_SIDE = (-1.0, -1.3, 1.1), (-1.0, -1.3, 0.45)  # quarter models are cut open towards -x and -y
+MARGIN = 1.06
 
 
 def write_preview(paths: list[Path], picture: Path) -> None:
-    """Render the hexahedra of Gmsh files, coloured by part: the whole on the left, the package on the right.
+    """Render the hexahedra of Gmsh files, coloured by part: the whole model on the left, the package on the right.
 
     Args:
         paths: ``.msh`` files (assembly, and joints if they exist).
         picture: PNG file to write.
     """
     parts = [part for path in paths for part in _parts(path)]
-    plotter = pyvista.Plotter(off_screen=True, shape=(1, 2), window_size=[1800, 760], border=False)
-    for column in (0, 1):
+    around_package = [(name, grid) for name, grid in parts if _role(name) != "board"]
+    plotter = pyvista.Plotter(off_screen=True, shape=(1, 2), window_size=list(SIZE), border=False)
+    plotter.set_background("white", all_renderers=True)
+    views = (("whole model", parts, FROM_ABOVE, 0.5), ("package and patch", around_package, FROM_THE_SIDE, 1.5))
+    for column, (title, shown, direction, line_width) in enumerate(views):
         plotter.subplot(0, column)
-        plotter.set_background("white")
-        for name, grid in parts:
+        for name, grid in shown:
+            surface = grid.extract_surface(algorithm="dataset_surface")
             plotter.add_mesh(
-                grid.extract_surface(algorithm="dataset_surface"), color=colour(name), show_edges=True,
-                edge_color="#26323c", line_width=1, ambient=0.25,
-            )  # fmt: skip
-    plotter.subplot(0, 0)
-    plotter.add_text("whole model", font_size=11, color="black")
-    _look_at(plotter, _bounds([grid for _, grid in parts]), 1.35)
-    plotter.subplot(0, 1)
-    plotter.add_text("package", font_size=11, color="black")
+                surface, color=colour(name), show_edges=True, edge_color="#1d262e", line_width=line_width, ambient=0.3
+            )
+        plotter.add_text(title, font_size=12, color="black")
+        _fit(plotter, np.vstack([_corners(grid) for _, grid in shown]), direction)
+    roles = [role for role in COLOURS if any(_role(name) == role for name, _ in parts)]
     plotter.add_legend(
-        [(role, colour(role)) for role in COLOURS if any(_role(name) == role for name, _ in parts)],
-        bcolor="white", face="rectangle", size=(0.2, 0.22), loc="upper right",
+        [(role.replace("_", " "), COLOURS[role]) for role in roles],
+        bcolor="white", face="rectangle", size=(0.2, 0.045 * len(roles)), loc="lower right",
     )  # fmt: skip
-    _look_at(plotter, _bounds([grid for name, grid in parts if _role(name) != "board"]), 1.25)
     plotter.screenshot(picture)
     plotter.close()
 
@@ -59,32 +61,35 @@ def _role(part: str) -> str:
 
 
 def _parts(path: Path) -> list[tuple[str, pyvista.UnstructuredGrid]]:
+    """Name and hexahedra [mm] of every physical volume."""
     mesh = meshio.read(path)
-    names = {tag: name for name, (tag, dimension) in mesh.field_data.items() if dimension == 3}
-    hexahedra = [
-        (block.data, tags)
-        for block, tags in zip(mesh.cells, mesh.cell_data["gmsh:physical"], strict=True)
-        if block.type == "hexahedron"
-    ]
-    cells = np.vstack([data for data, _ in hexahedra])
-    tags = np.concatenate([tags for _, tags in hexahedra])
-    points = mesh.points / MILLI
-    return [
-        (name, pyvista.UnstructuredGrid({pyvista.CellType.HEXAHEDRON: cells[tags == tag]}, points).clean())
-        for tag, name in names.items()
-    ]
+    names = [name for name, (_, dimension) in mesh.field_data.items() if dimension == 3]
+    grids = []
+    for name in names:
+        blocks = [b.data[chosen] for b, chosen in zip(mesh.cells, mesh.cell_sets[name], strict=True) if len(chosen)]
+        used, cells = np.unique(np.vstack(blocks), return_inverse=True)
+        hexahedra = {pyvista.CellType.HEXAHEDRON: cells.reshape(-1, 8)}
+        grids.append((name, pyvista.UnstructuredGrid(hexahedra, mesh.points[used] / MILLI)))
+    return grids
 
 
-def _bounds(grids: list[pyvista.UnstructuredGrid]) -> np.ndarray:
-    boxes = np.array([grid.bounds for grid in grids]).reshape(-1, 3, 2)
-    return np.column_stack([boxes[:, :, 0].min(axis=0), boxes[:, :, 1].max(axis=0)])
+def _corners(grid: pyvista.UnstructuredGrid) -> np.ndarray:
+    """Corners (8, 3) of the box around a part."""
+    x, y, z = np.reshape(grid.bounds, (3, 2))
+    return np.array([(a, b, c) for a in x for b in y for c in z])
 
 
-def _look_at(plotter: pyvista.Plotter, bounds: np.ndarray, zoom: float) -> None:
-    """View from the inner corner (towards which a quarter model is cut open), from above."""
-    centre, size = bounds.mean(axis=1), np.linalg.norm(bounds[:, 1] - bounds[:, 0])
-    plotter.camera.focal_point = centre
-    plotter.camera.position = centre + size * np.array([-1.0, -1.4, 1.0])
-    plotter.camera.up = (0.0, 0.0, 1.0)
-    plotter.reset_camera(bounds=bounds.ravel())
-    plotter.camera.zoom(zoom)
+def _fit(plotter: pyvista.Plotter, points: np.ndarray, direction: tuple[float, float, float]) -> None:
+    """Look at points (n, 3) from a direction, in parallel projection, so that they fill the view."""
+    toward = np.array(direction) / np.linalg.norm(direction)
+    right = np.cross([0.0, 0.0, 1.0], toward)
+    right /= np.linalg.norm(right)
+    axes = np.array([right, np.cross(toward, right), toward])
+    low, high = (points @ axes.T).min(axis=0), (points @ axes.T).max(axis=0)
+    half_width, half_height, depth = 0.5 * (high - low)
+    focus = 0.5 * (low + high) @ axes
+    camera = plotter.camera
+    camera.enable_parallel_projection()
+    camera.focal_point, camera.position, camera.up = focus, focus + 4.0 * (depth + half_width) * toward, (0.0, 0.0, 1.0)
+    camera.parallel_scale = MARGIN * max(half_height, half_width * SIZE[1] / (0.5 * SIZE[0]))
+    plotter.renderer.reset_camera_clipping_range()
