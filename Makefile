@@ -23,7 +23,7 @@ lint: setup  ## ruff, mypy, import rules
 	$(PYTHON) -m pytest tests/unit/test_code.py
 
 bench: setup  ## run the benchmarks; JSON in benchmarks/results
-	@for script in benchmarks/bench_*.py; do [ -e "$$script" ] || continue; echo "$$script"; $(PYTHON) "$$script" || exit 1; done
+	@for script in benchmarks/*.py; do [ -e "$$script" ] || continue; echo "$$script"; $(PYTHON) "$$script" || exit 1; done
 
 clean:  ## remove runs and caches (keeps .venv)
 	rm -rf runs build *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache benchmarks/results

@@ -23,7 +23,7 @@ def mpi_command(ranks: int, program: Sequence[str], oversubscribe: bool) -> list
         program: program and arguments.
         oversubscribe: whether there may be more ranks than cores.
     """
-    command = ["mpirun", "-n", str(ranks)]
+    command = ["mpirun", "--quiet", "-n", str(ranks)]
     if os.geteuid() == 0:
         command.append("--allow-run-as-root")
     if oversubscribe:
@@ -58,8 +58,8 @@ def launch(command: Sequence[str], on_line: Callable[[str], None], log: Path) ->
             end_group(process)
             raise
     if code != 0:
-        words = "\n".join(log.read_text(errors="replace").splitlines()[-LAST_LINES:])
-        raise LaunchError(f"{command[0]} ended with exit code {code}\n{words}")
+        words = "\n".join(log.read_text(errors="replace").strip().splitlines()[-LAST_LINES:])
+        raise LaunchError(f"{command[0]} ended with exit code {code}: {words}")
 
 
 def end_group(process: subprocess.Popen) -> None:

@@ -13,10 +13,10 @@ from workflow.launch import LaunchError, launch, mpi_command
 
 def test_mpi_command(monkeypatch):
     monkeypatch.setattr(os, "geteuid", lambda: 1000)
-    assert mpi_command(2, ["program"], oversubscribe=False) == ["mpirun", "-n", "2", "program"]
+    assert mpi_command(2, ["program"], oversubscribe=False) == ["mpirun", "--quiet", "-n", "2", "program"]
     monkeypatch.setattr(os, "geteuid", lambda: 0)
     assert mpi_command(3, ["program"], oversubscribe=True) == [
-        "mpirun", "-n", "3", "--allow-run-as-root", "--oversubscribe", "program",
+        "mpirun", "--quiet", "-n", "3", "--allow-run-as-root", "--oversubscribe", "program",
     ]  # fmt: skip
 
 
@@ -34,7 +34,7 @@ def test_threads_are_one(tmp_path):
 
 
 def test_the_last_words_of_a_failure_are_kept(tmp_path):
-    with pytest.raises(LaunchError, match="exit code 3\nno equilibrium at step 7"):
+    with pytest.raises(LaunchError, match="exit code 3: no equilibrium at step 7"):
         launch(
             [sys.executable, "-c", "import sys; print('no equilibrium at step 7', file=sys.stderr); sys.exit(3)"],
             print,
