@@ -26,7 +26,7 @@ bench: setup  ## run the benchmarks; JSON in benchmarks/results
 	@for script in benchmarks/*.py; do [ -e "$$script" ] || continue; echo "$$script"; $(PYTHON) "$$script" || exit 1; done
 
 clean:  ## remove runs and caches (keeps .venv)
-	rm -rf runs build *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache benchmarks/results
+	rm -rf runs build *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
 	find . -name __pycache__ -not -path './.venv/*' -prune -exec rm -rf {} +
 
 .PHONY: help setup demo test test-mpi lint bench clean

@@ -12,7 +12,7 @@ import typer
 
 from workflow import __version__
 from workflow.case import Case, available_cores, read_case
-from workflow.inputs import CASE, examine, write_inputs
+from workflow.inputs import CASE, examine, read_case_of_run, write_inputs
 from workflow.pipeline import RunFolderBusy, drive, failed_checks, locked
 from workflow.problems import CaseError
 from workflow.stage_table import NAMES
@@ -97,14 +97,14 @@ def status(case: CasePath, settings: Settings = None, out: Out = None) -> None:
 
 @app.command()
 def report(case: CasePath, settings: Settings = None, out: Out = None) -> None:
-    """Write the report again, from the products that are there."""
+    """Write the report again, from the products that are there and the values that they were made with."""
     from workflow.report import write_report
 
-    resolved, folder = _load(case, settings, out, True)
-    if not folder.is_dir():
-        print_error(f"{folder} does not exist: nothing was run")
+    _, folder = _load(case, settings, out, True)
+    if not (folder / CASE).is_file():
+        print_error(f"{folder} is no run folder: nothing was run")
         raise typer.Exit(1)
-    write_report(folder, resolved)
+    write_report(folder, read_case_of_run(folder))
     console.print(f"report: {folder / 'report.html'}")
 
 
@@ -136,7 +136,6 @@ def stage(
     oversubscribe: Oversubscribe = False,
 ) -> None:
     """Run one stage; Snakemake calls this."""
-    from workflow.inputs import read_case_of_run
     from workflow.stage_runner import Run, execute
     from workflow.stages import STAGE_FUNCTIONS
 
