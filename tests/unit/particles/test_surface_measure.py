@@ -45,6 +45,19 @@ def test_area_equals_numpy_twin(cloud):
 
 
 @pytest.mark.parametrize("cloud", CLOUDS, ids=["drop", "joint"])
+def test_volume_equals_numpy_twin(cloud):
+    """Twin: the integral of z n_z over the free surface and over the upper wall."""
+    points = shaken(cloud)
+    a, b, c = (points[cloud.triangles[:, k]] for k in range(3))
+    free = float((np.cross(b - a, c - a)[:, 2] * (a + b + c)[:, 2]).sum() / 6)
+    walls = sum(
+        height * ring_area(points, ring) for ring, height in zip(cloud.rings[1:], cloud.ring_heights[1:], strict=True)
+    )
+    found = enclosed_volume(points, cloud.triangles, cloud.rings, cloud.ring_heights)
+    assert found == pytest.approx(free + walls)
+
+
+@pytest.mark.parametrize("cloud", CLOUDS, ids=["drop", "joint"])
 def test_stiffness_times_position_is_the_gradient_of_the_area(cloud):
     points = shaken(cloud)
     stiffness = cotangent_laplacian(points, cloud.triangles, len(points))

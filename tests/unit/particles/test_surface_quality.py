@@ -48,6 +48,22 @@ def test_smoothing_is_tangential_and_vanishes_on_an_even_grid():
     assert (offset * normal).sum(axis=1)[off_line] == pytest.approx(0.0, abs=1e-15)
 
 
+def test_smoothing_equals_numpy_twin():
+    cloud = box_cloud(1.0, 6)
+    points = cloud.points + 0.02 * np.random.default_rng(15).normal(size=cloud.points.shape)
+    count = cloud.surface_count
+    corner = points[cloud.triangles]
+    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    area = np.linalg.norm(normal, axis=1)
+    offset = smoothing_offsets(points, cloud.triangles, count, cloud.rings)
+    for vertex in np.setdiff1d(np.arange(count), cloud.rings[0]):
+        own = (cloud.triangles == vertex).any(axis=1)
+        mean = area[own] @ corner[own].mean(axis=1) / area[own].sum() - points[vertex]
+        n = normal[own].sum(axis=0)
+        n /= np.linalg.norm(n)
+        assert offset[vertex] == pytest.approx(0.3 * (mean - (mean @ n) * n), abs=1e-14)
+
+
 def test_smoothing_evens_out_a_contact_line_along_itself():
     cloud = joint_cloud(JointGeometry(1.0, 0.8, 0.8), 2.2, 0.2)
     points, ring = cloud.points.copy(), cloud.rings[0]
