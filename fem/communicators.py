@@ -12,15 +12,15 @@ Role = Literal["macro", "meso", "dns"]
 
 
 class Communicators:
-    """The communicator of this rank's model, and the one that joins all models.
+    """The communicators of the models on this rank, and the one that joins all models.
 
-    Placement ``split``: the first ``ranks.macro`` ranks carry the macro model, the others the meso model. A placement
-    that gives both models to every rank would hand out two duplicates of ``world`` here and nowhere else.
+    Placement ``split``: the first ``ranks.macro`` ranks carry the macro model, the others the meso model. Placement
+    ``shared``: every rank carries both.
 
     Attributes:
         world: All ranks of the run.
-        model: The ranks of this rank's model.
-        role: The model that this rank carries.
+        models: The ranks of each model that this rank carries, in the order of the window.
+        first: Lowest rank of ``world`` that carries each model.
     """
 
     def __init__(self, world: MPI.Comm, mode: Literal["two_scale", "dns"], ranks: Ranks) -> None:
@@ -35,8 +35,14 @@ class Communicators:
                 f"the input asks for {ranks.macro} macro + {ranks.meso} meso ranks, mpirun started {world.size}"
             )
         self.world = world.Dup()
-        self.role: Role = "dns" if mode == "dns" else "macro" if world.rank < ranks.macro else "meso"
-        self.model = self.world.Split(["dns", "macro", "meso"].index(self.role), self.world.rank)
+        roles: tuple[Role, ...] = ("dns",) if mode == "dns" else ("macro", "meso")
+        split = mode == "two_scale" and ranks.placement == "split"
+        self.first = {role: ranks.macro if split and role == "meso" else 0 for role in roles}
+        if split:
+            role = roles[world.rank >= ranks.macro]
+            self.models = {role: self.world.Split(roles.index(role), self.world.rank)}
+        else:
+            self.models = {role: self.world.Dup() for role in roles}
 
     def __enter__(self) -> Self:
         """Return self."""
@@ -45,7 +51,8 @@ class Communicators:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Free both communicators, unless an error may have left other ranks inside a call on them."""
+        """Free all communicators, unless an error may have left other ranks inside a call on them."""
         if error is None:
-            self.model.Free()
+            for model in self.models.values():
+                model.Free()
             self.world.Free()

@@ -1,49 +1,54 @@
 """History samples: ranks of all models combine their parts, rank 0 of the run keeps them."""
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from fem.communicators import Role
 from fem.ledger import Ledger, ledger_sums
 from fem.loads import HalfSineDrop
 from fem.participant import Participant
 from fem.watch import Watch
 
 LEDGER_SIZE = 20
+SIDE: dict[Role, float] = {"macro": 1.0, "meso": -1.0, "dns": 0.0}
 LAYERS = ("von_mises_board", "von_mises_package", "peel_board", "peel_package")
 
 
 class History:
     """Samples of the watch points and the ledger, equal on all ranks."""
 
-    def __init__(self, world: MPI.Comm, watch: Watch, ledger: Ledger, load: HalfSineDrop) -> None:
-        """Start an empty history."""
-        self.joints = watch.joints
+    def __init__(self, world: MPI.Comm, watches: Mapping[Role, Watch], ledger: Ledger, load: HalfSineDrop) -> None:
+        """Start an empty history; ``watches`` are those of the models on this rank."""
+        self.joints = next(iter(watches.values())).joints
         self.ledger = ledger
-        self._world, self._watch, self._load = world, watch, load
+        self._world, self._watches, self._load = world, watches, load
         self._rows: list[dict[str, NDArray[np.float64] | float]] = []
 
-    def sample(self, participant: Participant, sign: float) -> None:
+    def sample(self, crew: Mapping[Role, Participant]) -> None:
         """Add a sample; collective over all models.
 
         Args:
-            participant: The model on this rank.
-            sign: Side of the cut, see ``ledger.ledger_sums``.
+            crew: The models on this rank.
 
         Raises:
             EnergyError: On every rank, see ``Ledger.judge``.
         """
-        motion = participant.motion
-        watched, maxima = self._watch.sample(motion.displacement)
-        sums = np.concatenate([ledger_sums(participant, sign), watched])
+        sums, maxima = np.zeros(1), np.full(1, -np.inf)
+        for role, participant in crew.items():
+            time = participant.motion.time
+            watched, largest = self._watches[role].sample(participant.motion.displacement)
+            sums = sums + np.concatenate([ledger_sums(participant, SIDE[role]), watched])
+            maxima = np.maximum(maxima, largest)
         total, largest = np.empty_like(sums), np.empty_like(maxima)
         self._world.Allreduce(sums, total)
         self._world.Allreduce(maxima, largest, MPI.MAX)
-        energies = self.ledger.judge(total[:LEDGER_SIZE], motion.time)
+        energies = self.ledger.judge(total[:LEDGER_SIZE], time)
         if self._world.rank == 0:
-            self._rows.append({**self._row(motion.time, total[LEDGER_SIZE:], largest), **energies})
+            self._rows.append({**self._row(time, total[LEDGER_SIZE:], largest), **energies})
 
     def _row(
         self, time: float, watched: NDArray[np.float64], maxima: NDArray[np.float64]

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from fem import dolfinx_api
 from fem.agreement import agreed
 from fem.body import Body, make_body, make_pieces
-from fem.communicators import Communicators
+from fem.communicators import Communicators, Role
 from fem.inputs import RunInput
 from fem.local_mesh import distribute
 from fem.mesh import MeshData, read_meshes
@@ -19,33 +19,40 @@ class Model:
 
     tables: Tables
     body: Body
-    steps: Steps
 
 
-def build_model(comms: Communicators, request: RunInput) -> Model:
-    """Read, prepare and distribute the model of this rank; collective."""
+def build_models(comms: Communicators, request: RunInput) -> tuple[dict[Role, Model], Steps]:
+    """Read, prepare and distribute the models of this rank, and choose their steps; collective."""
     world = comms.world
-    mesh, tables = read_model(comms, request)
+    inputs = read_models(comms, request)
     dolfinx_api.compile_ahead(world)
-    local = distribute(comms.model, mesh)
-    pieces = agreed(world, lambda: make_pieces(local, tables, request.materials))
-    steps = choose_steps(world, pieces, tables, request.shock)
-    return Model(tables, make_body(comms.model, pieces, tables, steps.mass_factor), steps)
+    meshes = {role: distribute(comms.models[role], mesh) for role, (mesh, _) in inputs.items()}
+    pieces = agreed(
+        world, lambda: {role: make_pieces(meshes[role], inputs[role][1], request.materials) for role in meshes}
+    )
+    steps = choose_steps(world, [(pieces[role], inputs[role][1]) for role in pieces], request.shock)
+    models = {
+        role: Model(inputs[role][1], make_body(comms.models[role], pieces[role], inputs[role][1], factor))
+        for role, factor in zip(pieces, steps.mass_factors, strict=True)
+    }
+    return models, steps
 
 
-def read_model(comms: Communicators, request: RunInput) -> tuple[MeshData | None, Tables]:
+def read_models(comms: Communicators, request: RunInput) -> dict[Role, tuple[MeshData | None, Tables]]:
     """Read and check all meshes on rank 0, and hand each model its part.
 
     Returns:
-        The model's mesh on the first of its ranks, None on the others; its tables.
+        Per model of this rank: its mesh on the first rank that carries it, None on the others; its tables.
     """
     world = comms.world
     inputs = agreed(world, lambda: prepare(read_meshes(request.meshes), request.mode) if world.rank == 0 else None)
     tables = world.bcast({role: item.tables for role, item in inputs.items()} if inputs else None)
-    first = {"macro": 0, "meso": request.shock.ranks.macro, "dns": 0}
-    if inputs and "meso" in inputs:
-        world.send(inputs["meso"].mesh, first["meso"])
-    if world.rank != first[comms.role]:
-        return None, tables[comms.role]
-    mesh = inputs[comms.role].mesh if inputs else world.recv(source=0)
-    return mesh, tables[comms.role]
+    meshes: dict[Role, MeshData | None] = dict.fromkeys(comms.models)
+    for role, first in comms.first.items():
+        if inputs and first == 0:
+            meshes[role] = inputs[role].mesh
+        elif inputs:
+            world.send(inputs[role].mesh, first)
+        elif world.rank == first:
+            meshes[role] = world.recv(source=0)
+    return {role: (meshes[role], tables[role]) for role in comms.models}

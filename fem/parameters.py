@@ -71,10 +71,15 @@ class Materials(Parameters):
 
 
 class Ranks(Parameters):
-    """MPI ranks of each model; a DNS run uses the sum of both."""
+    """MPI ranks of each model; a DNS run uses the sum of both.
+
+    ``split`` gives each model ranks of its own, which work at the same time; ``shared`` gives both models to all ranks,
+    which take turns: better where the models' costs differ from their ranks.
+    """
 
     macro: int = Field(1, ge=1)
     meso: int = Field(1, ge=1)
+    placement: Literal["split", "shared"] = "split"
 
 
 class ShockNumerics(Parameters):

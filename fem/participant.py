@@ -33,8 +33,11 @@ class Participant(Protocol):
     plan: WindowPlan
     interface_work: float
 
-    def run_window(self) -> None:
-        """Advance by one window."""
+    def begin_window(self) -> None:
+        """Do what must come before other models of the rank have their turn."""
+
+    def finish_window(self) -> None:
+        """Do the rest of the window."""
 
     def cut_force(self) -> NDArray[np.float64]:
         """Return the forces ``(n, 3)`` [N] across the cut as this participant knows them, zero elsewhere."""
@@ -54,11 +57,14 @@ class Alone:
         self.plan = plan
         self._zero = np.zeros_like(self.motion.force)
 
-    def run_window(self) -> None:
+    def begin_window(self) -> None:
         """Take m substeps."""
         for _ in range(self.plan.substeps):
             self.motion.advance()
             self.motion.update_force()
+
+    def finish_window(self) -> None:
+        """Do nothing: the window is done."""
 
     def cut_force(self) -> NDArray[np.float64]:
         """Return zero: there is no cut."""
@@ -82,11 +88,6 @@ class Macro:
         self.plan = plan
         self._counted = counted_cut(body)
         self.interface_work = 0.0
-
-    def run_window(self) -> None:
-        """Take one step while the meso model takes its substeps."""
-        self.begin_window()
-        self.finish_window()
 
     def begin_window(self) -> None:
         """Move, and send the cut's velocity."""
@@ -127,7 +128,7 @@ class Meso:
         self._zero = np.zeros_like(self._cut_force)
         self.interface_work = 0.0
 
-    def run_window(self) -> None:
+    def begin_window(self) -> None:
         """Take m substeps at the received velocity of the cut, then send its force."""
         motion = self.motion
         self._channels.velocities.receive(motion.velocity)
@@ -140,6 +141,9 @@ class Meso:
         add_impulse(self._counted, motion.force, -0.5 * motion.step, impulse)
         self._channels.forces.send(motion.force)
         self.interface_work -= float(np.sum(impulse * motion.velocity[self._counted]))
+
+    def finish_window(self) -> None:
+        """Do nothing: the window is done."""
 
     def cut_force(self) -> NDArray[np.float64]:
         """Return the force that was sent."""

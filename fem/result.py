@@ -8,10 +8,11 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from fem.communicators import Communicators
+from fem.communicators import Communicators, Role
 from fem.history import History
 from fem.inputs import RunInput
 from fem.model import Model
+from fem.steps import Steps
 
 FORCE_RESIDUAL_LIMIT = 1e-10
 ADDED_MASS_LIMIT = 0.05
@@ -26,9 +27,12 @@ class Timings:
     fields: float
 
 
-def write_result(comms: Communicators, request: RunInput, model: Model, history: History, timings: Timings) -> None:
-    """Write both files on rank 0; collective."""
-    summary = model_summary(comms, request, model)
+def write_result(
+    comms: Communicators, request: RunInput, built: tuple[dict[Role, Model], Steps], history: History, timings: Timings
+) -> None:
+    """Write both files on rank 0; collective. ``built`` are the models of this rank and the steps of the run."""
+    models, steps = built
+    summary = model_summary(comms, request, models, steps)
     if comms.world.rank == 0:
         history.write(request.output)
         result = {
@@ -37,7 +41,7 @@ def write_result(comms: Communicators, request: RunInput, model: Model, history:
             "effects": effects(request, summary),
             "timings": asdict(timings),
             "model": summary,
-            "parts": list(model.tables.part_names),
+            "parts": list(next(iter(models.values())).tables.part_names),
         }
         (request.output / "result.json").write_text(json.dumps(result, indent=1))
 
@@ -47,20 +51,20 @@ def quantity(value: Any, unit: str = "") -> dict[str, Any]:
     return {"value": value, "unit": unit}
 
 
-def model_summary(comms: Communicators, request: RunInput, model: Model) -> dict[str, Any]:
+def model_summary(comms: Communicators, request: RunInput, models: dict[Role, Model], steps: Steps) -> dict[str, Any]:
     """Return sizes, steps and masses of the run; collective, complete on all ranks."""
-    cells = comms.world.allgather((comms.role, len(model.body.local.cells)))
-    nodes = dict(comms.world.allgather((comms.role, model.tables.nodes)))
-    moved = comms.world.allreduce(model.tables.moved, MPI.MAX)
-    ties = comms.world.allgather((comms.role, len(model.tables.tie.slave)))
-    steps, plan = model.steps, model.steps.plan
+    mine = {role: (len(model.body.local.cells), model.tables.nodes) for role, model in models.items()}
+    everyone = comms.world.allgather(mine)
+    tables = [model.tables for model in models.values()]
+    plan = steps.plan
     return {
         "mode": request.mode,
         "ranks": comms.world.size,
-        "elements": {role: sum(count for name, count in cells if name == role) for role in nodes},
-        "nodes": nodes,
-        "tied_nodes": sum(dict(ties).values()),
-        "largest_tie_move": moved,
+        "placement": request.shock.ranks.placement if request.mode == "two_scale" else "shared",
+        "elements": {role: sum(rank[role][0] for rank in everyone if role in rank) for role in comms.first},
+        "nodes": {role: next(rank[role][1] for rank in everyone if role in rank) for role in comms.first},
+        "tied_nodes": comms.world.allreduce(max(len(item.tie.slave) for item in tables), MPI.MAX),
+        "largest_tie_move": comms.world.allreduce(max(item.moved for item in tables), MPI.MAX),
         "critical_steps": steps.critical,
         "cut_critical_step": steps.cut,
         "window": plan.window,

@@ -49,9 +49,9 @@ def start(directory: Path, ranks: int, **changes) -> subprocess.CompletedProcess
     )
 
 
-def history(directory: Path, ranks: tuple[int, int], mode: str) -> dict[str, np.ndarray]:
-    output = directory / f"{mode}_{ranks[0]}_{ranks[1]}"
-    shock = SHOCK | {"ranks": {"macro": ranks[0], "meso": ranks[1]}}
+def history(directory: Path, ranks: tuple[int, int], mode: str, placement: str = "split") -> dict[str, np.ndarray]:
+    output = directory / f"{mode}_{ranks[0]}_{ranks[1]}_{placement}"
+    shock = SHOCK | {"ranks": {"macro": ranks[0], "meso": ranks[1], "placement": placement}}
     done = start(directory, sum(ranks), mode=mode, shock=shock, output=str(output))
     assert done.returncode == 0, done.stderr
     result = json.loads((output / "result.json").read_text())
@@ -82,6 +82,10 @@ def reference(assembly) -> dict[str, np.ndarray]:
 @pytest.mark.parametrize("ranks", [(1, 2), (2, 1)])
 def test_two_scale_is_the_same_on_more_ranks(assembly, reference, ranks):
     assert_same(reference, history(assembly, ranks, "two_scale"))
+
+
+def test_two_scale_is_the_same_when_ranks_carry_both_models(assembly, reference):
+    assert_same(reference, history(assembly, (1, 1), "two_scale", "shared"))
 
 
 def test_dns_is_the_same_on_one_and_two_ranks(assembly):
@@ -128,7 +132,7 @@ def test_crash_of_one_rank_ends_all(assembly, tmp_path):
         "from mpi4py import MPI\n"
         "import fem.participant, fem.__main__ as program\n"
         "def broken(self): raise ZeroDivisionError('broken rank')\n"
-        "fem.participant.Meso.run_window = broken\n"
+        "fem.participant.Meso.begin_window = broken\n"
         "sys.exit(program.main(sys.argv[1:]))\n"
     )
     path = tmp_path / "input.json"

@@ -47,7 +47,7 @@ class Window:
 
     def run(self) -> None:
         self.macro.begin_window()
-        self.meso.run_window()
+        self.meso.begin_window()
         self.macro.finish_window()
 
     def apply(self, state: np.ndarray) -> np.ndarray:

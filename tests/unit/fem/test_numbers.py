@@ -75,7 +75,7 @@ def test_window_is_below_both_limits_and_divides_the_duration():
 
 def test_prediction_of_equal_ranks():
     plan = window_plan(1.0, 0.1, 1.0, 100.0, 10)
-    two_scale, dns = predict_seconds(10000, 1000, plan, (1, 1), rate=1e6)
+    two_scale, dns = predict_seconds(22000, 1000, plan, (1, 1), rate=1e6)
     assert two_scale == pytest.approx(100 * 0.01, rel=0.01)
     assert dns == pytest.approx(100 * 0.055, rel=0.01)
 
