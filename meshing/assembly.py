@@ -3,13 +3,14 @@
 Joints are not in it: they are meshed after reflow and tied to ``board_side`` and ``package_side``.
 """
 
+from collections.abc import Iterable
 from itertools import chain
 from pathlib import Path
 
 import gmsh
 import numpy as np
 
-from meshing.blocks import MILLI, RoundHole, Surfaces, extrude, plan_surfaces
+from meshing.blocks import MILLI, Block, RoundHole, Surfaces, extrude, plan_surfaces
 from meshing.gmsh_session import gmsh_model, name_groups, write_msh
 from meshing.pads import lift
 from meshing.parameters import Board, Package, Warpage
@@ -129,7 +130,7 @@ def _check_elements() -> None:
         raise ValueError(f"assembly: smallest scaled Jacobian {worst:.3g}, allowed > 0")
 
 
-def _select(surfaces: Surfaces, blocks) -> Surfaces:
+def _select(surfaces: Surfaces, blocks: Iterable[Block]) -> Surfaces:
     return {block: surfaces[block] for block in sorted(blocks)}
 
 

@@ -87,7 +87,9 @@ def _transfinite_surface(sides: list[int]) -> int:
     return surface
 
 
-def _ring_around_hole(hole: RoundHole, centre, corners: list[int], sides: list[tuple[int, int]]) -> list[int]:
+def _ring_around_hole(
+    hole: RoundHole, centre: tuple[float, float, float], corners: list[int], sides: list[tuple[int, int]]
+) -> list[int]:
     """Four blocks between the circle and the square: spokes from the circle's diagonals to the corners."""
     geo = gmsh.model.geo
     middle, radius = geo.addPoint(*centre), hole.radius / MILLI

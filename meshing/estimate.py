@@ -1,10 +1,13 @@
 """Element counts and smallest lengths of the meshes, from parameters alone (for ``plan``)."""
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
-from meshing.pads import has_rim, pad_table
+from meshing.pads import PadSite, has_rim, pad_table
 from meshing.parameters import Board, Package, Warpage
 from meshing.plan import Interval, Plan, blocks_within, board_plan, footprint, hole_rings, package_plan, patch
+
+FLAT = Warpage()
 
 
 @dataclass(frozen=True, slots=True)
@@ -15,12 +18,14 @@ class PartEstimate:
     smallest: tuple[float, float, float]
 
 
-def count_elements(package: Package, board: Board) -> dict[str, PartEstimate]:
+def count_elements(package: Package, board: Board, warpage: Warpage = FLAT) -> dict[str, PartEstimate]:
     """Count the hexahedra of every part; the joints' ``solder`` and ``copper`` are summed over the array.
 
-    The counts are exact; lengths of joint elements are those of a cylinder of the wetted radius.
+    The counts are exact as long as solder reaches the edge of its pad or mask; lengths of joint elements are those of a
+    cylinder of the smallest wetted radius and gap.
     """
-    parts = _board_estimates(package, board) | _package_estimates(package, board) | _joint_estimates(package, board)
+    joints = pad_table(package, board, warpage)
+    parts = _board_estimates(package, board) | _package_estimates(package, board) | _joint_estimates(package, joints)
     return {name: part for name, part in parts.items() if part.elements}
 
 
@@ -54,27 +59,26 @@ def _package_estimates(package: Package, board: Board) -> dict[str, PartEstimate
     }
 
 
-def _joint_estimates(package: Package, board: Board) -> dict[str, PartEstimate]:
-    joints = len(pad_table(package, board, Warpage()))
+def _joint_estimates(package: Package, joints: list[PadSite]) -> dict[str, PartEstimate]:
     numerics = package.joint_numerics
     section = numerics.core**2 + 4 * numerics.core * numerics.rings
     pads = (package.board_pad, package.package_pad)
     edge = min(pad.wetted_radius for pad in pads) / (0.5 * numerics.core + numerics.rings)
-    height = package.standoff / numerics.layers
-    parts = {"solder": PartEstimate(joints * section * numerics.layers, (edge, edge, height))}
+    height = min((site.gap for site in joints), default=package.standoff) / numerics.layers
+    parts = {"solder": PartEstimate(len(joints) * section * numerics.layers, (edge, edge, height))}
     if package.copper.layout == "pads":
         rims = sum(has_rim(0.5 * pad.diameter, pad.wetted_radius) for pad in pads)
-        cells = joints * (2 * section + rims * 4 * numerics.core)
+        cells = len(joints) * (2 * section + rims * 4 * numerics.core)
         parts["copper"] = PartEstimate(cells, (edge, edge, package.copper.thickness))
     return parts
 
 
-def _plate(package: Package, plan: Plan, blocks) -> PartEstimate:
+def _plate(package: Package, plan: Plan, blocks: Collection[tuple[int, int]]) -> PartEstimate:
     cells = _cells(plan, blocks) if package.copper.layout == "plate" else 0
     return PartEstimate(cells, (_smallest(plan.x), _smallest(plan.y), package.copper.thickness))
 
 
-def _cells(plan: Plan, blocks) -> int:
+def _cells(plan: Plan, blocks: Collection[tuple[int, int]]) -> int:
     return sum(plan.x[i].cells * plan.y[j].cells for i, j in blocks)
 
 

@@ -3,12 +3,17 @@
 import json
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
 
 from meshing.parameters import Board, Package, Warpage
 
 # JEDEC JEP95 design guide 4.5: row letters skip those that look like digits or other letters.
 ROW_LETTERS = "ABCDEFGHJKLMNPRTUVWY"
 SMALLEST_RIM = 1.02  # pad over wetted radius; a thinner rim counts as wetted, its slivers would rule the time step
+
+Length = TypeVar("Length", float, np.ndarray)
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,8 +87,8 @@ def has_rim(pad_radius: float, wetted_radius: float) -> bool:
     return pad_radius > SMALLEST_RIM * wetted_radius
 
 
-def lift(package: Package, warpage: Warpage, x, y):
-    """Return the warpage of the package at (x, y) [m]; a single joint has none."""
+def lift(package: Package, warpage: Warpage, x: Length, y: Length) -> Length:
+    """Return the warpage of the package at (x, y), scalars or arrays [m]; a single joint has none."""
     corner_x, corner_y = corner_axis(package)
     if corner_x == corner_y == 0.0:
         return 0.0 * x

@@ -130,3 +130,10 @@ def test_estimate_counts_what_is_meshed(tmp_path, symmetry, copper):
     estimate = count_elements(the_package, the_board)
     counts = write_assembly(the_package, the_board, Warpage(), tmp_path / "assembly.msh")
     assert {name: estimate[name].elements for name in counts} == counts
+
+
+def test_estimate_of_solder_follows_the_smallest_gap():
+    flat, bent = (count_elements(package(), board(), Warpage(corner=corner))["solder"] for corner in (0.0, -0.06 * MM))
+    assert flat.smallest[2] == pytest.approx(0.31 * MM / 6)
+    assert bent.smallest[2] == pytest.approx(0.25 * MM / 6)
+    assert bent.elements == flat.elements
