@@ -99,16 +99,27 @@ def _sizes(case: Case, outlook: Forecast) -> Table:
 
 
 def _shock(case: Case, outlook: Forecast) -> Table:
-    shock, ranks = outlook.shock, case.shock.ranks
-    every = ranks.macro + ranks.meso
+    shock, every = outlook.shock, case.shock.ranks.macro + case.shock.ranks.meso
     table = _table("\nShock", "what", "value", "remark")
     table.add_row("window", nano(shock.window), f"step of the macro model, {shock.windows} windows")
     table.add_row("step ratio m", f"{shock.substeps}", f"meso step {nano(shock.window / shock.substeps)}")
-    places = f"ranks 0-{ranks.macro - 1} macro, {ranks.macro}-{every - 1} meso, on {available_cores()} cores"
-    table.add_row("two-scale", f"about {duration(shock.two_scale)}", places + _absent("two_scale", case))
+    table.add_row("two-scale", f"about {duration(shock.two_scale)}", _placement(case) + _absent("two_scale", case))
     table.add_row("DNS", f"about {duration(shock.dns)}", f"all {every} ranks on one model" + _absent("dns", case))
     table.add_row("two-scale / DNS", f"{shock.two_scale / shock.dns:.2f}", "predicted ratio of wall times")
     return table
+
+
+def _placement(case: Case) -> str:
+    """Say which MPI rank works on which model."""
+    ranks, cores = case.shock.ranks, f"on {available_cores()} cores"
+    if ranks.placement == "shared":
+        return f"all {ranks.macro + ranks.meso} ranks on both models in turn, {cores}"
+    macro, meso = _span(0, ranks.macro), _span(ranks.macro, ranks.meso)
+    return f"{macro} macro, {meso} meso, at the same time, {cores}"
+
+
+def _span(first: int, count: int) -> str:
+    return f"rank {first}" if count == 1 else f"ranks {first}-{first + count - 1}"
 
 
 def _absent(mode: str, case: Case) -> str:
