@@ -2,6 +2,7 @@
 
 import json
 import os
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -101,7 +102,7 @@ def _is_newer(run_folder: Path, before: Stage, after: Stage) -> bool:
     return all(path.exists() for path in paths) and paths[0].stat().st_mtime > paths[1].stat().st_mtime
 
 
-def _flat(table: dict, prefix: str = ""):
+def _flat(table: dict, prefix: str = "") -> Iterator[tuple[str, object]]:
     for key, value in table.items():
         if isinstance(value, dict):
             yield from _flat(value, f"{prefix}{key}.")

@@ -2,6 +2,7 @@
 
 import json
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 from workflow.launch import launch, mpi_command
@@ -45,7 +46,7 @@ def read_results(folder: Path) -> dict[str, dict]:
     }
 
 
-def _pass_on(line: str, progress) -> None:
+def _pass_on(line: str, progress: Callable[[float], None]) -> None:
     """Show how far a run is, if a line of its output says so."""
     if line.startswith('{"progress"'):
         progress(json.loads(line)["progress"])
