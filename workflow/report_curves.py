@@ -6,7 +6,7 @@ import matplotlib
 import numpy as np
 
 matplotlib.use("Agg")
-from matplotlib import pyplot  # noqa: E402  (the backend must be chosen first)
+from matplotlib import pyplot
 
 MODE_STYLE = {
     "two_scale": {"color": "#0b5fa5", "linestyle": "-", "linewidth": 1.6, "label": "two-scale"},
@@ -106,9 +106,7 @@ def _map_panel(axis, joints: list[dict], key: str, label: str) -> None:
     middle = 0.5 * (values.min() + values.max())
     for joint, value, px, py in zip(joints, values, x, y, strict=True):
         color = "white" if value <= middle else "black"
-        axis.annotate(
-            f"{joint['name']}\n{value:.0f}", (px, py), ha="center", va="center", fontsize=6.5, color=color
-        )
+        axis.annotate(f"{joint['name']}\n{value:.0f}", (px, py), ha="center", va="center", fontsize=6.5, color=color)
     axis.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal")
     axis.margins(0.14)
     axis.figure.colorbar(marks, ax=axis, label=label)

@@ -31,9 +31,16 @@ def render_shapes(surface_folder: Path, joints: list[dict], picture: Path) -> No
         surface = pyvista.read(surface_folder / f"{joint['shape']}.vtu")
         _add_shape(plotter, surface, joint, (column * spacing, 0.0, -row * spacing), limits)
     plotter.add_scalar_bar(
-        title="radius [um]", n_labels=3, fmt="%.0f", vertical=False, position_x=0.36, position_y=0.01, width=0.28,
-        height=70 / plotter.window_size[1], color="black",
-    )  # fmt: skip
+        title="radius [um]",
+        n_labels=3,
+        fmt="%.0f",
+        vertical=False,
+        position_x=0.36,
+        position_y=0.01,
+        width=0.28,
+        height=70 / plotter.window_size[1],
+        color="black",
+    )
     centre = (0.5 * (columns - 1) * spacing, 0.0, -0.5 * (rows - 1) * spacing)
     plotter.camera_position = [(centre[0], -100.0, centre[2] + 14.0), centre, (0.0, 0.0, 1.0)]
     plotter.enable_parallel_projection()
@@ -61,26 +68,44 @@ def render_joints(folder: Path, history: dict, parts: list[str], picture: Path) 
     grid["von Mises [MPa]"] = grid.cell_data["von_mises"] / MEGA
     plotter = _plotter((1800, 1000))
     plotter.add_mesh(
-        _of_role(grid, parts, "solder"), scalars="von Mises [MPa]", cmap="turbo", clim=(0.0, float(1.0e-6 * stress.max())),
-        scalar_bar_args={"vertical": True, "position_x": 0.88, "position_y": 0.3, "height": 0.5, "color": "black", "n_labels": 4, "fmt": "%.0f"},
-    )  # fmt: skip
+        _of_role(grid, parts, "solder"),
+        scalars="von Mises [MPa]",
+        cmap="turbo",
+        clim=(0.0, float(1.0e-6 * stress.max())),
+        scalar_bar_args={
+            "vertical": True,
+            "position_x": 0.88,
+            "position_y": 0.3,
+            "height": 0.5,
+            "color": "black",
+            "n_labels": 4,
+            "fmt": "%.0f",
+        },
+    )
     plotter.add_mesh(_of_role(grid, parts, "copper"), color="#b87333")
-    plotter.add_mesh(_of_role(grid, parts, "board_patch"), color="#9cc9a7", show_edges=True, edge_color="#5d8f6b", line_width=0.5)
+    plotter.add_mesh(
+        _of_role(grid, parts, "board_patch"), color="#9cc9a7", show_edges=True, edge_color="#5d8f6b", line_width=0.5
+    )
     for role, colour in (("substrate", "#c9a227"), ("die", "#5b6770")):
         outline = _of_role(grid, parts, role).extract_surface(algorithm="dataset_surface").extract_feature_edges(60)
         plotter.add_mesh(outline, color=colour, line_width=3)
     mark = _of_role(grid, parts, f"solder@{critical}")
     plotter.add_point_labels(
-        [(mark.center[0], mark.center[1], mark.bounds[5] + 0.05)], [critical], font_size=26, text_color="#b3261e",
-        shape=None, show_points=False, always_visible=True,
-    )  # fmt: skip
+        [(mark.center[0], mark.center[1], mark.bounds[5] + 0.05)],
+        [critical],
+        font_size=26,
+        text_color="#b3261e",
+        shape=None,
+        show_points=False,
+        always_visible=True,
+    )
     plotter.camera_position = [(1.5, 1.15, 0.75), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)]
     plotter.reset_camera()
     plotter.camera.zoom(1.4)
     _save(plotter, picture)
     return (
-        f"Von Mises stress in the joints at {1e3 * time:.3f} ms, seen from the package's corner; the package is drawn as "
-        f"an outline. The scale ends at {critical}'s average at its worse pad; single elements reach more."
+        f"Von Mises stress in the joints at {1e3 * time:.3f} ms, seen from the package's corner; the package is drawn "
+        f"as an outline. The scale ends at {critical}'s average at its worse pad; single elements reach more."
     )
 
 
@@ -95,12 +120,27 @@ def render_board(folder: Path, history: dict, picture: Path) -> str:
     bent.points = bent.points / MILLI
     plotter = _plotter((1800, 900))
     plotter.add_mesh(
-        bent, scalars="deflection [mm]", cmap="coolwarm", show_edges=True, edge_color="#55606b", line_width=0.4,
-        scalar_bar_args={"vertical": True, "position_x": 0.88, "position_y": 0.3, "height": 0.5, "color": "black", "n_labels": 4, "fmt": "%.1f"},
-    )  # fmt: skip
+        bent,
+        scalars="deflection [mm]",
+        cmap="coolwarm",
+        show_edges=True,
+        edge_color="#55606b",
+        line_width=0.4,
+        scalar_bar_args={
+            "vertical": True,
+            "position_x": 0.88,
+            "position_y": 0.3,
+            "height": 0.5,
+            "color": "black",
+            "n_labels": 4,
+            "fmt": "%.1f",
+        },
+    )
     flat = grid.copy()
     flat.points = flat.points / MILLI
-    plotter.add_mesh(flat.extract_surface(algorithm="dataset_surface").extract_feature_edges(60), color="#8a949e", line_width=1.5)
+    plotter.add_mesh(
+        flat.extract_surface(algorithm="dataset_surface").extract_feature_edges(60), color="#8a949e", line_width=1.5
+    )
     plotter.camera_position = [(-0.8, -1.8, 0.7), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)]
     plotter.reset_camera()
     plotter.camera.zoom(1.5)
@@ -119,9 +159,15 @@ def _add_shape(plotter: pyvista.Plotter, surface, joint: dict, place: tuple, lim
     )
     label = f"{joint['name']}  {1e6 * joint['standoff']:.0f} x {1e6 * joint['max_width']:.0f} um"
     plotter.add_point_labels(
-        [(place[0], 0.0, surface.points[:, 2].max() + 0.12)], [label], shape=None, font_size=17, text_color="black",
-        show_points=False, always_visible=True, justification_horizontal="center",
-    )  # fmt: skip
+        [(place[0], 0.0, surface.points[:, 2].max() + 0.12)],
+        [label],
+        shape=None,
+        font_size=17,
+        text_color="black",
+        show_points=False,
+        always_visible=True,
+        justification_horizontal="center",
+    )
 
 
 def _of_role(grid: pyvista.UnstructuredGrid, parts: list[str], role: str) -> pyvista.UnstructuredGrid:
@@ -132,7 +178,9 @@ def _of_role(grid: pyvista.UnstructuredGrid, parts: list[str], role: str) -> pyv
 
 def _radius_limits(joints: list[dict]) -> tuple[float, float]:
     """Colour range [um] from the narrowest contact to the widest joint, the same for all."""
-    narrow = min(min(joint["contact_radius_board"], joint["contact_radius_package"], 0.5 * joint["waist"]) for joint in joints)
+    narrow = min(
+        min(joint["contact_radius_board"], joint["contact_radius_package"], 0.5 * joint["waist"]) for joint in joints
+    )
     return 1.0e6 * narrow, 0.5e6 * max(joint["max_width"] for joint in joints)
 
 

@@ -23,8 +23,19 @@ COMPARISON = (
     ("two_scale_dns_time_ratio", "wall time, two-scale over DNS on as many ranks"),
 )
 PACKAGES = (
-    "numpy", "scipy", "numba", "gmsh", "meshio", "pyvista", "fenics-dolfinx", "petsc4py", "mpi4py", "pydantic", "pint", "snakemake",
-)  # fmt: skip
+    "numpy",
+    "scipy",
+    "numba",
+    "gmsh",
+    "meshio",
+    "pyvista",
+    "fenics-dolfinx",
+    "petsc4py",
+    "mpi4py",
+    "pydantic",
+    "pint",
+    "snakemake",
+)
 
 
 MODEL_ROWS = (
@@ -49,7 +60,12 @@ def headline(metrics: dict) -> list[dict]:
 def health_rows(health: dict) -> list[dict]:
     """One record a check: name, value, limit (texts) and ok."""
     return [
-        {"name": name.replace("_", " "), "value": number(check["value"]), "limit": number(check["limit"]), "ok": check["ok"]}
+        {
+            "name": name.replace("_", " "),
+            "value": number(check["value"]),
+            "limit": number(check["limit"]),
+            "ok": check["ok"],
+        }
         for name, check in health.items()
     ]
 
@@ -63,7 +79,9 @@ def parameters(case) -> dict:
 
 def effects(records: dict) -> dict:
     """Which effects were simulated, and why."""
-    rows = [[name.replace("_", " "), "on" if record["on"] else "off", record["why"]] for name, record in records.items()]
+    rows = [
+        [name.replace("_", " "), "on" if record["on"] else "off", record["why"]] for name, record in records.items()
+    ]
     return {"head": ["effect", "state", "why"], "rows": rows}
 
 
@@ -94,20 +112,32 @@ def joint_records(run_folder: Path) -> list[dict]:
 def shapes(joints: list[dict]) -> dict:
     """One row a distinct shape, by increasing standoff."""
     head = [
-        "joints", "standoff [µm]", "max. width [µm]", "width error", "axial force [mN]", "volume drift", "mesh volume error", "min. scaled Jacobian",
-    ]  # fmt: skip
+        "joints",
+        "standoff [µm]",
+        "max. width [µm]",
+        "width error",
+        "axial force [mN]",
+        "volume drift",
+        "mesh volume error",
+        "min. scaled Jacobian",
+    ]
     names: dict[str, list[str]] = {}
     for joint in joints:
         names.setdefault(joint["shape"], []).append(joint["name"])
     firsts = {joint["shape"]: joint for joint in reversed(joints)}
     rows = [
         [
-            " ".join(names[shape]), micro(joint["standoff"]), micro(joint["max_width"]), percent(joint["width_error"]),
-            f"{1e3 * joint['axial_force']:+.3f}", percent(joint["volume_drift"], 4), percent(joint["volume_error"], 3),
+            " ".join(names[shape]),
+            micro(joint["standoff"]),
+            micro(joint["max_width"]),
+            percent(joint["width_error"]),
+            f"{1e3 * joint['axial_force']:+.3f}",
+            percent(joint["volume_drift"], 4),
+            percent(joint["volume_error"], 3),
             f"{joint['minimum_scaled_jacobian']:.2f}",
         ]
         for shape, joint in sorted(firsts.items(), key=lambda item: item[1]["standoff"])
-    ]  # fmt: skip
+    ]
     return {"head": head, "rows": rows}
 
 
@@ -122,13 +152,26 @@ def ranked_joints(history: dict, joints: list[dict]) -> dict:
         side = "board" if history["von_mises_board"][row, column] == at_pads[row, column] else "package"
         rows.append(
             [
-                name, mega(at_pads[row, column]), side, f"{1e3 * history['time'][row]:.3f}", mega(peel[:, column].max()),
-                mega(history["von_mises_max"][:, column].max()), micro(shape[name]["standoff"]), micro(shape[name]["max_width"]),
+                name,
+                mega(at_pads[row, column]),
+                side,
+                f"{1e3 * history['time'][row]:.3f}",
+                mega(peel[:, column].max()),
+                mega(history["von_mises_max"][:, column].max()),
+                micro(shape[name]["standoff"]),
+                micro(shape[name]["max_width"]),
             ]
-        )  # fmt: skip
+        )
     head = [
-        "joint", "von Mises at pad [MPa]", "pad", "time [ms]", "peel stress [MPa]", "largest in an element [MPa]", "standoff [µm]", "width [µm]",
-    ]  # fmt: skip
+        "joint",
+        "von Mises at pad [MPa]",
+        "pad",
+        "time [ms]",
+        "peel stress [MPa]",
+        "largest in an element [MPa]",
+        "standoff [µm]",
+        "width [µm]",
+    ]
     return {"head": head, "rows": rows}
 
 
@@ -138,7 +181,10 @@ def late_peak(history: dict) -> str:
     if np.argmax(at_pads) < len(at_pads) - max(2, len(at_pads) // 50):
         return ""
     end = 1e3 * history["time"][-1]
-    return f"The stress is still rising when the simulated time ends ({end:.3g} ms): a longer shock.duration gives a higher peak."
+    return (
+        f"The stress is still rising when the simulated time ends ({end:.3g} ms): "
+        "a longer shock.duration gives a higher peak."
+    )
 
 
 def comparison(metrics: dict) -> dict | None:
@@ -162,7 +208,8 @@ def models(results: dict[str, dict]) -> dict:
     rows = [[label, *(text(record) for record in records)] for label, text in MODEL_ROWS]
     roles = dict.fromkeys(role for record in records for role in record["critical_steps"])
     rows += [
-        [f"critical time step, {role}", *(nano(record["critical_steps"].get(role)) for record in records)] for role in roles
+        [f"critical time step, {role}", *(nano(record["critical_steps"].get(role)) for record in records)]
+        for role in roles
     ]
     return {"head": ["model", *(_mode(mode) for mode in results)], "rows": rows}
 

@@ -3,6 +3,7 @@
 import hashlib
 import json
 from pathlib import Path
+from typing import Any
 
 from workflow import __version__
 
@@ -20,7 +21,7 @@ def collect_summary(run_folder: Path, case_name: str) -> dict:
         The contents of ``summary.json``: case, version, inputs_sha256, metrics, timings [s], effects, health.
         A stage that has not run contributes nothing.
     """
-    summary = {
+    summary: dict[str, Any] = {
         "case": case_name,
         "version": __version__,
         "inputs_sha256": inputs_digest(run_folder),

@@ -62,7 +62,11 @@ def test_quantities_read_as_an_engineer_writes_them(name, metric, text):
 
 def test_curves_are_inline_svg(history):
     joints = [{"name": "A10", "x": 4.5e-3, "y": 4.5e-3, **JOINT}, {"name": "A9", "x": 3.5e-3, "y": 4.5e-3, **JOINT}]
-    for drawing in (array_map(joints), history_curves({"two_scale": history, "dns": history}, "A10"), energy_curves(history)):
+    for drawing in (
+        array_map(joints),
+        history_curves({"two_scale": history, "dns": history}, "A10"),
+        energy_curves(history),
+    ):
         assert drawing.startswith("<svg") and drawing.rstrip().endswith("</svg>")
 
 
