@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-COMPARED = ("die_centre", "board_centre", "board_strain")
+COMPARED = {"die_displacement": "die_centre", "board_displacement": "board_centre", "board_strain": "board_strain"}
 
 
 def relative_error(values: NDArray[np.float64], reference: NDArray[np.float64]) -> float:
@@ -19,8 +19,8 @@ def compare_histories(two_scale: Path, dns: Path) -> dict[str, float | str]:
 
     Returns:
         ``critical_joint`` (largest interface-averaged von Mises of the DNS); relative L2 errors:
-        ``critical_joint_stress_error`` (its board and package side), ``worst_joint_stress_error``, and ``<name>_error``
-        for both centres and the board strain.
+        ``critical_joint_stress_error`` (its board and package side), ``worst_joint_stress_error``, and ``die_displacement_error``
+        and ``board_displacement_error`` (their centres), ``board_strain_error``.
 
     Raises:
         ValueError: The files have different sample times or joints.
@@ -30,7 +30,9 @@ def compare_histories(two_scale: Path, dns: Path) -> dict[str, float | str]:
     same = len(ours["time"]) == len(reference["time"]) and np.allclose(ours["time"], reference["time"], rtol=1e-9)
     if not same or not np.array_equal(ours["joints"], reference["joints"]):
         raise ValueError(f"{two_scale} and {dns} have different sample times or joints and cannot be compared")
-    result: dict[str, float | str] = {f"{name}_error": relative_error(ours[name], reference[name]) for name in COMPARED}
+    result: dict[str, float | str] = {
+        f"{name}_error": relative_error(ours[array], reference[array]) for name, array in COMPARED.items()
+    }
     if len(reference["joints"]):
         result |= joint_errors(ours, reference)
     return result

@@ -53,14 +53,13 @@ class History:
     def _row(
         self, time: float, watched: NDArray[np.float64], maxima: NDArray[np.float64]
     ) -> dict[str, NDArray[np.float64] | float]:
-        high, low = maxima[-2], -maxima[-1]
         row: dict[str, NDArray[np.float64] | float] = {
             "time": time,
             "base_acceleration": self._load.base(time),
             "board_centre": watched[:3],
             "die_centre": watched[3:6],
             "von_mises_max": maxima[:-2],
-            "board_strain": high if high >= -low else low,
+            "board_strain": max(maxima[-2:]),
         }
         return row | dict(zip(LAYERS, watched[6:].reshape(len(LAYERS), -1), strict=True))
 

@@ -120,7 +120,7 @@ def _draw_histories(axes, mode: str, history: dict, critical_joint: str) -> None
     axes[0, 1].plot(time, history["die_centre"][:, 2] / MILLI, **style)
     axes[0, 1].set_ylabel("die centre, relative to table [mm]")
     axes[1, 0].plot(time, 1.0e3 * history["board_strain"], **style)
-    axes[1, 0].set_ylabel("board strain under the package [1e-3]")
+    axes[1, 0].set_ylabel("largest board strain under the package [1e-3]")
     stress = np.maximum(history["von_mises_board"][:, column], history["von_mises_package"][:, column])
     axes[1, 1].plot(time, stress / 1.0e6, **style)
     axes[1, 1].set_ylabel(f"von Mises at the pads of {critical_joint} [MPa]")

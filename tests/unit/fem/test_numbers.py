@@ -132,7 +132,7 @@ def test_comparison_is_relative_to_the_dns(tmp_path):
     ours, reference = write_history(tmp_path / "a.npz", 1.1), write_history(tmp_path / "b.npz", 1.0)
     found = compare_histories(ours, reference)
     assert found["critical_joint"] == "A2"
-    for name in ("critical_joint_stress_error", "die_centre_error", "board_centre_error", "worst_joint_stress_error"):
+    for name in ("critical_joint_stress_error", "die_displacement_error", "board_displacement_error", "worst_joint_stress_error"):
         assert found[name] == pytest.approx(0.1)
 
 
