@@ -19,8 +19,8 @@ def compare_histories(two_scale: Path, dns: Path) -> dict[str, float | str]:
 
     Returns:
         ``critical_joint`` (largest interface-averaged von Mises of the DNS); relative L2 errors:
-        ``critical_joint_stress_error`` (its board and package side), ``worst_joint_stress_error``, and ``die_displacement_error``
-        and ``board_displacement_error`` (their centres), ``board_strain_error``.
+        ``critical_joint_stress_error`` (its board and package side), ``worst_joint_stress_error``,
+        ``die_displacement_error`` and ``board_displacement_error`` (their centres), ``board_strain_error``.
 
     Raises:
         ValueError: The files have different sample times or joints.

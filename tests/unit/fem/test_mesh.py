@@ -26,7 +26,8 @@ def test_file_comes_back_as_it_was_written(tmp_path):
 
 def test_file_without_hexahedra_is_an_error(tmp_path):
     path = tmp_path / "points.msh"
-    path.write_text("$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Nodes\n0 0 0 0\n$EndNodes\n$Elements\n0 0 0 0\n$EndElements\n")
+    header = "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n"
+    path.write_text(header + "$Nodes\n0 0 0 0\n$EndNodes\n$Elements\n0 0 0 0\n$EndElements\n")
     with pytest.raises((MeshError, ValueError)):
         read_mesh(path)
 
