@@ -3,43 +3,15 @@
 Exit code 0 when the results are written; 1, with a message on standard error, when any rank fails.
 """
 
-import json
+import os
 import sys
-import traceback
-from pathlib import Path
-
-from mpi4py import MPI
-
-from fem.agreement import agreed
-from fem.errors import AgreedError, EnergyError, RankError
-from fem.inputs import RunInput
-from fem.run import run
-
-
-def main(arguments: list[str]) -> int:
-    """Run the input file named by the only argument; return the exit code."""
-    world = MPI.COMM_WORLD
-    try:
-        request = agreed(world, lambda: read_input(arguments))
-        run(world, request)
-    except (AgreedError, EnergyError, RankError) as error:  # raised on every rank
-        if world.rank == 0:
-            print(f"error: {error}", file=sys.stderr, flush=True)
-        return 1
-    except Exception:  # only this rank knows: tell the user, and end the ranks that wait for it
-        print(f"error on rank {world.rank}:\n{traceback.format_exc()}", file=sys.stderr, flush=True)
-        world.Abort(1)
-    return 0
-
-
-def read_input(arguments: list[str]) -> RunInput:
-    """Read the input file, and make the output directory."""
-    if len(arguments) != 1:
-        raise ValueError("usage: mpirun -n N python -m fem INPUT.json")
-    request = RunInput.model_validate(json.loads(Path(arguments[0]).read_text()))
-    request.output.mkdir(parents=True, exist_ok=True)
-    return request
-
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    # Waiting ranks of Open MPI spin; on a machine that does other work too, they should let it have the core. Read at
+    # MPI_Init, that is when mpi4py is imported.
+    os.environ.setdefault("OMPI_MCA_mpi_yield_when_idle", "1")
+    from mpi4py import MPI
+
+    from fem.program import main
+
+    sys.exit(main(MPI.COMM_WORLD, sys.argv[1:]))

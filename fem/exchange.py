@@ -111,14 +111,18 @@ class Channel:
     cut node of the source sends it to every rank that holds it of the target.
     """
 
-    def __init__(self, comm: MPI.Comm, source: NDArray[np.int32], target: NDArray[np.int32]) -> None:
+    def __init__(
+        self, comm: MPI.Comm, source: NDArray[np.int32], target: NDArray[np.int32], receiver_waits: bool
+    ) -> None:
         """Agree on who sends what; collective over all models.
 
         Args:
             comm: Communicator of all models.
             source: ``(nc,)`` local node of each cut node in the sending model, -1 where this rank has none.
             target: The same in the receiving model.
+            receiver_waits: Whether receivers are already waiting when this rank sends: it carries one model only.
         """
+        self._receiver_waits = receiver_waits
         sources = np.array(comm.allgather(source >= 0)).reshape(comm.size, -1)
         targets = np.array(comm.allgather(target >= 0)).reshape(comm.size, -1)
         sender = np.where(sources, np.arange(comm.size)[:, None], np.argmax(sources, axis=0))
@@ -135,12 +139,12 @@ class Channel:
     def send(self, values: NDArray[np.float64]) -> None:
         """Send the cut rows of ``values (n, 3)``.
 
-        Where this rank receives nothing, the receiver already waits and the wait is short: a large message makes no
-        progress while its sender computes.
+        A large message makes no progress while its sender computes, so this waits until it is taken, where receivers
+        are waiting for it. Ranks that carry both models receive at a later turn: waiting for them would never end.
         """
         pack(values, self._out_rows, self._sent)
         MPI.Prequest.Startall(self._sends)
-        if not len(self._in_rows):
+        if self._receiver_waits:
             MPI.Prequest.Waitall(self._sends)
 
     def receive(self, values: NDArray[np.float64]) -> None:
@@ -172,15 +176,18 @@ class CutChannels:
     forces: Channel
 
     @classmethod
-    def open(cls, comm: MPI.Comm, macro: NDArray[np.int32], meso: NDArray[np.int32]) -> "CutChannels":
+    def open(
+        cls, comm: MPI.Comm, macro: NDArray[np.int32], meso: NDArray[np.int32], receiver_waits: bool
+    ) -> "CutChannels":
         """Open both; collective over all models.
 
         Args:
             comm: Communicator of all models.
             macro: ``(nc,)`` local node of each cut node in this rank's macro model, -1 where it has none.
             meso: The same in its meso model.
+            receiver_waits: See ``Channel``.
         """
-        return cls(Channel(comm, macro, meso), Channel(comm, meso, macro))
+        return cls(Channel(comm, macro, meso, receiver_waits), Channel(comm, meso, macro, receiver_waits))
 
     def free(self) -> None:
         """Free both."""

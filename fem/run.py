@@ -57,7 +57,7 @@ def make_crew(
         return {"dns": Alone(bodies["dns"], [load], plan)}
     absent = np.full_like(next(iter(bodies.values())).cut, -1)
     macro, meso = (bodies[role].cut if role in bodies else absent for role in ("macro", "meso"))
-    channels = CutChannels.open(comms.world, macro, meso)
+    channels = CutChannels.open(comms.world, macro, meso, receiver_waits=len(comms.models) == 1)
     made: dict[Role, Participant] = {}
     if "meso" in bodies:  # first: it sends the interface mass that the macro model waits for
         made["meso"] = Meso(bodies["meso"], [load], plan, channels)

@@ -84,8 +84,36 @@ def test_two_scale_is_the_same_on_more_ranks(assembly, reference, ranks):
     assert_same(reference, history(assembly, ranks, "two_scale"))
 
 
-def test_two_scale_is_the_same_when_ranks_carry_both_models(assembly, reference):
-    assert_same(reference, history(assembly, (1, 1), "two_scale", "shared"))
+@pytest.mark.parametrize("ranks", [(1, 1), (1, 2)])
+def test_two_scale_is_the_same_when_ranks_carry_both_models(assembly, reference, ranks):
+    assert_same(reference, history(assembly, ranks, "two_scale", "shared"))
+
+
+def test_ranks_that_carry_both_models_do_not_wait_for_large_messages(tmp_path):
+    script = tmp_path / "turns.py"
+    script.write_text(
+        "import numpy as np\n"
+        "from mpi4py import MPI\n"
+        "from fem.exchange import Channel\n"
+        "world, count = MPI.COMM_WORLD, 50_000  # far more than Open MPI buffers\n"
+        "here, nowhere = np.arange(count, dtype=np.int32), np.full(count, -1, np.int32)\n"
+        "channel = Channel(world, *((here, nowhere) if world.rank == 0 else (nowhere, here)), receiver_waits=False)\n"
+        "values = np.full((count, 3), 7.0 if world.rank == 0 else 0.0)\n"
+        "channel.send(values)\n"
+        "world.Barrier()  # a turn of another model\n"
+        "channel.receive(values)\n"
+        "assert (values == 7.0).all()\n"
+    )
+    done = subprocess.run(
+        ["mpirun", "--allow-run-as-root", "--oversubscribe", "-n", "2", sys.executable, str(script)],
+        cwd=ROOT,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
 
 
 def test_dns_is_the_same_on_one_and_two_ranks(assembly):
@@ -130,10 +158,10 @@ def test_crash_of_one_rank_ends_all(assembly, tmp_path):
     script.write_text(
         "import sys\n"
         "from mpi4py import MPI\n"
-        "import fem.participant, fem.__main__ as program\n"
+        "import fem.participant, fem.program as program\n"
         "def broken(self): raise ZeroDivisionError('broken rank')\n"
         "fem.participant.Meso.begin_window = broken\n"
-        "sys.exit(program.main(sys.argv[1:]))\n"
+        "sys.exit(program.main(MPI.COMM_WORLD, sys.argv[1:]))\n"
     )
     path = tmp_path / "input.json"
     meshes = [str(assembly / "assembly.msh"), str(assembly / "joints.msh")]

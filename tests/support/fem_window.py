@@ -33,7 +33,7 @@ class Window:
             role: make_body(MPI.COMM_SELF, pieces[role], tables[role], np.ones(len(pieces[role].steps)))
             for role in pieces
         }
-        channels = CutChannels.open(MPI.COMM_SELF, bodies["macro"].cut, bodies["meso"].cut)
+        channels = CutChannels.open(MPI.COMM_SELF, bodies["macro"].cut, bodies["meso"].cut, receiver_waits=False)
         self.meso = Meso(bodies["meso"], list(loads), self.plan, channels)
         self.macro = Macro(bodies["macro"], list(loads), self.plan, channels)
         self._channels = channels

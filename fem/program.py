@@ -1,0 +1,37 @@
+"""The program that each rank runs: read the input, run the shock, end all ranks when one fails."""
+
+import json
+import sys
+import traceback
+from pathlib import Path
+
+from mpi4py import MPI
+
+from fem.agreement import agreed
+from fem.errors import AgreedError, EnergyError, RankError
+from fem.inputs import RunInput
+from fem.run import run
+
+
+def main(world: MPI.Comm, arguments: list[str]) -> int:
+    """Run the input file named by the only argument on all ranks of ``world``; return the exit code."""
+    try:
+        request = agreed(world, lambda: read_input(arguments))
+        run(world, request)
+    except (AgreedError, EnergyError, RankError) as error:  # raised on every rank
+        if world.rank == 0:
+            print(f"error: {error}", file=sys.stderr, flush=True)
+        return 1
+    except Exception:  # only this rank knows: tell the user, and end the ranks that wait for it
+        print(f"error on rank {world.rank}:\n{traceback.format_exc()}", file=sys.stderr, flush=True)
+        world.Abort(1)
+    return 0
+
+
+def read_input(arguments: list[str]) -> RunInput:
+    """Read the input file, and make the output directory."""
+    if len(arguments) != 1:
+        raise ValueError("usage: mpirun -n N python -m fem INPUT.json")
+    request = RunInput.model_validate(json.loads(Path(arguments[0]).read_text()))
+    request.output.mkdir(parents=True, exist_ok=True)
+    return request
