@@ -88,7 +88,7 @@ def impossible(case: Case) -> list[Problem]:
     if contradictions:
         known = {key: field for key, _, field in fields.leaves(case)}
         return [
-            Problem(found.key, "contradicts other values", _shown(found.value, known.get(found.key)), found.allowed)
+            Problem(found.key, found.message, _shown(found.value, known.get(found.key)), found.allowed)
             for found in contradictions
         ]
     geometries = joint_geometries(pad_table(case.package, case.board, case.warpage))

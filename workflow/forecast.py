@@ -100,7 +100,7 @@ def forecast_parts(case: Case) -> dict[str, PartForecast]:
         name: PartForecast(
             part.elements, box_critical_step(material_of(case, name), np.array(part.smallest)), role_of(name) in scaled
         )
-        for name, part in count_elements(case.package, case.board).items()
+        for name, part in count_elements(case.package, case.board, case.warpage).items()
     }
 
 

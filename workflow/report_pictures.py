@@ -95,6 +95,7 @@ def render_joints(folder: Path, history: dict, parts: list[str], picture: Path) 
         [critical],
         font_size=26,
         text_color="#b3261e",
+        justification_horizontal="center",
         shape=None,
         show_points=False,
         always_visible=True,
@@ -190,7 +191,7 @@ def _fields_near(folder: Path, names: tuple[str, ...], time: float) -> tuple[pyv
     reader = pyvista.get_reader(path)
     stored = min(reader.time_values, key=lambda value: abs(value - time))
     reader.set_active_time_value(stored)
-    return _linear(reader.read().combine()), stored
+    return _linear(reader.read().combine(merge_points=True)), stored
 
 
 def _linear(grid: pyvista.UnstructuredGrid) -> pyvista.UnstructuredGrid:

@@ -132,8 +132,8 @@ def shapes(joints: list[dict]) -> dict:
             micro(joint["max_width"]),
             percent(joint["width_error"]),
             f"{1e3 * joint['axial_force']:+.3f}",
-            percent(joint["volume_drift"], 4),
-            percent(joint["volume_error"], 3),
+            percent(joint["volume_drift"]),
+            percent(joint["volume_error"]),
             f"{joint['minimum_scaled_jacobian']:.2f}",
         ]
         for shape, joint in sorted(firsts.items(), key=lambda item: item[1]["standoff"])
@@ -249,7 +249,7 @@ def _mode(mode: str) -> str:
 def named_quantity(metrics: dict, name: str) -> str:
     """Text of a metric: errors as per cent, strains in microstrain, others as ``quantity``."""
     if "_error" in name:
-        return f"{100.0 * metrics[name]['value']:.2g} %"
+        return percent(metrics[name]["value"])
     if name.endswith("_strain"):
         return f"{1e6 * metrics[name]['value']:.0f} µm/m"
     return quantity(metrics[name])
@@ -288,6 +288,6 @@ def mega(value: float) -> str:
     return f"{1e-6 * value:.1f}"
 
 
-def percent(value: float, digits: int = 2) -> str:
-    """A fraction as per cent."""
-    return f"{100.0 * value:.{digits}f} %"
+def percent(value: float) -> str:
+    """A fraction as per cent, two digits."""
+    return f"{100.0 * value:.2g} %" if abs(value) >= 1.0e-6 else "< 0.0001 %"
