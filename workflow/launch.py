@@ -3,12 +3,20 @@
 import os
 import signal
 import subprocess
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 
 GRACE = 5.0  # seconds that a program has to end by itself after SIGTERM
 LAST_LINES = 15
+
+# What Open MPI leaves in the environment of a process that initialised MPI. An mpirun that inherits it takes itself for
+# a part of that job and fails (seen from notebooks and test runs that imported mpi4py).
+OTHER_MPI_JOB = (
+    "PMIX_NAMESPACE", "PMIX_RANK", "PMIX_SERVER_", "PMIX_DSTORE_", "PMIX_SECURITY_MODE", "PMIX_GDS_MODULE",
+    "PMIX_BFROP_BUFFER_TYPE", "PMIX_VERSION", "PMIX_HOSTNAME", "PMIX_SYSTEM_TMPDIR", "PMIX_MCA_psec", "ORTE_",
+    "OMPI_COMM_WORLD_", "OMPI_APP_CTX_", "OMPI_MCA_ess", "OMPI_MCA_orte_", "OMPI_MCA_pmix",
+)  # fmt: skip
 
 
 class LaunchError(RuntimeError):
@@ -42,7 +50,7 @@ def launch(command: Sequence[str], on_line: Callable[[str], None], log: Path) ->
     Raises:
         LaunchError: the program cannot be started or its exit code is not 0.
     """
-    environment = os.environ | {"OMP_NUM_THREADS": "1"}
+    environment = own_environment(os.environ) | {"OMP_NUM_THREADS": "1"}
     with log.open("w") as errors:
         try:
             process = subprocess.Popen(
@@ -60,6 +68,11 @@ def launch(command: Sequence[str], on_line: Callable[[str], None], log: Path) ->
     if code != 0:
         words = "\n".join(log.read_text(errors="replace").strip().splitlines()[-LAST_LINES:])
         raise LaunchError(f"{command[0]} ended with exit code {code}: {words}")
+
+
+def own_environment(environment: Mapping[str, str]) -> dict[str, str]:
+    """Return an environment without the traces of an MPI job that this process may be part of."""
+    return {name: value for name, value in environment.items() if not name.startswith(OTHER_MPI_JOB)}
 
 
 def end_group(process: subprocess.Popen) -> None:

@@ -44,3 +44,9 @@ def test_files_are_short(package):
 def test_import_is_light(module):
     heavy = "{'gmsh', 'numba', 'dolfinx', 'petsc4py', 'mpi4py', 'pyvista', 'matplotlib', 'vtkmodules'}"
     run_tool("-c", f"import sys, {module}; loaded = {heavy} & set(sys.modules); assert not loaded, loaded")
+
+
+@pytest.mark.parametrize("first, second", [("dolfinx", "h5py"), ("h5py", "dolfinx")])
+def test_one_hdf5_in_a_process(tmp_path, first, second):
+    file = str(tmp_path / "numbers.h5")
+    run_tool("-c", f"import {first}, {second}, h5py; h5py.File({file!r}, 'w')['numbers'] = [1.0, 2.0]")

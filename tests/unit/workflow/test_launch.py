@@ -2,6 +2,7 @@
 
 import os
 import signal
+import subprocess
 import sys
 import time
 
@@ -53,10 +54,11 @@ def test_an_interruption_ends_the_program_and_its_children(tmp_path):
     def interrupt(_line: str) -> None:
         raise KeyboardInterrupt
 
+    before = psutil.Process().children(recursive=True)
     children: list[psutil.Process] = []
 
     def look_then_interrupt(line: str) -> None:
-        children.extend(psutil.Process().children(recursive=True))
+        children.extend(set(psutil.Process().children(recursive=True)) - set(before))
         interrupt(line)
 
     start = time.perf_counter()
@@ -68,3 +70,17 @@ def test_an_interruption_ends_the_program_and_its_children(tmp_path):
     for process in alive:
         process.send_signal(signal.SIGKILL)
     assert alive == []
+
+
+def test_mpirun_starts_from_a_process_that_initialised_mpi(tmp_path):
+    launching = (
+        "from mpi4py import MPI; from workflow.launch import launch, mpi_command; from pathlib import Path; "
+        + (f"launch(mpi_command(2, ['true'], True), print, Path({str(tmp_path / 'log.txt')!r}))")
+    )
+    nested = (
+        "import subprocess, sys; from mpi4py import MPI; sys.exit(subprocess.call([sys.executable, *sys.argv[1:]]))"
+    )
+    result = subprocess.run(
+        [sys.executable, "-c", nested, "-c", launching], capture_output=True, text=True, check=False
+    )
+    assert result.returncode == 0, result.stderr
