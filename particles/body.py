@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from particles.cloud import Cloud
+from particles.plate import Plate
 from particles.surface_measure import volume_and_gradient
 
 Floats = NDArray[np.float64]
@@ -24,6 +25,7 @@ class Body:
         surface_pressure: pressure that carries the volume constraint [Pa].
         triangles: `(t, 3)` current free surface.
         volumes: `(n,)` share of each particle in the volume [m^3].
+        plates: the plates under the contact lines, where they are now.
     """
 
     cloud: Cloud
@@ -33,13 +35,21 @@ class Body:
     surface_pressure: float
     triangles: Indices
     volumes: Floats
+    plates: tuple[Plate, ...]
 
     @classmethod
     def at_rest(cls, cloud: Cloud) -> "Body":
         """Start a body at rest from its initial cloud."""
         count = len(cloud.points)
         body = cls(
-            cloud, cloud.points.copy(), np.zeros((count, 3)), np.zeros(count), 0.0, cloud.triangles, np.zeros(count)
+            cloud=cloud,
+            points=cloud.points.copy(),
+            velocity=np.zeros((count, 3)),
+            pressure=np.zeros(count),
+            surface_pressure=0.0,
+            triangles=cloud.triangles,
+            volumes=np.zeros(count),
+            plates=cloud.plates,
         )
         body.volumes = particle_volumes(cloud, body.volume()[0])
         return body
@@ -49,9 +59,22 @@ class Body:
         """The particles below the free surface, those on the walls included, `(m,)`."""
         return np.arange(self.cloud.surface_count, len(self.points), dtype=np.int32)
 
+    def move(self, time_step: float, twists: dict[int, Floats]) -> None:
+        """Displace particles by their velocity, plates by their twists `(6,)` [m/s, rad/s] with what they carry."""
+        moved = self.points + time_step * self.velocity
+        plates = list(self.plates)
+        for wall, twist in twists.items():
+            plate, plates[wall] = plates[wall], plates[wall].moved(time_step * twist)
+            on_plate = self.cloud.wall == wall
+            points = self.points[on_plate]
+            slip = self.velocity[on_plate] - plate.rigid_velocity(twist, points)
+            local = plate.local(points + time_step * slip)
+            moved[on_plate] = plates[wall].place(local * np.array([1.0, 1.0, 0.0]))
+        self.points, self.plates = moved, tuple(plates)
+
     def volume(self) -> tuple[float, Floats]:
         """Enclosed volume [m^3] and its gradient `(n, 3)` [m^2]."""
-        return volume_and_gradient(self.points, self.triangles, self.cloud.rings, self.cloud.ring_heights)
+        return volume_and_gradient(self.points, self.triangles, self.cloud.rings)
 
 
 def particle_volumes(cloud: Cloud, volume: float) -> Floats:

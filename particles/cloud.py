@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from particles.geometry import JointGeometry, joint_counts
+from particles.plate import Plate, joint_plates
 from particles.surface_measure import enclosed_volume
 
 Floats = NDArray[np.float64]
@@ -22,7 +23,7 @@ class Cloud:
         surface_count: number of surface particles, rings included.
         triangles: `(t, 3)` free surface, outward oriented, open at the walls.
         rings: one or two contact lines, each `(k,)` ordered counter-clockwise seen from +z.
-        ring_heights: z of the wall under each ring [m].
+        plates: the plate under each ring, at the start.
         wall: `(n,)` index of the wall that a particle slides on, -1 off the walls (rings are on their wall).
         spacing: mean distance of neighbours [m].
     """
@@ -31,7 +32,7 @@ class Cloud:
     surface_count: int
     triangles: Indices
     rings: tuple[Indices, ...]
-    ring_heights: tuple[float, ...]
+    plates: tuple[Plate, ...]
     wall: NDArray[np.int8]
     spacing: float
 
@@ -71,7 +72,7 @@ def joint_cloud(geometry: JointGeometry, volume: float, spacing: float) -> Cloud
 
 
 def _volume(cloud: Cloud) -> float:
-    return enclosed_volume(cloud.points, cloud.triangles, cloud.rings, cloud.ring_heights)
+    return enclosed_volume(cloud.points, cloud.triangles, cloud.rings)
 
 
 def _stack(geometry: JointGeometry, counts: tuple[int, int], bulge: float, spacing: float) -> Cloud:
@@ -97,7 +98,16 @@ def _stack(geometry: JointGeometry, counts: tuple[int, int], bulge: float, spaci
     first = np.arange(corners, dtype=np.int32)
     rings = (first, first + corners * (layer_count - 1))
     triangles = _band_triangles(corners, layer_count)
-    return Cloud(points, surface_count, triangles, rings, (0.0, geometry.gap), wall, spacing)
+    plates = joint_plates(geometry)
+    return Cloud(_lean(points, plates[1]), surface_count, triangles, rings, plates, wall, spacing)
+
+
+def _lean(points: Floats, package: Plate) -> Floats:
+    """Move upright layers, the more the higher, so that the uppermost lies on the package's plate."""
+    flat = points * np.array([1.0, 1.0, 0.0])
+    height = package.origin[2]
+    upright = flat + np.array([0.0, 0.0, height])
+    return points + points[:, 2:3] / height * (package.place(flat) - upright)
 
 
 def _circle(radius: float, height: float, count: int, turn: float) -> Floats:
@@ -142,7 +152,7 @@ def box_cloud(edge: float, count: int) -> Cloud:
     ring = np.concatenate([sheet[:-1, 0] for sheet in sheets]).astype(np.int32)
     points = lattice * (edge / last) - np.array([0.5 * edge, 0.5 * edge, 0.0])
     wall = np.where(lattice[:, 2] == 0, 0, -1).astype(np.int8)
-    return Cloud(points, int(surface.sum()), triangles, (ring,), (0.0,), wall, edge / last)
+    return Cloud(points, int(surface.sum()), triangles, (ring,), (Plate.horizontal(0.0),), wall, edge / last)
 
 
 def _grid_triangles(sheet: NDArray[np.int64]) -> NDArray[np.int64]:

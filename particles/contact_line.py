@@ -28,7 +28,7 @@ class ContactLine:
             edge_radius: radius of the vertices on the edge of the wetted disc [m]; infinite on a uniform wall.
             pad_angle: contact angle inside the edge [rad].
             mask_angle: contact angle outside it [rad].
-            radii: `(k,)` distances of the vertices from the axis [m].
+            radii: `(k,)` distances of the vertices from the centre of the pad [m].
         """
         self.wall = wall
         self.edge_radius = edge_radius
@@ -45,10 +45,10 @@ class ContactLine:
         return body.cloud.rings[self.wall][self.state == PINNED]
 
     def outward(self, body: Body) -> tuple[Floats, Floats]:
-        """Unit radial direction `(k, 3)` and length of line that each vertex stands for `(k,)` [m]."""
-        points = body.points[body.cloud.rings[self.wall]]
-        radial = points * np.array([1.0, 1.0, 0.0])
-        radial /= np.linalg.norm(radial, axis=1)[:, None]
+        """Direction away from the pad's centre `(k, 3)` and length of line that each vertex stands for `(k,)` [m]."""
+        points, plate = body.points[body.cloud.rings[self.wall]], body.plates[self.wall]
+        local = plate.local(points) * np.array([1.0, 1.0, 0.0])
+        radial = local / np.linalg.norm(local, axis=1)[:, None] @ plate.frame
         step = np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1)
         return radial, 0.5 * (step + np.roll(step, 1))
 
@@ -73,9 +73,10 @@ class ContactLine:
 
         Args: as `contact_cosine`.
         """
-        ring = body.cloud.rings[self.wall]
+        ring, plate = body.cloud.rings[self.wall], body.plates[self.wall]
         cosine = self.contact_cosine(body, load, coefficient)
-        radius = np.linalg.norm(body.points[ring, :2], axis=1)
+        local = plate.local(body.points[ring])
+        radius = np.linalg.norm(local[:, :2], axis=1)
         near = np.abs(radius - self.edge_radius) < CATCH_DISTANCE * body.cloud.spacing
         holds = near & (cosine < self._cosine[ON_PAD]) & (cosine > self._cosine[ON_MASK])
         returned_outward = (self.state == ON_PAD) & (holds | (radius >= self.edge_radius))
@@ -84,4 +85,5 @@ class ContactLine:
         self.state[held & (cosine > self._cosine[ON_PAD] + RELEASE_MARGIN)] = ON_PAD
         self.state[held & (cosine < self._cosine[ON_MASK] - RELEASE_MARGIN)] = ON_MASK
         self.state[caught] = PINNED
-        body.points[ring[caught], :2] *= (self.edge_radius / radius[caught])[:, None]
+        local[caught, :2] *= (self.edge_radius / radius[caught])[:, None]
+        body.points[ring[caught]] = plate.place(local[caught])

@@ -81,9 +81,9 @@ class LiquidFlow:
         for event in self.physics.events:
             event.update(body)
         self.neighbours.update(body.points)
-        iterations = self._accelerate()
+        iterations, twists = self._accelerate()
         before = body.points[: body.cloud.surface_count].copy()
-        body.points += self.time_step.size * body.velocity
+        body.move(self.time_step.size, twists)
         flips = self._keep_quality()
         self._correct_volume()
         self.steps += 1
@@ -92,24 +92,24 @@ class LiquidFlow:
         self.time_step.grow()
         return record
 
-    def _accelerate(self) -> int:
+    def _accelerate(self) -> tuple[int, dict[int, Floats]]:
         """Solve for velocity and pressure, again with a smaller step where a particle would move too far.
 
         Returns:
-            Iterations of the last solve.
+            Iterations of the last solve, and the twists of the plates that move.
         """
         body, first_below = self.body, self.body.cloud.surface_count
         equations = StepEquations(body, self.physics, self.neighbours, self.basis)
         while True:
             solution = solve(equations.problem(self.time_step.size, self.volume))
-            velocity = equations.expand(solution.velocity)
+            velocity, twists = equations.expand(solution.velocity, self.time_step.size)
             if self.time_step.accepts(float(np.sqrt((velocity**2).sum(axis=1).max()))):
                 break
         body.velocity = velocity
         body.surface_pressure = float(solution.pressure[-1])
         body.pressure[:] = body.surface_pressure
         body.pressure[first_below:] += solution.pressure[:-1]
-        return solution.iterations
+        return solution.iterations, twists
 
     def _keep_quality(self) -> int:
         """Flip and smooth the surface, shift the interior; return the number of flips."""
@@ -119,23 +119,24 @@ class LiquidFlow:
             body.triangles, flips = flip_to_delaunay(body.points, body.triangles, cloud.rings)
         count = cloud.surface_count
         offset = smoothing_offsets(body.points, body.triangles, count, cloud.rings)
-        body.points[:count] += np.where(self.physics.free(body)[:count], offset, 0.0)
+        offset = np.concatenate((offset, np.zeros((len(body.points) - count, 3))))
+        body.points += self.physics.admit(body, offset)
         self.neighbours.update(body.points)
         body.points[count:] += interior_shift(body, self.neighbours)
         return flips
 
     def _correct_volume(self) -> None:
         """Newton steps along the gradient of the volume."""
-        free = self.physics.free(self.body)
         for _ in range(VOLUME_PASSES):
             volume, gradient = self.body.volume()
-            gradient = np.where(free, gradient, 0.0)
+            gradient = self.physics.admit(self.body, gradient)
             self.body.points += (self.volume - volume) / (gradient**2).sum() * gradient
 
     def _record(self, before: Floats, flips: int, iterations: int) -> StepRecord:
         body, size, count = self.body, self.time_step.size, len(before)
         volume, gradient = body.volume()
-        normal = gradient[:count] / np.linalg.norm(gradient[:count], axis=1)[:, None]
+        normal = self.physics.admit(body, gradient)[:count]
+        normal /= np.maximum(np.linalg.norm(normal, axis=1), np.finfo(float).tiny)[:, None]
         moved = float(np.abs(((body.points[:count] - before) * normal).sum(axis=1)).max())
         return StepRecord(
             step=self.steps,

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from particles.body import Body
-from particles.surface_measure import ring_area, wall_side
+from particles.surface_measure import wall_corners
 
 Floats = NDArray[np.float64]
 
@@ -26,16 +26,14 @@ class Gravity:
     def energy(self, body: Body) -> float:
         """Potential energy rho g times the integral of z over the body [J], by the divergence theorem.
 
-        The integral of z^2 / 2 n_z over the free surface, exact for flat triangles, and over the walls.
+        The integral of z^2 / 2 n_z over the free surface and over the walls, exact for flat triangles.
         """
-        corners = body.points[body.triangles]
+        walls = [wall_corners(body.points, ring, wall) for wall, ring in enumerate(body.cloud.rings)]
+        corners = np.concatenate([body.points[body.triangles], *walls])
         doubled_area_z = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])[:, 2]
         z = corners[:, :, 2]
         mean_square = (z.sum(axis=1) ** 2 + (z**2).sum(axis=1)) / 12.0
-        total = 0.25 * float((mean_square * doubled_area_z).sum())
-        for wall, (ring, height) in enumerate(zip(body.cloud.rings, body.cloud.ring_heights, strict=True)):
-            total += 0.5 * wall_side(wall) * height**2 * ring_area(body.points, ring)
-        return self.weight * total
+        return self.weight * 0.25 * float((mean_square * doubled_area_z).sum())
 
     def force(self, body: Body) -> Floats:
         """Force -rho g z dV/dx, `(n, 3)` [N]."""

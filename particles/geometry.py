@@ -1,4 +1,4 @@
-"""Geometry of one joint: two coaxial wetted discs a gap apart, and the counts of its particle cloud. Plain data."""
+"""Geometry of one joint: two wetted discs a gap apart, and the counts of its particle cloud. Plain data."""
 
 from dataclasses import dataclass
 from math import ceil, pi, sqrt
@@ -6,17 +6,26 @@ from math import ceil, pi, sqrt
 
 @dataclass(frozen=True, slots=True)
 class JointGeometry:
-    """Two wetted discs: the board's at z = 0, the package's at z = gap, both centred on the z axis.
+    """Two wetted discs: the board's at z = 0 around the z axis, the package's a gap above.
 
     Attributes:
-        gap: distance of the discs [m].
+        gap: height of the centre of the package's disc [m].
         radius_board: radius of the disc that solder wets on the board [m].
         radius_package: the same on the package [m].
+        offset: x and y of the centre of the package's disc [m].
+        tilt: rotation of the package about its disc's centre: turns about the x and the y axis [rad].
     """
 
     gap: float
     radius_board: float
     radius_package: float
+    offset: tuple[float, float] = (0.0, 0.0)
+    tilt: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def is_coaxial(self) -> bool:
+        """Whether both discs are horizontal and centred on the z axis: the joint is a body of revolution."""
+        return self.offset == self.tilt == (0.0, 0.0)
 
 
 def joint_counts(geometry: JointGeometry, volume: float, spacing: float) -> tuple[int, int]:

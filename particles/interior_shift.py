@@ -6,6 +6,7 @@ from numpy.typing import NDArray
 
 from particles.body import Body
 from particles.neighbours import NeighbourList
+from particles.plate import slide
 from particles.surface_quality import vertex_normals
 
 Floats = NDArray[np.float64]
@@ -64,5 +65,4 @@ def interior_shift(body: Body, neighbours: NeighbourList) -> Floats:
     shift *= np.minimum(1.0, LARGEST_SHIFT * cloud.spacing / np.maximum(length, 1e-300))[:, None]
     normals = vertex_normals(body.points, body.triangles, cloud.surface_count)
     shift += _penetration(rows, body.points, lists, normals, SMALLEST_DEPTH * cloud.spacing)
-    shift[cloud.wall[rows] >= 0, 2] = 0.0
-    return shift
+    return slide(body.plates, cloud.wall[rows], shift)

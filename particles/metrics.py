@@ -12,7 +12,7 @@ from particles.force_gravity import Gravity
 from particles.force_wetting import Wetting
 from particles.geometry import JointGeometry
 from particles.parameters import Solder
-from particles.physics import Force
+from particles.plate_force import plate_wrench
 from particles.rest import Run
 from particles.surface_measure import ring_area
 from particles.time_step import capillary_limit
@@ -56,25 +56,6 @@ def mean_angle(cosines: Floats) -> float:
     return float(np.degrees(np.arccos(np.clip(cosines.mean(), -1.0, 1.0))))
 
 
-def axial_force(body: Body, others: Sequence[Force], weight: float) -> float:
-    """Force of the liquid on the package along +z [N], by virtual work: positive pushes the plates apart.
-
-    Lifting the package lifts its contact line and adds a slice of the wetted area to the volume:
-    F = p dV/dH + sum of f_z over the line, at the pressure of the package's height.
-
-    Args:
-        body: a joint with two walls.
-        others: forces on the surface but wetting (which does not act along z).
-        weight: rho g, zero without gravity [N/m^3].
-    """
-    ring = body.cloud.rings[1]
-    gradient = body.volume()[1]
-    line_force = sum(float(force.force(body)[ring, 2].sum()) for force in others)
-    cap = ring_area(body.points, ring) / 3.0
-    cap_pressure = body.surface_pressure - weight * body.cloud.ring_heights[1]
-    return body.surface_pressure * float(gradient[ring, 2].sum()) + cap_pressure * cap + line_force
-
-
 def verdict(lines: Sequence[ContactLine], ruptured: bool) -> str:
     """Judge a joint: "open", "overflow", "dewetted" or "ok"."""
     if ruptured:
@@ -102,7 +83,7 @@ def _shape_at_rest(geometry: JointGeometry, solder: Solder, flow: LiquidFlow, ru
         "contact_radius_package": (contact_radius(body, 1), "m"),
         "contact_angle_board": (mean_angle(angles[0]), "deg"),
         "contact_angle_package": (mean_angle(angles[1]), "deg"),
-        "axial_force": (axial_force(body, others, weight), "N"),
+        "axial_force": (float(plate_wrench(body, others, 1)[2]), "N"),
         "width_error": (profile.max_width / reference.max_width - 1.0 if reference else float("nan"), ""),
     }
 
@@ -121,7 +102,9 @@ def _cost_and_rest(solder: Solder, flow: LiquidFlow, run: Run) -> Metrics:
 
 
 def reference_meridian(geometry: JointGeometry, solder: Solder, weight: float) -> Meridian | None:
-    """Young-Laplace meridian of a joint with Gibbs' condition at the edges; none where there is no equilibrium."""
+    """Young-Laplace meridian of a coaxial joint with Gibbs' condition at the edges; none without equilibrium."""
+    if not geometry.is_coaxial:
+        return None
     try:
         return joint_meridian(
             solder.volume,

@@ -11,6 +11,8 @@ from scipy import sparse
 from particles.body import Body
 from particles.contact_line import ContactLine
 from particles.mls import Derivatives
+from particles.plate import slide
+from particles.plate_motion import PlateMotion
 
 Floats = NDArray[np.float64]
 
@@ -56,6 +58,7 @@ class Physics:
         momenta: empty in the quasi-static mode, where each step relaxes towards rest.
         events: changes before a step.
         lines: contact lines, which hold their pinned vertices.
+        motions: of the plates that do not rest.
     """
 
     forces: Sequence[Force]
@@ -63,19 +66,24 @@ class Physics:
     momenta: Sequence[Momentum]
     events: Sequence[Event]
     lines: Sequence[ContactLine]
+    motions: Sequence[PlateMotion] = ()
 
     def force(self, body: Body) -> Floats:
         """Sum of the forces `(n, 3)` [N]."""
         return sum((force.force(body) for force in self.forces), np.zeros_like(body.points))
 
     def energy(self, body: Body) -> float:
-        """Sum of the energies [J]."""
-        return sum(force.energy(body) for force in self.forces)
+        """Sum of the energies [J], with the potential of the loads on the plates."""
+        loads = sum(float(motion.load @ body.plates[motion.wall].origin) for motion in self.motions)
+        return sum(force.energy(body) for force in self.forces) - loads
 
-    def free(self, body: Body) -> NDArray[np.bool_]:
-        """Degrees of freedom that move, `(n, 3)`: walls hold z (free slip), edges hold their pinned vertices."""
-        free = np.ones(body.points.shape, bool)
-        free[body.cloud.wall >= 0, 2] = False
+    def pinned(self, body: Body) -> NDArray[np.bool_]:
+        """The particles that the edges hold, `(n,)`."""
+        pinned = np.zeros(len(body.points), bool)
         for line in self.lines:
-            free[line.pinned(body)] = False
-        return free
+            pinned[line.pinned(body)] = True
+        return pinned
+
+    def admit(self, body: Body, field: Floats) -> Floats:
+        """The part of a displacement `(n, 3)` that resting plates (free slip) and edges (none) allow."""
+        return np.where(self.pinned(body)[:, None], 0.0, slide(body.plates, body.cloud.wall, field))

@@ -61,7 +61,7 @@ def contact_line(cloud: Cloud, wall: int, radius: float, solder: Solder) -> Cont
     """Set up the contact line on one wall, whose edge is the polygon of the wetted disc's area [m]."""
     ring = cloud.rings[wall]
     edge = equal_area_radius(radius, len(ring))
-    distance = np.hypot(*cloud.points[ring, :2].T)
+    distance = np.hypot(*cloud.plates[wall].local(cloud.points[ring])[:, :2].T)
     return ContactLine(wall, edge, solder.pad_contact_angle, solder.mask_contact_angle, distance)
 
 

@@ -1,9 +1,10 @@
-"""The linear equations of one step: forces, implicit operators, constraints; fixed degrees of freedom left out."""
+"""The linear equations of one step: forces, implicit operators, constraints, in the velocities that walls admit."""
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from particles.admissible import Admissible
 from particles.body import Body
 from particles.incompressibility import SaddlePoint
 from particles.mls import derivatives
@@ -32,13 +33,13 @@ class StepEquations:
             DegenerateStencil: the divergence of a particle cannot be fitted.
         """
         self._body, self._physics = body, physics
-        self._free = physics.free(body).T.ravel()
+        self._admissible = Admissible(body, physics.pinned(body), physics.motions)
         self._stencils = derivatives(body.points, body.interior, neighbours, basis)
         self._volume, gradient = body.volume()
         share = sparse.diags(body.volumes[body.interior])
         divergence = sparse.hstack([share @ component for component in self._stencils.gradient])
-        rows = sparse.vstack((divergence, sparse.csr_matrix(gradient.T.ravel())), format="csr")
-        self._constraint = rows[:, self._free]
+        self._constraint = sparse.vstack((divergence, sparse.csr_matrix(gradient.T.ravel())), format="csr")
+        self._reduced_constraint = (self._constraint @ self._admissible.basis).tocsr()
         self._force = physics.force(body)
 
     def problem(self, time_step: float, volume: float) -> SaddlePoint:
@@ -46,13 +47,13 @@ class StepEquations:
         body, physics = self._body, self._physics
         operator = sum(part.matrix(body, self._stencils, time_step) for part in physics.operators)
         load = self._force + sum(momentum.load(body, time_step) for momentum in physics.momenta)
-        rate = np.zeros(self._constraint.shape[0])
-        rate[-1] = (volume - self._volume) / time_step
-        reduced = operator.tocsr()[self._free][:, self._free]
-        return SaddlePoint(reduced, self._constraint, load.T.ravel()[self._free], rate)
+        given, basis = self._admissible.given(time_step), self._admissible.basis
+        rate = -(self._constraint @ given)
+        rate[-1] += (volume - self._volume) / time_step
+        reduced_load = self._admissible.reduce(load.T.ravel() - operator @ given)
+        return SaddlePoint((basis.T @ operator @ basis).tocsr(), self._reduced_constraint, reduced_load, rate)
 
-    def expand(self, velocity: Floats) -> Floats:
-        """Put the free degrees of freedom `(d,)` into velocities `(n, 3)`, zero where they are fixed."""
-        full = np.zeros(self._free.shape)
-        full[self._free] = velocity
-        return np.ascontiguousarray(full.reshape(3, -1).T)
+    def expand(self, unknowns: Floats, time_step: float) -> tuple[Floats, dict[int, Floats]]:
+        """Velocities `(n, 3)` of the degrees of freedom `(d,)`, and the twists of the plates that move."""
+        full = self._admissible.basis @ unknowns + self._admissible.given(time_step)
+        return np.ascontiguousarray(full.reshape(3, -1).T), self._admissible.twists(unknowns, time_step)

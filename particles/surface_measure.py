@@ -1,6 +1,6 @@
 """Area and volume of a triangulated free surface that ends on flat walls, and their gradients.
 
-The liquid body is closed by the polygons of its contact lines; all walls are planes z = constant.
+The liquid body is closed by the polygons of its contact lines, each of which lies in the plane of its wall.
 """
 
 from collections.abc import Sequence
@@ -42,18 +42,30 @@ def _volume_and_gradient(points, triangles, gradient):
     return total
 
 
+def _area_vector(points: Floats, ring: Indices) -> Floats:
+    """Normal of the polygon of a contact line times its area, `(3,)` [m^2] (shoelace formula in space)."""
+    x = points[ring] - points[ring].mean(axis=0)
+    return 0.5 * np.cross(x, np.roll(x, -1, axis=0)).sum(axis=0)
+
+
 def ring_area(points: Floats, ring: Indices) -> float:
-    """Area of the polygon of a contact line [m^2] (shoelace), positive if counter-clockwise seen from +z."""
-    x, y = points[ring, 0], points[ring, 1]
-    return 0.5 * float((x * np.roll(y, -1) - y * np.roll(x, -1)).sum())
+    """Area of the plane polygon of a contact line [m^2]."""
+    return float(np.linalg.norm(_area_vector(points, ring)))
 
 
 def ring_area_gradient(points: Floats, ring: Indices) -> Floats:
     """Gradient of `ring_area` with respect to the vertices of the ring, `(k, 3)` [m]."""
-    x, y = points[ring, 0], points[ring, 1]
-    dx = 0.5 * (np.roll(y, -1) - np.roll(y, 1))
-    dy = 0.5 * (np.roll(x, 1) - np.roll(x, -1))
-    return np.column_stack((dx, dy, np.zeros(len(ring))))
+    x, normal = points[ring], _area_vector(points, ring)
+    normal /= np.linalg.norm(normal)
+    return 0.5 * np.cross(np.roll(x, -1, axis=0) - np.roll(x, 1, axis=0), normal)
+
+
+def wall_corners(points: Floats, ring: Indices, wall: int) -> Floats:
+    """Triangles around the mean of a contact line that close the body on a wall, `(k, 3, 3)`, outward oriented."""
+    x = points[ring]
+    after = np.roll(x, -1, axis=0)
+    centre = np.broadcast_to(x.mean(axis=0), x.shape)
+    return np.stack((centre, x, after) if wall_side(wall) > 0.0 else (centre, after, x), axis=1)
 
 
 def wall_side(wall: int) -> float:
@@ -61,25 +73,26 @@ def wall_side(wall: int) -> float:
     return -1.0 if wall == 0 else 1.0
 
 
-def volume_and_gradient(
-    points: Floats, triangles: Indices, rings: Sequence[Indices], heights: Sequence[float]
-) -> tuple[float, Floats]:
-    """Volume enclosed by the surface and the walls [m^3], and its gradient at fixed walls `(n, 3)` [m^2].
+def volume_and_gradient(points: Floats, triangles: Indices, rings: Sequence[Indices]) -> tuple[float, Floats]:
+    """Volume enclosed by the surface and the polygons of the contact lines [m^3], and its gradient `(n, 3)` [m^2].
 
-    Divergence theorem: 3 V = integral of x . n over the free surface and over the walled polygons.
+    Divergence theorem: 3 V = integral of x . n over the free surface and over the walls. A wall is where its contact
+    line is: the gradient's part along the wall's normal is the work of the pressure on the wall that moves.
     """
     gradient = np.zeros_like(points)
     volume = _volume_and_gradient(points, triangles, gradient)
-    for wall, (ring, height) in enumerate(zip(rings, heights, strict=True)):
-        third = wall_side(wall) * height / 3.0
-        volume += third * ring_area(points, ring)
-        gradient[ring] += third * ring_area_gradient(points, ring)
+    for wall, ring in enumerate(rings):
+        x, sixth = points[ring], wall_side(wall) / 6.0
+        centre, normals = x.mean(axis=0), np.cross(x, np.roll(x, -1, axis=0)).sum(axis=0)
+        volume += sixth * float(centre @ normals)
+        edges = np.roll(x, -1, axis=0) - np.roll(x, 1, axis=0)
+        gradient[ring] += sixth * (np.cross(edges, centre) + normals / len(ring))
     return volume, gradient
 
 
-def enclosed_volume(points: Floats, triangles: Indices, rings: Sequence[Indices], heights: Sequence[float]) -> float:
+def enclosed_volume(points: Floats, triangles: Indices, rings: Sequence[Indices]) -> float:
     """Volume enclosed by the surface and the walls [m^3]."""
-    return volume_and_gradient(points, triangles, rings, heights)[0]
+    return volume_and_gradient(points, triangles, rings)[0]
 
 
 @njit(cache=True)

@@ -31,17 +31,18 @@ def joint_geometries(pads: "Sequence[PadSite]") -> "dict[str, JointGeometry]":
 
 
 def distinct_geometries(geometries: "Mapping[str, JointGeometry]") -> "dict[tuple[str, ...], JointGeometry]":
-    """Group joints whose gap and radii are equal.
+    """Group joints of equal geometry.
 
     Args:
-        geometries: joint name -> gap and radii [m].
+        geometries: joint name -> geometry.
 
     Returns:
         Names of the joints that are alike -> their geometry.
     """
     groups: dict[tuple[float, ...], list[str]] = {}
     for name, geometry in geometries.items():
-        sizes = (geometry.gap, geometry.radius_board, geometry.radius_package)
+        discs = (geometry.gap, geometry.radius_board, geometry.radius_package)
+        sizes = (*discs, *geometry.offset, *geometry.tilt)
         groups.setdefault(tuple(round(size, ALIKE) for size in sizes), []).append(name)
     return {tuple(names): geometries[names[0]] for names in groups.values()}
 

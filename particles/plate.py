@@ -1,0 +1,77 @@
+"""Rigid plates: the planes that bound a liquid body, with the centre of a pad, and how they are placed and moved."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from particles.geometry import JointGeometry
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Plate:
+    """A rigid plate.
+
+    Attributes:
+        origin: `(3,)` centre of the pad [m].
+        frame: `(3, 3)` orthonormal rows: two tangents and the normal, which is +z where the plate is horizontal.
+    """
+
+    origin: Floats
+    frame: Floats
+
+    @classmethod
+    def horizontal(cls, height: float, centre: tuple[float, float] = (0.0, 0.0)) -> "Plate":
+        """Place a plate at z = height."""
+        return cls(np.array([*centre, height]), np.eye(3))
+
+    @property
+    def normal(self) -> Floats:
+        """Unit normal `(3,)`."""
+        return self.frame[2]
+
+    def local(self, points: Floats) -> Floats:
+        """Coordinates in the plate's frame of points `(k, 3)` [m]; the third is the height above the plate."""
+        return (points - self.origin) @ self.frame.T
+
+    def place(self, local: Floats) -> Floats:
+        """Points `(k, 3)` [m] of coordinates in the plate's frame."""
+        return self.origin + local @ self.frame
+
+    def rigid_velocity(self, twist: Floats, points: Floats) -> Floats:
+        """Velocity `(k, 3)` [m/s] that a twist of the plate gives to points.
+
+        Args:
+            twist: `(6,)` velocity of the origin [m/s] and angular velocity [rad/s].
+            points: `(k, 3)` [m].
+        """
+        return twist[:3] + np.cross(twist[3:], points - self.origin)
+
+    def moved(self, motion: Floats) -> "Plate":
+        """This plate displaced by `motion[:3]` [m] and turned about its origin by the rotation vector `motion[3:]`."""
+        turn = Rotation.from_rotvec(motion[3:]).as_matrix()
+        return Plate(self.origin + motion[:3], self.frame @ turn.T)
+
+    def motion_to(self, other: "Plate") -> Floats:
+        """Displacement and rotation vector `(6,)` with which `moved` leads to another plate."""
+        turn = Rotation.from_matrix(other.frame.T @ self.frame).as_rotvec()
+        return np.concatenate((other.origin - self.origin, turn))
+
+
+def joint_plates(geometry: JointGeometry) -> tuple[Plate, Plate]:
+    """Place the plates of a joint: the board's at z = 0, the package's with its offset and tilt."""
+    package = Plate.horizontal(geometry.gap, geometry.offset)
+    return Plate.horizontal(0.0), package.moved(np.array([0.0, 0.0, 0.0, *geometry.tilt, 0.0]))
+
+
+def slide(plates: Sequence[Plate], wall: NDArray[np.int8], field: Floats) -> Floats:
+    """The part of a vector field `(k, 3)` along the plates; `wall (k,)` names the plate of a vector, -1 for none."""
+    result = field.copy()
+    for number, plate in enumerate(plates):
+        on_plate = wall == number
+        result[on_plate] -= np.outer(result[on_plate] @ plate.normal, plate.normal)
+    return result
