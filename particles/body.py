@@ -74,7 +74,7 @@ class Body:
 
     def volume(self) -> tuple[float, Floats]:
         """Enclosed volume [m^3] and its gradient `(n, 3)` [m^2]."""
-        return volume_and_gradient(self.points, self.triangles, self.cloud.rings)
+        return volume_and_gradient(self.points, self.triangles, self.cloud.rings, self.plates)
 
 
 def particle_volumes(cloud: Cloud, volume: float) -> Floats:

@@ -72,7 +72,7 @@ def joint_cloud(geometry: JointGeometry, volume: float, spacing: float) -> Cloud
 
 
 def _volume(cloud: Cloud) -> float:
-    return enclosed_volume(cloud.points, cloud.triangles, cloud.rings)
+    return enclosed_volume(cloud.points, cloud.triangles, cloud.rings, cloud.plates)
 
 
 def _stack(geometry: JointGeometry, counts: tuple[int, int], bulge: float, spacing: float) -> Cloud:

@@ -28,7 +28,7 @@ class Gravity:
 
         The integral of z^2 / 2 n_z over the free surface and over the walls, exact for flat triangles.
         """
-        walls = [wall_corners(body.points, ring, wall) for wall, ring in enumerate(body.cloud.rings)]
+        walls = [wall_corners(body.points, *on_wall) for on_wall in zip(body.cloud.rings, body.plates, strict=True)]
         corners = np.concatenate([body.points[body.triangles], *walls])
         doubled_area_z = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])[:, 2]
         z = corners[:, :, 2]

@@ -15,6 +15,7 @@ REPULSION_RANGE = 1.1
 REPULSION_STRENGTH = 0.15
 LARGEST_SHIFT = 0.1
 SMALLEST_DEPTH = 0.4
+SMALLEST_HEIGHT = 0.25
 
 
 @njit(cache=True)
@@ -65,4 +66,20 @@ def interior_shift(body: Body, neighbours: NeighbourList) -> Floats:
     shift *= np.minimum(1.0, LARGEST_SHIFT * cloud.spacing / np.maximum(length, 1e-300))[:, None]
     normals = vertex_normals(body.points, body.triangles, cloud.surface_count)
     shift += _penetration(rows, body.points, lists, normals, SMALLEST_DEPTH * cloud.spacing)
-    return slide(body.plates, cloud.wall[rows], shift)
+    shift = slide(body.plates, cloud.wall[rows], shift)
+    return shift + _away_from_plates(body, body.points[rows] + shift)
+
+
+def _away_from_plates(body: Body, points: Floats) -> Floats:
+    """Displacements `(m, 3)` [m] that put the particles below the surface, now at `points`, off the plates.
+
+    Where a drop spreads, the particles on its wall thin out and no longer keep those above them from passing through.
+    """
+    result = np.zeros_like(points)
+    loose = body.cloud.wall[body.interior] < 0
+    for plate in body.plates:
+        inward = -plate.side
+        height = inward * plate.local(points)[:, 2]
+        lift = np.where(loose, np.maximum(SMALLEST_HEIGHT * body.cloud.spacing - height, 0.0), 0.0)
+        result += inward * lift[:, None] * plate.normal
+    return result

@@ -19,15 +19,17 @@ class Plate:
     Attributes:
         origin: `(3,)` centre of the pad [m].
         frame: `(3, 3)` orthonormal rows: two tangents and the normal, which is +z where the plate is horizontal.
+        side: +1 if the normal points out of the liquid, as on the package, -1 if into it, as on the board.
     """
 
     origin: Floats
     frame: Floats
+    side: float = -1.0
 
     @classmethod
-    def horizontal(cls, height: float, centre: tuple[float, float] = (0.0, 0.0)) -> "Plate":
+    def horizontal(cls, height: float, centre: tuple[float, float] = (0.0, 0.0), side: float = -1.0) -> "Plate":
         """Place a plate at z = height."""
-        return cls(np.array([*centre, height]), np.eye(3))
+        return cls(np.array([*centre, height]), np.eye(3), side)
 
     @property
     def normal(self) -> Floats:
@@ -54,7 +56,7 @@ class Plate:
     def moved(self, motion: Floats) -> "Plate":
         """This plate displaced by `motion[:3]` [m] and turned about its origin by the rotation vector `motion[3:]`."""
         turn = Rotation.from_rotvec(motion[3:]).as_matrix()
-        return Plate(self.origin + motion[:3], self.frame @ turn.T)
+        return Plate(self.origin + motion[:3], self.frame @ turn.T, self.side)
 
     def motion_to(self, other: "Plate") -> Floats:
         """Displacement and rotation vector `(6,)` with which `moved` leads to another plate."""
@@ -64,7 +66,7 @@ class Plate:
 
 def joint_plates(geometry: JointGeometry) -> tuple[Plate, Plate]:
     """Place the plates of a joint: the board's at z = 0, the package's with its offset and tilt."""
-    package = Plate.horizontal(geometry.gap, geometry.offset)
+    package = Plate.horizontal(geometry.gap, geometry.offset, side=1.0)
     return Plate.horizontal(0.0), package.moved(np.array([0.0, 0.0, 0.0, *geometry.tilt, 0.0]))
 
 

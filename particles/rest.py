@@ -1,6 +1,6 @@
 """Running a flow until the body is at rest."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from math import log
 from time import perf_counter
@@ -87,7 +87,7 @@ def run_to_rest(
                 f"{CALM_DISPLACEMENT:g}; more steps or a larger solder.numerics.time_step_limit help"
             )
         record = _advance(run, flow)
-        calm = calm + 1 if _is_calm(run, rule) else 0
+        calm = calm + 1 if is_calm(run.records, rule) else 0
         moved += record.displacement
         if moved > SNAPSHOT_DISPLACEMENT:
             _snap(run, flow, on_snapshot)
@@ -123,10 +123,11 @@ def _motion(record: StepRecord, rule: StopRule) -> float:
     return record.displacement * rule.calm_time / record.time_step
 
 
-def _is_calm(run: Run, rule: StopRule) -> bool:
-    if len(run.records) < 2:
+def is_calm(records: Sequence[StepRecord], rule: StopRule) -> bool:
+    """Whether the last step hardly moved the surface and hardly changed the energy."""
+    if len(records) < 2:
         return False
-    before, last = run.records[-2:]
+    before, last = records[-2:]
     change = abs(last.energy - before.energy)
     return _motion(last, rule) < CALM_DISPLACEMENT and change < rule.tolerance * abs(last.energy)
 

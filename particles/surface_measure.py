@@ -10,6 +10,8 @@ from numba import njit
 from numpy.typing import NDArray
 from scipy import sparse
 
+from particles.plate import Plate
+
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int32]
 
@@ -60,20 +62,17 @@ def ring_area_gradient(points: Floats, ring: Indices) -> Floats:
     return 0.5 * np.cross(np.roll(x, -1, axis=0) - np.roll(x, 1, axis=0), normal)
 
 
-def wall_corners(points: Floats, ring: Indices, wall: int) -> Floats:
+def wall_corners(points: Floats, ring: Indices, plate: Plate) -> Floats:
     """Triangles around the mean of a contact line that close the body on a wall, `(k, 3, 3)`, outward oriented."""
     x = points[ring]
     after = np.roll(x, -1, axis=0)
     centre = np.broadcast_to(x.mean(axis=0), x.shape)
-    return np.stack((centre, x, after) if wall_side(wall) > 0.0 else (centre, after, x), axis=1)
+    return np.stack((centre, x, after) if plate.side > 0.0 else (centre, after, x), axis=1)
 
 
-def wall_side(wall: int) -> float:
-    """Return z of the outward normal of the liquid on a wall: -1 on the board (wall 0), +1 on the package."""
-    return -1.0 if wall == 0 else 1.0
-
-
-def volume_and_gradient(points: Floats, triangles: Indices, rings: Sequence[Indices]) -> tuple[float, Floats]:
+def volume_and_gradient(
+    points: Floats, triangles: Indices, rings: Sequence[Indices], plates: Sequence[Plate]
+) -> tuple[float, Floats]:
     """Volume enclosed by the surface and the polygons of the contact lines [m^3], and its gradient `(n, 3)` [m^2].
 
     Divergence theorem: 3 V = integral of x . n over the free surface and over the walls. A wall is where its contact
@@ -81,8 +80,8 @@ def volume_and_gradient(points: Floats, triangles: Indices, rings: Sequence[Indi
     """
     gradient = np.zeros_like(points)
     volume = _volume_and_gradient(points, triangles, gradient)
-    for wall, ring in enumerate(rings):
-        x, sixth = points[ring], wall_side(wall) / 6.0
+    for ring, plate in zip(rings, plates, strict=True):
+        x, sixth = points[ring], plate.side / 6.0
         centre, normals = x.mean(axis=0), np.cross(x, np.roll(x, -1, axis=0)).sum(axis=0)
         volume += sixth * float(centre @ normals)
         edges = np.roll(x, -1, axis=0) - np.roll(x, 1, axis=0)
@@ -90,9 +89,9 @@ def volume_and_gradient(points: Floats, triangles: Indices, rings: Sequence[Indi
     return volume, gradient
 
 
-def enclosed_volume(points: Floats, triangles: Indices, rings: Sequence[Indices]) -> float:
+def enclosed_volume(points: Floats, triangles: Indices, rings: Sequence[Indices], plates: Sequence[Plate]) -> float:
     """Volume enclosed by the surface and the walls [m^3]."""
-    return volume_and_gradient(points, triangles, rings)[0]
+    return volume_and_gradient(points, triangles, rings, plates)[0]
 
 
 @njit(cache=True)

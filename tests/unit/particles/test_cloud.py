@@ -31,7 +31,7 @@ def test_surface_is_an_oriented_manifold_that_ends_at_the_contact_lines(cloud):
 
 def test_joint_has_the_volume_and_the_wetted_areas():
     cloud = joint_cloud(GEOMETRY, BALL, 5e-5)
-    volume = enclosed_volume(cloud.points, cloud.triangles, cloud.rings)
+    volume = enclosed_volume(cloud.points, cloud.triangles, cloud.rings, cloud.plates)
     assert volume == pytest.approx(BALL, rel=1e-10)
     for ring, radius in zip(cloud.rings, (0.24e-3, 0.20e-3), strict=True):
         assert ring_area(cloud.points, ring) == pytest.approx(np.pi * radius**2, rel=1e-12)

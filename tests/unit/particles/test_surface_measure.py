@@ -31,7 +31,7 @@ def slope(function, points, direction, step=1e-6):
 def test_box_has_the_area_and_volume_of_a_cube():
     cloud = CLOUDS[0]
     assert surface_area(cloud.points, cloud.triangles) == pytest.approx(5.0)
-    assert enclosed_volume(cloud.points, cloud.triangles, cloud.rings) == pytest.approx(1.0)
+    assert enclosed_volume(cloud.points, cloud.triangles, cloud.rings, cloud.plates) == pytest.approx(1.0)
     assert ring_area(cloud.points, cloud.rings[0]) == pytest.approx(1.0)
 
 
@@ -53,7 +53,7 @@ def test_volume_equals_numpy_twin(cloud):
     walls = sum(
         plate.origin[2] * ring_area(points, ring) for ring, plate in zip(cloud.rings[1:], cloud.plates[1:], strict=True)
     )
-    found = enclosed_volume(points, cloud.triangles, cloud.rings)
+    found = enclosed_volume(points, cloud.triangles, cloud.rings, cloud.plates)
     assert found == pytest.approx(free + walls)
 
 
@@ -73,8 +73,8 @@ def test_gradient_of_the_volume(cloud):
     points = shaken(cloud)
     direction = np.random.default_rng(8).normal(size=points.shape)
     direction[cloud.wall >= 0, 2] = 0.0
-    gradient = volume_and_gradient(points, cloud.triangles, cloud.rings)[1]
-    expected = slope(lambda x: enclosed_volume(x, cloud.triangles, cloud.rings), points, direction)
+    gradient = volume_and_gradient(points, cloud.triangles, cloud.rings, cloud.plates)[1]
+    expected = slope(lambda x: enclosed_volume(x, cloud.triangles, cloud.rings, cloud.plates), points, direction)
     assert float((gradient * direction).sum()) == pytest.approx(expected, rel=1e-7)
 
 

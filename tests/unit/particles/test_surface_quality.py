@@ -28,7 +28,7 @@ def test_flips_make_a_plane_delaunay_and_keep_its_area():
     assert flips > 0
     assert max(opposite_angle_sums(points, triangles)) < np.pi + 0.011
     assert surface_area(points, triangles) == pytest.approx(5.0)
-    assert enclosed_volume(points, triangles, cloud.rings) == pytest.approx(1.0)
+    assert enclosed_volume(points, triangles, cloud.rings, cloud.plates) == pytest.approx(1.0)
 
 
 def test_a_delaunay_surface_is_left_alone():

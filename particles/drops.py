@@ -1,0 +1,88 @@
+"""Several drops: each flows by itself until it is at rest; two that touch become one, collapsed ones are rebuilt."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+from particles.body import Body
+from particles.flow import LiquidFlow, StepRecord
+from particles.rebuild import collapsing, rebuild, touch
+from particles.rest import NoRest, StopRule, is_calm
+
+CALM_STEPS = 3
+
+
+@dataclass(slots=True, eq=False)
+class Drop:
+    """A drop on its way to rest.
+
+    Attributes:
+        flow: the flow.
+        origins: numbers of the first drops that it is made of.
+        records: its steps since it was made.
+        calm: its last steps that hardly moved it.
+    """
+
+    flow: LiquidFlow
+    origins: tuple[int, ...]
+    records: list[StepRecord] = field(default_factory=list)
+    calm: int = 0
+
+    def step(self, rule: StopRule) -> None:
+        """Advance one time step."""
+        self.records.append(self.flow.step())
+        self.calm = self.calm + 1 if is_calm(self.records, rule) else 0
+
+    def moves(self, rule: StopRule) -> bool:
+        """Whether it is neither at rest nor at the end of the process."""
+        return self.calm < CALM_STEPS and self.flow.time < rule.end_time
+
+
+def run_drops(flows: Sequence[LiquidFlow], rule: StopRule, start: Callable[[Body], LiquidFlow]) -> list[Drop]:
+    """Let drops flow until all are at rest; the one that is behind in time goes first.
+
+    Args:
+        flows: a flow a drop, advanced in place.
+        rule: when a drop is at rest.
+        start: makes the flow of a body that two drops became.
+
+    Returns:
+        The drops that are left.
+
+    Raises:
+        NoRest: a drop took too many steps.
+        CannotRebuild: drops touch, or one collapses, between walls.
+    """
+    drops = _merge_touching([Drop(flow, (number,)) for number, flow in enumerate(flows)], start)
+    while moving := [drop for drop in drops if drop.moves(rule)]:
+        drop = min(moving, key=lambda candidate: candidate.flow.time)
+        if len(drop.records) >= rule.max_steps:
+            raise NoRest(f"drop {drop.origins} is not at rest after {rule.max_steps} steps (solder.numerics.max_steps)")
+        drop.step(rule)
+        if collapsing(drop.flow.body):
+            drop.flow = _restarted(start, drop)
+        drops = _merge_touching(drops, start)
+    return drops
+
+
+def _restarted(start: Callable[[Body], LiquidFlow], *drops: Drop) -> LiquidFlow:
+    """Flow of the body that drops become, from the time of the latest."""
+    flow = start(rebuild(*(drop.flow.body for drop in drops)))
+    flow.time = max(drop.flow.time for drop in drops)
+    return flow
+
+
+def _merge_touching(drops: list[Drop], start: Callable[[Body], LiquidFlow]) -> list[Drop]:
+    """Merge pairs of drops until none touch."""
+    while (pair := _touching(drops)) is not None:
+        rest = [drop for drop in drops if drop not in pair]
+        origins = sorted(pair[0].origins + pair[1].origins)
+        drops = [*rest, Drop(_restarted(start, *pair), tuple(origins))]
+    return drops
+
+
+def _touching(drops: Sequence[Drop]) -> tuple[Drop, Drop] | None:
+    for number, first in enumerate(drops):
+        for second in drops[number + 1 :]:
+            if touch(first.flow.body, second.flow.body):
+                return first, second
+    return None

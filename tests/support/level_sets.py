@@ -1,0 +1,24 @@
+"""Level sets of drops, exact."""
+
+import numpy as np
+
+from particles.level_set import Grid, LevelSet
+
+
+def ball(grid, centre, radius, mirrored=False):
+    """Level set of a ball; mirrored: of its part above z = 0 and the mirror image of that."""
+    nodes = np.stack(np.meshgrid(*grid.axes(), indexing="ij"), axis=-1)
+    if mirrored:
+        nodes[..., 2] = np.abs(nodes[..., 2])
+    return LevelSet(grid, np.linalg.norm(nodes - np.asarray(centre), axis=-1) - radius)
+
+
+def grid_around_ball(centre, radius, spacing):
+    corners = np.asarray(centre) + radius * np.array([[-1.0], [1.0]])
+    return Grid.around(corners, spacing)
+
+
+def cap_radius(volume, angle):
+    """Radius of the sphere of a cap of a volume and contact angle [m]."""
+    c = np.cos(angle)
+    return np.cbrt(3.0 * volume / (np.pi * (1.0 - c) ** 2 * (2.0 + c)))

@@ -1,0 +1,138 @@
+import numpy as np
+import pytest
+
+from particles.body import Body
+from particles.cloud import box_cloud, joint_cloud
+from particles.cloud_level_set import boundary_loops, cloud_from_level_set
+from particles.geometry import JointGeometry
+from particles.level_set import Grid, signed_distance, smooth_union
+from particles.rebuild import CannotRebuild, closed_surface, collapsing, rebuild, touch
+from particles.surface_nets import extract_surface, relax
+from tests.support.level_sets import ball, cap_radius, grid_around_ball
+
+R = 0.5e-3
+SPHERE = 4.0 / 3.0 * np.pi * R**3
+
+
+def sphere_body(spacing, centre=(0.0, 0.0, 0.0)):
+    cloud = cloud_from_level_set(ball(grid_around_ball((0, 0, 0), R, spacing), (0, 0, 0), R), SPHERE, on_wall=False)
+    body = Body.at_rest(cloud)
+    body.points += np.asarray(centre)
+    return body
+
+
+def quality(points, triangles):
+    corner = points[triangles]
+    edges = corner - np.roll(corner, 1, axis=1)
+    area = 0.5 * np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
+    return 4.0 * np.sqrt(3.0) * area / (edges**2).sum(axis=(1, 2))
+
+
+@pytest.mark.parametrize("centre", [(0, 0, 0), (0.31e-4, -0.17e-4, 0.23e-4)])
+def test_the_net_of_a_sphere_is_closed_even_and_near(centre):
+    spacing = 0.2 * R
+    level = ball(grid_around_ball(centre, R, spacing), centre, R)
+    points, triangles = relax(level, *extract_surface(level), ())
+    assert boundary_loops(triangles) == ()
+    assert len(points) - len(triangles) // 2 == 2  # Euler's formula for a sphere
+    assert np.abs(np.linalg.norm(points - centre, axis=1) / R - 1.0).max() < 5e-3
+    assert quality(points, triangles).min() > 0.6
+
+
+def test_the_net_converges_with_order_two():
+    errors = []
+    for spacing in (R / 4, R / 8):
+        level = ball(grid_around_ball((0, 0, 0), R, spacing), (0, 0, 0), R)
+        points, triangles = relax(level, *extract_surface(level), ())
+        errors.append(
+            1.0
+            - np.einsum("ij,ij", points[triangles[:, 0]], np.cross(*points[triangles[:, 1:]].swapaxes(0, 1)))
+            / 6
+            / SPHERE
+        )
+    assert np.log2(errors[0] / errors[1]) > 1.8
+
+
+def test_signed_distance_of_a_net_is_that_of_the_sphere():
+    spacing = R / 8
+    grid = grid_around_ball((0, 0, 0), R, spacing)
+    exact = ball(grid, (0, 0, 0), R)
+    points, triangles = relax(exact, *extract_surface(exact), ())
+    assert np.abs(signed_distance(points, triangles, grid).values - exact.values).max() < 0.1 * spacing
+
+
+def test_smooth_union_closes_gaps_narrower_than_half_its_reach():
+    spacing, reach = 0.1 * R, 0.2 * R
+    for gap, connected in ((0.4 * reach, True), (0.6 * reach, False)):
+        x = R + 0.5 * gap
+        grid = Grid.around(np.array([[-x - R, -R, -R], [x + R, R, R]]), spacing)
+        union = smooth_union([ball(grid, (s * x, 0, 0), R) for s in (-1, 1)], reach)
+        assert (union.at(np.zeros((1, 3)))[0] < 0.0) == connected
+
+
+def test_a_rebuilt_drop_on_a_wall_has_one_ring_and_its_volume():
+    angle, volume = np.radians(60.0), 1e-9
+    radius = cap_radius(volume, angle)
+    centre = (0, 0, -radius * np.cos(angle))
+    grid = Grid.around(np.array([[-radius] * 3, [radius] * 3]), 0.1 * radius)
+    cloud = cloud_from_level_set(ball(grid, centre, radius, mirrored=True), volume, on_wall=True)
+    body = Body.at_rest(cloud)
+    assert body.volume()[0] == pytest.approx(volume, rel=1e-9)
+    assert len(cloud.rings) == 1
+    ring = cloud.points[cloud.rings[0]]
+    assert np.all(ring[:, 2] == 0.0)
+    x, y = ring[:, 0], ring[:, 1]
+    assert (x * np.roll(y, -1) - y * np.roll(x, -1)).sum() > 0.0  # counter-clockwise
+    # the net rounds the edge between the drop and its mirror image within a cell
+    assert np.hypot(x, y) == pytest.approx(radius * np.sin(angle), rel=0.03)
+    assert cloud.points[:, 2].min() == 0.0
+    assert (cloud.wall[cloud.surface_count :] == 0).any()
+
+
+def test_a_mirrored_drop_closes():
+    body = Body.at_rest(box_cloud(1e-3, 5))
+    points, triangles = closed_surface(body)
+    assert boundary_loops(triangles) == ()
+    inside = signed_distance(points, triangles, Grid.around(points, 2e-4)).at(np.array([[0.0, 0.0, 1e-5]]))
+    assert inside[0] < 0.0
+
+
+def test_touching_needs_a_spacing():
+    spacing = 0.2 * R
+    first = sphere_body(spacing)
+    assert touch(first, sphere_body(spacing, (2.0 * R + 0.5 * spacing, 0, 0)))
+    assert not touch(first, sphere_body(spacing, (2.0 * R + 1.5 * spacing, 0, 0)))
+
+
+def test_merging_keeps_volume_and_momentum():
+    spacing = 0.2 * R
+    first, second = sphere_body(spacing), sphere_body(spacing, (2.0 * R + 0.5 * spacing, 0, 0))
+    first.velocity[:] = (0.3, 0.1, 0.0)
+    second.velocity[:] = (-0.2, 0.0, 0.05)
+    body = rebuild(first, second)
+    assert body.volume()[0] == pytest.approx(2.0 * SPHERE, rel=1e-9)
+    momentum = (body.volumes[:, None] * body.velocity).sum(axis=0)
+    assert momentum == pytest.approx(SPHERE * np.array([0.1, 0.1, 0.05]), rel=1e-9)
+    assert len(body.points) > body.cloud.surface_count
+    assert boundary_loops(body.triangles) == ()
+
+
+def test_bodies_that_cannot_rebuild():
+    joint = Body.at_rest(joint_cloud(JointGeometry(0.3e-3, 0.24e-3, 0.24e-3), 0.07e-9, 0.8e-4))
+    with pytest.raises(CannotRebuild, match="not joints"):
+        rebuild(joint, joint)
+    with pytest.raises(CannotRebuild, match="free drop"):
+        rebuild(sphere_body(0.2 * R), Body.at_rest(box_cloud(1e-3, 5)))
+
+
+def test_a_collapsed_surface_is_made_even_again():
+    body = sphere_body(0.2 * R)
+    top = int(body.points[: body.cloud.surface_count, 2].argmax())
+    neighbour = int(np.setdiff1d(body.triangles[(body.triangles == top).any(axis=1)], [top])[0])
+    assert not collapsing(body)
+    body.points[neighbour] += 0.9 * (body.points[top] - body.points[neighbour])
+    assert collapsing(body)
+    volume = body.volume()[0]
+    body = rebuild(body)
+    assert not collapsing(body)
+    assert body.volume()[0] == pytest.approx(volume, rel=1e-9)

@@ -1,0 +1,91 @@
+"""Drops that merge come to rest in the exact shape of their common volume."""
+
+from math import inf
+
+import numpy as np
+import pytest
+
+from particles.cloud import box_cloud
+from particles.cloud_level_set import cloud_from_level_set
+from particles.drops import run_drops
+from particles.parameters import Solder, SolderNumerics
+from particles.profile import fit_profile
+from particles.reflow import contact_line, start_flow, stop_rule
+from tests.support.level_sets import ball, cap_radius, grid_around_ball
+
+ANGLE = np.radians(60.0)
+ON = {"surface_tension": True, "gravity": False, "wall_adhesion": True, "viscosity": False, "inertia": False}
+FREE = ON | {"wall_adhesion": False}
+
+
+def start_on_wall(cloud, solder):
+    lines = tuple(contact_line(cloud, wall, inf, solder) for wall in range(len(cloud.rings)))
+    return start_flow(cloud, solder, ON, lines)
+
+
+def cubes_on_a_wall(edges, centres, count, solder):
+    flows = []
+    for edge, centre in zip(edges, centres, strict=True):
+        flow = start_on_wall(box_cloud(edge, count), solder)
+        flow.body.points[:, 0] += centre
+        flows.append(flow)
+    return flows
+
+
+def solder_of(spacing):
+    return Solder(volume=1e-9, pad_contact_angle=ANGLE, numerics=SolderNumerics(spacing=spacing, max_steps=600))
+
+
+def centroid(body):
+    """Centroid of the volume inside a closed surface, by tetrahedra with the origin."""
+    corner = body.points[body.triangles]
+    volumes = np.einsum("ij,ij->i", corner[:, 0], np.cross(corner[:, 1], corner[:, 2])) / 6.0
+    return (volumes[:, None] * corner.sum(axis=1) / 4.0).sum(axis=0) / volumes.sum()
+
+
+@pytest.mark.parametrize("radii", [(0.5e-3, 0.5e-3), (0.5e-3, 0.35e-3)])
+def test_two_free_drops_become_one_sphere(radii):
+    spacing = 1.0e-4
+    solder = solder_of(spacing)
+    flows, place = [], 0.0
+    for radius in radii:
+        volume = 4.0 / 3.0 * np.pi * radius**3
+        level = ball(grid_around_ball((0, 0, 0), radius, spacing), (0, 0, 0), radius)
+        flow = start_flow(cloud_from_level_set(level, volume, on_wall=False), solder, FREE, ())
+        flow.body.points[:, 0] += place + radius
+        place += 2.0 * radius + 0.5 * spacing
+        flows.append(flow)
+    cloud = flows[0].body.cloud
+    (drop,) = run_drops(flows, stop_rule(cloud, solder, FREE), lambda body: start_flow(body.cloud, solder, FREE, ()))
+    body = drop.flow.body
+    total = 4.0 / 3.0 * np.pi * sum(radius**3 for radius in radii)
+    assert body.volume()[0] == pytest.approx(total, rel=1e-3)
+    exact = np.cbrt(3.0 * total / (4.0 * np.pi))
+    surface = body.points[: body.cloud.surface_count]
+    assert np.linalg.norm(surface - centroid(body), axis=1) == pytest.approx(exact, rel=1e-2)
+
+
+def test_two_drops_that_spread_into_each_other_become_one_cap():
+    edge = np.cbrt(0.5e-9)
+    solder = solder_of(1e-4)
+    flows = cubes_on_a_wall((edge, edge), (-0.62e-3, 0.62e-3), 7, solder)
+    rule = stop_rule(flows[0].body.cloud, solder, ON)
+    (drop,) = run_drops(flows, rule, lambda body: start_on_wall(body.cloud, solder))
+    assert drop.origins == (0, 1)
+    body, radius = drop.flow.body, cap_radius(1e-9, ANGLE)
+    assert body.volume()[0] == pytest.approx(1e-9, rel=1e-3)
+    surface = body.points[: body.cloud.surface_count]
+    assert np.ptp(surface[:, 2]) == pytest.approx(radius * (1.0 - np.cos(ANGLE)), rel=1e-2)
+    assert fit_profile(body.points, body.triangles).max_width == pytest.approx(2.0 * radius * np.sin(ANGLE), rel=1e-2)
+
+
+def test_drops_that_do_not_reach_each_other_stay_two():
+    edge = np.cbrt(0.5e-9)
+    solder = solder_of(1.3e-4)
+    flows = cubes_on_a_wall((edge, edge), (-1.2e-3, 1.2e-3), 7, solder)
+    drops = run_drops(flows, stop_rule(flows[0].body.cloud, solder, ON), lambda body: start_on_wall(body.cloud, solder))
+    assert [drop.origins for drop in drops] == [(0,), (1,)]
+    exact = cap_radius(0.5e-9, ANGLE) * (1.0 - np.cos(ANGLE))
+    for drop in drops:
+        body = drop.flow.body
+        assert np.ptp(body.points[:, 2]) == pytest.approx(exact, rel=1e-2)
