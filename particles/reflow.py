@@ -5,6 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 from particles.body import Body
+from particles.checkpoint import Checkpoint
 from particles.cloud import Cloud, equal_area_radius, joint_cloud
 from particles.contact_line import ContactLine
 from particles.effects import decide_effects
@@ -32,6 +33,7 @@ def solve_joint(
     solder: Solder,
     progress: Callable[[float], None] | None = None,
     on_snapshot: Callable[[Snapshot], None] | None = None,
+    checkpoint: Checkpoint | None = None,
 ) -> JointShape:
     """Let molten solder flow between two wetted discs until it is at rest.
 
@@ -41,7 +43,8 @@ def solve_joint(
         geometry: gap and radii of the discs [m].
         solder: volume, fluid and process.
         progress: called with the fraction done.
-        on_snapshot: called with each snapshot.
+        on_snapshot: called with each new snapshot.
+        checkpoint: where the run continues from, to the last bit, and leaves its state.
 
     Raises:
         ValueError: the volume does not fit between the discs.
@@ -53,7 +56,7 @@ def solve_joint(
     radii = (geometry.radius_board, geometry.radius_package)
     lines = tuple(contact_line(cloud, wall, radius, solder) for wall, radius in enumerate(radii))
     flow = start_flow(cloud, solder, effects, lines)
-    run = run_to_rest(flow, stop_rule(cloud, solder, effects), progress, on_snapshot)
+    run = run_to_rest(flow, stop_rule(cloud, solder, effects), progress, on_snapshot, checkpoint)
     return _shape(geometry, solder, flow, run)
 
 

@@ -8,6 +8,7 @@ from time import perf_counter
 import numpy as np
 from numpy.typing import NDArray
 
+from particles.checkpoint import Checkpoint
 from particles.flow import LiquidFlow, StepRecord
 from particles.profile import Profile, fit_profile
 from particles.shape import Snapshot
@@ -41,13 +42,25 @@ class StopRule:
 
 @dataclass(slots=True)
 class Run:
-    """The steps of a run and its snapshots; `ruptured` if the neck became thinner than two spacings."""
+    """The steps of a run and its snapshots.
+
+    Attributes:
+        records: what each step did.
+        profiles: the shape after each step.
+        snapshots: the first, the last and some states between.
+        seconds: wall time of the steps, those before a restart included [s].
+        ruptured: whether the neck became thinner than two spacings.
+        calm: steps that the body has been at rest.
+        moved: displacement since the last snapshot, over the spacing.
+    """
 
     records: list[StepRecord] = field(default_factory=list)
     profiles: list[Profile] = field(default_factory=list)
     snapshots: list[Snapshot] = field(default_factory=list)
     seconds: float = 0.0
     ruptured: bool = False
+    calm: int = 0
+    moved: float = 0.0
 
     def history(self, viscosity_over_tension: float) -> dict[str, NDArray]:
         """Columns of the records, with width and capillary number mu v / gamma."""
@@ -64,6 +77,7 @@ def run_to_rest(
     rule: StopRule,
     progress: Callable[[float], None] | None = None,
     on_snapshot: Callable[[Snapshot], None] | None = None,
+    checkpoint: Checkpoint | None = None,
 ) -> Run:
     """Step until the surface hardly moves and the energy hardly changes for three steps, or until the end time.
 
@@ -71,45 +85,64 @@ def run_to_rest(
         flow: the flow; advanced in place.
         rule: when to stop.
         progress: called with the estimated fraction done, in [0, 1].
-        on_snapshot: called with each snapshot.
+        on_snapshot: called with each new snapshot.
+        checkpoint: where the run continues from, to the last bit, and leaves its state, that at rest included.
 
     Raises:
         NoRest: too many steps; names step, displacement and time.
     """
-    run, start, calm, moved, done = Run(), perf_counter(), 0, 0.0, 0.0
-    _snap(run, flow, on_snapshot)
-    while calm < CALM_STEPS and flow.time < rule.end_time and not run.ruptured:
-        if flow.steps >= rule.max_steps:
-            last = run.records[-1]
-            raise NoRest(
-                f"no rest after {last.step} steps (solder.numerics.max_steps) at time {last.time:.3g} s: the surface "
-                f"still moves {_motion(last, rule):.2e} spacings in {rule.calm_time:.3g} s, at rest it would be "
-                f"{CALM_DISPLACEMENT:g}; more steps or a larger solder.numerics.time_step_limit help"
-            )
-        record = _advance(run, flow)
-        calm = calm + 1 if is_calm(run.records, rule) else 0
-        moved += record.displacement
-        if moved > SNAPSHOT_DISPLACEMENT:
+    run, done = _start(flow, on_snapshot, checkpoint), 0.0
+    while run.calm < CALM_STEPS and flow.time < rule.end_time and not run.ruptured:
+        _limit_steps(flow, run, rule)
+        _advance(run, flow, rule)
+        if run.moved > SNAPSHOT_DISPLACEMENT:
             _snap(run, flow, on_snapshot)
-            moved = 0.0
+        if checkpoint is not None and checkpoint.is_due():
+            checkpoint.write((flow, run))
         done = max(done, _fraction(run, rule))
         if progress is not None:
             progress(done)
-    if moved > 0.0:
+    if run.moved > 0.0:
         _snap(run, flow, on_snapshot)
-    run.seconds = perf_counter() - start
+    if checkpoint is not None:
+        checkpoint.write((flow, run))
     if progress is not None:
         progress(1.0)
     return run
 
 
-def _advance(run: Run, flow: LiquidFlow) -> StepRecord:
+def _start(flow: LiquidFlow, on_snapshot: Callable[[Snapshot], None] | None, checkpoint: Checkpoint | None) -> Run:
+    """Start a run, or continue that of the checkpoint, whose state the flow takes over."""
+    state = None if checkpoint is None else checkpoint.read()
+    if state is not None:
+        saved, run = state
+        vars(flow).update(vars(saved))
+        return run
+    run = Run()
+    _snap(run, flow, on_snapshot)
+    return run
+
+
+def _limit_steps(flow: LiquidFlow, run: Run, rule: StopRule) -> None:
+    if flow.steps < rule.max_steps:
+        return
+    last = run.records[-1]
+    raise NoRest(
+        f"no rest after {last.step} steps (solder.numerics.max_steps) at time {last.time:.3g} s: the surface "
+        f"still moves {_motion(last, rule):.2e} spacings in {rule.calm_time:.3g} s, at rest it would be "
+        f"{CALM_DISPLACEMENT:g}; more steps or a larger solder.numerics.time_step_limit help"
+    )
+
+
+def _advance(run: Run, flow: LiquidFlow, rule: StopRule) -> None:
+    start = perf_counter()
     record = flow.step()
-    profile = fit_profile(flow.body.points, flow.body.triangles)
     run.records.append(record)
-    run.profiles.append(profile)
+    run.profiles.append(fit_profile(flow.body.points, flow.body.triangles))
     run.ruptured = len(flow.body.cloud.rings) == 2 and _ruptures(run.profiles, flow.body.cloud.spacing)
-    return record
+    run.calm = run.calm + 1 if is_calm(run.records, rule) else 0
+    run.moved += record.displacement
+    run.seconds += perf_counter() - start
 
 
 def _ruptures(profiles: list[Profile], spacing: float) -> bool:
@@ -144,5 +177,6 @@ def _fraction(run: Run, rule: StopRule) -> float:
 def _snap(run: Run, flow: LiquidFlow, on_snapshot: Callable[[Snapshot], None] | None) -> None:
     snapshot = Snapshot(flow.time, flow.body.points.copy(), flow.body.triangles.copy())
     run.snapshots.append(snapshot)
+    run.moved = 0.0
     if on_snapshot is not None:
         on_snapshot(snapshot)

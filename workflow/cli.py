@@ -76,7 +76,7 @@ def run(
             elif not drive(folder, until, cores or available_cores(), oversubscribe, lock):
                 raise typer.Exit(1)
     except KeyboardInterrupt as error:
-        print_error("interrupted; stages that were complete are kept")
+        print_error("interrupted; complete stages and checkpoints are kept: the same command continues")
         raise typer.Exit(1) from error
     failures = failed_checks(folder, until)
     for failure in failures:

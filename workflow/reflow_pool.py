@@ -1,9 +1,13 @@
 """Reflow of many joints: those that are alike once, several at a time, each in a process of its own."""
 
 import multiprocessing
+import os
 import queue
+import threading
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from particles.parameters import Solder
@@ -17,6 +21,16 @@ ALIKE = 12  # decimals of a metre to which gaps and radii of joints are compared
 POLL = 0.2  # seconds between two looks at the progress
 
 _progress: Any = None  # the queue of a worker process: a pool has no other place for it
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """One reflow: name of the joint, gap and radii, solder, and the file from which it continues if it is there."""
+
+    name: str
+    geometry: "JointGeometry"
+    solder: Solder
+    checkpoint: Path
 
 
 class ReflowError(RuntimeError):
@@ -58,27 +72,36 @@ def joint_records(groups: "Mapping[tuple[str, ...], JointGeometry]", shapes: "Ma
 
 
 def solve_joints(
-    geometries: "Mapping[str, JointGeometry]", solder: Solder, cores: int, progress: Callable[[float], None]
-) -> "dict[str, JointShape]":
-    """Solve the reflow of each geometry.
+    geometries: "Mapping[str, JointGeometry]",
+    solder: Solder,
+    cores: int,
+    progress: Callable[[float], None],
+    checkpoints: Path,
+) -> "tuple[dict[str, JointShape], int]":
+    """Solve the reflow of each geometry; joints that an earlier run finished or began continue from their checkpoints.
 
     Args:
-        geometries: name of a joint -> gap and radii [m].
+        geometries: name of a joint -> geometry.
         solder: volume, fluid and process.
         cores: number of processes.
         progress: called with the share of the whole that is done, 0 to 1.
+        checkpoints: folder of the checkpoints; made if it is missing.
 
     Returns:
-        Name -> shape, in the given order.
+        Name -> shape, in the given order, and the number of joints that continued.
 
     Raises:
         ReflowError: names the first joint that failed, and how.
     """
+    checkpoints.mkdir(parents=True, exist_ok=True)
     context = multiprocessing.get_context("spawn")
     reports = context.Queue()
     workers = min(cores, len(geometries))
     with ProcessPoolExecutor(workers, context, _start_worker, (reports,)) as pool:
-        jobs = {pool.submit(_solve, name, geometry, solder): name for name, geometry in geometries.items()}
+        jobs = {
+            pool.submit(_solve, Job(name, geometry, solder, checkpoints / name)): name
+            for name, geometry in geometries.items()
+        }
         try:
             _wait_for(jobs, reports, progress)
         except BaseException:
@@ -86,10 +109,11 @@ def solve_joints(
             for process in multiprocessing.active_children():
                 process.terminate()
             raise
-    return {name: job.result() for job, name in jobs.items()}
+    results = {name: job.result() for job, name in jobs.items()}
+    return {name: shape for name, (shape, _) in results.items()}, sum(continued for _, continued in results.values())
 
 
-def _wait_for(jobs: "Mapping[Future[JointShape], str]", reports: Any, progress: Callable[[float], None]) -> None:
+def _wait_for(jobs: "Mapping[Future, str]", reports: Any, progress: Callable[[float], None]) -> None:
     """Wait for all jobs, passing on how far they are; raise as soon as one fails."""
     done = dict.fromkeys(jobs.values(), 0.0)
     pending: Sequence[Future] | set[Future] = set(jobs)
@@ -112,9 +136,26 @@ def _wait_for(jobs: "Mapping[Future[JointShape], str]", reports: Any, progress: 
 def _start_worker(reports: Any) -> None:
     global _progress
     _progress = reports
+    threading.Thread(target=_end_with_parent, daemon=True).start()
 
 
-def _solve(name: str, geometry: "JointGeometry", solder: Solder) -> "JointShape":
+def _end_with_parent() -> None:
+    """End this process when its parent was killed: it would compete with the workers of the run that continues."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
+
+
+def _solve(job: Job) -> "tuple[JointShape, bool]":
+    """Return the shape, and whether it continued from a checkpoint."""
+    from particles.checkpoint import Checkpoint
     from particles.reflow import solve_joint
 
-    return solve_joint(geometry, solder, progress=lambda fraction: _progress.put((name, fraction)))
+    checkpoint = Checkpoint(job.checkpoint, (job.geometry, job.solder))
+
+    def report(fraction: float) -> None:
+        _progress.put((job.name, fraction))
+
+    shape = solve_joint(job.geometry, job.solder, progress=report, checkpoint=checkpoint)
+    return shape, checkpoint.continued

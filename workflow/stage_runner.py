@@ -30,6 +30,10 @@ class Run:
     cores: int
     oversubscribe: bool = False
 
+    def checkpoints(self, stage: str) -> Path:
+        """Folder in which a stage keeps what it needs to continue after a kill; removed when it is complete."""
+        return self.folder / f".{stage}.checkpoints"
+
 
 @dataclass(frozen=True, slots=True)
 class Findings:
@@ -39,11 +43,13 @@ class Findings:
         metrics: name -> {"value", "unit"}.
         health: check -> {"value", "limit", "ok"}.
         effects: effect -> {"on", "why"}.
+        continued: what continued from checkpoints, in words.
     """
 
     metrics: dict = field(default_factory=dict)
     health: dict = field(default_factory=dict)
     effects: dict = field(default_factory=dict)
+    continued: str = ""
 
 
 StageFunction = Callable[[Run, Path], Findings]
@@ -58,7 +64,7 @@ def run_stage(name: str, function: StageFunction, run: Run) -> dict:
         run: what the stage works with.
 
     Returns:
-        The record written to ``stage.json``: seconds, metrics, health, effects, inputs.
+        The record written to ``stage.json``: seconds, metrics, health, effects, continued, inputs.
     """
     folder, partial = run.folder / name, run.folder / f".{name}.partial"
     _remove(partial)
@@ -70,11 +76,13 @@ def run_stage(name: str, function: StageFunction, run: Run) -> dict:
         "metrics": findings.metrics,
         "health": findings.health,
         "effects": findings.effects,
+        "continued": findings.continued,
         "inputs": stage_inputs(run.case, BY_NAME[name]),
     }
     (partial / "stage.json").write_text(json.dumps(record, indent=1) + "\n")
     _remove(folder)
     partial.rename(folder)
+    _remove(run.checkpoints(name))
     return record
 
 
@@ -91,7 +99,7 @@ def execute(name: str, function: StageFunction, run: Run) -> bool:
         log.write_text(traceback.format_exc())
         print_error(f"stage {name} failed: {type(error).__name__}: {error}\ntraceback: {log}")
         return False
-    health_line(name, record["seconds"], record["health"])
+    health_line(name, record["seconds"], record["health"], record["continued"])
     return True
 
 

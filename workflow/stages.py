@@ -4,6 +4,7 @@ Each reads products of earlier stages from ``run.folder``, writes its own into `
 Packages are imported inside the functions, so that a stage loads only what it uses.
 """
 
+from dataclasses import replace
 from pathlib import Path
 
 from workflow import findings
@@ -36,11 +37,12 @@ def reflow(run: Run, folder: Path) -> Findings:
     groups = distinct_geometries(joint_geometries(read_pads(run.folder / "geometry/pads.json")))
     distinct = {names[0]: geometry for names, geometry in groups.items()}
     with progress_bar(f"reflow of {len(distinct)} distinct joints") as progress:
-        shapes = solve_joints(distinct, run.case.solder, run.cores, progress)
+        shapes, continued = solve_joints(distinct, run.case.solder, run.cores, progress, run.checkpoints("reflow"))
     write_shapes(folder / "shapes.h5", shapes)
     joints = joint_records(groups, shapes)
     write_json(folder / "joints.json", joints)
-    return findings.of_reflow(joints, decide_effects(next(iter(distinct.values())), run.case.solder))
+    found = findings.of_reflow(joints, decide_effects(next(iter(distinct.values())), run.case.solder))
+    return replace(found, continued=f"{continued} of {len(distinct)} joints" if continued else "")
 
 
 def surface(run: Run, folder: Path) -> Findings:

@@ -19,8 +19,15 @@ def print_error(text: str) -> None:
         errors.print(escape(rest), soft_wrap=True)
 
 
-def health_line(stage: str, seconds: float, health: dict) -> None:
-    """Print how a stage ended: its time, the checks that did not hold, or else the one closest to its limit."""
+def health_line(stage: str, seconds: float, health: dict, continued: str = "") -> None:
+    """Print how a stage ended: its time, the checks that did not hold, or else the one closest to its limit.
+
+    Args:
+        stage: its name.
+        seconds: its time.
+        health: check -> value, limit, ok.
+        continued: what continued from checkpoints, in words.
+    """
     failed = [name for name, result in health.items() if not result["ok"]]
     mark = "[bold red]FAILED[/]" if failed else "[green]ok[/]    "
     if failed:
@@ -31,6 +38,8 @@ def health_line(stage: str, seconds: float, health: dict) -> None:
         text = f"{checks}; closest: {_against_limit(closest, health[closest])}"
     else:
         text = "done"
+    if continued:
+        text += f"; {continued} continued from checkpoints"
     console.print(f"{mark} [bold]{stage:<11}[/] {seconds:6.1f} s  {escape(text)}", soft_wrap=True)
 
 

@@ -8,9 +8,11 @@ import sys
 import time
 from pathlib import Path
 
+import numpy as np
 import psutil
 import pytest
 
+from particles.products import read_shapes
 from tests.support.workflow_command import SMALL_CASE, command_line, reflowshock
 from workflow.stage_table import BY_NAME, NAMES, STAGES
 
@@ -27,8 +29,8 @@ def planned(text: str) -> set[str]:
     return {row[0].strip() for row in rows if row[1].strip() == "run"}
 
 
-def start(folder: Path, setting: str) -> subprocess.Popen:
-    line = command_line("run", folder, settings=(setting,))
+def start(folder: Path, *settings: str) -> subprocess.Popen:
+    line = command_line("run", folder, settings=settings)
     return subprocess.Popen(line, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
 
 
@@ -131,6 +133,33 @@ def test_a_stage_that_is_broken_off_leaves_nothing_and_is_redone(run_folder):
     after = times(run_folder)
     assert after["geometry"] == before["geometry"]
     assert after["reflow"] > before["reflow"]
+
+
+@pytest.mark.parametrize("end", [signal.SIGTERM, signal.SIGKILL])
+def test_a_reflow_that_is_broken_off_continues_to_the_same_bits(first_run, tmp_path, end):
+    folder, checkpoints = tmp_path / "small", tmp_path / "small" / ".reflow.checkpoints"
+    process = start(folder)
+    wait_until(lambda: checkpoints.exists() and any(path.suffix == "" for path in checkpoints.iterdir()))
+    children = psutil.Process(process.pid).children(recursive=True)
+    if end == signal.SIGTERM:
+        process.send_signal(end)
+        assert b"the same command continues" in process.communicate(timeout=30)[1]
+    else:
+        for child in children:
+            if "stage" in child.cmdline():
+                child.kill()
+        process.communicate(timeout=60)
+    assert process.returncode == 1
+    assert psutil.wait_procs(children, timeout=15)[1] == []
+    result = reflowshock("run", folder, "--until", "reflow")
+    assert result.returncode == 0, result.stderr
+    assert "continued from checkpoints" in result.stdout
+    assert not checkpoints.exists()
+    expected, found = (read_shapes(run / "reflow/shapes.h5") for run in (first_run[0], folder))
+    assert found.keys() == expected.keys()
+    for name, shape in expected.items():
+        assert np.array_equal(found[name].points, shape.points)
+        assert np.array_equal(found[name].history["energy"], shape.history["energy"])
 
 
 def test_a_killed_stage_leaves_nothing(run_folder):

@@ -1,0 +1,141 @@
+"""A run that was broken off continues to the same bits; a file that does not belong to it is never used."""
+
+import signal
+import subprocess
+import sys
+from dataclasses import fields
+
+import numpy as np
+import pytest
+
+from particles.checkpoint import Checkpoint
+from particles.geometry import JointGeometry
+from particles.parameters import Solder, SolderEffects, SolderNumerics
+from particles.reflow import solve_joint
+
+JOINT = JointGeometry(0.31e-3, 0.24e-3, 0.24e-3)
+COARSE = SolderNumerics(spacing=1e-4)
+QUASI_STATIC = Solder(volume=0.0724e-9, numerics=COARSE)
+INERTIAL = Solder(volume=0.0724e-9, numerics=COARSE, effects=SolderEffects(inertia="on", viscosity="on"))
+CLOCK = ("seconds", "particle_steps_per_second")
+BREAK = 5
+
+PROGRAM = """
+import os, sys
+from pathlib import Path
+from particles.checkpoint import Checkpoint
+from particles.parameters import Solder
+from particles.reflow import JointGeometry, solve_joint
+
+joint, solder, steps = JointGeometry(*map(float, sys.argv[2:5])), Solder.model_validate_json(sys.argv[5]), []
+
+def kill(_):
+    steps.append(1)
+    if len(steps) == int(sys.argv[6]):
+        os.kill(os.getpid(), int(sys.argv[7]))
+
+solve_joint(joint, solder, kill, checkpoint=Checkpoint(Path(sys.argv[1]), (joint, solder), 0.0))
+"""
+
+
+class BrokenOff(Exception):
+    pass
+
+
+def break_off(solder, path, steps=BREAK):
+    calls = []
+
+    def stop(_):
+        calls.append(1)
+        if len(calls) == steps:
+            raise BrokenOff
+
+    with pytest.raises(BrokenOff):
+        solve_joint(JOINT, solder, stop, checkpoint=Checkpoint(path, (JOINT, solder), 0.0))
+
+
+def check_equal(found, expected):
+    for field in fields(expected):
+        given = getattr(expected, field.name)
+        if isinstance(given, np.ndarray):
+            assert np.array_equal(getattr(found, field.name), given), field.name
+    assert all(np.array_equal(found.history[name], column) for name, column in expected.history.items())
+    assert len(found.snapshots) == len(expected.snapshots)
+    for one, other in zip(found.snapshots, expected.snapshots, strict=True):
+        assert one.time == other.time
+        assert np.array_equal(one.points, other.points)
+    assert {name: value for name, value in found.metrics.items() if name not in CLOCK} == {
+        name: value for name, value in expected.metrics.items() if name not in CLOCK
+    }
+    assert found.verdict == expected.verdict
+
+
+@pytest.fixture(scope="module")
+def uninterrupted():
+    return solve_joint(JOINT, QUASI_STATIC)
+
+
+@pytest.mark.parametrize("end", [signal.SIGTERM, signal.SIGKILL])
+def test_a_killed_process_is_continued_to_the_last_bit(tmp_path, uninterrupted, end):
+    path = tmp_path / "joint"
+    discs = (str(size) for size in (JOINT.gap, JOINT.radius_board, JOINT.radius_package))
+    arguments = (str(path), *discs, QUASI_STATIC.model_dump_json(), str(BREAK), str(int(end)))
+    killed = subprocess.run([sys.executable, "-c", PROGRAM, *arguments], timeout=120, check=False)
+    assert killed.returncode == -end
+    checkpoint = Checkpoint(path, (JOINT, QUASI_STATIC))
+    check_equal(solve_joint(JOINT, QUASI_STATIC, checkpoint=checkpoint), uninterrupted)
+    assert checkpoint.continued
+
+
+def test_momentum_and_contact_lines_are_part_of_the_state(tmp_path):
+    break_off(INERTIAL, tmp_path / "joint", 10)
+    continued = solve_joint(JOINT, INERTIAL, checkpoint=Checkpoint(tmp_path / "joint", (JOINT, INERTIAL)))
+    check_equal(continued, solve_joint(JOINT, INERTIAL))
+
+
+def test_a_finished_run_is_not_run_again(tmp_path, uninterrupted):
+    path, steps = tmp_path / "joint", []
+    solve_joint(JOINT, QUASI_STATIC, checkpoint=Checkpoint(path, (JOINT, QUASI_STATIC)))
+    again = solve_joint(JOINT, QUASI_STATIC, steps.append, checkpoint=Checkpoint(path, (JOINT, QUASI_STATIC)))
+    assert steps == [1.0]
+    check_equal(again, uninterrupted)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.001, 0.5, 0.999])
+def test_a_truncated_file_is_ignored_with_a_message(tmp_path, caplog, share):
+    path = tmp_path / "joint"
+    Checkpoint(path, ("inputs",)).write(np.arange(1000))
+    content = path.read_bytes()
+    path.write_bytes(content[: int(share * len(content))])
+    checkpoint = Checkpoint(path, ("inputs",))
+    assert checkpoint.read() is None
+    assert "broken off" in caplog.text
+    assert not checkpoint.continued
+
+
+def test_a_file_of_other_inputs_is_ignored_with_a_message(tmp_path, caplog):
+    path = tmp_path / "joint"
+    Checkpoint(path, (JOINT, QUASI_STATIC)).write("state")
+    assert Checkpoint(path, (JOINT, INERTIAL)).read() is None
+    assert "other inputs" in caplog.text
+    assert Checkpoint(path, (JOINT, QUASI_STATIC)).read() == "state"
+
+
+def test_a_file_of_other_code_is_ignored(tmp_path, monkeypatch):
+    path = tmp_path / "joint"
+    Checkpoint(path, ()).write("state")
+    monkeypatch.setattr("particles.checkpoint._code", lambda: b"another version")
+    assert Checkpoint(path, ()).read() is None
+
+
+def test_a_write_that_fails_leaves_the_old_file(tmp_path, monkeypatch):
+    checkpoint = Checkpoint(tmp_path / "joint", ())
+    checkpoint.write("old")
+
+    def fail(_):
+        raise OSError("no space")
+
+    monkeypatch.setattr("particles.checkpoint.os.fsync", fail)
+    with pytest.raises(OSError, match="no space"):
+        checkpoint.write("new")
+    assert checkpoint.read() == "old"
