@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from particles.body import Body
+from particles.discretisation_mls import particle_discretisation
 from particles.incompressibility import solve
 from particles.interior_shift import interior_shift
 from particles.mls import SUPPORT
@@ -99,7 +100,8 @@ class LiquidFlow:
             Iterations of the last solve, and the twists of the plates that move.
         """
         body, first_below = self.body, self.body.cloud.surface_count
-        equations = StepEquations(body, self.physics, self.neighbours, self.basis)
+        space = particle_discretisation(body, self.neighbours, self.basis)
+        equations = StepEquations(body, self.physics, space)
         while True:
             solution = solve(equations.problem(self.time_step.size, self.volume))
             velocity, twists = equations.expand(solution.velocity, self.time_step.size)

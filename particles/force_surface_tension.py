@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from particles.body import Body
-from particles.mls import Derivatives
+from particles.discretisation import Discretisation
 from particles.surface_measure import cotangent_laplacian, surface_area
 
 Floats = NDArray[np.float64]
@@ -34,6 +34,6 @@ class SurfaceTension:
         """Force -dE/dx = -gamma K x, `(n, 3)` [N]."""
         return -(self._stiffness(body) @ body.points)
 
-    def matrix(self, body: Body, _stencils: Derivatives, time_step: float) -> sparse.csr_matrix:
+    def matrix(self, body: Body, _space: Discretisation, time_step: float) -> sparse.csr_matrix:
         """Semi-implicit part dt gamma K, `(3 n, 3 n)` [kg/s]: the force at the end of the step is f - dt gamma K v."""
         return sparse.kron(sparse.identity(3), time_step * self._stiffness(body), format="csr")

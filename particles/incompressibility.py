@@ -1,6 +1,6 @@
 """Velocity and pressure of one implicit step: a saddle-point problem with incompressible particles and body.
 
-    A v - C^T p = f,     C v = g
+    A v - C^T p = f,     C v + S p = g
 
 A is the mass over the time step plus implicit viscosity and surface tension, symmetric and positive definite. The rows
 of C are the divergence of every particle below the surface, times its volume, and one global row a . v = dV/dt, a the
@@ -35,12 +35,14 @@ class SaddlePoint:
         constraint: C, `(m, d)` [m^2].
         load: f, `(d,)` [N].
         rate: g, `(m,)` [m^3/s].
+        stabilisation: S, `(m, m)` symmetric, positive semidefinite [m^3/(Pa s)]; None where C needs none.
     """
 
     operator: sparse.csr_matrix
     constraint: sparse.csr_matrix
     load: Floats
     rate: Floats
+    stabilisation: sparse.csr_matrix | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,17 +93,24 @@ class _Inverse:
 
 
 class _Schur:
-    """PETSc shell of S = C A^-1 C^T."""
+    """PETSc shell of C A^-1 C^T + S."""
 
-    def __init__(self, constraint: sparse.csr_matrix, inverse: _Inverse) -> None:
-        self._constraint, self._transposed, self._inverse = constraint, constraint.T.tocsr(), inverse
+    def __init__(self, problem: SaddlePoint, inverse: _Inverse) -> None:
+        self._problem, self._transposed, self._inverse = problem, problem.constraint.T.tocsr(), inverse
 
     def mult(self, _matrix: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        y.setArray(self._constraint @ self._inverse(self._transposed @ x.getArray(readonly=True)))
+        pressure = x.getArray(readonly=True)
+        flux = self._problem.constraint @ self._inverse(self._transposed @ pressure)
+        y.setArray(flux + _leak(self._problem, pressure))
+
+
+def _leak(problem: SaddlePoint, pressure: Floats) -> Floats | float:
+    """S p, `(m,)` [m^3/s]."""
+    return 0.0 if problem.stabilisation is None else problem.stabilisation @ pressure
 
 
 def solve(problem: SaddlePoint) -> Solution:
-    """Solve by conjugate gradients on the Schur complement, preconditioned with C diag(A)^-1 C^T.
+    """Solve by conjugate gradients on the Schur complement, preconditioned with C diag(A)^-1 C^T + S.
 
     Raises:
         SolveFailed: the true residual of either equation stays above the limit.
@@ -109,8 +118,10 @@ def solve(problem: SaddlePoint) -> Solution:
     operator, constraint = problem.operator, problem.constraint
     inverse = _Inverse(operator)
     lumped = constraint @ sparse.diags(1.0 / operator.diagonal()) @ constraint.T
+    if problem.stabilisation is not None:
+        lumped = lumped + problem.stabilisation
     count = constraint.shape[0]
-    shell = PETSc.Mat().createPython([count, count], _Schur(constraint, inverse), comm=PETSc.COMM_SELF)
+    shell = PETSc.Mat().createPython([count, count], _Schur(problem, inverse), comm=PETSc.COMM_SELF)
     shell.setUp()
     solver = PETSc.KSP().create(PETSc.COMM_SELF)
     preconditioner = _petsc(lumped.tocsr())
@@ -134,7 +145,7 @@ def _check(problem: SaddlePoint, solution: Solution, reason: int, scale: float) 
     """Compare the true residuals, not the solver's word, with the limit."""
     force = float(np.linalg.norm(problem.load)) or 1.0
     momentum = problem.operator @ solution.velocity - problem.constraint.T @ solution.pressure - problem.load
-    continuity = problem.constraint @ solution.velocity - problem.rate
+    continuity = problem.constraint @ solution.velocity + _leak(problem, solution.pressure) - problem.rate
     relative = (float(np.linalg.norm(momentum)) / force, float(np.linalg.norm(continuity)) / (scale or 1.0))
     if not (reason > 0 and max(relative) < RESIDUAL_LIMIT):
         raise SolveFailed(

@@ -7,14 +7,14 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from particles.body import Body
-from particles.mls import Derivatives
+from particles.discretisation import Discretisation
 
 Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
 class Mass:
-    """Lumped mass. Without `Inertia` beside it, it only damps: velocity is force times dt over mass.
+    """Mass. Without `Inertia` beside it, it only damps: velocity is force times dt over mass.
 
     Attributes:
         density: [kg/m^3].
@@ -22,9 +22,9 @@ class Mass:
 
     density: float
 
-    def matrix(self, body: Body, _stencils: Derivatives, time_step: float) -> sparse.csr_matrix:
-        """Diagonal M / dt, `(3 n, 3 n)` [kg/s]."""
-        return sparse.diags(np.tile(self.density * body.volumes / time_step, 3), format="csr")
+    def matrix(self, _body: Body, space: Discretisation, time_step: float) -> sparse.csr_matrix:
+        """M / dt, `(3 n, 3 n)` [kg/s]."""
+        return sparse.kron(sparse.identity(3), self.density / time_step * space.mass, format="csr")
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +37,6 @@ class Inertia:
 
     density: float
 
-    def load(self, body: Body, time_step: float) -> Floats:
+    def load(self, body: Body, space: Discretisation, time_step: float) -> Floats:
         """M v_n / dt, `(n, 3)` [N]."""
-        return (self.density * body.volumes / time_step)[:, None] * body.velocity
+        return self.density / time_step * (space.mass @ body.velocity)

@@ -10,7 +10,7 @@ from scipy import sparse
 
 from particles.body import Body
 from particles.contact_line import ContactLine
-from particles.mls import Derivatives
+from particles.discretisation import Discretisation
 from particles.plate import slide
 from particles.plate_motion import PlateMotion
 
@@ -30,14 +30,14 @@ class Force(Protocol):
 class Operator(Protocol):
     """A part of the implicit step: a symmetric matrix that multiplies the new velocity."""
 
-    def matrix(self, body: Body, stencils: Derivatives, time_step: float) -> sparse.csr_matrix:
+    def matrix(self, body: Body, space: Discretisation, time_step: float) -> sparse.csr_matrix:
         """Matrix `(3 n, 3 n)` [kg/s], components one after the other."""
 
 
 class Momentum(Protocol):
     """What is left of the last step's velocity."""
 
-    def load(self, body: Body, time_step: float) -> Floats:
+    def load(self, body: Body, space: Discretisation, time_step: float) -> Floats:
         """Momentum over the time step, `(n, 3)` [N]."""
 
 

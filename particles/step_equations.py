@@ -2,13 +2,11 @@
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
 
 from particles.admissible import Admissible
 from particles.body import Body
+from particles.discretisation import Discretisation
 from particles.incompressibility import SaddlePoint
-from particles.mls import derivatives
-from particles.neighbours import NeighbourList
 from particles.physics import Physics
 
 Floats = NDArray[np.float64]
@@ -20,38 +18,34 @@ class StepEquations:
     Degrees of freedom are stored by component: all x, all y, all z.
     """
 
-    def __init__(self, body: Body, physics: Physics, neighbours: NeighbourList, basis: str) -> None:
-        """Fit the stencils and build what does not depend on the time step.
+    def __init__(self, body: Body, physics: Physics, space: Discretisation) -> None:
+        """Build what does not depend on the time step.
 
         Args:
             body: the liquid body.
             physics: what acts on it.
-            neighbours: a valid list with the support radius of the basis.
-            basis: "linear" or "quadratic".
-
-        Raises:
-            DegenerateStencil: the divergence of a particle cannot be fitted.
+            space: operators at the body's current positions.
         """
-        self._body, self._physics = body, physics
+        self._body, self._physics, self._space = body, physics, space
         self._admissible = Admissible(body, physics.pinned(body), physics.motions)
-        self._stencils = derivatives(body.points, body.interior, neighbours, basis)
-        self._volume, gradient = body.volume()
-        share = sparse.diags(body.volumes[body.interior])
-        divergence = sparse.hstack([share @ component for component in self._stencils.gradient])
-        self._constraint = sparse.vstack((divergence, sparse.csr_matrix(gradient.T.ravel())), format="csr")
-        self._reduced_constraint = (self._constraint @ self._admissible.basis).tocsr()
+        self._volume = body.volume()[0]
+        self._reduced_constraint = (space.constraint @ self._admissible.basis).tocsr()
         self._force = physics.force(body)
 
     def problem(self, time_step: float, volume: float) -> SaddlePoint:
         """Build the saddle-point problem for a time step [s] that ends at a volume [m^3]."""
-        body, physics = self._body, self._physics
-        operator = sum(part.matrix(body, self._stencils, time_step) for part in physics.operators)
-        load = self._force + sum(momentum.load(body, time_step) for momentum in physics.momenta)
+        body, physics, space = self._body, self._physics, self._space
+        operator = sum(part.matrix(body, space, time_step) for part in physics.operators)
+        load = self._force + sum(momentum.load(body, space, time_step) for momentum in physics.momenta)
         given, basis = self._admissible.given(time_step), self._admissible.basis
-        rate = -(self._constraint @ given)
-        rate[-1] += (volume - self._volume) / time_step
-        reduced_load = self._admissible.reduce(load.T.ravel() - operator @ given)
-        return SaddlePoint((basis.T @ operator @ basis).tocsr(), self._reduced_constraint, reduced_load, rate)
+        rate = (volume - self._volume) / time_step * space.volume_share - space.constraint @ given
+        return SaddlePoint(
+            operator=(basis.T @ operator @ basis).tocsr(),
+            constraint=self._reduced_constraint,
+            load=self._admissible.reduce(load.T.ravel() - operator @ given),
+            rate=rate,
+            stabilisation=None if space.stabilisation is None else time_step * space.stabilisation,
+        )
 
     def expand(self, unknowns: Floats, time_step: float) -> tuple[Floats, dict[int, Floats]]:
         """Velocities `(n, 3)` of the degrees of freedom `(d,)`, and the twists of the plates that move."""

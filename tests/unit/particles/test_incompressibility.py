@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy import sparse
@@ -17,6 +19,14 @@ def test_solution_equals_the_dense_solution():
     a, c = given.operator.toarray(), given.constraint.toarray()
     zero = np.zeros((len(c), len(c)))
     expected = np.linalg.solve(np.block([[a, -c.T], [c, zero]]), np.concatenate((given.load, given.rate)))
+    found = solve(given)
+    assert np.concatenate((found.velocity, found.pressure)) == pytest.approx(expected, abs=1e-7)
+
+
+def test_stabilised_solution_equals_the_dense_solution():
+    given = replace(problem(), stabilisation=0.3 * sparse.identity(20, format="csr"))
+    a, c, s = given.operator.toarray(), given.constraint.toarray(), given.stabilisation.toarray()
+    expected = np.linalg.solve(np.block([[a, -c.T], [c, s]]), np.concatenate((given.load, given.rate)))
     found = solve(given)
     assert np.concatenate((found.velocity, found.pressure)) == pytest.approx(expected, abs=1e-7)
 

@@ -5,10 +5,11 @@ import pytest
 
 from particles.body import Body
 from particles.cloud import box_cloud
+from particles.discretisation_mls import particle_discretisation
 from particles.force_surface_tension import SurfaceTension
 from particles.interior_shift import SMALLEST_DEPTH, interior_shift
 from particles.mass import Inertia, Mass
-from particles.mls import SUPPORT, derivatives
+from particles.mls import SUPPORT
 from particles.neighbours import NeighbourList
 from particles.time_step import TimeStep, capillary_limit
 from particles.viscosity import Viscosity
@@ -19,10 +20,10 @@ def body():
     return Body.at_rest(box_cloud(1.0, 6))
 
 
-def stencils(body):
+def discretise(body):
     neighbours = NeighbourList(SUPPORT["quadratic"] * body.cloud.spacing, 0.0)
     neighbours.update(body.points)
-    return derivatives(body.points, body.interior, neighbours, "quadratic")
+    return particle_discretisation(body, neighbours, "quadratic")
 
 
 def power(matrix, field):
@@ -32,7 +33,7 @@ def power(matrix, field):
 
 def test_viscous_power_of_simple_flows(body):
     """2 mu D : D over the volume of the particles below the surface: shear mu V, extension 4 mu V, rotation none."""
-    matrix = Viscosity(2.0).matrix(body, stencils(body), 1.0)
+    matrix = Viscosity(2.0).matrix(body, discretise(body), 1.0)
     x, y, z = body.points.T
     below = body.volumes[body.interior].sum()
     assert power(matrix, np.column_stack((z, 0 * x, 0 * x))) == pytest.approx(2.0 * below)
@@ -43,15 +44,15 @@ def test_viscous_power_of_simple_flows(body):
 
 def test_surface_tension_matrix_is_the_time_step_times_the_stiffness(body):
     tension = SurfaceTension(0.5)
-    matrix = tension.matrix(body, stencils(body), 0.1)
+    matrix = tension.matrix(body, discretise(body), 0.1)
     pulled = (matrix @ body.points.T.ravel()).reshape(3, -1).T
     assert pulled == pytest.approx(-0.1 * tension.force(body), abs=1e-12)
 
 
 def test_mass_and_momentum(body):
     body.velocity[:] = [1.0, 2.0, 3.0]
-    assert Mass(5.0).matrix(body, stencils(body), 0.5).sum() == pytest.approx(3 * 5.0 * 1.0 / 0.5)
-    assert Inertia(5.0).load(body, 0.5).sum(axis=0) == pytest.approx([10.0, 20.0, 30.0])
+    assert Mass(5.0).matrix(body, discretise(body), 0.5).sum() == pytest.approx(3 * 5.0 * 1.0 / 0.5)
+    assert Inertia(5.0).load(body, discretise(body), 0.5).sum(axis=0) == pytest.approx([10.0, 20.0, 30.0])
 
 
 def test_shift_keeps_particles_below_the_surface_and_on_their_wall(body):

@@ -1,0 +1,159 @@
+"""A free drop with inertia: at rest (Laplace pressure) or swinging in its second mode (Rayleigh)."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import ceil, pi
+from time import perf_counter
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import curve_fit
+
+from particles.body import Body
+from particles.cloud_sphere import oblong, sphere_cloud
+from particles.discretisation_tetrahedra import LinearTetrahedra
+from particles.inertial_flow import InertialFlow
+from particles.parameters import Solder
+from particles.rayleigh import lamb_decay_rate, rayleigh_frequency
+from particles.reflow import build_physics
+from particles.surface_quality import vertex_normals
+from particles.tetrahedra import tetrahedralise
+
+Floats = NDArray[np.float64]
+
+EFFECTS = {"surface_tension": True, "gravity": False, "wall_adhesion": False, "inertia": True}
+COLUMNS = ("time", "amplitude", "energy", "kinetic_energy", "volume", "momentum")
+# The oscillation is fitted after this share of a period, when the start from rest has settled.
+SETTLING = 0.25
+SECOND_MOMENT = np.array([-1.0, -1.0, 2.0])
+
+
+@dataclass(frozen=True, slots=True)
+class FreeDrop:
+    """How a free drop moved.
+
+    Attributes:
+        points: `(n, 3)` particles at the end [m], the first `s` are the vertices of the surface.
+        pressure: `(n,)` above ambient at the end [Pa].
+        surface_points: `(s, 3)` [m].
+        triangles: `(t, 3)` of the surface, outward oriented.
+        history: arrays of equal length, the start included: time [s], amplitude of the second mode over the radius,
+            energy (surface plus kinetic) [J], kinetic_energy [J], volume [m^3], momentum (its length) [kg m/s].
+        metrics: name to value and unit.
+    """
+
+    points: Floats
+    pressure: Floats
+    surface_points: Floats
+    triangles: NDArray[np.int32]
+    history: dict[str, Floats]
+    metrics: dict[str, tuple[float, str]]
+
+
+def solve_free_drop(
+    solder: Solder,
+    amplitude: float = 0.0,
+    periods: float = 2.0,
+    steps_per_period: int = 100,
+    progress: Callable[[float], None] | None = None,
+) -> FreeDrop:
+    """Let a drop without walls and gravity move from rest.
+
+    The viscosity acts unless `solder.effects.viscosity` is "off"; the spacing is that of `solder.numerics`.
+
+    Args:
+        solder: volume and fluid.
+        amplitude: of the second mode over the radius at the start; 0 for a ball.
+        periods: duration in Rayleigh periods of the second mode.
+        steps_per_period: time steps in one of them.
+        progress: called with the fraction done.
+
+    Raises:
+        ValueError: the spacing leaves fewer than two shells.
+        SolveFailed: a linear solve failed.
+    """
+    flow = _start(solder, amplitude)
+    period = 2.0 * pi / rayleigh_frequency(2, _radius(solder), solder.density, solder.surface_tension)
+    steps, time_step = ceil(periods * steps_per_period), period / steps_per_period
+    rows, start = [_sample(flow, solder, 0.0)], perf_counter()
+    for step in range(1, steps + 1):
+        flow.step(time_step)
+        rows.append(_sample(flow, solder, step * time_step))
+        if progress is not None:
+            progress(step / steps)
+    seconds = perf_counter() - start
+    body, count = flow.body, flow.body.cloud.surface_count
+    history = dict(zip(COLUMNS, np.array(rows).T, strict=True))
+    metrics = _rest_metrics(flow, solder, history)
+    metrics["particle_steps_per_second"] = (steps * len(body.points) / seconds, "1/s")
+    if amplitude != 0.0:
+        metrics |= _swing_metrics(solder, history)
+    return FreeDrop(body.points, body.pressure, body.points[:count], body.triangles, history, metrics)
+
+
+def _radius(solder: Solder) -> float:
+    """Radius of the ball [m]."""
+    return float(np.cbrt(3.0 * solder.volume / (4.0 * pi)))
+
+
+def _start(solder: Solder, amplitude: float) -> InertialFlow:
+    """Set up the drop at rest."""
+    radius, spacing = _radius(solder), solder.numerics.spacing
+    shells = round(radius / spacing)
+    if shells < 2:
+        raise ValueError(f"solder.numerics.spacing = {spacing:.4g} m must be below half the radius {radius:.4g} m")
+    ball = sphere_cloud(solder.volume, shells)
+    cells = tetrahedralise(ball.points, ball.spacing)
+    body = Body.at_rest(oblong(ball, amplitude))
+    physics = build_physics(solder, EFFECTS | {"viscosity": solder.effects.viscosity != "off"}, ())
+    return InertialFlow(body, physics, LinearTetrahedra.start(body.points, cells, solder.density))
+
+
+def _sample(flow: InertialFlow, solder: Solder, time: float) -> tuple[float, ...]:
+    """One row of the history."""
+    body, mass = flow.body, flow.space.mass
+    offset = body.points - (mass @ body.points).sum(axis=0) / mass.sum()
+    moment = SECOND_MOMENT @ (offset * (mass @ offset)).sum(axis=0) / mass.sum()
+    momentum = solder.density * (mass @ body.velocity)
+    kinetic = 0.5 * float((momentum * body.velocity).sum())
+    energy = flow.physics.energy(body) + kinetic
+    amplitude = 5.0 / 6.0 * float(moment) / _radius(solder) ** 2
+    return time, amplitude, energy, kinetic, body.volume()[0], float(np.linalg.norm(momentum.sum(axis=0)))
+
+
+def _rest_metrics(flow: InertialFlow, solder: Solder, history: dict[str, Floats]) -> dict[str, tuple[float, str]]:
+    """Pressure, remaining motion of the surface and volume at the end."""
+    body, weight = flow.body, np.asarray(flow.space.mass.sum(axis=0)).ravel()
+    mean = float(np.average(body.pressure, weights=weight))
+    scatter = float(np.sqrt(np.average((body.pressure - mean) ** 2, weights=weight)))
+    normals = vertex_normals(body.points, body.triangles, body.cloud.surface_count)
+    speed = float(np.abs((body.velocity[: len(normals)] * normals).sum(axis=1)).max())
+    return {
+        "mean_pressure": (mean, "Pa"),
+        "pressure_scatter": (scatter / mean, ""),
+        "mean_pressure_error": (mean * _radius(solder) / (2.0 * solder.surface_tension) - 1.0, ""),
+        "capillary_number_at_rest": (solder.viscosity * speed / solder.surface_tension, ""),
+        "volume_drift": (float(np.ptp(history["volume"]) / solder.volume), ""),
+        "particles": (float(len(body.points)), ""),
+    }
+
+
+def _swing_metrics(solder: Solder, history: dict[str, Floats]) -> dict[str, tuple[float, str]]:
+    """Period and decay rate of a fitted damped oscillation, and their errors against Rayleigh and Lamb."""
+    omega = rayleigh_frequency(2, _radius(solder), solder.density, solder.surface_tension)
+    lamb = lamb_decay_rate(2, _radius(solder), solder.density, solder.viscosity)
+    later = history["time"] > SETTLING * 2.0 * pi / omega
+    time, amplitude = history["time"][later] * omega, history["amplitude"][later]
+
+    def swing(t: Floats, *parameters: float) -> Floats:
+        mean, size, decay, frequency, phase = parameters
+        return mean + size * np.exp(-decay * t) * np.cos(frequency * t + phase)
+
+    guess = (0.0, history["amplitude"][0], lamb / omega, 1.0, 0.0)
+    _, _, decay, frequency, _ = curve_fit(swing, time, amplitude, p0=guess)[0]
+    return {
+        "period": (2.0 * pi / (frequency * omega), "s"),
+        "decay_rate": (float(decay * omega), "1/s"),
+        "period_error": (float(1.0 / frequency - 1.0), ""),
+        "decay_rate_error": (float(decay * omega / lamb - 1.0), ""),
+    }
