@@ -26,7 +26,7 @@ def sphere_cloud(volume: float, shells: int) -> Cloud:
     points = np.concatenate([*layers, np.zeros((1, 3))])
     surface_count = len(layers[0])
     triangles = _outward(layers[0], ConvexHull(layers[0]).simplices.astype(np.int32))
-    points *= np.cbrt(volume / enclosed_volume(points, triangles, ()))
+    points *= np.cbrt(volume / enclosed_volume(points, triangles, (), ()))
     return Cloud(
         points=points,
         surface_count=surface_count,
@@ -48,7 +48,7 @@ def oblong(cloud: Cloud, amplitude: float) -> Cloud:
     radius = np.maximum(np.linalg.norm(cloud.points, axis=1), 1e-300)
     cosine = cloud.points[:, 2] / radius
     points = cloud.points * (1.0 + amplitude * (1.5 * cosine**2 - 0.5))[:, None]
-    volume, stretched = (enclosed_volume(where, cloud.triangles, ()) for where in (cloud.points, points))
+    volume, stretched = (enclosed_volume(where, cloud.triangles, (), ()) for where in (cloud.points, points))
     return replace(cloud, points=points * np.cbrt(volume / stretched))
 
 
