@@ -30,7 +30,7 @@ def test_viscous_oscillation_has_its_limits():
 
 
 def test_second_mode_of_a_viscous_drop():
-    """Small amplitude, Ohnesorge number 0.02: exact period within 0.5 %, exact decay rate within 10 % (147 particles)."""
+    """147 particles, small amplitude, Ohnesorge number 0.02: period within 0.5 %, decay rate within 10 % of Reid's."""
     result = solve_free_drop(drop(0.02, 3), amplitude=0.02, periods=1.5)
     diffusion_rate = 0.02 * np.sqrt(GAMMA / (DENSITY * RADIUS**3))
     decay, frequency = viscous_oscillation(2, rayleigh_frequency(2, RADIUS, DENSITY, GAMMA), diffusion_rate)
