@@ -72,6 +72,14 @@ class Body:
             moved[on_plate] = plates[wall].place(local * np.array([1.0, 1.0, 0.0]))
         self.points, self.plates = moved, tuple(plates)
 
+    def span(self) -> tuple[float, float]:
+        """Heights [m] between which horizontal sections cut the surface, but no plate, tilted ones neither."""
+        z, rings = self.points[: self.cloud.surface_count, 2], self.cloud.rings
+        sides = [(plate.side, z[ring]) for plate, ring in zip(self.plates, rings, strict=True)]
+        low = max((float(line.max()) for side, line in sides if side < 0.0), default=float(z.min()))
+        high = min((float(line.min()) for side, line in sides if side > 0.0), default=float(z.max()))
+        return low, high
+
     def volume(self) -> tuple[float, Floats]:
         """Enclosed volume [m^3] and its gradient `(n, 3)` [m^2]."""
         return volume_and_gradient(self.points, self.triangles, self.cloud.rings, self.plates)

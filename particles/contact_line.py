@@ -40,6 +40,20 @@ class ContactLine:
         """Cosine of the contact angle that acts on each vertex `(k,)`; zero where the edge holds it."""
         return self._cosine[self.state]
 
+    def cosine_area(self, body: Body) -> float:
+        """Integral of cos(theta) over the area between the edge and the line [m^2], negative inside the edge.
+
+        Continuous where a vertex leaves the edge, since the area next to a pinned vertex belongs to the free one. On
+        a uniform wall it is the whole wetted area.
+        """
+        local = body.plates[self.wall].local(body.points[body.cloud.rings[self.wall]])[:, :2]
+        area = _sectors(local)
+        if np.isfinite(self.edge_radius):
+            area -= _sectors(local * (self.edge_radius / np.linalg.norm(local, axis=1))[:, None])
+        cosine, free = self.cosine(), (self.state != PINNED).astype(float)
+        mean = (cosine + np.roll(cosine, -1)) / np.maximum(1.0, free + np.roll(free, -1))
+        return float((mean * area).sum())
+
     def pinned(self, body: Body) -> NDArray[np.int32]:
         """The pinned vertices."""
         return body.cloud.rings[self.wall][self.state == PINNED]
@@ -87,3 +101,9 @@ class ContactLine:
         self.state[caught] = PINNED
         local[caught, :2] *= (self.edge_radius / radius[caught])[:, None]
         body.points[ring[caught]] = plate.place(local[caught])
+
+
+def _sectors(local: Floats) -> Floats:
+    """Areas of the triangles between the centre and each segment of a closed line, `(k,)` [m^2]; `local (k, 2)`."""
+    x, y = local.T
+    return 0.5 * (x * np.roll(y, -1) - y * np.roll(x, -1))

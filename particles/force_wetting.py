@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from particles.body import Body
 from particles.contact_line import ContactLine
 from particles.physics import Force
-from particles.surface_measure import ring_area, ring_area_gradient
+from particles.surface_measure import ring_area_gradient
 
 Floats = NDArray[np.float64]
 
@@ -29,10 +29,8 @@ class Wetting:
     others: Sequence[Force]
 
     def energy(self, body: Body) -> float:
-        """Energy of the walls [J]; a mean angle where the line lies on pad and mask."""
-        return -self.coefficient * sum(
-            float(line.cosine().mean()) * ring_area(body.points, body.cloud.rings[line.wall]) for line in self.lines
-        )
+        """Energy of the walls [J], that of a line at the edges of the pads being zero."""
+        return -self.coefficient * sum(line.cosine_area(body) for line in self.lines)
 
     def force(self, body: Body) -> Floats:
         """Force gamma cos(theta) dA_wet/dx on the contact lines, `(n, 3)` [N]."""

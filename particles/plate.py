@@ -1,7 +1,7 @@
 """Rigid plates: the planes that bound a liquid body, with the centre of a pad, and how they are placed and moved."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -68,6 +68,14 @@ def joint_plates(geometry: JointGeometry) -> tuple[Plate, Plate]:
     """Place the plates of a joint: the board's at z = 0, the package's with its offset and tilt."""
     package = Plate.horizontal(geometry.gap, geometry.offset, side=1.0)
     return Plate.horizontal(0.0), package.moved(np.array([0.0, 0.0, 0.0, *geometry.tilt, 0.0]))
+
+
+def placed_geometry(geometry: JointGeometry, plates: Sequence[Plate]) -> JointGeometry:
+    """The geometry of a joint whose plates have moved, seen from the board's plate."""
+    board, package = plates
+    x, y, gap = board.local(package.origin[None])[0]
+    turn = Rotation.from_matrix(board.frame @ package.frame.T).as_rotvec()
+    return replace(geometry, gap=gap, offset=(x, y), tilt=(turn[0], turn[1]))
 
 
 def slide(plates: Sequence[Plate], wall: NDArray[np.int8], field: Floats) -> Floats:

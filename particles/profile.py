@@ -42,7 +42,7 @@ class Profile:
 
 
 def section_areas(points: Floats, triangles: Indices, heights: Floats) -> Floats:
-    """Areas of the cross-sections of a surface that is open at walls z = constant only.
+    """Areas of the cross-sections of a surface at heights between its walls.
 
     Args:
         points: `(n, 3)` [m].
@@ -79,10 +79,16 @@ def _segments(corner: Floats, height: float) -> Floats:
     return segment
 
 
-def fit_profile(points: Floats, triangles: Indices) -> Profile:
-    """Fit the equivalent radius of a free surface between its lowest and its highest point."""
+def fit_profile(points: Floats, triangles: Indices, span: tuple[float, float] | None = None) -> Profile:
+    """Fit the equivalent radius of a free surface.
+
+    Args:
+        points: `(n, 3)` [m].
+        triangles: `(t, 3)` of the free surface, outward oriented.
+        span: heights of the fit [m]; by default from the lowest to the highest point.
+    """
     z = points[np.unique(triangles), 2]
-    low, high = float(z.min()), float(z.max())
+    low, high = span or (float(z.min()), float(z.max()))
     nodes, _ = np.polynomial.legendre.leggauss(SLICES)
     heights = 0.5 * (low + high) + 0.5 * (high - low) * nodes
     areas = section_areas(points, triangles, heights)

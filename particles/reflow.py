@@ -51,13 +51,18 @@ def solve_joint(
         NoRest: no rest within `solder.numerics.max_steps`.
         SolveFailed: a linear solve failed.
     """
+    flow, rule = start_joint(geometry, solder)
+    run = run_to_rest(flow, rule, progress, on_snapshot, checkpoint)
+    return joint_shape(geometry, solder, flow, run)
+
+
+def start_joint(geometry: JointGeometry, solder: Solder) -> tuple[LiquidFlow, StopRule]:
+    """Set up the flow of a joint from its double cone, with the effects that are called for, and when it ends."""
     cloud = joint_cloud(geometry, solder.volume, solder.numerics.spacing)
     effects = {name: decision["on"] for name, decision in decide_effects(geometry, solder).items()}
     radii = (geometry.radius_board, geometry.radius_package)
     lines = tuple(contact_line(cloud, wall, radius, solder) for wall, radius in enumerate(radii))
-    flow = start_flow(cloud, solder, effects, lines)
-    run = run_to_rest(flow, stop_rule(cloud, solder, effects), progress, on_snapshot, checkpoint)
-    return _shape(geometry, solder, flow, run)
+    return start_flow(cloud, solder, effects, lines), stop_rule(cloud, solder, effects)
 
 
 def contact_line(cloud: Cloud, wall: int, radius: float, solder: Solder) -> ContactLine:
@@ -112,8 +117,8 @@ def build_physics(solder: Solder, effects: dict[str, bool], lines: tuple[Contact
     return Physics(tuple(forces), tuple(operators), tuple(momenta), tuple(events), lines)
 
 
-def _shape(geometry: JointGeometry, solder: Solder, flow: LiquidFlow, run: Run) -> JointShape:
-    """Collect the result."""
+def joint_shape(geometry: JointGeometry, solder: Solder, flow: LiquidFlow, run: Run) -> JointShape:
+    """Collect the result of a run that ended with the plates at a geometry."""
     body, cloud = flow.body, flow.body.cloud
     metrics = joint_metrics(geometry, solder, flow, run)
     return JointShape(

@@ -82,3 +82,21 @@ def test_wetting_force_is_the_gradient_of_its_energy_and_vanishes_at_right_angle
         assert wetting.energy(body) == pytest.approx(-2.0 * pull * ring_area(body.points, ring))
         # Widening the square by a factor 1 + e gains 2 e gamma cos(theta) A.
         assert float((wetting.force(body) * body.points).sum()) == pytest.approx(2.0 * 2.0 * pull, abs=1e-12)
+
+
+def test_wetting_energy_is_continuous_at_the_edge_and_falls_along_the_force(body):
+    """Half of the line on the mask: a vertex that leaves the edge takes no energy along, and does the force's work."""
+    line, ring = line_on(body), body.cloud.rings[0]
+    wetting, count = Wetting(2.0, (line,), ()), len(body.cloud.rings[0]) // 2
+    line.state[:count] = ON_MASK
+    assert wetting.energy(body) == pytest.approx(0.0, abs=1e-15)
+    body.points[ring[:count], :2] *= 1.1
+    field = np.zeros_like(body.points)
+    field[ring[:count], :2] = body.points[ring[:count], :2]
+    force = wetting.force(body)
+    energies = []
+    for step in (1e-6, -1e-6):
+        moved = Body.at_rest(body.cloud)
+        moved.points = body.points + step * field
+        energies.append(wetting.energy(moved))
+    assert float((force * field).sum()) == pytest.approx(-(energies[0] - energies[1]) / 2e-6, rel=1e-6)

@@ -3,7 +3,7 @@ import pytest
 
 from particles.cloud import joint_cloud
 from particles.geometry import JointGeometry
-from particles.plate import Plate, joint_plates, slide
+from particles.plate import Plate, joint_plates, placed_geometry, slide
 
 SEED = 11
 
@@ -53,3 +53,12 @@ def test_a_cloud_leans_to_an_offset_and_tilted_plate_with_its_volume():
     assert local[:, 2] == pytest.approx(0.0, abs=1e-18)
     assert local[:, :2] == pytest.approx(straight.points[straight.wall == 1, :2], abs=1e-18)
     assert (cloud.points[cloud.wall == 0, 2] == 0.0).all()
+
+
+def test_the_geometry_of_plates_that_moved_is_seen_from_the_board():
+    geometry = JointGeometry(0.3, 0.2, 0.1, offset=(0.1, 0.05), tilt=(0.03, -0.2))
+    plates = joint_plates(geometry)
+    turned = [plate.moved(np.array([0.0, 0.0, 0.5, 0.0, 0.0, 0.0])) for plate in plates]
+    placed = placed_geometry(JointGeometry(1.0, 0.2, 0.1), turned)
+    for name in ("gap", "radius_board", "radius_package", "offset", "tilt"):
+        assert getattr(placed, name) == pytest.approx(getattr(geometry, name))

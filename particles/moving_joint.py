@@ -1,0 +1,61 @@
+"""A joint whose package floats on the solder, or is moved slowly from place to place."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+
+from particles.geometry import JointGeometry
+from particles.parameters import Solder
+from particles.plate import joint_plates, placed_geometry
+from particles.plate_motion import PlateMotion, Travel
+from particles.reflow import joint_shape, start_joint
+from particles.rest import run_to_rest
+from particles.shape import JointShape
+
+SPACINGS_IN_A_STEP = 0.2
+
+
+def settle_joint(
+    geometry: JointGeometry,
+    solder: Solder,
+    motions: Sequence[PlateMotion],
+    progress: Callable[[float], None] | None = None,
+) -> JointShape:
+    """Let a joint come to rest with plates that move: its metrics are those of where the plates end.
+
+    Args:
+        geometry: where the plates start.
+        solder: volume, fluid and process; the rigid motion of a floating plate is soft, so that a
+            `time_step_limit` of 100 is five times faster than one of 20.
+        motions: of the plates that do not rest.
+        progress: called with the fraction done.
+
+    Raises: as `solve_joint`.
+    """
+    flow, rule = start_joint(geometry, solder)
+    flow.physics = replace(flow.physics, motions=motions)
+    run = run_to_rest(flow, rule, progress)
+    return joint_shape(placed_geometry(geometry, flow.body.plates), solder, flow, run)
+
+
+def follow_path(geometry: JointGeometry, solder: Solder, path: Sequence[JointGeometry]) -> Iterator[JointShape]:
+    """Move the package along a path and yield the joint at rest, at the start and in each place.
+
+    The path ends early where the neck ruptures. Call it in the quasi-static mode: the speed between the places has no
+    meaning, the plate goes a fifth of a spacing in the longest time step.
+
+    Args:
+        geometry: where the joint reflows.
+        solder: volume, fluid and numerics; `max_steps` holds for each place.
+        path: places of the package (gap, offset and tilt) one after the other.
+
+    Raises: as `solve_joint`.
+    """
+    flow, rule = start_joint(geometry, solder)
+    speed = SPACINGS_IN_A_STEP * flow.body.cloud.spacing / flow.time_step.largest
+    for place in (geometry, *path):
+        travel = Travel(1, joint_plates(place)[1], speed, lever=place.radius_package)
+        flow.physics = replace(flow.physics, motions=(travel,))
+        run = run_to_rest(flow, replace(rule, max_steps=flow.steps + rule.max_steps))
+        yield joint_shape(place, solder, flow, run)
+        if run.ruptured:
+            return
