@@ -18,7 +18,7 @@ class Discretisation:
         weights: `(m,)` volumes of these points [m^3].
         mass: `(n, n)` symmetric; the kinetic energy is rho/2 v . mass v [m^3].
         constraint: `(k, 3 n)` rate of the volume that each pressure controls [m^2].
-        volume_share: `(k,)` how a wanted rate of the total volume is shared by these rates; its sum is one.
+        volume_share: `(k,)` these rates where the whole volume grows evenly at the rate one.
         stabilisation: `(k, k)` symmetric, positive semidefinite, over the time step [m^3/(Pa s^2)], or None.
     """
 

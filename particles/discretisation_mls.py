@@ -26,13 +26,12 @@ def particle_discretisation(body: Body, neighbours: NeighbourList, basis: str) -
     gradient = derivatives(body.points, body.interior, neighbours, basis).gradient
     weights = body.volumes[body.interior]
     divergence = sparse.hstack([sparse.diags(weights) @ component for component in gradient])
-    whole = sparse.csr_matrix(body.volume()[1].T.ravel())
-    share = np.zeros(len(weights) + 1)
-    share[-1] = 1.0
+    volume, slope = body.volume()
+    whole = sparse.csr_matrix(slope.T.ravel())
     return Discretisation(
         gradient=gradient,
         weights=weights,
         mass=sparse.diags(body.volumes, format="csr"),
         constraint=sparse.vstack((divergence, whole), format="csr"),
-        volume_share=share,
+        volume_share=np.append(weights / volume, 1.0),
     )

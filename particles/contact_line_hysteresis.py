@@ -1,0 +1,44 @@
+"""A contact line with hysteresis: it advances at one contact angle, recedes at a smaller one, and else stands."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from particles.body import Body
+from particles.contact_line import PINNED, RELEASE_MARGIN, ContactLine
+
+Floats = NDArray[np.float64]
+
+RECEDING, ADVANCING = 1, 2
+
+
+class HystereticLine(ContactLine):
+    """The contact line on a uniform wall whose advancing and receding angles differ.
+
+    Each vertex stands while receding angle < contact angle < advancing angle. Beyond, it moves with the force of the
+    angle that it has passed, and stands again as soon as the liquid carries it the other way.
+    """
+
+    def __init__(self, wall: int, receding_angle: float, advancing_angle: float, radii: Floats) -> None:
+        """Let each vertex stand where it is.
+
+        Args:
+            wall: index of the wall and of the ring.
+            receding_angle: largest contact angle at which the line recedes [rad].
+            advancing_angle: smallest contact angle at which the line advances [rad].
+            radii: `(k,)` distances of the vertices from the centre of the plate [m].
+        """
+        super().__init__(wall, np.inf, receding_angle, advancing_angle, radii)
+        self.state[:] = PINNED
+
+    def update(self, body: Body, load: Floats, coefficient: float) -> None:
+        """Let vertices stand that moved against their sense, release those whose angle passed one of the two.
+
+        Args: as `ContactLine.contact_cosine`.
+        """
+        radial, _ = self.outward(body)
+        speed = (body.velocity[body.cloud.rings[self.wall]] * radial).sum(axis=1)
+        turned = ((self.state == ADVANCING) & (speed < 0.0)) | ((self.state == RECEDING) & (speed > 0.0))
+        self.state[turned] = PINNED
+        cosine, standing = self.contact_cosine(body, load, coefficient), self.state == PINNED
+        self.state[standing & (cosine > self._cosine[RECEDING] + RELEASE_MARGIN)] = RECEDING
+        self.state[standing & (cosine < self._cosine[ADVANCING] - RELEASE_MARGIN)] = ADVANCING
