@@ -71,8 +71,8 @@ def _spacing_problems(solder: Solder, name: str, geometry: JointGeometry) -> lis
     limit = min(geometry.gap / SPACINGS_IN_GAP, smallest_radius / SPACINGS_IN_RADIUS)
     if spacing <= limit:
         return []
-    message = f"too coarse for joint {name}: gap {_mm(geometry.gap)}, smallest radius {_mm(smallest_radius)}"
-    return [Problem("solder.numerics.spacing", _mm(spacing), f"<= {_mm(limit)}", message)]
+    message = f"too coarse for joint {name}: gap {mm(geometry.gap)}, smallest radius {mm(smallest_radius)}"
+    return [Problem("solder.numerics.spacing", mm(spacing), f"<= {mm(limit)}", message)]
 
 
 def _too_much(solder: Solder, name: str, geometry: JointGeometry, pitch: float) -> list[Problem]:
@@ -88,8 +88,8 @@ def _too_much(solder: Solder, name: str, geometry: JointGeometry, pitch: float) 
         return []
     smallest = pi * geometry.gap * min(geometry.radius_board, geometry.radius_package) ** 2
     limit = _bisect(fits, smallest, solder.volume)
-    message = f"joint {name} (gap {_mm(geometry.gap)}) would touch its neighbour at the pitch of {_mm(pitch)}"
-    return [Problem("solder.volume", _mm3(solder.volume), f"<= {_mm3(limit)}", message)]
+    message = f"joint {name} (gap {mm(geometry.gap)}) would touch its neighbour at the pitch of {mm(pitch)}"
+    return [Problem("solder.volume", mm3(solder.volume), f"<= {mm3(limit)}", message)]
 
 
 def _too_little(solder: Solder, name: str, geometry: JointGeometry) -> list[Problem]:
@@ -103,8 +103,8 @@ def _too_little(solder: Solder, name: str, geometry: JointGeometry) -> list[Prob
     if solder.volume >= full or fits(solder.volume):
         return []
     limit = _bisect(fits, full, solder.volume)
-    message = f"joint {name} would rupture: too little solder to span its gap of {_mm(geometry.gap)}"
-    return [Problem("solder.volume", _mm3(solder.volume), f">= {_mm3(limit)}", message)]
+    message = f"joint {name} would rupture: too little solder to span its gap of {mm(geometry.gap)}"
+    return [Problem("solder.volume", mm3(solder.volume), f">= {mm3(limit)}", message)]
 
 
 def _width_and_waist(solder: Solder, geometry: JointGeometry, volume: float) -> tuple[float, float] | None:
@@ -127,9 +127,11 @@ def _bisect(fits: Callable[[float], bool], good: float, bad: float) -> float:
     return good
 
 
-def _mm(length: float) -> str:
+def mm(length: float) -> str:
+    """Write a length [m]."""
     return f"{1e3 * length:.4g} mm"
 
 
-def _mm3(volume: float) -> str:
+def mm3(volume: float) -> str:
+    """Write a volume [m^3]."""
     return f"{1e9 * volume:.3g} mm^3"

@@ -1,5 +1,6 @@
 """Which effects a reflow calls for, decided from dimensionless numbers. No numerical library is loaded here."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from math import pi, sqrt
 from typing import TypedDict
@@ -25,7 +26,7 @@ class Decision(TypedDict):
 
 @dataclass(frozen=True, slots=True)
 class Numbers:
-    """Dimensionless numbers and times of a joint.
+    """Dimensionless numbers and times of a joint or drop.
 
     Attributes:
         bond: rho g L H / gamma, weight over surface tension.
@@ -43,13 +44,28 @@ class Numbers:
 def dimensionless_numbers(geometry: JointGeometry, solder: Solder) -> Numbers:
     """Numbers of a joint; L is the radius of a cylinder of the joint's volume and gap, H the gap."""
     length = sqrt(solder.volume / (pi * geometry.gap))
+    return _numbers(solder, length, length * geometry.gap)
+
+
+def drop_numbers(solder: Solder) -> Numbers:
+    """Numbers of a drop: its Bond number with V^(1/3), times and Ohnesorge number with the radius of its sphere."""
+    return _numbers(solder, (0.75 * solder.volume / pi) ** (1.0 / 3.0), solder.volume ** (2.0 / 3.0))
+
+
+def _numbers(solder: Solder, length: float, area: float) -> Numbers:
+    """Numbers from the length that times are made of [m] and the area of the Bond number [m^2]."""
     density, tension = solder.density, solder.surface_tension
     return Numbers(
-        bond=density * solder.gravity * length * geometry.gap / tension,
+        bond=density * solder.gravity * area / tension,
         ohnesorge=solder.viscosity / sqrt(density * tension * length),
         capillary_time=sqrt(density * length**3 / tension),
         viscous_time=density * length**2 / solder.viscosity,
     )
+
+
+def acting_weight(solder: Solder, effects: Mapping[str, Decision]) -> float:
+    """Weight of the unit volume that acts [N/m^3]."""
+    return solder.density * solder.gravity if effects["gravity"]["on"] else 0.0
 
 
 def _by_switch(switch: str, auto: Decision) -> Decision:
@@ -59,12 +75,16 @@ def _by_switch(switch: str, auto: Decision) -> Decision:
 
 
 def decide_effects(geometry: JointGeometry, solder: Solder) -> dict[str, Decision]:
-    """Decide each effect of a joint's reflow.
+    """Decide each effect of a joint's reflow: `decide` with its numbers."""
+    return decide(dimensionless_numbers(geometry, solder), solder)
+
+
+def decide(numbers: Numbers, solder: Solder) -> dict[str, Decision]:
+    """Decide each effect of a reflow.
 
     Returns:
         For gravity, inertia, viscosity, surface_tension and wall_adhesion: on or off, and the reason with its number.
     """
-    numbers = dimensionless_numbers(geometry, solder)
     change = SHAPE_CHANGE_BY_BOND * numbers.bond
     slowest = max(numbers.capillary_time, numbers.viscous_time)
     ratio = solder.process_time / slowest

@@ -7,6 +7,7 @@ from particles.parameters import Solder
 SECONDS_PER_STEP_OF_THOUSAND = 0.12
 COST_EXPONENT = 1.8
 TYPICAL_STEPS = 8
+TYPICAL_STEPS_OF_DROP = 60
 
 
 def particle_count(solder: Solder, geometry: JointGeometry) -> int:
@@ -17,5 +18,13 @@ def particle_count(solder: Solder, geometry: JointGeometry) -> int:
 
 def reflow_seconds(solder: Solder, geometry: JointGeometry) -> float:
     """Expected time of `solve_joint` on one core [s], from the measured cost of a step."""
-    thousands = particle_count(solder, geometry) / 1000.0
-    return TYPICAL_STEPS * SECONDS_PER_STEP_OF_THOUSAND * thousands**COST_EXPONENT
+    return TYPICAL_STEPS * _seconds_per_step(particle_count(solder, geometry))
+
+
+def drop_seconds(count: int) -> float:
+    """Expected time of `solve_drop` on one core [s]; `count` particles along an edge of the cube."""
+    return TYPICAL_STEPS_OF_DROP * _seconds_per_step(count**3)
+
+
+def _seconds_per_step(particles: int) -> float:
+    return SECONDS_PER_STEP_OF_THOUSAND * (particles / 1000.0) ** COST_EXPONENT

@@ -1,4 +1,4 @@
-"""Numbers of a joint at rest, and their comparison with the Young-Laplace reference."""
+"""Numbers of a joint or drop at rest, and their comparison with the Young-Laplace reference."""
 
 from collections.abc import Sequence
 
@@ -16,24 +16,41 @@ from particles.plate_force import plate_wrench
 from particles.rest import Run
 from particles.surface_measure import ring_area
 from particles.time_step import capillary_limit
-from particles.young_laplace import Meridian, NoMeridian, joint_meridian
+from particles.young_laplace import Meridian, NoMeridian, joint_meridian, pad_meridian
 
 Floats = NDArray[np.float64]
 Metrics = dict[str, tuple[float, str]]
 
 
 def joint_metrics(geometry: JointGeometry, solder: Solder, flow: LiquidFlow, run: Run) -> Metrics:
-    """Collect the numbers of a joint at the end of its run: name to SI value and unit.
+    """Collect the numbers of a joint at the end of its run: name to SI value and unit."""
+    reference = reference_meridian(geometry, solder, _weight(flow))
+    shape = _joint_shape(geometry, flow, run) | _joint_errors(solder, flow, run, reference)
+    return _volume(solder, flow) | shape | _pressure(solder, flow, run, reference) | _cost_and_rest(solder, flow, run)
 
-    The scatter of the pressure is its standard deviation over the capillary pressure of a sphere of the joint's width.
+
+def drop_metrics(solder: Solder, pad_radius: float, flow: LiquidFlow, run: Run) -> Metrics:
+    """Collect the numbers of a drop at the end of its run: name to SI value and unit.
+
+    Args:
+        solder: volume, contact angles and fluid.
+        pad_radius: radius of the pad [m], infinite for a uniform wall.
+        flow: the flow at its end.
+        run: how it came there.
     """
-    below = particle_pressure(flow)[flow.body.cloud.surface_count :]
-    capillary = 4.0 * solder.surface_tension / run.profiles[-1].max_width
-    pressure: Metrics = {
-        "mean_pressure": (float(below.mean()), "Pa"),
-        "pressure_scatter": (float(below.std() / capillary), ""),
+    reference = reference_drop(solder, pad_radius, _weight(flow))
+    height, width = run.records[-1].height, run.profiles[-1].max_width
+    angle = mean_angle(_contact_cosines(flow)[0])
+    shape: Metrics = {
+        "height": (height, "m"),
+        "max_width": (width, "m"),
+        "contact_radius": (contact_radius(flow.body, 0), "m"),
+        "contact_angle": (angle, "deg"),
+        "height_error": (height / reference.height - 1.0, ""),
+        "max_width_error": (width / reference.max_width - 1.0, ""),
+        "contact_angle_error": (angle - float(np.degrees(reference.angle_board)), "deg"),
     }
-    return _shape_at_rest(geometry, solder, flow, run) | pressure | _cost_and_rest(solder, flow, run)
+    return _volume(solder, flow) | shape | _pressure(solder, flow, run, reference) | _cost_and_rest(solder, flow, run)
 
 
 def _weight(flow: LiquidFlow) -> float:
@@ -66,16 +83,23 @@ def verdict(lines: Sequence[ContactLine], ruptured: bool) -> str:
     return "dewetted" if (states == ON_PAD).any() else "ok"
 
 
-def _shape_at_rest(geometry: JointGeometry, solder: Solder, flow: LiquidFlow, run: Run) -> Metrics:
+def _contact_cosines(flow: LiquidFlow) -> list[Floats]:
+    """Cosines of the contact angles along each contact line, by the balance of forces."""
+    for event in flow.physics.events:
+        if isinstance(event, Wetting):
+            return event.contact_cosines(flow.body)
+    raise ValueError("contact angles are those of a body with wall adhesion")
+
+
+def _volume(solder: Solder, flow: LiquidFlow) -> Metrics:
+    volume = flow.body.volume()[0]
+    return {"volume": (volume, "m^3"), "volume_drift": (volume / solder.volume - 1.0, "")}
+
+
+def _joint_shape(geometry: JointGeometry, flow: LiquidFlow, run: Run) -> Metrics:
     body, profile = flow.body, run.profiles[-1]
-    others = tuple(force for force in flow.physics.forces if not isinstance(force, Wetting))
-    weight = _weight(flow)
-    angles = Wetting(solder.surface_tension, flow.physics.lines, others).contact_cosines(body)
-    volume = body.volume()[0]
-    reference = reference_meridian(geometry, solder, weight)
+    angles = _contact_cosines(flow)
     return {
-        "volume": (volume, "m^3"),
-        "volume_drift": (volume / solder.volume - 1.0, ""),
         "standoff": (geometry.gap, "m"),
         "max_width": (profile.max_width, "m"),
         "waist": (profile.waist, "m"),
@@ -83,9 +107,43 @@ def _shape_at_rest(geometry: JointGeometry, solder: Solder, flow: LiquidFlow, ru
         "contact_radius_package": (contact_radius(body, 1), "m"),
         "contact_angle_board": (mean_angle(angles[0]), "deg"),
         "contact_angle_package": (mean_angle(angles[1]), "deg"),
-        "axial_force": (float(plate_wrench(body, others, 1)[2]), "N"),
-        "width_error": (profile.max_width / reference.max_width - 1.0 if reference else float("nan"), ""),
+        "axial_force": (axial_force(flow), "N"),
     }
+
+
+def _joint_errors(solder: Solder, flow: LiquidFlow, run: Run, reference: Meridian | None) -> Metrics:
+    """Errors against the reference, the force's over pi gamma times the smaller contact radius; nan without one."""
+    if reference is None:
+        return {name: (float("nan"), "") for name in ("width_error", "waist_error", "axial_force_error")}
+    profile = run.profiles[-1]
+    scale = np.pi * solder.surface_tension * min(contact_radius(flow.body, wall) for wall in (0, 1))
+    return {
+        "width_error": (profile.max_width / reference.max_width - 1.0, ""),
+        "waist_error": (profile.waist / reference.waist - 1.0, ""),
+        "axial_force_error": ((axial_force(flow) - reference.axial_force) / scale, ""),
+    }
+
+
+def axial_force(flow: LiquidFlow) -> float:
+    """Force of the liquid on the package along +z [N]."""
+    others = tuple(force for force in flow.physics.forces if not isinstance(force, Wetting))
+    return float(plate_wrench(flow.body, others, 1)[2])
+
+
+def _pressure(solder: Solder, flow: LiquidFlow, run: Run, reference: Meridian | None) -> Metrics:
+    """Mean pressure of the particles below the surface, its error and its scatter.
+
+    The scatter is the standard deviation from the hydrostatic pressure, over the capillary pressure of a sphere of the
+    body's width.
+    """
+    body, first = flow.body, flow.body.cloud.surface_count
+    mean = float(particle_pressure(flow)[first:].mean())
+    capillary = 4.0 * solder.surface_tension / run.profiles[-1].max_width
+    metrics: Metrics = {"mean_pressure": (mean, "Pa")}
+    if reference is not None:
+        exact = reference.pressure - _weight(flow) * float(body.points[first:, 2].mean())
+        metrics["mean_pressure_error"] = (mean / exact - 1.0, "")
+    return metrics | {"pressure_scatter": (float(body.pressure[first:].std() / capillary), "")}
 
 
 def _cost_and_rest(solder: Solder, flow: LiquidFlow, run: Run) -> Metrics:
@@ -117,3 +175,9 @@ def reference_meridian(geometry: JointGeometry, solder: Solder, weight: float) -
         )
     except NoMeridian:
         return None
+
+
+def reference_drop(solder: Solder, pad_radius: float, weight: float) -> Meridian:
+    """Young-Laplace meridian of a drop on a pad in the mask, with Gibbs' condition at the pad's edge."""
+    limits = (solder.pad_contact_angle, solder.mask_contact_angle)
+    return pad_meridian(solder.volume, pad_radius, solder.surface_tension, weight, angle_limits=limits)

@@ -16,24 +16,34 @@ class Parameters(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
 
-class SolderNumerics(Parameters):
-    """How the reflow is computed."""
+class FlowNumerics(Parameters):
+    """How a reflow is computed, apart from its resolution."""
 
-    spacing: Annotated[float, "mm"] = Field(5.0e-5, gt=0)
     basis: Literal["linear", "quadratic"] = "quadratic"
     time_step_limit: float = Field(20.0, gt=0, le=100)
     tolerance: float = Field(1.0e-6, gt=0, lt=1)
     max_steps: int = Field(400, ge=1)
 
 
-class SolderEffects(Parameters):
-    """Effects of the reflow: decided from dimensionless numbers (auto), or by the user."""
+class SolderNumerics(FlowNumerics):
+    """How the reflow is computed."""
 
-    gravity: Switch = "auto"
+    spacing: Annotated[float, "mm"] = Field(5.0e-5, gt=0)
+
+
+class FlowEffects(Parameters):
+    """Effects of a reflow but gravity: decided from dimensionless numbers (auto), or by the user."""
+
     inertia: Switch = "auto"
     viscosity: Switch = "auto"
     surface_tension: Switch = "auto"
     wall_adhesion: Switch = "auto"
+
+
+class SolderEffects(FlowEffects):
+    """Effects of the reflow: decided from dimensionless numbers (auto), or by the user."""
+
+    gravity: Switch = "auto"
 
 
 class Solder(Parameters):

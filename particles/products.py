@@ -8,8 +8,11 @@ import meshio
 import numpy as np
 
 from particles.shape import JointShape, Snapshot
+from particles.young_laplace import Meridian
 
-ARRAYS = ("points", "velocity", "pressure", "triangles", "ring_board", "ring_package")
+BODY = "body"
+REFERENCE = "reference"
+ARRAYS = ("points", "velocity", "pressure", "triangles")
 
 
 def write_shapes(path: Path | str, shapes: Mapping[str, JointShape]) -> None:
@@ -29,6 +32,8 @@ def _write_shape(group: h5py.Group, shape: JointShape) -> None:
     group.attrs["surface_count"] = len(shape.surface_points)
     for name in ARRAYS:
         group[name] = getattr(shape, name)
+    for wall, ring in enumerate(shape.rings):
+        group[f"rings/{wall}"] = ring
     for name, column in shape.history.items():
         text = column.dtype.kind == "U"
         group[f"history/{name}"] = column.astype(h5py.string_dtype()) if text else column
@@ -39,6 +44,21 @@ def _write_shape(group: h5py.Group, shape: JointShape) -> None:
     for name, (value, unit) in shape.metrics.items():
         place = group.create_group(f"metrics/{name}")
         place.attrs["value"], place.attrs["unit"] = value, unit
+
+
+def write_body(folder: Path, shape: JointShape, reference: Meridian | None) -> None:
+    """Write one drop or joint: `shape.h5` with its exact meridian, where there is one, and `particles.vtu`."""
+    write_shapes(folder / "shape.h5", {BODY: shape})
+    if reference is not None:
+        with h5py.File(folder / "shape.h5", "a") as file:
+            file[REFERENCE] = np.stack((reference.r, reference.z))
+    write_particles(folder / "particles.vtu", shape)
+
+
+def read_body(folder: Path) -> tuple[JointShape, np.ndarray | None]:
+    """Read what `write_body` wrote: the shape, and radius and height `(2, k)` of the exact meridian [m]."""
+    with h5py.File(folder / "shape.h5", "r") as file:
+        return _read_shape(file[BODY]), file[REFERENCE][()] if REFERENCE in file else None
 
 
 def read_shapes(path: Path | str) -> dict[str, JointShape]:
@@ -61,6 +81,7 @@ def _read_shape(group: h5py.Group) -> JointShape:
     }
     return JointShape(
         **arrays,
+        rings=tuple(ring[()] for _, ring in sorted(group["rings"].items())),
         surface_points=arrays["points"][: group.attrs["surface_count"]],
         history=history,
         snapshots=snapshots,

@@ -15,7 +15,7 @@ from particles.force_surface_tension import SurfaceTension
 from particles.force_wetting import Wetting
 from particles.geometry import JointGeometry
 from particles.mass import Inertia, Mass
-from particles.metrics import joint_metrics, particle_pressure, verdict
+from particles.metrics import Metrics, joint_metrics, particle_pressure, verdict
 from particles.parameters import Solder
 from particles.physics import Event, Force, Momentum, Operator, Physics
 from particles.rest import Run, StopRule, run_to_rest
@@ -119,16 +119,19 @@ def build_physics(solder: Solder, effects: dict[str, bool], lines: tuple[Contact
 
 def joint_shape(geometry: JointGeometry, solder: Solder, flow: LiquidFlow, run: Run) -> JointShape:
     """Collect the result of a run that ended with the plates at a geometry."""
+    return collect_shape(solder, flow, run, joint_metrics(geometry, solder, flow, run))
+
+
+def collect_shape(solder: Solder, flow: LiquidFlow, run: Run, metrics: Metrics) -> JointShape:
+    """Collect the result of a run."""
     body, cloud = flow.body, flow.body.cloud
-    metrics = joint_metrics(geometry, solder, flow, run)
     return JointShape(
         points=body.points,
         velocity=body.velocity,
         pressure=particle_pressure(flow),
         surface_points=body.points[: cloud.surface_count],
         triangles=body.triangles,
-        ring_board=cloud.rings[0],
-        ring_package=cloud.rings[1],
+        rings=cloud.rings,
         history=run.history(solder.viscosity / solder.surface_tension),
         snapshots=run.snapshots,
         metrics=metrics,

@@ -26,15 +26,15 @@ class Snapshot:
 
 @dataclass(frozen=True, slots=True)
 class JointShape:
-    """A joint at the end of its reflow, in its own frame: origin at the centre of the board's disc, z up.
+    """A joint or drop at the end of its reflow, in its own frame: origin at the centre of the board's disc, z up.
 
     Attributes:
         points: `(n, 3)` particles [m], the first `s` are the vertices of the free surface.
         velocity: `(n, 3)` [m/s].
         pressure: `(n,)` above ambient [Pa].
         surface_points: `(s, 3)` vertices of the tracked free surface [m].
-        triangles: `(t, 3)` of the free surface, outward oriented, open at both walls.
-        ring_board, ring_package: `(k,)` contact lines as vertices of the surface, counter-clockwise seen from +z.
+        triangles: `(t, 3)` of the free surface, outward oriented, open at the walls.
+        rings: contact lines, the board's first, each `(k,)` vertices of the surface, counter-clockwise seen from +z.
         history: arrays of equal length: step, time, time_step, binding, height, width, volume, energy,
             capillary_number, displacement, iterations.
         snapshots: the first, the last and some states between.
@@ -47,9 +47,18 @@ class JointShape:
     pressure: Floats
     surface_points: Floats
     triangles: Indices
-    ring_board: Indices
-    ring_package: Indices
+    rings: tuple[Indices, ...]
     history: dict[str, NDArray]
     snapshots: list[Snapshot]
     metrics: dict[str, tuple[float, str]]
     verdict: str
+
+    @property
+    def ring_board(self) -> Indices:
+        """Contact line on the board `(k,)`."""
+        return self.rings[0]
+
+    @property
+    def ring_package(self) -> Indices:
+        """Contact line on the package `(k,)`; a joint has one."""
+        return self.rings[1]

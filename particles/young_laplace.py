@@ -204,6 +204,39 @@ def sessile_meridian(volume: float, contact_angle: float, surface_tension: float
     )
 
 
+def pad_meridian(
+    volume: float,
+    pad_radius: float,
+    surface_tension: float,
+    weight: float = 0.0,
+    *,
+    angle_limits: tuple[float, float],
+) -> Meridian:
+    """Find the meridian of a drop on a round pad in a mask: pinned at the pad's edge while its angle allows it (Gibbs).
+
+    The base narrows as the contact angle grows: inside the pad a drop has the pad's angle, outside the mask's.
+
+    Args:
+        volume: [m^3].
+        pad_radius: [m], infinite for a uniform wall.
+        surface_tension: gamma [N/m].
+        weight: rho g [N/m^3].
+        angle_limits: contact angles of pad and mask [rad].
+    """
+
+    def drop(angle: float) -> Meridian:
+        return sessile_meridian(volume, angle, surface_tension, weight)
+
+    def overhang(angle: float) -> float:
+        return float(drop(angle).r[0]) - pad_radius
+
+    if overhang(angle_limits[0]) <= 0.0:
+        return drop(angle_limits[0])
+    if overhang(angle_limits[1]) >= 0.0:
+        return drop(angle_limits[1])
+    return drop(brentq(overhang, *angle_limits, xtol=1e-10))
+
+
 def _from_apex(curvature: float, bond: float, contact_angle: float) -> Floats:
     """Radius, depth below the apex and volume along the meridian, `(3, k)`, in lengths of V^(1/3)."""
 

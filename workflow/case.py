@@ -1,20 +1,28 @@
-"""The case: what a case file means, composed from the parameter models of the packages."""
+"""The case: what a case file means, composed from the parameter models of the packages.
+
+A case file is of one kind, by the table that only this kind has: [package], [drop] or [joint].
+"""
 
 import os
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from pydantic.fields import FieldInfo
 
 from fem.parameters import Materials, Shock
 from meshing.parameters import Board, Package, Warpage
-from particles.parameters import Solder
+from particles.parameters import Solder, Switch
+from particles.scenes import Drop, Fluid, Joint
 from workflow import fields
-from workflow.problems import CaseError, Problem
+from workflow.problems import CaseError, Problem, nearest
+from workflow.stage_table import BOARD_DROP, DROP, JOINT, Pipeline
 from workflow.validation import translate
+
+if TYPE_CHECKING:
+    from particles.checks import Problem as ParticlesProblem
 
 NAME = r"^[A-Za-z0-9][A-Za-z0-9_.-]*$"
 
@@ -29,17 +37,129 @@ class Title(BaseModel):
 
 
 class Case(BaseModel):
-    """Everything that a run depends on, in SI floats."""
+    """Everything that a run depends on, in SI floats.
+
+    Attributes:
+        kind: the table that makes a file a case of this kind.
+        pipeline: its stages.
+        case: its name.
+    """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
+    kind: ClassVar[str]
+    pipeline: ClassVar[Pipeline]
+
     case: Title
+
+    def problems(self) -> list[Problem]:
+        """Find parameters that are each allowed, but impossible together."""
+        raise NotImplementedError
+
+    @property
+    def ranks(self) -> int:
+        """MPI ranks that it asks for."""
+        return 1
+
+
+class BoardDropCase(Case):
+    """A package on a board: its joints reflowed, then the board dropped."""
+
+    kind = "package"
+    pipeline = BOARD_DROP
+
     package: Package
     board: Board
     warpage: Warpage = Warpage()
     solder: Solder
     materials: Materials = Materials()
     shock: Shock
+
+    def problems(self) -> list[Problem]:
+        """Find parameters that make no possible package, joint or board together."""
+        from meshing import checks as meshing_checks
+        from meshing.pads import pad_table
+        from particles import checks as particles_checks
+        from workflow.reflow_pool import joint_geometries
+
+        contradictions = meshing_checks.problems(self.package, self.board, self.warpage)
+        if contradictions:
+            known = {key: field for key, _, field in fields.leaves(self)}
+            return [
+                Problem(found.key, found.message, _shown(found.value, known.get(found.key)), found.allowed)
+                for found in contradictions
+            ]
+        geometries = joint_geometries(pad_table(self.package, self.board, self.warpage))
+        return _of_particles(particles_checks.problems(self.solder, geometries, self.package.pitch))
+
+    @property
+    def ranks(self) -> int:
+        """MPI ranks of the shock."""
+        return self.shock.ranks.macro + self.shock.ranks.meso
+
+
+class DropCase(Case):
+    """A drop of solder on a wall or pad."""
+
+    kind = "drop"
+    pipeline = DROP
+
+    gravity: Switch = "auto"
+    drop: Drop
+    solder: Fluid = Field(default_factory=Fluid)
+
+    @property
+    def molten(self) -> Solder:
+        """The solder as the solver takes it."""
+        return self.solder.resolve(self.drop, self.gravity)
+
+    def problems(self) -> list[Problem]:
+        """Find parameters that make no possible drop together."""
+        from particles.scene_checks import drop_problems
+
+        return _of_particles(drop_problems(self.drop))
+
+
+class JointCase(Case):
+    """A joint of solder between two pads."""
+
+    kind = "joint"
+    pipeline = JOINT
+
+    gravity: Switch = "auto"
+    joint: Joint
+    solder: Fluid = Field(default_factory=Fluid)
+
+    @property
+    def molten(self) -> Solder:
+        """The solder as the solver takes it."""
+        return self.solder.resolve(self.joint, self.gravity)
+
+    def problems(self) -> list[Problem]:
+        """Find parameters that make no possible joint together."""
+        from particles.scene_checks import joint_problems
+
+        return _of_particles(joint_problems(self.joint, self.molten))
+
+
+KINDS: dict[str, type[Case]] = {model.kind: model for model in (BoardDropCase, DropCase, JointCase)}
+
+
+def kind_of(table: Mapping) -> type[Case]:
+    """Return the model of a case file.
+
+    Raises:
+        CaseError: the file has the tables of no kind, or of several.
+    """
+    found = [kind for kind in KINDS if kind in table]
+    if len(found) == 1:
+        return KINDS[found[0]]
+    choice = "exactly one of " + ", ".join(f"[{kind}]" for kind in KINDS)
+    if found:
+        message = "is of several kinds at once: it has " + " and ".join(f"[{kind}]" for kind in found)
+        raise CaseError("case", [Problem("", message, None, choice)])
+    hint = next((f"[{near}]" for name in table if (near := nearest(name, KINDS))), "")
+    raise CaseError("case", [Problem("", "says not what kind of case it is", None, choice, hint)])
 
 
 def read_case(path: Path, overrides: Sequence[str] = (), oversubscribe: bool = False) -> Case:
@@ -59,46 +179,31 @@ def read_case(path: Path, overrides: Sequence[str] = (), oversubscribe: bool = F
     problems: list[Problem] = []
     table = _read_toml(path)
     overridden = _apply(table, overrides, problems)
-    values = fields.to_si_table(Case, table, "", problems)
+    try:
+        kind = kind_of(table)
+    except CaseError as error:
+        raise CaseError(str(path), error.problems + problems, overridden) from None
+    values = fields.to_si_table(kind, table, "", problems)
     case = None
     try:
-        case = Case.model_validate(values, strict=True)
+        case = kind.model_validate(values, strict=True)
     except ValidationError as error:
-        problems += translate(Case, error, table, {problem.key for problem in problems})
+        problems += translate(kind, error, table, {problem.key for problem in problems})
     if case is not None and not problems:
-        problems = impossible(case) + too_many_ranks(case, oversubscribe)
+        problems = case.problems() + too_many_ranks(case, oversubscribe)
     if case is None or problems:
         raise CaseError(str(path), problems, overridden)
     return case
 
 
 def display_values(case: Case) -> dict[str, str]:
-    """Return every resolved parameter as dotted key -> text in the user's unit."""
-    return {key: fields.display(value, field) for key, value, field in fields.leaves(case)}
-
-
-def impossible(case: Case) -> list[Problem]:
-    """Find parameters that are each allowed, but that make no possible package, joint or board together."""
-    from meshing import checks as meshing_checks
-    from meshing.pads import pad_table
-    from particles import checks as particles_checks
-    from workflow.reflow_pool import joint_geometries
-
-    contradictions = meshing_checks.problems(case.package, case.board, case.warpage)
-    if contradictions:
-        known = {key: field for key, _, field in fields.leaves(case)}
-        return [
-            Problem(found.key, found.message, _shown(found.value, known.get(found.key)), found.allowed)
-            for found in contradictions
-        ]
-    geometries = joint_geometries(pad_table(case.package, case.board, case.warpage))
-    impossible_joints = particles_checks.problems(case.solder, geometries, case.package.pitch)
-    return [Problem(found.key, found.message, found.value, found.allowed) for found in impossible_joints]
+    """Return every parameter that has a value as dotted key -> text in the user's unit."""
+    return {key: fields.display(value, field) for key, value, field in fields.leaves(case) if value is not None}
 
 
 def too_many_ranks(case: Case, oversubscribe: bool) -> list[Problem]:
-    """Find out whether the shock asks for more MPI ranks than there are cores."""
-    ranks, cores = case.shock.ranks.macro + case.shock.ranks.meso, available_cores()
+    """Find out whether a case asks for more MPI ranks than there are cores."""
+    ranks, cores = case.ranks, available_cores()
     if oversubscribe or ranks <= cores:
         return []
     message = f"macro and meso ask for {ranks} MPI ranks, this machine offers {cores} cores"
@@ -108,6 +213,10 @@ def too_many_ranks(case: Case, oversubscribe: bool) -> list[Problem]:
 def available_cores() -> int:
     """Return the number of cores that this process may use."""
     return len(os.sched_getaffinity(0))
+
+
+def _of_particles(found: "Sequence[ParticlesProblem]") -> list[Problem]:
+    return [Problem(problem.key, problem.message, problem.value, problem.allowed) for problem in found]
 
 
 def _shown(value: object, field: FieldInfo | None) -> object:

@@ -71,15 +71,18 @@ def _add_table(blocks: list[str], key: str, parameters: BaseModel) -> None:
         else:
             lines.append(_line(name, value, field))
     if lines:
-        blocks.append("\n".join([*_describe(parameters), f"[{key}]", *lines, ""]))
+        header = [*_describe(parameters), f"[{key}]"] if key else []
+        blocks.append("\n".join([*header, *lines, ""]))
     for name, table in tables:
         _add_table(blocks, name, table)
 
 
 def _line(name: str, value: object, field: FieldInfo) -> str:
+    if value is None:
+        return f"# {name} = ...".ljust(COMMENT_COLUMN) + f" # not given; {allowed(field)}"
     text = f'"{display(value, field)}"' if unit_of(field) else as_toml(value)
     remarks = [allowed(field)] if len(literal_names(field)) != 1 else []
-    if field.default not in (PydanticUndefined, ""):
+    if field.default not in (PydanticUndefined, "", None):
         remarks.append(f"default {display(field.default, field)}")
     comment = "; ".join(remark for remark in remarks if remark)
     line = f"{name} = {text}"

@@ -15,12 +15,11 @@ from workflow.case import Case, available_cores, read_case
 from workflow.inputs import CASE, examine, read_case_of_run, write_inputs
 from workflow.pipeline import RunFolderBusy, drive, failed_checks, locked
 from workflow.problems import CaseError
-from workflow.stage_table import NAMES
 from workflow.terminal import console, print_error
 
 app = typer.Typer(
     name="reflowshock",
-    help="From a case file to a drop-shock report: solder reflow by particles, two-scale explicit dynamics.",
+    help="From a case file to a report: solder reflow by particles, two-scale explicit drop shock.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     add_completion=False,
@@ -59,29 +58,31 @@ def plan(case: CasePath, settings: Settings = None, out: Out = None, oversubscri
 def run(
     case: CasePath,
     settings: Settings = None,
-    until: Annotated[str, typer.Option(metavar="STAGE", help="last stage: " + ", ".join(NAMES))] = NAMES[-1],
+    until: Annotated[str, typer.Option(metavar="STAGE", help="last stage, of those that plan lists")] = "report",
     cores: Annotated[int | None, typer.Option("-j", "--cores", min=1, help="cores to use [default: all]")] = None,
     out: Out = None,
     oversubscribe: Oversubscribe = False,
 ) -> None:
     """Run what is stale."""
-    if until not in NAMES:
-        raise typer.BadParameter(f"'{until}' is no stage; allowed: {', '.join(NAMES)}", param_hint="--until")
     resolved, folder = _load(case, settings, out, oversubscribe)
+    pipeline = resolved.pipeline
+    if until not in pipeline.names:
+        allowed = ", ".join(pipeline.names)
+        raise typer.BadParameter(f"'{until}' is no stage of this case; allowed: {allowed}", param_hint="--until")
     try:
         with locked(folder) as lock:
             write_inputs(folder, resolved)
             if not _has_work(folder, resolved, until):
                 console.print(f"nothing to do: {folder} is up to date")
-            elif not drive(folder, until, cores or available_cores(), oversubscribe, lock):
+            elif not drive(folder, pipeline[until], cores or available_cores(), oversubscribe, lock):
                 raise typer.Exit(1)
     except KeyboardInterrupt as error:
         print_error("interrupted; complete stages and checkpoints are kept: the same command continues")
         raise typer.Exit(1) from error
-    failures = failed_checks(folder, until)
+    failures = failed_checks(folder, pipeline.upstream(until))
     for failure in failures:
         print_error(failure)
-    if until == NAMES[-1]:
+    if until == pipeline.names[-1]:
         console.print(f"report: {folder / 'report.html'}")
     raise typer.Exit(1 if failures else 0)
 
@@ -140,7 +141,7 @@ def stage(
     from workflow.stages import STAGE_FUNCTIONS
 
     run = Run(folder, read_case_of_run(folder), cores, oversubscribe)
-    if not execute(name, STAGE_FUNCTIONS[name], run):
+    if not execute(name, STAGE_FUNCTIONS[run.case.kind][name], run):
         raise typer.Exit(1)
 
 
@@ -187,4 +188,4 @@ def _load(path: Path, settings: list[str] | None, out: Path | None, oversubscrib
 
 def _has_work(folder: Path, case: Case, until: str) -> bool:
     verdicts = examine(folder, case)
-    return any(verdicts[name].stale for name in NAMES[: NAMES.index(until) + 1])
+    return any(verdicts[stage.name].stale for stage in case.pipeline.upstream(until))

@@ -13,6 +13,20 @@ VOLUME_ERROR = 0.005  # of a joint's hexahedra, against its closed surface
 SCALED_JACOBIAN = 0.2
 STRESS_ERROR = 0.10  # of the critical joint's von Mises history, two-scale against DNS, relative L2
 
+DROP_ERROR = 0.01  # of a drop's height and width, against the Young-Laplace shape
+JOINT_ERROR = 0.005  # of a joint's width and waist, against the Young-Laplace shape
+AXIAL_FORCE_ERROR = 0.02  # of a joint, against the Young-Laplace shape, over pi times radius times surface tension
+CAPILLARY_NUMBER = 1.0e-4  # of the largest speed of a surface at rest
+ONE_JOINT_NAMES = {
+    "standoff": "height",
+    "width_error": "max_width_error",
+    "contact_radius_board": "contact_radius",
+    "contact_angle_board": "contact_angle",
+    "contact_radius_package": "contact_radius_top",
+    "contact_angle_package": "contact_angle_top",
+}
+
+Numbers = Mapping[str, tuple[float, str]]
 Records = Mapping[str, Mapping[str, Any]]
 
 
@@ -66,6 +80,32 @@ def of_reflow(joints: Records, effects: Mapping[str, Any]) -> Findings:
         },
         effects=dict(effects),
     )
+
+
+def of_drop(metrics: Numbers, verdict: str, effects: Mapping[str, Any]) -> Findings:
+    """Judge a drop by volume, rest and the Young-Laplace shape; overflow is no failure, but said."""
+    limits = {"height_error": DROP_ERROR, "max_width_error": DROP_ERROR}
+    return Findings(_known(metrics) | {"verdict": metric(verdict)}, _at_rest(metrics, limits), dict(effects))
+
+
+def of_joint(metrics: Numbers, verdict: str, effects: Mapping[str, Any]) -> Findings:
+    """Judge one joint by volume, rest, verdict and, where there is one, the Young-Laplace shape."""
+    named = {ONE_JOINT_NAMES.get(name, name): number for name, number in metrics.items()}
+    limits = {"max_width_error": JOINT_ERROR, "waist_error": JOINT_ERROR, "axial_force_error": AXIAL_FORCE_ERROR}
+    health = _at_rest(named, limits) | {"joints_not_ok": at_most(int(verdict != "ok"), 0)}
+    return Findings(_known(named) | {"verdict": metric(verdict)}, health, dict(effects))
+
+
+def _known(metrics: Numbers) -> dict:
+    """Metrics that have a value: without a reference there are no errors."""
+    return {name: metric(value, unit) for name, (value, unit) in metrics.items() if value == value}
+
+
+def _at_rest(metrics: Numbers, limits: Mapping[str, float]) -> dict:
+    """Checks of volume, rest and those errors against a reference that are known."""
+    limits = {"volume_drift": VOLUME_DRIFT, "capillary_number_at_rest": CAPILLARY_NUMBER, **limits}
+    known = _known(metrics)
+    return {name: at_most(abs(metrics[name][0]), limit) for name, limit in limits.items() if name in known}
 
 
 def of_surface(surfaces: Records) -> Findings:

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from fem.parameters import Material, Materials
-from workflow.case import Case, available_cores
+from workflow.case import BoardDropCase, available_cores
 from workflow.reflow_pool import distinct_geometries, joint_geometries
 
 MACRO = "board"  # the part of the macro model; all others belong to the meso model
@@ -62,7 +62,7 @@ class Forecast:
     seconds: dict[str, float]
 
 
-def forecast(case: Case) -> Forecast:
+def forecast(case: BoardDropCase) -> Forecast:
     """Predict sizes, time steps and cost of a run."""
     from meshing.pads import pad_table
     from particles.effects import decide_effects
@@ -88,7 +88,7 @@ def forecast(case: Case) -> Forecast:
     )
 
 
-def forecast_parts(case: Case) -> dict[str, PartForecast]:
+def forecast_parts(case: BoardDropCase) -> dict[str, PartForecast]:
     """Predict size and critical time step of every part of the mesh."""
     import numpy as np
 
@@ -104,7 +104,7 @@ def forecast_parts(case: Case) -> dict[str, PartForecast]:
     }
 
 
-def forecast_shock(case: Case, parts: dict[str, PartForecast]) -> ShockForecast:
+def forecast_shock(case: BoardDropCase, parts: dict[str, PartForecast]) -> ShockForecast:
     """Predict the time steps and the wall time of the shock.
 
     Scaled masses follow the smallest step of the others, so they do not limit it. The board's patch touches the cut: it
@@ -140,6 +140,6 @@ def role_of(part: str) -> str:
     return part.split("@")[0].split("_")[0]
 
 
-def material_of(case: Case, part: str) -> Material:
+def material_of(case: BoardDropCase, part: str) -> Material:
     """Return the material of a part."""
     return getattr(case.materials, role_of(part))

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from workflow.case import Case
-from workflow.stage_table import BY_NAME, STAGES, Stage
+from workflow.case import Case, kind_of
+from workflow.stage_table import Stage
 
 CASE = "inputs/case.json"
 
@@ -55,7 +55,7 @@ def write_inputs(run_folder: Path, case: Case) -> None:
     """
     (run_folder / "inputs").mkdir(parents=True, exist_ok=True)
     _write_if_changed(run_folder / CASE, case.model_dump(mode="json"))
-    for stage in STAGES:
+    for stage in case.pipeline.stages:
         path, content = run_folder / stage.inputs, stage_inputs(case, stage)
         _write_if_changed(path, content)
         record = read_record(run_folder, stage)
@@ -66,7 +66,8 @@ def write_inputs(run_folder: Path, case: Case) -> None:
 
 def read_case_of_run(run_folder: Path) -> Case:
     """Return the case whose inputs were last written."""
-    return Case.model_validate_json((run_folder / CASE).read_text())
+    table = json.loads((run_folder / CASE).read_text())
+    return kind_of(table).model_validate(table)
 
 
 def read_record(run_folder: Path, stage: Stage) -> dict | None:
@@ -79,11 +80,11 @@ def read_record(run_folder: Path, stage: Stage) -> dict | None:
 def examine(run_folder: Path, case: Case) -> dict[str, Verdict]:
     """Say for each stage, in order, whether it would run, and why."""
     verdicts: dict[str, Verdict] = {}
-    for stage in STAGES:
+    for stage in case.pipeline.stages:
         record = read_record(run_folder, stage)
         changes = () if record is None else compare(record["inputs"], stage_inputs(case, stage))
         because_of = tuple(
-            name for name in stage.follows if verdicts[name].stale or _is_newer(run_folder, BY_NAME[name], stage)
+            name for name in stage.follows if verdicts[name].stale or _is_newer(run_folder, case.pipeline[name], stage)
         )
         stale = record is None or bool(changes) or bool(because_of)
         verdicts[stage.name] = Verdict(stale, record is None, changes, because_of)

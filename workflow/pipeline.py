@@ -4,13 +4,13 @@ import fcntl
 import os
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
 from workflow.inputs import read_record
 from workflow.launch import end_group
-from workflow.stage_table import BY_NAME, upstream
+from workflow.stage_table import Stage
 
 SNAKEFILE = Path(__file__).parent / "Snakefile"
 
@@ -41,12 +41,12 @@ def locked(run_folder: Path) -> Iterator[int]:
         os.close(descriptor)
 
 
-def drive(run_folder: Path, until: str, cores: int, oversubscribe: bool, lock: int) -> bool:
+def drive(run_folder: Path, until: Stage, cores: int, oversubscribe: bool, lock: int) -> bool:
     """Run every stale stage up to one; the inputs must have been written.
 
     Args:
         run_folder: folder of the run.
-        until: name of the last stage.
+        until: the last stage.
         cores: number of cores that may be used.
         oversubscribe: whether MPI may have more ranks than cores.
         lock: what ``locked`` yields; Snakemake keeps it should this process be killed.
@@ -59,7 +59,7 @@ def drive(run_folder: Path, until: str, cores: int, oversubscribe: bool, lock: i
         sys.executable, "-m", "snakemake", "--snakefile", str(SNAKEFILE), "--directory", str(run_folder),
         "--cores", str(cores), "--rerun-triggers", "mtime", "--rerun-incomplete", "--nolock", "--quiet", "all",
         "--config", f"run={run_folder}", f"oversubscribe={int(oversubscribe)}",
-        "--", str(run_folder / BY_NAME[until].record),
+        "--", str(run_folder / until.record),
     ]  # fmt: skip
     environment = os.environ | {"OMP_NUM_THREADS": "1"}
     process = subprocess.Popen(command, env=environment, start_new_session=True, pass_fds=(lock,))
@@ -70,12 +70,12 @@ def drive(run_folder: Path, until: str, cores: int, oversubscribe: bool, lock: i
         raise
 
 
-def failed_checks(run_folder: Path, until: str) -> list[str]:
-    """List the health checks that did not hold, in words, of the stages up to one."""
+def failed_checks(run_folder: Path, stages: Sequence[Stage]) -> list[str]:
+    """List the health checks of stages that did not hold, in words."""
     failures = []
-    for name in upstream(until):
-        record = read_record(run_folder, BY_NAME[name]) or {"health": {}}
+    for stage in stages:
+        record = read_record(run_folder, stage) or {"health": {}}
         for check, result in record["health"].items():
             if not result["ok"]:
-                failures.append(f"{name}: {check.replace('_', ' ')} {result['value']} exceeds {result['limit']}")
+                failures.append(f"{stage.name}: {check.replace('_', ' ')} {result['value']} exceeds {result['limit']}")
     return failures

@@ -5,10 +5,11 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from workflow.case import Case, available_cores
+from workflow.case import BoardDropCase, Case, DropCase, JointCase, available_cores
 from workflow.fields import display, leaves, unit_of
 from workflow.forecast import MACRO, Forecast, forecast
 from workflow.inputs import Change, Verdict, examine
+from workflow.scene_forecast import SceneForecast, forecast_scene
 from workflow.units import from_si
 
 LONGEST_LIST = 4
@@ -16,15 +17,36 @@ LONGEST_LIST = 4
 
 def show_plan(case: Case, run_folder: Path, console: Console) -> None:
     """Print stages to run and why, effects, sizes, time steps, predicted cost and rank placement."""
-    outlook = forecast(case)
     console.print(f"[bold]{case.case.name}[/]  {case.case.title}\n")
-    console.print(_stages(case, run_folder, outlook))
-    console.print(_effects(outlook))
-    console.print(_sizes(case, outlook))
-    console.print(_shock(case, outlook))
-    rate = f"{outlook.shock.updates_per_second:.1e} element updates per second and rank (fem/estimate.py)"
-    console.print(f"\n[dim]Costs assume {rate}")
-    console.print("[dim]and the reflow speed in particles/estimate.py, both as benchmarks/ measured them.")
+    if isinstance(case, BoardDropCase):
+        outlook = forecast(case)
+        _show(case, run_folder, outlook, console)
+        console.print(_sizes(outlook))
+        console.print(_shock(case, outlook))
+        rate = f"{outlook.shock.updates_per_second:.1e} element updates per second and rank (fem/estimate.py)"
+        console.print(f"\n[dim]Costs assume {rate}")
+        console.print("[dim]and the reflow speed in particles/estimate.py, both as benchmarks/ measured them.")
+    elif isinstance(case, DropCase | JointCase):
+        body = forecast_scene(case)
+        _show(case, run_folder, body, console)
+        console.print(_particles(body))
+        console.print("\n[dim]Costs assume the reflow speed in particles/estimate.py, as benchmarks/ measured it.")
+
+
+def _show(case: Case, run_folder: Path, outlook: Forecast | SceneForecast, console: Console) -> None:
+    console.print(_stages(case, run_folder, outlook.seconds))
+    console.print(_effects(outlook.effects))
+
+
+def _particles(outlook: SceneForecast) -> Table:
+    table = _table("\nReflow", "what", "value", "remark")
+    table.add_row("particles", f"{outlook.particles}", f"{1e6 * outlook.spacing:.3g} um apart at the start")
+    table.add_row(
+        "capillary limit", nano(outlook.capillary_limit), "time step at which explicit surface tension breaks"
+    )
+    ratio = outlook.largest_step / outlook.capillary_limit
+    table.add_row("largest time step", nano(outlook.largest_step), f"{ratio:g} times the limit")
+    return table
 
 
 def change_text(change: Change, case: Case) -> str:
@@ -64,25 +86,25 @@ def _table(title: str, *columns: str) -> Table:
     return table
 
 
-def _stages(case: Case, run_folder: Path, outlook: Forecast) -> Table:
+def _stages(case: Case, run_folder: Path, predicted: dict[str, float]) -> Table:
     table = _table(f"Stages, in {run_folder}", "stage", "", "cost", "why")
     for name, verdict in examine(run_folder, case).items():
         mark = "[yellow]run[/]" if verdict.stale else "[green]skip[/]"
-        seconds = outlook.seconds.get(name)
+        seconds = predicted.get(name)
         cost = f"about {duration(seconds)}" if verdict.stale and seconds is not None else ""
         table.add_row(name, mark, cost, reason(verdict, case))
     return table
 
 
-def _effects(outlook: Forecast) -> Table:
+def _effects(effects: dict) -> Table:
     table = _table("\nEffects of the reflow", "effect", "", "why")
-    for name, decision in outlook.effects.items():
+    for name, decision in effects.items():
         mark = "[green]on[/]" if decision["on"] else "[dim]off[/]"
         table.add_row(name.replace("_", " "), mark, decision["why"])
     return table
 
 
-def _sizes(case: Case, outlook: Forecast) -> Table:
+def _sizes(outlook: Forecast) -> Table:
     smallest, largest = outlook.particles
     particles = f"{smallest}" if smallest == largest else f"{smallest} to {largest}"
     table = _table("\nSizes and critical time steps", "part", "hexahedra", "critical step", "belongs to")
@@ -98,7 +120,7 @@ def _sizes(case: Case, outlook: Forecast) -> Table:
     return table
 
 
-def _shock(case: Case, outlook: Forecast) -> Table:
+def _shock(case: BoardDropCase, outlook: Forecast) -> Table:
     shock, every = outlook.shock, case.shock.ranks.macro + case.shock.ranks.meso
     table = _table("\nShock", "what", "value", "remark")
     table.add_row("window", nano(shock.window), f"step of the macro model, {shock.windows} windows")
@@ -109,7 +131,7 @@ def _shock(case: Case, outlook: Forecast) -> Table:
     return table
 
 
-def _placement(case: Case) -> str:
+def _placement(case: BoardDropCase) -> str:
     """Say which MPI rank works on which model."""
     ranks, cores = case.shock.ranks, f"on {available_cores()} cores"
     if ranks.placement == "shared":
@@ -122,7 +144,7 @@ def _span(first: int, count: int) -> str:
     return f"rank {first}" if count == 1 else f"ranks {first}-{first + count - 1}"
 
 
-def _absent(mode: str, case: Case) -> str:
+def _absent(mode: str, case: BoardDropCase) -> str:
     return "" if mode in case.shock.numerics.modes else "; not in shock.numerics.modes"
 
 

@@ -4,8 +4,10 @@ import re
 from collections.abc import Iterator
 
 from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+from pydantic_core import PydanticUndefined
 
-from workflow.case import Case
+from workflow.case import KINDS, Case
 from workflow.fields import allowed, display, models_of, unit_of
 from workflow.units import QUANTITY, dimension
 
@@ -13,12 +15,23 @@ PATTERN = re.sub(r"\?P<\w+>", "", f"^{QUANTITY.pattern}$")
 
 
 def case_schema() -> dict:
-    """Return the JSON schema (draft 2020-12) of a case file."""
-    schema = Case.model_json_schema()
-    schema["$schema"] = "https://json-schema.org/draft/2020-12/schema"
-    schema["title"] = "reflowshock case"
-    for model in set(_reachable(Case)):
-        properties = schema if model is Case else schema["$defs"][model.__name__]
+    """Return the JSON schema (draft 2020-12) of a case file: that of any kind."""
+    kinds = [_kind_schema(kind) for kind in KINDS.values()]
+    definitions: dict = {}
+    for kind in kinds:
+        definitions |= kind.pop("$defs")
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "reflowshock case",
+        "anyOf": kinds,
+        "$defs": definitions,
+    }
+
+
+def _kind_schema(kind: type[Case]) -> dict:
+    schema = kind.model_json_schema()
+    for model in set(_reachable(kind)):
+        properties = schema if model is kind else schema["$defs"][model.__name__]
         for name, field in model.model_fields.items():
             unit = unit_of(field)
             if unit is not None:
@@ -27,11 +40,15 @@ def case_schema() -> dict:
                     "pattern": PATTERN,
                     "description": f"{dimension(unit)}, e.g. in {unit}; {allowed(field)}",
                     "x-unit": unit,
-                    **({} if field.is_required() else {"default": display(field.default, field)}),
+                    **_default(field),
                 }
     # Defaults of whole tables would be repeated in SI floats; each field has its own.
     _drop_table_defaults(schema)
     return schema
+
+
+def _default(field: FieldInfo) -> dict:
+    return {} if field.default in (PydanticUndefined, None) else {"default": display(field.default, field)}
 
 
 def _reachable(model: type[BaseModel]) -> Iterator[type[BaseModel]]:

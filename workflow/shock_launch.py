@@ -41,9 +41,7 @@ def run_mode(run: Run, folder: Path, mode: str) -> None:
 
 def read_results(folder: Path) -> dict[str, dict]:
     """Return ``result.json`` of each mode that ran, two-scale first."""
-    return {
-        mode: json.loads((folder / mode / "result.json").read_text()) for mode in MODES if (folder / mode).is_dir()
-    }
+    return {mode: json.loads((folder / mode / "result.json").read_text()) for mode in MODES if (folder / mode).is_dir()}
 
 
 def _pass_on(line: str, progress: Callable[[float], None]) -> None:

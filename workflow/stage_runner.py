@@ -7,15 +7,17 @@ import traceback
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any, Generic, TypeVar
 
 from workflow.case import Case
 from workflow.inputs import stage_inputs
-from workflow.stage_table import BY_NAME
 from workflow.terminal import health_line, print_error
+
+AnyCase = TypeVar("AnyCase", bound=Case)
 
 
 @dataclass(frozen=True, slots=True)
-class Run:
+class Run(Generic[AnyCase]):
     """What a stage works with.
 
     Attributes:
@@ -26,7 +28,7 @@ class Run:
     """
 
     folder: Path
-    case: Case
+    case: AnyCase
     cores: int
     oversubscribe: bool = False
 
@@ -52,7 +54,7 @@ class Findings:
     continued: str = ""
 
 
-StageFunction = Callable[[Run, Path], Findings]
+StageFunction = Callable[[Run[Any], Path], Findings]
 
 
 def run_stage(name: str, function: StageFunction, run: Run) -> dict:
@@ -77,7 +79,7 @@ def run_stage(name: str, function: StageFunction, run: Run) -> dict:
         "health": findings.health,
         "effects": findings.effects,
         "continued": findings.continued,
-        "inputs": stage_inputs(run.case, BY_NAME[name]),
+        "inputs": stage_inputs(run.case, run.case.pipeline[name]),
     }
     (partial / "stage.json").write_text(json.dumps(record, indent=1) + "\n")
     _remove(folder)

@@ -45,34 +45,58 @@ class Stage:
         return f"inputs/{self.name}.json"
 
 
-STAGES = (
-    Stage(
-        "geometry",
-        (*ARRAY, "package.copper", "package.substrate", "package.die", "package.numerics", "board"),
-        (),
-        ("geometry/assembly.msh", "geometry/pads.json", "geometry/preview.png"),
-    ),
-    Stage("reflow", (*ARRAY, "solder"), (), ("reflow/shapes.h5", "reflow/joints.json"), pads=True),
-    Stage("surface", (), ("reflow",), ("surface/surfaces.json",)),
-    Stage(
-        "solder_mesh",
-        (*ARRAY, "package.copper", "package.joint_numerics", "materials.copper", "materials.solder"),
-        ("surface",),
-        ("solder_mesh/joints.msh", "solder_mesh/quality.json"),
-        pads=True,
-    ),
-    Stage("shock", ("shock", "materials"), ("geometry", "solder_mesh"), ()),
-    Stage(
-        "report",
-        ("case",),
-        ("geometry", "reflow", "surface", "solder_mesh", "shock"),
-        ("report.html", "summary.json"),
-    ),
+@dataclass(frozen=True, slots=True)
+class Pipeline:
+    """The stages of a kind of case, in order."""
+
+    stages: tuple[Stage, ...]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the stages."""
+        return tuple(stage.name for stage in self.stages)
+
+    def __getitem__(self, name: str) -> Stage:
+        return self.stages[self.names.index(name)]
+
+    def upstream(self, name: str) -> tuple[Stage, ...]:
+        """Return the stages up to and including one."""
+        return self.stages[: self.names.index(name) + 1]
+
+
+BOARD_DROP = Pipeline(
+    (
+        Stage(
+            "geometry",
+            (*ARRAY, "package.copper", "package.substrate", "package.die", "package.numerics", "board"),
+            (),
+            ("geometry/assembly.msh", "geometry/pads.json", "geometry/preview.png"),
+        ),
+        Stage("reflow", (*ARRAY, "solder"), (), ("reflow/shapes.h5", "reflow/joints.json"), pads=True),
+        Stage("surface", (), ("reflow",), ("surface/surfaces.json",)),
+        Stage(
+            "solder_mesh",
+            (*ARRAY, "package.copper", "package.joint_numerics", "materials.copper", "materials.solder"),
+            ("surface",),
+            ("solder_mesh/joints.msh", "solder_mesh/quality.json"),
+            pads=True,
+        ),
+        Stage("shock", ("shock", "materials"), ("geometry", "solder_mesh"), ()),
+        Stage(
+            "report",
+            ("case",),
+            ("geometry", "reflow", "surface", "solder_mesh", "shock"),
+            ("report.html", "summary.json"),
+        ),
+    )
 )
-BY_NAME = {stage.name: stage for stage in STAGES}
-NAMES = tuple(BY_NAME)
 
 
-def upstream(name: str) -> tuple[str, ...]:
-    """Return the stages up to and including one, in order."""
-    return NAMES[: NAMES.index(name) + 1]
+def _one_body(scene: str) -> Pipeline:
+    """Reflow of one drop or joint, and its report."""
+    reflow = Stage("reflow", (scene, "solder", "gravity"), (), ("reflow/shape.h5", "reflow/particles.vtu"))
+    return Pipeline((reflow, Stage("report", ("case",), ("reflow",), ("report.html", "summary.json"))))
+
+
+DROP = _one_body("drop")
+JOINT = _one_body("joint")

@@ -1,4 +1,6 @@
-"""The pipeline: geometry -> reflow -> surface -> solder_mesh -> shock -> report, one function a stage.
+"""The pipelines, one function a stage; which kind of case has which stages stands at the end.
+
+Board drop: geometry -> reflow -> surface -> solder_mesh -> shock -> report. Drop and joint: reflow -> report.
 
 Each reads products of earlier stages from ``run.folder``, writes its own into ``folder``, and returns what it found.
 Packages are imported inside the functions, so that a stage loads only what it uses.
@@ -8,12 +10,13 @@ from dataclasses import replace
 from pathlib import Path
 
 from workflow import findings
+from workflow.case import BoardDropCase, DropCase, JointCase
 from workflow.products import read_json, write_json
 from workflow.progress import progress_bar
 from workflow.stage_runner import Findings, Run, StageFunction
 
 
-def geometry(run: Run, folder: Path) -> Findings:
+def geometry(run: Run[BoardDropCase], folder: Path) -> Findings:
     """Mesh board and package; tabulate the pads."""
     from meshing.assembly import write_assembly
     from meshing.pads import pad_table, write_pads
@@ -27,7 +30,7 @@ def geometry(run: Run, folder: Path) -> Findings:
     return findings.of_geometry(len(pads), counts)
 
 
-def reflow(run: Run, folder: Path) -> Findings:
+def reflow(run: Run[BoardDropCase], folder: Path) -> Findings:
     """Melt the solder of each distinct joint between its pads."""
     from meshing.pads import read_pads
     from particles.effects import decide_effects
@@ -45,7 +48,7 @@ def reflow(run: Run, folder: Path) -> Findings:
     return replace(found, continued=f"{continued} of {len(distinct)} joints" if continued else "")
 
 
-def surface(run: Run, folder: Path) -> Findings:
+def surface(run: Run[BoardDropCase], folder: Path) -> Findings:
     """Close the surface of each distinct joint and measure it."""
     from meshing.surface import close_surface, measure, write_surface
     from particles.products import read_shapes
@@ -60,7 +63,7 @@ def surface(run: Run, folder: Path) -> Findings:
     return findings.of_surface(surfaces)
 
 
-def solder_mesh(run: Run, folder: Path) -> Findings:
+def solder_mesh(run: Run[BoardDropCase], folder: Path) -> Findings:
     """Mesh every joint in its place with hexahedra."""
     from meshing.joints_file import write_joints
     from meshing.pads import read_pads
@@ -81,13 +84,44 @@ def solder_mesh(run: Run, folder: Path) -> Findings:
     return findings.of_solder_mesh(quality)
 
 
-def shock(run: Run, folder: Path) -> Findings:
+def shock(run: Run[BoardDropCase], folder: Path) -> Findings:
     """Drop the board: each mode is one MPI run of the package fem; two modes are compared."""
     from workflow.shock_launch import read_results, run_mode
 
     for mode in run.case.shock.numerics.modes:
         run_mode(run, folder / mode, mode)
     return findings.of_shock(read_results(folder), folder)
+
+
+def reflow_drop(run: Run[DropCase], folder: Path) -> Findings:
+    """Melt a cube of solder on a wall or pad."""
+    from particles.effects import acting_weight, decide, drop_numbers
+    from particles.metrics import reference_drop
+    from particles.products import write_body
+    from particles.sessile import drop_shape, solve_drop
+
+    drop, solder = run.case.drop, run.case.molten
+    with progress_bar(f"reflow of {drop.count**3} particles") as progress:
+        flow, solved = solve_drop(solder, drop.count, drop.edge_radius, progress)
+    shape = drop_shape(solder, drop.edge_radius, flow, solved)
+    effects = decide(drop_numbers(solder), solder)
+    write_body(folder, shape, reference_drop(solder, drop.edge_radius, acting_weight(solder, effects)))
+    return findings.of_drop(shape.metrics, shape.verdict, effects)
+
+
+def reflow_joint(run: Run[JointCase], folder: Path) -> Findings:
+    """Melt the solder of one joint between its pads."""
+    from particles.effects import acting_weight, decide_effects
+    from particles.metrics import reference_meridian
+    from particles.products import write_body
+    from particles.reflow import solve_joint
+
+    geometry, solder = run.case.joint.geometry, run.case.molten
+    with progress_bar("reflow of a joint") as progress:
+        shape = solve_joint(geometry, solder, progress)
+    effects = decide_effects(geometry, solder)
+    write_body(folder, shape, reference_meridian(geometry, solder, acting_weight(solder, effects)))
+    return findings.of_joint(shape.metrics, shape.verdict, effects)
 
 
 def report(run: Run, folder: Path) -> Findings:
@@ -98,6 +132,15 @@ def report(run: Run, folder: Path) -> Findings:
     return Findings()
 
 
-STAGE_FUNCTIONS: dict[str, StageFunction] = {
-    function.__name__: function for function in (geometry, reflow, surface, solder_mesh, shock, report)
+STAGE_FUNCTIONS: dict[str, dict[str, StageFunction]] = {
+    BoardDropCase.kind: {
+        "geometry": geometry,
+        "reflow": reflow,
+        "surface": surface,
+        "solder_mesh": solder_mesh,
+        "shock": shock,
+        "report": report,
+    },
+    DropCase.kind: {"reflow": reflow_drop, "report": report},
+    JointCase.kind: {"reflow": reflow_joint, "report": report},
 }

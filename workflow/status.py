@@ -7,13 +7,15 @@ from rich.table import Table
 
 from workflow.case import Case
 from workflow.inputs import Verdict, examine, read_record
-from workflow.stage_table import BY_NAME
 from workflow.units import from_si
 
 SHOWN_UNITS = {"m": "mm", "m^3": "mm^3", "Pa": "MPa", "J": "mJ", "kg": "mg", "s": "ns"}
 FIGURES = {
     "geometry": ("joint_count", "elements_board", "elements_board_patch"),
-    "reflow": ("distinct_shapes", "joint_width_min", "joint_width_max", "joint_width_error_max"),
+    "reflow": (
+        "distinct_shapes", "joint_width_min", "joint_width_max", "joint_width_error_max",
+        "height", "max_width", "waist", "contact_angle", "height_error", "max_width_error", "verdict",
+    ),
     "surface": ("surface_volume_error_max",),
     "solder_mesh": ("joint_volume_error_max", "joint_scaled_jacobian_min", "joint_critical_time_step"),
     "shock": (
@@ -32,7 +34,7 @@ def show_status(case: Case, run_folder: Path, console: Console) -> None:
     table.add_column("time", justify="right", no_wrap=True)
     table.add_column("figures", ratio=1)
     for name, verdict in examine(run_folder, case).items():
-        record = read_record(run_folder, BY_NAME[name]) or {"metrics": {}, "health": {}}
+        record = read_record(run_folder, case.pipeline[name]) or {"metrics": {}, "health": {}}
         seconds = f"{record['seconds']:.1f} s" if "seconds" in record else ""
         table.add_row(name, _state(verdict, record["health"]), seconds, _figures(name, record["metrics"]))
     console.print(table)

@@ -14,13 +14,14 @@ import pytest
 
 from particles.products import read_shapes
 from tests.support.workflow_command import SMALL_CASE, command_line, reflowshock
-from workflow.stage_table import BY_NAME, NAMES, STAGES
+from workflow.stage_table import BOARD_DROP
 
+NAMES = BOARD_DROP.names
 SNAKEFILE = Path(__file__).resolve().parents[2] / "workflow" / "Snakefile"
 
 
 def times(folder: Path) -> dict[str, int]:
-    return {name: (folder / BY_NAME[name].record).stat().st_mtime_ns for name in NAMES}
+    return {name: (folder / BOARD_DROP[name].record).stat().st_mtime_ns for name in NAMES}
 
 
 def planned(text: str) -> set[str]:
@@ -44,7 +45,7 @@ def wait_until(condition, seconds: float = 60.0) -> None:
 def test_the_whole_path(first_run):
     folder, result = first_run
     assert result.returncode == 0, result.stdout + result.stderr
-    for stage in STAGES:
+    for stage in BOARD_DROP.stages:
         assert all((folder / product).stat().st_size for product in (*stage.products, stage.record))
     assert not list(folder.glob("*.partial")) + list(folder.glob(".*.partial"))
     assert [name for name in NAMES if name in result.stdout] == list(NAMES)
@@ -127,7 +128,7 @@ def test_a_stage_that_is_broken_off_leaves_nothing_and_is_redone(run_folder):
     assert b"interrupted" in errors
     _, alive = psutil.wait_procs(children, timeout=15)
     assert alive == []
-    assert not (run_folder / BY_NAME["reflow"].record).exists()
+    assert not (run_folder / BOARD_DROP["reflow"].record).exists()
     result = reflowshock("run", run_folder, "--until", "reflow", settings=("solder.gravity=0 m/s^2",))
     assert result.returncode == 0, result.stderr
     after = times(run_folder)
@@ -170,8 +171,8 @@ def test_a_killed_stage_leaves_nothing(run_folder):
         os.kill(stage.pid, signal.SIGKILL)
     process.communicate(timeout=60)
     assert process.returncode == 1
-    assert not (run_folder / BY_NAME["shock"].record).exists()
-    assert (run_folder / BY_NAME["solder_mesh"].record).exists()
+    assert not (run_folder / BOARD_DROP["shock"].record).exists()
+    assert (run_folder / BOARD_DROP["solder_mesh"].record).exists()
 
 
 def test_a_failure_names_stage_and_joint(tmp_path):

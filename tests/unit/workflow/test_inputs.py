@@ -9,8 +9,9 @@ import pytest
 from tests.support.workflow_command import SMALL_CASE
 from workflow.case import read_case
 from workflow.inputs import compare, examine, read_case_of_run, stage_inputs, write_inputs
-from workflow.stage_table import BY_NAME, NAMES, STAGES
+from workflow.stage_table import BOARD_DROP
 
+NAMES = BOARD_DROP.names
 AFTER = {name: NAMES[NAMES.index(name) :] for name in NAMES}
 RERUN = {
     "shock.peak_acceleration=1000 G": ("shock", "report"),
@@ -35,7 +36,7 @@ def complete(folder: Path, case, names=NAMES) -> None:
     """Write records and empty products, as if the stages had run one after the other."""
     write_inputs(folder, case)
     for name in names:
-        stage = BY_NAME[name]
+        stage = BOARD_DROP[name]
         record = {"seconds": 1.0, "metrics": {}, "health": {}, "effects": {}, "inputs": stage_inputs(case, stage)}
         for product in (*stage.products, stage.record):
             path = folder / product
@@ -52,7 +53,7 @@ def stale(folder: Path, case) -> tuple[str, ...]:
 
 
 def test_every_parameter_belongs_to_a_stage(case):
-    used = {key for stage in STAGES for key in stage_inputs(case, stage)}
+    used = {key for stage in BOARD_DROP.stages for key in stage_inputs(case, stage)}
     from workflow.fields import leaves
 
     assert {key for key, _, _ in leaves(case)} == used
@@ -87,7 +88,7 @@ def test_the_changed_key_is_named(tmp_path, case):
 def test_an_interrupted_rerun_is_continued(tmp_path, case):
     complete(tmp_path, case)
     moment = 1_500_000_100
-    os.utime(tmp_path / BY_NAME["reflow"].record, (moment, moment))
+    os.utime(tmp_path / BOARD_DROP["reflow"].record, (moment, moment))
     assert stale(tmp_path, case) == ("surface", "solder_mesh", "shock", "report")
 
 
@@ -100,18 +101,18 @@ def test_a_lost_product_is_made_again(tmp_path, case):
 def test_inputs_are_rewritten_only_when_they_change(tmp_path, case):
     complete(tmp_path, case)
     write_inputs(tmp_path, case)
-    before = {stage.name: (tmp_path / stage.inputs).stat().st_mtime_ns for stage in STAGES}
+    before = {stage.name: (tmp_path / stage.inputs).stat().st_mtime_ns for stage in BOARD_DROP.stages}
     write_inputs(tmp_path, read_case(SMALL_CASE, ["shock.peak_acceleration=1000 G"]))
-    after = {stage.name: (tmp_path / stage.inputs).stat().st_mtime_ns for stage in STAGES}
+    after = {stage.name: (tmp_path / stage.inputs).stat().st_mtime_ns for stage in BOARD_DROP.stages}
     assert [name for name in NAMES if after[name] != before[name]] == ["shock"]
-    assert after["shock"] > (tmp_path / BY_NAME["shock"].record).stat().st_mtime_ns
+    assert after["shock"] > (tmp_path / BOARD_DROP["shock"].record).stat().st_mtime_ns
 
 
 def test_a_value_that_returns_makes_nothing_stale(tmp_path, case):
     complete(tmp_path, case)
     write_inputs(tmp_path, read_case(SMALL_CASE, ["shock.peak_acceleration=1000 G"]))
     write_inputs(tmp_path, case)
-    stage = BY_NAME["shock"]
+    stage = BOARD_DROP["shock"]
     assert (tmp_path / stage.inputs).stat().st_mtime <= (tmp_path / stage.record).stat().st_mtime
 
 

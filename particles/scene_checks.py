@@ -1,0 +1,70 @@
+"""Parameters of a scene that are each allowed but make no drop or joint together. Loads neither numba nor PETSc."""
+
+from dataclasses import replace
+from math import degrees, inf
+
+from particles import checks
+from particles.checks import Problem, mm, mm3
+from particles.estimate import particle_count
+from particles.parameters import Solder
+from particles.scenes import Drop, Joint
+
+FEWEST_PER_EDGE = 5
+MOST_PARTICLES = 200_000
+SPACINGS_IN_PAD = 2.0
+KEYS = {
+    "solder.volume": "joint.volume",
+    "solder.pad_contact_angle": "joint.pad_contact_angle",
+    "solder.numerics.spacing": "joint.spacing",
+}
+
+
+def drop_problems(drop: Drop) -> list[Problem]:
+    """Find what cannot work before a drop runs."""
+    return _resolution_problems(drop) or _pad_problems(drop)
+
+
+def joint_problems(joint: Joint, solder: Solder) -> list[Problem]:
+    """Find what cannot work before a joint runs: those of an array without neighbours, under the joint's own keys."""
+    if joint.offset >= joint.pad_bottom + joint.pad_top:
+        allowed = f"< {mm(joint.pad_bottom + joint.pad_top)}"
+        return [Problem("joint.offset", mm(joint.offset), allowed, "the pads do not overlap")]
+    found = checks.problems(solder, {"of the case": joint.geometry}, inf)
+    if found:
+        return [replace(problem, key=KEYS[problem.key]) for problem in found]
+    return _too_many("joint", joint.spacing, particle_count(solder, joint.geometry))
+
+
+def _resolution_problems(drop: Drop) -> list[Problem]:
+    if drop.spacing is None:
+        return []
+    if drop.particles_per_edge is not None:
+        message = f"drop.particles_per_edge = {drop.particles_per_edge} is given as well"
+        return [Problem("drop.spacing", mm(drop.spacing), "one of drop.spacing, drop.particles_per_edge", message)]
+    limit = drop.edge / (FEWEST_PER_EDGE - 1)
+    if drop.count < FEWEST_PER_EDGE:
+        message = f"too coarse for a drop that starts as a cube of {mm(drop.edge)}"
+        return [Problem("drop.spacing", mm(drop.spacing), f"<= {mm(limit)}", message)]
+    return _too_many("drop", drop.spacing, drop.count**3)
+
+
+def _pad_problems(drop: Drop) -> list[Problem]:
+    if drop.pad_radius is None:
+        return []
+    pad, mask = map(degrees, drop.angle_limits)
+    if pad >= mask:
+        message = "the pad must be wetted better than the solder mask"
+        return [Problem("drop.contact_angle", f"{pad:.4g} deg", f"< {mask:.4g} deg", message)]
+    limit = SPACINGS_IN_PAD * drop.resolution
+    if drop.pad_radius < limit:
+        message = f"too small for a particle spacing of {mm(drop.resolution)}: volume {mm3(drop.volume)} cannot fit it"
+        return [Problem("drop.pad_radius", mm(drop.pad_radius), f">= {mm(limit)}", message)]
+    return []
+
+
+def _too_many(scene: str, spacing: float, count: int) -> list[Problem]:
+    if count <= MOST_PARTICLES:
+        return []
+    limit = spacing * (count / MOST_PARTICLES) ** (1.0 / 3.0)
+    message = f"would take {count} particles, more than {MOST_PARTICLES}: a volume that cannot fit, or too fine"
+    return [Problem(f"{scene}.spacing", mm(spacing), f">= {mm(limit)}", message)]

@@ -1,0 +1,126 @@
+"""Scenes of one body of solder: a drop on a wall or pad, a joint between two pads. Their parameters in SI floats.
+
+A scene is resolved into the `Solder` and the geometry that the solvers take.
+"""
+
+from math import inf
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from particles.geometry import JointGeometry
+from particles.parameters import FlowEffects, FlowNumerics, Parameters, Solder, SolderEffects, SolderNumerics, Switch
+
+PI = 3.14159265
+DEFAULT_PER_EDGE = 11
+
+# Hu et al. print 10 times the surface tension and 100 times the viscosity of molten SAC solder.
+PROPERTIES = {
+    "physical": {"density": 8930.0, "surface_tension": 0.4985, "viscosity": 2.27e-3},
+    "paper": {"density": 8930.0, "surface_tension": 4.985, "viscosity": 0.227},
+}
+
+
+class Drop(Parameters):
+    """A drop that starts as a cube on a wall: uniform, or a round pad in the solder mask (with ``pad_radius``).
+
+    Resolution: ``spacing`` or ``particles_per_edge`` of the cube, not both; 11 per edge if neither is given.
+    """
+
+    volume: Annotated[float, "mm^3"] = Field(gt=0)
+    contact_angle: Annotated[float, "deg"] = Field(gt=0, lt=PI)
+    pad_radius: Annotated[float | None, "mm"] = Field(None, gt=0)
+    mask_contact_angle: Annotated[float, "deg"] = Field(2.5830872929, gt=0, lt=PI)
+    spacing: Annotated[float | None, "mm"] = Field(None, gt=0)
+    particles_per_edge: int | None = Field(None, ge=5, le=50)
+
+    @property
+    def edge(self) -> float:
+        """Edge of the cube that the drop starts as [m]."""
+        return self.volume ** (1.0 / 3.0)
+
+    @property
+    def count(self) -> int:
+        """Particles along an edge of the cube."""
+        if self.spacing is not None:
+            return 1 + round(self.edge / self.spacing)
+        return self.particles_per_edge or DEFAULT_PER_EDGE
+
+    @property
+    def resolution(self) -> float:
+        """Spacing of the particles at the start [m]."""
+        return self.edge / (self.count - 1)
+
+    @property
+    def edge_radius(self) -> float:
+        """Radius of the pad's edge [m], infinite on a uniform wall."""
+        return self.pad_radius or inf
+
+    @property
+    def angle_limits(self) -> tuple[float, float]:
+        """Contact angles of pad and mask [rad]."""
+        return self.contact_angle, self.mask_contact_angle
+
+
+class Joint(Parameters):
+    """A joint between two round pads, one above the other; its rims are pinned or slide by pad and mask angle."""
+
+    volume: Annotated[float, "mm^3"] = Field(gt=0)
+    pad_bottom: Annotated[float, "mm"] = Field(gt=0)
+    pad_top: Annotated[float, "mm"] = Field(gt=0)
+    standoff: Annotated[float, "mm"] = Field(gt=0)
+    offset: Annotated[float, "mm"] = Field(0.0, ge=0)
+    pad_contact_angle: Annotated[float, "deg"] = Field(0.0872664626, gt=0, lt=PI)
+    mask_contact_angle: Annotated[float, "deg"] = Field(2.5830872929, gt=0, lt=PI)
+    spacing: Annotated[float, "mm"] = Field(5.0e-5, gt=0)
+
+    @property
+    def geometry(self) -> JointGeometry:
+        """Gap, pads and offset for the solver."""
+        return JointGeometry(self.standoff, self.pad_bottom, self.pad_top, (self.offset, 0.0))
+
+    @property
+    def resolution(self) -> float:
+        """Spacing of the particles at the start [m]."""
+        return self.spacing
+
+    @property
+    def angle_limits(self) -> tuple[float, float]:
+        """Contact angles of pad and mask [rad]."""
+        return self.pad_contact_angle, self.mask_contact_angle
+
+
+class Fluid(Parameters):
+    """Molten solder by the name of a set of properties; a single value given here overrides that of the set.
+
+    The set physical is SAC solder; paper is what Hu et al. print, with 10 times the surface tension and 100 times
+    the viscosity.
+    """
+
+    parameters: Literal["physical", "paper"] = "physical"
+    density: Annotated[float | None, "kg/m^3"] = Field(None, gt=0)
+    surface_tension: Annotated[float | None, "N/m"] = Field(None, gt=0)
+    viscosity: Annotated[float | None, "Pa*s"] = Field(None, gt=0)
+    gravity: Annotated[float, "m/s^2"] = Field(9.81, ge=0)
+    process_time: Annotated[float, "s"] = Field(60.0, gt=0)
+    effects: FlowEffects = FlowEffects()
+    numerics: FlowNumerics = FlowNumerics()
+
+    def resolve(self, scene: Drop | Joint, gravity: Switch) -> Solder:
+        """Return the solder of a scene, with the set's properties where none are given.
+
+        Args:
+            scene: volume and contact angles.
+            gravity: whether gravity acts.
+        """
+        own = {name: getattr(self, name) for name in PROPERTIES["physical"] if getattr(self, name) is not None}
+        return Solder(
+            volume=scene.volume,
+            pad_contact_angle=scene.angle_limits[0],
+            mask_contact_angle=scene.angle_limits[1],
+            gravity=self.gravity,
+            process_time=self.process_time,
+            effects=SolderEffects(gravity=gravity, **self.effects.model_dump()),
+            numerics=SolderNumerics(spacing=scene.resolution, **self.numerics.model_dump()),
+            **PROPERTIES[self.parameters] | own,
+        )
