@@ -5,6 +5,7 @@ from math import inf
 
 import numpy as np
 
+from particles.checkpoint import Checkpoint
 from particles.cloud import box_cloud
 from particles.effects import decide, drop_numbers
 from particles.flow import LiquidFlow
@@ -16,7 +17,11 @@ from particles.shape import JointShape
 
 
 def solve_drop(
-    solder: Solder, count: int, pad_radius: float = inf, progress: Callable[[float], None] | None = None
+    solder: Solder,
+    count: int,
+    pad_radius: float = inf,
+    progress: Callable[[float], None] | None = None,
+    checkpoint: Checkpoint | None = None,
 ) -> tuple[LiquidFlow, Run]:
     """Let a cube of solder flow on a pad and the mask around it.
 
@@ -25,6 +30,7 @@ def solve_drop(
         count: particles along an edge of the cube.
         pad_radius: radius of the pad [m]; infinite for a uniform wall with the contact angle of the pad.
         progress: called with the fraction done.
+        checkpoint: where the run continues from, to the last bit, and leaves its state.
 
     Returns:
         The flow at rest, and its run.
@@ -32,7 +38,7 @@ def solve_drop(
     cloud = box_cloud(float(np.cbrt(solder.volume)), count)
     effects = {name: decision["on"] for name, decision in decide(drop_numbers(solder), solder).items()}
     flow = start_flow(cloud, solder, effects, (contact_line(cloud, 0, pad_radius, solder),))
-    return flow, run_to_rest(flow, stop_rule(cloud, solder, effects), progress)
+    return flow, run_to_rest(flow, stop_rule(cloud, solder, effects), progress, checkpoint=checkpoint)
 
 
 def drop_shape(solder: Solder, pad_radius: float, flow: LiquidFlow, run: Run) -> JointShape:

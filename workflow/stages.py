@@ -95,33 +95,44 @@ def shock(run: Run[BoardDropCase], folder: Path) -> Findings:
 
 def reflow_drop(run: Run[DropCase], folder: Path) -> Findings:
     """Melt a cube of solder on a wall or pad."""
+    from particles.checkpoint import Checkpoint
     from particles.effects import acting_weight, decide, drop_numbers
     from particles.metrics import reference_drop
     from particles.products import write_body
     from particles.sessile import drop_shape, solve_drop
 
     drop, solder = run.case.drop, run.case.molten
+    checkpoint = Checkpoint(_made(run.checkpoints("reflow")) / "drop", (drop, solder))
     with progress_bar(f"reflow of {drop.count**3} particles") as progress:
-        flow, solved = solve_drop(solder, drop.count, drop.edge_radius, progress)
+        flow, solved = solve_drop(solder, drop.count, drop.edge_radius, progress, checkpoint)
     shape = drop_shape(solder, drop.edge_radius, flow, solved)
     effects = decide(drop_numbers(solder), solder)
     write_body(folder, shape, reference_drop(solder, drop.edge_radius, acting_weight(solder, effects)))
-    return findings.of_drop(shape.metrics, shape.verdict, effects)
+    found = findings.of_drop(shape.metrics, shape.verdict, effects)
+    return replace(found, continued="the drop" if checkpoint.continued else "")
 
 
 def reflow_joint(run: Run[JointCase], folder: Path) -> Findings:
     """Melt the solder of one joint between its pads."""
+    from particles.checkpoint import Checkpoint
     from particles.effects import acting_weight, decide_effects
     from particles.metrics import reference_meridian
     from particles.products import write_body
     from particles.reflow import solve_joint
 
     geometry, solder = run.case.joint.geometry, run.case.molten
+    checkpoint = Checkpoint(_made(run.checkpoints("reflow")) / "joint", (geometry, solder))
     with progress_bar("reflow of a joint") as progress:
-        shape = solve_joint(geometry, solder, progress)
+        shape = solve_joint(geometry, solder, progress, checkpoint=checkpoint)
     effects = decide_effects(geometry, solder)
     write_body(folder, shape, reference_meridian(geometry, solder, acting_weight(solder, effects)))
-    return findings.of_joint(shape.metrics, shape.verdict, effects)
+    found = findings.of_joint(shape.metrics, shape.verdict, effects)
+    return replace(found, continued="the joint" if checkpoint.continued else "")
+
+
+def _made(folder: Path) -> Path:
+    folder.mkdir(exist_ok=True)
+    return folder
 
 
 def report(run: Run, folder: Path) -> Findings:
