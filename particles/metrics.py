@@ -74,10 +74,10 @@ def mean_angle(cosines: Floats) -> float:
 
 
 def verdict(lines: Sequence[ContactLine], ruptured: bool) -> str:
-    """Judge a joint: "open", "overflow", "dewetted" or "ok"."""
+    """Judge a joint or drop: "open", "overflow", "dewetted" or "ok"; a uniform wall has no edge to leave."""
     if ruptured:
         return "open"
-    states = np.concatenate([line.state for line in lines])
+    states = np.concatenate([line.state for line in lines if np.isfinite(line.edge_radius)] or [np.empty(0)])
     if (states == ON_MASK).any():
         return "overflow"
     return "dewetted" if (states == ON_PAD).any() else "ok"

@@ -1,0 +1,101 @@
+"""Kinds of case: a drop, a joint; refused with place, key, value, range and nearest name where they cannot be."""
+
+import tomllib
+from pathlib import Path
+
+import jsonschema
+import pytest
+
+from workflow.case import BoardDropCase, DropCase, JointCase, display_values, read_case
+from workflow.case_text import templates, write_new_case
+from workflow.inputs import stage_inputs
+from workflow.problems import CaseError
+from workflow.schema import case_schema
+
+CASES = Path(__file__).resolve().parents[3] / "cases"
+DROP, BALL, JOINT = (CASES / name / "case.toml" for name in ("sessile_drop", "bga_ball", "solder_joint"))
+BAD_VALUES = {
+    "angle of a full turn": (DROP, "drop.contact_angle=190 deg", ['"190 deg"', "out of range", "< 180 deg"]),
+    "angle of zero": (DROP, "drop.contact_angle=0 deg", ["drop.contact_angle", "> 0 deg"]),
+    "two resolutions": (DROP, "drop.spacing=0.1 mm", ["drop.spacing", '"0.1 mm"', "particles_per_edge = 11"]),
+    "unknown set": (DROP, "solder.parameters=papre", ["one of physical, paper", "did you mean paper?"]),
+    "unknown key": (DROP, "drop.angle=60 deg", ["drop.angle", "unknown key", "contact_angle"]),
+    "unknown switch": (DROP, "gravity=of", ['gravity = "of"', "one of auto, on, off", "did you mean off?"]),
+    "two kinds": (DROP, "package.rows=3", ["[package] and [drop]", "exactly one of [package], [drop], [joint]"]),
+    "pad that repels": (BALL, "drop.contact_angle=150 deg", ["drop.contact_angle", "< 148 deg", "better"]),
+    "pad too small": (BALL, "drop.pad_radius=0.01 mm", ["drop.pad_radius", '"0.01 mm"', "cannot fit", ">= 0.09"]),
+    "volume that ruptures": (JOINT, "joint.volume=0.005 mm^3", ["joint.volume", '"0.005 mm^3"', "rupture", ">= "]),
+    "volume without end": (JOINT, "joint.volume=1000 mm^3", ["joint.spacing", "cannot fit", ">= "]),
+    "too coarse": (JOINT, "joint.spacing=0.3 mm", ["joint.spacing", '"0.3 mm"', "too coarse", "<= 0.1"]),
+    "offset past the pad": (JOINT, "joint.offset=0.5 mm", ["joint.offset", "< 0.48 mm", "do not overlap"]),
+}
+
+
+def problems_of(path: Path, *settings: str) -> str:
+    with pytest.raises(CaseError) as caught:
+        read_case(path, settings)
+    return "\n".join(caught.value.lines())
+
+
+@pytest.mark.parametrize(("path", "setting", "words"), BAD_VALUES.values(), ids=BAD_VALUES.keys())
+def test_bad_values_are_named(path, setting, words):
+    text = problems_of(path, setting)
+    assert [word for word in words if word not in text] == [], text
+
+
+def test_a_spacing_larger_than_the_drop(tmp_path):
+    path = tmp_path / "case.toml"
+    path.write_text(DROP.read_text().replace("particles_per_edge = 11", 'spacing = "2 mm"'))
+    text = problems_of(path)
+    assert 'drop.spacing = "2 mm"' in text and "cube of 1 mm" in text and "<= 0.25 mm" in text
+
+
+def test_a_file_of_no_kind_names_the_nearest(tmp_path):
+    path = tmp_path / "case.toml"
+    path.write_text('[case]\nname = "x"\n[dorp]\nvolume = "1 mm^3"\n')
+    text = problems_of(path)
+    assert text.startswith(str(path)) and "exactly one of [package], [drop], [joint]" in text
+    assert "did you mean [drop]?" in text
+
+
+@pytest.mark.parametrize("name", templates())
+def test_every_case_is_a_template(name, tmp_path):
+    """A new case is equal to its template, passes the schema, and each of its parameters belongs to a stage."""
+    case = read_case(write_new_case("mine", name, tmp_path), oversubscribe=True)
+    template = read_case(templates()[name], ["case.name=mine"], oversubscribe=True)
+    assert display_values(case) == display_values(template)
+    jsonschema.validate(tomllib.loads((tmp_path / "mine.toml").read_text()), case_schema())
+    used = {key for stage in case.pipeline.stages for key in stage_inputs(case, stage)}
+    assert used == {key for key, _ in _leaves(case.model_dump())}
+
+
+def _leaves(table: dict, prefix: str = ""):
+    for key, value in table.items():
+        if isinstance(value, dict):
+            yield from _leaves(value, f"{prefix}{key}.")
+        else:
+            yield prefix + key, value
+
+
+def test_the_table_says_the_kind():
+    kinds = [type(read_case(path, oversubscribe=True)) for path in (CASES / "bga_drop/case.toml", DROP, JOINT)]
+    assert kinds == [BoardDropCase, DropCase, JointCase]
+
+
+def test_parameter_sets_by_name():
+    """PHYSICS 1: the paper prints 10 times the surface tension and 100 times the viscosity; one value still counts."""
+    physical, paper = read_case(DROP).molten, read_case(DROP, ["solder.parameters=paper"]).molten
+    assert (physical.surface_tension, physical.viscosity, physical.density) == (0.4985, 2.27e-3, 8930.0)
+    assert (paper.surface_tension, paper.viscosity, paper.density) == (4.985, 0.227, 8930.0)
+    mixed = read_case(DROP, ["solder.parameters=paper", "solder.viscosity=1 Pa*s"]).molten
+    assert (mixed.surface_tension, mixed.viscosity) == (4.985, 1.0)
+
+
+def test_the_spacing_of_a_drop():
+    assert read_case(DROP).molten.numerics.spacing == pytest.approx(1e-4)
+    assert read_case(DROP, ["drop.particles_per_edge=21"]).drop.count == 21
+
+
+def test_gravity_is_a_switch_of_the_case():
+    assert read_case(DROP).molten.effects.gravity == "off"
+    assert read_case(DROP, ["gravity=auto"]).molten.effects.gravity == "auto"
