@@ -25,7 +25,6 @@ VARIANTS = (
     {"vary": "time step", "time_step_limit": 20.0},
     {"vary": "time step", "time_step_limit": 100.0},
     {"vary": "basis", "basis": "linear"},
-    {"vary": "mode", "mode": "inertia", "time_step_limit": 20.0},
 )
 
 

@@ -77,10 +77,10 @@ def verdict(lines: Sequence[ContactLine], ruptured: bool) -> str:
     """Judge a joint or drop: "open", "overflow", "dewetted" or "ok"; a uniform wall has no edge to leave."""
     if ruptured:
         return "open"
-    states = np.concatenate([line.state for line in lines if np.isfinite(line.edge_radius)] or [np.empty(0)])
-    if (states == ON_MASK).any():
+    with_edge = [line for line in lines if np.isfinite(line.edge_radius)]
+    if any((line.state == ON_MASK).any() for line in with_edge):
         return "overflow"
-    return "dewetted" if (states == ON_PAD).any() else "ok"
+    return "dewetted" if any((line.state == ON_PAD).any() for line in with_edge) else "ok"
 
 
 def _contact_cosines(flow: LiquidFlow) -> list[Floats]:
