@@ -1,6 +1,4 @@
-"""Body-fitted cloud of a free drop: concentric geodesic spheres, and its deformation to an oblong drop."""
-
-from dataclasses import replace
+"""Body-fitted cloud of a free drop: concentric geodesic spheres."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,20 +34,6 @@ def sphere_cloud(volume: float, shells: int) -> Cloud:
         wall=np.full(len(points), -1, np.int8),
         spacing=float(np.cbrt(volume / len(points))),
     )
-
-
-def oblong(cloud: Cloud, amplitude: float) -> Cloud:
-    """Stretch a ball about the origin by 1 + a P2(cos theta) along each radius, to the same volume.
-
-    Args:
-        cloud: the ball.
-        amplitude: a, positive for a drop that is long in z, above -1 and below 2.
-    """
-    radius = np.maximum(np.linalg.norm(cloud.points, axis=1), 1e-300)
-    cosine = cloud.points[:, 2] / radius
-    points = cloud.points * (1.0 + amplitude * (1.5 * cosine**2 - 0.5))[:, None]
-    volume, stretched = (enclosed_volume(where, cloud.triangles, (), ()) for where in (cloud.points, points))
-    return replace(cloud, points=points * np.cbrt(volume / stretched))
 
 
 def geodesic_sphere(frequency: int) -> Floats:

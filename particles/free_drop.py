@@ -7,10 +7,10 @@ from time import perf_counter
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import curve_fit
 
 from particles.body import Body
-from particles.cloud_sphere import oblong, sphere_cloud
+from particles.cloud_sphere import sphere_cloud
+from particles.damped_oscillation import fit_oscillation
 from particles.discretisation_tetrahedra import LinearTetrahedra
 from particles.inertial_flow import InertialFlow
 from particles.parameters import Solder
@@ -23,8 +23,8 @@ Floats = NDArray[np.float64]
 
 EFFECTS = {"surface_tension": True, "gravity": False, "wall_adhesion": False, "inertia": True}
 COLUMNS = ("time", "amplitude", "energy", "kinetic_energy", "volume", "momentum")
-# The oscillation is fitted after this share of a period, when the start from rest has settled.
-SETTLING = 0.25
+# Ways to the rest of the polyhedron, whose vertices are not quite on a sphere; the step in radians of the second mode.
+SETTLING_STEP, SETTLING_STEPS = 3.0, 10
 SECOND_MOMENT = np.array([-1.0, -1.0, 2.0])
 
 
@@ -57,13 +57,14 @@ def solve_free_drop(
     steps_per_period: int = 100,
     progress: Callable[[float], None] | None = None,
 ) -> FreeDrop:
-    """Let a drop without walls and gravity move from rest.
+    """Let a drop without walls and gravity swing in its second mode, or rest.
 
-    The viscosity acts unless `solder.effects.viscosity` is "off"; the spacing is that of `solder.numerics`.
+    The ball starts with the velocity of the mode, linear in space: a start from a stretched shape would excite the
+    modes of the grid, too, whose phases part in the first period and look like damping. The viscosity acts unless `solder.effects.viscosity` is "off"; the spacing is that of `solder.numerics`.
 
     Args:
         solder: volume and fluid.
-        amplitude: of the second mode over the radius at the start; 0 for a ball.
+        amplitude: to which the velocity at the start swings the second mode, over the radius; 0 for a ball at rest.
         periods: duration in Rayleigh periods of the second mode.
         steps_per_period: time steps in one of them.
         progress: called with the fraction done.
@@ -97,16 +98,20 @@ def _radius(solder: Solder) -> float:
 
 
 def _start(solder: Solder, amplitude: float) -> InertialFlow:
-    """Set up the drop at rest."""
+    """Set up the ball at rest and give it the velocity a omega/2 (-x, -y, 2 z), on its surface a omega R P2."""
     radius, spacing = _radius(solder), solder.numerics.spacing
     shells = round(radius / spacing)
     if shells < 2:
         raise ValueError(f"solder.numerics.spacing = {spacing:.4g} m must be below half the radius {radius:.4g} m")
     ball = sphere_cloud(solder.volume, shells)
     cells = tetrahedralise(ball.points, ball.spacing)
-    body = Body.at_rest(oblong(ball, amplitude))
+    body = Body.at_rest(ball)
     physics = build_physics(solder, EFFECTS | {"viscosity": solder.effects.viscosity != "off"}, ())
-    return InertialFlow(body, physics, LinearTetrahedra.start(body.points, cells, solder.density))
+    flow = InertialFlow(body, physics, LinearTetrahedra.start(body.points, cells, solder.density))
+    omega = rayleigh_frequency(2, radius, solder.density, solder.surface_tension)
+    flow.settle(SETTLING_STEP / omega, SETTLING_STEPS)
+    body.velocity = 0.5 * amplitude * omega * SECOND_MOMENT * body.points
+    return flow
 
 
 def _sample(flow: InertialFlow, solder: Solder, time: float) -> tuple[float, ...]:
@@ -142,18 +147,10 @@ def _swing_metrics(solder: Solder, history: dict[str, Floats]) -> dict[str, tupl
     """Period and decay rate of a fitted damped oscillation, and their errors against Rayleigh and Lamb."""
     omega = rayleigh_frequency(2, _radius(solder), solder.density, solder.surface_tension)
     lamb = lamb_decay_rate(2, _radius(solder), solder.density, solder.viscosity)
-    later = history["time"] > SETTLING * 2.0 * pi / omega
-    time, amplitude = history["time"][later] * omega, history["amplitude"][later]
-
-    def swing(t: Floats, *parameters: float) -> Floats:
-        mean, size, decay, frequency, phase = parameters
-        return mean + size * np.exp(-decay * t) * np.cos(frequency * t + phase)
-
-    guess = (0.0, history["amplitude"][0], lamb / omega, 1.0, 0.0)
-    _, _, decay, frequency, _ = curve_fit(swing, time, amplitude, p0=guess)[0]
+    decay, frequency = fit_oscillation(history["time"], history["amplitude"], omega)
     return {
-        "period": (2.0 * pi / (frequency * omega), "s"),
-        "decay_rate": (float(decay * omega), "1/s"),
-        "period_error": (float(1.0 / frequency - 1.0), ""),
-        "decay_rate_error": (float(decay * omega / lamb - 1.0), ""),
+        "period": (2.0 * pi / frequency, "s"),
+        "decay_rate": (decay, "1/s"),
+        "period_error": (omega / frequency - 1.0, ""),
+        "decay_rate_error": (decay / lamb - 1.0, ""),
     }

@@ -54,6 +54,13 @@ class InertialFlow:
         self.volume = body.volume()[0]
         self._history = BackwardDifference.start(len(body.points))
 
+    def settle(self, time_step: float, steps: int) -> None:
+        """Bring the body to rest: stop all motion after every step [s]."""
+        for _ in range(steps):
+            self.step(time_step)
+            self.body.velocity = np.zeros_like(self.body.velocity)
+            self._history = BackwardDifference.start(len(self.body.points))
+
     def _predicted(self, velocity: Floats) -> Physics:
         """Physics at the positions that a velocity `(n, 3)` predicts."""
         tensions = (part for part in self.physics.operators if isinstance(part, SurfaceTension))

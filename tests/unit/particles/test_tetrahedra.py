@@ -5,7 +5,7 @@ import pytest
 
 from particles.backward_difference import BackwardDifference
 from particles.body import Body
-from particles.cloud_sphere import geodesic_sphere, oblong, sphere_cloud
+from particles.cloud_sphere import geodesic_sphere, sphere_cloud
 from particles.discretisation_tetrahedra import LinearTetrahedra
 from particles.surface_measure import enclosed_volume
 from particles.tetrahedra import boundary_triangles, cell_volumes, tetrahedralise, volume_gradients
@@ -16,7 +16,8 @@ from particles.viscosity import Viscosity
 def drop():
     ball = sphere_cloud(2.0, 3)
     cells = tetrahedralise(ball.points, ball.spacing)
-    body = Body.at_rest(oblong(ball, 0.2))
+    body = Body.at_rest(ball)
+    body.points = body.points * np.array([0.8, 1.25, 1.0]) + 0.02 * np.sin(4.0 * body.points[:, ::-1])
     return body, LinearTetrahedra.start(body.points, cells, density=3.0)
 
 
@@ -46,16 +47,6 @@ def test_boundary_of_the_tetrahedra_is_the_surface(shells):
     assert oriented(boundary_triangles(cells)) == oriented(cloud.triangles)
     assert enclosed_volume(cloud.points, cloud.triangles, (), ()) == pytest.approx(1e-9, rel=1e-12)
     assert cell_volumes(cloud.points, cells).sum() == pytest.approx(1e-9, rel=1e-12)
-
-
-def test_oblong_drop_has_the_volume_and_the_second_mode():
-    ball = sphere_cloud(1.0, 6)
-    radius = np.linalg.norm(ball.points[0])
-    long = oblong(ball, 0.01)
-    assert enclosed_volume(long.points, long.triangles, (), ()) == pytest.approx(1.0, rel=1e-12)
-    r = np.linalg.norm(long.points[: long.surface_count], axis=1)
-    cosine = long.points[: long.surface_count, 2] / r
-    assert r / radius - 1.0 == pytest.approx(0.01 * (1.5 * cosine**2 - 0.5), abs=2e-4)
 
 
 def test_volume_gradients_equal_differences():
@@ -103,7 +94,7 @@ def test_viscous_power_of_simple_flows(drop):
     body, tetrahedra = drop
     space = tetrahedra(body)
     matrix, volume = Viscosity(2.0).matrix(body, space, 1.0), space.weights.sum()
-    assert volume == pytest.approx(2.0, rel=5e-3)
+    assert volume == pytest.approx(body.volume()[0], rel=5e-3)
     x, y, z = body.points.T
     flows = ((z, 0 * x, 0 * x), (x, -y, 0 * x), (-y, x, 0 * x))
     powers = [field @ matrix @ field for field in map(np.concatenate, flows)]

@@ -1,0 +1,31 @@
+"""Frequency and decay rate of a weakly nonlinear damped oscillation, from samples."""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+Floats = NDArray[np.float64]
+
+
+def fit_oscillation(time: Floats, values: Floats, frequency: float) -> tuple[float, float]:
+    """Fit decay rate [1/s] and angular frequency [rad/s] of the fundamental.
+
+    Model: exp(-b t) cos(w t + ..), and of second order its harmonic exp(-2 b t) cos(2 w t + ..), its mean exp(-2 b t)
+    and a constant. The factors of these are linear and eliminated (variable projection).
+
+    Args:
+        time: `(k,)` [s], more than a period.
+        values: `(k,)`.
+        frequency: a guess within some 20 % [rad/s].
+    """
+
+    def misfit(unknowns: Floats) -> Floats:
+        decay, angle = np.exp(-unknowns[0] * scaled), unknowns[1] * scaled
+        first, second = decay * np.exp(1j * angle), decay**2 * np.exp(2j * angle)
+        columns = (first.real, first.imag, second.real, second.imag, decay**2, np.ones_like(decay))
+        basis = np.column_stack(columns)
+        return basis @ np.linalg.lstsq(basis, values, rcond=None)[0] - values
+
+    scaled = time * frequency
+    decay, ratio = least_squares(misfit, (0.01, 1.0), x_scale=(0.01, 0.01), xtol=1e-12, ftol=1e-12).x
+    return decay * frequency, ratio * frequency
