@@ -60,7 +60,8 @@ def solve_free_drop(
     """Let a drop without walls and gravity swing in its second mode, or rest.
 
     The ball starts with the velocity of the mode, linear in space: a start from a stretched shape would excite the
-    modes of the grid, too, whose phases part in the first period and look like damping. The viscosity acts unless `solder.effects.viscosity` is "off"; the spacing is that of `solder.numerics`.
+    modes of the grid, too, whose phases part in the first period and look like damping.
+    The viscosity acts unless `solder.effects.viscosity` is "off"; the spacing is that of `solder.numerics`.
 
     Args:
         solder: volume and fluid.

@@ -77,4 +77,4 @@ def test_laplace_drop():
     assert result.metrics["mean_pressure"][0] == pytest.approx(3080.0, rel=5e-3)
     assert result.metrics["pressure_scatter"][0] < 2e-3
     assert result.metrics["capillary_number_at_rest"][0] < 1e-4
-    assert result.metrics["volume_drift"][0] < 1e-9
+    assert result.metrics["volume_drift"][0] < 1e-6
