@@ -64,6 +64,7 @@ def _context(run_folder: Path, case, summary: dict) -> dict:
         context["curves"]["timings"] = timing_bars(summary["timings"])
     _add_preview(run_folder, context)
     _add_joints(run_folder, context)
+    _add_body(run_folder, context, summary)
     _add_shock(run_folder, context, summary)
     return context
 
@@ -88,6 +89,25 @@ def _add_joints(run_folder: Path, context: dict) -> None:
         picture = Path(folder) / "shapes.png"
         render_shapes(run_folder / "surface", joints, picture)
         context["pictures"]["shapes"] = _base64(picture)
+
+
+def _add_body(run_folder: Path, context: dict, summary: dict) -> None:
+    """Add what is told of one drop or joint."""
+    if not (run_folder / "reflow" / "shape.h5").exists():
+        return
+    from particles.products import read_body
+    from workflow import report_body
+
+    shape, meridian = read_body(run_folder / "reflow")
+    context["headline"] = report_body.headline(summary["metrics"])
+    context["tables"]["body"] = report_body.metric_table(summary["metrics"], summary["health"])
+    context["tables"]["work_precision"] = report_body.work_precision_table()
+    context["curves"]["profile"] = report_body.profile_curve(shape.surface_points, meridian)
+    context["curves"]["body_history"] = report_body.history_curve(shape.history)
+    with tempfile.TemporaryDirectory() as folder:
+        picture = Path(folder) / "body.png"
+        report_body.render_body(shape, picture)
+        context["pictures"]["body"] = _base64(picture)
 
 
 def _add_shock(run_folder: Path, context: dict, summary: dict) -> None:

@@ -37,7 +37,7 @@ def array_map(joints: list[dict]) -> str:
         figure, axes = pyplot.subplots(1, 2, figsize=(9.2, 3.9), constrained_layout=True)
         _map_panel(axes[0], joints, "standoff", "standoff [µm]")
         _map_panel(axes[1], joints, "max_width", "maximum width [µm]")
-        return _svg(figure)
+        return svg(figure)
 
 
 def history_curves(histories: dict[str, dict], critical_joint: str) -> str:
@@ -65,7 +65,7 @@ def history_curves(histories: dict[str, dict], critical_joint: str) -> str:
         axes[0, 0].legend(frameon=False)
         for axis in axes[1]:
             axis.set_xlabel("time [ms]")
-        return _svg(figure)
+        return svg(figure)
 
 
 def energy_curves(history: dict) -> str:
@@ -82,7 +82,7 @@ def energy_curves(history: dict) -> str:
         right.plot(time, 100.0 * history["interface"] / largest, color="#5f6c7b", label="interface")
         right.set(xlabel="time [ms]", ylabel="share of the largest energy [%]")
         right.legend(frameon=False)
-        return _svg(figure)
+        return svg(figure)
 
 
 def timing_bars(timings: dict[str, float]) -> str:
@@ -95,7 +95,7 @@ def timing_bars(timings: dict[str, float]) -> str:
         axis.invert_yaxis()
         axis.set_xlabel("wall time [s]")
         axis.grid(axis="y", visible=False)
-        return _svg(figure)
+        return svg(figure)
 
 
 def _map_panel(axis, joints: list[dict], key: str, label: str) -> None:
@@ -126,7 +126,8 @@ def _draw_histories(axes, mode: str, history: dict, critical_joint: str) -> None
     axes[1, 1].set_ylabel(f"von Mises at the pads of {critical_joint} [MPa]")
 
 
-def _svg(figure) -> str:
+def svg(figure) -> str:
+    """Return a figure as an SVG element, and close it."""
     stream = io.StringIO()
     figure.savefig(stream, format="svg")
     pyplot.close(figure)

@@ -24,7 +24,7 @@ def render_shapes(surface_folder: Path, joints: list[dict], picture: Path) -> No
     columns = min(len(ordered), 7)
     rows = -(-len(ordered) // columns)
     spacing = 1.3 * max(joint["max_width"] for joint in ordered) / MILLI
-    plotter = _plotter((1800, 110 + round(1800 * rows / columns)))
+    plotter = new_plotter((1800, 110 + round(1800 * rows / columns)))
     limits = _radius_limits(ordered)
     for index, joint in enumerate(ordered):
         row, column = divmod(index, columns)
@@ -45,7 +45,7 @@ def render_shapes(surface_folder: Path, joints: list[dict], picture: Path) -> No
     plotter.camera_position = [(centre[0], -100.0, centre[2] + 14.0), centre, (0.0, 0.0, 1.0)]
     plotter.enable_parallel_projection()
     plotter.camera.parallel_scale = 0.5 * columns * spacing * plotter.window_size[1] / plotter.window_size[0]
-    _save(plotter, picture)
+    save(plotter, picture)
 
 
 def render_joints(folder: Path, history: dict, parts: list[str], picture: Path) -> str:
@@ -66,7 +66,7 @@ def render_joints(folder: Path, history: dict, parts: list[str], picture: Path) 
     grid, time = _fields_near(folder, ("meso", "dns"), float(history["time"][row]))
     grid.points = grid.points / MILLI
     grid["von Mises [MPa]"] = grid.cell_data["von_mises"] / MEGA
-    plotter = _plotter((1800, 1000))
+    plotter = new_plotter((1800, 1000))
     plotter.add_mesh(
         _of_role(grid, parts, "solder"),
         scalars="von Mises [MPa]",
@@ -103,7 +103,7 @@ def render_joints(folder: Path, history: dict, parts: list[str], picture: Path) 
     plotter.camera_position = [(1.5, 1.15, 0.75), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)]
     plotter.reset_camera()
     plotter.camera.zoom(1.4)
-    _save(plotter, picture)
+    save(plotter, picture)
     return (
         f"Von Mises stress in the joints at {1e3 * time:.3f} ms, seen from the package's corner; the package is drawn "
         f"as an outline. The scale ends at {critical}'s average at its worse pad; single elements reach more."
@@ -119,7 +119,7 @@ def render_board(folder: Path, history: dict, picture: Path) -> str:
     factor = _round_down(0.12 * length / float(np.abs(grid.point_data["displacement"][:, 2]).max()))
     bent = grid.warp_by_vector("displacement", factor=factor)
     bent.points = bent.points / MILLI
-    plotter = _plotter((1800, 900))
+    plotter = new_plotter((1800, 900))
     plotter.add_mesh(
         bent,
         scalars="deflection [mm]",
@@ -145,7 +145,7 @@ def render_board(folder: Path, history: dict, picture: Path) -> str:
     plotter.camera_position = [(-0.8, -1.8, 0.7), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)]
     plotter.reset_camera()
     plotter.camera.zoom(1.5)
-    _save(plotter, picture)
+    save(plotter, picture)
     return f"The board at {1e3 * time:.3f} ms, deflection drawn {factor:g} times as large; grey: at rest."
 
 
@@ -209,14 +209,15 @@ def _round_down(factor: float) -> float:
     return float(max(step * power for step in (1.0, 2.0, 5.0) if step * power <= factor))
 
 
-def _plotter(size=WINDOW) -> pyvista.Plotter:
+def new_plotter(size=WINDOW) -> pyvista.Plotter:
+    """Return an off-screen view with a white background."""
     plotter = pyvista.Plotter(off_screen=True, window_size=list(size))
     plotter.set_background("white")
     plotter.enable_anti_aliasing("ssaa")
     return plotter
 
 
-def _save(plotter: pyvista.Plotter, picture: Path) -> None:
+def save(plotter: pyvista.Plotter, picture: Path) -> None:
     """Write the view without the white around it."""
     image = plotter.screenshot(return_img=True)
     plotter.close()
