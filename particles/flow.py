@@ -9,13 +9,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from particles.approximate_projection import project
 from particles.body import Body
 from particles.discretisation_mls import particle_discretisation
-from particles.incompressibility import solve
+from particles.force_surface_tension import SurfaceTension
+from particles.incompressibility import SaddlePoint, Solution, solve
 from particles.interior_shift import interior_shift
+from particles.mass import Mass
 from particles.mls import SUPPORT
 from particles.neighbours import NeighbourList
 from particles.physics import Physics
+from particles.pressure_laplacian import pressure_laplacian
 from particles.step_equations import StepEquations
 from particles.surface_quality import flip_to_delaunay, smoothing_offsets
 from particles.time_step import TimeStep
@@ -51,6 +55,13 @@ class StepRecord:
     displacement: float
     flips: int
     iterations: int
+
+
+def _relaxing_density(physics: Physics) -> float | None:
+    """Density, if no momentum is kept and every operator but the mass acts on the surface only; else None."""
+    on_surface = all(isinstance(part, Mass | SurfaceTension) for part in physics.operators)
+    densities = [part.density for part in physics.operators if isinstance(part, Mass)]
+    return densities[0] if on_surface and not physics.momenta else None
 
 
 class LiquidFlow:
@@ -103,7 +114,7 @@ class LiquidFlow:
         space = particle_discretisation(body, self.neighbours, self.basis)
         equations = StepEquations(body, self.physics, space)
         while True:
-            solution = solve(equations.problem(self.time_step.size, self.volume))
+            solution = self._solve(equations.problem(self.time_step.size, self.volume))
             velocity, twists = equations.expand(solution.velocity, self.time_step.size)
             if self.time_step.accepts(float(np.sqrt((velocity**2).sum(axis=1).max()))):
                 break
@@ -112,6 +123,14 @@ class LiquidFlow:
         body.pressure[:] = body.surface_pressure
         body.pressure[first_below:] += solution.pressure[:-1]
         return solution.iterations, twists
+
+    def _solve(self, problem: SaddlePoint) -> Solution:
+        """Solve exactly where particles carry or share momentum, else by the compact Laplacian."""
+        density = _relaxing_density(self.physics)
+        if density is None:
+            return solve(problem)
+        laplacian = pressure_laplacian(self.body, self.neighbours)
+        return project(problem, self.time_step.size / density * laplacian)
 
     def _keep_quality(self) -> int:
         """Flip and smooth the surface, shift the interior; return the number of flips."""

@@ -60,18 +60,19 @@ class Solution:
     iterations: int
 
 
-def _petsc(matrix: sparse.csr_matrix) -> PETSc.Mat:
+def petsc(matrix: sparse.csr_matrix) -> PETSc.Mat:
+    """Copy a symmetric positive definite matrix to PETSc."""
     matrix.sort_indices()
     parts = (matrix.indptr.astype(PETSc.IntType), matrix.indices.astype(PETSc.IntType), matrix.data)
-    return PETSc.Mat().createAIJ(matrix.shape, csr=parts, comm=PETSc.COMM_SELF)
+    result = PETSc.Mat().createAIJ(matrix.shape, csr=parts, comm=PETSc.COMM_SELF)
+    result.setOption(PETSc.Mat.Option.SPD, True)
+    return result
 
 
 def _cholesky(matrix: sparse.csr_matrix) -> PETSc.KSP:
     """Factor a symmetric positive definite matrix with MUMPS."""
-    factored = _petsc(matrix)
-    factored.setOption(PETSc.Mat.Option.SPD, True)
     solver = PETSc.KSP().create(PETSc.COMM_SELF)
-    solver.setOperators(factored)
+    solver.setOperators(petsc(matrix))
     solver.setType(PETSc.KSP.Type.PREONLY)
     solver.getPC().setType(PETSc.PC.Type.CHOLESKY)
     solver.getPC().setFactorSolverType("mumps")
@@ -79,7 +80,7 @@ def _cholesky(matrix: sparse.csr_matrix) -> PETSc.KSP:
     return solver
 
 
-class _Inverse:
+class Inverse:
     """x -> A^-1 x on NumPy vectors."""
 
     def __init__(self, matrix: sparse.csr_matrix) -> None:
@@ -87,6 +88,7 @@ class _Inverse:
         self._solution, self._right = self._solver.getOperators()[0].createVecs()
 
     def __call__(self, right: Floats) -> Floats:
+        """A^-1 x."""
         self._right.setArray(right)
         self._solver.solve(self._right, self._solution)
         return self._solution.getArray().copy()
@@ -95,7 +97,7 @@ class _Inverse:
 class _Schur:
     """PETSc shell of C A^-1 C^T + S."""
 
-    def __init__(self, problem: SaddlePoint, inverse: _Inverse) -> None:
+    def __init__(self, problem: SaddlePoint, inverse: Inverse) -> None:
         self._problem, self._transposed, self._inverse = problem, problem.constraint.T.tocsr(), inverse
 
     def mult(self, _matrix: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
@@ -116,19 +118,14 @@ def solve(problem: SaddlePoint) -> Solution:
         SolveFailed: the true residual of either equation stays above the limit.
     """
     operator, constraint = problem.operator, problem.constraint
-    inverse = _Inverse(operator)
+    inverse = Inverse(operator)
     lumped = constraint @ sparse.diags(1.0 / operator.diagonal()) @ constraint.T
     if problem.stabilisation is not None:
         lumped = lumped + problem.stabilisation
     count = constraint.shape[0]
     shell = PETSc.Mat().createPython([count, count], _Schur(problem, inverse), comm=PETSc.COMM_SELF)
     shell.setUp()
-    solver = PETSc.KSP().create(PETSc.COMM_SELF)
-    preconditioner = _petsc(lumped.tocsr())
-    preconditioner.setOption(PETSc.Mat.Option.SPD, True)
-    solver.setOperators(shell, preconditioner)
-    solver.setType(PETSc.KSP.Type.CG)
-    solver.setTolerances(rtol=RELATIVE_TOLERANCE, max_it=MAX_ITERATIONS)
+    solver = conjugate_gradients(shell, petsc(lumped.tocsr()))
     solver.getPC().setType(PETSc.PC.Type.CHOLESKY)
     solver.getPC().setFactorSolverType("mumps")
     unconstrained = inverse(problem.load)
@@ -137,15 +134,38 @@ def solve(problem: SaddlePoint) -> Solution:
     solver.solve(right, pressure)
     velocity = inverse(problem.load + constraint.T @ pressure.getArray())
     solution = Solution(velocity, pressure.getArray().copy(), solver.getIterationNumber())
-    _check(problem, solution, solver.getConvergedReason(), float(np.linalg.norm(right.getArray())))
+    scale = float(np.linalg.norm(right.getArray()))
+    check_residuals(problem, solution, solver.getConvergedReason(), (scale, _leak(problem, solution.pressure)))
     return solution
 
 
-def _check(problem: SaddlePoint, solution: Solution, reason: int, scale: float) -> None:
-    """Compare the true residuals, not the solver's word, with the limit."""
+def conjugate_gradients(operator: PETSc.Mat, preconditioner: PETSc.Mat) -> PETSc.KSP:
+    """Set up conjugate gradients on the pressure."""
+    solver = PETSc.KSP().create(PETSc.COMM_SELF)
+    solver.setOperators(operator, preconditioner)
+    solver.setType(PETSc.KSP.Type.CG)
+    solver.setTolerances(rtol=RELATIVE_TOLERANCE, max_it=MAX_ITERATIONS)
+    return solver
+
+
+def check_residuals(
+    problem: SaddlePoint, solution: Solution, reason: int, rates: tuple[float, Floats | float]
+) -> None:
+    """Compare the true residuals, not the solver's word, with the limit.
+
+    Args:
+        problem: what was to be solved.
+        solution: what was found.
+        reason: of PETSc, positive where it converged.
+        rates: norm of the rates that the pressure had to supply, and S p, both [m^3/s].
+
+    Raises:
+        SolveFailed: a residual is above the limit.
+    """
+    scale, leak = rates
     force = float(np.linalg.norm(problem.load)) or 1.0
     momentum = problem.operator @ solution.velocity - problem.constraint.T @ solution.pressure - problem.load
-    continuity = problem.constraint @ solution.velocity + _leak(problem, solution.pressure) - problem.rate
+    continuity = problem.constraint @ solution.velocity + leak - problem.rate
     relative = (float(np.linalg.norm(momentum)) / force, float(np.linalg.norm(continuity)) / (scale or 1.0))
     if not (reason > 0 and max(relative) < RESIDUAL_LIMIT):
         raise SolveFailed(
