@@ -29,6 +29,8 @@ Floats = NDArray[np.float64]
 SKIN = 0.2
 VOLUME_PASSES = 2
 FLIP_INTERVAL = 2
+# Pressures up to which the exact divergence is solved for; its factorisation costs 0.2 s at 800 of them, 3 s at 3600.
+LARGEST_EXACT = 2000
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,9 +127,9 @@ class LiquidFlow:
         return solution.iterations, twists
 
     def _solve(self, problem: SaddlePoint) -> Solution:
-        """Solve exactly where particles carry or share momentum, else by the compact Laplacian."""
+        """Solve exactly where that is cheap or particles carry or share momentum, else by the compact Laplacian."""
         density = _relaxing_density(self.physics)
-        if density is None:
+        if density is None or len(problem.rate) <= LARGEST_EXACT:
             return solve(problem)
         laplacian = pressure_laplacian(self.body, self.neighbours)
         return project(problem, self.time_step.size / density * laplacian)

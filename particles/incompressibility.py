@@ -81,17 +81,25 @@ def _cholesky(matrix: sparse.csr_matrix) -> PETSc.KSP:
 
 
 class Inverse:
-    """x -> A^-1 x on NumPy vectors."""
+    """x -> A^-1 x on NumPy vectors; only the rows that A couples are factored."""
 
     def __init__(self, matrix: sparse.csr_matrix) -> None:
-        self._solver = _cholesky(matrix)
-        self._solution, self._right = self._solver.getOperators()[0].createVecs()
+        matrix.eliminate_zeros()
+        self._coupled = np.flatnonzero(np.diff(matrix.indptr) > 1)
+        self._diagonal = matrix.diagonal()
+        self._solver = None
+        if len(self._coupled) > 0:
+            self._solver = _cholesky(matrix[self._coupled][:, self._coupled])
+            self._solution, self._right = self._solver.getOperators()[0].createVecs()
 
     def __call__(self, right: Floats) -> Floats:
         """A^-1 x."""
-        self._right.setArray(right)
-        self._solver.solve(self._right, self._solution)
-        return self._solution.getArray().copy()
+        result = right / self._diagonal
+        if self._solver is not None:
+            self._right.setArray(right[self._coupled])
+            self._solver.solve(self._right, self._solution)
+            result[self._coupled] = self._solution.getArray()
+        return result
 
 
 class _Schur:
