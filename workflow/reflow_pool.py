@@ -97,7 +97,7 @@ def solve_joints(
     context = multiprocessing.get_context("spawn")
     reports = context.Queue()
     workers = min(cores, len(geometries))
-    with ProcessPoolExecutor(workers, context, _start_worker, (reports,)) as pool:
+    with ProcessPoolExecutor(workers, context, _start_worker, (reports, cores // workers)) as pool:
         jobs = {
             pool.submit(_solve, Job(name, geometry, solder, checkpoints / name)): name
             for name, geometry in geometries.items()
@@ -133,8 +133,9 @@ def _wait_for(jobs: "Mapping[Future, str]", reports: Any, progress: Callable[[fl
         progress(sum(done.values()) / len(done))
 
 
-def _start_worker(reports: Any) -> None:
+def _start_worker(reports: Any, threads: int) -> None:
     global _progress
+    os.environ["NUMBA_NUM_THREADS"] = str(threads)  # numba, which is loaded after this, would take all cores
     _progress = reports
     threading.Thread(target=_end_with_parent, daemon=True).start()
 

@@ -1,0 +1,73 @@
+"""Cost of a step against the number of particles, on one and two threads: a cube that spreads to 60 degrees.
+
+Run: .venv/bin/python benchmarks/bench_reflow_scale.py   (two minutes; writes benchmarks/results/reflow_scale.json)
+Each row runs in a process of its own; bytes are the growth of its largest resident size over that of 343 particles.
+"""
+
+import json
+import os
+import resource
+import subprocess
+import sys
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+
+from particles.cloud import box_cloud
+from particles.flow import LiquidFlow
+from particles.parameters import Solder, SolderNumerics
+from particles.reflow import contact_line, start_flow
+
+RESULTS = Path(__file__).parent / "results" / "reflow_scale.json"
+EFFECTS = {"surface_tension": True, "wall_adhesion": True, "gravity": False, "inertia": False, "viscosity": False}
+PER_EDGE = (11, 13, 17, 27, 41)
+STEPS = 3
+
+
+def cube(count: int) -> LiquidFlow:
+    numerics = SolderNumerics(time_step_limit=100)
+    solder = Solder(volume=1e-9, pad_contact_angle=np.radians(60), numerics=numerics)
+    cloud = box_cloud(1e-3, count)
+    return start_flow(cloud, solder, EFFECTS, (contact_line(cloud, 0, np.inf, solder),))
+
+
+def largest_size() -> float:
+    return 1024.0 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+
+
+def measure(count: int) -> dict:
+    cube(7).step()
+    before, flow = largest_size(), cube(count)
+    records = [flow.step()]
+    start = perf_counter()
+    records += [flow.step() for _ in range(STEPS)]
+    seconds = (perf_counter() - start) / STEPS
+    particles = len(flow.body.points)
+    return {
+        "particles": particles,
+        "threads": int(os.environ["NUMBA_NUM_THREADS"]),
+        "seconds_a_step": seconds,
+        "particle_steps_per_second": particles / seconds,
+        "iterations": max(record.iterations for record in records),
+        "bytes_a_particle": (largest_size() - before) / particles,
+    }
+
+
+def main() -> None:
+    rows = []
+    for count in PER_EDGE:
+        for threads in (1, 2):
+            environment = os.environ | {"NUMBA_NUM_THREADS": str(threads)}
+            command = [sys.executable, __file__, str(count)]
+            rows.append(json.loads(subprocess.run(command, env=environment, capture_output=True, check=True).stdout))
+            print(rows[-1], flush=True)
+    RESULTS.parent.mkdir(exist_ok=True)
+    RESULTS.write_text(json.dumps(rows, indent=1))
+
+
+if __name__ == "__main__":
+    if len(sys.argv) > 1:
+        print(json.dumps(measure(int(sys.argv[1]))))
+    else:
+        main()
