@@ -6,9 +6,7 @@ from dataclasses import dataclass, field
 from particles.body import Body
 from particles.flow import LiquidFlow, StepRecord
 from particles.rebuild import collapsing, rebuild, touch
-from particles.rest import NoRest, StopRule, is_calm
-
-CALM_STEPS = 3
+from particles.rest import CALM_STEPS, NoRest, StopRule, is_calm
 
 
 @dataclass(slots=True, eq=False)

@@ -5,6 +5,7 @@ A case file is of one kind, by the table that only this kind has: [package], [dr
 
 import os
 import tomllib
+from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, ClassVar
@@ -52,9 +53,9 @@ class Case(BaseModel):
 
     case: Title
 
+    @abstractmethod
     def problems(self) -> list[Problem]:
         """Find parameters that are each allowed, but impossible together."""
-        raise NotImplementedError
 
     @property
     def ranks(self) -> int:

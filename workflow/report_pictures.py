@@ -9,6 +9,7 @@ from matplotlib import pyplot
 MILLI = 1.0e-3
 MEGA = 1.0e6
 WINDOW = (1600, 800)
+SCALAR_BAR = {"vertical": True, "position_x": 0.88, "position_y": 0.3, "height": 0.5, "color": "black", "n_labels": 4}
 
 
 def render_shapes(surface_folder: Path, joints: list[dict], picture: Path) -> None:
@@ -72,15 +73,7 @@ def render_joints(folder: Path, history: dict, parts: list[str], picture: Path) 
         scalars="von Mises [MPa]",
         cmap="turbo",
         clim=(0.0, float(1.0e-6 * stress.max())),
-        scalar_bar_args={
-            "vertical": True,
-            "position_x": 0.88,
-            "position_y": 0.3,
-            "height": 0.5,
-            "color": "black",
-            "n_labels": 4,
-            "fmt": "%.0f",
-        },
+        scalar_bar_args=SCALAR_BAR | {"fmt": "%.0f"},
     )
     plotter.add_mesh(_of_role(grid, parts, "copper"), color="#b87333")
     plotter.add_mesh(
@@ -127,15 +120,7 @@ def render_board(folder: Path, history: dict, picture: Path) -> str:
         show_edges=True,
         edge_color="#55606b",
         line_width=0.4,
-        scalar_bar_args={
-            "vertical": True,
-            "position_x": 0.88,
-            "position_y": 0.3,
-            "height": 0.5,
-            "color": "black",
-            "n_labels": 4,
-            "fmt": "%.1f",
-        },
+        scalar_bar_args=SCALAR_BAR | {"fmt": "%.1f"},
     )
     flat = grid.copy()
     flat.points = flat.points / MILLI
