@@ -39,9 +39,7 @@ def drop(vary: str, degrees: float, per_edge: int, **choices) -> dict:
         volume=VOLUME,
         pad_contact_angle=np.radians(degrees),
         effects=SolderEffects(gravity="off", inertia="on" if inertia else "auto"),
-        numerics=SolderNumerics(
-            basis=choices["basis"], time_step_limit=choices["time_step_limit"], max_steps=1000
-        ),
+        numerics=SolderNumerics(basis=choices["basis"], time_step_limit=choices["time_step_limit"], max_steps=1000),
         **(PAPER if inertia else {}),
     )
     row = {"vary": vary, "contact_angle": degrees, "per_edge": per_edge} | choices

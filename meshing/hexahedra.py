@@ -14,9 +14,7 @@ def volumes(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
     total = np.zeros(len(cells))
     for location in np.array(np.meshgrid(GAUSS, GAUSS, GAUSS)).reshape(3, -1).T:
         factors = 1.0 + CORNERS * location
-        derivatives = [
-            0.125 * CORNERS[:, k] * factors[:, (k + 1) % 3] * factors[:, (k + 2) % 3] for k in range(3)
-        ]
+        derivatives = [0.125 * CORNERS[:, k] * factors[:, (k + 1) % 3] * factors[:, (k + 2) % 3] for k in range(3)]
         jacobian = np.einsum("ka,cai->cki", np.array(derivatives), points[cells])
         total += np.linalg.det(jacobian)
     return total

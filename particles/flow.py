@@ -9,18 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from particles.approximate_projection import project
 from particles.body import Body
-from particles.discretisation_mls import particle_discretisation
-from particles.force_surface_tension import SurfaceTension
-from particles.incompressibility import SaddlePoint, Solution, solve
 from particles.interior_shift import interior_shift
-from particles.mass import Mass
-from particles.mls import SUPPORT
 from particles.neighbours import NeighbourList
 from particles.physics import Physics
-from particles.pressure_laplacian import pressure_laplacian
-from particles.step_equations import StepEquations
+from particles.step_solver import Motion, StepSolver
 from particles.surface_quality import flip_to_delaunay, smoothing_offsets
 from particles.time_step import TimeStep
 
@@ -29,8 +22,6 @@ Floats = NDArray[np.float64]
 SKIN = 0.2
 VOLUME_PASSES = 2
 FLIP_INTERVAL = 2
-# Pressures up to which the exact divergence is solved for; its factorisation costs 0.2 s at 800 of them, 3 s at 3600.
-LARGEST_EXACT = 4000
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,29 +50,22 @@ class StepRecord:
     iterations: int
 
 
-def _relaxing_density(physics: Physics) -> float | None:
-    """Density, if no momentum is kept and every operator but the mass acts on the surface only; else None."""
-    on_surface = all(isinstance(part, Mass | SurfaceTension) for part in physics.operators)
-    densities = [part.density for part in physics.operators if isinstance(part, Mass)]
-    return densities[0] if on_surface and not physics.momenta else None
-
-
 class LiquidFlow:
     """A liquid body that flows under its physics."""
 
-    def __init__(self, body: Body, physics: Physics, time_step: TimeStep, basis: str) -> None:
-        """Set up the neighbour list of the basis and remember the volume to keep.
+    def __init__(self, body: Body, physics: Physics, time_step: TimeStep, solver: StepSolver) -> None:
+        """Set up the neighbour list of the solver and remember the volume to keep.
 
         Args:
             body: the liquid body; changed in place.
             physics: what acts on it.
             time_step: the step size control.
-            basis: basis of the moving least squares, "linear" or "quadratic".
+            solver: of the motion in a step.
         """
         spacing = body.cloud.spacing
-        self.body, self.physics, self.time_step, self.basis = body, physics, time_step, basis
+        self.body, self.physics, self.time_step, self.solver = body, physics, time_step, solver
         self.volume = body.volume()[0]
-        self.neighbours = NeighbourList(SUPPORT[basis] * spacing, SKIN * spacing)
+        self.neighbours = NeighbourList(solver.support * spacing, SKIN * spacing)
         self.time, self.steps = 0.0, 0
 
     def step(self) -> StepRecord:
@@ -95,44 +79,28 @@ class LiquidFlow:
         for event in self.physics.events:
             event.update(body)
         self.neighbours.update(body.points)
-        iterations, twists = self._accelerate()
+        motion = self._accelerate()
         before = body.points[: body.cloud.surface_count].copy()
-        body.move(self.time_step.size, twists)
+        body.move(self.time_step.size, motion.twists)
         flips = self._keep_quality()
         self._correct_volume()
         self.steps += 1
         self.time += self.time_step.size
-        record = self._record(before, flips, iterations)
+        record = self._record(before, flips, motion.iterations)
         self.time_step.grow()
         return record
 
-    def _accelerate(self) -> tuple[int, dict[int, Floats]]:
-        """Solve for velocity and pressure, again with a smaller step where a particle would move too far.
-
-        Returns:
-            Iterations of the last solve, and the twists of the plates that move.
-        """
-        body, first_below = self.body, self.body.cloud.surface_count
-        space = particle_discretisation(body, self.neighbours, self.basis)
-        equations = StepEquations(body, self.physics, space)
+    def _accelerate(self) -> Motion:
+        """Solve for velocity and pressure, again with a smaller step where a particle would move too far."""
+        body = self.body
+        prepared = self.solver.prepare(body, self.physics, self.neighbours)
         while True:
-            solution = self._solve(equations.problem(self.time_step.size, self.volume))
-            velocity, twists = equations.expand(solution.velocity, self.time_step.size)
-            if self.time_step.accepts(float(np.sqrt((velocity**2).sum(axis=1).max()))):
+            motion = prepared.solve(self.time_step.size, self.volume)
+            if self.time_step.accepts(float(np.sqrt((motion.velocity**2).sum(axis=1).max()))):
                 break
-        body.velocity = velocity
-        body.surface_pressure = float(solution.pressure[-1])
-        body.pressure[:] = body.surface_pressure
-        body.pressure[first_below:] += solution.pressure[:-1]
-        return solution.iterations, twists
-
-    def _solve(self, problem: SaddlePoint) -> Solution:
-        """Solve exactly where that is cheap or particles carry or share momentum, else by the compact Laplacian."""
-        density = _relaxing_density(self.physics)
-        if density is None or len(problem.rate) <= LARGEST_EXACT:
-            return solve(problem)
-        laplacian = pressure_laplacian(self.body, self.neighbours)
-        return project(problem, self.time_step.size / density * laplacian)
+        body.velocity, body.pressure = motion.velocity, motion.pressure
+        body.surface_pressure = motion.surface_pressure
+        return motion
 
     def _keep_quality(self) -> int:
         """Flip and smooth the surface, shift the interior; return the number of flips."""

@@ -158,9 +158,7 @@ def conjugate_gradients(operator: PETSc.Mat, preconditioner: PETSc.Mat) -> PETSc
     return solver
 
 
-def check_residuals(
-    problem: SaddlePoint, solution: Solution, reason: int, rates: tuple[float, Floats | float]
-) -> None:
+def check_residuals(problem: SaddlePoint, solution: Solution, reason: int, rates: tuple[float, Floats | float]) -> None:
     """Compare the true residuals, not the solver's word, with the limit.
 
     Args:

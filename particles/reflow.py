@@ -8,6 +8,7 @@ from particles.body import Body
 from particles.checkpoint import Checkpoint
 from particles.cloud import Cloud, equal_area_radius, joint_cloud
 from particles.contact_line import ContactLine
+from particles.coupled_step import CoupledStep
 from particles.effects import decide_effects
 from particles.flow import LiquidFlow
 from particles.force_gravity import Gravity
@@ -78,7 +79,8 @@ def start_flow(cloud: Cloud, solder: Solder, effects: dict[str, bool], lines: tu
     limit = capillary_limit(solder.density, cloud.spacing, solder.surface_tension)
     largest = solder.numerics.time_step_limit * limit
     physics = build_physics(solder, effects, lines)
-    return LiquidFlow(Body.at_rest(cloud), physics, TimeStep(largest, cloud.spacing, largest), solder.numerics.basis)
+    solver = CoupledStep(solder.numerics.basis)
+    return LiquidFlow(Body.at_rest(cloud), physics, TimeStep(largest, cloud.spacing, largest), solver)
 
 
 def stop_rule(cloud: Cloud, solder: Solder, effects: dict[str, bool]) -> StopRule:

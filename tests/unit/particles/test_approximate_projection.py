@@ -77,7 +77,7 @@ def test_the_shape_at_rest_is_that_of_the_exact_divergence(degrees, monkeypatch)
         volume=1e-9, pad_contact_angle=np.radians(degrees), numerics=numerics, effects=SolderEffects(gravity="off")
     )
     for largest in (0, 2000):
-        monkeypatch.setattr("particles.flow.LARGEST_EXACT", largest)
+        monkeypatch.setattr("particles.coupled_step.LARGEST_EXACT", largest)
         _, run = solve_drop(solder, 7)
         widths.append(run.profiles[-1].max_width)
         assert max(record.iterations for record in run.records) <= 15

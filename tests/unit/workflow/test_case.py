@@ -95,9 +95,7 @@ def test_absent_file(tmp_path):
 
 
 def test_overrides_are_toml_or_bare_text():
-    case = read_case(
-        SMALL_CASE, ["shock.peak_acceleration=1000 G", 'shock.pulse_duration="0.4 ms"', "package.rows=2"]
-    )
+    case = read_case(SMALL_CASE, ["shock.peak_acceleration=1000 G", 'shock.pulse_duration="0.4 ms"', "package.rows=2"])
     assert case.shock.peak_acceleration == pytest.approx(9806.65)
     assert case.shock.pulse_duration == pytest.approx(4e-4)
     assert case.package.rows == 2

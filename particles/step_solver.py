@@ -1,0 +1,54 @@
+"""What solves for the motion in a time step: a member of this family for each way to treat pressure and inertia."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from particles.body import Body
+from particles.neighbours import NeighbourList
+from particles.physics import Physics
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """What happens in a time step.
+
+    Attributes:
+        velocity: `(n, 3)` of the particles [m/s].
+        pressure: `(n,)` above the ambient pressure [Pa].
+        surface_pressure: pressure that carries the volume constraint [Pa].
+        twists: `(6,)` of each plate that moves, by its index [m/s, rad/s].
+        iterations: of the pressure solve.
+    """
+
+    velocity: Floats
+    pressure: Floats
+    surface_pressure: float
+    twists: dict[int, Floats]
+    iterations: int
+
+
+class PreparedStep(Protocol):
+    """A step from the body's current positions, for any size."""
+
+    def solve(self, time_step: float, volume: float) -> Motion:
+        """Return the motion in a time step [s] that ends at a volume [m^3].
+
+        Raises:
+            SolveFailed: the linear solve failed.
+        """
+
+
+class StepSolver(Protocol):
+    """How a step is solved."""
+
+    @property
+    def support(self) -> float:
+        """Radius of the neighbour list that it needs, in spacings."""
+
+    def prepare(self, body: Body, physics: Physics, neighbours: NeighbourList) -> PreparedStep:
+        """Build what does not depend on the size of the step."""
