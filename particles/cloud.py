@@ -1,6 +1,7 @@
 """Body-fitted initial clouds: particles of which the first ones are the vertices of a triangulated free surface."""
 
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,7 @@ from particles.surface_measure import enclosed_volume
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int32]
+Lengths = TypeVar("Lengths", float, Floats)
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,8 +39,8 @@ class Cloud:
     spacing: float
 
 
-def equal_area_radius(radius: float, corners: int) -> float:
-    """Radius of the corners of a regular polygon that has the area of the disc [m]."""
+def equal_area_radius(radius: Lengths, corners: Lengths) -> Lengths:
+    """Radius of the corners of a regular polygon that has the area of the disc [m]; of several, given arrays."""
     return radius * np.sqrt(2.0 * np.pi / (corners * np.sin(2.0 * np.pi / corners)))
 
 

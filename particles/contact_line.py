@@ -1,11 +1,16 @@
-"""Contact lines: each vertex is pinned at the edge of its wetted disc, or free on the pad, or free on the mask."""
+"""Contact lines: each vertex is pinned at the edge of a pad, or free on a pad, or free on the mask between pads."""
+
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from particles.body import Body
+from particles.cloud import equal_area_radius
+from particles.plate import Pad
 
 Floats = NDArray[np.float64]
+Indices = NDArray[np.int32]
 
 PINNED, ON_PAD, ON_MASK = 0, 1, 2
 RELEASE_MARGIN = 0.02
@@ -13,58 +18,83 @@ CATCH_DISTANCE = 0.05
 
 
 class ContactLine:
-    """The contact line on one wall.
+    """One contact line on a wall, which is solder mask with one pad or several.
 
-    A line at the edge of the pad stays there while pad angle < contact angle < mask angle (Gibbs' condition);
-    a vertex is released when the pad's force pulls it inward or the mask's force pulls it outward, and caught
-    again when it returns to the edge.
+    A line at the edge of a pad stays there while pad angle < contact angle < mask angle (Gibbs' condition); a vertex
+    is released when the pad's force pulls it inward or the mask's force pulls it outward, and caught again when it
+    returns to the edge. A line that comes to a pad from outside steps onto it.
+
+    Attributes:
+        wall: index of the contact line among the body's, and of its plate.
+        pads: the pads on the wall.
+        edges: `(m,)` radii of the vertices on the edge of each pad [m].
+        pad: `(k,)` the pad whose edge is nearest to each vertex.
+        state: `(k,)` PINNED, ON_PAD or ON_MASK.
     """
 
-    def __init__(self, wall: int, edge_radius: float, pad_angle: float, mask_angle: float, radii: Floats) -> None:
-        """Let each vertex start where it is: at the edge, inside or outside.
+    def __init__(self, wall: int, pads: Sequence[Pad], mask_angle: float, local: Floats, corners: Floats) -> None:
+        """Let each vertex start where it is: at an edge, inside or outside.
 
         Args:
-            wall: index of the wall and of the ring.
-            edge_radius: radius of the vertices on the edge of the wetted disc [m]; infinite on a uniform wall.
-            pad_angle: contact angle inside the edge [rad].
-            mask_angle: contact angle outside it [rad].
-            radii: `(k,)` distances of the vertices from the centre of the pad [m].
+            wall: index of the contact line.
+            pads: the pads on the wall, at least one.
+            mask_angle: contact angle outside them [rad].
+            local: `(k, 2)` or `(k, 3)` vertices in the frame of the plate [m].
+            corners: `(m,)` vertices that a line along the whole edge of each pad has: their polygon has the pad's area.
         """
-        self.wall = wall
-        self.edge_radius = edge_radius
-        self._cosine = np.array([0.0, np.cos(pad_angle), np.cos(mask_angle)])
-        self.state = np.where(radii < edge_radius, ON_PAD, ON_MASK).astype(np.int8)
-        self.state[np.isclose(radii, edge_radius, rtol=1e-9)] = PINNED
+        self.wall, self.pads = wall, tuple(pads)
+        self._centres = np.array([pad.centre for pad in pads])
+        radii = np.array([pad.radius for pad in pads])
+        self.edges = equal_area_radius(radii, corners)
+        self._square = np.where(np.isfinite(radii), radii, 0.0) ** 2
+        self._pad_cosine, self._mask_cosine = np.cos([pad.angle for pad in pads]), float(np.cos(mask_angle))
+        self.pad = self._nearest(local)
+        distance = self._offset(local)[1]
+        edge = self.edges[self.pad]
+        self.state = np.where(distance < edge, ON_PAD, ON_MASK).astype(np.int8)
+        self.state[np.isclose(distance, edge, rtol=1e-9)] = PINNED
+
+    @property
+    def has_edge(self) -> bool:
+        """Whether there is a mask to leave a pad for; a uniform wall has none."""
+        return bool(np.isfinite(self.edges).all())
+
+    def held_pads(self) -> frozenset[int]:
+        """The pads that the line is on or at the edge of."""
+        return frozenset(self.pad[self.state != ON_MASK].tolist())
 
     def cosine(self) -> Floats:
-        """Cosine of the contact angle that acts on each vertex `(k,)`; zero where the edge holds it."""
-        return self._cosine[self.state]
+        """Cosine of the contact angle that acts on each vertex `(k,)`; zero where an edge holds it."""
+        free = np.where(self.state == ON_PAD, self._pad_cosine[self.pad], self._mask_cosine)
+        return np.where(self.state == PINNED, 0.0, free)
 
     def cosine_area(self, body: Body) -> float:
-        """Integral of cos(theta) over the area between the edge and the line [m^2], negative inside the edge.
+        """Integral of cos(theta) over the wetted area [m^2], zero for a line along the edges of the pads it surrounds.
 
-        Continuous where a vertex leaves the edge, since the area next to a pinned vertex belongs to the free one. On
+        Continuous where a vertex leaves an edge, since the area next to a pinned vertex belongs to the free one. On
         a uniform wall it is the whole wetted area.
         """
         local = body.plates[self.wall].local(body.points[body.cloud.rings[self.wall]])[:, :2]
-        area = _sectors(local)
-        if np.isfinite(self.edge_radius):
-            area -= _sectors(local * (self.edge_radius / np.linalg.norm(local, axis=1))[:, None])
+        turns = np.array([_turns(local - centre).sum() for centre in self._centres])
+        total = self._mask_cosine * (_sectors(local).sum() - 0.5 * self._square @ turns)
+        own = local - self._centres[self.pad]
+        beyond = _sectors(own) - 0.5 * self._square[self.pad] * _turns(own)
         cosine, free = self.cosine(), (self.state != PINNED).astype(float)
         mean = (cosine + np.roll(cosine, -1)) / np.maximum(1.0, free + np.roll(free, -1))
-        return float((mean * area).sum())
+        same = self.pad == np.roll(self.pad, -1)
+        return float(total + ((mean - self._mask_cosine) * beyond)[same].sum())
 
-    def pinned(self, body: Body) -> NDArray[np.int32]:
+    def pinned(self, body: Body) -> Indices:
         """The pinned vertices."""
         return body.cloud.rings[self.wall][self.state == PINNED]
 
     def outward(self, body: Body) -> tuple[Floats, Floats]:
-        """Direction away from the pad's centre `(k, 3)` and length of line that each vertex stands for `(k,)` [m]."""
+        """Direction across the line out of the liquid `(k, 3)` and length of line of each vertex `(k,)` [m]."""
         points, plate = body.points[body.cloud.rings[self.wall]], body.plates[self.wall]
-        local = plate.local(points) * np.array([1.0, 1.0, 0.0])
-        radial = local / np.linalg.norm(local, axis=1)[:, None] @ plate.frame
-        step = np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1)
-        return radial, 0.5 * (step + np.roll(step, 1))
+        before, after = np.roll(points, 1, axis=0), np.roll(points, -1, axis=0)
+        across = np.cross(after - before, plate.normal)
+        step = np.linalg.norm(after - points, axis=1)
+        return across / np.linalg.norm(across, axis=1)[:, None], 0.5 * (step + np.roll(step, 1))
 
     def contact_cosine(self, body: Body, load: Floats, coefficient: float) -> Floats:
         """Cosine of the contact angle at each vertex `(k,)` from the balance of forces on it.
@@ -78,32 +108,53 @@ class ContactLine:
             load: `(n, 3)` all forces but the wall's, with the pressure [N].
             coefficient: surface tension [N/m].
         """
-        radial, length = self.outward(body)
-        cosine = -(load[body.cloud.rings[self.wall]] * radial).sum(axis=1) / (coefficient * length)
+        outward, length = self.outward(body)
+        cosine = -(load[body.cloud.rings[self.wall]] * outward).sum(axis=1) / (coefficient * length)
         return 0.5 * cosine + 0.25 * (np.roll(cosine, 1) + np.roll(cosine, -1))
 
     def update(self, body: Body, load: Floats, coefficient: float) -> None:
-        """Release the vertices that the edge no longer holds, catch those that returned to it (moves these).
+        """Release the vertices that their edge no longer holds, catch those that returned to one (moves these).
 
         Args: as `contact_cosine`.
         """
         ring, plate = body.cloud.rings[self.wall], body.plates[self.wall]
         cosine = self.contact_cosine(body, load, coefficient)
         local = plate.local(body.points[ring])
-        radius = np.linalg.norm(local[:, :2], axis=1)
-        near = np.abs(radius - self.edge_radius) < CATCH_DISTANCE * body.cloud.spacing
-        holds = near & (cosine < self._cosine[ON_PAD]) & (cosine > self._cosine[ON_MASK])
-        returned_outward = (self.state == ON_PAD) & (holds | (radius >= self.edge_radius))
-        returned_inward = (self.state == ON_MASK) & (holds | (radius <= self.edge_radius))
-        held, caught = self.state == PINNED, returned_outward | returned_inward
-        self.state[held & (cosine > self._cosine[ON_PAD] + RELEASE_MARGIN)] = ON_PAD
-        self.state[held & (cosine < self._cosine[ON_MASK] - RELEASE_MARGIN)] = ON_MASK
+        self.pad = np.where(self.state == ON_MASK, self._nearest(local), self.pad)
+        offset, radius = self._offset(local)
+        edge, pad_cosine = self.edges[self.pad], self._pad_cosine[self.pad]
+        near = np.abs(radius - edge) < CATCH_DISTANCE * body.cloud.spacing
+        holds = near & (cosine < pad_cosine) & (cosine > self._mask_cosine)
+        # Behind the line is the pad that the liquid covers; one before it is stepped onto, not caught at.
+        behind = (offset * (self.outward(body)[0] @ plate.frame.T)[:, :2]).sum(axis=1) > 0.0
+        on_pad, on_mask, held = (self.state == which for which in (ON_PAD, ON_MASK, PINNED))
+        caught = behind & ((on_pad & (holds | (radius >= edge))) | (on_mask & (holds | (radius <= edge))))
+        self.state[on_mask & ~behind & (radius < edge)] = ON_PAD
+        self.state[on_pad & ~behind & (radius > edge)] = ON_MASK
+        self.state[held & (cosine > pad_cosine + RELEASE_MARGIN)] = ON_PAD
+        self.state[held & (cosine < self._mask_cosine - RELEASE_MARGIN)] = ON_MASK
         self.state[caught] = PINNED
-        local[caught, :2] *= (self.edge_radius / radius[caught])[:, None]
+        local[caught, :2] += (edge[caught] / radius[caught] - 1.0)[:, None] * offset[caught]
         body.points[ring[caught]] = plate.place(local[caught])
+
+    def _nearest(self, local: Floats) -> Indices:
+        """The pad whose edge is nearest to each vertex, or that it is deepest inside of, `(k,)`."""
+        distance = np.linalg.norm(local[:, None, :2] - self._centres, axis=2)
+        return (distance - self.edges).argmin(axis=1).astype(np.int32)
+
+    def _offset(self, local: Floats) -> tuple[Floats, Floats]:
+        """Offset of each vertex from the centre of its pad `(k, 2)`, and its length `(k,)` [m]."""
+        offset = local[:, :2] - self._centres[self.pad]
+        return offset, np.linalg.norm(offset, axis=1)
 
 
 def _sectors(local: Floats) -> Floats:
-    """Areas of the triangles between the centre and each segment of a closed line, `(k,)` [m^2]; `local (k, 2)`."""
+    """Areas of the triangles between the origin and each segment of a closed line, `(k,)` [m^2]; `local (k, 2)`."""
     x, y = local.T
     return 0.5 * (x * np.roll(y, -1) - y * np.roll(x, -1))
+
+
+def _turns(local: Floats) -> Floats:
+    """Angles about the origin under which each segment of a closed line is seen, `(k,)` [rad]; `local (k, 2)`."""
+    after = np.roll(local, -1, axis=0)
+    return np.arctan2(2.0 * _sectors(local), (local * after).sum(axis=1))

@@ -4,11 +4,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from particles.body import Body
-from particles.contact_line import PINNED, RELEASE_MARGIN, ContactLine
+from particles.contact_line import ON_MASK, ON_PAD, PINNED, RELEASE_MARGIN, ContactLine
+from particles.plate import Pad
 
 Floats = NDArray[np.float64]
 
-RECEDING, ADVANCING = 1, 2
+RECEDING, ADVANCING = ON_PAD, ON_MASK
 
 
 class HystereticLine(ContactLine):
@@ -18,16 +19,18 @@ class HystereticLine(ContactLine):
     angle that it has passed, and stands again as soon as the liquid carries it the other way.
     """
 
-    def __init__(self, wall: int, receding_angle: float, advancing_angle: float, radii: Floats) -> None:
+    def __init__(self, wall: int, receding_angle: float, advancing_angle: float, local: Floats) -> None:
         """Let each vertex stand where it is.
 
         Args:
             wall: index of the wall and of the ring.
             receding_angle: largest contact angle at which the line recedes [rad].
             advancing_angle: smallest contact angle at which the line advances [rad].
-            radii: `(k,)` distances of the vertices from the centre of the plate [m].
+            local: `(k, 2)` or `(k, 3)` vertices in the frame of the plate [m].
         """
-        super().__init__(wall, np.inf, receding_angle, advancing_angle, radii)
+        super().__init__(
+            wall, (Pad((0.0, 0.0), np.inf, receding_angle),), advancing_angle, local, np.array([len(local)])
+        )
         self.state[:] = PINNED
 
     def update(self, body: Body, load: Floats, coefficient: float) -> None:
@@ -35,10 +38,10 @@ class HystereticLine(ContactLine):
 
         Args: as `ContactLine.contact_cosine`.
         """
-        radial, _ = self.outward(body)
-        speed = (body.velocity[body.cloud.rings[self.wall]] * radial).sum(axis=1)
+        outward, _ = self.outward(body)
+        speed = (body.velocity[body.cloud.rings[self.wall]] * outward).sum(axis=1)
         turned = ((self.state == ADVANCING) & (speed < 0.0)) | ((self.state == RECEDING) & (speed > 0.0))
         self.state[turned] = PINNED
         cosine, standing = self.contact_cosine(body, load, coefficient), self.state == PINNED
-        self.state[standing & (cosine > self._cosine[RECEDING] + RELEASE_MARGIN)] = RECEDING
-        self.state[standing & (cosine < self._cosine[ADVANCING] - RELEASE_MARGIN)] = ADVANCING
+        self.state[standing & (cosine > self._pad_cosine[0] + RELEASE_MARGIN)] = RECEDING
+        self.state[standing & (cosine < self._mask_cosine - RELEASE_MARGIN)] = ADVANCING

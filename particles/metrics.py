@@ -77,7 +77,7 @@ def verdict(lines: Sequence[ContactLine], ruptured: bool) -> str:
     """Judge a joint or drop: "open", "overflow", "dewetted" or "ok"; a uniform wall has no edge to leave."""
     if ruptured:
         return "open"
-    with_edge = [line for line in lines if np.isfinite(line.edge_radius)]
+    with_edge = [line for line in lines if line.has_edge]
     if any((line.state == ON_MASK).any() for line in with_edge):
         return "overflow"
     return "dewetted" if any((line.state == ON_PAD).any() for line in with_edge) else "ok"

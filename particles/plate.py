@@ -12,19 +12,36 @@ from particles.geometry import JointGeometry
 Floats = NDArray[np.float64]
 
 
+@dataclass(frozen=True, slots=True)
+class Pad:
+    """A round pad in the solder mask of a plate.
+
+    Attributes:
+        centre: x and y in the frame of the plate [m].
+        radius: of its edge [m]; infinite where it covers the whole plate.
+        angle: contact angle on it [rad].
+    """
+
+    centre: tuple[float, float]
+    radius: float
+    angle: float
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Plate:
-    """A rigid plate.
+    """A rigid plate: solder mask with pads.
 
     Attributes:
         origin: `(3,)` centre of the pad [m].
         frame: `(3, 3)` orthonormal rows: two tangents and the normal, which is +z where the plate is horizontal.
         side: +1 if the normal points out of the liquid, as on the package, -1 if into it, as on the board.
+        pads: the pads on it, where a scene has several; that of a single joint or drop is at the origin.
     """
 
     origin: Floats
     frame: Floats
     side: float = -1.0
+    pads: tuple[Pad, ...] = ()
 
     @classmethod
     def horizontal(cls, height: float, centre: tuple[float, float] = (0.0, 0.0), side: float = -1.0) -> "Plate":
@@ -56,7 +73,7 @@ class Plate:
     def moved(self, motion: Floats) -> "Plate":
         """This plate displaced by `motion[:3]` [m] and turned about its origin by the rotation vector `motion[3:]`."""
         turn = Rotation.from_rotvec(motion[3:]).as_matrix()
-        return Plate(self.origin + motion[:3], self.frame @ turn.T, self.side)
+        return replace(self, origin=self.origin + motion[:3], frame=self.frame @ turn.T)
 
     def motion_to(self, other: "Plate") -> Floats:
         """Displacement and rotation vector `(6,)` with which `moved` leads to another plate."""

@@ -6,7 +6,7 @@ import numpy as np
 
 from particles.body import Body
 from particles.checkpoint import Checkpoint
-from particles.cloud import Cloud, equal_area_radius, joint_cloud
+from particles.cloud import Cloud, joint_cloud
 from particles.contact_line import ContactLine
 from particles.coupled_step import CoupledStep
 from particles.effects import decide_effects
@@ -19,6 +19,7 @@ from particles.mass import Inertia, Mass
 from particles.metrics import Metrics, joint_metrics, particle_pressure, verdict
 from particles.parameters import Solder
 from particles.physics import Event, Force, Momentum, Operator, Physics
+from particles.plate import Pad
 from particles.rest import Run, StopRule, run_to_rest
 from particles.shape import JointShape, Snapshot
 from particles.time_step import TimeStep, capillary_limit
@@ -67,11 +68,10 @@ def start_joint(geometry: JointGeometry, solder: Solder) -> tuple[LiquidFlow, St
 
 
 def contact_line(cloud: Cloud, wall: int, radius: float, solder: Solder) -> ContactLine:
-    """Set up the contact line on one wall, whose edge is the polygon of the wetted disc's area [m]."""
-    ring = cloud.rings[wall]
-    edge = equal_area_radius(radius, len(ring))
-    distance = np.hypot(*cloud.plates[wall].local(cloud.points[ring])[:, :2].T)
-    return ContactLine(wall, edge, solder.pad_contact_angle, solder.mask_contact_angle, distance)
+    """Set up the contact line around one pad, at the plate's origin, with its radius [m]."""
+    ring, pad = cloud.rings[wall], Pad((0.0, 0.0), radius, solder.pad_contact_angle)
+    local = cloud.plates[wall].local(cloud.points[ring])
+    return ContactLine(wall, (pad,), solder.mask_contact_angle, local, np.array([len(ring)]))
 
 
 def start_flow(cloud: Cloud, solder: Solder, effects: dict[str, bool], lines: tuple[ContactLine, ...]) -> LiquidFlow:

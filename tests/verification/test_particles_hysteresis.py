@@ -24,8 +24,9 @@ def base_radius(volume, angle):
 def flow():
     cloud = box_cloud(np.cbrt(VOLUME), 8)
     solder = Solder(volume=VOLUME, numerics=SolderNumerics(spacing=cloud.spacing, max_steps=2000))
-    radii = np.hypot(*cloud.points[cloud.rings[0], :2].T)
-    return start_flow(cloud, solder, EFFECTS, (HystereticLine(0, RECEDING, ADVANCING, radii),)), solder
+    return start_flow(
+        cloud, solder, EFFECTS, (HystereticLine(0, RECEDING, ADVANCING, cloud.points[cloud.rings[0]]),)
+    ), solder
 
 
 def to_volume(flow, solder, volume):

@@ -1,3 +1,5 @@
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -6,7 +8,8 @@ from particles.cloud import box_cloud, equal_area_radius, joint_cloud
 from particles.contact_line import ON_MASK, ON_PAD, PINNED, ContactLine
 from particles.force_wetting import Wetting
 from particles.geometry import JointGeometry
-from particles.surface_measure import ring_area
+from particles.plate import Pad, Plate
+from particles.surface_measure import ring_area, ring_area_gradient
 
 PAD, MASK = np.radians(5.0), np.radians(148.0)
 
@@ -18,8 +21,7 @@ def body():
 
 def line_on(body, state=PINNED, pad=PAD):
     ring = body.cloud.rings[0]
-    radii = np.linalg.norm(body.points[ring, :2], axis=1)
-    line = ContactLine(0, equal_area_radius(0.8, len(ring)), pad, MASK, radii)
+    line = ContactLine(0, (Pad((0, 0), 0.8, pad),), MASK, body.points[ring], np.array([len(ring)]))
     assert (line.state == PINNED).all()
     line.state[:] = state
     return line
@@ -55,7 +57,7 @@ def test_a_vertex_that_crosses_the_edge_is_caught_there(body, state, factor):
     line.update(body, load_of_angle(body, line, np.radians(90.0)), 1.0)
     assert line.state[4] == PINNED
     assert (np.delete(line.state, 4) == state).all()
-    assert np.linalg.norm(body.points[vertex]) == pytest.approx(line.edge_radius)
+    assert np.linalg.norm(body.points[vertex]) == pytest.approx(line.edges[0])
 
 
 def test_a_vertex_near_the_edge_is_caught_where_the_edge_would_hold_it(body):
@@ -77,7 +79,9 @@ def test_wetting_force_is_the_gradient_of_its_energy_and_vanishes_at_right_angle
     body = Body.at_rest(box_cloud(1.0, 5))
     ring = body.cloud.rings[0]
     for degrees, pull in ((60.0, 0.5), (90.0, 0.0)):
-        line = ContactLine(0, np.inf, np.radians(degrees), np.radians(degrees), np.ones(len(ring)))
+        line = ContactLine(
+            0, (Pad((0, 0), np.inf, np.radians(degrees)),), MASK, body.points[ring], np.array([len(ring)])
+        )
         wetting = Wetting(2.0, (line,), ())
         assert wetting.energy(body) == pytest.approx(-2.0 * pull * ring_area(body.points, ring))
         # Widening the square by a factor 1 + e gains 2 e gamma cos(theta) A.
@@ -100,3 +104,61 @@ def test_wetting_energy_is_continuous_at_the_edge_and_falls_along_the_force(body
         moved.points = body.points + step * field
         energies.append(wetting.energy(moved))
     assert float((force * field).sum()) == pytest.approx(-(energies[0] - energies[1]) / 2e-6, rel=1e-6)
+
+
+def stadium(half_length, radius, count):
+    """Points `(4 count, 3)` along a stadium about (-half_length, 0) and (half_length, 0), counter-clockwise."""
+    angle = np.linspace(-0.5, 0.5, count, endpoint=False) * np.pi
+    arc = np.column_stack((half_length + radius * np.cos(angle), radius * np.sin(angle)))
+    side = np.column_stack((np.linspace(half_length, -half_length, count, endpoint=False), np.full(count, radius)))
+    half = np.concatenate((arc, side))
+    return np.column_stack((np.concatenate((half, -half)), np.zeros(4 * count)))
+
+
+def line_over_pads(points, pads, corners=60):
+    """A line and as much of a body as a line looks at."""
+    ring = np.arange(len(points), dtype=np.int32)
+    body = SimpleNamespace(
+        points=points, plates=(Plate.horizontal(0.0),), cloud=SimpleNamespace(rings=(ring,), spacing=0.1)
+    )
+    return ContactLine(0, pads, MASK, points, np.full(len(pads), corners)), body
+
+
+PAIR = (Pad((-1.0, 0.0), 0.5, PAD), Pad((1.0, 0.0), 0.5, PAD))
+
+
+def test_a_line_around_two_pads_wets_the_mask_between_them():
+    """Pinned at the far side of both pads, on the mask between: the sides enclose 2 x 1, of which two half discs."""
+    line, body = line_over_pads(stadium(1.0, equal_area_radius(0.5, 60), 31), PAIR)
+    assert line.held_pads() == {0, 1}
+    assert (line.state == PINNED).sum() == 2 * 32  # the arcs and the first vertex of each side
+    assert line.cosine_area(body) == pytest.approx(np.cos(MASK) * (2.0 * 1.0 - 0.25 * np.pi), rel=1e-2)
+
+
+def test_the_energy_around_two_pads_falls_along_the_force():
+    points = stadium(1.0, 0.6, 30)
+    line, body = line_over_pads(points, PAIR)
+    assert (line.state == ON_MASK).all()
+    area = 4.0 * 0.6 + np.pi * 0.36 - 2.0 * np.pi * 0.25
+    assert line.cosine_area(body) == pytest.approx(np.cos(MASK) * area, rel=3e-3)
+    force = np.cos(MASK) * ring_area_gradient(points, body.cloud.rings[0])
+    field = 1e-6 * np.random.default_rng(1).normal(size=points.shape) * (1.0, 1.0, 0.0)
+    areas = []
+    for sign in (1.0, -1.0):
+        body.points = points + sign * field
+        areas.append(line.cosine_area(body))
+    assert float((force * field).sum()) == pytest.approx(0.5 * (areas[0] - areas[1]), rel=1e-5)
+
+
+def test_a_line_steps_onto_a_pad_that_it_comes_to_and_stops_at_its_far_edge():
+    """A round line about the left pad grows until it has crossed the right one."""
+    angle = 2.0 * np.pi * np.arange(200) / 200
+    circle = np.column_stack((np.cos(angle), np.sin(angle), np.zeros(200)))
+    line, body = line_over_pads(1.4 * circle - (1.0, 0, 0), PAIR)
+    reached = []
+    for radius in (1.4, 1.8, 2.2, 2.6):
+        body.points = np.where((line.state == PINNED)[:, None], body.points, radius * circle - (1.0, 0, 0))
+        line.update(body, load_of_angle(body, line, np.radians(120.0)), 1.0)
+        reached.append((line.held_pads(), int(line.state[0])))
+    assert reached == [(set(), ON_MASK), ({1}, ON_PAD), ({1}, ON_PAD), ({1}, PINNED)]
+    assert body.points[0] == pytest.approx((1.0 + line.edges[1], 0.0, 0.0))
