@@ -18,7 +18,7 @@ from typing import Any
 
 logger = logging.getLogger(__name__)
 
-INTERVAL = 5.0
+INTERVAL = 1.0
 LIBRARIES = ("numpy", "scipy", "numba", "petsc4py")
 
 
@@ -33,7 +33,7 @@ class Checkpoint:
         """Name the file and what it belongs to.
 
         Args:
-            path: file, in a folder that exists.
+            path: file; its folder is made when it is first written.
             inputs: all that the run depends on; plain data, whose `repr` tells all of it.
             interval: wall time between two checkpoints [s].
         """
@@ -64,6 +64,7 @@ class Checkpoint:
     def write(self, state: object) -> None:
         """Replace the file; a kill at any moment leaves the old one or the new one."""
         content = pickle.dumps(state, pickle.HIGHEST_PROTOCOL)
+        self.path.parent.mkdir(parents=True, exist_ok=True)
         partial = self.path.with_name(f"{self.path.name}.{os.getpid()}.partial")
         with partial.open("wb") as file:
             file.write(self._owner + hashlib.sha256(content).digest() + content)

@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 from particles.body import Body
+from particles.checkpoint import Checkpoint
 from particles.flow import LiquidFlow, StepRecord
 from particles.rebuild import collapsing, rebuild, touch
 from particles.rest import CALM_STEPS, NoRest, StopRule, is_calm
@@ -35,13 +36,19 @@ class Drop:
         return self.calm < CALM_STEPS and self.flow.time < rule.end_time
 
 
-def run_drops(flows: Sequence[LiquidFlow], rule: StopRule, start: Callable[[Body], LiquidFlow]) -> list[Drop]:
+def run_drops(
+    flows: Sequence[LiquidFlow],
+    rule: StopRule,
+    start: Callable[[Body], LiquidFlow],
+    checkpoint: Checkpoint | None = None,
+) -> list[Drop]:
     """Let drops flow until all are at rest; the one that is behind in time goes first.
 
     Args:
         flows: a flow a drop, advanced in place.
         rule: when a drop is at rest.
         start: makes the flow of a body that two drops became.
+        checkpoint: where the run continues from, to the last bit, and leaves its state.
 
     Returns:
         The drops that are left.
@@ -50,7 +57,8 @@ def run_drops(flows: Sequence[LiquidFlow], rule: StopRule, start: Callable[[Body
         NoRest: a drop took too many steps.
         CannotRebuild: drops touch, or one collapses, between walls.
     """
-    drops = _merge_touching([Drop(flow, (number,)) for number, flow in enumerate(flows)], start)
+    state = checkpoint.read() if checkpoint else None
+    drops = state or _merge_touching([Drop(flow, (number,)) for number, flow in enumerate(flows)], start)
     while moving := [drop for drop in drops if drop.moves(rule)]:
         drop = min(moving, key=lambda candidate: candidate.flow.time)
         if len(drop.records) >= rule.max_steps:
@@ -59,6 +67,8 @@ def run_drops(flows: Sequence[LiquidFlow], rule: StopRule, start: Callable[[Body
         if collapsing(drop.flow.body):
             drop.flow = _restarted(start, drop)
         drops = _merge_touching(drops, start)
+        if checkpoint is not None and checkpoint.is_due():
+            checkpoint.write(drops)
     return drops
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from particles.body import Body
+from particles.checkpoint import Checkpoint
 from particles.cloud_sphere import sphere_cloud
 from particles.damped_oscillation import fit_oscillation
 from particles.discretisation_tetrahedra import LinearTetrahedra
@@ -16,6 +17,7 @@ from particles.inertial_flow import InertialFlow
 from particles.parameters import Solder
 from particles.rayleigh import lamb_decay_rate, rayleigh_frequency
 from particles.reflow import build_physics
+from particles.shape import Snapshot
 from particles.surface_quality import vertex_normals
 from particles.tetrahedra import tetrahedralise
 
@@ -25,6 +27,7 @@ EFFECTS = {"surface_tension": True, "gravity": False, "wall_adhesion": False, "i
 COLUMNS = ("time", "amplitude", "energy", "kinetic_energy", "volume", "momentum")
 # Ways to the rest of the polyhedron, whose vertices are not quite on a sphere; the step in radians of the second mode.
 SETTLING_STEP, SETTLING_STEPS = 3.0, 10
+SNAPSHOTS_PER_PERIOD = 8
 SECOND_MOMENT = np.array([-1.0, -1.0, 2.0])
 
 
@@ -39,6 +42,7 @@ class FreeDrop:
         triangles: `(t, 3)` of the surface, outward oriented.
         history: arrays of equal length, the start included: time [s], amplitude of the second mode over the radius,
             energy (surface plus kinetic) [J], kinetic_energy [J], volume [m^3], momentum (its length) [kg m/s].
+        snapshots: the start, and each eighth of a Rayleigh period.
         metrics: name to value and unit.
     """
 
@@ -47,15 +51,39 @@ class FreeDrop:
     surface_points: Floats
     triangles: NDArray[np.int32]
     history: dict[str, Floats]
+    snapshots: list[Snapshot]
     metrics: dict[str, tuple[float, str]]
 
 
-def solve_free_drop(
+@dataclass(slots=True)
+class _Swing:
+    """State of a run: the flow, a row of the history for each step and the start, snapshots, wall time [s]."""
+
+    flow: InertialFlow
+    rows: list[tuple[float, ...]]
+    snapshots: list[Snapshot]
+    seconds: float = 0.0
+
+    @classmethod
+    def start(cls, flow: InertialFlow, solder: Solder) -> "_Swing":
+        """Start with the drop as it is."""
+        swing = cls(flow, [_sample(flow, solder, 0.0)], [])
+        swing.snap()
+        return swing
+
+    def snap(self) -> None:
+        """Keep the present shape."""
+        body = self.flow.body
+        self.snapshots.append(Snapshot(self.rows[-1][0], body.points.copy(), body.triangles.copy()))
+
+
+def solve_free_drop(  # noqa: PLR0913 - what swings and for how long, how it is run
     solder: Solder,
     amplitude: float = 0.0,
     periods: float = 2.0,
     steps_per_period: int = 100,
     progress: Callable[[float], None] | None = None,
+    checkpoint: Checkpoint | None = None,
 ) -> FreeDrop:
     """Let a drop without walls and gravity swing in its second mode, or rest.
 
@@ -69,28 +97,35 @@ def solve_free_drop(
         periods: duration in Rayleigh periods of the second mode.
         steps_per_period: time steps in one of them.
         progress: called with the fraction done.
+        checkpoint: where the run continues from, to the last bit, and leaves its state.
 
     Raises:
         ValueError: the spacing leaves fewer than two shells.
         SolveFailed: a linear solve failed.
     """
-    flow = _start(solder, amplitude)
+    swing = (checkpoint.read() if checkpoint else None) or _Swing.start(_start(solder, amplitude), solder)
+    flow, rows = swing.flow, swing.rows
     period = 2.0 * pi / rayleigh_frequency(2, _radius(solder), solder.density, solder.surface_tension)
     steps, time_step = ceil(periods * steps_per_period), period / steps_per_period
-    rows, start = [_sample(flow, solder, 0.0)], perf_counter()
-    for step in range(1, steps + 1):
+    for step in range(len(rows), steps + 1):
+        start = perf_counter()
         flow.step(time_step)
         rows.append(_sample(flow, solder, step * time_step))
+        swing.seconds += perf_counter() - start
+        if step % max(1, steps_per_period // SNAPSHOTS_PER_PERIOD) == 0:
+            swing.snap()
+        if checkpoint is not None and checkpoint.is_due():
+            checkpoint.write(swing)
         if progress is not None:
             progress(step / steps)
-    seconds = perf_counter() - start
     body, count = flow.body, flow.body.cloud.surface_count
     history = dict(zip(COLUMNS, np.array(rows).T, strict=True))
     metrics = _rest_metrics(flow, solder, history)
-    metrics["particle_steps_per_second"] = (steps * len(body.points) / seconds, "1/s")
+    metrics["particle_steps_per_second"] = (steps * len(body.points) / swing.seconds, "1/s")
     if amplitude != 0.0:
         metrics |= _swing_metrics(solder, history)
-    return FreeDrop(body.points, body.pressure, body.points[:count], body.triangles, history, metrics)
+    surface = body.points[:count]
+    return FreeDrop(body.points, body.pressure, surface, body.triangles, history, swing.snapshots, metrics)
 
 
 def _radius(solder: Solder) -> float:

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
+from particles.checkpoint import Checkpoint
 from particles.geometry import JointGeometry
 from particles.parameters import Solder
 from particles.plate import joint_plates, placed_geometry
@@ -19,6 +20,7 @@ def settle_joint(
     solder: Solder,
     motions: Sequence[PlateMotion],
     progress: Callable[[float], None] | None = None,
+    checkpoint: Checkpoint | None = None,
 ) -> JointShape:
     """Let a joint come to rest with plates that move: its metrics are those of where the plates end.
 
@@ -28,16 +30,22 @@ def settle_joint(
             `time_step_limit` of 100 is five times faster than one of 20.
         motions: of the plates that do not rest.
         progress: called with the fraction done.
+        checkpoint: where the run continues from, to the last bit, and leaves its state.
 
     Raises: as `solve_joint`.
     """
     flow, rule = start_joint(geometry, solder)
     flow.physics = replace(flow.physics, motions=motions)
-    run = run_to_rest(flow, rule, progress)
+    run = run_to_rest(flow, rule, progress, checkpoint=checkpoint)
     return joint_shape(placed_geometry(geometry, flow.body.plates), solder, flow, run)
 
 
-def follow_path(geometry: JointGeometry, solder: Solder, path: Sequence[JointGeometry]) -> Iterator[JointShape]:
+def follow_path(
+    geometry: JointGeometry,
+    solder: Solder,
+    path: Sequence[JointGeometry],
+    checkpoints: Callable[[int], Checkpoint] | None = None,
+) -> Iterator[JointShape]:
     """Move the package along a path and yield the joint at rest, at the start and in each place.
 
     The path ends early where the neck ruptures. Call it in the quasi-static mode: the speed between the places has no
@@ -47,15 +55,17 @@ def follow_path(geometry: JointGeometry, solder: Solder, path: Sequence[JointGeo
         geometry: where the joint reflows.
         solder: volume, fluid and numerics; `max_steps` holds for each place.
         path: places of the package (gap, offset and tilt) one after the other.
+        checkpoints: gives the checkpoint of each place by its number, that of the start is 0.
 
     Raises: as `solve_joint`.
     """
     flow, rule = start_joint(geometry, solder)
     speed = SPACINGS_IN_A_STEP * flow.body.cloud.spacing / flow.time_step.largest
-    for place in (geometry, *path):
+    for number, place in enumerate((geometry, *path)):
         travel = Travel(1, joint_plates(place)[1], speed, lever=place.radius_package)
         flow.physics = replace(flow.physics, motions=(travel,))
-        run = run_to_rest(flow, replace(rule, max_steps=flow.steps + rule.max_steps))
+        checkpoint = checkpoints(number) if checkpoints else None
+        run = run_to_rest(flow, replace(rule, max_steps=flow.steps + rule.max_steps), checkpoint=checkpoint)
         yield joint_shape(place, solder, flow, run)
         if run.ruptured:
             return

@@ -99,20 +99,25 @@ class BoardDropCase(Case):
         return self.shock.ranks.macro + self.shock.ranks.meso
 
 
-class DropCase(Case):
-    """A drop of solder on a wall or pad."""
-
-    kind = "drop"
-    pipeline = DROP
+class SceneCase(Case):
+    """Molten solder alone, without package and board; the table that names the kind holds its scene."""
 
     gravity: Switch = "auto"
-    drop: Drop
     solder: Fluid = Field(default_factory=Fluid)
 
     @property
     def molten(self) -> Solder:
         """The solder as the solver takes it."""
-        return self.solder.resolve(self.drop, self.gravity)
+        return self.solder.resolve(getattr(self, self.kind), self.gravity)
+
+
+class DropCase(SceneCase):
+    """A drop of solder on a wall or pad."""
+
+    kind = "drop"
+    pipeline = DROP
+
+    drop: Drop
 
     def problems(self) -> list[Problem]:
         """Find parameters that make no possible drop together."""
@@ -121,20 +126,13 @@ class DropCase(Case):
         return _of_particles(drop_problems(self.drop))
 
 
-class JointCase(Case):
+class JointCase(SceneCase):
     """A joint of solder between two pads."""
 
     kind = "joint"
     pipeline = JOINT
 
-    gravity: Switch = "auto"
     joint: Joint
-    solder: Fluid = Field(default_factory=Fluid)
-
-    @property
-    def molten(self) -> Solder:
-        """The solder as the solver takes it."""
-        return self.solder.resolve(self.joint, self.gravity)
 
     def problems(self) -> list[Problem]:
         """Find parameters that make no possible joint together."""

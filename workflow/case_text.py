@@ -73,7 +73,8 @@ def _add_table(blocks: list[str], key: str, parameters: BaseModel) -> None:
     if lines:
         header = [*_describe(parameters), f"[{key}]"] if key else []
         blocks.append("\n".join([*header, *lines, ""]))
-    for name, table in tables:
+    own = getattr(parameters, "kind", "")
+    for name, table in sorted(tables, key=lambda item: item[0] not in ("case", own)):
         _add_table(blocks, name, table)
 
 

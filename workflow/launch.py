@@ -1,6 +1,7 @@
 """Launching MPI programs: command line, lines of output, and a clean end whatever happens."""
 
 import os
+import shutil
 import signal
 import subprocess
 from collections.abc import Callable, Mapping, Sequence
@@ -9,6 +10,10 @@ from pathlib import Path
 
 GRACE = 5.0  # seconds that a program has to end by itself after SIGTERM
 LAST_LINES = 15
+
+# In front of a command: the system sends the signal when the process that starts it ends, however that happens.
+END_WITH_PARENT = ("setpriv", "--pdeathsig", "TERM")
+DIE_WITH_PARENT = ("setpriv", "--pdeathsig", "KILL")
 
 # What Open MPI leaves in the environment of a process that initialised MPI. An mpirun that inherits it takes itself for
 # a part of that job and fails (seen from notebooks and test runs that imported mpi4py).
@@ -50,14 +55,19 @@ def launch(command: Sequence[str], on_line: Callable[[str], None], log: Path) ->
     Raises:
         LaunchError: the program cannot be started or its exit code is not 0.
     """
+    program = command[0]
+    if shutil.which(program) is None:
+        raise LaunchError(f"{program} is not installed")
     environment = own_environment(os.environ) | {"OMP_NUM_THREADS": "1"}
     with log.open("w") as errors:
-        try:
-            process = subprocess.Popen(
-                command, stdout=subprocess.PIPE, stderr=errors, text=True, env=environment, start_new_session=True
-            )
-        except FileNotFoundError as error:
-            raise LaunchError(f"{command[0]} is not installed") from error
+        process = subprocess.Popen(
+            [*END_WITH_PARENT, *command],
+            stdout=subprocess.PIPE,
+            stderr=errors,
+            text=True,
+            env=environment,
+            start_new_session=True,
+        )
         try:
             for line in process.stdout or ():
                 on_line(line.rstrip("\n"))
@@ -67,7 +77,7 @@ def launch(command: Sequence[str], on_line: Callable[[str], None], log: Path) ->
             raise
     if code != 0:
         words = "\n".join(log.read_text(errors="replace").strip().splitlines()[-LAST_LINES:])
-        raise LaunchError(f"{command[0]} ended with exit code {code}: {words}")
+        raise LaunchError(f"{program} ended with exit code {code}: {words}")
 
 
 def own_environment(environment: Mapping[str, str]) -> dict[str, str]:

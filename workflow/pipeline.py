@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from workflow.inputs import read_record
-from workflow.launch import end_group
+from workflow.launch import DIE_WITH_PARENT, end_group
 from workflow.stage_table import Stage
 
 SNAKEFILE = Path(__file__).parent / "Snakefile"
@@ -44,20 +44,23 @@ def locked(run_folder: Path) -> Iterator[int]:
 def drive(run_folder: Path, until: Stage, cores: int, oversubscribe: bool, lock: int) -> bool:
     """Run every stale stage up to one; the inputs must have been written.
 
+    Should this process be killed, Snakemake dies with it; each stage, which ends with Snakemake, has time to clean up.
+
     Args:
         run_folder: folder of the run.
         until: the last stage.
         cores: number of cores that may be used.
         oversubscribe: whether MPI may have more ranks than cores.
-        lock: what ``locked`` yields; Snakemake keeps it should this process be killed.
+        lock: what ``locked`` yields; Snakemake holds it, too.
 
     Returns:
         Whether all went well; a stage that failed has said why.
     """
     run_folder = run_folder.resolve()
     command = [
-        sys.executable, "-m", "snakemake", "--snakefile", str(SNAKEFILE), "--directory", str(run_folder),
-        "--cores", str(cores), "--rerun-triggers", "mtime", "--rerun-incomplete", "--nolock", "--quiet", "all",
+        *DIE_WITH_PARENT, sys.executable, "-m", "snakemake", "--snakefile", str(SNAKEFILE),
+        "--directory", str(run_folder), "--cores", str(cores), "--rerun-triggers", "mtime", "--rerun-incomplete",
+        "--nolock", "--quiet", "all",
         "--config", f"run={run_folder}", f"oversubscribe={int(oversubscribe)}",
         "--", str(run_folder / until.record),
     ]  # fmt: skip

@@ -85,7 +85,7 @@ def solve_joints(
         solder: volume, fluid and process.
         cores: number of processes.
         progress: called with the share of the whole that is done, 0 to 1.
-        checkpoints: folder of the checkpoints; made if it is missing.
+        checkpoints: folder of the checkpoints.
 
     Returns:
         Name -> shape, in the given order, and the number of joints that continued.
@@ -93,7 +93,6 @@ def solve_joints(
     Raises:
         ReflowError: names the first joint that failed, and how.
     """
-    checkpoints.mkdir(parents=True, exist_ok=True)
     context = multiprocessing.get_context("spawn")
     reports = context.Queue()
     workers = min(cores, len(geometries))

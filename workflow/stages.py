@@ -102,7 +102,7 @@ def reflow_drop(run: Run[DropCase], folder: Path) -> Findings:
     from particles.sessile import drop_shape, solve_drop
 
     drop, solder = run.case.drop, run.case.molten
-    checkpoint = Checkpoint(_made(run.checkpoints("reflow")) / "drop", (drop, solder))
+    checkpoint = Checkpoint(run.checkpoints("reflow") / "drop", (drop, solder))
     with progress_bar(f"reflow of {drop.count**3} particles") as progress:
         flow, solved = solve_drop(solder, drop.count, drop.edge_radius, progress, checkpoint)
     shape = drop_shape(solder, drop.edge_radius, flow, solved)
@@ -121,18 +121,13 @@ def reflow_joint(run: Run[JointCase], folder: Path) -> Findings:
     from particles.reflow import solve_joint
 
     geometry, solder = run.case.joint.geometry, run.case.molten
-    checkpoint = Checkpoint(_made(run.checkpoints("reflow")) / "joint", (geometry, solder))
+    checkpoint = Checkpoint(run.checkpoints("reflow") / "joint", (geometry, solder))
     with progress_bar("reflow of a joint") as progress:
         shape = solve_joint(geometry, solder, progress, checkpoint=checkpoint)
     effects = decide_effects(geometry, solder)
     write_body(folder, shape, reference_meridian(geometry, solder, acting_weight(solder, effects)))
     found = findings.of_joint(shape.metrics, shape.verdict, effects)
     return replace(found, continued="the joint" if checkpoint.continued else "")
-
-
-def _made(folder: Path) -> Path:
-    folder.mkdir(exist_ok=True)
-    return folder
 
 
 def report(run: Run, folder: Path) -> Findings:

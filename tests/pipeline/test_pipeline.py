@@ -13,7 +13,7 @@ import psutil
 import pytest
 
 from particles.products import read_shapes
-from tests.support.workflow_command import SMALL_CASE, command_line, reflowshock
+from tests.support.workflow_command import SMALL_CASE, break_off, command_line, reflowshock, wait_until
 from workflow.stage_table import BOARD_DROP
 
 NAMES = BOARD_DROP.names
@@ -33,13 +33,6 @@ def planned(text: str) -> set[str]:
 def start(folder: Path, *settings: str) -> subprocess.Popen:
     line = command_line("run", folder, settings=settings)
     return subprocess.Popen(line, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
-
-
-def wait_until(condition, seconds: float = 60.0) -> None:
-    deadline = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < deadline, "waited too long"
-        time.sleep(0.05)
 
 
 def test_the_whole_path(first_run):
@@ -136,22 +129,10 @@ def test_a_stage_that_is_broken_off_leaves_nothing_and_is_redone(run_folder):
     assert after["reflow"] > before["reflow"]
 
 
-@pytest.mark.parametrize("end", [signal.SIGTERM, signal.SIGKILL])
-def test_a_reflow_that_is_broken_off_continues_to_the_same_bits(first_run, tmp_path, end):
+@pytest.mark.parametrize(("end", "whom"), [(signal.SIGTERM, "command"), (signal.SIGKILL, "stage")])
+def test_a_reflow_that_is_broken_off_continues_to_the_same_bits(first_run, tmp_path, end, whom):
     folder, checkpoints = tmp_path / "small", tmp_path / "small" / ".reflow.checkpoints"
-    process = start(folder)
-    wait_until(lambda: checkpoints.exists() and any(path.suffix == "" for path in checkpoints.iterdir()))
-    children = psutil.Process(process.pid).children(recursive=True)
-    if end == signal.SIGTERM:
-        process.send_signal(end)
-        assert b"the same command continues" in process.communicate(timeout=30)[1]
-    else:
-        for child in children:
-            if "stage" in child.cmdline():
-                child.kill()
-        process.communicate(timeout=60)
-    assert process.returncode == 1
-    assert psutil.wait_procs(children, timeout=15)[1] == []
+    break_off(command_line("run", folder), folder, end, whom)
     result = reflowshock("run", folder, "--until", "reflow")
     assert result.returncode == 0, result.stderr
     assert "continued from checkpoints" in result.stdout

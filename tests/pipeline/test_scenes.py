@@ -1,11 +1,19 @@
 """Drops and joints from case file to report, shortened."""
 
 import json
+import signal
 import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
+
+from particles.products import read_body
+from particles.reflow import solve_joint
+from particles.sessile import solve_drop
+from tests.support.workflow_command import break_off
+from workflow.case import DropCase, JointCase, read_case
 
 CASES = Path(__file__).resolve().parents[2] / "cases"
 COARSE_DROP, COARSE_JOINT = "drop.particles_per_edge=7", "joint.spacing=0.06 mm"
@@ -16,10 +24,14 @@ ALWAYS = {
 }  # fmt: skip
 
 
-def run(name: str, folder: Path, *settings: str) -> subprocess.CompletedProcess:
+def command(name: str, folder: Path, *settings: str) -> list[str]:
     line = [sys.executable, "-m", "workflow", "run", str(CASES / name / "case.toml"), "--out", str(folder)]
-    overrides = [item for setting in settings for item in ("--set", setting)]
-    return subprocess.run([*line, *overrides], capture_output=True, text=True, timeout=240, check=False)
+    return [*line, *(item for setting in settings for item in ("--set", setting))]
+
+
+def run(name: str, folder: Path, *settings: str) -> subprocess.CompletedProcess:
+    line = command(name, folder, *settings)
+    return subprocess.run(line, capture_output=True, text=True, timeout=240, check=False)
 
 
 @pytest.mark.parametrize(
@@ -49,6 +61,32 @@ def test_an_offset_joint_has_no_meridian(tmp_path):
     summary = json.loads((tmp_path / "summary.json").read_text())
     assert "max_width_error" not in summary["metrics"]
     assert "volume_drift" in summary["health"]
+
+
+def rest_of_drop(case: DropCase) -> np.ndarray:
+    return solve_drop(case.molten, case.drop.count)[0].body.points
+
+
+def rest_of_joint(case: JointCase) -> np.ndarray:
+    return solve_joint(case.joint.geometry, case.molten).points
+
+
+@pytest.mark.parametrize(
+    ("name", "settings", "at_rest", "end"),
+    [
+        ("sessile_drop", ("drop.particles_per_edge=8",), rest_of_drop, signal.SIGKILL),
+        ("solder_joint", (COARSE_JOINT, "solder.numerics.time_step_limit=3"), rest_of_joint, signal.SIGTERM),
+    ],
+)
+def test_a_run_that_is_broken_off_continues_to_the_same_bits(tmp_path, name, settings, at_rest, end):
+    """Also when the command itself is killed: what it has started ends with it."""
+    break_off(command(name, tmp_path, *settings), tmp_path, end, "command")
+    result = run(name, tmp_path, *settings)
+    assert result.returncode == 0, result.stderr
+    assert "continued from checkpoints" in " ".join(result.stdout.split())
+    assert not (tmp_path / ".reflow.checkpoints").exists()
+    expected = at_rest(read_case(CASES / name / "case.toml", settings))
+    assert np.array_equal(read_body(tmp_path / "reflow")[0].points, expected)
 
 
 def test_a_drop_that_finds_no_rest_says_so(tmp_path):

@@ -1,8 +1,13 @@
-"""The command line as a subprocess, and the shortened case that the pipeline's tests run."""
+"""The command line as a subprocess, run to its end or broken off, and the shortened case of the pipeline's tests."""
 
+import signal
 import subprocess
 import sys
+import time
+from collections.abc import Callable
 from pathlib import Path
+
+import psutil
 
 SMALL_CASE = Path(__file__).resolve().parents[1] / "pipeline" / "small.toml"
 
@@ -18,3 +23,28 @@ def reflowshock(
     """Run a command on the shortened case to its end."""
     line = command_line(command, folder, *arguments, settings=settings)
     return subprocess.run(line, capture_output=True, text=True, timeout=240, check=False)
+
+
+def wait_until(condition: Callable[[], bool], seconds: float = 60.0) -> None:
+    """Wait for a condition."""
+    deadline = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < deadline, "waited too long"
+        time.sleep(0.05)
+
+
+def break_off(line: list[str], folder: Path, end: signal.Signals, whom: str) -> None:
+    """Start a run and, as soon as its reflow has a checkpoint, send a signal to the "command" or to its "stage".
+
+    Nothing that it started may be left, and the command fails.
+    """
+    checkpoints = folder / ".reflow.checkpoints"
+    process = subprocess.Popen(line, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    wait_until(lambda: checkpoints.exists() and any(path.suffix == "" for path in checkpoints.iterdir()))
+    children = psutil.Process(process.pid).children(recursive=True)
+    for victim in [process] if whom == "command" else [child for child in children if "stage" in child.cmdline()]:
+        victim.send_signal(end)
+    errors = process.communicate(timeout=60)[1]
+    assert psutil.wait_procs(children, timeout=15)[1] == []
+    assert process.returncode == (-end if (end, whom) == (signal.SIGKILL, "command") else 1)
+    assert end == signal.SIGKILL or b"the same command continues" in errors
