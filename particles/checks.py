@@ -1,8 +1,8 @@
 """Parameters of the solder that are each allowed but make no joint together. Loads neither numba nor PETSc."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from math import degrees, pi, sqrt
+from math import degrees, pi
 
 from particles.geometry import JointGeometry
 from particles.parameters import Solder
@@ -11,7 +11,6 @@ from particles.young_laplace import NoMeridian, joint_meridian
 SPACINGS_IN_NECK = 2.0
 SPACINGS_IN_GAP = 3.0
 SPACINGS_IN_RADIUS = 2.0
-BISECTIONS = 8
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,8 +33,7 @@ class Problem:
 def problems(solder: Solder, geometries: Mapping[str, JointGeometry], pitch: float) -> list[Problem]:
     """Find what cannot work before anything runs.
 
-    Joints widen with their volume and thin with their gap: of joints with equal discs only those with the smallest and
-    the largest gap are examined.
+    Joints thin with their gap: of joints with equal discs only the smallest and the largest gap are examined.
 
     Args:
         solder: the solder.
@@ -53,7 +51,7 @@ def problems(solder: Solder, geometries: Mapping[str, JointGeometry], pitch: flo
         low, high = names[0], names[-1]
         found += _spacing_problems(solder, low, geometries[low])
         found += _too_much(solder, low, geometries[low], pitch)
-        found += _too_little(solder, high, geometries[high])
+        found += _too_thin(solder, high, geometries[high])
     return list({problem.key: problem for problem in found}.values())
 
 
@@ -76,55 +74,37 @@ def _spacing_problems(solder: Solder, name: str, geometry: JointGeometry) -> lis
 
 
 def _too_much(solder: Solder, name: str, geometry: JointGeometry, pitch: float) -> list[Problem]:
-    """The joint would touch its neighbour."""
-
-    def fits(volume: float) -> bool:
-        if 2.0 * sqrt(volume / (pi * geometry.gap)) >= pitch:
-            return False
-        width = _width_and_waist(solder, geometry, volume)
-        return width is None or width[0] < pitch
-
-    if fits(solder.volume):
+    """More solder than there is room between the plates; less may still touch the neighbour, which the flow decides."""
+    limit = pitch**2 * geometry.gap
+    if solder.volume < limit:
         return []
-    smallest = pi * geometry.gap * min(geometry.radius_board, geometry.radius_package) ** 2
-    limit = _bisect(fits, smallest, solder.volume)
-    message = f"joint {name} (gap {mm(geometry.gap)}) would touch its neighbour at the pitch of {mm(pitch)}"
-    return [Problem("solder.volume", mm3(solder.volume), f"<= {mm3(limit)}", message)]
+    message = f"cannot fit: joint {name} has a gap of {mm(geometry.gap)} at the pitch of {mm(pitch)}"
+    return [Problem("solder.volume", mm3(solder.volume), f"< {mm3(limit)}", message)]
 
 
-def _too_little(solder: Solder, name: str, geometry: JointGeometry) -> list[Problem]:
-    """The neck would rupture: no equilibrium between both pads, or one too thin for the particles."""
-
-    def fits(volume: float) -> bool:
-        width = _width_and_waist(solder, geometry, volume)
-        return width is not None and width[1] > SPACINGS_IN_NECK * solder.numerics.spacing
-
-    full = pi * geometry.gap * max(geometry.radius_board, geometry.radius_package) ** 2
-    if solder.volume >= full or fits(solder.volume):
+def _too_thin(solder: Solder, name: str, geometry: JointGeometry) -> list[Problem]:
+    """A neck too thin for the particles. Where no neck spans the gap at all, the flow says that the joint is open."""
+    spacing, full = (
+        solder.numerics.spacing,
+        pi * geometry.gap * max(geometry.radius_board, geometry.radius_package) ** 2,
+    )
+    waist = None if solder.volume >= full else _waist(solder, geometry)
+    if waist is None or waist > SPACINGS_IN_NECK * spacing:
         return []
-    limit = _bisect(fits, full, solder.volume)
-    message = f"joint {name} would rupture: too little solder to span its gap of {mm(geometry.gap)}"
-    return [Problem("solder.volume", mm3(solder.volume), f">= {mm3(limit)}", message)]
+    limit = waist / SPACINGS_IN_NECK
+    message = f"too coarse for the neck of joint {name}, which is {mm(waist)} wide in its gap of {mm(geometry.gap)}"
+    return [Problem("solder.numerics.spacing", mm(spacing), f"< {mm(limit)}", message)]
 
 
-def _width_and_waist(solder: Solder, geometry: JointGeometry, volume: float) -> tuple[float, float] | None:
-    """Largest and smallest diameter of the Young-Laplace joint [m]; none without equilibrium."""
+def _waist(solder: Solder, geometry: JointGeometry) -> float | None:
+    """Smallest diameter of the Young-Laplace joint [m]; none without equilibrium."""
     discs = (geometry.radius_board, geometry.radius_package, geometry.gap)
     limits = (solder.pad_contact_angle, solder.mask_contact_angle)
     weight = solder.density * solder.gravity
     try:
-        meridian = joint_meridian(volume, *discs, solder.surface_tension, weight, angle_limits=limits)
+        return joint_meridian(solder.volume, *discs, solder.surface_tension, weight, angle_limits=limits).waist
     except NoMeridian:
         return None
-    return meridian.max_width, meridian.waist
-
-
-def _bisect(fits: Callable[[float], bool], good: float, bad: float) -> float:
-    """A volume near the limit between one that fits and one that does not, on the side that fits [m^3]."""
-    for _ in range(BISECTIONS):
-        middle = 0.5 * (good + bad)
-        good, bad = (middle, bad) if fits(middle) else (good, middle)
-    return good
 
 
 def mm(length: float) -> str:

@@ -16,6 +16,10 @@ Indices = NDArray[np.int32]
 Lengths = TypeVar("Lengths", float, Floats)
 
 
+class TooLittleSolder(ValueError):
+    """No body of this volume reaches from one disc to the other."""
+
+
 @dataclass(frozen=True, slots=True)
 class Cloud:
     """Particles that fill a liquid body, its free surface and its contact lines.
@@ -56,7 +60,7 @@ def joint_cloud(geometry: JointGeometry, volume: float, spacing: float) -> Cloud
         spacing: particle spacing [m].
 
     Raises:
-        ValueError: the volume is too small for a double cone that does not rupture.
+        TooLittleSolder: the volume is too small for a double cone that does not rupture.
     """
     ring_count, layer_count = joint_counts(geometry, volume, spacing)
 
@@ -68,7 +72,7 @@ def joint_cloud(geometry: JointGeometry, volume: float, spacing: float) -> Cloud
 
     lowest = -0.95 * min(geometry.radius_board, geometry.radius_package)
     if excess(lowest) > 0.0:
-        raise ValueError(f"solder.volume = {volume:.4g} m^3 is too small for the gap {geometry.gap:.4g} m: it ruptures")
+        raise TooLittleSolder(f"solder.volume = {volume:.4g} m^3 spans no gap of {geometry.gap:.4g} m: it ruptures")
     highest = np.sqrt(3.0 * volume / (np.pi * geometry.gap)) * 2.0
     return place(brentq(excess, lowest, highest, rtol=1e-13))
 

@@ -20,6 +20,13 @@ from particles.young_laplace import Meridian, NoMeridian, joint_meridian, pad_me
 
 Floats = NDArray[np.float64]
 Metrics = dict[str, tuple[float, str]]
+JOINT_NAMES = {
+    "height": "drop_height",
+    "height_error": "drop_height_error",
+    "max_width_error": "width_error",
+    "contact_radius": "contact_radius_board",
+    "contact_angle": "contact_angle_board",
+}
 
 
 def joint_metrics(geometry: JointGeometry, solder: Solder, flow: LiquidFlow, run: Run) -> Metrics:
@@ -51,6 +58,13 @@ def drop_metrics(solder: Solder, pad_radius: float, flow: LiquidFlow, run: Run) 
         "contact_angle_error": (angle - float(np.degrees(reference.angle_board)), "deg"),
     }
     return _volume(solder, flow) | shape | _pressure(solder, flow, run, reference) | _cost_and_rest(solder, flow, run)
+
+
+def open_metrics(geometry: JointGeometry, solder: Solder, flow: LiquidFlow, run: Run) -> Metrics:
+    """Collect the numbers of a joint whose solder is a drop on the board: those of the drop, under a joint's names."""
+    drop = drop_metrics(solder, geometry.radius_board, flow, run)
+    own = {JOINT_NAMES.get(name, name): number for name, number in drop.items()}
+    return own | {"standoff": (geometry.gap, "m"), "axial_force": (0.0, "N")}
 
 
 def _weight(flow: LiquidFlow) -> float:

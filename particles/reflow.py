@@ -1,12 +1,13 @@
 """Reflow of one joint: from the wetted discs, the gap and the solder to the shape at rest."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
 from particles.body import Body
 from particles.checkpoint import Checkpoint
-from particles.cloud import Cloud, joint_cloud
+from particles.cloud import Cloud, TooLittleSolder, box_cloud, joint_cloud
 from particles.contact_line import ContactLine
 from particles.coupled_step import CoupledStep
 from particles.effects import decide_effects
@@ -16,7 +17,7 @@ from particles.force_surface_tension import SurfaceTension
 from particles.force_wetting import Wetting
 from particles.geometry import JointGeometry
 from particles.mass import Inertia, Mass
-from particles.metrics import Metrics, joint_metrics, particle_pressure, verdict
+from particles.metrics import Metrics, joint_metrics, open_metrics, particle_pressure, verdict
 from particles.parameters import Solder
 from particles.physics import Event, Force, Momentum, Operator, Physics
 from particles.plate import Pad
@@ -28,6 +29,7 @@ from particles.viscosity import Viscosity
 __all__ = ["JointGeometry", "JointShape", "solve_joint"]
 
 CALM_CAPILLARY_TIMES = 20.0
+FEWEST_PER_EDGE = 5
 
 
 def solve_joint(
@@ -39,7 +41,8 @@ def solve_joint(
 ) -> JointShape:
     """Let molten solder flow between two wetted discs until it is at rest.
 
-    The solder starts as a double cone of its volume on both discs and flows by its effects (`decide_effects`).
+    The solder starts as a double cone of its volume on both discs and flows by its effects (`decide_effects`). Too
+    little for such a cone is a drop on the board's disc; the joint is open.
 
     Args:
         geometry: gap and radii of the discs [m].
@@ -49,13 +52,35 @@ def solve_joint(
         checkpoint: where the run continues from, to the last bit, and leaves its state.
 
     Raises:
-        ValueError: the volume does not fit between the discs.
+        TooLittleSolder: no cone of the volume spans the gap, though a drop would reach the other disc.
         NoRest: no rest within `solder.numerics.max_steps`.
         SolveFailed: a linear solve failed.
     """
-    flow, rule = start_joint(geometry, solder)
+    try:
+        flow, rule = start_joint(geometry, solder)
+    except TooLittleSolder:
+        flow, rule = _start_on_board(geometry, solder)
     run = run_to_rest(flow, rule, progress, on_snapshot, checkpoint)
+    if len(flow.body.cloud.rings) == 1:
+        return _open_shape(geometry, solder, flow, run)
     return joint_shape(geometry, solder, flow, run)
+
+
+def _start_on_board(geometry: JointGeometry, solder: Solder) -> tuple[LiquidFlow, StopRule]:
+    """Set up the flow of a drop on the board's disc alone."""
+    edge = float(np.cbrt(solder.volume))
+    cloud = box_cloud(edge, max(FEWEST_PER_EDGE, 1 + round(edge / solder.numerics.spacing)))
+    effects = {name: decision["on"] for name, decision in decide_effects(geometry, solder).items()}
+    lines = (contact_line(cloud, 0, geometry.radius_board, solder),)
+    return start_flow(cloud, solder, effects, lines), stop_rule(cloud, solder, effects)
+
+
+def _open_shape(geometry: JointGeometry, solder: Solder, flow: LiquidFlow, run: Run) -> JointShape:
+    """Collect the result of a joint whose solder stays on the board."""
+    height = run.records[-1].height
+    if height >= geometry.gap:
+        raise TooLittleSolder(f"a drop of {height:.4g} m reaches across the gap of {geometry.gap:.4g} m, no joint does")
+    return replace(collect_shape(solder, flow, run, open_metrics(geometry, solder, flow, run)), verdict="open")
 
 
 def start_joint(geometry: JointGeometry, solder: Solder) -> tuple[LiquidFlow, StopRule]:

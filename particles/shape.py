@@ -39,7 +39,8 @@ class JointShape:
             capillary_number, displacement, iterations.
         snapshots: the first, the last and some states between.
         metrics: name to value and unit.
-        verdict: "ok", "overflow" (solder on the mask), "dewetted" (left the pad's edge), "open" (neck ruptured).
+        verdict: "ok", "overflow" (solder on the mask), "dewetted" (left the pad's edge), "open" (neck ruptured, or a
+            drop on the board that does not reach the package), "bridged" (one body on the pads of several joints).
     """
 
     points: Floats

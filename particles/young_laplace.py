@@ -146,7 +146,8 @@ def _solve_joint_meridian(guess: _State, ends: tuple[_End, _End], target: float,
         package = ends[1].residual(high[0], high[2])
         return np.array([board, low[1], low[3], package, high[1] - 1.0, high[3] - target])
 
-    found = solve_bvp(slopes, conditions, guess.s, guess.y, p=guess.unknown, tol=TOLERANCE, max_nodes=20000)
+    with np.errstate(all="ignore"):  # where there is no equilibrium, the search runs away before it gives up
+        found = solve_bvp(slopes, conditions, guess.s, guess.y, p=guess.unknown, tol=TOLERANCE, max_nodes=20000)
     if not found.success or found.y[0].min() <= SMALLEST_RADIUS:
         raise NoMeridian(
             f"no equilibrium joint of volume {target:.4g} and ends {ends} (in gaps): {found.message.lower()}"

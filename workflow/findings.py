@@ -46,9 +46,9 @@ def at_least(value: float, limit: float) -> dict:
 
 
 def worst(values: Iterable[float]) -> float:
-    """Return the largest magnitude; nan if any value is."""
+    """Return the largest magnitude; nan if any value is, zero if there is none."""
     magnitudes = [abs(value) for value in values]
-    return float("nan") if any(value != value for value in magnitudes) else max(magnitudes)
+    return float("nan") if any(value != value for value in magnitudes) else max(magnitudes, default=0.0)
 
 
 def of_geometry(joints: int, elements: Mapping[str, int]) -> Findings:
@@ -58,13 +58,20 @@ def of_geometry(joints: int, elements: Mapping[str, int]) -> Findings:
 
 
 def of_reflow(joints: Records, effects: Mapping[str, Any]) -> Findings:
-    """Judge the joints' shapes by volume, by the Young-Laplace shape and by their verdicts."""
+    """Judge the joints' shapes by volume, by the Young-Laplace shape and by their verdicts.
+
+    An open joint has no shape to compare with.
+    """
 
     def values(name: str) -> list[float]:
         return [joint["metrics"][name]["value"] for joint in joints.values()]
 
-    width_error, drift = worst(values("width_error")), worst(values("volume_drift"))
-    imperfect = sum(joint["verdict"] != "ok" for joint in joints.values())
+    def count(verdict: str) -> int:
+        return sum(joint["verdict"] == verdict for joint in joints.values())
+
+    closed = [joint for joint in joints.values() if joint["verdict"] != "open"]
+    width_error = worst(joint["metrics"]["width_error"]["value"] for joint in closed)
+    drift = worst(values("volume_drift"))
     return Findings(
         metrics={
             "distinct_shapes": metric(len({joint["shape"] for joint in joints.values()})),
@@ -76,7 +83,9 @@ def of_reflow(joints: Records, effects: Mapping[str, Any]) -> Findings:
         health={
             "joint_width_error_max": at_most(width_error, WIDTH_ERROR),
             "joint_volume_drift_max": at_most(drift, VOLUME_DRIFT),
-            "joints_not_ok": at_most(imperfect, 0),
+            "joints_bridged": at_most(count("bridged"), 0),
+            "joints_open": at_most(count("open"), 0),
+            "joints_not_ok": at_most(len(joints) - count("ok"), 0),
         },
         effects=dict(effects),
     )

@@ -71,6 +71,30 @@ def joint_records(groups: "Mapping[tuple[str, ...], JointGeometry]", shapes: "Ma
     return records
 
 
+def mark_bridges(records: dict[str, dict], pads: "Sequence[PadSite]", mirrored: bool) -> None:
+    """Give joints that touch others the verdict "bridged" and the names of those others.
+
+    Args:
+        records: what `joint_records` returned; changed in place.
+        pads: the pad table.
+        mirrored: whether the array goes on beyond the planes of symmetry x = 0 and y = 0.
+    """
+    from particles.bridges import contacts, neighbours
+
+    places = {pad.name: (pad.x, pad.y) for pad in pads}
+    widths = {name: records[name]["metrics"]["max_width"]["value"] for name in places}
+    for name, others in neighbours(contacts(places, widths, mirrored)).items():
+        records[name] |= {"verdict": "bridged", "touches": others}
+
+
+def refuse_joints_without_mesh(records: Mapping[str, dict]) -> None:
+    """Raise ReflowError where joints are bridged or open: they have no shape of their own between their pads."""
+    for verdict in ("bridged", "open"):
+        names = [name for name, record in records.items() if record["verdict"] == verdict]
+        if names:
+            raise ReflowError(f"{', '.join(names)} {verdict}: there is no such joint to mesh, see reflow/joints.json")
+
+
 def solve_joints(
     geometries: "Mapping[str, JointGeometry]",
     solder: Solder,

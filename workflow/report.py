@@ -76,6 +76,8 @@ def _add_preview(run_folder: Path, context: dict) -> None:
 
 
 def _add_joints(run_folder: Path, context: dict) -> None:
+    if (run_folder / "reflow" / "joints.json").exists():
+        context["tables"]["verdicts"] = tables.verdicts(run_folder)
     path = run_folder / "solder_mesh" / "quality.json"
     if not path.exists():
         return

@@ -141,6 +141,22 @@ def shapes(joints: list[dict]) -> dict:
     return {"head": head, "rows": rows}
 
 
+def verdicts(run_folder: Path) -> dict:
+    """Verdict of the reflow on every joint, those that are not ok first."""
+    joints = json.loads((run_folder / "reflow" / "joints.json").read_text())
+    rows = [
+        [
+            name,
+            joint["verdict"],
+            " ".join(joint.get("touches", ())) or "–",
+            micro(joint["metrics"]["standoff"]["value"]),
+            micro(joint["metrics"]["max_width"]["value"]),
+        ]
+        for name, joint in sorted(joints.items(), key=lambda item: item[1]["verdict"] == "ok")
+    ]
+    return {"head": ["joint", "verdict", "touches", "standoff [µm]", "max. width alone [µm]"], "rows": rows}
+
+
 def ranked_joints(history: dict, joints: list[dict]) -> dict:
     """Joints ranked by peak von Mises stress at their pads."""
     shape = {joint["name"]: joint for joint in joints}

@@ -35,14 +35,16 @@ def reflow(run: Run[BoardDropCase], folder: Path) -> Findings:
     from meshing.pads import read_pads
     from particles.effects import decide_effects
     from particles.products import write_shapes
-    from workflow.reflow_pool import distinct_geometries, joint_geometries, joint_records, solve_joints
+    from workflow.reflow_pool import distinct_geometries, joint_geometries, joint_records, mark_bridges, solve_joints
 
-    groups = distinct_geometries(joint_geometries(read_pads(run.folder / "geometry/pads.json")))
+    pads = read_pads(run.folder / "geometry/pads.json")
+    groups = distinct_geometries(joint_geometries(pads))
     distinct = {names[0]: geometry for names, geometry in groups.items()}
     with progress_bar(f"reflow of {len(distinct)} distinct joints") as progress:
         shapes, continued = solve_joints(distinct, run.case.solder, run.cores, progress, run.checkpoints("reflow"))
     write_shapes(folder / "shapes.h5", shapes)
     joints = joint_records(groups, shapes)
+    mark_bridges(joints, pads, mirrored=run.case.board.symmetry == "quarter")
     write_json(folder / "joints.json", joints)
     found = findings.of_reflow(joints, decide_effects(next(iter(distinct.values())), run.case.solder))
     return replace(found, continued=f"{continued} of {len(distinct)} joints" if continued else "")
@@ -52,7 +54,9 @@ def surface(run: Run[BoardDropCase], folder: Path) -> Findings:
     """Close the surface of each distinct joint and measure it."""
     from meshing.surface import close_surface, measure, write_surface
     from particles.products import read_shapes
+    from workflow.reflow_pool import refuse_joints_without_mesh
 
+    refuse_joints_without_mesh(read_json(run.folder / "reflow/joints.json"))
     surfaces = {}
     for name, shape in read_shapes(run.folder / "reflow/shapes.h5").items():
         closed = close_surface(shape.surface_points, shape.triangles, shape.ring_board, shape.ring_package)

@@ -65,6 +65,17 @@ def test_a_joint_without_equilibrium_opens():
     assert shape.verdict == "open"
 
 
+def test_too_little_solder_for_any_neck_stays_on_the_board_and_is_open():
+    gap = 0.34e-3
+    solder = Solder(volume=0.012e-9, numerics=SolderNumerics(spacing=6e-5))
+    shape = solve_joint(JointGeometry(gap, RADIUS, RADIUS), solder)
+    assert shape.verdict == "open"
+    assert len(shape.rings) == 1
+    assert shape.metrics["drop_height"][0] < 0.5 * gap
+    assert abs(shape.metrics["width_error"][0]) < 0.01
+    assert abs(shape.metrics["volume_drift"][0]) < 1e-6
+
+
 @pytest.mark.parametrize("properties", ["physical", "paper"])
 def test_inertia_never_gains_energy(properties):
     """With inertia and no viscosity from a violent start: the potential energy swings, but below its first value."""

@@ -42,7 +42,7 @@ BAD_VALUES = {
     ),
     "volume that cannot fit its gap": (
         "solder.volume=5 mm^3",
-        ["solder.volume", '"5 mm^3"', "would touch its neighbour", "<= 0.2"],
+        ["solder.volume", '"5 mm^3"', "cannot fit", "< 0.31"],
     ),
     "package larger than the board": (
         "package.substrate.length=250 mm",

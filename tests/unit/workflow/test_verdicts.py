@@ -1,0 +1,55 @@
+"""Joints that are bridged or open: told in the records, the checks and the report, and never meshed."""
+
+import json
+from types import SimpleNamespace
+
+import pytest
+
+from workflow import findings
+from workflow import report_tables as tables
+from workflow.reflow_pool import ReflowError, mark_bridges, refuse_joints_without_mesh
+
+PADS = [SimpleNamespace(name=f"A{k}", x=k * 1e-3, y=2.5e-3) for k in (1, 2, 3, 4)]
+
+
+def joint(width, verdict="ok"):
+    values = {"max_width": width, "standoff": 3e-4, "width_error": 1e-3, "volume_drift": 0.0}
+    return {"shape": "A1", "verdict": verdict, "metrics": {k: {"value": v, "unit": ""} for k, v in values.items()}}
+
+
+@pytest.fixture
+def records():
+    joints = {"A1": joint(0.8e-3), "A2": joint(1.01e-3, "overflow"), "A3": joint(1.02e-3, "overflow")}
+    joints["A4"] = joint(0.4e-3, "open")
+    joints["A4"]["metrics"]["width_error"]["value"] = float("nan")
+    mark_bridges(joints, PADS, mirrored=True)
+    return joints
+
+
+def test_joints_that_touch_are_bridged_and_name_each_other(records):
+    assert [record["verdict"] for record in records.values()] == ["ok", "bridged", "bridged", "open"]
+    assert [record.get("touches") for record in records.values()] == [None, ["A3"], ["A2"], None]
+
+
+def test_health_counts_them(records):
+    health = findings.of_reflow(records, {}).health
+    counts = {name: check["value"] for name, check in health.items() if name.startswith("joints_")}
+    assert counts == {"joints_bridged": 2, "joints_open": 1, "joints_not_ok": 3}
+    assert not any(health[name]["ok"] for name in counts)
+    assert health["joint_width_error_max"]["ok"]
+
+
+def test_they_have_no_mesh(records):
+    with pytest.raises(ReflowError, match="A2, A3 bridged"):
+        refuse_joints_without_mesh(records)
+    with pytest.raises(ReflowError, match="A4 open"):
+        refuse_joints_without_mesh({name: records[name] for name in ("A1", "A4")})
+    refuse_joints_without_mesh({"A1": records["A1"]})
+
+
+def test_the_report_lists_them_first(records, tmp_path):
+    (tmp_path / "reflow").mkdir()
+    (tmp_path / "reflow/joints.json").write_text(json.dumps(records))
+    rows = tables.verdicts(tmp_path)["rows"]
+    assert [row[0] for row in rows] == ["A2", "A3", "A4", "A1"]
+    assert rows[0][1:3] == ["bridged", "A3"]
