@@ -11,6 +11,7 @@ from particles.young_laplace import NoMeridian, joint_meridian
 SPACINGS_IN_NECK = 2.0
 SPACINGS_IN_GAP = 3.0
 SPACINGS_IN_RADIUS = 2.0
+LARGEST_EXPLICIT = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +41,7 @@ def problems(solder: Solder, geometries: Mapping[str, JointGeometry], pitch: flo
         geometries: joint name to geometry.
         pitch: distance of neighbouring joints [m].
     """
-    found = _angle_problems(solder)
+    found = scheme_problems(solder) + _angle_problems(solder)
     if found:
         return found
     by_discs: dict[tuple[float, float], list[str]] = {}
@@ -53,6 +54,16 @@ def problems(solder: Solder, geometries: Mapping[str, JointGeometry], pitch: flo
         found += _too_much(solder, low, geometries[low], pitch)
         found += _too_thin(solder, high, geometries[high])
     return list({problem.key: problem for problem in found}.values())
+
+
+def scheme_problems(solder: Solder) -> list[Problem]:
+    """Find a time step that the scheme cannot take."""
+    numerics = solder.numerics
+    if numerics.scheme != "gripc" or numerics.time_step_limit <= LARGEST_EXPLICIT:
+        return []
+    message = 'scheme "gripc" takes surface tension explicitly: no step above the capillary limit is stable'
+    key = "solder.numerics.time_step_limit"
+    return [Problem(key, f"{numerics.time_step_limit:g}", f"<= {LARGEST_EXPLICIT:g}", message)]
 
 
 def _angle_problems(solder: Solder) -> list[Problem]:

@@ -60,13 +60,18 @@ class Solution:
     iterations: int
 
 
-def petsc(matrix: sparse.csr_matrix) -> PETSc.Mat:
-    """Copy a symmetric positive definite matrix to PETSc."""
+def to_petsc(matrix: sparse.csr_matrix) -> PETSc.Mat:
+    """Copy a matrix to PETSc."""
     matrix.sort_indices()
     # petsc4py delays the destruction of what went out of scope: without this each step would leak its factors.
     PETSc.garbage_cleanup(PETSc.COMM_SELF)
     parts = (matrix.indptr.astype(PETSc.IntType), matrix.indices.astype(PETSc.IntType), matrix.data)
-    result = PETSc.Mat().createAIJ(matrix.shape, csr=parts, comm=PETSc.COMM_SELF)
+    return PETSc.Mat().createAIJ(matrix.shape, csr=parts, comm=PETSc.COMM_SELF)
+
+
+def petsc(matrix: sparse.csr_matrix) -> PETSc.Mat:
+    """Copy a symmetric positive definite matrix to PETSc."""
+    result = to_petsc(matrix)
     result.setOption(PETSc.Mat.Option.SPD, True)
     return result
 

@@ -8,6 +8,7 @@ from scipy import sparse
 
 from particles.mls_linear import linear_weights
 from particles.mls_quadratic import quadratic_weights
+from particles.mls_shape import shape_weights
 from particles.neighbours import NeighbourList
 
 Floats = NDArray[np.float64]
@@ -51,12 +52,38 @@ def derivatives(points: Floats, rows: NDArray[np.int32], neighbours: NeighbourLi
     """
     kernel = {"linear": linear_weights, "quadratic": quadratic_weights}[basis]
     pair, own, order = kernel(rows, points, neighbours.offsets, neighbours.indices, neighbours.radius)
+    _check_order(order, points, rows, neighbours)
+    first, second, third, laplacian = _assemble(len(points), rows, neighbours, (pair, own))
+    return Derivatives(rows, (first, second, third), laplacian, order)
+
+
+def shape_functions(points: Floats, rows: NDArray[np.int32], neighbours: NeighbourList) -> sparse.csr_matrix:
+    """Values psi_J of the linear MLS shape functions at some particles (Hu et al., eq 11), `(m, n)`; rows add up to 1.
+
+    Args: as `derivatives`.
+
+    Raises:
+        DegenerateStencil: a particle has too few neighbours, or they lie in a plane.
+    """
+    pair, own, order = shape_weights(rows, points, neighbours.offsets, neighbours.indices, neighbours.radius)
+    _check_order(order, points, rows, neighbours)
+    return _assemble(len(points), rows, neighbours, (pair, own))[0]
+
+
+def _check_order(order: NDArray[np.int8], points: Floats, rows: NDArray[np.int32], neighbours: NeighbourList) -> None:
     if (order == 0).any():
         worst = rows[int(np.argmin(order))]
         raise DegenerateStencil(
             f"particle {worst} at {points[worst]} m has {np.diff(neighbours.offsets)[worst]} neighbours within "
             f"{neighbours.radius:.3g} m, or they lie in a plane: no gradient can be fitted"
         )
+
+
+def _assemble(
+    count: int, rows: NDArray[np.int32], neighbours: NeighbourList, weights: tuple[Floats, Floats]
+) -> list[sparse.csr_matrix]:
+    """One matrix `(m, count)` for each column of the weights per pair and at the particle."""
+    pair, own = weights
     lengths = np.diff(neighbours.offsets)[rows]
     starts = np.concatenate(([0], np.cumsum(lengths + 1)))
     first = np.cumsum(lengths) - lengths
@@ -67,9 +94,9 @@ def derivatives(points: Floats, rows: NDArray[np.int32], neighbours: NeighbourLi
     columns[is_own] = rows
     columns[~is_own] = neighbours.indices[slot]
     matrices = []
-    for c in range(4):
+    for c in range(pair.shape[1]):
         values = np.empty(starts[-1])
         values[is_own] = own[:, c]
         values[~is_own] = pair[slot, c]
-        matrices.append(sparse.csr_matrix((values, columns, starts), shape=(len(rows), len(points))))
-    return Derivatives(rows, (matrices[0], matrices[1], matrices[2]), matrices[3], order)
+        matrices.append(sparse.csr_matrix((values, columns, starts), shape=(len(rows), count)))
+    return matrices

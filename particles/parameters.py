@@ -17,8 +17,13 @@ class Parameters(BaseModel):
 
 
 class FlowNumerics(Parameters):
-    """How a reflow is computed, apart from its resolution."""
+    """How a reflow is computed, apart from its resolution.
 
+    The scheme energy moves to the least energy of the tracked surface at exactly the volume. The scheme gripc is the
+    pressure correction that Hu et al. print, kept for comparison: its time steps end at the capillary limit.
+    """
+
+    scheme: Literal["energy", "gripc"] = "energy"
     basis: Literal["linear", "quadratic"] = "quadratic"
     time_step_limit: float = Field(20.0, gt=0, le=100)
     tolerance: float = Field(1.0e-6, gt=0, lt=1)

@@ -16,6 +16,7 @@ from particles.force_gravity import Gravity
 from particles.force_surface_tension import SurfaceTension
 from particles.force_wetting import Wetting
 from particles.geometry import JointGeometry
+from particles.gripc_step import GripcStep
 from particles.mass import Inertia, Mass
 from particles.metrics import Metrics, joint_metrics, open_metrics, particle_pressure, verdict
 from particles.parameters import Solder
@@ -30,6 +31,7 @@ __all__ = ["JointGeometry", "JointShape", "solve_joint"]
 
 CALM_CAPILLARY_TIMES = 20.0
 FEWEST_PER_EDGE = 5
+SCHEMES: dict[str, type[CoupledStep] | type[GripcStep]] = {"energy": CoupledStep, "gripc": GripcStep}
 
 
 def solve_joint(
@@ -104,7 +106,7 @@ def start_flow(cloud: Cloud, solder: Solder, effects: dict[str, bool], lines: tu
     limit = capillary_limit(solder.density, cloud.spacing, solder.surface_tension)
     largest = solder.numerics.time_step_limit * limit
     physics = build_physics(solder, effects, lines)
-    solver = CoupledStep(solder.numerics.basis)
+    solver = SCHEMES[solder.numerics.scheme](solder.numerics.basis)
     return LiquidFlow(Body.at_rest(cloud), physics, TimeStep(largest, cloud.spacing, largest), solver)
 
 

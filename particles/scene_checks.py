@@ -16,12 +16,13 @@ KEYS = {
     "solder.volume": "joint.volume",
     "solder.pad_contact_angle": "joint.pad_contact_angle",
     "solder.numerics.spacing": "joint.spacing",
+    "solder.numerics.time_step_limit": "solder.numerics.time_step_limit",
 }
 
 
-def drop_problems(drop: Drop) -> list[Problem]:
+def drop_problems(drop: Drop, solder: Solder) -> list[Problem]:
     """Find what cannot work before a drop runs."""
-    return _resolution_problems(drop) or _pad_problems(drop)
+    return checks.scheme_problems(solder) or _resolution_problems(drop) or _pad_problems(drop)
 
 
 def joint_problems(joint: Joint, solder: Solder) -> list[Problem]:

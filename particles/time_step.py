@@ -6,6 +6,11 @@ import numpy as np
 
 LARGEST_DISPLACEMENT = 0.25
 GROWTH = 1.15
+SMALLEST_SHARE = 1e-9
+
+
+class StepCollapsed(RuntimeError):
+    """No time step is small enough for the particles to move by less than a quarter of their spacing."""
 
 
 def capillary_limit(density: float, spacing: float, surface_tension: float) -> float:
@@ -30,10 +35,19 @@ class TimeStep:
     binding: str = "capillary multiple"
 
     def accepts(self, speed: float) -> bool:
-        """Whether a largest particle speed [m/s] moves no particle too far; else the step is cut."""
+        """Whether a largest particle speed [m/s] moves no particle too far; else the step is cut.
+
+        Raises:
+            StepCollapsed: the step would be 1e-9 of its upper bound.
+        """
         displacement = speed * self.size
         if displacement <= LARGEST_DISPLACEMENT * self.spacing:
             return True
+        if not self.size > SMALLEST_SHARE * self.largest:
+            raise StepCollapsed(
+                f"the time step was cut to {self.size:.2e} s, {SMALLEST_SHARE:g} of its upper bound, and the fastest "
+                f"particle still moves {displacement / self.spacing:.2g} spacings in it: the flow is unstable"
+            )
         self.size *= max(0.25, 0.8 * LARGEST_DISPLACEMENT * self.spacing / displacement)
         self.binding = "displacement"
         return False

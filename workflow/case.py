@@ -123,7 +123,7 @@ class DropCase(SceneCase):
         """Find parameters that make no possible drop together."""
         from particles.scene_checks import drop_problems
 
-        return _of_particles(drop_problems(self.drop))
+        return _of_particles(drop_problems(self.drop, self.molten))
 
 
 class JointCase(SceneCase):

@@ -13,6 +13,10 @@ from workflow.scene_forecast import SceneForecast, forecast_scene
 from workflow.units import from_si
 
 LONGEST_LIST = 4
+SCHEMES = {
+    "energy": "least energy of the tracked surface at exactly the volume",
+    "gripc": "pressure correction as Hu et al. print it, for comparison only; its steps are not foreseen in the cost",
+}
 
 
 def show_plan(case: Case, run_folder: Path, console: Console) -> None:
@@ -41,6 +45,7 @@ def _show(case: Case, run_folder: Path, outlook: Forecast | SceneForecast, conso
 def _particles(outlook: SceneForecast) -> Table:
     table = _table("\nReflow", "what", "value", "remark")
     table.add_row("particles", f"{outlook.particles}", f"{1e6 * outlook.spacing:.3g} um apart at the start")
+    table.add_row("scheme", outlook.scheme, SCHEMES[outlook.scheme])
     table.add_row(
         "capillary limit", nano(outlook.capillary_limit), "time step at which explicit surface tension breaks"
     )

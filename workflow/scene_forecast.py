@@ -12,6 +12,7 @@ class SceneForecast:
     Attributes:
         effects: effect -> {"on", "why"}.
         particles: number of particles.
+        scheme: how steps are solved.
         spacing: their distance at the start [m].
         capillary_limit: largest stable time step of an explicit surface tension [s].
         largest_step: largest time step that will be taken [s].
@@ -20,6 +21,7 @@ class SceneForecast:
 
     effects: dict
     particles: int
+    scheme: str
     spacing: float
     capillary_limit: float
     largest_step: float
@@ -40,5 +42,6 @@ def forecast_scene(case: DropCase | JointCase) -> SceneForecast:
         effects, particles = decide_effects(case.joint.geometry, solder), particle_count(solder, case.joint.geometry)
         seconds = reflow_seconds(solder, case.joint.geometry)
     limit = capillary_limit(solder.density, solder.numerics.spacing, solder.surface_tension)
-    largest = solder.numerics.time_step_limit * limit
-    return SceneForecast(effects, particles, solder.numerics.spacing, limit, largest, {"reflow": seconds})
+    numerics = solder.numerics
+    largest = numerics.time_step_limit * limit
+    return SceneForecast(effects, particles, numerics.scheme, numerics.spacing, limit, largest, {"reflow": seconds})

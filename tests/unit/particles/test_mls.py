@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from particles.mls import SUPPORT, DegenerateStencil, derivatives
+from particles.mls import SUPPORT, DegenerateStencil, derivatives, shape_functions
 from particles.neighbours import NeighbourList
 
 
@@ -43,6 +43,16 @@ def mls_value(cloud, values, at):
     basis = np.column_stack((np.ones(len(cloud)), cloud - at))
     w = weights(cloud - at, SUPPORT["linear"])
     return np.linalg.solve(basis.T @ (w[:, None] * basis), basis.T @ (w * values))[0]
+
+
+@pytest.mark.parametrize("row", [171, 0])
+def test_shape_functions_equal_the_mls_approximation(cloud, row):
+    values = np.random.default_rng(6).normal(size=len(cloud))
+    neighbours = NeighbourList(SUPPORT["linear"], skin=0.3)
+    neighbours.update(cloud)
+    found = shape_functions(cloud, np.array([row], np.int32), neighbours)
+    assert found @ values == pytest.approx(mls_value(cloud, values, cloud[row]))
+    assert found @ cloud == pytest.approx(cloud[[row]], abs=1e-12)
 
 
 def test_linear_derivatives_equal_differences_of_the_mls_approximation(cloud):

@@ -21,6 +21,8 @@ BAD_VALUES = {
     "unknown set": (DROP, "solder.parameters=papre", ["one of physical, paper", "did you mean paper?"]),
     "unknown key": (DROP, "drop.angle=60 deg", ["drop.angle", "unknown key", "contact_angle"]),
     "unknown switch": (DROP, "gravity=of", ['gravity = "of"', "one of auto, on, off", "did you mean off?"]),
+    "unknown scheme": (DROP, "solder.numerics.scheme=gripk", ["one of energy, gripc", "did you mean gripc?"]),
+    "explicit step": (DROP, "solder.numerics.scheme=gripc", ["solder.numerics.time_step_limit", '"100"', "<= 1"]),
     "two kinds": (DROP, "package.rows=3", ["[package] and [drop]", "exactly one of [package], [drop], [joint]"]),
     "pad that repels": (BALL, "drop.contact_angle=150 deg", ["drop.contact_angle", "< 148 deg", "better"]),
     "pad too small": (BALL, "drop.pad_radius=0.01 mm", ["drop.pad_radius", '"0.01 mm"', "cannot fit", ">= 0.09"]),
@@ -104,3 +106,9 @@ def test_the_spacing_of_a_drop():
 def test_gravity_is_a_switch_of_the_case():
     assert read_case(DROP).molten.effects.gravity == "off"
     assert read_case(DROP, ["gravity=auto"]).molten.effects.gravity == "auto"
+
+
+def test_the_scheme_is_ours_unless_the_seeds_is_asked_for():
+    assert read_case(DROP).molten.numerics.scheme == "energy"
+    asked = ["solder.numerics.scheme=gripc", "solder.numerics.time_step_limit=0.5"]
+    assert read_case(DROP, asked).molten.numerics.scheme == "gripc"

@@ -1,0 +1,87 @@
+import numpy as np
+import pytest
+
+from particles.ghosts import mirror
+from particles.mls import derivatives
+from particles.neighbours import NeighbourList
+from particles.plate import Plate
+
+REACH = 0.3
+
+
+def tilted() -> Plate:
+    return Plate.horizontal(0.0).moved(np.array([0.0, 0.0, 0.0, 0.2, -0.1, 0.0]))
+
+
+@pytest.fixture
+def points():
+    cloud = np.random.default_rng(3).uniform(0.0, 1.0, (200, 3))
+    cloud[:20, 2] = 0.0
+    return cloud
+
+
+def test_images_equal_a_loop_over_particles(points):
+    """Twin: the reflection formula, one particle at a time."""
+    plate = tilted()
+    found = mirror(points, (plate,), REACH)
+    expected, source = [], []
+    for number, point in enumerate(points):
+        height = float((point - plate.origin) @ plate.normal)
+        if 1e-6 * REACH < height < REACH:
+            expected.append(point - 2.0 * height * plate.normal)
+            source.append(number)
+    assert found.source.tolist() == source
+    assert found.points == pytest.approx(np.array(expected))
+
+
+def test_particles_on_the_wall_are_their_own_image(points):
+    found = mirror(points, (Plate.horizontal(0.0),), REACH)
+    assert not set(found.source) & set(range(20))
+
+
+def test_an_edge_between_two_walls_has_images_of_both():
+    side = Plate(np.zeros(3), np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]))
+    found = mirror(np.array([[0.1, 0.5, 0.1]]), (Plate.horizontal(0.0), side), REACH)
+    expected = [[-0.1, 0.5, -0.1], [-0.1, 0.5, 0.1], [0.1, 0.5, -0.1]]
+    assert np.array(sorted(found.points.tolist())) == pytest.approx(np.array(expected))
+    velocity = found.vector(1) @ np.array([1.0, 2.0, 3.0])
+    assert pytest.approx(np.sign([[0.1, 0.5, 0.1], *found.points]) * [1.0, 2.0, 3.0]) == velocity.reshape(3, -1).T
+
+
+def gradients(basis):
+    """Gradients at the particles of a wall, of an even and of a mirrored vector field."""
+    axis = np.linspace(0.0, 1.0, 7)
+    cloud = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1).reshape(-1, 3)
+    cloud += np.random.default_rng(8).uniform(-0.02, 0.02, cloud.shape) * (cloud[:, 2:] > 0.0)
+    ghosts = mirror(cloud, (Plate.horizontal(0.0),), 0.4)
+    everything = np.concatenate((cloud, ghosts.points))
+    rows = np.flatnonzero((cloud[:, 2] == 0.0) & (np.abs(cloud[:, :2] - 0.5) < 0.3).all(axis=1)).astype(np.int32)
+    neighbours = NeighbourList(0.4, 0.0)
+    neighbours.update(everything)
+    fitted = derivatives(everything, rows, neighbours, basis)
+    scalar = ghosts.even(len(cloud)) @ (2.0 * cloud[:, 0] - cloud[:, 1] + 3.0)
+    vector = ghosts.vector(len(cloud)) @ np.column_stack((cloud[:, 0], -3.0 * cloud[:, 1], 2.0 * cloud[:, 2])).T.ravel()
+    components = [scalar, *vector.reshape(3, -1)]
+    return np.array([[(part @ field).ravel() for part in fitted.gradient] for field in components])
+
+
+@pytest.mark.parametrize("basis", ["linear", "quadratic"])
+def test_linear_fields_that_fit_the_wall_are_exact_on_it(basis):
+    """A scalar without slope across the wall, and a velocity that slips along it."""
+    exact = np.array([[2.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, -3.0, 0.0], [0.0, 0.0, 2.0]])
+    assert gradients(basis) == pytest.approx(np.broadcast_to(exact[:, :, None], gradients(basis).shape), abs=1e-9)
+
+
+def test_a_quadratic_even_field_is_exact_at_the_wall():
+    """u = x^2 - z^2 is even in z: its Laplacian vanishes on the wall, its slope across it as well."""
+    axis = np.linspace(-0.5, 0.5, 7)
+    cloud = np.stack(np.meshgrid(axis, axis, axis + 0.5, indexing="ij"), axis=-1).reshape(-1, 3)
+    ghosts = mirror(cloud, (Plate.horizontal(0.0),), 0.4)
+    everything = np.concatenate((cloud, ghosts.points))
+    neighbours = NeighbourList(0.4, 0.0)
+    neighbours.update(everything)
+    row = np.array([np.argmin((cloud**2).sum(axis=1))], np.int32)
+    fitted = derivatives(everything, row, neighbours, "quadratic")
+    field = ghosts.even(len(cloud)) @ (cloud[:, 0] ** 2 - cloud[:, 2] ** 2)
+    assert fitted.laplacian @ field == pytest.approx(0.0, abs=1e-9)
+    assert fitted.gradient[2] @ field == pytest.approx(0.0, abs=1e-9)

@@ -1,0 +1,111 @@
+"""Parts of the seed's scheme against exact fields and printed sums."""
+
+import numpy as np
+import pytest
+from scipy import sparse
+
+from particles.body import Body
+from particles.cloud import box_cloud
+from particles.collocation import collocate
+from particles.contact_line import ContactLine
+from particles.force_surface_tension import SurfaceTension
+from particles.gripc_step import GripcStep
+from particles.incompressibility import SolveFailed
+from particles.krylov import solve_gmres
+from particles.mass import Mass
+from particles.neighbours import NeighbourList
+from particles.physics import Physics
+from particles.plate import Plate
+from particles.plate_motion import PlateMotion
+from particles.pressure_poisson import Poisson, correct_pressure
+from particles.surface_pressure import force_pressure, viscous_pressure
+from particles.velocity_smoothing import Velocities, smooth
+
+
+@pytest.fixture(scope="module")
+def box():
+    return box_cloud(1.0, 6)
+
+
+@pytest.fixture(scope="module")
+def operators(box):
+    return collocate(box.points, box.plates, box.spacing, "quadratic")
+
+
+def test_smoothing_equals_the_printed_sum():
+    """Twin of eq 28, one particle at a time."""
+    random = np.random.default_rng(2)
+    shape, old, new, kept = random.normal(size=(4, 4)), *random.normal(size=(3, 4))
+    found = smooth(Velocities(old, kept), new, sparse.csr_matrix(shape))
+    for j in range(4):
+        change = sum(shape[j, i] * (new[i] - old[i]) for i in range(4))
+        end = sum(shape[j, i] * new[i] for i in range(4))
+        assert found.unsmoothed[j] == pytest.approx(0.5 * (kept[j] + change) + 0.5 * end)
+    assert found.coefficients is new
+
+
+@pytest.mark.parametrize("basis", ["linear", "quadratic"])
+def test_a_uniform_slip_is_not_smoothed_away(box, basis):
+    uniform = np.repeat([2.0, -1.0, 0.0], len(box.points))
+    smoothing = collocate(box.points, box.plates, box.spacing, basis).smoothing
+    assert smooth(Velocities(uniform, uniform), uniform, smoothing).unsmoothed == pytest.approx(uniform)
+
+
+def test_the_corrected_pressure_is_given_on_the_surface(box, operators):
+    """Eqs 5 and 22: p_new = phi + p - mu div v*, equal to the given pressure on the surface."""
+    random = np.random.default_rng(6)
+    divergence, pressure, given = random.normal(size=(3, len(box.points)))
+    surface = np.arange(len(box.points)) < box.surface_count
+    found = correct_pressure(Poisson(operators, surface, "quadratic"), (3.0, 0.2), divergence, pressure, given)
+    assert found.pressure[surface] == pytest.approx(given[surface], abs=1e-6)
+    assert found.pressure == pytest.approx(found.potential + pressure - 0.2 * divergence, abs=1e-9)
+    assert (operators.laplacian @ found.potential)[~surface] == pytest.approx(3.0 * divergence[~surface], abs=1e-5)
+
+
+def test_a_failed_solve_tells_its_residual():
+    singular = sparse.csr_matrix(np.array([[1.0, 1.0], [1.0, 1.0]]))
+    with pytest.raises(SolveFailed, match="residual"):
+        solve_gmres(singular, np.array([1.0, -1.0]), "quadratic")
+
+
+def test_viscous_pressure_of_an_even_strain(box):
+    """Twin: 2 mu n . grad v . n, on the faces of a cube the strain along their axis."""
+    body, strain = Body.at_rest(box), np.diag([-0.5, -1.5, 2.0])
+    gradient = np.broadcast_to(strain[:, :, None], (3, 3, len(box.points)))
+    found = viscous_pressure(body, 0.3, gradient)
+    inside = np.abs(box.points[: box.surface_count] - [0.0, 0.0, 0.5])
+    for axis in range(3):
+        face = (inside[:, axis] > 0.49) & (np.delete(inside, axis, 1) < 0.45).all(axis=1)
+        face &= box.wall[: box.surface_count] < 0
+        assert face.any()
+        assert found[face] == pytest.approx(0.6 * strain[axis, axis])
+
+
+def test_an_edge_bears_what_is_left_on_a_held_vertex(box):
+    """All of the line is pinned: its pressure is the mean of the neighbours, the balance within the wall left out."""
+    body = Body.at_rest(box)
+    ring = box.rings[0]
+    line = ContactLine.__new__(ContactLine)
+    line.wall, line.state = 0, np.zeros(len(ring), np.int8)
+    tension = SurfaceTension(0.5)
+    found = force_pressure(body, Physics((tension,), (tension,), (), (), (line,)))
+    amid = np.abs(box.points[ring, :2]).min(axis=1) < 0.2
+    assert amid.any()
+    assert found[ring[amid]] == pytest.approx(0.0, abs=1e-9)
+    assert found[: box.surface_count].max() > 1.0
+
+
+def test_plates_that_move_are_refused(box):
+    body = Body.at_rest(box)
+    neighbours = NeighbourList(2.0 * box.spacing, 0.0)
+    physics = Physics((), (Mass(1.0),), (), (), (), (PlateMotion.__new__(PlateMotion),))
+    with pytest.raises(ValueError, match="plates at rest"):
+        GripcStep("quadratic").prepare(body, physics, neighbours)
+
+
+def test_walls_let_fluid_slip(box):
+    """A shear along the wall has neither divergence nor viscous force next to it, whatever its amplitude."""
+    operators = collocate(box.points, (Plate.horizontal(0.0),), box.spacing, "quadratic")
+    shear = np.concatenate((np.full(len(box.points), 3.0), np.zeros(2 * len(box.points))))
+    assert operators.divergence @ shear == pytest.approx(0.0, abs=1e-9)
+    assert operators.velocity_laplacian @ shear == pytest.approx(0.0, abs=1e-7)

@@ -1,0 +1,19 @@
+import pytest
+
+from particles.time_step import StepCollapsed, TimeStep
+
+
+def test_a_flow_that_no_step_can_follow_is_an_error():
+    """Speed grows as the step shrinks: an unstable scheme."""
+    step = TimeStep(largest=1e-6, spacing=1e-4, size=1e-6)
+    with pytest.raises(StepCollapsed, match="unstable"):
+        while not step.accepts(speed=1e-3 / step.size):
+            pass
+
+
+def test_a_cut_step_keeps_particles_within_a_quarter_of_the_spacing():
+    step = TimeStep(largest=1e-3, spacing=1e-4, size=1e-3)
+    while not step.accepts(speed=1.0):
+        pass
+    assert step.size <= 0.25e-4
+    assert step.binding == "displacement"
