@@ -161,6 +161,26 @@ def box_cloud(edge: float, count: int) -> Cloud:
     return Cloud(points, int(surface.sum()), triangles, (ring,), (Plate.horizontal(0.0),), wall, edge / last)
 
 
+def free_box_cloud(edge: float, count: int) -> Cloud:
+    """Fill a cube about the origin with a lattice; no wall touches it.
+
+    Args:
+        edge: length of an edge [m].
+        count: particles along an edge.
+    """
+    axis, last = np.arange(count), count - 1
+    lattice = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1).reshape(-1, 3)
+    surface = ((lattice == 0) | (lattice == last)).any(axis=1)
+    lattice = np.concatenate((lattice[surface], lattice[~surface]))
+    number = np.empty((count,) * 3, np.int64)
+    number[tuple(lattice.T)] = np.arange(len(lattice))
+    ends = [number[:, :, last], number[:, ::-1, 0]]
+    sheets = [*ends, number[:, 0, :], number[last, :, :], number[::-1, last, :], number[0, ::-1, :]]
+    triangles = np.concatenate([_grid_triangles(sheet) for sheet in sheets]).astype(np.int32)
+    wall = np.full(len(lattice), -1, np.int8)
+    return Cloud((lattice / last - 0.5) * edge, int(surface.sum()), triangles, (), (), wall, edge / last)
+
+
 def _grid_triangles(sheet: NDArray[np.int64]) -> NDArray[np.int64]:
     """Split the quadrilaterals of a sheet of vertex numbers, with alternating diagonals; normal = axis 0 x axis 1."""
     a, b = sheet[:-1, :-1], sheet[1:, :-1]

@@ -24,6 +24,12 @@ class Decision(TypedDict):
     why: str
 
 
+NO_WALL: dict[str, Decision] = {
+    "gravity": {"on": False, "why": "no wall: the drop falls as a whole, which does not change its shape"},
+    "wall_adhesion": {"on": False, "why": "no wall"},
+}
+
+
 @dataclass(frozen=True, slots=True)
 class Numbers:
     """Dimensionless numbers and times of a joint or drop.
@@ -77,6 +83,12 @@ def _by_switch(switch: str, auto: Decision) -> Decision:
 def decide_effects(geometry: JointGeometry, solder: Solder) -> dict[str, Decision]:
     """Decide each effect of a joint's reflow: `decide` with its numbers."""
     return decide(dimensionless_numbers(geometry, solder), solder)
+
+
+def decide_drop(solder: Solder, is_free: bool) -> dict[str, Decision]:
+    """Decide each effect of a drop: `decide` with its numbers; what needs a wall is off where a drop is free."""
+    decisions = decide(drop_numbers(solder), solder)
+    return decisions | NO_WALL if is_free else decisions
 
 
 def decide(numbers: Numbers, solder: Solder) -> dict[str, Decision]:

@@ -45,19 +45,34 @@ def drop_metrics(solder: Solder, pad_radius: float, flow: LiquidFlow, run: Run) 
         flow: the flow at its end.
         run: how it came there.
     """
-    reference = reference_drop(solder, pad_radius, _weight(flow))
+    return body_metrics(solder, reference_drop(solder, pad_radius, _weight(flow)), flow, run)
+
+
+def body_metrics(solder: Solder, reference: Meridian | None, flow: LiquidFlow, run: Run) -> Metrics:
+    """Collect the numbers of a drop, with its errors against a reference and its contact angle where it has them."""
     height, width = run.records[-1].height, run.profiles[-1].max_width
-    angle = mean_angle(_contact_cosines(flow)[0])
-    shape: Metrics = {
-        "height": (height, "m"),
-        "max_width": (width, "m"),
+    shape: Metrics = {"height": (height, "m"), "max_width": (width, "m")}
+    if reference is not None:
+        shape["height_error"] = (height / reference.height - 1.0, "")
+        shape["max_width_error"] = (width / reference.max_width - 1.0, "")
+    if flow.physics.lines:
+        shape |= _contact(flow, reference)
+    return _volume(solder, flow) | shape | _pressure(solder, flow, run, reference) | _cost_and_rest(solder, flow, run)
+
+
+def _contact(flow: LiquidFlow, reference: Meridian | None) -> Metrics:
+    """Radius of the wetted area; mean contact angle, the smallest and the largest along the line."""
+    cosines = _contact_cosines(flow)[0]
+    angle, angles = mean_angle(cosines), np.degrees(np.arccos(np.clip(cosines, -1.0, 1.0)))
+    contact: Metrics = {
         "contact_radius": (contact_radius(flow.body, 0), "m"),
         "contact_angle": (angle, "deg"),
-        "height_error": (height / reference.height - 1.0, ""),
-        "max_width_error": (width / reference.max_width - 1.0, ""),
-        "contact_angle_error": (angle - float(np.degrees(reference.angle_board)), "deg"),
+        "contact_angle_min": (float(angles.min()), "deg"),
+        "contact_angle_max": (float(angles.max()), "deg"),
     }
-    return _volume(solder, flow) | shape | _pressure(solder, flow, run, reference) | _cost_and_rest(solder, flow, run)
+    if reference is not None:
+        contact["contact_angle_error"] = (angle - float(np.degrees(reference.angle_board)), "deg")
+    return contact
 
 
 def open_metrics(geometry: JointGeometry, solder: Solder, flow: LiquidFlow, run: Run) -> Metrics:

@@ -81,7 +81,7 @@ def _read_shape(group: h5py.Group) -> JointShape:
     }
     return JointShape(
         **arrays,
-        rings=tuple(ring[()] for _, ring in sorted(group["rings"].items())),
+        rings=tuple(ring[()] for _, ring in sorted(group.get("rings", {}).items())),
         surface_points=arrays["points"][: group.attrs["surface_count"]],
         history=history,
         snapshots=snapshots,

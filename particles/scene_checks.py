@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from math import degrees, inf
+from typing import Protocol
 
 from particles import checks
 from particles.checks import Problem, mm, mm3
@@ -20,9 +21,27 @@ KEYS = {
 }
 
 
+class HasWall(Protocol):
+    """A scene that may stand on a wall."""
+
+    @property
+    def is_free(self) -> bool:
+        """Whether there is no wall."""
+
+
 def drop_problems(drop: Drop, solder: Solder) -> list[Problem]:
     """Find what cannot work before a drop runs."""
-    return checks.scheme_problems(solder) or _resolution_problems(drop) or _pad_problems(drop)
+    found = checks.scheme_problems(solder) or _resolution_problems(drop)
+    return found or _wall_problems(drop) or _pad_problems(drop) or free_problems(drop, solder)
+
+
+def free_problems(scene: HasWall, solder: Solder) -> list[Problem]:
+    """Find effects that are asked for, but need a wall that a scene has not."""
+    if not scene.is_free:
+        return []
+    switches = {"gravity": solder.effects.gravity, "solder.effects.wall_adhesion": solder.effects.wall_adhesion}
+    message = "without a contact angle there is no wall: a free drop falls as a whole"
+    return [Problem(key, switch, "auto, off", message) for key, switch in switches.items() if switch == "on"]
 
 
 def joint_problems(joint: Joint, solder: Solder) -> list[Problem]:
@@ -49,10 +68,29 @@ def _resolution_problems(drop: Drop) -> list[Problem]:
     return _too_many("drop", drop.spacing, drop.count**3)
 
 
+def _wall_problems(drop: Drop) -> list[Problem]:
+    """Find angles that do not go together, and a pad without its angle."""
+    given = {"receding_angle": drop.receding_angle, "advancing_angle": drop.advancing_angle}
+    angles = {f"drop.{name}": value for name, value in given.items() if value is not None}
+    key, value = next(iter(angles.items()), ("", 0.0))
+    if drop.contact_angle is not None and angles:
+        both = "drop.receding_angle and drop.advancing_angle, or drop.contact_angle"
+        return [Problem(key, deg(value), both, "a wall has hysteresis, or one contact angle")]
+    if len(angles) == 1:
+        return [Problem(key, deg(value), "drop.receding_angle with drop.advancing_angle", "one is given alone")]
+    if drop.hysteresis is not None and drop.hysteresis[0] >= drop.hysteresis[1]:
+        allowed = f"< {deg(drop.hysteresis[1])}, the advancing angle"
+        return [Problem(key, deg(value), allowed, "a line recedes at a smaller angle than it advances at")]
+    if drop.pad_radius is not None and drop.contact_angle is None:
+        message = "a pad has no hysteresis here, and needs a contact angle"
+        return [Problem("drop.pad_radius", mm(drop.pad_radius), "only with drop.contact_angle", message)]
+    return []
+
+
 def _pad_problems(drop: Drop) -> list[Problem]:
-    if drop.pad_radius is None:
+    if drop.pad_radius is None or drop.contact_angle is None:
         return []
-    pad, mask = map(degrees, drop.angle_limits)
+    pad, mask = degrees(drop.contact_angle), degrees(drop.mask_contact_angle)
     if pad >= mask:
         message = "the pad must be wetted better than the solder mask"
         return [Problem("drop.contact_angle", f"{pad:.4g} deg", f"< {mask:.4g} deg", message)]
@@ -69,3 +107,8 @@ def _too_many(scene: str, spacing: float, count: int) -> list[Problem]:
     limit = spacing * (count / MOST_PARTICLES) ** (1.0 / 3.0)
     message = f"would take {count} particles, more than {MOST_PARTICLES}: a volume that cannot fit, or too fine"
     return [Problem(f"{scene}.spacing", mm(spacing), f">= {mm(limit)}", message)]
+
+
+def deg(angle: float) -> str:
+    """Write an angle [rad]."""
+    return f"{degrees(angle):.4g} deg"

@@ -4,7 +4,7 @@ A scene is resolved into the `Solder` and the geometry that the solvers take.
 """
 
 from math import inf
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Protocol
 
 from pydantic import Field
 
@@ -24,11 +24,15 @@ PROPERTIES = {
 class Drop(Parameters):
     """A drop that starts as a cube on a wall: uniform, or a round pad in the solder mask (with ``pad_radius``).
 
+    A wall with hysteresis has ``receding_angle`` and ``advancing_angle`` in the place of ``contact_angle``. Without any
+    angle there is no wall: the drop is free and becomes a sphere.
     Resolution: ``spacing`` or ``particles_per_edge`` of the cube, not both; 11 per edge if neither is given.
     """
 
     volume: Annotated[float, "mm^3"] = Field(gt=0)
-    contact_angle: Annotated[float, "deg"] = Field(gt=0, lt=PI)
+    contact_angle: Annotated[float | None, "deg"] = Field(None, gt=0, lt=PI)
+    receding_angle: Annotated[float | None, "deg"] = Field(None, gt=0, lt=PI)
+    advancing_angle: Annotated[float | None, "deg"] = Field(None, gt=0, lt=PI)
     pad_radius: Annotated[float | None, "mm"] = Field(None, gt=0)
     mask_contact_angle: Annotated[float, "deg"] = Field(2.5830872929, gt=0, lt=PI)
     spacing: Annotated[float | None, "mm"] = Field(None, gt=0)
@@ -57,9 +61,23 @@ class Drop(Parameters):
         return self.pad_radius or inf
 
     @property
-    def angle_limits(self) -> tuple[float, float]:
-        """Contact angles of pad and mask [rad]."""
-        return self.contact_angle, self.mask_contact_angle
+    def hysteresis(self) -> tuple[float, float] | None:
+        """Receding and advancing angle [rad] of a wall with hysteresis."""
+        if self.receding_angle is None or self.advancing_angle is None:
+            return None
+        return self.receding_angle, self.advancing_angle
+
+    @property
+    def is_free(self) -> bool:
+        """Whether there is no wall."""
+        return self.contact_angle is None and self.hysteresis is None
+
+    @property
+    def contact_angles(self) -> dict[str, float]:
+        """Contact angles as the solder has them [rad]: of pad and mask."""
+        if self.contact_angle is None:
+            return {}
+        return {"pad_contact_angle": self.contact_angle, "mask_contact_angle": self.mask_contact_angle}
 
 
 class Joint(Parameters):
@@ -85,13 +103,26 @@ class Joint(Parameters):
         return self.spacing
 
     @property
-    def angle_limits(self) -> tuple[float, float]:
-        """Contact angles of pad and mask [rad]."""
-        return self.pad_contact_angle, self.mask_contact_angle
+    def contact_angles(self) -> dict[str, float]:
+        """Contact angles as the solder has them [rad]: of pad and mask."""
+        return {"pad_contact_angle": self.pad_contact_angle, "mask_contact_angle": self.mask_contact_angle}
 
 
-class Fluid(Parameters):
-    """Molten solder by the name of a set of properties; a single value given here overrides that of the set.
+class Scene(Protocol):
+    """What the solver has to know of a scene besides its geometry: volume [m^3], contact angles [rad], spacing [m]."""
+
+    @property
+    def volume(self) -> float: ...  # noqa: D102
+
+    @property
+    def contact_angles(self) -> dict[str, float]: ...  # noqa: D102
+
+    @property
+    def resolution(self) -> float: ...  # noqa: D102
+
+
+class Liquid(Parameters):
+    """A liquid by the name of a set of properties; a single value given here overrides that of the set.
 
     The set physical is SAC solder; paper is what Hu et al. print, with 10 times the surface tension and 100 times
     the viscosity.
@@ -101,26 +132,39 @@ class Fluid(Parameters):
     density: Annotated[float | None, "kg/m^3"] = Field(None, gt=0)
     surface_tension: Annotated[float | None, "N/m"] = Field(None, gt=0)
     viscosity: Annotated[float | None, "Pa*s"] = Field(None, gt=0)
+
+    @property
+    def properties(self) -> dict[str, float]:
+        """Density, surface tension and viscosity."""
+        own = {name: getattr(self, name) for name in PROPERTIES["physical"] if getattr(self, name) is not None}
+        return PROPERTIES[self.parameters] | own
+
+
+class Fluid(Liquid):
+    """Molten solder by the name of a set of properties; a single value given here overrides that of the set.
+
+    The set physical is SAC solder; paper is what Hu et al. print, with 10 times the surface tension and 100 times
+    the viscosity.
+    """
+
     gravity: Annotated[float, "m/s^2"] = Field(9.81, ge=0)
     process_time: Annotated[float, "s"] = Field(60.0, gt=0)
     effects: FlowEffects = FlowEffects()
     numerics: FlowNumerics = FlowNumerics()
 
-    def resolve(self, scene: Drop | Joint, gravity: Switch) -> Solder:
+    def resolve(self, scene: Scene, gravity: Switch) -> Solder:
         """Return the solder of a scene, with the set's properties where none are given.
 
         Args:
             scene: volume and contact angles.
             gravity: whether gravity acts.
         """
-        own = {name: getattr(self, name) for name in PROPERTIES["physical"] if getattr(self, name) is not None}
         return Solder(
             volume=scene.volume,
-            pad_contact_angle=scene.angle_limits[0],
-            mask_contact_angle=scene.angle_limits[1],
             gravity=self.gravity,
             process_time=self.process_time,
             effects=SolderEffects(gravity=gravity, **self.effects.model_dump()),
             numerics=SolderNumerics(spacing=scene.resolution, **self.numerics.model_dump()),
-            **PROPERTIES[self.parameters] | own,
+            **scene.contact_angles,
+            **self.properties,
         )

@@ -56,7 +56,7 @@ class Meridian:
     @property
     def height(self) -> float:
         """Height [m]."""
-        return float(self.z.max())
+        return float(np.ptp(self.z))
 
 
 def joint_meridian(  # noqa: PLR0913 - six physical numbers define a joint
@@ -203,6 +203,13 @@ def sessile_meridian(volume: float, contact_angle: float, surface_tension: float
     return Meridian(
         r[::-1] * length, (height - depth[::-1]) * length, float(pressure), 0.0, contact_angle, float("nan")
     )
+
+
+def sphere_meridian(volume: float, surface_tension: float) -> Meridian:
+    """Meridian of a free drop about the origin: volume [m^3], surface tension gamma [N/m]."""
+    radius, psi = float(np.cbrt(3.0 * volume / (4.0 * np.pi))), np.linspace(0.0, np.pi, SAMPLES)
+    pressure = 2.0 * surface_tension / radius
+    return Meridian(radius * np.sin(psi), -radius * np.cos(psi), pressure, 0.0, float("nan"), float("nan"))
 
 
 def pad_meridian(

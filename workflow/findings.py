@@ -14,6 +14,9 @@ SCALED_JACOBIAN = 0.2
 STRESS_ERROR = 0.10  # of the critical joint's von Mises history, two-scale against DNS, relative L2
 
 DROP_ERROR = 0.01  # of a drop's height and width, against the Young-Laplace shape
+PRESSURE_ERROR = 0.005  # of a drop's mean pressure, against the Young-Laplace shape
+PRESSURE_SCATTER = 0.01  # of the pressures in a drop, over the capillary pressure
+ANGLE_EXCESS = 3.0  # of contact angles beyond the receding and the advancing one [deg]
 JOINT_ERROR = 0.005  # of a joint's width and waist, against the Young-Laplace shape
 AXIAL_FORCE_ERROR = 0.02  # of a joint, against the Young-Laplace shape, over pi times radius times surface tension
 CAPILLARY_NUMBER = 1.0e-4  # of the largest speed of a surface at rest
@@ -93,7 +96,13 @@ def of_reflow(joints: Records, effects: Mapping[str, Any]) -> Findings:
 
 def of_drop(metrics: Numbers, verdict: str, effects: Mapping[str, Any]) -> Findings:
     """Judge a drop by volume, rest and the Young-Laplace shape; overflow is no failure, but said."""
-    limits = {"height_error": DROP_ERROR, "max_width_error": DROP_ERROR}
+    limits = {
+        "height_error": DROP_ERROR,
+        "max_width_error": DROP_ERROR,
+        "mean_pressure_error": PRESSURE_ERROR,
+        "pressure_scatter": PRESSURE_SCATTER,
+        "contact_angle_excess": ANGLE_EXCESS,
+    }
     return Findings(_known(metrics) | {"verdict": metric(verdict)}, _at_rest(metrics, limits), dict(effects))
 
 

@@ -47,10 +47,10 @@ def _particles(outlook: SceneForecast) -> Table:
     table.add_row("particles", f"{outlook.particles}", f"{1e6 * outlook.spacing:.3g} um apart at the start")
     table.add_row("scheme", outlook.scheme, SCHEMES[outlook.scheme])
     table.add_row(
-        "capillary limit", nano(outlook.capillary_limit), "time step at which explicit surface tension breaks"
+        "capillary limit", short(outlook.capillary_limit), "time step at which explicit surface tension breaks"
     )
     ratio = outlook.largest_step / outlook.capillary_limit
-    table.add_row("largest time step", nano(outlook.largest_step), f"{ratio:g} times the limit")
+    table.add_row("largest time step", short(outlook.largest_step), f"{ratio:g} times the limit")
     return table
 
 
@@ -117,7 +117,7 @@ def _sizes(outlook: Forecast) -> Table:
         remark = "macro model" if name == MACRO else "meso model"
         if part.mass_scaled:
             remark += "; mass scaled to the smallest step of the others"
-        table.add_row(name, f"{part.elements}", nano(part.critical_step), remark)
+        table.add_row(name, f"{part.elements}", short(part.critical_step), remark)
     total = sum(part.elements for part in outlook.parts.values())
     table.add_row("all", f"{total}", "", "", style="bold")
     table.caption = f"{outlook.joints} joints, {outlook.distinct} of them distinct, {particles} particles each"
@@ -128,8 +128,8 @@ def _sizes(outlook: Forecast) -> Table:
 def _shock(case: BoardDropCase, outlook: Forecast) -> Table:
     shock, every = outlook.shock, case.shock.ranks.macro + case.shock.ranks.meso
     table = _table("\nShock", "what", "value", "remark")
-    table.add_row("window", nano(shock.window), f"step of the macro model, {shock.windows} windows")
-    table.add_row("step ratio m", f"{shock.substeps}", f"meso step {nano(shock.window / shock.substeps)}")
+    table.add_row("window", short(shock.window), f"step of the macro model, {shock.windows} windows")
+    table.add_row("step ratio m", f"{shock.substeps}", f"meso step {short(shock.window / shock.substeps)}")
     table.add_row("two-scale", f"about {duration(shock.two_scale)}", _placement(case) + _absent("two_scale", case))
     table.add_row("DNS", f"about {duration(shock.dns)}", f"all {every} ranks on one model" + _absent("dns", case))
     table.add_row("two-scale / DNS", f"{shock.two_scale / shock.dns:.2f}", "predicted ratio of wall times")
@@ -158,6 +158,7 @@ def duration(seconds: float) -> str:
     return f"{seconds:.2g} s" if seconds < 100 else f"{seconds / 60:.2g} min"
 
 
-def nano(seconds: float) -> str:
-    """Write a time step."""
-    return f"{1e9 * seconds:.3g} ns"
+def short(seconds: float) -> str:
+    """Write a time step in the unit that makes its figure readable."""
+    factor, unit = next(((f, u) for f, u in ((1e9, "ns"), (1e6, "us")) if f * seconds < 1e3), (1e3, "ms"))
+    return f"{factor * seconds:.3g} {unit}"

@@ -13,6 +13,7 @@ from workflow.report_pictures import new_plotter, save
 from workflow.report_tables import number, percent, quantity
 
 WORK_PRECISION = CASES / "sessile_drop" / "work_precision.json"
+SMALLEST_RANGE = 0.01
 HEADLINE = ("height", "max_width", "waist", "contact_angle", "max_width_error", "verdict", "particles", "seconds")
 
 
@@ -106,12 +107,20 @@ def render_body(shape, picture: Path) -> None:
     cloud = pyvista.PolyData(after)
     cloud["pressure [Pa]"] = shape.pressure
     bar = {"vertical": True, "position_x": 0.9, "position_y": 0.25, "height": 0.5, "color": "black", "n_labels": 3}
-    plotter.add_mesh(cloud, scalars="pressure [Pa]", cmap="viridis", scalar_bar_args=bar | {"fmt": "%.0f"}, **size)
+    limits, bar = _colour_limits(shape.pressure), bar | {"fmt": "%.4g"}
+    plotter.add_mesh(cloud, scalars="pressure [Pa]", cmap="viridis", clim=limits, scalar_bar_args=bar, **size)
     plotter.camera_position = [(-0.5 * gap, -10.0, 4.0), (-0.5 * gap, 0.0, 0.0), (0.0, 0.0, 1.0)]
     plotter.enable_parallel_projection()
     plotter.reset_camera()
     plotter.camera.zoom(1.2)
     save(plotter, picture)
+
+
+def _colour_limits(pressure: np.ndarray) -> tuple[float, float]:
+    """Range of the colours: that of the values, at least one per cent about the mean, so that equal ones look equal."""
+    mean = float(pressure.mean())
+    low, high = float(pressure.min()), float(pressure.max())
+    return min(low, mean - SMALLEST_RANGE * abs(mean)), max(high, mean + SMALLEST_RANGE * abs(mean))
 
 
 def _text(name: str, metric: dict) -> str:

@@ -30,13 +30,13 @@ class SceneForecast:
 
 def forecast_scene(case: DropCase | JointCase) -> SceneForecast:
     """Predict effects, size, time step and cost."""
-    from particles.effects import decide, decide_effects, drop_numbers
+    from particles.effects import decide_drop, decide_effects
     from particles.estimate import drop_seconds, particle_count, reflow_seconds
     from particles.time_step import capillary_limit
 
     solder = case.molten
     if isinstance(case, DropCase):
-        effects, particles = decide(drop_numbers(solder), solder), case.drop.count**3
+        effects, particles = decide_drop(solder, case.drop.is_free), case.drop.count**3
         seconds = drop_seconds(case.drop.count)
     else:
         effects, particles = decide_effects(case.joint.geometry, solder), particle_count(solder, case.joint.geometry)

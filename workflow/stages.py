@@ -98,21 +98,17 @@ def shock(run: Run[BoardDropCase], folder: Path) -> Findings:
 
 
 def reflow_drop(run: Run[DropCase], folder: Path) -> Findings:
-    """Melt a cube of solder on a wall or pad."""
+    """Melt a cube of solder on a wall or pad, or without a wall."""
     from particles.checkpoint import Checkpoint
-    from particles.effects import acting_weight, decide, drop_numbers
-    from particles.metrics import reference_drop
+    from particles.drop_at_rest import drop_to_rest
     from particles.products import write_body
-    from particles.sessile import drop_shape, solve_drop
 
     drop, solder = run.case.drop, run.case.molten
     checkpoint = Checkpoint(run.checkpoints("reflow") / "drop", (drop, solder))
     with progress_bar(f"reflow of {drop.count**3} particles") as progress:
-        flow, solved = solve_drop(solder, drop.count, drop.edge_radius, progress, checkpoint)
-    shape = drop_shape(solder, drop.edge_radius, flow, solved)
-    effects = decide(drop_numbers(solder), solder)
-    write_body(folder, shape, reference_drop(solder, drop.edge_radius, acting_weight(solder, effects)))
-    found = findings.of_drop(shape.metrics, shape.verdict, effects)
+        result = drop_to_rest(drop, solder, progress, checkpoint)
+    write_body(folder, result.shape, result.reference)
+    found = findings.of_drop(result.shape.metrics, result.shape.verdict, result.effects)
     return replace(found, continued="the drop" if checkpoint.continued else "")
 
 

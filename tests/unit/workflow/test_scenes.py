@@ -13,7 +13,9 @@ from workflow.problems import CaseError
 from workflow.schema import case_schema
 
 CASES = Path(__file__).resolve().parents[3] / "cases"
-DROP, BALL, JOINT = (CASES / name / "case.toml" for name in ("sessile_drop", "bga_ball", "solder_joint"))
+DROP, BALL, JOINT, FREE = (
+    CASES / name / "case.toml" for name in ("sessile_drop", "bga_ball", "solder_joint", "laplace_drop")
+)
 BAD_VALUES = {
     "angle of a full turn": (DROP, "drop.contact_angle=190 deg", ['"190 deg"', "out of range", "< 180 deg"]),
     "angle of zero": (DROP, "drop.contact_angle=0 deg", ["drop.contact_angle", "> 0 deg"]),
@@ -27,6 +29,11 @@ BAD_VALUES = {
     "pad that repels": (BALL, "drop.contact_angle=150 deg", ["drop.contact_angle", "< 148 deg", "better"]),
     "pad too small": (BALL, "drop.pad_radius=0.01 mm", ["drop.pad_radius", '"0.01 mm"', "cannot fit", ">= 0.09"]),
     "volume without end": (JOINT, "joint.volume=1000 mm^3", ["joint.spacing", "cannot fit", ">= "]),
+    "gravity without a wall": (FREE, "gravity=on", ['gravity = "on"', "auto, off", "no wall"]),
+    "pad without an angle": (FREE, "drop.pad_radius=0.01 mm", ["drop.pad_radius", "only with drop.contact_angle"]),
+    "angle and hysteresis": (DROP, "drop.advancing_angle=90 deg", ["drop.advancing_angle", "or drop.contact_angle"]),
+    "half a hysteresis": (FREE, "drop.receding_angle=30 deg", ["drop.receding_angle", '"30 deg"', "alone"]),
+    "advancing angle out of range": (FREE, "drop.advancing_angle=181 deg", ['"181 deg"', "< 180 deg"]),
     "too coarse": (JOINT, "joint.spacing=0.3 mm", ["joint.spacing", '"0.3 mm"', "too coarse", "<= 0.1"]),
     "offset past the pad": (JOINT, "joint.offset=0.5 mm", ["joint.offset", "< 0.48 mm", "do not overlap"]),
 }
@@ -55,6 +62,11 @@ def test_a_spacing_larger_than_the_drop(tmp_path):
     path.write_text(DROP.read_text().replace("particles_per_edge = 11", 'spacing = "2 mm"'))
     text = problems_of(path)
     assert 'drop.spacing = "2 mm"' in text and "cube of 1 mm" in text and "<= 0.25 mm" in text
+
+
+def test_a_receding_angle_above_the_advancing_one():
+    text = problems_of(FREE, "drop.receding_angle=80 deg", "drop.advancing_angle=60 deg")
+    assert 'drop.receding_angle = "80 deg"' in text and "< 60 deg" in text
 
 
 def test_a_file_of_no_kind_names_the_nearest(tmp_path):
