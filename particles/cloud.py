@@ -1,6 +1,6 @@
 """Body-fitted initial clouds: particles of which the first ones are the vertices of a triangulated free surface."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
@@ -14,6 +14,8 @@ from particles.surface_measure import enclosed_volume
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int32]
 Lengths = TypeVar("Lengths", float, Floats)
+
+LARGEST_BULGE = 0.5 * np.sqrt(3.0)  # of a double cone beyond its discs, over the gap
 
 
 class TooLittleSolder(ValueError):
@@ -45,14 +47,15 @@ class Cloud:
 
 def equal_area_radius(radius: Lengths, corners: Lengths) -> Lengths:
     """Radius of the corners of a regular polygon that has the area of the disc [m]; of several, given arrays."""
-    return radius * np.sqrt(2.0 * np.pi / (corners * np.sin(2.0 * np.pi / corners)))
+    return radius / np.sqrt(np.sinc(2.0 / corners))
 
 
 def joint_cloud(geometry: JointGeometry, volume: float, spacing: float) -> Cloud:
     """Fill a double cone of a given volume between two discs.
 
     The radius changes linearly from the board's disc to the middle and on to the package's disc: a shape that
-    meets both contact lines and has the right volume, but is no equilibrium.
+    meets both contact lines and has the right volume, but is no equilibrium. It is not steeper than 60 degrees off the
+    vertical, where its surface would pass through the plates as it rounds off: more solder starts on the mask.
 
     Args:
         geometry: gap and radii of the wetted discs.
@@ -63,9 +66,13 @@ def joint_cloud(geometry: JointGeometry, volume: float, spacing: float) -> Cloud
         TooLittleSolder: the volume is too small for a double cone that does not rupture.
     """
     ring_count, layer_count = joint_counts(geometry, volume, spacing)
+    steepest = LARGEST_BULGE * geometry.gap
 
     def place(bulge: float) -> Cloud:
-        return _stack(geometry, (ring_count, layer_count), bulge, spacing)
+        beyond = max(0.0, bulge - steepest)
+        board, package = geometry.radius_board + beyond, geometry.radius_package + beyond
+        wetted = replace(geometry, radius_board=board, radius_package=package)
+        return _stack(wetted, (ring_count, layer_count), bulge - beyond, spacing)
 
     def excess(bulge: float) -> float:
         return _volume(place(bulge)) - volume

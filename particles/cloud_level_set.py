@@ -1,9 +1,11 @@
 """Clouds built from a level set: where liquids merge, the surface and the particles below it are made anew."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
-from particles.cloud import Cloud
+from particles.cloud import Cloud, equal_area_radius
 from particles.level_set import LevelSet
 from particles.plate import Plate
 from particles.surface_measure import volume_and_gradient
@@ -13,43 +15,53 @@ Floats = NDArray[np.float64]
 Indices = NDArray[np.int32]
 
 DEPTH = 0.75
+SNAP_SPACINGS = 0.5  # the net rounds the edge between a surface and its mirror image by less
 VOLUME_PASSES = 4
 
 
-def cloud_from_level_set(level: LevelSet, volume: float, on_wall: bool) -> Cloud:
+def cloud_from_level_set(level: LevelSet, volume: float, walls: Sequence[Plate]) -> Cloud:
     """Fill a level set with particles a node spacing apart.
 
     Args:
-        level: negative in the liquid; with a wall it is symmetric about z = 0 and only z >= 0 is filled. Where the
-            liquid wets the wall in several places, or leaves dry spots, each of their contact lines has a plate.
+        level: negative in the liquid, symmetric about each wall; only what is between the walls is filled. Where the
+            liquid wets a wall in several places, or leaves dry spots, each of their contact lines has a plate. Lines
+            near the edge of a pad are put on it.
         volume: volume of the liquid, kept exactly [m^3].
-        on_wall: whether the liquid stands on the wall z = 0.
+        walls: horizontal plates that the liquid stands on, hangs from, or both, the lower one first.
     """
     points, triangles = extract_surface(level)
-    rings: tuple[Indices, ...] = ()
-    if on_wall:
-        points, triangles, rings = _above(points, triangles, 1e-6 * level.grid.spacing)
+    points, triangles = _between(points, triangles, walls, 1e-6 * level.grid.spacing)
+    contacts = [(ring, plate) for plate in walls for ring in _loops(points, triangles, plate)]
+    rings, plates = tuple(ring for ring, _ in contacts), tuple(plate for _, plate in contacts)
     points, triangles = relax(level, points, triangles, rings)
-    plates = (Plate.horizontal(0.0),) * len(rings)
-    points = _with_volume(points, triangles, (rings, plates), volume)
-    below = _interior(level, on_wall)
+    on_edge = [_snap(points, ring, plate, level.grid.spacing) for ring, plate in contacts]
+    points = _with_volume(points, triangles, (rings, plates, on_edge), volume)
+    below = _interior(level, walls)
     wall = np.full(len(points) + len(below), -1, np.int8)
-    wall[len(points) :][below[:, 2] == 0.0] = 0
-    for number, ring in enumerate(rings):
+    for number, (ring, plate) in reversed(list(enumerate(contacts))):
+        wall[len(points) :][below[:, 2] == plate.origin[2]] = number
         wall[ring] = number
     everything = np.concatenate((points, below))
     return Cloud(everything, len(points), triangles, rings, plates, wall, level.grid.spacing)
 
 
-def _above(points: Floats, triangles: Indices, tolerance: float) -> tuple[Floats, Indices, tuple[Indices, ...]]:
-    """Keep the upper half of a surface that is symmetric about z = 0, and the loops along which it ends there."""
-    kept = triangles[(points[triangles, 2] > -tolerance).all(axis=1)]
+def _between(points: Floats, triangles: Indices, walls: Sequence[Plate], tolerance: float) -> tuple[Floats, Indices]:
+    """Keep the part of a symmetric surface on the liquid's side of each wall, its edges exactly in the wall."""
+    inside = np.ones(len(points), bool)
+    for plate in walls:
+        height = plate.side * (points[:, 2] - plate.origin[2])
+        inside &= height < tolerance
+        points[np.abs(height) <= tolerance, 2] = plate.origin[2]
+    kept = triangles[inside[triangles].all(axis=1)]
     used, renumbered = np.unique(kept, return_inverse=True)
-    points, kept = points[used], renumbered.reshape(-1, 3).astype(np.int32)
-    rings = boundary_loops(kept)
-    for ring in rings:
-        points[ring, 2] = 0.0
-    return points, kept, rings
+    return points[used], renumbered.reshape(-1, 3).astype(np.int32)
+
+
+def _loops(points: Floats, triangles: Indices, plate: Plate) -> list[Indices]:
+    """The contact lines on a plate, those around liquid counter-clockwise seen from +z."""
+    loops = boundary_loops(triangles)
+    on_plate = [loop for loop in loops if points[loop[0], 2] == plate.origin[2]]
+    return [loop if plate.side < 0.0 else loop[::-1].copy() for loop in on_plate]
 
 
 def boundary_loops(triangles: Indices) -> tuple[Indices, ...]:
@@ -66,23 +78,46 @@ def boundary_loops(triangles: Indices) -> tuple[Indices, ...]:
     return tuple(loops)
 
 
+def _snap(points: Floats, ring: Indices, plate: Plate, spacing: float) -> Indices:
+    """Put vertices of a contact line that are near the edge of a pad on it; return them."""
+    local, caught = plate.local(points[ring]), np.zeros(len(ring), bool)
+    for pad in plate.pads:
+        edge = equal_area_radius(pad.radius, pad.corners(spacing))
+        offset = local[:, :2] - pad.centre
+        radius = np.linalg.norm(offset, axis=1)
+        near = np.abs(radius - edge) < SNAP_SPACINGS * spacing
+        local[near, :2] = pad.centre + (edge / radius[near])[:, None] * offset[near]
+        caught |= near
+    points[ring] = plate.place(local)
+    return ring[caught]
+
+
 def _with_volume(
-    points: Floats, triangles: Indices, walls: tuple[tuple[Indices, ...], tuple[Plate, ...]], volume: float
+    points: Floats,
+    triangles: Indices,
+    walls: tuple[tuple[Indices, ...], tuple[Plate, ...], list[Indices]],
+    volume: float,
 ) -> Floats:
-    """Move the surface along its normals by one distance until it encloses the volume."""
+    """Move the surface along its normals by one distance until it encloses the volume, but not what is on an edge."""
+    rings, plates, on_edge = walls
     for _ in range(VOLUME_PASSES):
-        enclosed, gradient = volume_and_gradient(points, triangles, *walls)
-        for ring in walls[0]:
+        enclosed, gradient = volume_and_gradient(points, triangles, rings, plates)
+        for ring in rings:
             gradient[ring, 2] = 0.0
         normal = gradient / np.linalg.norm(gradient, axis=1)[:, None]
+        for held in on_edge:
+            normal[held] = 0.0
         points = points + (volume - enclosed) / (gradient * normal).sum() * normal
     return points
 
 
-def _interior(level: LevelSet, on_wall: bool) -> Floats:
-    """Points of a cubic lattice deeper than three quarters of a spacing, `(m, 3)` [m]; with a wall, some are on it."""
-    axes = level.grid.axes()
-    if on_wall:
-        axes[2] = level.grid.spacing * np.arange(level.grid.counts[2] // 2)
+def _interior(level: LevelSet, walls: Sequence[Plate]) -> Floats:
+    """Points of a cubic lattice deeper than three quarters of a spacing, `(m, 3)` [m]; with walls, some are on them."""
+    axes, spacing = level.grid.axes(), level.grid.spacing
+    heights = [plate.origin[2] for plate in walls]
+    if len(walls) == 1:
+        axes[2] = heights[0] - walls[0].side * spacing * np.arange(len(axes[2]))
+    elif len(walls) == 2:
+        axes[2] = np.linspace(heights[0], heights[1], 1 + round((heights[1] - heights[0]) / spacing))
     lattice = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
-    return lattice[level.at(lattice) < -DEPTH * level.grid.spacing]
+    return lattice[level.at(lattice) < -DEPTH * spacing]

@@ -27,15 +27,24 @@ class Grid:
     counts: tuple[int, int, int]
 
     @classmethod
-    def around(cls, points: Floats, spacing: float) -> "Grid":
+    def around(cls, points: Floats, spacing: float, walls: Sequence[float] = (0.0,)) -> "Grid":
         """Cover points `(n, 3)` with two nodes to spare.
 
-        The plane z = 0 lies midway between nodes: the net of a surface that is symmetric about it has vertices in it.
+        Walls lie midway between nodes: the net of a surface that is symmetric about one has vertices in it.
+
+        Args:
+            points: what to cover [m].
+            spacing: of the nodes [m]; between two walls the nearest one that divides their distance.
+            walls: heights of one or two horizontal walls [m].
         """
-        first = np.floor(points.min(axis=0) / spacing) - 2.0
-        last = np.ceil(points.max(axis=0) / spacing) + 2.0 + np.array([0.0, 0.0, 1.0])
+        if len(walls) == 2:
+            gap = walls[1] - walls[0]
+            spacing = gap / round(gap / spacing)
+        datum = np.array([0.0, 0.0, walls[0]])
+        first = np.floor((points.min(axis=0) - datum) / spacing) - 2.0
+        last = np.ceil((points.max(axis=0) - datum) / spacing) + 2.0 + np.array([0.0, 0.0, 1.0])
         x, y, z = (last - first).astype(int) + 1
-        return cls((first - np.array([0.0, 0.0, 0.5])) * spacing, spacing, (int(x), int(y), int(z)))
+        return cls(datum + (first - np.array([0.0, 0.0, 0.5])) * spacing, spacing, (int(x), int(y), int(z)))
 
     def axes(self) -> list[Floats]:
         """Coordinates of the nodes along each axis [m]."""
@@ -78,6 +87,12 @@ def signed_distance(points: Floats, triangles: Indices, grid: Grid) -> LevelSet:
     surface = pyvista.PolyData.from_regular_faces(points, triangles)
     values = nodes.compute_implicit_distance(surface)["implicit_distance"]
     return LevelSet(grid, np.asarray(values).reshape(grid.counts, order="F"))
+
+
+def depths(points: Floats, surface: tuple[Floats, Indices]) -> Floats:
+    """How deep points `(n, 3)` are inside a closed surface, negative outside, `(n,)` [m]; arguments as above."""
+    closed = pyvista.PolyData.from_regular_faces(*surface)
+    return -np.asarray(pyvista.PolyData(points).compute_implicit_distance(closed)["implicit_distance"])
 
 
 def smooth_union(parts: Sequence[LevelSet], reach: float) -> LevelSet:

@@ -82,6 +82,16 @@ def open_metrics(geometry: JointGeometry, solder: Solder, flow: LiquidFlow, run:
     return own | {"standoff": (geometry.gap, "m"), "axial_force": (0.0, "N")}
 
 
+def bridge_metrics(gap: float, solder: Solder, flow: LiquidFlow, run: Run) -> Metrics:
+    """Collect the numbers of joints that became one body between plates a gap apart [m]: name to SI value and unit.
+
+    The volume of the solder is that of all joints together.
+    """
+    length = float(np.ptp(flow.body.points[:, 0]))
+    shape: Metrics = {"standoff": (gap, "m"), "length": (length, "m"), "axial_force": (axial_force(flow), "N")}
+    return _volume(solder, flow) | shape | _pressure(solder, flow, run, None) | _cost_and_rest(solder, flow, run)
+
+
 def _weight(flow: LiquidFlow) -> float:
     """Weight of the unit volume that acts [N/m^3]; zero without gravity."""
     return sum(force.weight for force in flow.physics.forces if isinstance(force, Gravity))
@@ -156,7 +166,8 @@ def _joint_errors(solder: Solder, flow: LiquidFlow, run: Run, reference: Meridia
 def axial_force(flow: LiquidFlow) -> float:
     """Force of the liquid on the package along +z [N]."""
     others = tuple(force for force in flow.physics.forces if not isinstance(force, Wetting))
-    return float(plate_wrench(flow.body, others, 1)[2])
+    on_package = [wall for wall, plate in enumerate(flow.body.plates) if plate.side > 0.0]
+    return float(sum(plate_wrench(flow.body, others, wall)[2] for wall in on_package))
 
 
 def _pressure(solder: Solder, flow: LiquidFlow, run: Run, reference: Meridian | None) -> Metrics:

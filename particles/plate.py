@@ -26,6 +26,10 @@ class Pad:
     radius: float
     angle: float
 
+    def corners(self, spacing: float) -> float:
+        """Vertices a spacing [m] apart around its edge, no whole number."""
+        return 2.0 * np.pi * self.radius / spacing
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Plate:

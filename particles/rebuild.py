@@ -10,6 +10,7 @@ from scipy.spatial import cKDTree
 from particles.body import Body
 from particles.cloud_level_set import cloud_from_level_set
 from particles.level_set import Grid, LevelSet, signed_distance, smooth_union
+from particles.plate import Plate
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int32]
@@ -23,7 +24,7 @@ LOWEST_QUALITY = 0.25
 
 
 class CannotRebuild(ValueError):
-    """Bodies on walls that a new surface cannot meet."""
+    """Bodies on walls that a common surface cannot meet."""
 
 
 def touch(first: Body, second: Body) -> bool:
@@ -56,46 +57,58 @@ def rebuild(*bodies: Body) -> Body:
     """Make bodies one, with new particles, their volume and momentum; the pressures are those of a body at rest.
 
     Args:
-        bodies: one body, or some that touch, all free or all on the wall z = 0.
+        bodies: one body, or some that touch, all free, on the same wall, or between the same two walls.
 
     Raises:
-        CannotRebuild: a body between two walls, on a wall elsewhere, or some free and some on a wall.
+        CannotRebuild: a wall is not horizontal, or the bodies are not on the same walls.
     """
-    places = {_on_wall(body) for body in bodies}
-    if len(places) > 1:
-        raise CannotRebuild("a free drop and a drop on a wall cannot merge")
+    walls = _common_walls(bodies)
     spacing = min(body.cloud.spacing for body in bodies)
+    inside = np.concatenate([body.points for body in bodies])
+    grid = Grid.around(inside, spacing, [plate.origin[2] for plate in walls] or (0.0,))
     surfaces = [closed_surface(body) for body in bodies]
-    grid = Grid.around(np.concatenate([points for points, _ in surfaces]), spacing)
     union = smooth_union([signed_distance(*surface, grid) for surface in surfaces], NECK_SPACINGS * spacing)
     if any(_contact_lines_meet(body) for body in bodies):
         union = LevelSet(grid, union.values - CLOSING_SPACINGS * spacing)
     volume = sum(body.volume()[0] for body in bodies)
-    result = Body.at_rest(cloud_from_level_set(union, volume, places.pop()))
+    result = Body.at_rest(cloud_from_level_set(union, volume, walls))
     result.velocity = _common_velocity(result, bodies)
     return result
 
 
 def closed_surface(body: Body) -> tuple[Floats, Indices]:
-    """Closed surface of a body: points `(n, 3)` [m] and triangles; on a wall with its mirror image below."""
+    """Surface of a body, with its mirror image behind each wall: points `(n, 3)` [m] and triangles.
+
+    It is closed on one wall; between two it ends far behind them.
+    """
     count, triangles = body.cloud.surface_count, body.triangles
-    points = body.points[:count]
-    if not body.cloud.rings:
-        return points.copy(), triangles
-    image = count + np.arange(count, dtype=np.int32)
-    for ring in body.cloud.rings:
-        image[ring] = ring
-    mirrored = points * np.array([1.0, 1.0, -1.0])
-    return np.concatenate((points, mirrored)), np.concatenate((triangles, image[triangles][:, ::-1]))
+    points, faces = [body.points[:count]], [triangles]
+    for plate in _walls(body):
+        image = count * len(points) + np.arange(count, dtype=np.int32)
+        for ring, under in zip(body.cloud.rings, body.plates, strict=True):
+            if under.side == plate.side:
+                image[ring] = ring
+        mirrored = points[0] * np.array([1.0, 1.0, -1.0]) + 2.0 * plate.origin * np.array([0.0, 0.0, 1.0])
+        points.append(mirrored)
+        faces.append(image[triangles][:, ::-1])
+    return np.concatenate(points), np.concatenate(faces)
 
 
-def _on_wall(body: Body) -> bool:
-    """Whether a body stands on the wall z = 0; else it is free."""
-    if not body.plates:
-        return False
-    if any(plate.origin[2] != 0.0 or plate.normal[2] != 1.0 for plate in body.plates):
-        raise CannotRebuild("only free drops and drops on the wall z = 0 can be rebuilt, not joints")
-    return True
+def _walls(body: Body) -> tuple[Plate, ...]:
+    """The walls that a body is on, the lower one first; contact lines on the same wall have plates of their own."""
+    if any(plate.normal[2] != 1.0 for plate in body.plates):
+        raise CannotRebuild("only bodies on horizontal walls can be rebuilt")
+    by_side = {plate.side: plate for plate in reversed(body.plates)}
+    return tuple(by_side[side] for side in sorted(by_side))
+
+
+def _common_walls(bodies: Sequence[Body]) -> tuple[Plate, ...]:
+    """The walls of bodies that are to become one."""
+    first, *others = [_walls(body) for body in bodies]
+    places = [[(plate.side, plate.origin[2]) for plate in walls] for walls in (first, *others)]
+    if any(place != places[0] for place in places[1:]):
+        raise CannotRebuild("only bodies that are free, or on the same walls, can become one")
+    return first
 
 
 def _common_velocity(body: Body, parts: Sequence[Body]) -> Floats:

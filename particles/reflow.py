@@ -101,6 +101,16 @@ def contact_line(cloud: Cloud, wall: int, radius: float, solder: Solder) -> Cont
     return ContactLine(wall, (pad,), solder.mask_contact_angle, local, np.array([len(ring)]))
 
 
+def pad_lines(cloud: Cloud, solder: Solder) -> tuple[ContactLine, ...]:
+    """Set up the contact lines of a body made anew, on plates that know their pads."""
+    lines = []
+    for wall, (ring, plate) in enumerate(zip(cloud.rings, cloud.plates, strict=True)):
+        corners = np.array([pad.corners(cloud.spacing) for pad in plate.pads])
+        local = plate.local(cloud.points[ring])
+        lines.append(ContactLine(wall, plate.pads, solder.mask_contact_angle, local, corners))
+    return tuple(lines)
+
+
 def start_flow(cloud: Cloud, solder: Solder, effects: dict[str, bool], lines: tuple[ContactLine, ...]) -> LiquidFlow:
     """Set up a flow from rest, with only the effects that are on."""
     limit = capillary_limit(solder.density, cloud.spacing, solder.surface_tension)

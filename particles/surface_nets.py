@@ -34,15 +34,16 @@ def relax(level: LevelSet, points: Floats, triangles: Indices, rings: Sequence[I
     """Even out the triangles of a surface: tangential smoothing, projection onto the level set, Delaunay flips.
 
     Args:
-        level: level set that is zero on the surface, symmetric about z = 0 if there are rings.
+        level: level set that is zero on the surface, symmetric about the walls.
         points: `(n, 3)` [m].
         triangles: `(t, 3)`.
-        rings: contact lines in the plane z = 0, which stay in it.
+        rings: contact lines, each in a horizontal wall, in which it stays.
     """
+    heights = [points[ring, 2].mean() for ring in rings]
     for _ in range(RELAXATIONS):
         points = project(level, points + smoothing_offsets(points, triangles, len(points), rings))
-        for ring in rings:
-            points[ring, 2] = 0.0
+        for ring, height in zip(rings, heights, strict=True):
+            points[ring, 2] = height
         triangles, _ = flip_to_delaunay(points, triangles, rings)
     return points, triangles
 

@@ -14,6 +14,7 @@ from particles.parameters import Solder
 
 if TYPE_CHECKING:
     from meshing.pads import PadSite
+    from particles.bridges import Contact
     from particles.geometry import JointGeometry
     from particles.shape import JointShape
 
@@ -71,20 +72,54 @@ def joint_records(groups: "Mapping[tuple[str, ...], JointGeometry]", shapes: "Ma
     return records
 
 
-def mark_bridges(records: dict[str, dict], pads: "Sequence[PadSite]", mirrored: bool) -> None:
+def mark_bridges(records: dict[str, dict], pads: "Sequence[PadSite]", mirrored: bool) -> "list[Contact]":
     """Give joints that touch others the verdict "bridged" and the names of those others.
 
     Args:
         records: what `joint_records` returned; changed in place.
         pads: the pad table.
         mirrored: whether the array goes on beyond the planes of symmetry x = 0 and y = 0.
+
+    Returns:
+        The pairs that touch, the largest overlap first.
     """
     from particles.bridges import contacts, neighbours
 
     places = {pad.name: (pad.x, pad.y) for pad in pads}
     widths = {name: records[name]["metrics"]["max_width"]["value"] for name in places}
-    for name, others in neighbours(contacts(places, widths, mirrored)).items():
+    found = contacts(places, widths, mirrored)
+    for name, others in neighbours(found).items():
         records[name] |= {"verdict": "bridged", "touches": others}
+    return found
+
+
+def bridge_shapes(
+    found: "Sequence[Contact]",
+    groups: "Mapping[tuple[str, ...], JointGeometry]",
+    shapes: "Mapping[str, JointShape]",
+    solder: Solder,
+) -> "dict[str, JointShape]":
+    """Flow the two joints that overlap most into one: its shape under both names, "A9+A10"; nothing where none touch.
+
+    Args:
+        found: the pairs that touch, the largest overlap first.
+        groups: names of the joints that are alike -> their geometry.
+        shapes: first of these names -> shape at rest, alone.
+        solder: of one joint.
+    """
+    from particles.bridge import solve_bridge
+
+    geometry_of = {name: geometry for names, geometry in groups.items() for name in names}
+    shape_of = {name: shapes[names[0]] for names in groups for name in names}
+    return {
+        f"{pair.first}+{pair.second}": solve_bridge(
+            [geometry_of[name] for name in (pair.first, pair.second)],
+            [shape_of[name] for name in (pair.first, pair.second)],
+            pair.distance,
+            solder,
+        )
+        for pair in found[:1]
+    }
 
 
 def refuse_joints_without_mesh(records: Mapping[str, dict]) -> None:

@@ -78,6 +78,7 @@ def _add_preview(run_folder: Path, context: dict) -> None:
 def _add_joints(run_folder: Path, context: dict) -> None:
     if (run_folder / "reflow" / "joints.json").exists():
         context["tables"]["verdicts"] = tables.verdicts(run_folder)
+        _add_bridge(run_folder, context)
     path = run_folder / "solder_mesh" / "quality.json"
     if not path.exists():
         return
@@ -91,6 +92,22 @@ def _add_joints(run_folder: Path, context: dict) -> None:
         picture = Path(folder) / "shapes.png"
         render_shapes(run_folder / "surface", joints, picture)
         context["pictures"]["shapes"] = _base64(picture)
+
+
+def _add_bridge(run_folder: Path, context: dict) -> None:
+    """Add the picture of two joints that became one, the only shape under two names."""
+    from particles.products import read_shapes
+    from workflow.report_body import render_body
+
+    for name, shape in read_shapes(run_folder / "reflow" / "shapes.h5").items():
+        if "+" in name:
+            context["bridge_caption"] = (
+                f"{name} as one body: particles and free surface, right by pressure above ambient."
+            )
+            with tempfile.TemporaryDirectory() as folder:
+                picture = Path(folder) / "bridge.png"
+                render_body(shape, picture)
+                context["pictures"]["bridge"] = _base64(picture)
 
 
 def _add_body(run_folder: Path, context: dict, summary: dict) -> None:

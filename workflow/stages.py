@@ -35,18 +35,18 @@ def reflow(run: Run[BoardDropCase], folder: Path) -> Findings:
     from meshing.pads import read_pads
     from particles.effects import decide_effects
     from particles.products import write_shapes
-    from workflow.reflow_pool import distinct_geometries, joint_geometries, joint_records, mark_bridges, solve_joints
+    from workflow import reflow_pool as pool
 
-    pads = read_pads(run.folder / "geometry/pads.json")
-    groups = distinct_geometries(joint_geometries(pads))
+    pads, solder = read_pads(run.folder / "geometry/pads.json"), run.case.solder
+    groups = pool.distinct_geometries(pool.joint_geometries(pads))
     distinct = {names[0]: geometry for names, geometry in groups.items()}
     with progress_bar(f"reflow of {len(distinct)} distinct joints") as progress:
-        shapes, continued = solve_joints(distinct, run.case.solder, run.cores, progress, run.checkpoints("reflow"))
-    write_shapes(folder / "shapes.h5", shapes)
-    joints = joint_records(groups, shapes)
-    mark_bridges(joints, pads, mirrored=run.case.board.symmetry == "quarter")
+        shapes, continued = pool.solve_joints(distinct, solder, run.cores, progress, run.checkpoints("reflow"))
+    joints = pool.joint_records(groups, shapes)
+    touching = pool.mark_bridges(joints, pads, mirrored=run.case.board.symmetry == "quarter")
+    write_shapes(folder / "shapes.h5", shapes | pool.bridge_shapes(touching, groups, shapes, solder))
     write_json(folder / "joints.json", joints)
-    found = findings.of_reflow(joints, decide_effects(next(iter(distinct.values())), run.case.solder))
+    found = findings.of_reflow(joints, decide_effects(next(iter(distinct.values())), solder))
     return replace(found, continued=f"{continued} of {len(distinct)} joints" if continued else "")
 
 

@@ -51,7 +51,7 @@ def test_two_free_drops_become_one_sphere(radii):
     for radius in radii:
         volume = 4.0 / 3.0 * np.pi * radius**3
         level = ball(grid_around_ball((0, 0, 0), radius, spacing), (0, 0, 0), radius)
-        flow = start_flow(cloud_from_level_set(level, volume, on_wall=False), solder, FREE, ())
+        flow = start_flow(cloud_from_level_set(level, volume, ()), solder, FREE, ())
         flow.body.points[:, 0] += place + radius
         place += 2.0 * radius + 0.5 * spacing
         flows.append(flow)

@@ -6,6 +6,7 @@ from particles.cloud import box_cloud, joint_cloud
 from particles.cloud_level_set import boundary_loops, cloud_from_level_set
 from particles.geometry import JointGeometry
 from particles.level_set import Grid, signed_distance, smooth_union
+from particles.plate import Plate
 from particles.rebuild import CannotRebuild, closed_surface, collapsing, rebuild, touch
 from particles.surface_nets import extract_surface, relax
 from tests.support.level_sets import ball, cap_radius, grid_around_ball
@@ -15,7 +16,7 @@ SPHERE = 4.0 / 3.0 * np.pi * R**3
 
 
 def sphere_body(spacing, centre=(0.0, 0.0, 0.0)):
-    cloud = cloud_from_level_set(ball(grid_around_ball((0, 0, 0), R, spacing), (0, 0, 0), R), SPHERE, on_wall=False)
+    cloud = cloud_from_level_set(ball(grid_around_ball((0, 0, 0), R, spacing), (0, 0, 0), R), SPHERE, ())
     body = Body.at_rest(cloud)
     body.points += np.asarray(centre)
     return body
@@ -75,7 +76,7 @@ def test_a_rebuilt_drop_on_a_wall_has_one_ring_and_its_volume():
     radius = cap_radius(volume, angle)
     centre = (0, 0, -radius * np.cos(angle))
     grid = Grid.around(np.array([[-radius] * 3, [radius] * 3]), 0.1 * radius)
-    cloud = cloud_from_level_set(ball(grid, centre, radius, mirrored=True), volume, on_wall=True)
+    cloud = cloud_from_level_set(ball(grid, centre, radius, mirrored=True), volume, (Plate.horizontal(0.0),))
     body = Body.at_rest(cloud)
     assert body.volume()[0] == pytest.approx(volume, rel=1e-9)
     assert len(cloud.rings) == 1
@@ -118,10 +119,11 @@ def test_merging_keeps_volume_and_momentum():
 
 
 def test_bodies_that_cannot_rebuild():
-    joint = Body.at_rest(joint_cloud(JointGeometry(0.3e-3, 0.24e-3, 0.24e-3), 0.07e-9, 0.8e-4))
-    with pytest.raises(CannotRebuild, match="not joints"):
+    tilted = JointGeometry(0.3e-3, 0.24e-3, 0.24e-3, tilt=(0.02, 0.0))
+    joint = Body.at_rest(joint_cloud(tilted, 0.07e-9, 0.8e-4))
+    with pytest.raises(CannotRebuild, match="horizontal walls"):
         rebuild(joint, joint)
-    with pytest.raises(CannotRebuild, match="free drop"):
+    with pytest.raises(CannotRebuild, match="free, or on the same walls"):
         rebuild(sphere_body(0.2 * R), Body.at_rest(box_cloud(1e-3, 5)))
 
 
