@@ -21,14 +21,16 @@ class Base:
         points: `(n, 3)` [m].
         velocity: `(n, 3)` [m/s].
         time_step: [s].
+        weight: of the last step.
     """
 
     points: Floats
     velocity: Floats
     time_step: float
+    weight: float
 
 
-@dataclass(slots=True)
+@dataclass(frozen=True, slots=True)
 class BackwardDifference:
     """The last step: its displacement and change of velocity, `(n, 3)`, and its size [s]; infinite at the start."""
 
@@ -49,8 +51,5 @@ class BackwardDifference:
             points=points + weight * self.displacement,
             velocity=velocity + weight * self.velocity_change,
             time_step=time_step * (1.0 + ratio) / (1.0 + 2.0 * ratio),
+            weight=weight,
         )
-
-    def remember(self, displacement: Floats, velocity_change: Floats, time_step: float) -> None:
-        """Store a step that was taken."""
-        self.displacement, self.velocity_change, self.time_step = displacement, velocity_change, time_step

@@ -59,15 +59,15 @@ class Body:
         """The particles below the free surface, those on the walls included, `(m,)`."""
         return np.arange(self.cloud.surface_count, len(self.points), dtype=np.int32)
 
-    def move(self, time_step: float, twists: dict[int, Floats]) -> None:
-        """Displace particles by their velocity, plates by their twists `(6,)` [m/s, rad/s] with what they carry."""
-        moved = self.points + time_step * self.velocity
+    def move(self, time_step: float, velocity: Floats, twists: dict[int, Floats]) -> None:
+        """Displace particles by a velocity `(n, 3)` [m/s], plates by their twists `(6,)` with what they carry."""
+        moved = self.points + time_step * velocity
         plates = list(self.plates)
         for wall, twist in twists.items():
             plate, plates[wall] = plates[wall], plates[wall].moved(time_step * twist)
             on_plate = self.cloud.wall == wall
             points = self.points[on_plate]
-            slip = self.velocity[on_plate] - plate.rigid_velocity(twist, points)
+            slip = velocity[on_plate] - plate.rigid_velocity(twist, points)
             local = plate.local(points + time_step * slip)
             moved[on_plate] = plates[wall].place(local * np.array([1.0, 1.0, 0.0]))
         self.points, self.plates = moved, tuple(plates)

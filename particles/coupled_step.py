@@ -80,7 +80,7 @@ class PreparedCoupledStep:
         surface_pressure = float(solution.pressure[-1])
         pressure = np.full(len(velocity), surface_pressure)
         pressure[self.body.cloud.surface_count :] += solution.pressure[:-1]
-        return Motion(velocity, pressure, surface_pressure, twists, solution.iterations)
+        return Motion(velocity, velocity, pressure, surface_pressure, twists, solution.iterations)
 
     def _solve(self, problem: SaddlePoint, time_step: float) -> Solution:
         """Solve exactly where that is cheap or particles carry or share momentum, else by the compact Laplacian."""

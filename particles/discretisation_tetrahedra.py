@@ -16,14 +16,14 @@ from scipy import sparse
 
 from particles.body import Body
 from particles.discretisation import Discretisation
-from particles.tetrahedra import cell_volumes, volume_gradients
+from particles.tetrahedra import SMALLEST_VOLUME, cell_volumes, thick_cells, volume_gradients
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int32]
 
 STABILISATION = 0.05
-# Flat tetrahedra have no gradient worth the name: they enter volumes and mass, but neither strain nor stabilisation.
-SMALLEST_VOLUME = 0.1
+# Share of its first volume below which a tetrahedron is worn out.
+WORN = 0.2
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,16 +34,27 @@ class LinearTetrahedra:
         cells: `(t, 4)`, whose boundary is the tracked surface.
         mass: `(n, n)` volumes that the particles carried when the tetrahedra were made [m^3].
         density: of the liquid [kg/m^3].
+        volumes: `(t,)` of the tetrahedra when they were made [m^3].
     """
 
     cells: Indices
     mass: sparse.csr_matrix
     density: float
+    volumes: Floats
 
     @classmethod
     def start(cls, points: Floats, cells: Indices, density: float) -> "LinearTetrahedra":
         """Give the particles the volumes of the tetrahedra at these points."""
-        return cls(cells, consistent_mass(cells, cell_volumes(points, cells), len(points)), density)
+        volumes = cell_volumes(points, cells)
+        # Inverted tetrahedra mend the boundary of others. Only flat ones count, so that the mass stays definite.
+        counted = np.where(volumes > -SMALLEST_VOLUME * volumes.mean(), volumes, 0.0)
+        counted *= volumes.sum() / counted.sum()
+        return cls(cells, consistent_mass(cells, counted, len(points)), density, volumes)
+
+    def is_worn(self, points: Floats) -> bool:
+        """Whether a tetrahedron has been squeezed flat on the way to these points `(n, 3)` [m]."""
+        thick = thick_cells(self.volumes)
+        return bool((cell_volumes(points, self.cells[thick]) < WORN * self.volumes[thick]).any())
 
     def __call__(self, body: Body) -> Discretisation:
         """Build the operators at the current positions."""
@@ -52,7 +63,8 @@ class LinearTetrahedra:
         average = _matrix(cells, np.full((len(cells), 4), 0.25), count).T.tocsr()
         slopes = volume_gradients(body.points, cells)
         scaled = [_matrix(cells, slopes[:, :, d], count) for d in range(3)]
-        thick = np.flatnonzero(volumes > SMALLEST_VOLUME * volumes.mean())
+        # Flat tetrahedra enter volumes and mass, but neither strain nor stabilisation.
+        thick = thick_cells(volumes)
         weights = volumes[thick]
         inverse = sparse.diags(1.0 / weights)
         x, y, z = ((inverse @ part[thick]).tocsr() for part in scaled)

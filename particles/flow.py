@@ -15,7 +15,7 @@ from particles.neighbours import NeighbourList
 from particles.physics import Physics
 from particles.step_solver import Motion, StepSolver
 from particles.surface_quality import flip_to_delaunay, smoothing_offsets
-from particles.time_step import TimeStep
+from particles.time_step import StepCollapsed, TimeStep
 
 Floats = NDArray[np.float64]
 
@@ -74,6 +74,7 @@ class LiquidFlow:
         Raises:
             SolveFailed: the linear solve failed.
             FloatingPointError: a position is not finite.
+            StepCollapsed: a particle would move too far in the shortest step.
         """
         body = self.body
         for event in self.physics.events:
@@ -81,13 +82,14 @@ class LiquidFlow:
         self.neighbours.update(body.points)
         motion = self._accelerate()
         before = body.points[: body.cloud.surface_count].copy()
-        body.move(self.time_step.size, motion.twists)
+        body.move(self.time_step.size, motion.transport, motion.twists)
         flips = self._keep_quality()
         self._correct_volume()
         self.steps += 1
         self.time += self.time_step.size
         record = self._record(before, flips, motion.iterations)
-        self.time_step.grow()
+        # Where momentum is kept, the next step will be as fast.
+        self.time_step.grow(motion.top_speed if self.physics.momenta else 0.0)
         return record
 
     def _accelerate(self) -> Motion:
@@ -96,11 +98,21 @@ class LiquidFlow:
         prepared = self.solver.prepare(body, self.physics, self.neighbours)
         while True:
             motion = prepared.solve(self.time_step.size, self.volume)
-            if self.time_step.accepts(float(np.sqrt((motion.velocity**2).sum(axis=1).max()))):
+            if self._accepts(motion):
                 break
         body.velocity, body.pressure = motion.velocity, motion.pressure
         body.surface_pressure = motion.surface_pressure
         return motion
+
+    def _accepts(self, motion: Motion) -> bool:
+        """Whether no particle moves too far; an error that no step can mend tells where the particle is."""
+        try:
+            return self.time_step.accepts(motion.top_speed)
+        except StepCollapsed as error:
+            particle = int((motion.transport**2).sum(axis=1).argmax())
+            place = ", ".join(f"{coordinate:.4g}" for coordinate in self.body.points[particle])
+            where = f"step {self.steps + 1} at time {self.time:.4g} s, particle {particle} at ({place}) m"
+            raise StepCollapsed(f"{where}: {error}") from error
 
     def _keep_quality(self) -> int:
         """Flip and smooth the surface, shift the interior; return the number of flips."""

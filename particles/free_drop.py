@@ -12,14 +12,12 @@ from particles.body import Body
 from particles.checkpoint import Checkpoint
 from particles.cloud_sphere import sphere_cloud
 from particles.damped_oscillation import fit_oscillation
-from particles.discretisation_tetrahedra import LinearTetrahedra
 from particles.inertial_flow import InertialFlow
 from particles.parameters import Solder
 from particles.rayleigh import lamb_decay_rate, rayleigh_frequency
 from particles.reflow import build_physics
 from particles.shape import Snapshot
 from particles.surface_quality import vertex_normals
-from particles.tetrahedra import tetrahedralise
 
 Floats = NDArray[np.float64]
 
@@ -140,10 +138,9 @@ def _start(solder: Solder, amplitude: float) -> InertialFlow:
     if shells < 2:
         raise ValueError(f"solder.numerics.spacing = {spacing:.4g} m must be below half the radius {radius:.4g} m")
     ball = sphere_cloud(solder.volume, shells)
-    cells = tetrahedralise(ball.points, ball.spacing)
     body = Body.at_rest(ball)
     physics = build_physics(solder, EFFECTS | {"viscosity": solder.effects.viscosity != "off"}, ())
-    flow = InertialFlow(body, physics, LinearTetrahedra.start(body.points, cells, solder.density))
+    flow = InertialFlow(body, physics, solder.density)
     omega = rayleigh_frequency(2, radius, solder.density, solder.surface_tension)
     flow.settle(SETTLING_STEP / omega, SETTLING_STEPS)
     body.velocity = 0.5 * amplitude * omega * SECOND_MOMENT * body.points
@@ -152,7 +149,7 @@ def _start(solder: Solder, amplitude: float) -> InertialFlow:
 
 def _sample(flow: InertialFlow, solder: Solder, time: float) -> tuple[float, ...]:
     """One row of the history."""
-    body, mass = flow.body, flow.space.mass
+    body, mass = flow.body, flow.mass
     offset = body.points - (mass @ body.points).sum(axis=0) / mass.sum()
     moment = SECOND_MOMENT @ (offset * (mass @ offset)).sum(axis=0) / mass.sum()
     momentum = solder.density * (mass @ body.velocity)
@@ -164,7 +161,7 @@ def _sample(flow: InertialFlow, solder: Solder, time: float) -> tuple[float, ...
 
 def _rest_metrics(flow: InertialFlow, solder: Solder, history: dict[str, Floats]) -> dict[str, tuple[float, str]]:
     """Pressure, remaining motion of the surface and volume at the end."""
-    body, weight = flow.body, np.asarray(flow.space.mass.sum(axis=0)).ravel()
+    body, weight = flow.body, np.asarray(flow.mass.sum(axis=0)).ravel()
     mean = float(np.average(body.pressure, weights=weight))
     scatter = float(np.sqrt(np.average((body.pressure - mean) ** 2, weights=weight)))
     normals = vertex_normals(body.points, body.triangles, body.cloud.surface_count)

@@ -92,7 +92,7 @@ class PreparedGripcStep:
         coefficients = self._admit(predicted - self._impulse(correction) / fluid[0])
         self.solver.velocities = smooth(self.last, coefficients, operators.smoothing)
         velocity = _by_particle(self._admit(operators.smoothing @ coefficients))
-        return Motion(velocity, correction.pressure, float(given[surface].mean()), {}, correction.iterations)
+        return Motion(velocity, velocity, correction.pressure, float(given[surface].mean()), {}, correction.iterations)
 
     def _given_pressure(self, predicted: Floats) -> Floats:
         """Pressure on the free surface, zero below it, `(n,)` [Pa]."""

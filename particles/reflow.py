@@ -17,6 +17,7 @@ from particles.force_surface_tension import SurfaceTension
 from particles.force_wetting import Wetting
 from particles.geometry import JointGeometry
 from particles.gripc_step import GripcStep
+from particles.inertial_step import InertialStep
 from particles.mass import Inertia, Mass
 from particles.metrics import Metrics, joint_metrics, open_metrics, particle_pressure, verdict
 from particles.parameters import Solder
@@ -24,6 +25,7 @@ from particles.physics import Event, Force, Momentum, Operator, Physics
 from particles.plate import Pad
 from particles.rest import Run, StopRule, run_to_rest
 from particles.shape import JointShape, Snapshot
+from particles.step_solver import StepSolver
 from particles.time_step import TimeStep, capillary_limit
 from particles.viscosity import Viscosity
 
@@ -31,7 +33,6 @@ __all__ = ["JointGeometry", "JointShape", "solve_joint"]
 
 CALM_CAPILLARY_TIMES = 20.0
 FEWEST_PER_EDGE = 5
-SCHEMES: dict[str, type[CoupledStep] | type[GripcStep]] = {"energy": CoupledStep, "gripc": GripcStep}
 
 
 def solve_joint(
@@ -116,8 +117,17 @@ def start_flow(cloud: Cloud, solder: Solder, effects: dict[str, bool], lines: tu
     limit = capillary_limit(solder.density, cloud.spacing, solder.surface_tension)
     largest = solder.numerics.time_step_limit * limit
     physics = build_physics(solder, effects, lines)
-    solver = SCHEMES[solder.numerics.scheme](solder.numerics.basis)
+    solver = _step_solver(solder, effects)
     return LiquidFlow(Body.at_rest(cloud), physics, TimeStep(largest, cloud.spacing, largest), solver)
+
+
+def _step_solver(solder: Solder, effects: dict[str, bool]) -> StepSolver:
+    """How steps are solved: tetrahedra where momentum is carried or shared, moving least squares on the way to rest."""
+    if solder.numerics.scheme == "gripc":
+        return GripcStep(solder.numerics.basis)
+    if effects["inertia"] or effects["viscosity"]:
+        return InertialStep(solder.density)
+    return CoupledStep(solder.numerics.basis)
 
 
 def stop_rule(cloud: Cloud, solder: Solder, effects: dict[str, bool]) -> StopRule:

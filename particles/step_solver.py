@@ -18,7 +18,8 @@ class Motion:
     """What happens in a time step.
 
     Attributes:
-        velocity: `(n, 3)` of the particles [m/s].
+        velocity: `(n, 3)` of the particles at the end [m/s].
+        transport: `(n, 3)` their mean velocity, which takes them where they go [m/s].
         pressure: `(n,)` above the ambient pressure [Pa].
         surface_pressure: pressure that carries the volume constraint [Pa].
         twists: `(6,)` of each plate that moves, by its index [m/s, rad/s].
@@ -26,10 +27,16 @@ class Motion:
     """
 
     velocity: Floats
+    transport: Floats
     pressure: Floats
     surface_pressure: float
     twists: dict[int, Floats]
     iterations: int
+
+    @property
+    def top_speed(self) -> float:
+        """Mean speed of the fastest particle [m/s]."""
+        return float(np.sqrt((self.transport**2).sum(axis=1).max()))
 
 
 class PreparedStep(Protocol):

@@ -8,6 +8,8 @@ Floats = NDArray[np.float64]
 Indices = NDArray[np.int32]
 
 JITTER = 1e-5
+# Flat tetrahedra have no gradient worth the name.
+SMALLEST_VOLUME = 0.1
 FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
 
 
@@ -46,3 +48,8 @@ def volume_gradients(points: Floats, cells: Indices) -> Floats:
     edges = points[cells[:, 1:]] - points[cells[:, :1]]
     inner = np.cross(np.roll(edges, -1, axis=1), np.roll(edges, -2, axis=1)) / 6.0
     return np.concatenate((-inner.sum(axis=1, keepdims=True), inner), axis=1)
+
+
+def thick_cells(volumes: Floats) -> NDArray[np.int64]:
+    """The tetrahedra, by their volumes `(t,)`, in which a gradient can be taken."""
+    return np.flatnonzero(volumes > SMALLEST_VOLUME * volumes.mean())

@@ -6,6 +6,10 @@ import numpy as np
 
 LARGEST_DISPLACEMENT = 0.25
 GROWTH = 1.15
+# Shares of the displacement bound at which a step that was cut, and the next one, aim.
+SAFETY = 0.8
+AIM = 0.9
+# Share of the largest step below which no smaller one is tried.
 SMALLEST_SHARE = 1e-9
 
 
@@ -48,13 +52,15 @@ class TimeStep:
                 f"the time step was cut to {self.size:.2e} s, {SMALLEST_SHARE:g} of its upper bound, and the fastest "
                 f"particle still moves {displacement / self.spacing:.2g} spacings in it: the flow is unstable"
             )
-        self.size *= max(0.25, 0.8 * LARGEST_DISPLACEMENT * self.spacing / displacement)
+        self.size *= max(0.25, SAFETY * LARGEST_DISPLACEMENT * self.spacing / displacement)
         self.binding = "displacement"
         return False
 
-    def grow(self) -> None:
-        """Grow after an accepted step, up to the bound."""
-        if GROWTH * self.size >= self.largest:
+    def grow(self, speed: float) -> None:
+        """Grow after an accepted step, up to the bound and as far as a largest particle speed [m/s] allows."""
+        displacement = LARGEST_DISPLACEMENT * self.spacing
+        self.size, self.binding = GROWTH * self.size, "growth"
+        if self.size * speed > AIM * displacement:
+            self.size, self.binding = AIM * displacement / speed, "displacement"
+        if self.size >= self.largest:
             self.size, self.binding = self.largest, "capillary multiple"
-        else:
-            self.size, self.binding = GROWTH * self.size, "growth"

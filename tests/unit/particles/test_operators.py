@@ -89,10 +89,12 @@ def test_time_step_is_cut_by_the_displacement_and_grows_back():
     assert step.binding == "displacement"
     assert step.size == pytest.approx(0.8 * 0.25 * 0.1 / 0.05)
     assert step.accepts(speed=0.05)
-    step.grow()
-    assert (step.binding, step.size) == ("growth", pytest.approx(1.15 * 0.4))
+    step.grow(speed=0.05)
+    assert (step.binding, step.size) == ("displacement", pytest.approx(0.9 * 0.25 * 0.1 / 0.05))
+    step.grow(speed=0.01)
+    assert (step.binding, step.size) == ("growth", pytest.approx(1.15 * 0.45))
     for _ in range(10):
-        step.grow()
+        step.grow(speed=0.01)
     assert (step.binding, step.size) == ("capillary multiple", 1.0)
 
 

@@ -113,7 +113,7 @@ def test_backward_difference_is_of_second_order():
             h = base.time_step
             new = (base.velocity - h * base.points) / (1.0 + h * h)
             position = base.points + h * new
-            history.remember(position - x, new - v, size)
+            history = BackwardDifference(position - x, new - v, size)
             x, v = position, new
         errors.append(abs(x[0, 0] - np.cos(1.0)))
     orders = np.log2(np.array(errors[:-1]) / errors[1:])

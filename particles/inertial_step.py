@@ -1,0 +1,192 @@
+"""A step with inertia and volume viscosity on tetrahedra of the particles, of second order in time: BDF2.
+
+Forces and operators are taken at the predicted positions x* = x_base + dt_eff v_n. The implicit surface tension then
+acts on v - v_n only: an added mass of order dt^2, not a damping of order dt. The tetrahedra travel with their particles
+until these are shifted, the surface changes or they are worn out: then they are made anew.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from particles.backward_difference import BackwardDifference, Base
+from particles.body import Body
+from particles.discretisation import Discretisation
+from particles.discretisation_tetrahedra import LinearTetrahedra
+from particles.field_transfer import Transfer, interpolation
+from particles.force_surface_tension import SurfaceTension
+from particles.incompressibility import solve
+from particles.inner_tetrahedra import fill
+from particles.neighbours import NeighbourList
+from particles.physics import Physics
+from particles.step_equations import StepEquations
+from particles.step_solver import Motion
+from particles.time_step import LARGEST_DISPLACEMENT
+
+Floats = NDArray[np.float64]
+
+SUPPORT = 1.5
+# Shift of a particle that calls for new tetrahedra, in spacings.
+SHIFT_TOLERANCE = 1e-6
+
+
+@dataclass(frozen=True, slots=True)
+class PredictedTension:
+    """Surface tension has moved the body to the predicted positions already: only the rest is implicit.
+
+    Attributes:
+        tension: the surface tension.
+        velocity: of the prediction, `(n, 3)` [m/s].
+    """
+
+    tension: SurfaceTension
+    velocity: Floats
+
+    def load(self, body: Body, space: Discretisation, time_step: float) -> Floats:
+        """Return dt gamma K v, `(n, 3)` [N]."""
+        matrix = self.tension.matrix(body, space, time_step)
+        return np.ascontiguousarray((matrix @ self.velocity.T.ravel()).reshape(3, -1).T)
+
+
+@dataclass(frozen=True, slots=True)
+class Past:
+    """What the last step left.
+
+    Attributes:
+        space: its tetrahedra.
+        triangles: `(t, 3)` of their surface.
+        points: `(n, 3)` where it took the particles [m].
+        history: its displacement and change of velocity.
+    """
+
+    space: LinearTetrahedra
+    triangles: NDArray[np.int32]
+    points: Floats
+    history: BackwardDifference
+
+    @classmethod
+    def start(cls, body: Body, density: float) -> "Past":
+        """Fill a body that has not moved yet with tetrahedra."""
+        space = LinearTetrahedra.start(body.points, fill(body), density)
+        return cls(space, body.triangles, body.points, BackwardDifference.start(len(body.points)))
+
+    def fits(self, body: Body) -> bool:
+        """Whether the tetrahedra still fill the body well."""
+        shift = float(np.abs(body.points - self.points).max())
+        same_surface = np.array_equal(self.triangles, body.triangles)
+        return same_surface and shift < SHIFT_TOLERANCE * body.cloud.spacing and not self.space.is_worn(body.points)
+
+    def transferred(self, body: Body, physics: Physics) -> tuple["Past", Floats]:
+        """The past on new tetrahedra, and the velocity `(n, 3)` of the particles where they are now [m/s]."""
+        new = LinearTetrahedra.start(body.points, fill(body), self.space.density)
+        values = interpolation(self.points, self.space.cells, body.points - self.points)
+        unit_fields = [physics.admit(body, np.broadcast_to(axis, body.points.shape)) for axis in np.eye(3)]
+        transfer = Transfer(values, self.space.mass, new.mass, unit_fields)
+        old = self.history
+        history = BackwardDifference(values @ old.displacement, transfer(old.velocity_change), old.time_step)
+        return Past(new, body.triangles, body.points, history), transfer(body.velocity)
+
+
+@dataclass(slots=True)
+class InertialStep:
+    """Linear tetrahedra with memory of the last step.
+
+    Attributes:
+        density: of the liquid [kg/m^3].
+        past: what the last step left, None before the first.
+    """
+
+    density: float
+    past: Past | None = None
+
+    @property
+    def support(self) -> float:
+        """Radius of the neighbour list, in spacings: what the shift of the particles needs."""
+        return SUPPORT
+
+    def prepare(self, body: Body, physics: Physics, _neighbours: NeighbourList) -> "PreparedInertialStep":
+        """Start a step; tetrahedra need no neighbour list."""
+        return self.start(body, physics)
+
+    def start(self, body: Body, physics: Physics) -> "PreparedInertialStep":
+        """Provide tetrahedra and the velocity of the particles where they are now; without inertia it is zero."""
+        if self.past is None or not physics.momenta:
+            self.past = Past.start(body, self.density)
+        elif not self.past.fits(body):
+            self.past, body.velocity = self.past.transferred(body, physics)
+        if not physics.momenta:
+            body.velocity = np.zeros_like(body.velocity)
+        return PreparedInertialStep(body, physics, self, self.past)
+
+    def stop(self, body: Body) -> None:
+        """Bring the body to rest."""
+        body.velocity = np.zeros_like(body.velocity)
+        if self.past is not None:
+            self.past = replace(self.past, history=BackwardDifference.start(len(body.points)))
+
+    @property
+    def mass(self) -> sparse.csr_matrix:
+        """Volumes that the particles carried in the last step, `(n, n)` [m^3]."""
+        if self.past is None:
+            raise ValueError("the first step gives the particles their volumes")
+        return self.past.space.mass
+
+    def kinetic_energy(self, body: Body) -> float:
+        """Kinetic energy of the body with the velocity of the last step [J]."""
+        return 0.5 * self.density * float((body.velocity * (self.mass @ body.velocity)).sum())
+
+
+@dataclass(frozen=True, slots=True)
+class PreparedInertialStep:
+    """A step from the body's current positions.
+
+    Attributes:
+        body: the liquid body.
+        physics: what acts on it.
+        solver: remembers the step.
+        past: tetrahedra at the body's positions and the step before.
+    """
+
+    body: Body
+    physics: Physics
+    solver: InertialStep
+    past: Past
+
+    def solve(self, time_step: float, volume: float) -> Motion:
+        """Return the motion in a time step [s] that ends at a volume [m^3].
+
+        Raises:
+            SolveFailed: the linear solve failed.
+        """
+        body, past = self.body, self.past
+        base = past.history.base(body.points, body.velocity, time_step)
+        guess = self._guess(base)
+        predicted = replace(body, points=base.points + base.time_step * guess, velocity=base.velocity)
+        space = past.space(predicted)
+        equations = StepEquations(predicted, self._with_prediction(guess), space)
+        swept = base.time_step * float((space.constraint @ guess.T.ravel()).sum())
+        problem = equations.problem(base.time_step, volume + swept)
+        solution = solve(replace(problem, guess=body.pressure))
+        velocity, twists = equations.expand(solution.velocity, base.time_step)
+        points = base.points + base.time_step * velocity
+        history = BackwardDifference(points - body.points, velocity - body.velocity, time_step)
+        self.solver.past = Past(past.space, past.triangles, points, history)
+        pressure = float(space.volume_share @ solution.pressure)
+        return Motion(
+            velocity, history.displacement / time_step, solution.pressure, pressure, twists, solution.iterations
+        )
+
+    def _guess(self, base: Base) -> Floats:
+        """Velocity of the prediction `(n, 3)` [m/s]: the last one, as far as a step may go."""
+        velocity = self.body.velocity
+        way = base.time_step * float(np.sqrt((velocity**2).sum(axis=1).max()))
+        bound = LARGEST_DISPLACEMENT * self.body.cloud.spacing
+        return velocity if way <= bound else bound / way * velocity
+
+    def _with_prediction(self, guess: Floats) -> Physics:
+        """Physics at the positions that a velocity `(n, 3)` predicts."""
+        tensions = (part for part in self.physics.operators if isinstance(part, SurfaceTension))
+        loads = [PredictedTension(tension, guess) for tension in tensions]
+        return replace(self.physics, momenta=(*self.physics.momenta, *loads))
