@@ -91,6 +91,16 @@ def decide_drop(solder: Solder, is_free: bool) -> dict[str, Decision]:
     return decisions | NO_WALL if is_free else decisions
 
 
+def decide_oscillation(solder: Solder) -> dict[str, Decision]:
+    """Decide each effect of a free drop that swings."""
+    ohnesorge = drop_numbers(solder).ohnesorge
+    motion: dict[str, Decision] = {
+        "inertia": {"on": True, "why": "a drop swings by its inertia"},
+        "viscosity": {"on": True, "why": f"Ohnesorge number {ohnesorge:.2g}: the swing decays"},
+    }
+    return decide_drop(solder, is_free=True) | motion
+
+
 def decide(numbers: Numbers, solder: Solder) -> dict[str, Decision]:
     """Decide each effect of a reflow.
 

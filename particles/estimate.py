@@ -26,5 +26,10 @@ def drop_seconds(count: int) -> float:
     return TYPICAL_STEPS_OF_DROP * _seconds_per_step(count**3)
 
 
+def oscillation_seconds(particles: int, steps: int) -> float:
+    """Expected time of `solve_oscillation` on one core [s]."""
+    return steps * _seconds_per_step(particles)
+
+
 def _seconds_per_step(particles: int) -> float:
     return SECONDS_PER_STEP_OF_THOUSAND * (particles / 1000.0) ** COST_EXPONENT

@@ -35,6 +35,7 @@ class FreeDrop:
 
     Attributes:
         points: `(n, 3)` particles at the end [m], the first `s` are the vertices of the surface.
+        velocity: `(n, 3)` at the end [m/s].
         pressure: `(n,)` above ambient at the end [Pa].
         surface_points: `(s, 3)` [m].
         triangles: `(t, 3)` of the surface, outward oriented.
@@ -45,6 +46,7 @@ class FreeDrop:
     """
 
     points: Floats
+    velocity: Floats
     pressure: Floats
     surface_points: Floats
     triangles: NDArray[np.int32]
@@ -122,8 +124,16 @@ def solve_free_drop(  # noqa: PLR0913 - what swings and for how long, how it is 
     metrics["particle_steps_per_second"] = (steps * len(body.points) / swing.seconds, "1/s")
     if amplitude != 0.0:
         metrics |= _swing_metrics(solder, history)
-    surface = body.points[:count]
-    return FreeDrop(body.points, body.pressure, surface, body.triangles, history, swing.snapshots, metrics)
+    return FreeDrop(
+        points=body.points,
+        velocity=body.velocity,
+        pressure=body.pressure,
+        surface_points=body.points[:count],
+        triangles=body.triangles,
+        history=history,
+        snapshots=swing.snapshots,
+        metrics=metrics,
+    )
 
 
 def _radius(solder: Solder) -> float:

@@ -1,6 +1,6 @@
 """The case: what a case file means, composed from the parameter models of the packages.
 
-A case file is of one kind, by the table that only this kind has: [package], [drop] or [joint].
+A case file is of one kind, by the table that only this kind has: [package], [drop], [joint], [oscillation].
 """
 
 import os
@@ -16,10 +16,11 @@ from pydantic.fields import FieldInfo
 from fem.parameters import Materials, Shock
 from meshing.parameters import Board, Package, Warpage
 from particles.parameters import Solder, Switch
-from particles.scenes import Drop, Fluid, Joint
+from particles.scene_oscillation import Oscillation
+from particles.scenes import Drop, Fluid, Joint, Liquid
 from workflow import fields
 from workflow.problems import CaseError, Problem, nearest
-from workflow.stage_table import BOARD_DROP, DROP, JOINT, Pipeline
+from workflow.stage_table import BOARD_DROP, DROP, JOINT, OSCILLATION, Pipeline
 from workflow.validation import translate
 
 if TYPE_CHECKING:
@@ -141,7 +142,26 @@ class JointCase(SceneCase):
         return _of_particles(joint_problems(self.joint, self.molten))
 
 
-KINDS: dict[str, type[Case]] = {model.kind: model for model in (BoardDropCase, DropCase, JointCase)}
+class OscillationCase(Case):
+    """A free drop that swings."""
+
+    kind = "oscillation"
+    pipeline = OSCILLATION
+
+    oscillation: Oscillation
+    solder: Liquid = Liquid()
+
+    @property
+    def molten(self) -> Solder:
+        """The liquid as the solver takes it."""
+        return self.oscillation.resolve(self.solder)
+
+    def problems(self) -> list[Problem]:
+        """None: whatever is allowed goes together."""
+        return []
+
+
+KINDS: dict[str, type[Case]] = {model.kind: model for model in (BoardDropCase, DropCase, JointCase, OscillationCase)}
 
 
 def kind_of(table: Mapping) -> type[Case]:

@@ -1,11 +1,13 @@
 """What a run would do, and what it would cost. Nothing is run, nothing is written."""
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from rich.console import Console
 from rich.table import Table
 
-from workflow.case import BoardDropCase, Case, DropCase, JointCase, available_cores
+from workflow.case import BoardDropCase, Case, available_cores
 from workflow.fields import display, leaves, unit_of
 from workflow.forecast import MACRO, Forecast, forecast
 from workflow.inputs import Change, Verdict, examine
@@ -15,6 +17,7 @@ from workflow.units import from_si
 LONGEST_LIST = 4
 SCHEMES = {
     "energy": "least energy of the tracked surface at exactly the volume",
+    "inertia": "tetrahedra that move with the drop, second order in space and time",
     "gripc": "pressure correction as Hu et al. print it, for comparison only; its steps are not foreseen in the cost",
 }
 
@@ -30,7 +33,7 @@ def show_plan(case: Case, run_folder: Path, console: Console) -> None:
         rate = f"{outlook.shock.updates_per_second:.1e} element updates per second and rank (fem/estimate.py)"
         console.print(f"\n[dim]Costs assume {rate}")
         console.print("[dim]and the reflow speed in particles/estimate.py, both as benchmarks/ measured them.")
-    elif isinstance(case, DropCase | JointCase):
+    else:
         body = forecast_scene(case)
         _show(case, run_folder, body, console)
         console.print(_particles(body))
@@ -50,7 +53,7 @@ def _particles(outlook: SceneForecast) -> Table:
         "capillary limit", short(outlook.capillary_limit), "time step at which explicit surface tension breaks"
     )
     ratio = outlook.largest_step / outlook.capillary_limit
-    table.add_row("largest time step", short(outlook.largest_step), f"{ratio:g} times the limit")
+    table.add_row("largest time step", short(outlook.largest_step), f"{ratio:.3g} times the limit")
     return table
 
 
@@ -101,7 +104,7 @@ def _stages(case: Case, run_folder: Path, predicted: dict[str, float]) -> Table:
     return table
 
 
-def _effects(effects: dict) -> Table:
+def _effects(effects: Mapping[str, Any]) -> Table:
     table = _table("\nEffects of the reflow", "effect", "", "why")
     for name, decision in effects.items():
         mark = "[green]on[/]" if decision["on"] else "[dim]off[/]"

@@ -64,7 +64,7 @@ def _context(run_folder: Path, case, summary: dict) -> dict:
         context["curves"]["timings"] = timing_bars(summary["timings"])
     _add_preview(run_folder, context)
     _add_joints(run_folder, context)
-    _add_body(run_folder, context, summary)
+    _add_body(run_folder, case.kind, context, summary)
     _add_shock(run_folder, context, summary)
     return context
 
@@ -97,7 +97,7 @@ def _add_joints(run_folder: Path, context: dict) -> None:
 def _add_bridge(run_folder: Path, context: dict) -> None:
     """Add the picture of two joints that became one, the only shape under two names."""
     from particles.products import read_shapes
-    from workflow.report_body import render_body
+    from workflow.report_body import render_stages
 
     for name, shape in read_shapes(run_folder / "reflow" / "shapes.h5").items():
         if "+" in name:
@@ -106,12 +106,12 @@ def _add_bridge(run_folder: Path, context: dict) -> None:
             )
             with tempfile.TemporaryDirectory() as folder:
                 picture = Path(folder) / "bridge.png"
-                render_body(shape, picture)
+                render_stages(shape.snapshots[:1], shape, picture)
                 context["pictures"]["bridge"] = _base64(picture)
 
 
-def _add_body(run_folder: Path, context: dict, summary: dict) -> None:
-    """Add what is told of one drop or joint."""
+def _add_body(run_folder: Path, kind: str, context: dict, summary: dict) -> None:
+    """Add what is told of a scene of solder alone."""
     if not (run_folder / "reflow" / "shape.h5").exists():
         return
     from particles.products import read_body
@@ -120,12 +120,16 @@ def _add_body(run_folder: Path, context: dict, summary: dict) -> None:
     shape, meridian = read_body(run_folder / "reflow")
     context["headline"] = report_body.headline(summary["metrics"])
     context["tables"]["body"] = report_body.metric_table(summary["metrics"], summary["health"])
-    context["tables"]["work_precision"] = report_body.work_precision_table()
-    context["curves"]["profile"] = report_body.profile_curve(shape.surface_points, meridian)
-    context["curves"]["body_history"] = report_body.history_curve(shape.history)
+    if kind == "drop":
+        context["tables"]["work_precision"] = report_body.work_precision_table()
+    if kind == "oscillation":
+        context["curves"]["swing"] = report_body.swing_curve(shape.history, summary["metrics"])
+    else:
+        context["curves"]["profile"] = report_body.profile_curve(shape.surface_points, meridian)
+        context["curves"]["body_history"] = report_body.history_curve(shape.history)
     with tempfile.TemporaryDirectory() as folder:
         picture = Path(folder) / "body.png"
-        report_body.render_body(shape, picture)
+        report_body.render_stages(report_body.stages(kind, shape), shape, picture)
         context["pictures"]["body"] = _base64(picture)
 
 

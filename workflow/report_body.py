@@ -1,7 +1,9 @@
-"""Report of one drop or joint: pictures, profile against the exact meridian, histories, metrics with their errors."""
+"""Report of solder alone: pictures, profile or swing against the exact one, histories, metrics with their errors."""
 
 import json
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pyvista
@@ -12,9 +14,15 @@ from workflow.report_curves import MICRO, MILLI, STYLE, svg
 from workflow.report_pictures import new_plotter, save
 from workflow.report_tables import number, percent, quantity
 
+if TYPE_CHECKING:
+    from particles.shape import JointShape, Snapshot
+
 WORK_PRECISION = CASES / "sessile_drop" / "work_precision.json"
 SMALLEST_RANGE = 0.01
-HEADLINE = ("height", "max_width", "waist", "contact_angle", "max_width_error", "verdict", "particles", "seconds")
+HEADLINE = (
+    "height", "max_width", "waist", "contact_angle", "max_width_error", "period", "period_error", "decay_rate",
+    "decay_rate_error", "verdict", "particles", "seconds",
+)  # fmt: skip
 
 
 def headline(metrics: dict) -> list[dict]:
@@ -90,30 +98,68 @@ def history_curve(history: dict) -> str:
         return svg(figure)
 
 
-def render_body(shape, picture: Path) -> None:
-    """Render particles and free surface before and after the reflow; after it coloured by pressure."""
+def render_stages(stages: "Sequence[Snapshot]", shape: "JointShape", picture: Path) -> None:
+    """Render particles and free surface at some times side by side, then at the end, coloured by pressure."""
     plotter = new_plotter((1800, 800))
-    after = shape.points / MILLI
-    first = shape.snapshots[0]
-    before = first.points / MILLI
-    gap = 0.6 * np.ptp(before[:, 0]) + 0.6 * np.ptp(after[:, 0])
-    before = before - np.array([gap, 0.0, 0.0])
-    for points, triangles in ((before, first.triangles), (after, shape.triangles)):
+    states = [*((stage.points, stage.triangles) for stage in stages), (shape.points, shape.triangles)]
+    place, size = 0.0, {"point_size": 9, "render_points_as_spheres": True}
+    for index, (points, triangles) in enumerate(states):
+        points = points / MILLI
+        points = points + np.array([place - points[:, 0].min(), 0.0, 0.0])
+        place = points[:, 0].max() + 0.2 * np.ptp(points[:, 0])
         faces = np.column_stack((np.full(len(triangles), 3), triangles))
         surface = pyvista.PolyData(points, faces.ravel())
         plotter.add_mesh(surface, color="#b9c4cf", opacity=0.35, show_edges=True, edge_color="#5f6c7b", line_width=0.6)
-    size = {"point_size": 9, "render_points_as_spheres": True}
-    plotter.add_mesh(pyvista.PolyData(before), color="#8a949e", **size)
-    cloud = pyvista.PolyData(after)
-    cloud["pressure [Pa]"] = shape.pressure
-    bar = {"vertical": True, "position_x": 0.9, "position_y": 0.25, "height": 0.5, "color": "black", "n_labels": 3}
-    limits, bar = _colour_limits(shape.pressure), bar | {"fmt": "%.4g"}
-    plotter.add_mesh(cloud, scalars="pressure [Pa]", cmap="viridis", clim=limits, scalar_bar_args=bar, **size)
-    plotter.camera_position = [(-0.5 * gap, -10.0, 4.0), (-0.5 * gap, 0.0, 0.0), (0.0, 0.0, 1.0)]
+        if index < len(stages):
+            plotter.add_mesh(pyvista.PolyData(points), color="#8a949e", **size)
+        else:
+            _add_coloured(plotter, points, shape.pressure, size)
+    centre = (0.5 * place, 0.0, 0.0)
+    plotter.camera_position = [(centre[0], -10.0 * place, 4.0 * place), centre, (0.0, 0.0, 1.0)]
     plotter.enable_parallel_projection()
     plotter.reset_camera()
     plotter.camera.zoom(1.2)
     save(plotter, picture)
+
+
+def stages(kind: str, shape: "JointShape") -> "list[Snapshot]":
+    """The states that a picture shows before the end: the start, of a swing each quarter of its first period."""
+    return shape.snapshots[:7:2] if kind == "oscillation" else shape.snapshots[:1]
+
+
+def _add_coloured(plotter: pyvista.Plotter, points: np.ndarray, pressure: np.ndarray, size: dict) -> None:
+    """Add particles at points `(n, 3)` [mm] coloured by their pressure `(n,)` [Pa], and the bar of the colours."""
+    cloud = pyvista.PolyData(points)
+    cloud["pressure [Pa]"] = pressure
+    bar = {"vertical": True, "position_x": 0.92, "position_y": 0.25, "height": 0.5, "color": "black", "n_labels": 3}
+    bar, limits = bar | {"fmt": "%.4g"}, _colour_limits(pressure)
+    plotter.add_mesh(cloud, scalars="pressure [Pa]", cmap="viridis", clim=limits, scalar_bar_args=bar, **size)
+
+
+def swing_curve(history: Mapping[str, np.ndarray], metrics: Mapping[str, dict]) -> str:
+    """Draw the amplitude of the second mode beside that of Rayleigh and Lamb, and the energies."""
+    time, value = history["time"], {name: metric["value"] for name, metric in metrics.items()}
+    period = value["period"] / (1.0 + value["period_error"])
+    decay = value["decay_rate"] / (1.0 + value["decay_rate_error"])
+    amplitude = history["amplitude"]
+    first = int(np.argmax(amplitude[time <= 0.5 * period]))
+    scale = amplitude[first] * np.exp(decay * time[first])
+    exact = scale * np.exp(-decay * time) * np.sin(2.0 * np.pi * time / period)
+    with pyplot.rc_context(STYLE):
+        figure, axes = pyplot.subplots(1, 2, figsize=(9.2, 3.2), constrained_layout=True)
+        axes[0].plot(time / MILLI, amplitude, color="#0b5fa5", label="particles")
+        axes[0].plot(time / MILLI, exact, "--", color="#d1495b", lw=1.0, label="Rayleigh, Lamb")
+        axes[0].set_ylabel("amplitude of the second mode / R")
+        axes[0].legend(frameon=False)
+        total, kinetic = history["energy"], history["kinetic_energy"]
+        rest = total[0] - kinetic[0]
+        axes[1].plot(time / MILLI, (total - rest) / kinetic[0], label="kinetic + surface")
+        axes[1].plot(time / MILLI, kinetic / kinetic[0], label="kinetic")
+        axes[1].set_ylabel("energy above that at rest / at the start")
+        axes[1].legend(frameon=False)
+        for axis in axes:
+            axis.set_xlabel("time [ms]")
+        return svg(figure)
 
 
 def _colour_limits(pressure: np.ndarray) -> tuple[float, float]:

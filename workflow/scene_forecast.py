@@ -1,8 +1,11 @@
-"""Effects, size and cost of the reflow of one drop or joint, from its parameters alone."""
+"""Effects, size and cost of the reflow of solder alone, from the parameters of the scene."""
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from math import ceil
+from typing import Any
 
-from workflow.case import DropCase, JointCase
+from workflow.case import Case, DropCase, JointCase, OscillationCase, SceneCase
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,7 +22,7 @@ class SceneForecast:
         seconds: stage -> predicted wall time [s].
     """
 
-    effects: dict
+    effects: Mapping[str, Any]
     particles: int
     scheme: str
     spacing: float
@@ -28,20 +31,59 @@ class SceneForecast:
     seconds: dict[str, float]
 
 
-def forecast_scene(case: DropCase | JointCase) -> SceneForecast:
-    """Predict effects, size, time step and cost."""
-    from particles.effects import decide_drop, decide_effects
-    from particles.estimate import drop_seconds, particle_count, reflow_seconds
+def forecast_scene(case: Case) -> SceneForecast:
+    """Predict effects, size, time step and cost of a scene of solder alone."""
+    return FORECASTS[case.kind](case)
+
+
+def _of_drop(case: DropCase) -> SceneForecast:
+    from particles.effects import decide_drop
+    from particles.estimate import drop_seconds
+
+    drop = case.drop
+    return _towards_rest(case, decide_drop(case.molten, drop.is_free), drop.count**3, drop_seconds(drop.count))
+
+
+def _of_joint(case: JointCase) -> SceneForecast:
+    from particles.effects import decide_effects
+    from particles.estimate import particle_count, reflow_seconds
+
+    geometry, solder = case.joint.geometry, case.molten
+    particles = particle_count(solder, geometry)
+    return _towards_rest(case, decide_effects(geometry, solder), particles, reflow_seconds(solder, geometry))
+
+
+def _towards_rest(case: SceneCase, effects: Mapping[str, Any], particles: int, seconds: float) -> SceneForecast:
     from particles.time_step import capillary_limit
 
     solder = case.molten
-    if isinstance(case, DropCase):
-        effects, particles = decide_drop(solder, case.drop.is_free), case.drop.count**3
-        seconds = drop_seconds(case.drop.count)
-    else:
-        effects, particles = decide_effects(case.joint.geometry, solder), particle_count(solder, case.joint.geometry)
-        seconds = reflow_seconds(solder, case.joint.geometry)
-    limit = capillary_limit(solder.density, solder.numerics.spacing, solder.surface_tension)
     numerics = solder.numerics
+    limit = capillary_limit(solder.density, numerics.spacing, solder.surface_tension)
     largest = numerics.time_step_limit * limit
     return SceneForecast(effects, particles, numerics.scheme, numerics.spacing, limit, largest, {"reflow": seconds})
+
+
+def _of_oscillation(case: OscillationCase) -> SceneForecast:
+    from particles.effects import decide_oscillation
+    from particles.estimate import oscillation_seconds
+    from particles.oscillation import rayleigh_period
+    from particles.time_step import capillary_limit
+
+    scene, solder = case.oscillation, case.molten
+    spacing = solder.numerics.spacing
+    return SceneForecast(
+        effects=decide_oscillation(solder),
+        particles=scene.particles,
+        scheme="inertia",
+        spacing=spacing,
+        capillary_limit=capillary_limit(solder.density, spacing, solder.surface_tension),
+        largest_step=rayleigh_period(scene, solder) / scene.steps_per_period,
+        seconds={"reflow": oscillation_seconds(scene.particles, ceil(scene.periods * scene.steps_per_period))},
+    )
+
+
+FORECASTS: dict[str, Callable[[Any], SceneForecast]] = {
+    DropCase.kind: _of_drop,
+    JointCase.kind: _of_joint,
+    OscillationCase.kind: _of_oscillation,
+}

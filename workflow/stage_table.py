@@ -93,10 +93,11 @@ BOARD_DROP = Pipeline(
 
 
 def _one_body(scene: str) -> Pipeline:
-    """Reflow of one drop or joint, and its report."""
+    """Reflow of one scene, and its report."""
     reflow = Stage("reflow", (scene, "solder", "gravity"), (), ("reflow/shape.h5", "reflow/particles.vtu"))
     return Pipeline((reflow, Stage("report", ("case",), ("reflow",), ("report.html", "summary.json"))))
 
 
 DROP = _one_body("drop")
 JOINT = _one_body("joint")
+OSCILLATION = _one_body("oscillation")

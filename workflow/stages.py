@@ -1,6 +1,7 @@
 """The pipelines, one function a stage; which kind of case has which stages stands at the end.
 
-Board drop: geometry -> reflow -> surface -> solder_mesh -> shock -> report. Drop and joint: reflow -> report.
+Board drop: geometry -> reflow -> surface -> solder_mesh -> shock -> report. Scenes of solder alone (their reflow is in
+`scene_stages.py`): reflow -> report.
 
 Each reads products of earlier stages from ``run.folder``, writes its own into ``folder``, and returns what it found.
 Packages are imported inside the functions, so that a stage loads only what it uses.
@@ -10,9 +11,10 @@ from dataclasses import replace
 from pathlib import Path
 
 from workflow import findings
-from workflow.case import BoardDropCase, DropCase, JointCase
+from workflow.case import BoardDropCase
 from workflow.products import read_json, write_json
 from workflow.progress import progress_bar
+from workflow.scene_stages import REFLOW_SCENES
 from workflow.stage_runner import Findings, Run, StageFunction
 
 
@@ -97,39 +99,6 @@ def shock(run: Run[BoardDropCase], folder: Path) -> Findings:
     return findings.of_shock(read_results(folder), folder)
 
 
-def reflow_drop(run: Run[DropCase], folder: Path) -> Findings:
-    """Melt a cube of solder on a wall or pad, or without a wall."""
-    from particles.checkpoint import Checkpoint
-    from particles.drop_at_rest import drop_to_rest
-    from particles.products import write_body
-
-    drop, solder = run.case.drop, run.case.molten
-    checkpoint = Checkpoint(run.checkpoints("reflow") / "drop", (drop, solder))
-    with progress_bar(f"reflow of {drop.count**3} particles") as progress:
-        result = drop_to_rest(drop, solder, progress, checkpoint)
-    write_body(folder, result.shape, result.reference)
-    found = findings.of_drop(result.shape.metrics, result.shape.verdict, result.effects)
-    return replace(found, continued="the drop" if checkpoint.continued else "")
-
-
-def reflow_joint(run: Run[JointCase], folder: Path) -> Findings:
-    """Melt the solder of one joint between its pads."""
-    from particles.checkpoint import Checkpoint
-    from particles.effects import acting_weight, decide_effects
-    from particles.metrics import reference_meridian
-    from particles.products import write_body
-    from particles.reflow import solve_joint
-
-    geometry, solder = run.case.joint.geometry, run.case.molten
-    checkpoint = Checkpoint(run.checkpoints("reflow") / "joint", (geometry, solder))
-    with progress_bar("reflow of a joint") as progress:
-        shape = solve_joint(geometry, solder, progress, checkpoint=checkpoint)
-    effects = decide_effects(geometry, solder)
-    write_body(folder, shape, reference_meridian(geometry, solder, acting_weight(solder, effects)))
-    found = findings.of_joint(shape.metrics, shape.verdict, effects)
-    return replace(found, continued="the joint" if checkpoint.continued else "")
-
-
 def report(run: Run, folder: Path) -> Findings:
     """Write report.html and summary.json from the products."""
     from workflow.report import write_report
@@ -147,6 +116,5 @@ STAGE_FUNCTIONS: dict[str, dict[str, StageFunction]] = {
         "shock": shock,
         "report": report,
     },
-    DropCase.kind: {"reflow": reflow_drop, "report": report},
-    JointCase.kind: {"reflow": reflow_joint, "report": report},
+    **{kind: {"reflow": reflow_scene, "report": report} for kind, reflow_scene in REFLOW_SCENES.items()},
 }

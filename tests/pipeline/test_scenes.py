@@ -58,6 +58,17 @@ def test_from_case_file_to_report(tmp_path, name, setting, own):
     assert "nothing to do" in run(name, tmp_path, setting).stdout
 
 
+def test_an_oscillation_from_case_file_to_report(tmp_path):
+    settings = ("oscillation.particles_per_radius=2", "oscillation.periods=1.5")
+    result = run("oscillating_drop", tmp_path, *settings)
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    own = {"period", "period_error", "decay_rate", "decay_rate_error", "volume_drift", "time_step_over_capillary_limit"}
+    assert set(summary["metrics"]) >= own | {"particles", "particle_steps_per_second"}
+    assert set(summary["health"]) == {"period_error", "decay_rate_error", "volume_drift"}
+    assert result.returncode == (0 if all(check["ok"] for check in summary["health"].values()) else 1)
+    assert "<svg" in (tmp_path / "report.html").read_text()
+
+
 def test_an_offset_joint_has_no_meridian(tmp_path):
     result = run("solder_joint", tmp_path, COARSE_JOINT, "joint.offset=0.07 mm")
     assert result.returncode == 0, result.stdout + result.stderr

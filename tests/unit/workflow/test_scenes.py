@@ -16,7 +16,11 @@ CASES = Path(__file__).resolve().parents[3] / "cases"
 DROP, BALL, JOINT, FREE = (
     CASES / name / "case.toml" for name in ("sessile_drop", "bga_ball", "solder_joint", "laplace_drop")
 )
+SWING = CASES / "oscillating_drop" / "case.toml"
 BAD_VALUES = {
+    "amplitude too large": (SWING, "oscillation.amplitude=0.5", ["oscillation.amplitude = 0.5", "<= 0.3"]),
+    "fewer than two shells": (SWING, "oscillation.particles_per_radius=1", ["particles_per_radius = 1", ">= 2"]),
+    "gravity of a swing": (SWING, "solder.gravity=1 m/s^2", ["solder.gravity", "unknown key"]),
     "angle of a full turn": (DROP, "drop.contact_angle=190 deg", ['"190 deg"', "out of range", "< 180 deg"]),
     "angle of zero": (DROP, "drop.contact_angle=0 deg", ["drop.contact_angle", "> 0 deg"]),
     "two resolutions": (DROP, "drop.spacing=0.1 mm", ["drop.spacing", '"0.1 mm"', "particles_per_edge = 11"]),
@@ -25,7 +29,7 @@ BAD_VALUES = {
     "unknown switch": (DROP, "gravity=of", ['gravity = "of"', "one of auto, on, off", "did you mean off?"]),
     "unknown scheme": (DROP, "solder.numerics.scheme=gripk", ["one of energy, gripc", "did you mean gripc?"]),
     "explicit step": (DROP, "solder.numerics.scheme=gripc", ["solder.numerics.time_step_limit", '"100"', "<= 1"]),
-    "two kinds": (DROP, "package.rows=3", ["[package] and [drop]", "exactly one of [package], [drop], [joint]"]),
+    "two kinds": (DROP, "package.rows=3", ["[package] and [drop]", "exactly one of [package], [drop], [joint], "]),
     "pad that repels": (BALL, "drop.contact_angle=150 deg", ["drop.contact_angle", "< 148 deg", "better"]),
     "pad too small": (BALL, "drop.pad_radius=0.01 mm", ["drop.pad_radius", '"0.01 mm"', "cannot fit", ">= 0.09"]),
     "volume without end": (JOINT, "joint.volume=1000 mm^3", ["joint.spacing", "cannot fit", ">= "]),
@@ -73,7 +77,7 @@ def test_a_file_of_no_kind_names_the_nearest(tmp_path):
     path = tmp_path / "case.toml"
     path.write_text('[case]\nname = "x"\n[dorp]\nvolume = "1 mm^3"\n')
     text = problems_of(path)
-    assert text.startswith(str(path)) and "exactly one of [package], [drop], [joint]" in text
+    assert text.startswith(str(path)) and "exactly one of [package], [drop], [joint], " in text
     assert "did you mean [drop]?" in text
 
 

@@ -1,0 +1,65 @@
+"""Reflow of solder alone, without package and board: one function a kind of scene."""
+
+from dataclasses import replace
+from pathlib import Path
+
+from workflow import findings
+from workflow.case import DropCase, JointCase, OscillationCase
+from workflow.progress import progress_bar
+from workflow.stage_runner import Findings, Run, StageFunction
+
+
+def reflow_drop(run: Run[DropCase], folder: Path) -> Findings:
+    """Melt a cube of solder on a wall or pad, or without a wall."""
+    from particles.checkpoint import Checkpoint
+    from particles.drop_at_rest import drop_to_rest
+    from particles.products import write_body
+
+    drop, solder = run.case.drop, run.case.molten
+    checkpoint = Checkpoint(run.checkpoints("reflow") / "drop", (drop, solder))
+    with progress_bar(f"reflow of {drop.count**3} particles") as progress:
+        result = drop_to_rest(drop, solder, progress, checkpoint)
+    write_body(folder, result.shape, result.reference)
+    found = findings.of_drop(result.shape.metrics, result.shape.verdict, result.effects)
+    return replace(found, continued="the drop" if checkpoint.continued else "")
+
+
+def reflow_joint(run: Run[JointCase], folder: Path) -> Findings:
+    """Melt the solder of one joint between its pads."""
+    from particles.checkpoint import Checkpoint
+    from particles.effects import acting_weight, decide_effects
+    from particles.metrics import reference_meridian
+    from particles.products import write_body
+    from particles.reflow import solve_joint
+
+    geometry, solder = run.case.joint.geometry, run.case.molten
+    checkpoint = Checkpoint(run.checkpoints("reflow") / "joint", (geometry, solder))
+    with progress_bar("reflow of a joint") as progress:
+        shape = solve_joint(geometry, solder, progress, checkpoint=checkpoint)
+    effects = decide_effects(geometry, solder)
+    write_body(folder, shape, reference_meridian(geometry, solder, acting_weight(solder, effects)))
+    found = findings.of_joint(shape.metrics, shape.verdict, effects)
+    return replace(found, continued="the joint" if checkpoint.continued else "")
+
+
+def reflow_oscillation(run: Run[OscillationCase], folder: Path) -> Findings:
+    """Let a free drop swing."""
+    from particles.checkpoint import Checkpoint
+    from particles.effects import decide_oscillation
+    from particles.oscillation import solve_oscillation
+    from particles.products import write_body
+
+    scene, solder = run.case.oscillation, run.case.molten
+    checkpoint = Checkpoint(run.checkpoints("reflow") / "drop", (scene, solder))
+    with progress_bar(f"oscillation of {scene.particles} particles") as progress:
+        shape = solve_oscillation(scene, solder, progress, checkpoint)
+    write_body(folder, shape, None)
+    found = findings.of_oscillation(shape.metrics, decide_oscillation(solder))
+    return replace(found, continued="the drop" if checkpoint.continued else "")
+
+
+REFLOW_SCENES: dict[str, StageFunction] = {
+    DropCase.kind: reflow_drop,
+    JointCase.kind: reflow_joint,
+    OscillationCase.kind: reflow_oscillation,
+}
