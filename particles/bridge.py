@@ -17,7 +17,7 @@ from particles.plate import Pad, Plate
 from particles.rebuild import rebuild
 from particles.reflow import collect_shape, pad_lines, start_flow, stop_rule
 from particles.rest import run_to_rest
-from particles.shape import JointShape
+from particles.shape import JointShape, Snapshot
 
 SPACINGS_IN_GAP = 4
 
@@ -49,7 +49,9 @@ def solve_bridge(
     body = rebuild(*placed_joints(geometries, shapes, distance, solder))
     rule = stop_rule(body.cloud, both, effects)
     (drop,) = run_drops([start(body)], rule, start)
+    first = Snapshot(0.0, body.points, body.triangles)
     run = run_to_rest(drop.flow, replace(rule, max_steps=drop.flow.steps + rule.max_steps))
+    run.snapshots.insert(0, first)
     metrics = bridge_metrics(body.plates[-1].origin[2], both, drop.flow, run)
     return replace(collect_shape(both, drop.flow, run, metrics), verdict="bridged")
 

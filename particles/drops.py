@@ -2,12 +2,19 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from itertools import combinations
 
 from particles.body import Body
 from particles.checkpoint import Checkpoint
 from particles.flow import LiquidFlow, StepRecord
-from particles.rebuild import collapsing, rebuild, touch
+from particles.rebuild import collapsing, overlap, rebuild, touch
 from particles.rest import CALM_STEPS, NoRest, StopRule, is_calm
+
+LARGEST_OVERLAP = 0.5  # spacings
+
+
+class OverlappingDrops(ValueError):
+    """Drops that are in the same place before anything has flowed."""
 
 
 @dataclass(slots=True, eq=False)
@@ -54,11 +61,12 @@ def run_drops(
         The drops that are left.
 
     Raises:
+        OverlappingDrops: drops overlap at the start: they cannot both have their volume.
         NoRest: a drop took too many steps.
         CannotRebuild: drops touch, or one collapses, between walls.
     """
     state = checkpoint.read() if checkpoint else None
-    drops = state or _merge_touching([Drop(flow, (number,)) for number, flow in enumerate(flows)], start)
+    drops = state or _merge_touching(_apart(flows), start)
     while moving := [drop for drop in drops if drop.moves(rule)]:
         drop = min(moving, key=lambda candidate: candidate.flow.time)
         if len(drop.records) >= rule.max_steps:
@@ -70,6 +78,18 @@ def run_drops(
         if checkpoint is not None and checkpoint.is_due():
             checkpoint.write(drops)
     return drops
+
+
+def _apart(flows: Sequence[LiquidFlow]) -> list[Drop]:
+    """The drops at the start, which may touch, but not overlap by more than half a spacing."""
+    for (i, first), (j, second) in combinations(enumerate(flows), 2):
+        spacing = min(first.body.cloud.spacing, second.body.cloud.spacing)
+        depth = overlap(first.body, second.body)
+        if depth > LARGEST_OVERLAP * spacing:
+            raise OverlappingDrops(
+                f"drops {i} and {j} overlap by {depth:.3g} m at the start, allowed <= {LARGEST_OVERLAP * spacing:.3g} m"
+            )
+    return [Drop(flow, (number,)) for number, flow in enumerate(flows)]
 
 
 def _restarted(start: Callable[[Body], LiquidFlow], *drops: Drop) -> LiquidFlow:

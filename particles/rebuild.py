@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 
 from particles.body import Body
 from particles.cloud_level_set import cloud_from_level_set
-from particles.level_set import Grid, LevelSet, signed_distance, smooth_union
+from particles.level_set import Grid, LevelSet, depths, signed_distance, smooth_union
 from particles.plate import Plate
 
 Floats = NDArray[np.float64]
@@ -33,6 +33,11 @@ def touch(first: Body, second: Body) -> bool:
     surfaces = [body.points[: body.cloud.surface_count] for body in (first, second)]
     distance, _ = cKDTree(surfaces[0]).query(surfaces[1], distance_upper_bound=reach)
     return bool(np.isfinite(distance).any())
+
+
+def overlap(first: Body, second: Body) -> float:
+    """How deep particles of the second body are inside the first [m]; negative where none are."""
+    return float(depths(second.points, closed_surface(first)).max())
 
 
 def collapsing(body: Body) -> bool:

@@ -7,7 +7,7 @@ import pytest
 
 from particles.cloud import box_cloud
 from particles.cloud_level_set import cloud_from_level_set
-from particles.drops import run_drops
+from particles.drops import OverlappingDrops, run_drops
 from particles.parameters import Solder, SolderNumerics
 from particles.profile import fit_profile
 from particles.reflow import contact_line, start_flow, stop_rule
@@ -89,3 +89,11 @@ def test_drops_that_do_not_reach_each_other_stay_two():
     for drop in drops:
         body = drop.flow.body
         assert np.ptp(body.points[:, 2]) == pytest.approx(exact, rel=1e-2)
+
+
+def test_drops_that_overlap_at_the_start_are_an_error():
+    edge = np.cbrt(0.5e-9)
+    solder = solder_of(1.3e-4)
+    flows = cubes_on_a_wall((edge, edge), (-0.3e-3, 0.3e-3), 7, solder)
+    with pytest.raises(OverlappingDrops, match="drops 0 and 1 overlap"):
+        run_drops(flows, stop_rule(flows[0].body.cloud, solder, ON), lambda body: start_on_wall(body.cloud, solder))
