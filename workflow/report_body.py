@@ -1,6 +1,5 @@
 """Report of solder alone: pictures, profile or swing against the exact one, histories, metrics with their errors."""
 
-import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -9,7 +8,6 @@ import numpy as np
 import pyvista
 from matplotlib import pyplot
 
-from workflow.case_text import CASES
 from workflow.report_curves import MICRO, MILLI, STYLE, svg
 from workflow.report_pictures import new_plotter, save
 from workflow.report_tables import number, percent, quantity
@@ -17,7 +15,6 @@ from workflow.report_tables import number, percent, quantity
 if TYPE_CHECKING:
     from particles.shape import JointShape, Snapshot
 
-WORK_PRECISION = CASES / "sessile_drop" / "work_precision.json"
 SMALLEST_RANGE = 0.01
 HEADLINE = (
     "height", "max_width", "waist", "contact_angle", "max_width_error", "period", "period_error", "decay_rate",
@@ -39,30 +36,6 @@ def metric_table(metrics: dict, health: dict) -> dict:
         for name, metric in metrics.items()
     ]
     return {"head": ["metric", "value", "limit"], "rows": rows}
-
-
-def work_precision_table() -> dict | None:
-    """The stored work-precision ladder of the sessile drop."""
-    if not WORK_PRECISION.exists():
-        return None
-    rows = [
-        [
-            f"{row['contact_angle']:g} deg, {row['per_edge']} per edge, {row['basis']}, {row['time_step_limit']:g} x",
-            percent(row["height_error"]) if "height_error" in row else "no rest",
-            percent(row["max_width_error"]) if "max_width_error" in row else "",
-            number(row.get("steps", "")),
-            number(row.get("seconds", "")),
-        ]
-        for row in json.loads(WORK_PRECISION.read_text())["rows"]
-    ]
-    head = [
-        "drop, resolution, basis, time step over capillary limit",
-        "height error",
-        "width error",
-        "steps",
-        "seconds",
-    ]
-    return {"head": head, "rows": rows}
 
 
 def profile_curve(points: np.ndarray, meridian: np.ndarray | None) -> str:
