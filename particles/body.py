@@ -1,6 +1,6 @@
 """The liquid body while it flows: positions, velocities, pressures and the current triangles."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -71,6 +71,13 @@ class Body:
             local = plate.local(points + time_step * slip)
             moved[on_plate] = plates[wall].place(local * np.array([1.0, 1.0, 0.0]))
         self.points, self.plates = moved, tuple(plates)
+
+    def surface(self) -> "Body":
+        """The free surface alone: a body without the particles below it."""
+        count = self.cloud.surface_count
+        cloud = replace(self.cloud, points=self.cloud.points[:count], wall=self.cloud.wall[:count])
+        parts = (self.points[:count], self.velocity[:count], self.pressure[:count])
+        return Body(cloud, *parts, self.surface_pressure, self.triangles, self.volumes[:count], self.plates)
 
     def span(self) -> tuple[float, float]:
         """Heights [m] between which horizontal sections cut the surface, but no plate, tilted ones neither."""

@@ -1,7 +1,7 @@
 """Shifting of the particles below the surface: even spacing, and none pierces the surface."""
 
 import numpy as np
-from numba import njit
+from numba import njit, prange
 from numpy.typing import NDArray
 
 from particles.body import Body
@@ -18,37 +18,54 @@ SMALLEST_DEPTH = 0.4
 SMALLEST_HEIGHT = 0.25
 
 
-@njit(cache=True)
+@njit(cache=True, parallel=True)
 def _repulsion(rows, points, lists, reach):
     """Sum of unit vectors away from the neighbours, weighed by 1 - r/reach, `(m, 3)`."""
     offsets, indices = lists
     result = np.zeros((rows.shape[0], 3))
-    for r in range(rows.shape[0]):
+    for r in prange(rows.shape[0]):
         i = rows[r]
         for k in range(offsets[i], offsets[i + 1]):
-            d = points[i] - points[indices[k]]
-            distance = np.sqrt((d * d).sum())
-            if distance < reach:
-                result[r] += d * ((1.0 - distance / reach) / distance)
+            j = indices[k]
+            x, y, z = points[i, 0] - points[j, 0], points[i, 1] - points[j, 1], points[i, 2] - points[j, 2]
+            square = x * x + y * y + z * z
+            if square < reach * reach:
+                distance = np.sqrt(square)
+                push = (1.0 - distance / reach) / distance
+                result[r, 0] += push * x
+                result[r, 1] += push * y
+                result[r, 2] += push * z
     return result
 
 
 @njit(cache=True)
+def _nearest(i, points, lists, count):
+    """The neighbour of particle i among the first `count` particles that is closest to it, -1 if there is none."""
+    offsets, indices = lists
+    nearest, smallest = -1, np.inf
+    for k in range(offsets[i], offsets[i + 1]):
+        j = indices[k]
+        if j < count:
+            square = 0.0
+            for d in range(3):
+                square += (points[i, d] - points[j, d]) ** 2
+            if square < smallest:
+                nearest, smallest = j, square
+    return nearest
+
+
+@njit(cache=True, parallel=True)
 def _penetration(rows, points, lists, normals, depth):
     """Displacement that puts a particle a depth below the tangent plane of its nearest surface vertex, `(m, 3)`."""
-    offsets, indices = lists
     result = np.zeros((rows.shape[0], 3))
-    for r in range(rows.shape[0]):
-        i = rows[r]
-        nearest, smallest = -1, np.inf
-        for k in range(offsets[i], offsets[i + 1]):
-            j = indices[k]
-            square = ((points[i] - points[j]) ** 2).sum()
-            if j < normals.shape[0] and square < smallest:
-                nearest, smallest = j, square
-        if nearest >= 0:
-            below = ((points[nearest] - points[i]) * normals[nearest]).sum()
-            result[r] = -max(depth - below, 0.0) * normals[nearest]
+    for r in prange(rows.shape[0]):
+        j = _nearest(rows[r], points, lists, normals.shape[0])
+        if j >= 0:
+            below = 0.0
+            for d in range(3):
+                below += (points[j, d] - points[rows[r], d]) * normals[j, d]
+            for d in range(3):
+                result[r, d] = -max(depth - below, 0.0) * normals[j, d]
     return result
 
 

@@ -1,10 +1,7 @@
-"""Neighbour lists: cell grid, compressed rows, Verlet skin.
-
-Kernels run on one thread: a joint has about a thousand particles, and joints run beside each other in processes.
-"""
+"""Neighbour lists: cell grid, compressed rows, Verlet skin."""
 
 import numpy as np
-from numba import njit
+from numba import njit, prange
 from numpy.typing import NDArray
 
 Points = NDArray[np.float64]
@@ -53,16 +50,18 @@ def _visit_row(i, points, radius, cells, found):
     return count
 
 
-@njit(cache=True)
+@njit(cache=True, parallel=True)
 def _rows(points, radius, cells):
     """Compressed rows: one pass counts, the other writes."""
     count = points.shape[0]
     nothing = np.empty(0, np.int32)
     offsets = np.zeros(count + 1, np.int32)
+    for i in prange(count):
+        offsets[i + 1] = _visit_row(i, points, radius, cells, nothing)
     for i in range(count):
-        offsets[i + 1] = offsets[i] + _visit_row(i, points, radius, cells, nothing)
+        offsets[i + 1] += offsets[i]
     indices = np.empty(offsets[count], np.int32)
-    for i in range(count):
+    for i in prange(count):
         _visit_row(i, points, radius, cells, indices[offsets[i] : offsets[i + 1]])
     return offsets, indices
 

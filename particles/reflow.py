@@ -9,7 +9,6 @@ from particles.body import Body
 from particles.checkpoint import Checkpoint
 from particles.cloud import Cloud, TooLittleSolder, box_cloud, joint_cloud
 from particles.contact_line import ContactLine
-from particles.coupled_step import CoupledStep
 from particles.effects import decide_effects
 from particles.flow import LiquidFlow
 from particles.force_gravity import Gravity
@@ -23,6 +22,7 @@ from particles.metrics import Metrics, joint_metrics, open_metrics, particle_pre
 from particles.parameters import Solder
 from particles.physics import Event, Force, Momentum, Operator, Physics
 from particles.plate import Pad
+from particles.relaxation import Relaxation
 from particles.rest import Run, StopRule, run_to_rest
 from particles.shape import JointShape, Snapshot
 from particles.step_solver import StepSolver
@@ -117,17 +117,17 @@ def start_flow(cloud: Cloud, solder: Solder, effects: dict[str, bool], lines: tu
     limit = capillary_limit(solder.density, cloud.spacing, solder.surface_tension)
     largest = solder.numerics.time_step_limit * limit
     physics = build_physics(solder, effects, lines)
-    solver = _step_solver(solder, effects)
+    solver = step_solver(solder, effects)
     return LiquidFlow(Body.at_rest(cloud), physics, TimeStep(largest, cloud.spacing, largest), solver)
 
 
-def _step_solver(solder: Solder, effects: dict[str, bool]) -> StepSolver:
-    """How steps are solved: tetrahedra where momentum is carried or shared, moving least squares on the way to rest."""
+def step_solver(solder: Solder, effects: dict[str, bool]) -> StepSolver:
+    """How steps are solved: by the seed's scheme, on tetrahedra where momentum is carried or shared, else to rest."""
     if solder.numerics.scheme == "gripc":
         return GripcStep(solder.numerics.basis)
     if effects["inertia"] or effects["viscosity"]:
         return InertialStep(solder.density)
-    return CoupledStep(solder.numerics.basis)
+    return Relaxation(solder.density)
 
 
 def stop_rule(cloud: Cloud, solder: Solder, effects: dict[str, bool]) -> StopRule:

@@ -17,12 +17,20 @@ Indices = NDArray[np.int32]
 
 
 @njit(cache=True)
+def area_vector(points, i, j, k):
+    """Normal of a triangle, of twice its area [m^2]."""
+    ux, uy, uz = points[j, 0] - points[i, 0], points[j, 1] - points[i, 1], points[j, 2] - points[i, 2]
+    vx, vy, vz = points[k, 0] - points[i, 0], points[k, 1] - points[i, 1], points[k, 2] - points[i, 2]
+    return uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+
+
+@njit(cache=True)
 def surface_area(points, triangles):
     """Area of the triangles [m^2]; `points (n, 3)`, `triangles (t, 3)`."""
     total = 0.0
     for t in range(triangles.shape[0]):
-        a, b, c = points[triangles[t, 0]], points[triangles[t, 1]], points[triangles[t, 2]]
-        total += np.sqrt((np.cross(b - a, c - a) ** 2).sum())
+        x, y, z = area_vector(points, triangles[t, 0], triangles[t, 1], triangles[t, 2])
+        total += np.sqrt(x * x + y * y + z * z)
     return 0.5 * total
 
 
@@ -89,6 +97,21 @@ def volume_and_gradient(
     return volume, gradient
 
 
+@njit(cache=True)
+def surface_flux(points, triangles, velocity):
+    """Volume that each vertex of the surface sweeps in a unit of time, `(k,)` [m^3/s], for `velocity (k, 3)`.
+
+    A third of the area vectors of its triangles times the velocity: over a closed surface the sum is dV/dt.
+    """
+    flux = np.zeros(velocity.shape[0])
+    for t in range(triangles.shape[0]):
+        a, b, c = triangles[t]
+        x, y, z = area_vector(points, a, b, c)
+        for v in (a, b, c):
+            flux[v] += (x * velocity[v, 0] + y * velocity[v, 1] + z * velocity[v, 2]) / 6.0
+    return flux
+
+
 def enclosed_volume(points: Floats, triangles: Indices, rings: Sequence[Indices], plates: Sequence[Plate]) -> float:
     """Volume enclosed by the surface and the walls [m^3]."""
     return volume_and_gradient(points, triangles, rings, plates)[0]
@@ -100,10 +123,12 @@ def _cotangents(points, triangles):
     result = np.empty(triangles.shape)
     for t in range(triangles.shape[0]):
         for k in range(3):
-            apex = points[triangles[t, k]]
-            u = points[triangles[t, (k + 1) % 3]] - apex
-            v = points[triangles[t, (k + 2) % 3]] - apex
-            result[t, k] = (u * v).sum() / np.sqrt((np.cross(u, v) ** 2).sum())
+            a, b, c = triangles[t, k], triangles[t, (k + 1) % 3], triangles[t, (k + 2) % 3]
+            along = 0.0
+            for d in range(3):
+                along += (points[b, d] - points[a, d]) * (points[c, d] - points[a, d])
+            x, y, z = area_vector(points, a, b, c)
+            result[t, k] = along / np.sqrt(x * x + y * y + z * z)
     return result
 
 

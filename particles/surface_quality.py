@@ -6,6 +6,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from particles.surface_measure import area_vector
+
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int32]
 
@@ -15,23 +17,47 @@ FLIP_PASSES = 4
 
 
 @njit(cache=True)
+def _angle(points, apex, i, j):
+    """Angle of a triangle at its apex."""
+    x, y, z = area_vector(points, apex, i, j)
+    along = 0.0
+    for d in range(3):
+        along += (points[i, d] - points[apex, d]) * (points[j, d] - points[apex, d])
+    return np.arctan2(np.sqrt(x * x + y * y + z * z), along)
+
+
+@njit(cache=True)
+def _folds(points, corners):
+    """Whether flipping the edge i j of the triangles p i j and q j i would fold the surface."""
+    p, q, i, j = corners
+    before, opposite = area_vector(points, p, i, j), area_vector(points, q, j, i)
+    first, second = area_vector(points, p, i, q), area_vector(points, p, q, j)
+    along_first, along_second = 0.0, 0.0
+    for d in range(3):
+        along_first += first[d] * (before[d] + opposite[d])
+        along_second += second[d] * (before[d] + opposite[d])
+    return along_first <= 0.0 or along_second <= 0.0
+
+
+@njit(cache=True)
 def _centroid_offsets(points, triangles, count):
     """Area-weighted mean of the centroids of a vertex's triangles, minus the vertex; and the vertex normal."""
-    offset = np.zeros((count, 3))
-    normal = np.zeros((count, 3))
-    area = np.zeros(count)
+    offset, normal, area = np.zeros((count, 3)), np.zeros((count, 3)), np.zeros(count)
     for t in range(triangles.shape[0]):
         a, b, c = triangles[t]
-        cross = np.cross(points[b] - points[a], points[c] - points[a])
-        size = np.sqrt((cross**2).sum())
-        centroid = (points[a] + points[b] + points[c]) / 3.0
+        cross = area_vector(points, a, b, c)
+        size = np.sqrt(cross[0] ** 2 + cross[1] ** 2 + cross[2] ** 2)
         for v in (a, b, c):
-            offset[v] += size * (centroid - points[v])
-            normal[v] += cross
             area[v] += size
+            for d in range(3):
+                centroid = (points[a, d] + points[b, d] + points[c, d]) / 3.0
+                offset[v, d] += size * (centroid - points[v, d])
+                normal[v, d] += cross[d]
     for v in range(count):
-        offset[v] /= area[v]
-        normal[v] /= np.sqrt((normal[v] ** 2).sum())
+        length = np.sqrt(normal[v, 0] ** 2 + normal[v, 1] ** 2 + normal[v, 2] ** 2)
+        for d in range(3):
+            offset[v, d] /= area[v]
+            normal[v, d] /= length
     return offset, normal
 
 
@@ -70,17 +96,6 @@ def _half_edges(triangles, count):
 
 
 @njit(cache=True)
-def _angle(points, apex, i, j):
-    u, v = points[i] - points[apex], points[j] - points[apex]
-    return np.arctan2(np.sqrt((np.cross(u, v) ** 2).sum()), (u * v).sum())
-
-
-@njit(cache=True)
-def _normal(points, i, j, k):
-    return np.cross(points[j] - points[i], points[k] - points[i])
-
-
-@njit(cache=True)
 def _flip_pass(points, triangles, on_ring, margin):
     """Flip edges whose opposite angles exceed pi, at most one edge a triangle; return the number of flips."""
     keys, order = _half_edges(triangles, points.shape[0])
@@ -100,8 +115,7 @@ def _flip_pass(points, triangles, on_ring, margin):
         found = np.searchsorted(keys, new_key)
         if found < keys.shape[0] and keys[found] == new_key:
             continue
-        old = _normal(points, p, i, j) + _normal(points, q, j, i)
-        if (_normal(points, p, i, q) * old).sum() <= 0.0 or (_normal(points, p, q, j) * old).sum() <= 0.0:
+        if _folds(points, (p, q, i, j)):
             continue
         triangles[s, 0], triangles[s, 1], triangles[s, 2] = p, i, q
         triangles[t, 0], triangles[t, 1], triangles[t, 2] = p, q, j
