@@ -124,7 +124,8 @@ class ContactLine:
         offset, radius = self._offset(local)
         edge, pad_cosine = self.edges[self.pad], self._pad_cosine[self.pad]
         near = np.abs(radius - edge) < CATCH_DISTANCE * body.cloud.spacing
-        holds = near & (cosine < pad_cosine) & (cosine > self._mask_cosine)
+        # With a margin as for the release: a line at rest just off the edge has the angle of its side.
+        holds = near & (cosine < pad_cosine - RELEASE_MARGIN) & (cosine > self._mask_cosine + RELEASE_MARGIN)
         # Behind the line is the pad that the liquid covers; one before it is stepped onto, not caught at.
         behind = (offset * (self.outward(body)[0] @ plate.frame.T)[:, :2]).sum(axis=1) > 0.0
         on_pad, on_mask, held = (self.state == which for which in (ON_PAD, ON_MASK, PINNED))

@@ -91,7 +91,7 @@ def test_viscosity_lets_a_vortex_decay_at_its_rate():
 @pytest.fixture(scope="module")
 def rest():
     """A drop of 60 degrees at rest by the energy scheme, 7 particles per edge, values of the paper."""
-    numerics = SolderNumerics(time_step_limit=100.0)
+    numerics = SolderNumerics(time_step_limit=100.0, tolerance=1e-7)
     solder = Solder(
         volume=1e-9, pad_contact_angle=np.pi / 3, effects=SolderEffects(gravity="off"), numerics=numerics, **PAPER
     ).model_copy(update={"process_time": 60.0})
