@@ -3,12 +3,14 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations
+from time import perf_counter
 
 from particles.body import Body
 from particles.checkpoint import Checkpoint
 from particles.flow import LiquidFlow, StepRecord
 from particles.rebuild import collapsing, overlap, rebuild, touch
-from particles.rest import CALM_STEPS, NoRest, StopRule, is_calm
+from particles.rest import CALM_STEPS, NoRest, StopRule, fraction_done, is_calm
+from particles.shape import Snapshot
 
 LARGEST_OVERLAP = 0.5  # spacings
 
@@ -24,18 +26,32 @@ class Drop:
     Attributes:
         flow: the flow.
         origins: numbers of the first drops that it is made of.
+        first: how it was when it was made.
+        parents: the drops that became this one, as they were when they touched.
         records: its steps since it was made.
         calm: its last steps that hardly moved it.
+        seconds: wall time of its steps [s].
     """
 
     flow: LiquidFlow
     origins: tuple[int, ...]
+    first: Snapshot
+    parents: tuple["Drop", ...] = ()
     records: list[StepRecord] = field(default_factory=list)
     calm: int = 0
+    seconds: float = 0.0
+
+    @classmethod
+    def made(cls, flow: LiquidFlow, origins: tuple[int, ...], parents: tuple["Drop", ...] = ()) -> "Drop":
+        """Make a drop of a flow that has not moved yet."""
+        first = Snapshot(flow.time, flow.body.points.copy(), flow.body.triangles.copy())
+        return cls(flow, origins, first, parents)
 
     def step(self, rule: StopRule) -> None:
         """Advance one time step."""
+        start = perf_counter()
         self.records.append(self.flow.step())
+        self.seconds += perf_counter() - start
         self.calm = self.calm + 1 if is_calm(self.records, rule) else 0
 
     def moves(self, rule: StopRule) -> bool:
@@ -48,6 +64,7 @@ def run_drops(
     rule: StopRule,
     start: Callable[[Body], LiquidFlow],
     checkpoint: Checkpoint | None = None,
+    progress: Callable[[float], None] | None = None,
 ) -> list[Drop]:
     """Let drops flow until all are at rest; the one that is behind in time goes first.
 
@@ -56,6 +73,7 @@ def run_drops(
         rule: when a drop is at rest.
         start: makes the flow of a body that two drops became.
         checkpoint: where the run continues from, to the last bit, and leaves its state.
+        progress: called with the fraction done of the drop that has most to do.
 
     Returns:
         The drops that are left.
@@ -77,6 +95,8 @@ def run_drops(
         drops = _merge_touching(drops, start)
         if checkpoint is not None and checkpoint.is_due():
             checkpoint.write(drops)
+        if progress is not None:
+            progress(min((fraction_done(one.records, rule) for one in drops if one.moves(rule)), default=1.0))
     return drops
 
 
@@ -89,7 +109,7 @@ def _apart(flows: Sequence[LiquidFlow]) -> list[Drop]:
             raise OverlappingDrops(
                 f"drops {i} and {j} overlap by {depth:.3g} m at the start, allowed <= {LARGEST_OVERLAP * spacing:.3g} m"
             )
-    return [Drop(flow, (number,)) for number, flow in enumerate(flows)]
+    return [Drop.made(flow, (number,)) for number, flow in enumerate(flows)]
 
 
 def _restarted(start: Callable[[Body], LiquidFlow], *drops: Drop) -> LiquidFlow:
@@ -104,7 +124,7 @@ def _merge_touching(drops: list[Drop], start: Callable[[Body], LiquidFlow]) -> l
     while (pair := _touching(drops)) is not None:
         rest = [drop for drop in drops if drop not in pair]
         origins = sorted(pair[0].origins + pair[1].origins)
-        drops = [*rest, Drop(_restarted(start, *pair), tuple(origins))]
+        drops = [*rest, Drop.made(_restarted(start, *pair), tuple(origins), pair)]
     return drops
 
 

@@ -66,7 +66,8 @@ class Run:
         """Columns of the records, with width and capillary number mu v / gamma."""
         names = ("step", "time", "time_step", "binding", "height", "volume", "energy", "displacement", "iterations")
         columns = {name: np.array([getattr(record, name) for record in self.records]) for name in names}
-        columns["width"] = np.array([profile.max_width for profile in self.profiles])
+        if self.profiles:
+            columns["width"] = np.array([profile.max_width for profile in self.profiles])
         speed = np.array([record.speed for record in self.records])
         columns["capillary_number"] = viscosity_over_tension * speed
         return columns
@@ -99,7 +100,7 @@ def run_to_rest(
             _snap(run, flow, on_snapshot)
         if checkpoint is not None and checkpoint.is_due():
             checkpoint.write((flow, run))
-        done = max(done, _fraction(run, rule))
+        done = max(done, fraction_done(run.records, rule))
         if progress is not None:
             progress(done)
     if run.moved > 0.0:
@@ -165,13 +166,15 @@ def is_calm(records: Sequence[StepRecord], rule: StopRule) -> bool:
     return _motion(last, rule) < CALM_DISPLACEMENT and change < rule.tolerance * abs(last.energy)
 
 
-def _fraction(run: Run, rule: StopRule) -> float:
+def fraction_done(records: Sequence[StepRecord], rule: StopRule) -> float:
     """Share of the way to rest: the motion dies out exponentially; or share of the process time."""
-    first, last = _motion(run.records[0], rule), _motion(run.records[-1], rule)
+    if not records:
+        return 0.0
+    first, last = _motion(records[0], rule), _motion(records[-1], rule)
     if first <= CALM_DISPLACEMENT:
         return 1.0
     settled = log(first / max(last, CALM_DISPLACEMENT)) / log(first / CALM_DISPLACEMENT)
-    return min(1.0, max(0.0, settled, run.records[-1].time / rule.end_time))
+    return min(1.0, max(0.0, settled, records[-1].time / rule.end_time))
 
 
 def _snap(run: Run, flow: LiquidFlow, on_snapshot: Callable[[Snapshot], None] | None) -> None:

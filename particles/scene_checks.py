@@ -1,14 +1,17 @@
 """Parameters of a scene that are each allowed but make no drop or joint together. Loads neither numba nor PETSc."""
 
 from dataclasses import replace
-from math import degrees, inf
+from math import degrees, inf, pi
 from typing import Protocol
 
 from particles import checks
 from particles.checks import Problem, mm, mm3
+from particles.effects import acting_weight, decide_drop
 from particles.estimate import particle_count
 from particles.parameters import Solder
+from particles.scene_drops import Drops
 from particles.scenes import Drop, Joint
+from particles.young_laplace import sessile_meridian
 
 FEWEST_PER_EDGE = 5
 MOST_PARTICLES = 200_000
@@ -33,6 +36,46 @@ def drop_problems(drop: Drop, solder: Solder) -> list[Problem]:
     """Find what cannot work before a drop runs."""
     found = checks.scheme_problems(solder) or _resolution_problems(drop)
     return found or _wall_problems(drop) or _pad_problems(drop) or free_problems(drop, solder)
+
+
+def pair_problems(pair: Drops, solder: Solder) -> list[Problem]:
+    """Find what cannot work before two drops run: too coarse, overlapping, or never or always in touch."""
+    found = checks.scheme_problems(solder) or free_problems(pair, solder) or _pair_resolution(pair)
+    return found or _distance_problems(pair, solder)
+
+
+def _pair_resolution(pair: Drops) -> list[Problem]:
+    limit = min(pair.volumes) ** (1.0 / 3.0) / (FEWEST_PER_EDGE - 1)
+    if pair.spacing > limit:
+        message = f"too coarse for the smaller drop, of {mm3(min(pair.volumes))}"
+        return [Problem("drops.spacing", mm(pair.spacing), f"<= {mm(limit)}", message)]
+    return _too_many("drops", pair.spacing, pair.particles)
+
+
+def _distance_problems(pair: Drops, solder: Solder) -> list[Problem]:
+    """The centres must be so far apart that the drops do not overlap, and so near that they touch if they shall."""
+    apart, reach = _distances(pair, solder)
+    value, clear = mm(pair.distance), reach + 2.0 * pair.spacing
+    if pair.distance < apart:
+        return [Problem("drops.distance", value, f">= {mm(apart)}", "the drops overlap at the start")]
+    if pair.merge and pair.distance > reach:
+        message = "the drops are meant to become one, but do not reach each other"
+        return [Problem("drops.distance", value, f"{mm(apart)} to {mm(reach)}", message)]
+    if not pair.merge and pair.distance < clear:
+        message = "the drops are not meant to become one (drops.merge = false), but would touch"
+        return [Problem("drops.distance", value, f">= {mm(clear)}", message)]
+    return []
+
+
+def _distances(pair: Drops, solder: Solder) -> tuple[float, float]:
+    """Distance of centres at which the drops touch at the start, and up to which they touch at rest [m]."""
+    edges = [volume ** (1.0 / 3.0) for volume in pair.volumes]
+    if pair.contact_angle is None:
+        apart = sum(edge * (0.75 / pi) ** (1.0 / 3.0) for edge in edges)
+        return apart, apart + 0.5 * pair.spacing
+    weight = acting_weight(solder, decide_drop(solder, is_free=False))
+    rest = [sessile_meridian(v, pair.contact_angle, solder.surface_tension, weight) for v in pair.volumes]
+    return 0.5 * sum(edges), max(0.5 * sum(edges), 0.5 * sum(drop.max_width for drop in rest))
 
 
 def free_problems(scene: HasWall, solder: Solder) -> list[Problem]:

@@ -1,6 +1,6 @@
 """The case: what a case file means, composed from the parameter models of the packages.
 
-A case file is of one kind, by the table that only this kind has: [package], [drop], [joint], [oscillation].
+A case file is of one kind, by the table that only this kind has: [package], [drop], [joint], [drops], [oscillation].
 """
 
 import os
@@ -16,11 +16,12 @@ from pydantic.fields import FieldInfo
 from fem.parameters import Materials, Shock
 from meshing.parameters import Board, Package, Warpage
 from particles.parameters import Solder, Switch
+from particles.scene_drops import Drops
 from particles.scene_oscillation import Oscillation
 from particles.scenes import Drop, Fluid, Joint, Liquid
 from workflow import fields
 from workflow.problems import CaseError, Problem, nearest
-from workflow.stage_table import BOARD_DROP, DROP, JOINT, OSCILLATION, Pipeline
+from workflow.stage_table import BOARD_DROP, DROP, DROPS, JOINT, OSCILLATION, Pipeline
 from workflow.validation import translate
 
 if TYPE_CHECKING:
@@ -142,6 +143,21 @@ class JointCase(SceneCase):
         return _of_particles(joint_problems(self.joint, self.molten))
 
 
+class DropsCase(SceneCase):
+    """Two drops that become one, or stay apart."""
+
+    kind = "drops"
+    pipeline = DROPS
+
+    drops: Drops
+
+    def problems(self) -> list[Problem]:
+        """Find parameters that make no possible pair together."""
+        from particles.scene_checks import pair_problems
+
+        return _of_particles(pair_problems(self.drops, self.molten))
+
+
 class OscillationCase(Case):
     """A free drop that swings."""
 
@@ -161,7 +177,9 @@ class OscillationCase(Case):
         return []
 
 
-KINDS: dict[str, type[Case]] = {model.kind: model for model in (BoardDropCase, DropCase, JointCase, OscillationCase)}
+KINDS: dict[str, type[Case]] = {
+    model.kind: model for model in (BoardDropCase, DropCase, JointCase, DropsCase, OscillationCase)
+}
 
 
 def kind_of(table: Mapping) -> type[Case]:

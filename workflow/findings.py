@@ -116,6 +116,14 @@ def of_joint(metrics: Numbers, verdict: str, effects: Mapping[str, Any]) -> Find
     return Findings(_known(named) | {"verdict": metric(verdict)}, health, dict(effects))
 
 
+def of_drops(metrics: Numbers, expected: int, effects: Mapping[str, Any]) -> Findings:
+    """Judge drops by how many are left, volume, rest and their exact shapes."""
+    limits = {"height_error": DROP_ERROR, "max_width_error": DROP_ERROR, "radius_error": DROP_ERROR}
+    unexpected = abs(int(metrics["drops_left"][0]) - expected)
+    health = _at_rest(metrics, limits) | {"drops_not_as_meant": at_most(unexpected, 0)}
+    return Findings(_known(metrics), health, dict(effects))
+
+
 def of_oscillation(metrics: Numbers, effects: Mapping[str, Any]) -> Findings:
     """Judge a drop that swings by volume, and by Rayleigh's period and Lamb's decay rate."""
     limits = {"period_error": PERIOD_ERROR, "decay_rate_error": DECAY_ERROR}

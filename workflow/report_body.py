@@ -57,7 +57,8 @@ def history_curve(history: dict) -> str:
     with pyplot.rc_context(STYLE):
         figure, axes = pyplot.subplots(2, 2, figsize=(9.2, 5.2), sharex=True, constrained_layout=True)
         axes[0, 0].plot(step, history["height"] / MILLI, label="height")
-        axes[0, 0].plot(step, history["width"] / MILLI, label="width")
+        if "width" in history:
+            axes[0, 0].plot(step, history["width"] / MILLI, label="width")
         axes[0, 0].set_ylabel("[mm]")
         axes[0, 0].legend(frameon=False)
         axes[0, 1].plot(step, history["energy"] / MICRO)
@@ -97,7 +98,7 @@ def render_stages(stages: "Sequence[Snapshot]", shape: "JointShape", picture: Pa
 
 def stages(kind: str, shape: "JointShape") -> "list[Snapshot]":
     """The states that a picture shows before the end: the start, of a swing each quarter of its first period."""
-    return shape.snapshots[:7:2] if kind == "oscillation" else shape.snapshots[:1]
+    return {"oscillation": shape.snapshots[:7:2], "drops": shape.snapshots}.get(kind, shape.snapshots[:1])
 
 
 def _add_coloured(plotter: pyvista.Plotter, points: np.ndarray, pressure: np.ndarray, size: dict) -> None:

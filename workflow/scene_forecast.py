@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from math import ceil
 from typing import Any
 
-from workflow.case import Case, DropCase, JointCase, OscillationCase, SceneCase
+from workflow.case import Case, DropCase, DropsCase, JointCase, OscillationCase, SceneCase
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,6 +53,15 @@ def _of_joint(case: JointCase) -> SceneForecast:
     return _towards_rest(case, decide_effects(geometry, solder), particles, reflow_seconds(solder, geometry))
 
 
+def _of_drops(case: DropsCase) -> SceneForecast:
+    from particles.effects import decide_drop
+    from particles.estimate import drop_seconds
+
+    drops = case.drops
+    seconds = sum(drop_seconds(drops.per_edge(volume)) for volume in (*drops.volumes, drops.volume))
+    return _towards_rest(case, decide_drop(case.molten, drops.is_free), drops.particles, seconds)
+
+
 def _towards_rest(case: SceneCase, effects: Mapping[str, Any], particles: int, seconds: float) -> SceneForecast:
     from particles.time_step import capillary_limit
 
@@ -85,5 +94,6 @@ def _of_oscillation(case: OscillationCase) -> SceneForecast:
 FORECASTS: dict[str, Callable[[Any], SceneForecast]] = {
     DropCase.kind: _of_drop,
     JointCase.kind: _of_joint,
+    DropsCase.kind: _of_drops,
     OscillationCase.kind: _of_oscillation,
 }

@@ -4,7 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from workflow import findings
-from workflow.case import DropCase, JointCase, OscillationCase
+from workflow.case import DropCase, DropsCase, JointCase, OscillationCase
 from workflow.progress import progress_bar
 from workflow.stage_runner import Findings, Run, StageFunction
 
@@ -42,6 +42,21 @@ def reflow_joint(run: Run[JointCase], folder: Path) -> Findings:
     return replace(found, continued="the joint" if checkpoint.continued else "")
 
 
+def reflow_drops(run: Run[DropsCase], folder: Path) -> Findings:
+    """Let two drops flow until they, or the one that they become, are at rest."""
+    from particles.checkpoint import Checkpoint
+    from particles.drop_pair import pair_to_rest
+    from particles.products import write_body
+
+    drops, solder = run.case.drops, run.case.molten
+    checkpoint = Checkpoint(run.checkpoints("reflow") / "drops", (drops, solder))
+    with progress_bar("reflow of two drops") as progress:
+        result = pair_to_rest(drops, solder, progress, checkpoint)
+    write_body(folder, result.shape, result.reference)
+    found = findings.of_drops(result.shape.metrics, 1 if drops.merge else 2, result.effects)
+    return replace(found, continued="the drops" if checkpoint.continued else "")
+
+
 def reflow_oscillation(run: Run[OscillationCase], folder: Path) -> Findings:
     """Let a free drop swing."""
     from particles.checkpoint import Checkpoint
@@ -61,5 +76,6 @@ def reflow_oscillation(run: Run[OscillationCase], folder: Path) -> Findings:
 REFLOW_SCENES: dict[str, StageFunction] = {
     DropCase.kind: reflow_drop,
     JointCase.kind: reflow_joint,
+    DropsCase.kind: reflow_drops,
     OscillationCase.kind: reflow_oscillation,
 }

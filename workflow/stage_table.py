@@ -100,4 +100,5 @@ def _one_body(scene: str) -> Pipeline:
 
 DROP = _one_body("drop")
 JOINT = _one_body("joint")
+DROPS = _one_body("drops")
 OSCILLATION = _one_body("oscillation")

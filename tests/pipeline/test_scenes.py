@@ -58,6 +58,18 @@ def test_from_case_file_to_report(tmp_path, name, setting, own):
     assert "nothing to do" in run(name, tmp_path, setting).stdout
 
 
+@pytest.mark.parametrize("place", [(), ("drops.contact_angle=60 deg", "drops.distance=1.3 mm")], ids=["free", "wall"])
+def test_two_drops_from_case_file_to_report(tmp_path, place):
+    result = run("coalescence", tmp_path, "drops.spacing=0.13 mm", "gravity=off", *place)
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    assert summary["metrics"]["drops_left"]["value"] == 1
+    assert abs(summary["metrics"]["volume_drift"]["value"]) < 1e-6
+    limits = {"height_error", "max_width_error"} | (set() if place else {"radius_error"})
+    assert set(summary["health"]) >= limits | {"drops_not_as_meant", "volume_drift", "capillary_number_at_rest"}
+    assert result.returncode == 0, result.stderr
+    assert "<svg" in (tmp_path / "report.html").read_text()
+
+
 def test_an_oscillation_from_case_file_to_report(tmp_path):
     settings = ("oscillation.particles_per_radius=2", "oscillation.periods=1.5")
     result = run("oscillating_drop", tmp_path, *settings)

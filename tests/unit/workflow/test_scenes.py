@@ -16,8 +16,14 @@ CASES = Path(__file__).resolve().parents[3] / "cases"
 DROP, BALL, JOINT, FREE = (
     CASES / name / "case.toml" for name in ("sessile_drop", "bga_ball", "solder_joint", "laplace_drop")
 )
+PAIR = CASES / "coalescence" / "case.toml"
 SWING = CASES / "oscillating_drop" / "case.toml"
 BAD_VALUES = {
+    "drops that overlap": (PAIR, "drops.distance=0.5 mm", ["drops.distance", '"0.5 mm"', ">= 0.8832 mm", "overlap"]),
+    "drops that never touch": (PAIR, "drops.distance=1.5 mm", ["drops.distance", "0.8832 mm to 0.9332 mm", "reach"]),
+    "drops not meant to merge": (PAIR, "drops.merge=false", ["drops.distance", ">= 1.133 mm", "drops.merge = false"]),
+    "coarser than a drop": (PAIR, "drops.spacing=0.5 mm", ["drops.spacing", "<= 0.1575 mm", "too coarse"]),
+    "gravity on free drops": (PAIR, "gravity=on", ['gravity = "on"', "no wall"]),
     "amplitude too large": (SWING, "oscillation.amplitude=0.5", ["oscillation.amplitude = 0.5", "<= 0.3"]),
     "fewer than two shells": (SWING, "oscillation.particles_per_radius=1", ["particles_per_radius = 1", ">= 2"]),
     "gravity of a swing": (SWING, "solder.gravity=1 m/s^2", ["solder.gravity", "unknown key"]),
