@@ -4,7 +4,7 @@ A particle off the walls has three, one on a wall two along its plate (free slip
 floating plate has its own and takes along what it carries. v0 is the part that prescribed motion gives.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,10 +29,11 @@ class Admissible:
             motions: motions of the plates.
         """
         self._body, self._pinned, self._motions = body, pinned, motions
-        plates = [self._carried(motion.wall, twist) for motion in motions for twist in motion.directions]
-        columns = [sparse.csr_matrix(column).T for column in plates]
-        self.basis = sparse.hstack([self._slip(), *columns], format="csr")
-        self._plate_count = len(plates)
+        twists = [(motion.wall, twist) for motion in motions for twist in motion.directions]
+        own = self._slip()
+        self.basis = _append(own, [self._carried(*twist) for twist in twists])
+        self.slip_basis = _append(own, [self._left_behind(*twist) for twist in twists])
+        self._plate_count = len(twists)
 
     def _slip(self) -> sparse.csr_matrix:
         """Columns of the particles' own motion, relative to their plates."""
@@ -53,18 +54,39 @@ class Admissible:
 
     def _carried(self, wall: int, twist: Floats) -> Floats:
         """Velocity `(3 n,)` with which a plate takes particles along: pinned ones wholly, others along its normal."""
+        field = self._rigid(wall, twist)
+        return (field - self._sliding(field)).T.ravel()
+
+    def _left_behind(self, wall: int, twist: Floats) -> Floats:
+        """Velocity `(3 n,)` relative to a plate of the particles that slide on it and stay where they are."""
+        return -self._sliding(self._rigid(wall, twist)).T.ravel()
+
+    def _rigid(self, wall: int, twist: Floats) -> Floats:
+        """Velocity `(n, 3)` of a plate at the particles on it."""
         body = self._body
         on_plate = body.cloud.wall == wall
         field = np.zeros_like(body.points)
         field[on_plate] = body.plates[wall].rigid_velocity(twist, body.points[on_plate])
-        sliding = np.where(self._pinned[:, None], 0.0, slide(body.plates, body.cloud.wall, field))
-        return (field - sliding).T.ravel()
+        return field
+
+    def _sliding(self, field: Floats) -> Floats:
+        """The part of a field `(n, 3)` along the plates, where nothing is pinned."""
+        body = self._body
+        return np.where(self._pinned[:, None], 0.0, slide(body.plates, body.cloud.wall, field))
 
     def given(self, time_step: float) -> Floats:
         """The velocity v0 `(3 n,)` [m/s] of prescribed motion over a time step [s]."""
+        return self._prescribed(self._carried, time_step)
+
+    def slip_given(self, time_step: float) -> Floats:
+        """Velocity relative to the plates `(3 n,)` [m/s] that prescribed motion over a time step [s] gives."""
+        return self._prescribed(self._left_behind, time_step)
+
+    def _prescribed(self, field: Callable[[int, Floats], Floats], time_step: float) -> Floats:
+        """Sum of a field of all plates that move along a prescribed path."""
         plates = self._body.plates
         twists = ((motion.wall, motion.given(plates[motion.wall], time_step)) for motion in self._motions)
-        return sum((self._carried(wall, twist) for wall, twist in twists), np.zeros(3 * len(self._body.points)))
+        return sum((field(wall, twist) for wall, twist in twists), np.zeros(3 * len(self._body.points)))
 
     def reduce(self, load: Floats) -> Floats:
         """Generalised forces `(d,)` of forces on the particles `(3 n,)`, with the loads on floating plates [N]."""
@@ -82,3 +104,8 @@ class Admissible:
             result[motion.wall] = given + rates[start:stop] @ motion.directions
             start = stop
         return result
+
+
+def _append(matrix: sparse.csr_matrix, columns: Sequence[Floats]) -> sparse.csr_matrix:
+    """A matrix with more columns."""
+    return sparse.hstack([matrix, *(sparse.csr_matrix(column).T for column in columns)], format="csr")

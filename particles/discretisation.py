@@ -20,6 +20,7 @@ class Discretisation:
         constraint: `(k, 3 n)` rate of the volume that each pressure controls [m^2].
         volume_share: `(k,)` these rates where the whole volume grows evenly at the rate one.
         stabilisation: `(k, k)` symmetric, positive semidefinite, over the time step [m^3/(Pa s^2)], or None.
+        diffusion_rate: at which viscosity carries momentum across a spacing; it weakens the stabilisation [1/s].
     """
 
     gradient: tuple[sparse.csr_matrix, sparse.csr_matrix, sparse.csr_matrix]
@@ -28,3 +29,4 @@ class Discretisation:
     constraint: sparse.csr_matrix
     volume_share: Floats
     stabilisation: sparse.csr_matrix | None = None
+    diffusion_rate: float = 0.0

@@ -22,6 +22,7 @@ Floats = NDArray[np.float64]
 Indices = NDArray[np.int32]
 
 STABILISATION = 0.05
+DIFFUSION = 4.0
 # Share of its first volume below which a tetrahedron is worn out.
 WORN = 0.2
 
@@ -34,22 +35,24 @@ class LinearTetrahedra:
         cells: `(t, 4)`, whose boundary is the tracked surface.
         mass: `(n, n)` volumes that the particles carried when the tetrahedra were made [m^3].
         density: of the liquid [kg/m^3].
+        viscosity: of the liquid [Pa s].
         volumes: `(t,)` of the tetrahedra when they were made [m^3].
     """
 
     cells: Indices
     mass: sparse.csr_matrix
     density: float
+    viscosity: float
     volumes: Floats
 
     @classmethod
-    def start(cls, points: Floats, cells: Indices, density: float) -> "LinearTetrahedra":
+    def start(cls, points: Floats, cells: Indices, density: float, viscosity: float = 0.0) -> "LinearTetrahedra":
         """Give the particles the volumes of the tetrahedra at these points."""
         volumes = cell_volumes(points, cells)
         # Inverted tetrahedra mend the boundary of others. Only flat ones count, so that the mass stays definite.
         counted = np.where(volumes > -SMALLEST_VOLUME * volumes.mean(), volumes, 0.0)
         counted *= volumes.sum() / counted.sum()
-        return cls(cells, consistent_mass(cells, counted, len(points)), density, volumes)
+        return cls(cells, consistent_mass(cells, counted, len(points)), density, viscosity, volumes)
 
     def is_worn(self, points: Floats) -> bool:
         """Whether a tetrahedron has been squeezed flat on the way to these points `(n, 3)` [m]."""
@@ -76,6 +79,7 @@ class LinearTetrahedra:
             constraint=sparse.hstack([average @ part for part in scaled], format="csr"),
             volume_share=dual / dual.sum(),
             stabilisation=STABILISATION / self.density * _unresolved((x, y, z), weights, average[:, thick]),
+            diffusion_rate=DIFFUSION * self.viscosity / (self.density * body.cloud.spacing**2),
         )
 
 

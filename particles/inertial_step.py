@@ -24,6 +24,7 @@ from particles.physics import Physics
 from particles.step_equations import StepEquations
 from particles.step_solver import Motion
 from particles.time_step import LARGEST_DISPLACEMENT
+from particles.viscosity import Viscosity
 
 Floats = NDArray[np.float64]
 
@@ -67,9 +68,9 @@ class Past:
     history: BackwardDifference
 
     @classmethod
-    def start(cls, body: Body, density: float) -> "Past":
+    def start(cls, body: Body, density: float, viscosity: float) -> "Past":
         """Fill a body that has not moved yet with tetrahedra."""
-        space = LinearTetrahedra.start(body.points, fill(body), density)
+        space = LinearTetrahedra.start(body.points, fill(body), density, viscosity)
         return cls(space, body.triangles, body.points, BackwardDifference.start(len(body.points)))
 
     def fits(self, body: Body) -> bool:
@@ -80,7 +81,7 @@ class Past:
 
     def transferred(self, body: Body, physics: Physics) -> tuple["Past", Floats]:
         """The past on new tetrahedra, and the velocity `(n, 3)` of the particles where they are now [m/s]."""
-        new = LinearTetrahedra.start(body.points, fill(body), self.space.density)
+        new = LinearTetrahedra.start(body.points, fill(body), self.space.density, self.space.viscosity)
         values = interpolation(self.points, self.space.cells, body.points - self.points)
         unit_fields = [physics.admit(body, np.broadcast_to(axis, body.points.shape)) for axis in np.eye(3)]
         transfer = Transfer(values, self.space.mass, new.mass, unit_fields)
@@ -113,7 +114,8 @@ class InertialStep:
     def start(self, body: Body, physics: Physics) -> "PreparedInertialStep":
         """Provide tetrahedra and the velocity of the particles where they are now; without inertia it is zero."""
         if self.past is None or not physics.momenta:
-            self.past = Past.start(body, self.density)
+            viscosity = sum(part.coefficient for part in physics.operators if isinstance(part, Viscosity))
+            self.past = Past.start(body, self.density, viscosity)
         elif not self.past.fits(body):
             self.past, body.velocity = self.past.transferred(body, physics)
         if not physics.momenta:

@@ -41,6 +41,13 @@ class Momentum(Protocol):
         """Momentum over the time step, `(n, 3)` [N]."""
 
 
+class Hold(Protocol):
+    """What keeps particles where they are on their plates."""
+
+    def pinned(self, body: Body) -> NDArray[np.int32]:
+        """The particles."""
+
+
 class Event(Protocol):
     """A discrete change before a step."""
 
@@ -59,6 +66,8 @@ class Physics:
         events: changes before a step.
         lines: contact lines, which hold their pinned vertices.
         motions: of the plates that do not rest.
+        frictions: operators on the velocities relative to the plates.
+        holds: what else pins particles to their plates.
     """
 
     forces: Sequence[Force]
@@ -67,6 +76,8 @@ class Physics:
     events: Sequence[Event]
     lines: Sequence[ContactLine]
     motions: Sequence[PlateMotion] = ()
+    frictions: Sequence[Operator] = ()
+    holds: Sequence[Hold] = ()
 
     def force(self, body: Body) -> Floats:
         """Sum of the forces `(n, 3)` [N]."""
@@ -78,10 +89,10 @@ class Physics:
         return sum(force.energy(body) for force in self.forces) - loads
 
     def pinned(self, body: Body) -> NDArray[np.bool_]:
-        """The particles that the edges hold, `(n,)`."""
+        """The particles that edges and walls hold, `(n,)`."""
         pinned = np.zeros(len(body.points), bool)
-        for line in self.lines:
-            pinned[line.pinned(body)] = True
+        for hold in (*self.lines, *self.holds):
+            pinned[hold.pinned(body)] = True
         return pinned
 
     def admit(self, body: Body, field: Floats) -> Floats:

@@ -2,6 +2,7 @@
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
 from particles.admissible import Admissible
 from particles.body import Body
@@ -39,13 +40,29 @@ class StepEquations:
         load = self._force + sum(momentum.load(body, space, time_step) for momentum in physics.momenta)
         given, basis = self._admissible.given(time_step), self._admissible.basis
         rate = (volume - self._volume) / time_step * space.volume_share - space.constraint @ given
+        reduced, drag = self._friction(time_step)
         return SaddlePoint(
-            operator=(basis.T @ operator @ basis).tocsr(),
+            operator=(basis.T @ operator @ basis + reduced).tocsr(),
             constraint=self._reduced_constraint,
-            load=self._admissible.reduce(load.T.ravel() - operator @ given),
+            load=self._admissible.reduce(load.T.ravel() - operator @ given) + drag,
             rate=rate,
-            stabilisation=None if space.stabilisation is None else time_step * space.stabilisation,
+            stabilisation=self._stabilisation(time_step),
         )
+
+    def _stabilisation(self, time_step: float) -> sparse.csr_matrix | None:
+        """S = tau times the space's, 1/tau = 1/dt + the rate of diffusion (Codina 2000)."""
+        space = self._space
+        if space.stabilisation is None:
+            return None
+        return time_step / (1.0 + time_step * space.diffusion_rate) * space.stabilisation
+
+    def _friction(self, time_step: float) -> tuple[sparse.csr_matrix | float, Floats | float]:
+        """Frictions on the degrees of freedom: matrix `(d, d)` [kg/s], and the drag of plates that move `(d,)` [N]."""
+        parts = [part.matrix(self._body, self._space, time_step) for part in self._physics.frictions]
+        if not parts:
+            return 0.0, 0.0
+        slip = self._admissible.slip_basis
+        return slip.T @ sum(parts) @ slip, -(slip.T @ (sum(parts) @ self._admissible.slip_given(time_step)))
 
     def expand(self, unknowns: Floats, time_step: float) -> tuple[Floats, dict[int, Floats]]:
         """Velocities `(n, 3)` of the degrees of freedom `(d,)`, and the twists of the plates that move."""

@@ -1,0 +1,129 @@
+"""Walls without slip and with Navier slip: torsion of a cylinder of liquid between two plates, an exact flow.
+
+With v = r f(z) e_phi the free side carries no stress, and the equations of motion reduce to those of a channel:
+rho f_t = mu f_zz, with slip length b: b f_z = +-(f - f_plate) at the plates.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+from particles.body import Body
+from particles.cloud import joint_cloud
+from particles.geometry import JointGeometry
+from particles.inertial_flow import InertialFlow
+from particles.inertial_step import InertialStep
+from particles.mass import Inertia, Mass
+from particles.physics import Physics
+from particles.viscosity import Viscosity
+from particles.wall_friction import NavierSlip, NoSlip, wall_areas
+
+RADIUS, GAP, VISCOSITY, DENSITY, SPIN = 0.5, 1.0, 2.0, 3.0, 1e-7
+SLIP_LENGTH, LONG = 0.3, 1e6
+
+
+@dataclass(frozen=True)
+class Spin:
+    """A plate that turns about its normal."""
+
+    wall: int
+    directions = np.zeros((0, 6))
+    load = np.zeros(3)
+
+    def given(self, _plate, _time_step):
+        return np.array([0.0, 0.0, 0.0, 0.0, 0.0, SPIN])
+
+
+@dataclass(frozen=True)
+class EdgesHold:
+    """Contact lines that move with their plates."""
+
+    def pinned(self, body):
+        return np.concatenate(body.cloud.rings)
+
+
+def cylinder(spacing):
+    """A prism of as many sides as the rings have particles."""
+    sides = joint_cloud(JointGeometry(GAP, RADIUS, RADIUS), np.pi * RADIUS**2 * GAP, spacing)
+    return Body.at_rest(sides)
+
+
+def physics(condition, *, inertia, spins):
+    operators, momenta = [Viscosity(VISCOSITY), Mass(DENSITY)], []
+    if inertia:
+        momenta = [Inertia(DENSITY)]
+    slip = condition == "slip"
+    return Physics(
+        forces=(),
+        operators=operators,
+        momenta=momenta,
+        events=(),
+        lines=(),
+        motions=(Spin(1),) if spins else (),
+        frictions=[NavierSlip(VISCOSITY / SLIP_LENGTH)] if slip else (),
+        holds=() if slip else [NoSlip(), EdgesHold()],
+    )
+
+
+def order(counts, errors):
+    """Order in the spacing of errors at numbers of particles."""
+    return -3.0 * np.polyfit(np.log(counts), np.log(errors), 1)[0]
+
+
+@pytest.mark.parametrize(("condition", "length"), [("no-slip", 0.0), ("slip", SLIP_LENGTH)])
+def test_steady_torsion(condition, length):
+    """f = spin (z + b) / (H + 2 b), and the moment on the plate mu pi R^4 / 2 spin / (H + 2 b)."""
+    counts, excess = [], []
+    for spacing in (0.2, 0.14, 0.1):
+        body = cylinder(spacing)
+        step = InertialStep(DENSITY).start(body, physics(condition, inertia=False, spins=True))
+        velocity = step.solve(LONG, body.volume()[0]).velocity
+        x, y, z = body.points.T
+        exact = SPIN * (z + length) / (GAP + 2.0 * length) * np.stack((-y, x, 0.0 * z))
+        stress = Viscosity(VISCOSITY).matrix(body, step.past.space(body), LONG) @ velocity.T.ravel()
+        top, (fx, fy, _) = body.cloud.wall == 1, stress.reshape(3, -1)
+        moment = VISCOSITY * np.pi * RADIUS**4 / 2.0 * SPIN / (GAP + 2.0 * length)
+        excess.append((x * fy - y * fx)[top].sum() / moment - 1.0)
+        counts.append(len(x))
+    assert np.linalg.norm(velocity.T - exact) < 0.02 * np.linalg.norm(exact)
+    assert order(counts, excess) > 1.8
+    assert 0.0 < excess[-1] < 0.15
+
+
+def test_walls_share_their_area():
+    body = cylinder(0.2)
+    step = InertialStep(DENSITY).start(body, physics("slip", inertia=False, spins=True))
+    areas = wall_areas(body, step.past.space(body))
+    corners = np.linalg.norm(body.points[body.cloud.rings[0]], axis=1)
+    polygon = 0.5 * len(corners) * corners[0] ** 2 * np.sin(2.0 * np.pi / len(corners))
+    for wall in (0, 1):
+        assert areas[body.cloud.wall == wall].sum() == pytest.approx(polygon)
+        assert areas[body.cloud.wall == wall].min() > 0.0
+    assert areas[body.cloud.wall < 0] == pytest.approx(0.0)
+
+
+def decay_rate(condition, wave, spacing):
+    """Rate at which f = cos(k (z - H/2)) decays [1/s], from the energies in half the time in which it is halved."""
+    body, steps = cylinder(spacing), 5
+    flow = InertialFlow(body, physics(condition, inertia=True, spins=False), DENSITY)
+    spin = SPIN * np.cos(wave * (body.points[:, 2] - 0.5 * GAP))
+    body.velocity = np.column_stack((-body.points[:, 1] * spin, body.points[:, 0] * spin, np.zeros(len(spin))))
+    time_step, energies = 0.5 * DENSITY / (VISCOSITY * wave**2) / steps, []
+    for _ in range(steps):
+        flow.step(time_step)
+        energies.append(flow.solver.kinetic_energy(body))
+    return len(spin), 0.5 * np.log(energies[1] / energies[-1]) / ((steps - 2) * time_step)
+
+
+@pytest.mark.parametrize("condition", ["no-slip", "slip"])
+def test_torsion_decays(condition):
+    """The slowest mode f = cos(k (z - H/2)) decays at k^2 mu / rho, with k b tan(k H / 2) = 1."""
+    wave = np.pi / GAP
+    if condition == "slip":
+        wave = brentq(lambda k: k * SLIP_LENGTH * np.tan(0.5 * k * GAP) - 1.0, 1e-3, 0.999 * np.pi / GAP)
+    counts, rates = zip(*(decay_rate(condition, wave, spacing) for spacing in (0.2, 0.1)), strict=True)
+    errors = np.array(rates) / (wave**2 * VISCOSITY / DENSITY) - 1.0
+    assert order(counts, errors) > 1.8
+    assert 0.0 < errors[-1] < 0.15
