@@ -3,11 +3,14 @@
 from particles.geometry import JointGeometry, joint_counts
 from particles.parameters import Solder
 
-# Measured by benchmarks/bench_reflow.py on one core of a 2-core x86-64 machine, quadratic basis.
-SECONDS_PER_STEP_OF_THOUSAND = 0.12
-COST_EXPONENT = 1.8
+# Measured by benchmarks/bench_reflow_scale.py on one core of a 2-core x86-64 machine.
+SECONDS_PER_STEP = 0.02
+SECONDS_PER_STEP_AND_PARTICLE = 1e-5
 TYPICAL_STEPS = 8
-TYPICAL_STEPS_OF_DROP = 60
+TYPICAL_STEPS_OF_DROP = 80
+# Steps with inertia factor a matrix of all particles.
+SECONDS_PER_INERTIAL_STEP_OF_THOUSAND = 0.12
+INERTIAL_COST_EXPONENT = 1.8
 
 
 def particle_count(solder: Solder, geometry: JointGeometry) -> int:
@@ -28,8 +31,8 @@ def drop_seconds(count: int) -> float:
 
 def oscillation_seconds(particles: int, steps: int) -> float:
     """Expected time of `solve_oscillation` on one core [s]."""
-    return steps * _seconds_per_step(particles)
+    return steps * SECONDS_PER_INERTIAL_STEP_OF_THOUSAND * (particles / 1000.0) ** INERTIAL_COST_EXPONENT
 
 
 def _seconds_per_step(particles: int) -> float:
-    return SECONDS_PER_STEP_OF_THOUSAND * (particles / 1000.0) ** COST_EXPONENT
+    return SECONDS_PER_STEP + SECONDS_PER_STEP_AND_PARTICLE * particles

@@ -33,7 +33,7 @@ class FlowNumerics(Parameters):
 class SolderNumerics(FlowNumerics):
     """How the reflow is computed."""
 
-    spacing: Annotated[float, "mm"] = Field(5.0e-5, gt=0)
+    spacing: Annotated[float, "mm"] = Field(4.0e-5, gt=0)
 
 
 class FlowEffects(Parameters):

@@ -90,7 +90,7 @@ class Joint(Parameters):
     offset: Annotated[float, "mm"] = Field(0.0, ge=0)
     pad_contact_angle: Annotated[float, "deg"] = Field(0.0872664626, gt=0, lt=PI)
     mask_contact_angle: Annotated[float, "deg"] = Field(2.5830872929, gt=0, lt=PI)
-    spacing: Annotated[float, "mm"] = Field(5.0e-5, gt=0)
+    spacing: Annotated[float, "mm"] = Field(4.0e-5, gt=0)
 
     @property
     def geometry(self) -> JointGeometry:
