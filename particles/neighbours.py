@@ -7,6 +7,9 @@ from numpy.typing import NDArray
 Points = NDArray[np.float64]
 Indices = NDArray[np.int32]
 
+# Cells in a radius. Three of four visited pairs are too far apart to be neighbours; with one cell, five of six.
+REACH = 2
+
 
 @njit(cache=True)
 def _sort_into_cells(points, origin, size, shape):
@@ -34,9 +37,9 @@ def _visit_row(i, points, radius, cells, found):
     """Write the neighbours of point i into found (unless it is empty) and return their number."""
     start, order, cell, shape = cells
     count = 0
-    for cx in range(max(cell[i, 0] - 1, 0), min(cell[i, 0] + 2, shape[0])):
-        for cy in range(max(cell[i, 1] - 1, 0), min(cell[i, 1] + 2, shape[1])):
-            for cz in range(max(cell[i, 2] - 1, 0), min(cell[i, 2] + 2, shape[2])):
+    for cx in range(max(cell[i, 0] - REACH, 0), min(cell[i, 0] + REACH + 1, shape[0])):
+        for cy in range(max(cell[i, 1] - REACH, 0), min(cell[i, 1] + REACH + 1, shape[1])):
+            for cz in range(max(cell[i, 2] - REACH, 0), min(cell[i, 2] + REACH + 1, shape[2])):
                 c = (cx * shape[1] + cy) * shape[2] + cz
                 for k in range(start[c], start[c + 1]):
                     j = order[k]
@@ -82,8 +85,9 @@ def find_neighbours(points: Points, radius: float) -> tuple[Indices, Indices]:
     if not np.isfinite(points).all():
         raise FloatingPointError("find_neighbours: a particle position is not finite")
     origin = points.min(axis=0)
-    shape = np.maximum(((points.max(axis=0) - origin) / radius).astype(np.int64) + 1, 1)
-    cells = (*_sort_into_cells(points, origin, radius, shape), shape)
+    size = radius / REACH
+    shape = np.maximum(((points.max(axis=0) - origin) / size).astype(np.int64) + 1, 1)
+    cells = (*_sort_into_cells(points, origin, size, shape), shape)
     return _rows(points, radius, cells)
 
 
