@@ -57,7 +57,21 @@ def problems(solder: Solder, geometries: Mapping[str, JointGeometry], pitch: flo
 
 
 def scheme_problems(solder: Solder) -> list[Problem]:
-    """Find a time step that the scheme cannot take."""
+    """Find a time step or a wall that the scheme cannot take, and a wall that is not fully given."""
+    return _wall_problems(solder) + _time_step_problems(solder)
+
+
+def _wall_problems(solder: Solder) -> list[Problem]:
+    if solder.numerics.scheme == "gripc" and solder.wall != "free-slip":
+        return [Problem("solder.wall", solder.wall, "free-slip", 'liquid slides freely in scheme "gripc"')]
+    if (solder.wall == "slip") == (solder.slip_length is not None):
+        return []
+    value = "none" if solder.slip_length is None else mm(solder.slip_length)
+    message = 'the slip length belongs to wall = "slip", which needs it'
+    return [Problem("solder.slip_length", value, 'a length with wall = "slip", else none', message)]
+
+
+def _time_step_problems(solder: Solder) -> list[Problem]:
     numerics = solder.numerics
     if numerics.scheme != "gripc" or numerics.time_step_limit <= LARGEST_EXPLICIT:
         return []

@@ -45,13 +45,23 @@ class FlowEffects(Parameters):
     wall_adhesion: Switch = "auto"
 
 
+class Walls(Parameters):
+    """How liquid slides on walls where viscosity acts; contact lines move in any case.
+
+    The slip length belongs to wall = "slip" (Navier): the depth below the wall at which the flow would rest.
+    """
+
+    wall: Literal["free-slip", "no-slip", "slip"] = "free-slip"
+    slip_length: Annotated[float | None, "mm"] = Field(None, gt=0)
+
+
 class SolderEffects(FlowEffects):
     """Effects of the reflow: decided from dimensionless numbers (auto), or by the user."""
 
     gravity: Switch = "auto"
 
 
-class Solder(Parameters):
+class Solder(Walls):
     """Molten solder: volume of a ball, fluid properties, contact angles, process."""
 
     volume: Annotated[float, "mm^3"] = Field(gt=0)

@@ -20,7 +20,7 @@ from particles.inertial_step import InertialStep
 from particles.mass import Inertia, Mass
 from particles.metrics import Metrics, joint_metrics, open_metrics, particle_pressure, verdict
 from particles.parameters import Solder
-from particles.physics import Event, Force, Momentum, Operator, Physics
+from particles.physics import Event, Force, Hold, Momentum, Operator, Physics
 from particles.plate import Pad
 from particles.relaxation import Relaxation
 from particles.rest import Run, StopRule, run_to_rest
@@ -28,6 +28,7 @@ from particles.shape import JointShape, Snapshot
 from particles.step_solver import StepSolver
 from particles.time_step import TimeStep, capillary_limit
 from particles.viscosity import Viscosity
+from particles.wall_friction import NavierSlip, NoSlip
 
 __all__ = ["JointGeometry", "JointShape", "solve_joint"]
 
@@ -159,11 +160,18 @@ def build_physics(solder: Solder, effects: dict[str, bool], lines: tuple[Contact
         wetting = Wetting(solder.surface_tension, lines, tuple(forces))
         forces.append(wetting)
         events.append(wetting)
+    frictions: list[Operator] = []
+    holds: list[Hold] = []
     if effects["viscosity"]:
         operators.append(Viscosity(solder.viscosity))
+        if solder.wall == "slip" and solder.slip_length is not None:
+            frictions.append(NavierSlip(solder.viscosity / solder.slip_length))
+        if solder.wall == "no-slip":
+            holds.append(NoSlip())
     if effects["inertia"]:
         momenta.append(Inertia(solder.density))
-    return Physics(tuple(forces), tuple(operators), tuple(momenta), tuple(events), lines)
+    lists = (tuple(forces), tuple(operators), tuple(momenta), tuple(events))
+    return Physics(*lists, lines, frictions=tuple(frictions), holds=tuple(holds))
 
 
 def joint_shape(geometry: JointGeometry, solder: Solder, flow: LiquidFlow, run: Run) -> JointShape:

@@ -21,6 +21,8 @@ KEYS = {
     "solder.pad_contact_angle": "joint.pad_contact_angle",
     "solder.numerics.spacing": "joint.spacing",
     "solder.numerics.time_step_limit": "solder.numerics.time_step_limit",
+    "solder.wall": "solder.wall",
+    "solder.slip_length": "solder.slip_length",
 }
 
 

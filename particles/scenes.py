@@ -9,7 +9,16 @@ from typing import Annotated, Literal, Protocol
 from pydantic import Field
 
 from particles.geometry import JointGeometry
-from particles.parameters import FlowEffects, FlowNumerics, Parameters, Solder, SolderEffects, SolderNumerics, Switch
+from particles.parameters import (
+    FlowEffects,
+    FlowNumerics,
+    Parameters,
+    Solder,
+    SolderEffects,
+    SolderNumerics,
+    Switch,
+    Walls,
+)
 
 PI = 3.14159265
 DEFAULT_PER_EDGE = 11
@@ -140,7 +149,7 @@ class Liquid(Parameters):
         return PROPERTIES[self.parameters] | own
 
 
-class Fluid(Liquid):
+class Fluid(Liquid, Walls):
     """Molten solder by the name of a set of properties; a single value given here overrides that of the set.
 
     The set physical is SAC solder; paper is what Hu et al. print, with 10 times the surface tension and 100 times
@@ -163,6 +172,8 @@ class Fluid(Liquid):
             volume=scene.volume,
             gravity=self.gravity,
             process_time=self.process_time,
+            wall=self.wall,
+            slip_length=self.slip_length,
             effects=SolderEffects(gravity=gravity, **self.effects.model_dump()),
             numerics=SolderNumerics(spacing=scene.resolution, **self.numerics.model_dump()),
             **scene.contact_angles,

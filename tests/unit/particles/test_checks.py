@@ -44,3 +44,12 @@ def test_spacing_must_resolve_the_joint():
 
 def test_the_pad_must_be_wetted_better_than_the_mask():
     assert keys(Solder(volume=0.0724e-9, pad_contact_angle=2.0, mask_contact_angle=1.0)) == ["solder.pad_contact_angle"]
+
+
+def test_a_slip_length_belongs_to_a_wall_with_slip():
+    assert keys(Solder(volume=0.0724e-9, wall="slip", slip_length=1e-5)) == []
+    assert keys(Solder(volume=0.0724e-9, wall="no-slip")) == []
+    assert keys(Solder(volume=0.0724e-9, wall="slip")) == ["solder.slip_length"]
+    assert keys(Solder(volume=0.0724e-9, slip_length=1e-5)) == ["solder.slip_length"]
+    gripc = SolderNumerics(scheme="gripc", time_step_limit=0.5)
+    assert keys(Solder(volume=0.0724e-9, wall="no-slip", numerics=gripc)) == ["solder.wall"]
