@@ -1,4 +1,4 @@
-"""Drops on a wall with inertia from a violent start, a cube: they come to rest as the cap, at any viscosity and step."""
+"""Drops on a wall with inertia from a violent start, a cube: they come to rest as the cap, at any viscosity."""
 
 import numpy as np
 import pytest
