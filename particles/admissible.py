@@ -13,6 +13,7 @@ from scipy import sparse
 from particles.body import Body
 from particles.plate import slide
 from particles.plate_motion import PlateMotion
+from particles.symmetry import on_plane
 
 Floats = NDArray[np.float64]
 
@@ -40,6 +41,8 @@ class Admissible:
         body, count = self._body, len(self._body.points)
         free = np.ones((3, count), bool)
         free[2, body.cloud.wall >= 0] = False
+        for across in body.cloud.symmetry:  # then the plates are horizontal, and their frame is that of space
+            free[across, on_plane(body.cloud, across)] = False
         free[:, self._pinned] = False
         frames = np.broadcast_to(np.eye(3), (count, 3, 3)).copy()
         for wall, plate in enumerate(body.plates):

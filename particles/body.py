@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from particles import symmetry
 from particles.cloud import Cloud
 from particles.plate import Plate
 from particles.surface_measure import volume_and_gradient
@@ -95,5 +96,5 @@ class Body:
 def particle_volumes(cloud: Cloud, volume: float) -> Floats:
     """Shares of the volume: a whole cell inside, half a cell on a surface or wall, a quarter on a contact line."""
     on_surface = np.arange(len(cloud.points)) < cloud.surface_count
-    share = np.where(on_surface, 0.5, 1.0) * np.where(cloud.wall >= 0, 0.5, 1.0)
-    return share * (volume / share.sum())
+    part = symmetry.share(cloud) * np.where(on_surface, 0.5, 1.0) * np.where(cloud.wall >= 0, 0.5, 1.0)
+    return part * (volume / part.sum())

@@ -34,6 +34,8 @@ class Cloud:
         plates: the plate under each ring, at the start.
         wall: `(n,)` index of the wall that a particle slides on, -1 off the walls (rings are on their wall).
         spacing: mean distance of neighbours [m].
+        symmetry: axes of the planes of symmetry through the origin, 0 for x = 0 and 1 for y = 0; the cloud is that part
+            of the body where these coordinates are not negative, and contact lines are arcs from plane to plane.
     """
 
     points: Floats
@@ -43,6 +45,12 @@ class Cloud:
     plates: tuple[Plate, ...]
     wall: NDArray[np.int8]
     spacing: float
+    symmetry: tuple[int, ...] = ()
+
+    @property
+    def parts(self) -> int:
+        """Of how many such parts the body consists."""
+        return 2 ** len(self.symmetry)
 
 
 def equal_area_radius(radius: Lengths, corners: Lengths) -> Lengths:

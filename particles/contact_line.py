@@ -8,6 +8,8 @@ from numpy.typing import NDArray
 from particles.body import Body
 from particles.cloud import equal_area_radius
 from particles.plate import Pad
+from particles.surface_measure import ring_area_gradient
+from particles.symmetry import share, unit, whole_points
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int32]
@@ -74,15 +76,22 @@ class ContactLine:
         Continuous where a vertex leaves an edge, since the area next to a pinned vertex belongs to the free one. On
         a uniform wall it is the whole wetted area.
         """
-        local = body.plates[self.wall].local(body.points[body.cloud.rings[self.wall]])[:, :2]
+        points, index = whole_points(body.cloud, body.points, self.wall)
+        local, pad = body.plates[self.wall].local(points)[:, :2], self.pad[index]
         turns = np.array([_turns(local - centre).sum() for centre in self._centres])
         total = self._mask_cosine * (_sectors(local).sum() - 0.5 * self._square @ turns)
-        own = local - self._centres[self.pad]
-        beyond = _sectors(own) - 0.5 * self._square[self.pad] * _turns(own)
-        cosine, free = self.cosine(), (self.state != PINNED).astype(float)
+        own = local - self._centres[pad]
+        beyond = _sectors(own) - 0.5 * self._square[pad] * _turns(own)
+        cosine, free = self.cosine()[index], (self.state[index] != PINNED).astype(float)
         mean = (cosine + np.roll(cosine, -1)) / np.maximum(1.0, free + np.roll(free, -1))
-        same = self.pad == np.roll(self.pad, -1)
-        return float(total + ((mean - self._mask_cosine) * beyond)[same].sum())
+        same = pad == np.roll(pad, -1)
+        return float(total + ((mean - self._mask_cosine) * beyond)[same].sum()) / body.cloud.parts
+
+    def area_gradient(self, body: Body) -> Floats:
+        """Gradient of the wetted area by the vertices of the line, `(k, 3)` [m]."""
+        ring, (points, index) = body.cloud.rings[self.wall], whole_points(body.cloud, body.points, self.wall)
+        whole = ring_area_gradient(points, np.arange(len(index), dtype=np.int32))
+        return whole[: len(ring)] * share(body.cloud)[ring][:, None]
 
     def pinned(self, body: Body) -> Indices:
         """The pinned vertices."""
@@ -90,11 +99,11 @@ class ContactLine:
 
     def outward(self, body: Body) -> tuple[Floats, Floats]:
         """Direction across the line out of the liquid `(k, 3)` and length of line of each vertex `(k,)` [m]."""
-        points, plate = body.points[body.cloud.rings[self.wall]], body.plates[self.wall]
+        points, ring = whole_points(body.cloud, body.points, self.wall)[0], body.cloud.rings[self.wall]
         before, after = np.roll(points, 1, axis=0), np.roll(points, -1, axis=0)
-        across = np.cross(after - before, plate.normal)
+        across = unit(np.cross(after - before, body.plates[self.wall].normal))[: len(ring)]
         step = np.linalg.norm(after - points, axis=1)
-        return across / np.linalg.norm(across, axis=1)[:, None], 0.5 * (step + np.roll(step, 1))
+        return across, (0.5 * (step + np.roll(step, 1)))[: len(ring)] * share(body.cloud)[ring]
 
     def contact_cosine(self, body: Body, load: Floats, coefficient: float) -> Floats:
         """Cosine of the contact angle at each vertex `(k,)` from the balance of forces on it.
@@ -110,7 +119,8 @@ class ContactLine:
         """
         outward, length = self.outward(body)
         cosine = -(load[body.cloud.rings[self.wall]] * outward).sum(axis=1) / (coefficient * length)
-        return 0.5 * cosine + 0.25 * (np.roll(cosine, 1) + np.roll(cosine, -1))
+        around = cosine[whole_points(body.cloud, body.points, self.wall)[1]]
+        return (0.5 * around + 0.25 * (np.roll(around, 1) + np.roll(around, -1)))[: len(cosine)]
 
     def update(self, body: Body, load: Floats, coefficient: float) -> None:
         """Release the vertices that their edge no longer holds, catch those that returned to one (moves these).

@@ -16,6 +16,7 @@ from particles.reflow import collect_shape, contact_line, start_flow, stop_rule
 from particles.rest import run_to_rest
 from particles.scenes import Drop
 from particles.shape import JointShape
+from particles.symmetry import cut
 from particles.young_laplace import Meridian, sessile_meridian, sphere_meridian
 
 ANGLE_OF_CUBE = 0.5 * np.pi
@@ -50,7 +51,8 @@ def drop_to_rest(
     """
     effects = decide_drop(solder, drop.is_free)
     acting = {name: decision["on"] for name, decision in effects.items()}
-    cloud = free_box_cloud(drop.edge, drop.count) if drop.is_free else box_cloud(drop.edge, drop.count)
+    whole = free_box_cloud(drop.edge, drop.count) if drop.is_free else box_cloud(drop.edge, drop.count)
+    cloud = cut(whole, drop.symmetry_axes)
     flow = start_flow(cloud, solder, acting, _contact_lines(drop, solder, cloud))
     run = run_to_rest(flow, stop_rule(cloud, solder, acting), progress, checkpoint=checkpoint)
     reference = _reference(drop, solder, acting_weight(solder, effects))

@@ -24,9 +24,9 @@ def reflow_seconds(solder: Solder, geometry: JointGeometry) -> float:
     return TYPICAL_STEPS * _seconds_per_step(particle_count(solder, geometry))
 
 
-def drop_seconds(count: int) -> float:
-    """Expected time of `solve_drop` on one core [s]; `count` particles along an edge of the cube."""
-    return TYPICAL_STEPS_OF_DROP * _seconds_per_step(count**3)
+def drop_seconds(particles: int) -> float:
+    """Expected time to bring a drop to rest on one core [s]."""
+    return TYPICAL_STEPS_OF_DROP * _seconds_per_step(particles)
 
 
 def oscillation_seconds(particles: int, steps: int) -> float:

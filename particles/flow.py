@@ -15,6 +15,7 @@ from particles.neighbours import NeighbourList
 from particles.physics import Physics
 from particles.step_solver import Motion, StepSolver
 from particles.surface_quality import flip_to_delaunay, smoothing_offsets
+from particles.symmetry import surface_planes
 from particles.time_step import StepCollapsed, TimeStep
 
 Floats = NDArray[np.float64]
@@ -117,11 +118,13 @@ class LiquidFlow:
     def _keep_quality(self) -> int:
         """Flip and smooth the surface, shift the interior; return the number of flips."""
         body, cloud = self.body, self.body.cloud
-        flips = 0
+        flips, planes = 0, surface_planes(cloud)
         if self.steps % FLIP_INTERVAL == 0:
-            body.triangles, flips = flip_to_delaunay(body.points, body.triangles, cloud.rings)
+            body.triangles, flips = flip_to_delaunay(
+                body.points, body.triangles, (*cloud.rings, *(on for _, on in planes))
+            )
         count = cloud.surface_count
-        offset = smoothing_offsets(body.points, body.triangles, count, cloud.rings)
+        offset = smoothing_offsets(body.points, body.triangles, count, cloud.rings, planes)
         offset = np.concatenate((offset, np.zeros((len(body.points) - count, 3))))
         body.points += self.physics.admit(body, offset)
         self.neighbours.update(body.points)
@@ -147,8 +150,8 @@ class LiquidFlow:
             time_step=size,
             binding=self.time_step.binding,
             height=float(np.ptp(body.points[:count, 2])),
-            volume=volume,
-            energy=self.physics.energy(body),
+            volume=body.cloud.parts * volume,
+            energy=body.cloud.parts * self.physics.energy(body),
             speed=moved / size,
             displacement=moved / body.cloud.spacing,
             flips=flips,

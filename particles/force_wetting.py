@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from particles.body import Body
 from particles.contact_line import ContactLine
 from particles.physics import Force
-from particles.surface_measure import ring_area_gradient
+from particles.symmetry import fold
 
 Floats = NDArray[np.float64]
 
@@ -37,7 +37,7 @@ class Wetting:
         force = np.zeros_like(body.points)
         for line in self.lines:
             ring = body.cloud.rings[line.wall]
-            force[ring] += self.coefficient * line.cosine()[:, None] * ring_area_gradient(body.points, ring)
+            force[ring] += self.coefficient * line.cosine()[:, None] * line.area_gradient(body)
         return force
 
     def contact_cosines(self, body: Body) -> list[Floats]:
@@ -58,7 +58,7 @@ class Wetting:
         pressure of the solve would bring the accelerations of a violent start into the contact angle.
         """
         force = sum((other.force(body) for other in self.others), np.zeros_like(body.points))
-        gradient = body.volume()[1]
+        force, gradient = fold(body.cloud, force), fold(body.cloud, body.volume()[1])
         off_lines = np.arange(len(body.points)) < body.cloud.surface_count
         off_lines[body.cloud.wall >= 0] = False
         a = gradient[off_lines]

@@ -8,6 +8,7 @@ from particles.body import Body
 from particles.neighbours import NeighbourList
 from particles.plate import slide
 from particles.surface_quality import vertex_normals
+from particles.symmetry import fold, on_plane, unit
 
 Floats = NDArray[np.float64]
 
@@ -81,10 +82,11 @@ def interior_shift(body: Body, neighbours: NeighbourList) -> Floats:
     shift = _repulsion(rows, body.points, lists, REPULSION_RANGE * cloud.spacing) * (REPULSION_STRENGTH * cloud.spacing)
     length = np.linalg.norm(shift, axis=1)
     shift *= np.minimum(1.0, LARGEST_SHIFT * cloud.spacing / np.maximum(length, 1e-300))[:, None]
-    normals = vertex_normals(body.points, body.triangles, cloud.surface_count)
+    normals = unit(fold(cloud, vertex_normals(body.points, body.triangles, cloud.surface_count)))
     shift += _penetration(rows, body.points, lists, normals, SMALLEST_DEPTH * cloud.spacing)
-    shift = slide(body.plates, cloud.wall[rows], shift)
-    return shift + _away_from_plates(body, body.points[rows] + shift)
+    shift = fold(cloud, slide(body.plates, cloud.wall[rows], shift), cloud.surface_count)
+    shift += _away_from_plates(body, body.points[rows] + shift)
+    return shift + _away_from_symmetry(body, body.points[rows] + shift)
 
 
 def _away_from_plates(body: Body, points: Floats) -> Floats:
@@ -99,4 +101,14 @@ def _away_from_plates(body: Body, points: Floats) -> Floats:
         height = inward * plate.local(points)[:, 2]
         lift = np.where(loose, np.maximum(SMALLEST_HEIGHT * body.cloud.spacing - height, 0.0), 0.0)
         result += inward * lift[:, None] * plate.normal
+    return result
+
+
+def _away_from_symmetry(body: Body, points: Floats) -> Floats:
+    """Displacements `(m, 3)` [m] that keep particles off the planes of symmetry, behind which are their images."""
+    result = np.zeros_like(points)
+    for axis in body.cloud.symmetry:
+        loose = ~on_plane(body.cloud, axis)[body.interior]
+        lift = np.maximum(SMALLEST_HEIGHT * body.cloud.spacing - points[:, axis], 0.0)
+        result[:, axis] = np.where(loose, lift, 0.0)
     return result

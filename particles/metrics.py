@@ -15,6 +15,7 @@ from particles.parameters import Solder
 from particles.plate_force import plate_wrench
 from particles.rest import Run
 from particles.surface_measure import ring_area
+from particles.symmetry import whole_points
 from particles.time_step import capillary_limit
 from particles.young_laplace import Meridian, NoMeridian, joint_meridian, pad_meridian
 
@@ -104,7 +105,8 @@ def particle_pressure(flow: LiquidFlow) -> Floats:
 
 def contact_radius(body: Body, wall: int) -> float:
     """Radius of the disc that has the wetted area of a wall [m]."""
-    return float(np.sqrt(ring_area(body.points, body.cloud.rings[wall]) / np.pi))
+    line = whole_points(body.cloud, body.points, wall)[0]
+    return float(np.sqrt(ring_area(line, np.arange(len(line), dtype=np.int32)) / np.pi))
 
 
 def mean_angle(cosines: Floats) -> float:
@@ -131,7 +133,7 @@ def _contact_cosines(flow: LiquidFlow) -> list[Floats]:
 
 
 def _volume(solder: Solder, flow: LiquidFlow) -> Metrics:
-    volume = flow.body.volume()[0]
+    volume = flow.body.cloud.parts * flow.body.volume()[0]
     return {"volume": (volume, "m^3"), "volume_drift": (volume / solder.volume - 1.0, "")}
 
 

@@ -13,6 +13,7 @@ from particles.contact_line import ContactLine
 from particles.discretisation import Discretisation
 from particles.plate import slide
 from particles.plate_motion import PlateMotion
+from particles.symmetry import fold
 
 Floats = NDArray[np.float64]
 
@@ -96,5 +97,6 @@ class Physics:
         return pinned
 
     def admit(self, body: Body, field: Floats) -> Floats:
-        """The part of a displacement `(n, 3)` that resting plates (free slip) and edges (none) allow."""
-        return np.where(self.pinned(body)[:, None], 0.0, slide(body.plates, body.cloud.wall, field))
+        """The part of a displacement `(n, 3)` that resting plates, symmetry (free slip) and edges (none) allow."""
+        along = fold(body.cloud, slide(body.plates, body.cloud.wall, field))
+        return np.where(self.pinned(body)[:, None], 0.0, along)

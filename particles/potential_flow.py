@@ -159,13 +159,13 @@ def _gradients(points, mirrors, lists, field, support):
 
 
 def _mirrors(body: Body) -> tuple[Floats, Floats]:
-    """Heights above each plate `(p, n)` [m], zero on it, and the plates' normals into the liquid `(p, 3)`."""
-    heights = np.empty((len(body.plates), len(body.points)))
-    normals = np.empty((len(body.plates), 3))
-    for wall, plate in enumerate(body.plates):
-        heights[wall] = np.where(body.cloud.wall == wall, 0.0, -plate.side * plate.local(body.points)[:, 2])
-        normals[wall] = -plate.side * plate.normal
-    return heights, normals
+    """Heights above each plate and plane of symmetry `(p, n)` [m], zero on it, and their normals into the liquid."""
+    symmetry, local = body.cloud.symmetry, [plate.local(body.points)[:, 2] for plate in body.plates]
+    heights = [
+        np.where(body.cloud.wall == wall, 0.0, -plate.side * local[wall]) for wall, plate in enumerate(body.plates)
+    ] + [body.points[:, axis] for axis in symmetry]
+    normals = [-plate.side * plate.normal for plate in body.plates] + [np.eye(3)[axis] for axis in symmetry]
+    return np.array(heights).reshape(-1, len(body.points)), np.array(normals).reshape(-1, 3)
 
 
 @dataclass(frozen=True, slots=True)

@@ -79,19 +79,20 @@ def _segments(corner: Floats, height: float) -> Floats:
     return segment
 
 
-def fit_profile(points: Floats, triangles: Indices, span: tuple[float, float] | None = None) -> Profile:
+def fit_profile(points: Floats, triangles: Indices, span: tuple[float, float] | None = None, parts: int = 1) -> Profile:
     """Fit the equivalent radius of a free surface.
 
     Args:
         points: `(n, 3)` [m].
         triangles: `(t, 3)` of the free surface, outward oriented.
         span: heights of the fit [m]; by default from the lowest to the highest point.
+        parts: of how many such parts, about planes of symmetry through the z axis, the body consists.
     """
     z = points[np.unique(triangles), 2]
     low, high = span or (float(z.min()), float(z.max()))
     nodes, _ = np.polynomial.legendre.leggauss(SLICES)
     heights = 0.5 * (low + high) + 0.5 * (high - low) * nodes
-    areas = section_areas(points, triangles, heights)
+    areas = parts * section_areas(points, triangles, heights)
     fit = Legendre.fit(heights, areas, DEGREE, domain=[low, high])
     sample = np.linspace(low, high, SAMPLES)
     return Profile(sample, np.sqrt(np.maximum(fit(sample), 0.0) / np.pi))

@@ -26,6 +26,7 @@ from particles.relaxation import Relaxation
 from particles.rest import Run, StopRule, run_to_rest
 from particles.shape import JointShape, Snapshot
 from particles.step_solver import StepSolver
+from particles.symmetry import whole_line
 from particles.time_step import TimeStep, capillary_limit
 from particles.viscosity import Viscosity
 from particles.wall_friction import NavierSlip, NoSlip
@@ -100,7 +101,8 @@ def contact_line(cloud: Cloud, wall: int, radius: float, solder: Solder) -> Cont
     """Set up the contact line around one pad, at the plate's origin, with its radius [m]."""
     ring, pad = cloud.rings[wall], Pad((0.0, 0.0), radius, solder.pad_contact_angle)
     local = cloud.plates[wall].local(cloud.points[ring])
-    return ContactLine(wall, (pad,), solder.mask_contact_angle, local, np.array([len(ring)]))
+    corners = len(whole_line(cloud, len(ring))[0])
+    return ContactLine(wall, (pad,), solder.mask_contact_angle, local, np.array([corners]))
 
 
 def pad_lines(cloud: Cloud, solder: Solder) -> tuple[ContactLine, ...]:

@@ -25,6 +25,7 @@ from particles.potential_flow import PotentialFlow
 from particles.step_equations import StepEquations
 from particles.step_solver import Motion
 from particles.surface_measure import ring_area, surface_flux
+from particles.symmetry import fold
 from particles.volume_constraint import solve_volume
 
 Floats = NDArray[np.float64]
@@ -106,7 +107,7 @@ class PreparedRelaxation:
         """Velocities below the surface `(m, 3)` [m/s]; on a plate they slip along it and go with it."""
         body, rows = self.body, self.body.interior
         wall = body.cloud.wall[rows]
-        velocity = slide(body.plates, wall, self.flow.velocity(potential))
+        velocity = fold(body.cloud, slide(body.plates, wall, self.flow.velocity(potential)), body.cloud.surface_count)
         for number, twist in twists.items():
             on_plate = wall == number
             carried = body.plates[number].rigid_velocity(twist, body.points[rows[on_plate]])

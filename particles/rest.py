@@ -139,7 +139,7 @@ def _advance(run: Run, flow: LiquidFlow, rule: StopRule) -> None:
     start = perf_counter()
     record = flow.step()
     run.records.append(record)
-    run.profiles.append(fit_profile(flow.body.points, flow.body.triangles, flow.body.span()))
+    run.profiles.append(fit_profile(flow.body.points, flow.body.triangles, flow.body.span(), flow.body.cloud.parts))
     run.ruptured = len(flow.body.cloud.rings) == 2 and _ruptures(run.profiles, flow.body.cloud.spacing)
     run.calm = run.calm + 1 if is_calm(run.records, rule) else 0
     run.moved += record.displacement

@@ -36,7 +36,7 @@ class HasWall(Protocol):
 
 def drop_problems(drop: Drop, solder: Solder) -> list[Problem]:
     """Find what cannot work before a drop runs."""
-    found = checks.scheme_problems(solder) or _resolution_problems(drop)
+    found = checks.scheme_problems(solder) or _resolution_problems(drop) or _symmetry_problems(drop, solder)
     return found or _wall_problems(drop) or _pad_problems(drop) or free_problems(drop, solder)
 
 
@@ -110,7 +110,21 @@ def _resolution_problems(drop: Drop) -> list[Problem]:
     if drop.count < FEWEST_PER_EDGE:
         message = f"too coarse for a drop that starts as a cube of {mm(drop.edge)}"
         return [Problem("drop.spacing", mm(drop.spacing), f"<= {mm(limit)}", message)]
-    return _too_many("drop", drop.spacing, drop.count**3)
+    return _too_many("drop", drop.spacing, drop.particles)
+
+
+def _symmetry_problems(drop: Drop, solder: Solder) -> list[Problem]:
+    """Find what a part of a drop cannot do for the whole."""
+    if drop.symmetry == "none":
+        return []
+    key, effects = "drop.symmetry", decide_drop(solder, drop.is_free)
+    if drop.count % 2 == 0:
+        message = f"no particles lie in a plane of symmetry of {drop.count} along an edge"
+        return [Problem(key, drop.symmetry, "an odd number of particles along an edge", message)]
+    if solder.numerics.scheme == "gripc" or effects["inertia"]["on"] or effects["viscosity"]["on"]:
+        message = "only a drop on its way to rest can be cut, without inertia, viscosity and the seed's scheme"
+        return [Problem(key, drop.symmetry, "none", message)]
+    return []
 
 
 def _wall_problems(drop: Drop) -> list[Problem]:

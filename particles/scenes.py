@@ -36,6 +36,7 @@ class Drop(Parameters):
     A wall with hysteresis has ``receding_angle`` and ``advancing_angle`` in the place of ``contact_angle``. Without any
     angle there is no wall: the drop is free and becomes a sphere.
     Resolution: ``spacing`` or ``particles_per_edge`` of the cube, not both; 11 per edge if neither is given.
+    With ``symmetry`` only half or a quarter of the drop is computed; volume and results are those of the whole.
     """
 
     volume: Annotated[float, "mm^3"] = Field(gt=0)
@@ -46,6 +47,18 @@ class Drop(Parameters):
     mask_contact_angle: Annotated[float, "deg"] = Field(2.5830872929, gt=0, lt=PI)
     spacing: Annotated[float | None, "mm"] = Field(None, gt=0)
     particles_per_edge: int | None = Field(None, ge=5, le=50)
+    symmetry: Literal["none", "half", "quarter"] = "none"
+
+    @property
+    def symmetry_axes(self) -> tuple[int, ...]:
+        """Axes of the planes of symmetry that the drop is cut by: 0 for x = 0, 1 for y = 0."""
+        return {"none": (), "half": (0,), "quarter": (0, 1)}[self.symmetry]
+
+    @property
+    def particles(self) -> int:
+        """Number of particles of the cube, or of the part of it that is computed."""
+        cuts = len(self.symmetry_axes)
+        return self.count ** (3 - cuts) * ((self.count + 1) // 2) ** cuts
 
     @property
     def edge(self) -> float:

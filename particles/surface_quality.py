@@ -66,13 +66,29 @@ def vertex_normals(points: Floats, triangles: Indices, count: int) -> Floats:
     return _centroid_offsets(points, triangles, count)[1]
 
 
-def smoothing_offsets(points: Floats, triangles: Indices, count: int, rings: Sequence[Indices]) -> Floats:
+def smoothing_offsets(
+    points: Floats,
+    triangles: Indices,
+    count: int,
+    rings: Sequence[Indices],
+    planes: Sequence[tuple[int, Indices]] = (),
+) -> Floats:
     """Tangential displacements `(count, 3)` [m] that even out the triangles and leave the shape.
 
     Vertices of the free surface go towards the mean of their triangles' centroids within the tangent plane,
     vertices of a contact line towards the middle of their neighbours along the line.
+
+    Args:
+        points: `(n, 3)` [m].
+        triangles: `(t, 3)`.
+        count: number of vertices.
+        rings: contact lines, which end on the planes of symmetry if there are any.
+        planes: axis of each plane of symmetry, and the vertices on it.
     """
     offset, normal = _centroid_offsets(points, triangles, count)
+    for axis, vertices in planes:  # the other half of their triangles is behind the plane
+        offset[vertices, axis] = normal[vertices, axis] = 0.0
+        normal[vertices] /= np.linalg.norm(normal[vertices], axis=1)[:, None]
     offset -= (offset * normal).sum(axis=1)[:, None] * normal
     for ring in rings:
         before, after = points[np.roll(ring, 1)], points[np.roll(ring, -1)]
@@ -80,6 +96,8 @@ def smoothing_offsets(points: Floats, triangles: Indices, count: int, rings: Seq
         along /= np.linalg.norm(along, axis=1)[:, None]
         middle = 0.5 * (before + after) - points[ring]
         offset[ring] = (middle * along).sum(axis=1)[:, None] * along
+        if planes:
+            offset[ring[[0, -1]]] = 0.0
     return SMOOTHING * offset
 
 

@@ -41,7 +41,7 @@ def _of_drop(case: DropCase) -> SceneForecast:
     from particles.estimate import drop_seconds
 
     drop = case.drop
-    return _towards_rest(case, decide_drop(case.molten, drop.is_free), drop.count**3, drop_seconds(drop.count))
+    return _towards_rest(case, decide_drop(case.molten, drop.is_free), drop.particles, drop_seconds(drop.particles))
 
 
 def _of_joint(case: JointCase) -> SceneForecast:
@@ -58,7 +58,7 @@ def _of_drops(case: DropsCase) -> SceneForecast:
     from particles.estimate import drop_seconds
 
     drops = case.drops
-    seconds = sum(drop_seconds(drops.per_edge(volume)) for volume in (*drops.volumes, drops.volume))
+    seconds = sum(drop_seconds(drops.per_edge(volume) ** 3) for volume in (*drops.volumes, drops.volume))
     return _towards_rest(case, decide_drop(case.molten, drops.is_free), drops.particles, seconds)
 
 

@@ -17,7 +17,7 @@ def reflow_drop(run: Run[DropCase], folder: Path) -> Findings:
 
     drop, solder = run.case.drop, run.case.molten
     checkpoint = Checkpoint(run.checkpoints("reflow") / "drop", (drop, solder))
-    with progress_bar(f"reflow of {drop.count**3} particles") as progress:
+    with progress_bar(f"reflow of {drop.particles} particles") as progress:
         result = drop_to_rest(drop, solder, progress, checkpoint)
     write_body(folder, result.shape, result.reference)
     found = findings.of_drop(result.shape.metrics, result.shape.verdict, result.effects)

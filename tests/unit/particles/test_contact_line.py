@@ -118,9 +118,8 @@ def stadium(half_length, radius, count):
 def line_over_pads(points, pads, corners=60):
     """A line and as much of a body as a line looks at."""
     ring = np.arange(len(points), dtype=np.int32)
-    body = SimpleNamespace(
-        points=points, plates=(Plate.horizontal(0.0),), cloud=SimpleNamespace(rings=(ring,), spacing=0.1)
-    )
+    cloud = SimpleNamespace(points=points, rings=(ring,), spacing=0.1, symmetry=(), parts=1)
+    body = SimpleNamespace(points=points, plates=(Plate.horizontal(0.0),), cloud=cloud)
     return ContactLine(0, pads, MASK, points, np.full(len(pads), corners)), body
 
 

@@ -38,6 +38,11 @@ BAD_VALUES = {
     "two kinds": (DROP, "package.rows=3", ["[package] and [drop]", "exactly one of [package], [drop], [joint], "]),
     "pad that repels": (BALL, "drop.contact_angle=150 deg", ["drop.contact_angle", "< 148 deg", "better"]),
     "pad too small": (BALL, "drop.pad_radius=0.01 mm", ["drop.pad_radius", '"0.01 mm"', "cannot fit", ">= 0.09"]),
+    "even count cut in half": (
+        DROP,
+        "drop={volume='1 mm^3',contact_angle='60 deg',particles_per_edge=10,symmetry='half'}",
+        ['drop.symmetry = "half"', "10 along an edge", "an odd number"],
+    ),
     "volume without end": (JOINT, "joint.volume=1000 mm^3", ["joint.spacing", "cannot fit", ">= "]),
     "gravity without a wall": (FREE, "gravity=on", ['gravity = "on"', "auto, off", "no wall"]),
     "pad without an angle": (FREE, "drop.pad_radius=0.01 mm", ["drop.pad_radius", "only with drop.contact_angle"]),
