@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from math import degrees, hypot
 
 from particles.checkpoint import Checkpoint
 from particles.geometry import JointGeometry
@@ -13,6 +14,7 @@ from particles.rest import run_to_rest
 from particles.shape import JointShape
 
 SPACINGS_IN_A_STEP = 0.2
+ALIGNED = 0.01  # of a radius, and rad
 
 
 def settle_joint(
@@ -22,7 +24,7 @@ def settle_joint(
     progress: Callable[[float], None] | None = None,
     checkpoint: Checkpoint | None = None,
 ) -> JointShape:
-    """Let a joint come to rest with plates that move: its metrics are those of where the plates end.
+    """Let a joint come to rest with plates that move: its metrics are those of where the plates end, and that place.
 
     Args:
         geometry: where the plates start.
@@ -37,7 +39,17 @@ def settle_joint(
     flow, rule = start_joint(geometry, solder)
     flow.physics = replace(flow.physics, motions=motions)
     run = run_to_rest(flow, rule, progress, checkpoint=checkpoint)
-    return joint_shape(placed_geometry(geometry, flow.body.plates), solder, flow, run)
+    placed = placed_geometry(geometry, flow.body.plates)
+    shape = joint_shape(_aligned(placed), solder, flow, run)
+    place = {"offset": (hypot(*placed.offset), "m"), "tilt": (degrees(hypot(*placed.tilt)), "deg")}
+    return replace(shape, metrics=shape.metrics | place)
+
+
+def _aligned(geometry: JointGeometry) -> JointGeometry:
+    """The coaxial joint where a joint differs from one to second order only: it has a meridian to compare with."""
+    radius = min(geometry.radius_board, geometry.radius_package)
+    nearly = hypot(*geometry.offset) < ALIGNED * radius and hypot(*geometry.tilt) < ALIGNED
+    return replace(geometry, offset=(0.0, 0.0), tilt=(0.0, 0.0)) if nearly else geometry
 
 
 def follow_path(

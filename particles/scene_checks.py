@@ -1,7 +1,7 @@
 """Parameters of a scene that are each allowed but make no drop or joint together. Loads neither numba nor PETSc."""
 
 from dataclasses import replace
-from math import degrees, inf, pi
+from math import asin, degrees, inf, pi, sin
 from typing import Protocol
 
 from particles import checks
@@ -97,7 +97,44 @@ def joint_problems(joint: Joint, solder: Solder) -> list[Problem]:
     found = checks.problems(solder, {"of the case": joint.geometry}, inf)
     if found:
         return [replace(problem, key=KEYS[problem.key]) for problem in found]
-    return _too_many("joint", joint.spacing, particle_count(solder, joint.geometry))
+    found = _tilt_problems(joint) or _path_problems(joint) or _package_problems(joint)
+    return found or _too_many("joint", joint.spacing, particle_count(solder, joint.geometry))
+
+
+def _tilt_problems(joint: Joint) -> list[Problem]:
+    """The edge of the tilted pad must stay above the lower plate."""
+    for key, place in (("joint.tilt", joint.geometry), *(("joint.path", place) for place in joint.places)):
+        drop, tilt = joint.pad_top * sin(abs(place.tilt[1])), place.tilt[1]
+        if drop >= place.gap:
+            message = f"the edge of the upper pad is {mm(drop)} lower than its centre, at a standoff of {mm(place.gap)}"
+            return [Problem(key, deg(tilt), f"< {deg(asin(min(1.0, place.gap / joint.pad_top)))}", message)]
+    return []
+
+
+def _path_problems(joint: Joint) -> list[Problem]:
+    if joint.path is None:
+        return []
+    if joint.package is not None:
+        message = "a package floats or is moved, not both"
+        return [Problem("joint.path", "", "joint.package or joint.path", message)]
+    if joint.places[-1] == joint.geometry:
+        message = "leads nowhere: it ends where it starts"
+        return [Problem("joint.path", "", "another standoff, offset or tilt", message)]
+    end, lowest = joint.places[-1], checks.SPACINGS_IN_GAP * joint.spacing
+    if end.gap < lowest:
+        message = f"too low for particles {mm(joint.spacing)} apart"
+        return [Problem("joint.path.standoff", mm(end.gap), f">= {mm(lowest)}", message)]
+    if end.offset[0] >= joint.pad_bottom + joint.pad_top:
+        allowed = f"< {mm(joint.pad_bottom + joint.pad_top)}"
+        return [Problem("joint.path.offset", mm(end.offset[0]), allowed, "the pads do not overlap")]
+    return []
+
+
+def _package_problems(joint: Joint) -> list[Problem]:
+    if joint.package is None or not {"shift", "turn"} <= set(joint.package.free):
+        return []
+    message = "free to shift and to turn, a package rolls off a single joint"
+    return [Problem("joint.package.free", ", ".join(joint.package.free), "lift with shift, or lift with turn", message)]
 
 
 def _resolution_problems(drop: Drop) -> list[Problem]:

@@ -19,8 +19,8 @@ from particles.parameters import (
     Switch,
     Walls,
 )
+from particles.scene_package import PI, FloatingPackage, PackagePath
 
-PI = 3.14159265
 DEFAULT_PER_EDGE = 11
 
 # Hu et al. print 10 times the surface tension and 100 times the viscosity of molten SAC solder.
@@ -103,21 +103,43 @@ class Drop(Parameters):
 
 
 class Joint(Parameters):
-    """A joint between two round pads, one above the other; its rims are pinned or slide by pad and mask angle."""
+    """A joint between two round pads, one above the other; its rims are pinned or slide by pad and mask angle.
+
+    The upper pad may be offset along x and tilted about y (its side at +x down). It holds still, unless there is a
+    table joint.package (it floats) or joint.path (it is moved).
+    """
 
     volume: Annotated[float, "mm^3"] = Field(gt=0)
     pad_bottom: Annotated[float, "mm"] = Field(gt=0)
     pad_top: Annotated[float, "mm"] = Field(gt=0)
     standoff: Annotated[float, "mm"] = Field(gt=0)
     offset: Annotated[float, "mm"] = Field(0.0, ge=0)
+    tilt: Annotated[float, "deg"] = Field(0.0, gt=-PI / 6.0, lt=PI / 6.0)
     pad_contact_angle: Annotated[float, "deg"] = Field(0.0872664626, gt=0, lt=PI)
     mask_contact_angle: Annotated[float, "deg"] = Field(2.5830872929, gt=0, lt=PI)
     spacing: Annotated[float, "mm"] = Field(4.0e-5, gt=0)
+    package: FloatingPackage | None = None
+    path: PackagePath | None = None
 
     @property
     def geometry(self) -> JointGeometry:
-        """Gap, pads and offset for the solver."""
-        return JointGeometry(self.standoff, self.pad_bottom, self.pad_top, (self.offset, 0.0))
+        """Gap, pads, offset and tilt for the solver."""
+        return self.place(self.standoff, self.offset, self.tilt)
+
+    def place(self, standoff: float, offset: float, tilt: float) -> JointGeometry:
+        """The pads with the upper one elsewhere: standoff and offset [m], tilt [rad]."""
+        return JointGeometry(standoff, self.pad_bottom, self.pad_top, (offset, 0.0), (0.0, tilt))
+
+    @property
+    def places(self) -> list[JointGeometry]:
+        """Where the path leads, step by step; empty without one."""
+        if self.path is None:
+            return []
+        start = (self.standoff, self.offset, self.tilt)
+        given = (self.path.standoff, self.path.offset, self.path.tilt)
+        ways = [(a, a if b is None else b) for a, b in zip(start, given, strict=True)]
+        shares = [number / self.path.steps for number in range(1, self.path.steps + 1)]
+        return [self.place(*(a + share * (b - a) for a, b in ways)) for share in shares]
 
     @property
     def resolution(self) -> float:

@@ -9,7 +9,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
 from workflow.case import NAME, Case, Title, read_case
-from workflow.fields import allowed, display, literal_names, unit_of
+from workflow.fields import allowed, display, literal_names, models_of, unit_of
 from workflow.problems import CaseError, Problem, as_toml, nearest
 
 CASES = Path(__file__).resolve().parent.parent / "cases"
@@ -63,19 +63,29 @@ def case_text(case: Case, template: str) -> str:
 
 def _add_table(blocks: list[str], key: str, parameters: BaseModel) -> None:
     """Append a table's block, then those of the tables in it."""
-    lines, tables = [], []
+    lines, tables, absent = [], [], []
     for name, field in type(parameters).model_fields.items():
         value = getattr(parameters, name)
         if isinstance(value, BaseModel):
             tables.append((f"{key}.{name}".lstrip("."), value))
+        elif value is None and models_of(field):
+            absent.append(_absent_table(f"{key}.{name}", models_of(field)[0]))
         else:
             lines.append(_line(name, value, field))
     if lines:
-        header = [*_describe(parameters), f"[{key}]"] if key else []
+        header = [*_describe(type(parameters)), f"[{key}]"] if key else []
         blocks.append("\n".join([*header, *lines, ""]))
+    blocks.extend(absent)
     own = getattr(parameters, "kind", "")
     for name, table in sorted(tables, key=lambda item: item[0] not in ("case", own)):
         _add_table(blocks, name, table)
+
+
+def _absent_table(key: str, model: type[BaseModel]) -> str:
+    """Describe a table that is not given, commented out."""
+    lines = [_line(name, field.get_default(), field) for name, field in model.model_fields.items()]
+    commented = [line if line.startswith("#") else f"# {line}" for line in (f"[{key}]", *lines)]
+    return "\n".join([*_describe(model, "Not given: "), *commented, ""])
 
 
 def _line(name: str, value: object, field: FieldInfo) -> str:
@@ -90,9 +100,9 @@ def _line(name: str, value: object, field: FieldInfo) -> str:
     return f"{line:<{COMMENT_COLUMN}} # {comment}" if comment else line
 
 
-def _describe(parameters: BaseModel) -> list[str]:
+def _describe(model: type[BaseModel], before: str = "") -> list[str]:
     """Comment lines from a model's docstring, ReST marks taken out."""
-    if isinstance(parameters, Title):
+    if model is Title:
         return []
-    text = " ".join((type(parameters).__doc__ or "").replace("``", "").split())
+    text = before + " ".join((model.__doc__ or "").replace("``", "").split())
     return textwrap.wrap(text, 118, initial_indent="# ", subsequent_indent="# ")

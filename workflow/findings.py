@@ -111,7 +111,11 @@ def of_drop(metrics: Numbers, verdict: str, effects: Mapping[str, Any]) -> Findi
 def of_joint(metrics: Numbers, verdict: str, effects: Mapping[str, Any]) -> Findings:
     """Judge one joint by volume, rest, verdict and, where there is one, the Young-Laplace shape."""
     named = {ONE_JOINT_NAMES.get(name, name): number for name, number in metrics.items()}
-    limits = {"max_width_error": JOINT_ERROR, "waist_error": JOINT_ERROR, "axial_force_error": AXIAL_FORCE_ERROR}
+    limits = {"max_width_error": JOINT_ERROR, "waist_error": JOINT_ERROR}
+    if "force_balance_error" in metrics:  # of a package that floats the force is given, the height is found
+        limits |= {"collapse_height_error": JOINT_ERROR, "force_balance_error": AXIAL_FORCE_ERROR}
+    else:
+        limits["axial_force_error"] = AXIAL_FORCE_ERROR
     health = _at_rest(named, limits) | {"joints_not_ok": at_most(int(verdict != "ok"), 0)}
     return Findings(_known(named) | {"verdict": metric(verdict)}, health, dict(effects))
 

@@ -9,6 +9,6 @@ def read_json(path: Path) -> dict:
     return json.loads(path.read_text())
 
 
-def write_json(path: Path, content: dict) -> None:
+def write_json(path: Path, content: dict | list) -> None:
     """Write a JSON product, one value a line."""
     path.write_text(json.dumps(content, indent=1) + "\n")

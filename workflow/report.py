@@ -130,6 +130,9 @@ def _add_body(run_folder: Path, kind: str, context: dict, summary: dict) -> None
     else:
         context["curves"]["profile"] = report_body.profile_curve(shape.surface_points, meridian)
         context["curves"]["body_history"] = report_body.history_curve(shape.history)
+    path = run_folder / "reflow" / "path.json"
+    if path.exists():
+        kind, context["curves"]["path"] = "path", report_body.path_curve(json.loads(path.read_text()))
     with tempfile.TemporaryDirectory() as folder:
         picture = Path(folder) / "body.png"
         report_body.render_stages(report_body.stages(kind, shape), shape, picture)

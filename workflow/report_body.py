@@ -17,8 +17,9 @@ if TYPE_CHECKING:
 
 SMALLEST_RANGE = 0.01
 HEADLINE = (
-    "height", "max_width", "waist", "contact_angle", "max_width_error", "period", "period_error", "decay_rate",
-    "decay_rate_error", "verdict", "particles", "seconds",
+    "height", "max_width", "waist", "contact_angle", "max_width_error", "axial_force", "offset",
+    "collapse_height_error", "drops_left", "radius_error", "period", "period_error", "decay_rate", "decay_rate_error",
+    "verdict", "particles", "seconds",
 )  # fmt: skip
 
 
@@ -96,9 +97,34 @@ def render_stages(stages: "Sequence[Snapshot]", shape: "JointShape", picture: Pa
     save(plotter, picture)
 
 
+def path_curve(places: Sequence[Mapping]) -> str:
+    """Draw force and waist of a joint in the places of a path, over what changes first: standoff, offset or tilt."""
+    axis_of = {"standoff": ("standoff [mm]", MILLI), "offset": ("offset [mm]", MILLI), "tilt": ("tilt [rad]", 1.0)}
+    name = next((name for name in axis_of if places[0][name] != places[-1][name]), "standoff")
+    label, scale = axis_of[name]
+    way = [place[name] / scale for place in places]
+    exact = [(x, place["axial_force_exact"] / MILLI) for x, place in zip(way, places, strict=True)
+             if place["axial_force_exact"] is not None]  # fmt: skip
+    with pyplot.rc_context(STYLE):
+        figure, axes = pyplot.subplots(1, 2, figsize=(9.2, 3.2), constrained_layout=True)
+        axes[0].plot(way, [place["axial_force"] / MILLI for place in places], "o", ms=4, label="particles")
+        if exact:
+            axes[0].plot(*zip(*exact, strict=True), color="#d1495b", lw=1.2, label="Young-Laplace")
+        axes[0].set_ylabel("force on the package, upwards [mN]")
+        axes[1].plot(way, [place["waist"] / MILLI for place in places], "o-", ms=4, label="waist")
+        axes[1].plot(way, [place["max_width"] / MILLI for place in places], "s-", ms=4, label="width")
+        axes[1].set_ylabel("[mm]")
+        for axis in axes:
+            axis.set_xlabel(label)
+            axis.legend(frameon=False)
+        return svg(figure)
+
+
 def stages(kind: str, shape: "JointShape") -> "list[Snapshot]":
-    """The states that a picture shows before the end: the start, of a swing each quarter of its first period."""
-    return {"oscillation": shape.snapshots[:7:2], "drops": shape.snapshots}.get(kind, shape.snapshots[:1])
+    """The states that a picture shows before the end: of a swing each quarter of its first period, of a path two."""
+    half = max(1, len(shape.snapshots) // 2)
+    shown = {"oscillation": shape.snapshots[:7:2], "drops": shape.snapshots, "path": shape.snapshots[: half + 1 : half]}
+    return shown.get(kind, shape.snapshots[:1])
 
 
 def _add_coloured(plotter: pyvista.Plotter, points: np.ndarray, pressure: np.ndarray, size: dict) -> None:

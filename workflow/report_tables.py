@@ -271,12 +271,15 @@ def named_quantity(metrics: dict, name: str) -> str:
     return quantity(metrics[name])
 
 
+SHOWN = {"Pa": (1e-6, "MPa"), "m": (1e3, "mm"), "J": (1e3, "mJ"), "N": (1e3, "mN"), "kg": (1e6, "mg")}
+
+
 def quantity(metric: dict) -> str:
     """Text of a metric record: fractions as per cent, stresses in MPa, lengths in mm."""
     value, unit = metric["value"], metric["unit"]
     if isinstance(value, str):
         return value
-    factor, shown = {"Pa": (1e-6, "MPa"), "m": (1e3, "mm"), "J": (1e3, "mJ"), "kg": (1e6, "mg")}.get(unit, (1.0, unit))
+    factor, shown = SHOWN.get(unit, (1.0, unit))
     return f"{number(factor * value)} {shown}".strip()
 
 

@@ -50,7 +50,8 @@ def _of_joint(case: JointCase) -> SceneForecast:
 
     geometry, solder = case.joint.geometry, case.molten
     particles = particle_count(solder, geometry)
-    return _towards_rest(case, decide_effects(geometry, solder), particles, reflow_seconds(solder, geometry))
+    seconds = (1 + len(case.joint.places)) * reflow_seconds(solder, geometry)
+    return _towards_rest(case, decide_effects(geometry, solder), particles, seconds)
 
 
 def _of_drops(case: DropsCase) -> SceneForecast:

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from workflow import findings
 from workflow.case import DropCase, DropsCase, JointCase, OscillationCase
+from workflow.products import write_json
 from workflow.progress import progress_bar
 from workflow.stage_runner import Findings, Run, StageFunction
 
@@ -27,19 +28,23 @@ def reflow_drop(run: Run[DropCase], folder: Path) -> Findings:
 def reflow_joint(run: Run[JointCase], folder: Path) -> Findings:
     """Melt the solder of one joint between its pads."""
     from particles.checkpoint import Checkpoint
-    from particles.effects import acting_weight, decide_effects
-    from particles.metrics import reference_meridian
+    from particles.joint_at_rest import joint_to_rest
     from particles.products import write_body
-    from particles.reflow import solve_joint
 
-    geometry, solder = run.case.joint.geometry, run.case.molten
-    checkpoint = Checkpoint(run.checkpoints("reflow") / "joint", (geometry, solder))
+    joint, solder = run.case.joint, run.case.molten
+    used: list[Checkpoint] = []
+
+    def checkpoint(place: int) -> Checkpoint:
+        used.append(Checkpoint(run.checkpoints("reflow") / f"joint-{place}", (joint, solder)))
+        return used[-1]
+
     with progress_bar("reflow of a joint") as progress:
-        shape = solve_joint(geometry, solder, progress, checkpoint=checkpoint)
-    effects = decide_effects(geometry, solder)
-    write_body(folder, shape, reference_meridian(geometry, solder, acting_weight(solder, effects)))
-    found = findings.of_joint(shape.metrics, shape.verdict, effects)
-    return replace(found, continued="the joint" if checkpoint.continued else "")
+        result = joint_to_rest(joint, solder, progress, checkpoint)
+    write_body(folder, result.shape, result.reference)
+    if result.places:
+        write_json(folder / "path.json", result.places)
+    found = findings.of_joint(result.shape.metrics, result.shape.verdict, result.effects)
+    return replace(found, continued="the joint" if any(one.continued for one in used) else "")
 
 
 def reflow_drops(run: Run[DropsCase], folder: Path) -> Findings:

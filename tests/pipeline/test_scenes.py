@@ -81,6 +81,29 @@ def test_an_oscillation_from_case_file_to_report(tmp_path):
     assert "<svg" in (tmp_path / "report.html").read_text()
 
 
+MOVED = ("joint.spacing=0.07 mm", "solder.numerics.time_step_limit=100")
+
+
+def test_a_package_floats_to_its_collapse_height_and_centres_itself(tmp_path):
+    """Offset by 0.3 radius, under a load: where the Young-Laplace force carries it."""
+    result = run("solder_joint", tmp_path, *MOVED, "joint.offset=0.072 mm", "joint.package.load=0.1 mN")
+    assert result.returncode == 0, result.stdout + result.stderr
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    assert summary["metrics"]["offset"]["value"] < 0.01 * 0.24e-3
+    assert set(summary["health"]) >= {"collapse_height_error", "force_balance_error", "max_width_error"}
+
+
+def test_a_package_is_moved_along_a_path(tmp_path):
+    result = run("solder_joint", tmp_path, *MOVED, "joint.path.standoff=0.42 mm", "joint.path.steps=2")
+    assert result.returncode == 0, result.stdout + result.stderr
+    places = json.loads((tmp_path / "reflow" / "path.json").read_text())
+    assert [place["standoff"] for place in places] == pytest.approx([0.35e-3, 0.385e-3, 0.42e-3])
+    pull = np.pi * 0.24e-3 * 0.4985
+    for place in places:
+        assert place["axial_force"] == pytest.approx(place["axial_force_exact"], abs=0.02 * pull)
+    assert json.loads((tmp_path / "summary.json").read_text())["metrics"]["places"]["value"] == 3
+
+
 def test_an_offset_joint_has_no_meridian(tmp_path):
     result = run("solder_joint", tmp_path, COARSE_JOINT, "joint.offset=0.07 mm")
     assert result.returncode == 0, result.stdout + result.stderr

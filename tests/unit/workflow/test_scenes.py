@@ -19,6 +19,13 @@ DROP, BALL, JOINT, FREE = (
 PAIR = CASES / "coalescence" / "case.toml"
 SWING = CASES / "oscillating_drop" / "case.toml"
 BAD_VALUES = {
+    "tilt too large": (JOINT, "joint.tilt=35 deg", ["joint.tilt", '"35 deg"', "< 30 deg"]),
+    "package that rolls off": (JOINT, 'joint.package.free=["shift", "turn"]', ["joint.package.free", "rolls off"]),
+    "unknown direction": (JOINT, 'joint.package.free=["lfit"]', ["unknown name", "any of lift, shift, turn"]),
+    "load of a length": (JOINT, "joint.package.load=1 mm", ["joint.package.load", "wanted is a force"]),
+    "path to nowhere": (JOINT, "joint.path.steps=3", ["joint.path", "leads nowhere"]),
+    "path into the pad": (JOINT, "joint.path.standoff=0.05 mm", ["joint.path.standoff", ">= 0.12 mm"]),
+    "path past the pad": (JOINT, "joint.path.offset=0.5 mm", ["joint.path.offset", "< 0.48 mm"]),
     "drops that overlap": (PAIR, "drops.distance=0.5 mm", ["drops.distance", '"0.5 mm"', ">= 0.8832 mm", "overlap"]),
     "drops that never touch": (PAIR, "drops.distance=1.5 mm", ["drops.distance", "0.8832 mm to 0.9332 mm", "reach"]),
     "drops not meant to merge": (PAIR, "drops.merge=false", ["drops.distance", ">= 1.133 mm", "drops.merge = false"]),
@@ -82,6 +89,21 @@ def test_a_spacing_larger_than_the_drop(tmp_path):
 def test_a_receding_angle_above_the_advancing_one():
     text = problems_of(FREE, "drop.receding_angle=80 deg", "drop.advancing_angle=60 deg")
     assert 'drop.receding_angle = "80 deg"' in text and "< 60 deg" in text
+
+
+def test_a_package_floats_or_is_moved():
+    text = problems_of(JOINT, "joint.path.standoff=0.3 mm", "joint.package.load=1 mN")
+    assert "joint.path" in text and "not both" in text
+
+
+def test_a_tilted_pad_stays_above_the_lower_one():
+    text = problems_of(JOINT, "joint.tilt=29 deg", "joint.pad_top=0.9 mm", "joint.volume=0.4 mm^3")
+    assert "joint.tilt" in text and "< 22." in text
+
+
+def test_tables_that_are_not_given_are_described(tmp_path):
+    text = write_new_case("mine", "solder_joint", tmp_path).read_text()
+    assert "# [joint.package]" in text and "# load = " in text and "# [joint.path]" in text
 
 
 def test_a_file_of_no_kind_names_the_nearest(tmp_path):
