@@ -22,7 +22,7 @@ from particles.reflow import contact_line, start_flow
 RESULTS = Path(__file__).parent / "results" / "reflow_scale.json"
 EFFECTS = {"surface_tension": True, "wall_adhesion": True, "gravity": False, "inertia": False, "viscosity": False}
 PER_EDGE = (11, 13, 17, 27, 41)
-STEPS = 3
+STEPS = 8
 
 
 def cube(count: int) -> LiquidFlow:
@@ -62,6 +62,7 @@ def main() -> None:
             command = [sys.executable, __file__, str(count)]
             rows.append(json.loads(subprocess.run(command, env=environment, capture_output=True, check=True).stdout))
             print(rows[-1], flush=True)
+        print(f"second thread: {rows[-2]['seconds_a_step'] / rows[-1]['seconds_a_step']:.2f} times faster", flush=True)
     RESULTS.parent.mkdir(exist_ok=True)
     RESULTS.write_text(json.dumps(rows, indent=1))
 
