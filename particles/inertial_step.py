@@ -13,16 +13,15 @@ from scipy import sparse
 
 from particles.backward_difference import BackwardDifference, Base
 from particles.body import Body
-from particles.discretisation import Discretisation
 from particles.discretisation_tetrahedra import LinearTetrahedra
 from particles.field_transfer import Transfer, interpolation
-from particles.force_surface_tension import SurfaceTension
 from particles.incompressibility import solve
 from particles.inner_tetrahedra import fill
 from particles.neighbours import NeighbourList
 from particles.physics import Physics
 from particles.step_equations import StepEquations
 from particles.step_solver import Motion
+from particles.stepped_physics import stepped
 from particles.time_step import LARGEST_DISPLACEMENT
 from particles.viscosity import Viscosity
 
@@ -34,24 +33,6 @@ SHIFT_TOLERANCE = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
-class PredictedTension:
-    """Surface tension has moved the body to the predicted positions already: only the rest is implicit.
-
-    Attributes:
-        tension: the surface tension.
-        velocity: of the prediction, `(n, 3)` [m/s].
-    """
-
-    tension: SurfaceTension
-    velocity: Floats
-
-    def load(self, body: Body, space: Discretisation, time_step: float) -> Floats:
-        """Return dt gamma K v, `(n, 3)` [N]."""
-        matrix = self.tension.matrix(body, space, time_step)
-        return np.ascontiguousarray((matrix @ self.velocity.T.ravel()).reshape(3, -1).T)
-
-
-@dataclass(frozen=True, slots=True)
 class Past:
     """What the last step left.
 
@@ -60,18 +41,20 @@ class Past:
         triangles: `(t, 3)` of their surface.
         points: `(n, 3)` where it took the particles [m].
         history: its displacement and change of velocity.
+        plates: `(6,)` displacement and rotation of each plate that moved, by its index [m, rad].
     """
 
     space: LinearTetrahedra
     triangles: NDArray[np.int32]
     points: Floats
     history: BackwardDifference
+    plates: dict[int, Floats]
 
     @classmethod
     def start(cls, body: Body, density: float, viscosity: float) -> "Past":
         """Fill a body that has not moved yet with tetrahedra."""
         space = LinearTetrahedra.start(body.points, fill(body), density, viscosity)
-        return cls(space, body.triangles, body.points, BackwardDifference.start(len(body.points)))
+        return cls(space, body.triangles, body.points, BackwardDifference.start(len(body.points)), {})
 
     def fits(self, body: Body) -> bool:
         """Whether the tetrahedra still fill the body well."""
@@ -87,7 +70,7 @@ class Past:
         transfer = Transfer(values, self.space.mass, new.mass, unit_fields)
         old = self.history
         history = BackwardDifference(values @ old.displacement, transfer(old.velocity_change), old.time_step)
-        return Past(new, body.triangles, body.points, history), transfer(body.velocity)
+        return Past(new, body.triangles, body.points, history, self.plates), transfer(body.velocity)
 
 
 @dataclass(slots=True)
@@ -126,7 +109,7 @@ class InertialStep:
         """Bring the body to rest."""
         body.velocity = np.zeros_like(body.velocity)
         if self.past is not None:
-            self.past = replace(self.past, history=BackwardDifference.start(len(body.points)))
+            self.past = replace(self.past, history=BackwardDifference.start(len(body.points)), plates={})
 
     @property
     def mass(self) -> sparse.csr_matrix:
@@ -165,19 +148,27 @@ class PreparedInertialStep:
         body, past = self.body, self.past
         base = past.history.base(body.points, body.velocity, time_step)
         guess = self._guess(base)
+        carried = {
+            motion.wall: base.weight * past.plates.get(motion.wall, np.zeros(6)) for motion in self.physics.motions
+        }
         predicted = replace(body, points=base.points + base.time_step * guess, velocity=base.velocity)
         space = past.space(predicted)
-        equations = StepEquations(predicted, self._with_prediction(guess), space)
+        equations = StepEquations(predicted, stepped(self.physics, guess, carried, time_step), space)
         swept = base.time_step * float((space.constraint @ guess.T.ravel()).sum())
         problem = equations.problem(base.time_step, volume + swept)
         solution = solve(replace(problem, guess=body.pressure))
         velocity, twists = equations.expand(solution.velocity, base.time_step)
         points = base.points + base.time_step * velocity
+        plates = {wall: carried[wall] + base.time_step * twist for wall, twist in twists.items()}
         history = BackwardDifference(points - body.points, velocity - body.velocity, time_step)
-        self.solver.past = Past(past.space, past.triangles, points, history)
-        pressure = float(space.volume_share @ solution.pressure)
+        self.solver.past = Past(past.space, past.triangles, points, history, plates)
         return Motion(
-            velocity, history.displacement / time_step, solution.pressure, pressure, twists, solution.iterations
+            velocity=velocity,
+            transport=history.displacement / time_step,
+            pressure=solution.pressure,
+            surface_pressure=float(space.volume_share @ solution.pressure),
+            twists={wall: way / time_step for wall, way in plates.items()},
+            iterations=solution.iterations,
         )
 
     def _guess(self, base: Base) -> Floats:
@@ -186,9 +177,3 @@ class PreparedInertialStep:
         way = base.time_step * float(np.sqrt((velocity**2).sum(axis=1).max()))
         bound = LARGEST_DISPLACEMENT * self.body.cloud.spacing
         return velocity if way <= bound else bound / way * velocity
-
-    def _with_prediction(self, guess: Floats) -> Physics:
-        """Physics at the positions that a velocity `(n, 3)` predicts."""
-        tensions = (part for part in self.physics.operators if isinstance(part, SurfaceTension))
-        loads = [PredictedTension(tension, guess) for tension in tensions]
-        return replace(self.physics, momenta=(*self.physics.momenta, *loads))

@@ -102,3 +102,15 @@ def test_laplace_drop():
     assert result.metrics["pressure_scatter"][0] < 2e-3
     assert result.metrics["capillary_number_at_rest"][0] < 1e-4
     assert result.metrics["volume_drift"][0] < 1e-6
+
+
+def test_a_drop_stretched_to_more_than_half_its_radius():
+    """Energy falls, momentum and volume are kept where tetrahedra wear out and are made anew; the period is longer."""
+    result = solve_free_drop(drop(1.37e-3, 3), amplitude=0.5, periods=1.0)
+    history = result.history
+    assert history["amplitude"].max() > 0.6
+    assert np.diff(history["energy"]).max() < 0.0
+    assert result.metrics["volume_drift"][0] < 2e-5
+    mass = DENSITY * history["volume"][0]
+    assert history["momentum"].max() < 1e-10 * np.sqrt(2.0 * mass * history["kinetic_energy"].max())
+    assert 0.0 < result.metrics["period_error"][0] < 0.25
