@@ -95,3 +95,12 @@ def test_a_transfer_keeps_momentum_and_raises_no_energy():
         energy = (velocity * (old.mass @ velocity)).sum()
         assert (moved * (new.mass @ moved)).sum() <= energy * (1.0 + 1e-12)
     assert transfer(translations[0]) == pytest.approx(translations[0], abs=1e-12)
+
+
+@pytest.mark.parametrize("count", [5, 8])
+def test_flipped_edges_of_a_lattice_are_single_cells(count):
+    """Neighbouring diagonals on the faces of a cube differ from Delaunay's: no cell is inverted, so none overlaps."""
+    body = Body.at_rest(box_cloud(1.0, count))
+    volumes = cell_volumes(body.points, fill(body))
+    assert volumes.min() >= 0.0
+    assert volumes.sum() == pytest.approx(body.volume()[0], rel=1e-12)

@@ -34,7 +34,7 @@ def test_viscous_power_of_simple_flows(body):
     space = discretise(body)
     matrix = Viscosity(2.0).matrix(body, space, 1.0)
     x, y, z = body.points.T
-    volume = space.weights.sum()
+    volume = body.volume()[0]
     assert power(matrix, np.column_stack((z, 0 * x, 0 * x))) == pytest.approx(2.0 * volume)
     assert power(matrix, np.column_stack((x, -y, 0 * x))) == pytest.approx(2.0 * 4.0 * volume)
     assert power(matrix, np.column_stack((-y, x, 0 * x))) == pytest.approx(0.0, abs=1e-12)
