@@ -1,0 +1,24 @@
+"""An overfilled array: joints that touch are reported, flowed into one, and never meshed."""
+
+import json
+
+from particles.products import read_shapes
+from tests.support.workflow_command import reflowshock
+
+OVERFILLED = ("solder.volume=0.26 mm^3", "solder.numerics.spacing=0.1 mm")
+
+
+def test_bridged_joints_are_told_and_end_the_run(tmp_path):
+    result = reflowshock("run", tmp_path, settings=OVERFILLED)
+    assert result.returncode == 1
+    assert "joints bridged 4 (limit 0)" in result.stdout
+    assert "A3" in result.stderr and "bridged: there is no such joint to mesh" in result.stderr
+    joints = json.loads((tmp_path / "reflow/joints.json").read_text())
+    assert {joint["verdict"] for joint in joints.values()} == {"bridged"}
+    assert "A4" in joints["A3"]["touches"]
+    (bridge,) = [shape for name, shape in read_shapes(tmp_path / "reflow/shapes.h5").items() if "+" in name]
+    assert bridge.verdict == "bridged"
+    assert abs(bridge.metrics["volume_drift"][0]) < 1e-3
+    assert reflowshock("report", tmp_path, settings=OVERFILLED).returncode == 0
+    assert "as one body" in (tmp_path / "report.html").read_text()
+    assert json.loads((tmp_path / "summary.json").read_text())["health"]["joints_bridged"]["value"] == 4
