@@ -4,8 +4,9 @@ As printed: strong form at the particles, moving least squares, explicit pressur
 surface, so that the time step is bound by the capillary limit. Different: walls are mirrored (their Neumann rows make
 Krylov solvers fail), the normal viscous stress is part of the pressure on the free surface (without it nothing damps an
 oscillation), and the pressure at a contact line is that of the surface energy, whose natural condition is the contact
-angle (their overwritten normal is worse). Kept for comparison: it loses volume in each step, which the flow gives back,
-and does not carry a drop from a cube to its rest; with the linear basis as printed even a drop at rest breaks up.
+angle (their overwritten normal is worse). Kept for comparison: it loses volume in each step, which the flow gives back.
+With a quadratic basis a drop at rest stays there, and a cube becomes a drop some percent off that goes on swinging, or
+loses particles at its contact line; with the linear basis, as printed, even a drop at rest breaks up.
 """
 
 from dataclasses import dataclass

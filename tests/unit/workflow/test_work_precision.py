@@ -23,7 +23,7 @@ def test_a_failed_run_is_a_row():
     rows = work_precision.table(RESULT)["rows"]
     assert rows[0] == [
         "60 deg, 7 per edge",
-        "energy, quasi-static, linear",
+        "energy, quasi-static",
         "100 x",
         "0.06 %",
         "-0.1 %",
@@ -31,6 +31,7 @@ def test_a_failed_run_is_a_row():
         "4.6",
         "at rest",
     ]
+    assert rows[1][1] == "gripc, quasi-static, linear"
     assert rows[1][3:] == ["", "", "45", "4.6", "StepCollapsed in step 46"]
 
 
