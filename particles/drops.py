@@ -113,9 +113,10 @@ def _apart(flows: Sequence[LiquidFlow]) -> list[Drop]:
 
 
 def _restarted(start: Callable[[Body], LiquidFlow], *drops: Drop) -> LiquidFlow:
-    """Flow of the body that drops become, from the time of the latest."""
+    """Flow of the body that drops become, from the time of the latest; its steps are counted on."""
     flow = start(rebuild(*(drop.flow.body for drop in drops)))
     flow.time = max(drop.flow.time for drop in drops)
+    flow.steps = max(drop.flow.steps for drop in drops)
     return flow
 
 

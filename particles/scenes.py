@@ -69,7 +69,7 @@ class Drop(Parameters):
     def count(self) -> int:
         """Particles along an edge of the cube."""
         if self.spacing is not None:
-            return 1 + round(self.edge / self.spacing)
+            return max(2, 1 + round(self.edge / self.spacing))
         return self.particles_per_edge or DEFAULT_PER_EDGE
 
     @property

@@ -57,6 +57,7 @@ def test_two_free_drops_become_one_sphere(radii):
         flows.append(flow)
     cloud = flows[0].body.cloud
     (drop,) = run_drops(flows, stop_rule(cloud, solder, FREE), lambda body: start_flow(body.cloud, solder, FREE, ()))
+    assert [record.step for record in drop.records] == list(range(1, len(drop.records) + 1))
     body = drop.flow.body
     total = 4.0 / 3.0 * np.pi * sum(radius**3 for radius in radii)
     assert body.volume()[0] == pytest.approx(total, rel=1e-3)
@@ -72,6 +73,8 @@ def test_two_drops_that_spread_into_each_other_become_one_cap():
     rule = stop_rule(flows[0].body.cloud, solder, ON)
     (drop,) = run_drops(flows, rule, lambda body: start_on_wall(body.cloud, solder))
     assert drop.origins == (0, 1)
+    before = max(len(parent.records) for parent in drop.parents)
+    assert [record.step - before for record in drop.records] == list(range(1, len(drop.records) + 1))
     body, radius = drop.flow.body, cap_radius(1e-9, ANGLE)
     assert body.volume()[0] == pytest.approx(1e-9, rel=1e-3)
     surface = body.points[: body.cloud.surface_count]

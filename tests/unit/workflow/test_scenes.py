@@ -36,6 +36,7 @@ BAD_VALUES = {
     "gravity of a swing": (SWING, "solder.gravity=1 m/s^2", ["solder.gravity", "unknown key"]),
     "angle of a full turn": (DROP, "drop.contact_angle=190 deg", ['"190 deg"', "out of range", "< 180 deg"]),
     "angle of zero": (DROP, "drop.contact_angle=0 deg", ["drop.contact_angle", "> 0 deg"]),
+    "spacing larger than the drop": (FREE, "drop={volume='1 mm^3',spacing='5 mm'}", ["drop.spacing", "<= 0.25 mm"]),
     "two resolutions": (DROP, "drop.spacing=0.1 mm", ["drop.spacing", '"0.1 mm"', "particles_per_edge = 11"]),
     "unknown set": (DROP, "solder.parameters=papre", ["one of physical, paper", "did you mean paper?"]),
     "unknown key": (DROP, "drop.angle=60 deg", ["drop.angle", "unknown key", "contact_angle"]),
