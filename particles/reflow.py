@@ -25,6 +25,7 @@ from particles.plate import Pad
 from particles.relaxation import Relaxation
 from particles.rest import Run, StopRule, run_to_rest
 from particles.shape import JointShape, Snapshot
+from particles.split import parted_shape, split_to_rest
 from particles.step_solver import StepSolver
 from particles.symmetry import whole_line
 from particles.time_step import TimeStep, capillary_limit
@@ -47,7 +48,8 @@ def solve_joint(
     """Let molten solder flow between two wetted discs until it is at rest.
 
     The solder starts as a double cone of its volume on both discs and flows by its effects (`decide_effects`). Too
-    little for such a cone is a drop on the board's disc; the joint is open.
+    little for such a cone is a drop on the board's disc; the joint is open. So is one whose neck collapses: a drop on
+    each disc.
 
     Args:
         geometry: gap and radii of the discs [m].
@@ -68,14 +70,31 @@ def solve_joint(
     run = run_to_rest(flow, rule, progress, on_snapshot, checkpoint)
     if len(flow.body.cloud.rings) == 1:
         return _open_shape(geometry, solder, flow, run)
-    return joint_shape(geometry, solder, flow, run)
+    shape = joint_shape(geometry, solder, flow, run)
+    return _parted(geometry, solder, flow, shape) if run.ruptured else shape
+
+
+def _acting(geometry: JointGeometry, solder: Solder) -> dict[str, bool]:
+    """Which effects act."""
+    return {name: decision["on"] for name, decision in decide_effects(geometry, solder).items()}
+
+
+def _parted(geometry: JointGeometry, solder: Solder, flow: LiquidFlow, shape: JointShape) -> JointShape:
+    """The shape of a joint whose neck has collapsed: a drop at rest on each pad; where that cannot be, as it is."""
+    effects = _acting(geometry, solder) | {"inertia": False, "viscosity": False}
+
+    def start(body: Body) -> LiquidFlow:
+        return start_flow(body.cloud, solder, effects, pad_lines(body.cloud, solder))
+
+    drops = split_to_rest(flow, stop_rule(flow.body.cloud, solder, effects), start)
+    return parted_shape(shape, drops) if drops else shape
 
 
 def _start_on_board(geometry: JointGeometry, solder: Solder) -> tuple[LiquidFlow, StopRule]:
     """Set up the flow of a drop on the board's disc alone."""
     edge = float(np.cbrt(solder.volume))
     cloud = box_cloud(edge, max(FEWEST_PER_EDGE, 1 + round(edge / solder.numerics.spacing)))
-    effects = {name: decision["on"] for name, decision in decide_effects(geometry, solder).items()}
+    effects = _acting(geometry, solder)
     lines = (contact_line(cloud, 0, geometry.radius_board, solder),)
     return start_flow(cloud, solder, effects, lines), stop_rule(cloud, solder, effects)
 
@@ -91,7 +110,7 @@ def _open_shape(geometry: JointGeometry, solder: Solder, flow: LiquidFlow, run: 
 def start_joint(geometry: JointGeometry, solder: Solder) -> tuple[LiquidFlow, StopRule]:
     """Set up the flow of a joint from its double cone, with the effects that are called for, and when it ends."""
     cloud = joint_cloud(geometry, solder.volume, solder.numerics.spacing)
-    effects = {name: decision["on"] for name, decision in decide_effects(geometry, solder).items()}
+    effects = _acting(geometry, solder)
     radii = (geometry.radius_board, geometry.radius_package)
     lines = tuple(contact_line(cloud, wall, radius, solder) for wall, radius in enumerate(radii))
     return start_flow(cloud, solder, effects, lines), stop_rule(cloud, solder, effects)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from particles.geometry import JointGeometry
+from particles.metrics import reference_drop
 from particles.parameters import Solder, SolderEffects, SolderNumerics
 from particles.reflow import joint_shape, solve_joint, start_joint
 from particles.rest import run_to_rest
@@ -62,8 +63,19 @@ def test_time_steps_far_beyond_the_capillary_limit(limit, spacing):
 
 def test_a_joint_without_equilibrium_opens():
     gap = 0.6e-3
-    shape = solve_joint(JointGeometry(gap, RADIUS, RADIUS), Solder(volume=cylinder(0.4, gap)))
+    solder = Solder(volume=cylinder(0.4, gap), numerics=SolderNumerics(spacing=7e-5))
+    shape = solve_joint(JointGeometry(gap, RADIUS, RADIUS), solder)
     assert shape.verdict == "open"
+    value = {name: number for name, (number, _) in shape.metrics.items()}
+    assert value["volume_board"] + value["volume_package"] == pytest.approx(solder.volume, rel=1e-9)
+    for plate in ("board", "package"):  # a cap on each pad; gravity changes its height by 0.3 %
+        part = solder.model_copy(update={"volume": value[f"volume_{plate}"]})
+        assert value[f"drop_height_{plate}"] == pytest.approx(reference_drop(part, RADIUS, 0.0).height, rel=1e-2)
+    middle = 0.5 * gap
+    sides = [set(np.sign(shape.points[ring, 2] - middle)) for ring in shape.rings]
+    assert sides == [{-1.0}, {1.0}]
+    corners = np.sign(shape.points[shape.triangles, 2] - middle)
+    assert np.all(corners == corners[:, :1])  # no triangle between the drops
 
 
 def test_too_little_solder_for_any_neck_stays_on_the_board_and_is_open():

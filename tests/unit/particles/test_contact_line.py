@@ -8,6 +8,7 @@ from particles.cloud import box_cloud, equal_area_radius, joint_cloud
 from particles.contact_line import ON_MASK, ON_PAD, PINNED, ContactLine
 from particles.force_wetting import Wetting
 from particles.geometry import JointGeometry
+from particles.metrics import verdict
 from particles.plate import Pad, Plate
 from particles.surface_measure import ring_area, ring_area_gradient
 
@@ -130,6 +131,7 @@ def test_a_line_around_two_pads_wets_the_mask_between_them():
     """Pinned at the far side of both pads, on the mask between: the sides enclose 2 x 1, of which two half discs."""
     line, body = line_over_pads(stadium(1.0, equal_area_radius(0.5, 60), 31), PAIR)
     assert line.held_pads() == {0, 1}
+    assert verdict((line,), ruptured=False) == "bridged"
     assert (line.state == PINNED).sum() == 2 * 32  # the arcs and the first vertex of each side
     assert line.cosine_area(body) == pytest.approx(np.cos(MASK) * (2.0 * 1.0 - 0.25 * np.pi), rel=1e-2)
 
