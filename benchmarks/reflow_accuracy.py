@@ -1,7 +1,7 @@
 """Work-precision of the sessile drop: error against cost for spacing, time step, basis, mode and scheme.
 
 Run: .venv/bin/python benchmarks/reflow_accuracy.py --quick     (a minute; coarse drops)
-     .venv/bin/python benchmarks/reflow_accuracy.py             (writes JSON, table and plot to benchmarks/results)
+     .venv/bin/python benchmarks/reflow_accuracy.py             (quarter of an hour; to benchmarks/results)
      .venv/bin/python benchmarks/reflow_accuracy.py --publish   (and to cases/sessile_drop: README, report)
      .venv/bin/python benchmarks/reflow_accuracy.py --publish --stored   (draws what is stored again)
 Seconds are those of the processor: of one core with NUMBA_NUM_THREADS=1 OMP_NUM_THREADS=1. 1 mm^3 without gravity,
