@@ -16,6 +16,7 @@ from particles.young_laplace import sessile_meridian
 FEWEST_PER_EDGE = 5
 MOST_PARTICLES = 200_000
 SPACINGS_IN_PAD = 2.0
+ROUNDING = 1e-9
 KEYS = {
     "solder.volume": "joint.volume",
     "solder.pad_contact_angle": "joint.pad_contact_angle",
@@ -121,7 +122,7 @@ def _path_problems(joint: Joint) -> list[Problem]:
         message = "leads nowhere: it ends where it starts"
         return [Problem("joint.path", "", "another standoff, offset or tilt", message)]
     end, lowest = joint.places[-1], checks.SPACINGS_IN_GAP * joint.spacing
-    if end.gap < lowest:
+    if end.gap < (1.0 - ROUNDING) * lowest:
         message = f"too low for particles {mm(joint.spacing)} apart"
         return [Problem("joint.path.standoff", mm(end.gap), f">= {mm(lowest)}", message)]
     if end.offset[0] >= joint.pad_bottom + joint.pad_top:

@@ -253,7 +253,7 @@ def available_cores() -> int:
 
 
 def _of_particles(found: "Sequence[ParticlesProblem]") -> list[Problem]:
-    return [Problem(problem.key, problem.message, problem.value, problem.allowed) for problem in found]
+    return [Problem(problem.key, problem.message, problem.value or None, problem.allowed) for problem in found]
 
 
 def _shown(value: object, field: FieldInfo | None) -> object:

@@ -11,6 +11,7 @@ from pydantic_core import PydanticUndefined
 from workflow.case import NAME, Case, Title, read_case
 from workflow.fields import allowed, display, literal_names, models_of, unit_of
 from workflow.problems import CaseError, Problem, as_toml, nearest
+from workflow.validation import NAMES
 
 CASES = Path(__file__).resolve().parent.parent / "cases"
 COMMENT_COLUMN = 44
@@ -45,7 +46,7 @@ def write_new_case(name: str, template: str, folder: Path = Path()) -> Path:
         choice, hint = "one of " + ", ".join(known), nearest(template, known)
         raise CaseError("new", [Problem("--template", "unknown template", template, choice, hint)])
     if not re.match(NAME, name):
-        raise CaseError("new", [Problem("NAME", "is no name", name, "letters, digits, _ . -")])
+        raise CaseError("new", [Problem("NAME", "is no name", name, NAMES)])
     path = folder / f"{name}.toml"
     if path.exists():
         raise CaseError("new", [Problem("NAME", f"{path} exists already", name)])
@@ -94,10 +95,15 @@ def _line(name: str, value: object, field: FieldInfo) -> str:
     text = f'"{display(value, field)}"' if unit_of(field) else as_toml(value)
     remarks = [allowed(field)] if len(literal_names(field)) != 1 else []
     if field.default not in (PydanticUndefined, "", None):
-        remarks.append(f"default {display(field.default, field)}")
+        remarks.append(f"default {_default(field)}")
     comment = "; ".join(remark for remark in remarks if remark)
     line = f"{name} = {text}"
     return f"{line:<{COMMENT_COLUMN}} # {comment}" if comment else line
+
+
+def _default(field: FieldInfo) -> str:
+    is_switch = isinstance(field.default, bool)
+    return as_toml(field.default) if is_switch else display(field.default, field)
 
 
 def _describe(model: type[BaseModel], before: str = "") -> list[str]:

@@ -46,6 +46,8 @@ def allowed(field: FieldInfo) -> str:
     names = literal_names(field)
     if names:
         return _choice(field) + ", ".join(names)
+    if field.annotation is bool:
+        return "true or false"
     unit = unit_of(field)
     bounds = [
         f"{sign} {from_si(getattr(item, attribute), unit, 6) if unit else f'{getattr(item, attribute):g}'}"

@@ -80,5 +80,6 @@ def failed_checks(run_folder: Path, stages: Sequence[Stage]) -> list[str]:
         record = read_record(run_folder, stage) or {"health": {}}
         for check, result in record["health"].items():
             if not result["ok"]:
-                failures.append(f"{stage.name}: {check.replace('_', ' ')} {result['value']} exceeds {result['limit']}")
+                value, limit = result["value"], result["limit"]
+                failures.append(f"{stage.name}: {check.replace('_', ' ')} {value:.3g}, limit {limit:.3g}")
     return failures

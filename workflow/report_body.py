@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from particles.shape import JointShape, Snapshot
 
 SMALLEST_RANGE = 0.01
+DEGREE = np.pi / 180.0
 HEADLINE = (
     "height", "max_width", "waist", "contact_angle", "max_width_error", "axial_force", "offset",
     "collapse_height_error", "drops_left", "radius_error", "period", "period_error", "decay_rate", "decay_rate_error",
@@ -33,10 +34,14 @@ def headline(metrics: dict) -> list[dict]:
 def metric_table(metrics: dict, health: dict) -> dict:
     """All metrics, those with a limit beside it."""
     rows = [
-        [name.replace("_", " "), _text(name, metric), percent(health[name]["limit"]) if name in health else ""]
+        [name.replace("_", " "), _text(name, metric), _limit(name, metric, health)]
         for name, metric in metrics.items()
     ]
     return {"head": ["metric", "value", "limit"], "rows": rows}
+
+
+def _limit(name: str, metric: dict, health: dict) -> str:
+    return _text(name, metric | {"value": health[name]["limit"]}) if name in health else ""
 
 
 def profile_curve(points: np.ndarray, meridian: np.ndarray | None) -> str:
@@ -48,7 +53,7 @@ def profile_curve(points: np.ndarray, meridian: np.ndarray | None) -> str:
         if meridian is not None:
             axis.plot(*(meridian / MILLI), color="#d1495b", lw=1.2, label="Young-Laplace")
         axis.set(xlabel="radius [mm]", ylabel="height [mm]", aspect="equal")
-        axis.legend(frameon=False)
+        figure.legend(frameon=False, loc="outside upper center", ncols=2)
         return svg(figure)
 
 
@@ -99,7 +104,7 @@ def render_stages(stages: "Sequence[Snapshot]", shape: "JointShape", picture: Pa
 
 def path_curve(places: Sequence[Mapping]) -> str:
     """Draw force and waist of a joint in the places of a path, over what changes first: standoff, offset or tilt."""
-    axis_of = {"standoff": ("standoff [mm]", MILLI), "offset": ("offset [mm]", MILLI), "tilt": ("tilt [rad]", 1.0)}
+    axis_of = {"standoff": ("standoff [mm]", MILLI), "offset": ("offset [mm]", MILLI), "tilt": ("tilt [deg]", DEGREE)}
     name = next((name for name in axis_of if places[0][name] != places[-1][name]), "standoff")
     label, scale = axis_of[name]
     way = [place[name] / scale for place in places]

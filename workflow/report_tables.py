@@ -271,7 +271,9 @@ def named_quantity(metrics: dict, name: str) -> str:
     return quantity(metrics[name])
 
 
-SHOWN = {"Pa": (1e-6, "MPa"), "m": (1e3, "mm"), "J": (1e3, "mJ"), "N": (1e3, "mN"), "kg": (1e6, "mg")}
+SHOWN = {
+    "Pa": (1e-6, "MPa"), "m": (1e3, "mm"), "m^3": (1e9, "mm^3"), "J": (1e3, "mJ"), "N": (1e3, "mN"), "kg": (1e6, "mg"),
+}  # fmt: skip
 
 
 def quantity(metric: dict) -> str:

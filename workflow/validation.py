@@ -9,6 +9,7 @@ from pydantic.fields import FieldInfo
 from workflow import fields
 from workflow.problems import Problem, nearest
 
+NAMES = "letters, digits, _ . -, the first one a letter or digit"
 RANGES = ("greater_than", "greater_than_equal", "less_than", "less_than_equal", "finite_number")
 
 
@@ -22,15 +23,15 @@ def translate(model: type[BaseModel], error: ValidationError, table: dict, known
         known: keys of which a problem is already known; those are left out.
 
     Returns:
-        One problem an error.
+        One problem a key.
     """
-    found = []
+    found: dict[str, Problem] = {}
     for record in error.errors():
         names = _names(model, record["loc"])
         key = ".".join(names)
         if key not in known:
-            found.append(_problem(model, names, record["type"], record["msg"], table))
-    return found
+            found.setdefault(key, _problem(model, names, record["type"], record["msg"], table))
+    return list(found.values())
 
 
 def _problem(root: type[BaseModel], names: list[str], kind: str, text: str, table: dict) -> Problem:
@@ -52,11 +53,21 @@ def _problem(root: type[BaseModel], names: list[str], kind: str, text: str, tabl
     if fields.models_of(field):
         return Problem(key, "must be a table", value)
     if kind == "literal_error":
-        names_allowed = fields.literal_names(field)
-        return Problem(key, "unknown name", value, fields.allowed(field), nearest(str(value), names_allowed))
+        return Problem(key, "unknown name", value, fields.allowed(field), _nearest_name(value, field))
     if kind in RANGES:
         return Problem(key, "is out of range", value, fields.allowed(field))
+    if kind == "string_pattern_mismatch":
+        return Problem(key, "is no name", value, NAMES)
+    if kind in ("tuple_type", "too_short"):
+        return Problem(key, "must be a list with at least one item", value, fields.allowed(field))
     return Problem(key, text[0].lower() + text[1:], value, fields.allowed(field))
+
+
+def _nearest_name(value: Any, field: FieldInfo) -> str:
+    """Valid name most like a wrong one, which may be an item of a list."""
+    valid = fields.literal_names(field)
+    wrong = [str(item) for item in (value if isinstance(value, list) else [value]) if item not in valid]
+    return nearest(wrong[0], valid) if wrong else ""
 
 
 def _names(model: type[BaseModel], location: Sequence[int | str]) -> list[str]:

@@ -54,7 +54,7 @@ def test_a_rerun_replaces_all_of_a_product(run):
 
 def test_a_check_that_failed_is_named(run):
     run_stage("surface", write_surfaces, run)
-    assert failed_checks(run.folder, run.case.pipeline.upstream("report")) == ["surface: volume error 0.2 exceeds 0.1"]
+    assert failed_checks(run.folder, run.case.pipeline.upstream("report")) == ["surface: volume error 0.2, limit 0.1"]
     assert failed_checks(run.folder, run.case.pipeline.upstream("reflow")) == []
 
 
