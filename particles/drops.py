@@ -90,7 +90,7 @@ def run_drops(
         if len(drop.records) >= rule.max_steps:
             raise NoRest(f"drop {drop.origins} is not at rest after {rule.max_steps} steps (solder.numerics.max_steps)")
         drop.step(rule)
-        if collapsing(drop.flow.body):
+        if drop.moves(rule) and collapsing(drop.flow.body):
             drop.flow = _restarted(start, drop)
         drops = _merge_touching(drops, start)
         if checkpoint is not None and checkpoint.is_due():
@@ -113,8 +113,10 @@ def _apart(flows: Sequence[LiquidFlow]) -> list[Drop]:
 
 
 def _restarted(start: Callable[[Body], LiquidFlow], *drops: Drop) -> LiquidFlow:
-    """Flow of the body that drops become, from the time of the latest; its steps are counted on."""
-    flow = start(rebuild(*(drop.flow.body for drop in drops)))
+    """Flow of the body that drops become, from the time of the latest, with their momentum; steps are counted on."""
+    body = rebuild(*(drop.flow.body for drop in drops))
+    flow = start(body)
+    flow.body.velocity = body.velocity
     flow.time = max(drop.flow.time for drop in drops)
     flow.steps = max(drop.flow.steps for drop in drops)
     return flow

@@ -1,5 +1,6 @@
 """Drops that merge come to rest in the exact shape of their common volume."""
 
+from dataclasses import replace
 from math import inf
 
 import numpy as np
@@ -43,11 +44,8 @@ def centroid(body):
     return (volumes[:, None] * corner.sum(axis=1) / 4.0).sum(axis=0) / volumes.sum()
 
 
-@pytest.mark.parametrize("radii", [(0.5e-3, 0.5e-3), (0.5e-3, 0.35e-3)])
-def test_two_free_drops_become_one_sphere(radii):
-    spacing = 1.0e-4
-    solder = solder_of(spacing)
-    flows, place = [], 0.0
+def touching_balls(radii, solder):
+    spacing, flows, place = solder.numerics.spacing, [], 0.0
     for radius in radii:
         volume = 4.0 / 3.0 * np.pi * radius**3
         level = ball(grid_around_ball((0, 0, 0), radius, spacing), (0, 0, 0), radius)
@@ -55,6 +53,23 @@ def test_two_free_drops_become_one_sphere(radii):
         flow.body.points[:, 0] += place + radius
         place += 2.0 * radius + 0.5 * spacing
         flows.append(flow)
+    return flows
+
+
+def test_drops_that_become_one_keep_their_momentum():
+    solder = solder_of(1.5e-4)
+    flows = touching_balls((0.5e-3, 0.5e-3), solder)
+    flows[0].body.velocity[:] = (0.3, 0.0, 0.1)
+    rule = replace(stop_rule(flows[0].body.cloud, solder, FREE), end_time=0.0)
+    (drop,) = run_drops(flows, rule, lambda body: start_flow(body.cloud, solder, FREE, ()))
+    body = drop.flow.body
+    assert body.volumes @ body.velocity == pytest.approx(0.5 * body.volumes.sum() * np.array([0.3, 0.0, 0.1]))
+
+
+@pytest.mark.parametrize("radii", [(0.5e-3, 0.5e-3), (0.5e-3, 0.35e-3)])
+def test_two_free_drops_become_one_sphere(radii):
+    solder = solder_of(1e-4)
+    flows = touching_balls(radii, solder)
     cloud = flows[0].body.cloud
     (drop,) = run_drops(flows, stop_rule(cloud, solder, FREE), lambda body: start_flow(body.cloud, solder, FREE, ()))
     assert [record.step for record in drop.records] == list(range(1, len(drop.records) + 1))
