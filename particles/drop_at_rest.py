@@ -55,7 +55,8 @@ def drop_to_rest(
     cloud = cut(whole, drop.symmetry_axes)
     flow = start_flow(cloud, solder, acting, _contact_lines(drop, solder, cloud))
     run = run_to_rest(flow, stop_rule(cloud, solder, acting), progress, checkpoint=checkpoint)
-    reference = _reference(drop, solder, acting_weight(solder, effects))
+    is_known = drop.is_free or acting["wall_adhesion"]
+    reference = _reference(drop, solder, acting_weight(solder, effects)) if is_known else None
     metrics = body_metrics(solder, reference, flow, run)
     return DropAtRest(collect_shape(solder, flow, run, metrics | _excess(drop, metrics)), effects, reference)
 

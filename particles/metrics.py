@@ -12,6 +12,7 @@ from particles.force_gravity import Gravity
 from particles.force_wetting import Wetting
 from particles.geometry import JointGeometry
 from particles.parameters import Solder
+from particles.physics import Force
 from particles.plate_force import plate_wrench
 from particles.rest import Run
 from particles.surface_measure import ring_area
@@ -33,7 +34,7 @@ JOINT_NAMES = {
 def joint_metrics(geometry: JointGeometry, solder: Solder, flow: LiquidFlow, run: Run) -> Metrics:
     """Collect the numbers of a joint at the end of its run: name to SI value and unit."""
     reference = reference_meridian(geometry, solder, _weight(flow))
-    shape = _joint_shape(geometry, flow, run) | _joint_errors(solder, flow, run, reference)
+    shape = _joint_shape(geometry, solder, flow, run) | _joint_errors(solder, flow, run, reference)
     return _volume(solder, flow) | shape | _pressure(solder, flow, run, reference) | _cost_and_rest(solder, flow, run)
 
 
@@ -57,13 +58,13 @@ def body_metrics(solder: Solder, reference: Meridian | None, flow: LiquidFlow, r
         shape["height_error"] = (height / reference.height - 1.0, "")
         shape["max_width_error"] = (width / reference.max_width - 1.0, "")
     if flow.physics.lines:
-        shape |= _contact(flow, reference)
+        shape |= _contact(solder, flow, reference)
     return _volume(solder, flow) | shape | _pressure(solder, flow, run, reference) | _cost_and_rest(solder, flow, run)
 
 
-def _contact(flow: LiquidFlow, reference: Meridian | None) -> Metrics:
+def _contact(solder: Solder, flow: LiquidFlow, reference: Meridian | None) -> Metrics:
     """Radius of the wetted area; mean contact angle, the smallest and the largest along the line."""
-    cosines = _contact_cosines(flow)[0]
+    cosines = _contact_cosines(solder, flow)[0]
     angle, angles = mean_angle(cosines), np.degrees(np.arccos(np.clip(cosines, -1.0, 1.0)))
     contact: Metrics = {
         "contact_radius": (contact_radius(flow.body, 0), "m"),
@@ -126,12 +127,14 @@ def verdict(lines: Sequence[ContactLine], ruptured: bool) -> str:
     return "dewetted" if any((line.state == ON_PAD).any() for line in with_edge) else "ok"
 
 
-def _contact_cosines(flow: LiquidFlow) -> list[Floats]:
+def _contact_cosines(solder: Solder, flow: LiquidFlow) -> list[Floats]:
     """Cosines of the contact angles along each contact line, by the balance of forces."""
-    for event in flow.physics.events:
-        if isinstance(event, Wetting):
-            return event.contact_cosines(flow.body)
-    raise ValueError("contact angles are those of a body with wall adhesion")
+    return Wetting(solder.surface_tension, flow.physics.lines, _others(flow)).contact_cosines(flow.body)
+
+
+def _others(flow: LiquidFlow) -> tuple[Force, ...]:
+    """All forces but that of the walls."""
+    return tuple(force for force in flow.physics.forces if not isinstance(force, Wetting))
 
 
 def _volume(solder: Solder, flow: LiquidFlow) -> Metrics:
@@ -139,9 +142,9 @@ def _volume(solder: Solder, flow: LiquidFlow) -> Metrics:
     return {"volume": (volume, "m^3"), "volume_drift": (volume / solder.volume - 1.0, "")}
 
 
-def _joint_shape(geometry: JointGeometry, flow: LiquidFlow, run: Run) -> Metrics:
+def _joint_shape(geometry: JointGeometry, solder: Solder, flow: LiquidFlow, run: Run) -> Metrics:
     body, profile = flow.body, run.profiles[-1]
-    angles = _contact_cosines(flow)
+    angles = _contact_cosines(solder, flow)
     return {
         "standoff": (geometry.gap, "m"),
         "max_width": (profile.max_width, "m"),
@@ -169,9 +172,8 @@ def _joint_errors(solder: Solder, flow: LiquidFlow, run: Run, reference: Meridia
 
 def axial_force(flow: LiquidFlow) -> float:
     """Force of the liquid on the package along +z [N]."""
-    others = tuple(force for force in flow.physics.forces if not isinstance(force, Wetting))
     on_package = [wall for wall, plate in enumerate(flow.body.plates) if plate.side > 0.0]
-    return float(sum(plate_wrench(flow.body, others, wall)[2] for wall in on_package))
+    return float(sum(plate_wrench(flow.body, _others(flow), wall)[2] for wall in on_package))
 
 
 def _pressure(solder: Solder, flow: LiquidFlow, run: Run, reference: Meridian | None) -> Metrics:

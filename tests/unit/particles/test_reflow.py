@@ -40,13 +40,12 @@ def test_too_few_steps_are_an_error_that_says_where_it_stopped():
         solve_joint(JOINT, Solder(volume=0.0724e-9, numerics=numerics))
 
 
-def test_the_linear_basis_gives_the_same_shape_at_rest():
-    """At rest the interior operator carries no force: statics depend on the surface only."""
-    widths = []
-    for basis in ("linear", "quadratic"):
-        numerics = SolderNumerics(spacing=1e-4, basis=basis)
-        widths.append(solve_joint(JOINT, Solder(volume=0.0724e-9, numerics=numerics)).metrics["max_width"][0])
-    assert widths[0] == pytest.approx(widths[1], rel=1e-3)
+def test_without_wall_adhesion_the_rims_stay_and_their_angles_are_known():
+    effects = SolderEffects(wall_adhesion="off")
+    neutral = solve_joint(JOINT, Solder(volume=0.0724e-9, numerics=COARSE, effects=effects)).metrics
+    plain = solve_joint(JOINT, Solder(volume=0.0724e-9, numerics=COARSE)).metrics
+    for name in ("max_width", "contact_angle_board"):
+        assert neutral[name][0] == pytest.approx(plain[name][0], rel=1e-3)
 
 
 def test_viscosity_and_inertia_do_not_change_the_shape_at_rest():
