@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from math import degrees, pi
 
+from particles.effects import Decision, acting_weight, decide_effects
 from particles.geometry import JointGeometry
 from particles.parameters import Solder
 from particles.young_laplace import NoMeridian, joint_meridian
@@ -41,7 +42,8 @@ def problems(solder: Solder, geometries: Mapping[str, JointGeometry], pitch: flo
         geometries: joint name to geometry.
         pitch: distance of neighbouring joints [m].
     """
-    found = scheme_problems(solder) + _angle_problems(solder)
+    effects = decide_effects(next(iter(geometries.values())), solder)
+    found = scheme_problems(solder) + effect_problems(solder, effects) + _angle_problems(solder)
     if found:
         return found
     by_discs: dict[tuple[float, float], list[str]] = {}
@@ -57,8 +59,17 @@ def problems(solder: Solder, geometries: Mapping[str, JointGeometry], pitch: flo
 
 
 def scheme_problems(solder: Solder) -> list[Problem]:
-    """Find a time step or a wall that the scheme cannot take, and a wall that is not fully given."""
-    return _wall_problems(solder) + _time_step_problems(solder)
+    """Find a time step, a basis or a wall that the scheme cannot take, and a wall that is not fully given."""
+    return _wall_problems(solder) + _time_step_problems(solder) + _basis_problems(solder)
+
+
+def effect_problems(solder: Solder, effects: Mapping[str, Decision]) -> list[Problem]:
+    """Find solder that never comes to rest, since without surface tension nothing gives it a shape."""
+    tension = effects["surface_tension"]
+    if tension["on"] or effects["inertia"]["on"]:
+        return []
+    message = f"nothing brings the solder to rest without surface tension; {tension['why']}"
+    return [Problem("solder.effects.surface_tension", solder.effects.surface_tension, "on", message)]
 
 
 def _wall_problems(solder: Solder) -> list[Problem]:
@@ -78,6 +89,14 @@ def _time_step_problems(solder: Solder) -> list[Problem]:
     message = 'scheme "gripc" takes surface tension explicitly: no step above the capillary limit is stable'
     key = "solder.numerics.time_step_limit"
     return [Problem(key, f"{numerics.time_step_limit:g}", f"<= {LARGEST_EXPLICIT:g}", message)]
+
+
+def _basis_problems(solder: Solder) -> list[Problem]:
+    basis = solder.numerics.basis
+    if solder.numerics.scheme == "gripc" or basis == "quadratic":
+        return []
+    message = 'the scheme "energy" has no basis to choose'
+    return [Problem("solder.numerics.basis", basis, 'quadratic, or any with scheme = "gripc"', message)]
 
 
 def _angle_problems(solder: Solder) -> list[Problem]:
@@ -125,7 +144,7 @@ def _waist(solder: Solder, geometry: JointGeometry) -> float | None:
     """Smallest diameter of the Young-Laplace joint [m]; none without equilibrium."""
     discs = (geometry.radius_board, geometry.radius_package, geometry.gap)
     limits = (solder.pad_contact_angle, solder.mask_contact_angle)
-    weight = solder.density * solder.gravity
+    weight = acting_weight(solder, decide_effects(geometry, solder))
     try:
         return joint_meridian(solder.volume, *discs, solder.surface_tension, weight, angle_limits=limits).waist
     except NoMeridian:

@@ -1,7 +1,7 @@
 """Which effects a reflow calls for, decided from dimensionless numbers. No numerical library is loaded here."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import pi, sqrt
 from typing import TypedDict
 
@@ -87,8 +87,8 @@ def decide_effects(geometry: JointGeometry, solder: Solder) -> dict[str, Decisio
 
 def decide_drop(solder: Solder, is_free: bool) -> dict[str, Decision]:
     """Decide each effect of a drop: `decide` with its numbers; what needs a wall is off where a drop is free."""
-    decisions = decide(drop_numbers(solder), solder)
-    return decisions | NO_WALL if is_free else decisions
+    numbers = drop_numbers(solder)
+    return decide(replace(numbers, bond=0.0), solder) | NO_WALL if is_free else decide(numbers, solder)
 
 
 def decide_oscillation(solder: Solder) -> dict[str, Decision]:
@@ -108,6 +108,7 @@ def decide(numbers: Numbers, solder: Solder) -> dict[str, Decision]:
         For gravity, inertia, viscosity, surface_tension and wall_adhesion: on or off, and the reason with its number.
     """
     change = SHAPE_CHANGE_BY_BOND * numbers.bond
+    rival = 0.0 if solder.effects.gravity == "off" else numbers.bond
     slowest = max(numbers.capillary_time, numbers.viscous_time)
     ratio = solder.process_time / slowest
     transient = ratio < PROCESS_TIME_RATIO
@@ -121,11 +122,11 @@ def decide(numbers: Numbers, solder: Solder) -> dict[str, Decision]:
         "inertia": {"on": transient, "why": rest},
         "viscosity": {"on": transient, "why": f"Ohnesorge number {numbers.ohnesorge:.2g}; {rest}"},
         "surface_tension": {
-            "on": numbers.bond < LARGEST_BOND,
-            "why": f"Bond number {numbers.bond:.3g} (off above {LARGEST_BOND:g})",
+            "on": rival < LARGEST_BOND,
+            "why": f"Bond number {rival:.3g} (off above {LARGEST_BOND:g})",
         },
         "wall_adhesion": {
-            "on": numbers.bond < LARGEST_BOND,
+            "on": rival < LARGEST_BOND,
             "why": "contact angles of pad and mask hold or move the contact lines wherever surface tension acts",
         },
     }

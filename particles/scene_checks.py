@@ -6,7 +6,7 @@ from typing import Protocol
 
 from particles import checks
 from particles.checks import Problem, mm, mm3
-from particles.effects import acting_weight, decide_drop
+from particles.effects import acting_weight, decide_drop, decide_effects
 from particles.estimate import particle_count
 from particles.parameters import Solder
 from particles.scene_drops import Drops
@@ -21,9 +21,6 @@ KEYS = {
     "solder.volume": "joint.volume",
     "solder.pad_contact_angle": "joint.pad_contact_angle",
     "solder.numerics.spacing": "joint.spacing",
-    "solder.numerics.time_step_limit": "solder.numerics.time_step_limit",
-    "solder.wall": "solder.wall",
-    "solder.slip_length": "solder.slip_length",
 }
 
 
@@ -37,14 +34,19 @@ class HasWall(Protocol):
 
 def drop_problems(drop: Drop, solder: Solder) -> list[Problem]:
     """Find what cannot work before a drop runs."""
-    found = checks.scheme_problems(solder) or _resolution_problems(drop) or _symmetry_problems(drop, solder)
+    found = _flow_problems(drop, solder) or _resolution_problems(drop) or _symmetry_problems(drop, solder)
     return found or _wall_problems(drop) or _pad_problems(drop) or free_problems(drop, solder)
 
 
 def pair_problems(pair: Drops, solder: Solder) -> list[Problem]:
     """Find what cannot work before two drops run: too coarse, overlapping, or never or always in touch."""
-    found = checks.scheme_problems(solder) or free_problems(pair, solder) or _pair_resolution(pair)
+    found = _flow_problems(pair, solder) or free_problems(pair, solder) or _pair_resolution(pair)
     return found or _distance_problems(pair, solder)
+
+
+def _flow_problems(scene: HasWall, solder: Solder) -> list[Problem]:
+    """Find a scheme that does not go with its numerics, and liquid that nothing brings to rest."""
+    return checks.scheme_problems(solder) + checks.effect_problems(solder, decide_drop(solder, scene.is_free))
 
 
 def _pair_resolution(pair: Drops) -> list[Problem]:
@@ -97,8 +99,9 @@ def joint_problems(joint: Joint, solder: Solder) -> list[Problem]:
         return [Problem("joint.offset", mm(joint.offset), allowed, "the pads do not overlap")]
     found = checks.problems(solder, {"of the case": joint.geometry}, inf)
     if found:
-        return [replace(problem, key=KEYS[problem.key]) for problem in found]
+        return [replace(problem, key=KEYS.get(problem.key, problem.key)) for problem in found]
     found = _tilt_problems(joint) or _path_problems(joint) or _package_problems(joint)
+    found = found or _motion_problems(joint, solder)
     return found or _too_many("joint", joint.spacing, particle_count(solder, joint.geometry))
 
 
@@ -136,6 +139,19 @@ def _package_problems(joint: Joint) -> list[Problem]:
         return []
     message = "free to shift and to turn, a package rolls off a single joint"
     return [Problem("joint.package.free", ", ".join(joint.package.free), "lift with shift, or lift with turn", message)]
+
+
+def _motion_problems(joint: Joint, solder: Solder) -> list[Problem]:
+    """Find what does not go with a package that moves."""
+    if joint.package is None and joint.path is None:
+        return []
+    if solder.numerics.scheme == "gripc":
+        return [Problem("solder.numerics.scheme", "gripc", "energy", "the seed's scheme knows plates at rest only")]
+    inertia = decide_effects(joint.geometry, solder)["inertia"]
+    if joint.path is not None and inertia["on"]:
+        message = f"a package goes its path from rest to rest, its speed has no meaning; {inertia['why']}"
+        return [Problem("solder.effects.inertia", solder.effects.inertia, "off", message)]
+    return []
 
 
 def _resolution_problems(drop: Drop) -> list[Problem]:

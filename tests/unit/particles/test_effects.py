@@ -3,7 +3,7 @@ import sys
 
 import pytest
 
-from particles.effects import decide_effects, dimensionless_numbers
+from particles.effects import decide_drop, decide_effects, dimensionless_numbers
 from particles.geometry import JointGeometry
 from particles.parameters import Solder, SolderEffects
 
@@ -36,6 +36,14 @@ def test_a_short_process_has_inertia_and_viscosity():
 def test_gravity_depends_on_the_bond_number():
     assert decide_effects(JOINT, BALL)["gravity"]["on"]
     assert not decide_effects(JOINT, Solder(volume=BALL.volume, gravity=1.6))["gravity"]["on"]
+
+
+def test_surface_tension_has_no_rival_without_gravity():
+    puddle = {"volume": 2e-5}
+    assert not decide_drop(Solder(**puddle), is_free=False)["surface_tension"]["on"]
+    weightless = Solder(**puddle, effects=SolderEffects(gravity="off"))
+    for decided in (decide_drop(weightless, is_free=False), decide_drop(Solder(**puddle), is_free=True)):
+        assert decided["surface_tension"]["on"]
 
 
 @pytest.mark.parametrize("switch", ["on", "off"])

@@ -47,6 +47,8 @@ BAD_VALUES = {
     "unknown switch": (DROP, "gravity=of", ['gravity = "of"', "one of auto, on, off", "did you mean off?"]),
     "unknown scheme": (DROP, "solder.numerics.scheme=gripk", ["one of energy, gripc", "did you mean gripc?"]),
     "explicit step": (DROP, "solder.numerics.scheme=gripc", ["solder.numerics.time_step_limit", '"100"', "<= 1"]),
+    "basis without its scheme": (DROP, "solder.numerics.basis=linear", ['basis = "linear"', 'scheme = "gripc"']),
+    "no surface tension": (JOINT, "solder.effects.surface_tension=off", ["effects.surface_tension", "to rest"]),
     "two kinds": (DROP, "package.rows=3", ["[package] and [drop]", "exactly one of [package], [drop], [joint], "]),
     "pad that repels": (BALL, "drop.contact_angle=150 deg", ["drop.contact_angle", "< 148 deg", "better"]),
     "pad too small": (BALL, "drop.pad_radius=0.01 mm", ["drop.pad_radius", '"0.01 mm"', "cannot fit", ">= 0.09"]),
@@ -99,6 +101,17 @@ def test_a_receding_angle_above_the_advancing_one():
 def test_a_package_floats_or_is_moved():
     text = problems_of(JOINT, "joint.path.standoff=0.3 mm", "joint.package.load=1 mN")
     assert "joint.path" in text and "not both" in text
+
+
+@pytest.mark.parametrize(
+    ("setting", "key"),
+    [
+        ("solder.numerics={scheme='gripc',time_step_limit=0.5}", "solder.numerics.scheme"),
+        ("solder.effects.inertia=on", "solder.effects.inertia"),
+    ],
+)
+def test_a_path_goes_from_rest_to_rest_at_least_energy(setting, key):
+    assert key in problems_of(JOINT, "joint.path.standoff=0.3 mm", setting)
 
 
 def test_a_tilted_pad_stays_above_the_lower_one():
