@@ -19,6 +19,10 @@ SNAP_SPACINGS = 0.5  # the net rounds the edge between a surface and its mirror 
 VOLUME_PASSES = 4
 
 
+class CannotRebuild(ValueError):
+    """Bodies on walls that a common surface cannot meet."""
+
+
 def cloud_from_level_set(level: LevelSet, volume: float, walls: Sequence[Plate]) -> Cloud:
     """Fill a level set with particles a node spacing apart.
 
@@ -65,10 +69,17 @@ def _loops(points: Floats, triangles: Indices, plate: Plate) -> list[Indices]:
 
 
 def boundary_loops(triangles: Indices) -> tuple[Indices, ...]:
-    """Loops of the edges that belong to one triangle, in the sense of these triangles' edges, `(k,)` each."""
+    """Loops of the edges that belong to one triangle, in the sense of these triangles' edges, `(k,)` each.
+
+    Raises:
+        CannotRebuild: loops meet in a vertex.
+    """
     edges = np.concatenate([triangles[:, [k, (k + 1) % 3]] for k in range(3)])
     known = set(map(tuple, edges.tolist()))
-    after = {i: j for i, j in known if (j, i) not in known}
+    outer = [(i, j) for i, j in known if (j, i) not in known]
+    after = dict(outer)
+    if len(after) < len(outer):
+        raise CannotRebuild("contact lines of a new surface meet in a point: too coarse for its shape")
     loops = []
     while after:
         loop = [next(iter(sorted(after)))]

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from particles.body import Body
-from particles.cloud_level_set import cloud_from_level_set
+from particles.cloud_level_set import CannotRebuild, cloud_from_level_set
 from particles.level_set import Grid, LevelSet, depths, signed_distance, smooth_union
 from particles.plate import Plate
 
@@ -21,10 +21,6 @@ CLOSING_SPACINGS = 0.5
 VELOCITY_NEIGHBOURS = 4
 SHORTEST_EDGE = 0.25
 LOWEST_QUALITY = 0.25
-
-
-class CannotRebuild(ValueError):
-    """Bodies on walls that a common surface cannot meet."""
 
 
 def touch(first: Body, second: Body) -> bool:

@@ -1,5 +1,6 @@
 """Reflow of many joints: those that are alike once, several at a time, each in a process of its own."""
 
+import logging
 import multiprocessing
 import os
 import queue
@@ -17,6 +18,8 @@ if TYPE_CHECKING:
     from particles.bridges import Contact
     from particles.geometry import JointGeometry
     from particles.shape import JointShape
+
+logger = logging.getLogger(__name__)
 
 ALIKE = 12  # decimals of a metre to which gaps and radii of joints are compared: a picometre
 POLL = 0.2  # seconds between two looks at the progress
@@ -108,18 +111,20 @@ def bridge_shapes(
         solder: of one joint.
     """
     from particles.bridge import solve_bridge
+    from particles.cloud_level_set import CannotRebuild
+    from particles.rest import NoRest
 
     geometry_of = {name: geometry for names, geometry in groups.items() for name in names}
     shape_of = {name: shapes[names[0]] for names in groups for name in names}
-    return {
-        f"{pair.first}+{pair.second}": solve_bridge(
-            [geometry_of[name] for name in (pair.first, pair.second)],
-            [shape_of[name] for name in (pair.first, pair.second)],
-            pair.distance,
-            solder,
-        )
-        for pair in found[:1]
-    }
+    bridges = {}
+    for pair in found[:1]:
+        ends, name = (pair.first, pair.second), f"{pair.first}+{pair.second}"
+        try:
+            alone = [geometry_of[end] for end in ends], [shape_of[end] for end in ends]
+            bridges[name] = solve_bridge(*alone, pair.distance, solder)
+        except (CannotRebuild, NoRest) as error:  # the verdict stands without it
+            logger.warning("%s are bridged, but their common body was not found: %s", name, error)
+    return bridges
 
 
 def refuse_joints_without_mesh(records: Mapping[str, dict]) -> None:

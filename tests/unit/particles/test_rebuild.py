@@ -90,6 +90,12 @@ def test_a_rebuilt_drop_on_a_wall_has_one_ring_and_its_volume():
     assert (cloud.wall[cloud.surface_count :] == 0).any()
 
 
+def test_contact_lines_that_meet_in_a_point_are_an_error():
+    bow = np.array([[0, 1, 2], [0, 3, 4]], np.int32)
+    with pytest.raises(CannotRebuild, match="meet in a point"):
+        boundary_loops(bow)
+
+
 def test_a_mirrored_drop_closes():
     body = Body.at_rest(box_cloud(1e-3, 5))
     points, triangles = closed_surface(body)
