@@ -7,6 +7,8 @@ from typing import Any
 
 from workflow.case import Case, DropCase, DropsCase, JointCase, OscillationCase, SceneCase
 
+SECONDS_TO_START = 2.0  # until a stage has loaded its libraries and kernels
+
 
 @dataclass(frozen=True, slots=True)
 class SceneForecast:
@@ -59,7 +61,9 @@ def _of_drops(case: DropsCase) -> SceneForecast:
     from particles.estimate import drop_seconds
 
     drops = case.drops
-    seconds = sum(drop_seconds(drops.per_edge(volume) ** 3) for volume in (*drops.volumes, drops.volume))
+    merged = (drops.volume,) if drops.merge else ()
+    flowing = merged if drops.is_free and drops.merge else (*drops.volumes, *merged)  # free ones touch at once
+    seconds = sum(drop_seconds(drops.per_edge(volume) ** 3) for volume in flowing)
     return _towards_rest(case, decide_drop(case.molten, drops.is_free), drops.particles, seconds)
 
 
@@ -70,7 +74,8 @@ def _towards_rest(case: SceneCase, effects: Mapping[str, Any], particles: int, s
     numerics = solder.numerics
     limit = capillary_limit(solder.density, numerics.spacing, solder.surface_tension)
     largest = numerics.time_step_limit * limit
-    return SceneForecast(effects, particles, numerics.scheme, numerics.spacing, limit, largest, {"reflow": seconds})
+    cost = {"reflow": SECONDS_TO_START + seconds}
+    return SceneForecast(effects, particles, numerics.scheme, numerics.spacing, limit, largest, cost)
 
 
 def _of_oscillation(case: OscillationCase) -> SceneForecast:
@@ -81,6 +86,7 @@ def _of_oscillation(case: OscillationCase) -> SceneForecast:
 
     scene, solder = case.oscillation, case.molten
     spacing = solder.numerics.spacing
+    steps = ceil(scene.periods * scene.steps_per_period)
     return SceneForecast(
         effects=decide_oscillation(solder),
         particles=scene.particles,
@@ -88,7 +94,7 @@ def _of_oscillation(case: OscillationCase) -> SceneForecast:
         spacing=spacing,
         capillary_limit=capillary_limit(solder.density, spacing, solder.surface_tension),
         largest_step=rayleigh_period(scene, solder) / scene.steps_per_period,
-        seconds={"reflow": oscillation_seconds(scene.particles, ceil(scene.periods * scene.steps_per_period))},
+        seconds={"reflow": SECONDS_TO_START + oscillation_seconds(scene.particles, steps)},
     )
 
 
