@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 SMALLEST_RANGE = 0.01
 DEGREE = np.pi / 180.0
+ROW_SHARE = 0.86
 HEADLINE = (
     "height", "max_width", "waist", "contact_angle", "max_width_error", "axial_force", "offset",
     "collapse_height_error", "drops_left", "radius_error", "period", "period_error", "decay_rate", "decay_rate_error",
@@ -82,7 +83,7 @@ def render_stages(stages: "Sequence[Snapshot]", shape: "JointShape", picture: Pa
     """Render particles and free surface at some times side by side, then at the end, coloured by pressure."""
     plotter = new_plotter((1800, 800))
     states = [*((stage.points, stage.triangles) for stage in stages), (shape.points, shape.triangles)]
-    place, size = 0.0, {"point_size": 9, "render_points_as_spheres": True}
+    place, size = 0.0, {"point_size": 11, "render_points_as_spheres": True}
     for index, (points, triangles) in enumerate(states):
         points = points / MILLI
         points = points + np.array([place - points[:, 0].min(), 0.0, 0.0])
@@ -94,11 +95,7 @@ def render_stages(stages: "Sequence[Snapshot]", shape: "JointShape", picture: Pa
             plotter.add_mesh(pyvista.PolyData(points), color="#8a949e", **size)
         else:
             _add_coloured(plotter, points, shape.pressure, size)
-    centre = (0.5 * place, 0.0, 0.0)
-    plotter.camera_position = [(centre[0], -10.0 * place, 4.0 * place), centre, (0.0, 0.0, 1.0)]
-    plotter.enable_parallel_projection()
-    plotter.reset_camera()
-    plotter.camera.zoom(1.2)
+    _look_at_row(plotter)
     save(plotter, picture)
 
 
@@ -132,6 +129,18 @@ def stages(kind: str, shape: "JointShape") -> "list[Snapshot]":
     return shown.get(kind, shape.snapshots[:1])
 
 
+def _look_at_row(plotter: pyvista.Plotter) -> None:
+    """Look at a row along x from slightly above, so that it fills the picture but for the bar on the right."""
+    left, right, front, back, low, high = plotter.bounds
+    aspect = plotter.window_size[0] / plotter.window_size[1]
+    width = max((right - left) / ROW_SHARE, 1.05 * aspect * (high - low + 0.4 * (back - front)))
+    centre = np.array([left + 0.5 * width - 0.02 * width, 0.0, 0.5 * (low + high)])
+    plotter.camera_position = [centre + width * np.array([0.0, -10.0, 4.0]), centre, (0.0, 0.0, 1.0)]
+    plotter.enable_parallel_projection()
+    plotter.camera.parallel_scale = 0.5 * width / aspect
+    plotter.camera.clipping_range = (width, 20.0 * width)
+
+
 def _add_coloured(plotter: pyvista.Plotter, points: np.ndarray, pressure: np.ndarray, size: dict) -> None:
     """Add particles at points `(n, 3)` [mm] coloured by their pressure `(n,)` [Pa], and the bar of the colours."""
     cloud = pyvista.PolyData(points)
@@ -147,23 +156,22 @@ def swing_curve(history: Mapping[str, np.ndarray], metrics: Mapping[str, dict]) 
     period = value["period"] / (1.0 + value["period_error"])
     decay = value["decay_rate"] / (1.0 + value["decay_rate_error"])
     amplitude = history["amplitude"]
-    first = int(np.argmax(amplitude[time <= 0.5 * period]))
-    scale = amplitude[first] * np.exp(decay * time[first])
+    first = amplitude[time <= period]
+    scale = 0.5 * (first.max() - first.min()) * np.exp(0.5 * decay * period)
     exact = scale * np.exp(-decay * time) * np.sin(2.0 * np.pi * time / period)
     with pyplot.rc_context(STYLE):
         figure, axes = pyplot.subplots(1, 2, figsize=(9.2, 3.2), constrained_layout=True)
         axes[0].plot(time / MILLI, amplitude, color="#0b5fa5", label="particles")
         axes[0].plot(time / MILLI, exact, "--", color="#d1495b", lw=1.0, label="Rayleigh, Lamb")
         axes[0].set_ylabel("amplitude of the second mode / R")
-        axes[0].legend(frameon=False)
         total, kinetic = history["energy"], history["kinetic_energy"]
         rest = total[0] - kinetic[0]
         axes[1].plot(time / MILLI, (total - rest) / kinetic[0], label="kinetic + surface")
         axes[1].plot(time / MILLI, kinetic / kinetic[0], label="kinetic")
         axes[1].set_ylabel("energy above that at rest / at the start")
-        axes[1].legend(frameon=False)
         for axis in axes:
             axis.set_xlabel("time [ms]")
+            axis.legend(frameon=False, ncols=2, loc="lower center", bbox_to_anchor=(0.5, 1.0))
         return svg(figure)
 
 
