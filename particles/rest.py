@@ -131,8 +131,14 @@ def _limit_steps(flow: LiquidFlow, run: Run, rule: StopRule) -> None:
     raise NoRest(
         f"no rest after {last.step} steps (solder.numerics.max_steps) at time {last.time:.3g} s: the surface "
         f"still moves {_motion(last, rule):.2e} spacings in {rule.calm_time:.3g} s, at rest it would be "
-        f"{CALM_DISPLACEMENT:g}; more steps or a larger solder.numerics.time_step_limit help"
+        f"{CALM_DISPLACEMENT:g}; {_what_helps(flow)}"
     )
+
+
+def _what_helps(flow: LiquidFlow) -> str:
+    if flow.physics.momenta:
+        return 'more steps help or, where only the shape at rest matters, solder.effects.inertia = "off"'
+    return "more steps or a larger solder.numerics.time_step_limit help"
 
 
 def _advance(run: Run, flow: LiquidFlow, rule: StopRule) -> None:

@@ -116,7 +116,8 @@ def of_joint(metrics: Numbers, verdict: str, effects: Mapping[str, Any]) -> Find
         limits |= {"collapse_height_error": JOINT_ERROR, "force_balance_error": AXIAL_FORCE_ERROR}
     else:
         limits["axial_force_error"] = AXIAL_FORCE_ERROR
-    health = _at_rest(named, limits) | {"joints_not_ok": at_most(int(verdict != "ok"), 0)}
+    verdict_check = "joints_not_ok" if verdict == "ok" else f"joint_{verdict}"
+    health = _at_rest(named, limits) | {verdict_check: at_most(int(verdict != "ok"), 0)}
     return Findings(_known(named) | {"verdict": metric(verdict)}, health, dict(effects))
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from workflow.inputs import read_record
 from workflow.launch import DIE_WITH_PARENT, end_group
+from workflow.problems import CaseError, Problem
 from workflow.stage_table import Stage
 
 SNAKEFILE = Path(__file__).parent / "Snakefile"
@@ -28,9 +29,14 @@ def locked(run_folder: Path) -> Iterator[int]:
 
     Raises:
         RunFolderBusy: another process holds it.
+        CaseError: the folder cannot be made or written to.
     """
-    run_folder.mkdir(parents=True, exist_ok=True)
-    descriptor = os.open(run_folder / ".lock", os.O_RDWR | os.O_CREAT, 0o644)
+    try:
+        run_folder.mkdir(parents=True, exist_ok=True)
+        descriptor = os.open(run_folder / ".lock", os.O_RDWR | os.O_CREAT, 0o644)
+    except OSError as error:
+        message, allowed = f"cannot be a run folder: {error.strerror}", "a folder that can be written to"
+        raise CaseError("run", [Problem("--out", message, str(run_folder), allowed)]) from error
     try:
         try:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -48,7 +48,8 @@ class CaseError(ValueError):
         return [f"{self._place(problem)}: {problem}" for problem in self.problems]
 
     def _place(self, problem: Problem) -> str:
-        return "--set" if problem.key in self.overridden else self.source
+        given = any(f"{key}.".startswith(f"{problem.key}.") for key in self.overridden)
+        return "--set" if given else self.source
 
 
 def nearest(name: str, names: Iterable[str]) -> str:

@@ -54,6 +54,7 @@ def profile_curve(points: np.ndarray, meridian: np.ndarray | None) -> str:
         if meridian is not None:
             axis.plot(*(meridian / MILLI), color="#d1495b", lw=1.2, label="Young-Laplace")
         axis.set(xlabel="radius [mm]", ylabel="height [mm]", aspect="equal")
+        axis.set_xlim(left=min(0.0, axis.get_xlim()[0]))
         figure.legend(frameon=False, loc="outside upper center", ncols=2)
         return svg(figure)
 
@@ -70,6 +71,7 @@ def history_curve(history: dict) -> str:
         axes[0, 0].legend(frameon=False)
         axes[0, 1].plot(step, history["energy"] / MICRO)
         axes[0, 1].set_ylabel("energy [µJ]")
+        axes[0, 1].ticklabel_format(useOffset=False)
         axes[1, 0].semilogy(step, history["capillary_number"])
         axes[1, 0].set_ylabel("capillary number")
         axes[1, 1].semilogy(step, history["time_step"] / MICRO)

@@ -8,6 +8,7 @@ import pytest
 from tests.support.workflow_command import SMALL_CASE
 from workflow.case import read_case
 from workflow.pipeline import RunFolderBusy, failed_checks, locked
+from workflow.problems import CaseError
 from workflow.stage_runner import Findings, Run, run_stage
 
 
@@ -62,4 +63,10 @@ def test_a_run_folder_has_one_user(tmp_path):
     with locked(tmp_path), pytest.raises(RunFolderBusy, match="another run is at work"), locked(tmp_path):
         pass
     with locked(tmp_path):
+        pass
+
+
+def test_a_file_is_no_run_folder(tmp_path):
+    (tmp_path / "file").touch()
+    with pytest.raises(CaseError, match="cannot be a run folder"), locked(tmp_path / "file"):
         pass

@@ -39,6 +39,11 @@ def test_health_counts_them(records):
     assert health["joint_width_error_max"]["ok"]
 
 
+def test_a_joint_that_failed_says_how():
+    assert findings.of_joint({}, "overflow", {}).health["joint_overflow"] == {"value": 1, "limit": 0, "ok": False}
+    assert findings.of_joint({}, "ok", {}).health["joints_not_ok"]["ok"]
+
+
 def test_they_have_no_mesh(records):
     with pytest.raises(ReflowError, match="A2, A3 bridged"):
         refuse_joints_without_mesh(records)
