@@ -14,7 +14,7 @@ from particles.cloud_sphere import sphere_cloud
 from particles.damped_oscillation import fit_oscillation
 from particles.inertial_flow import InertialFlow
 from particles.parameters import Solder
-from particles.rayleigh import lamb_decay_rate, rayleigh_frequency
+from particles.rayleigh import rayleigh_frequency, viscous_oscillation
 from particles.reflow import build_physics
 from particles.shape import Snapshot
 from particles.surface_quality import vertex_normals
@@ -187,13 +187,14 @@ def _rest_metrics(flow: InertialFlow, solder: Solder, history: dict[str, Floats]
 
 
 def _swing_metrics(solder: Solder, history: dict[str, Floats]) -> dict[str, tuple[float, str]]:
-    """Period and decay rate of a fitted damped oscillation, and their errors against Rayleigh and Lamb."""
-    omega = rayleigh_frequency(2, _radius(solder), solder.density, solder.surface_tension)
-    lamb = lamb_decay_rate(2, _radius(solder), solder.density, solder.viscosity)
-    decay, frequency = fit_oscillation(history["time"], history["amplitude"], omega)
+    """Period and decay rate of a fitted damped oscillation, and their errors against Reid's at this viscosity."""
+    radius = _radius(solder)
+    omega = rayleigh_frequency(2, radius, solder.density, solder.surface_tension)
+    exact_decay, exact_frequency = viscous_oscillation(2, omega, solder.viscosity / (solder.density * radius**2))
+    decay, frequency = fit_oscillation(history["time"], history["amplitude"], exact_frequency)
     return {
         "period": (2.0 * pi / frequency, "s"),
         "decay_rate": (decay, "1/s"),
-        "period_error": (omega / frequency - 1.0, ""),
-        "decay_rate_error": (decay / lamb - 1.0, ""),
+        "period_error": (exact_frequency / frequency - 1.0, ""),
+        "decay_rate_error": (decay / exact_decay - 1.0, ""),
     }

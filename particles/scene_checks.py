@@ -9,7 +9,9 @@ from particles.checks import Problem, mm, mm3
 from particles.effects import acting_weight, decide_drop, decide_effects
 from particles.estimate import particle_count
 from particles.parameters import Solder
+from particles.rayleigh import lamb_decay_rate, rayleigh_frequency
 from particles.scene_drops import Drops
+from particles.scene_oscillation import Oscillation
 from particles.scenes import Drop, Joint
 from particles.young_laplace import sessile_meridian
 
@@ -81,6 +83,17 @@ def _distances(pair: Drops, solder: Solder) -> tuple[float, float]:
     weight = acting_weight(solder, decide_drop(solder, is_free=False))
     rest = [sessile_meridian(v, pair.contact_angle, solder.surface_tension, weight) for v in pair.volumes]
     return 0.5 * sum(edges), max(0.5 * sum(edges), 0.5 * sum(drop.max_width for drop in rest))
+
+
+def oscillation_problems(scene: Oscillation, solder: Solder) -> list[Problem]:
+    """Find a liquid so viscous that a drop of it creeps back to its sphere."""
+    decay = lamb_decay_rate(2, scene.radius, solder.density, solder.viscosity)
+    frequency = rayleigh_frequency(2, scene.radius, solder.density, solder.surface_tension)
+    if decay < frequency:
+        return []
+    value, limit = f"{solder.viscosity:.4g} Pa*s", f"< {solder.viscosity * frequency / decay:.4g} Pa*s"
+    message = "a drop that is so small and viscous does not swing"
+    return [Problem("solder.viscosity", value, limit, message)]
 
 
 def free_problems(scene: HasWall, solder: Solder) -> list[Problem]:

@@ -173,8 +173,10 @@ class OscillationCase(Case):
         return self.oscillation.resolve(self.solder)
 
     def problems(self) -> list[Problem]:
-        """None: whatever is allowed goes together."""
-        return []
+        """Find a drop that does not swing."""
+        from particles.scene_checks import oscillation_problems
+
+        return _of_particles(oscillation_problems(self.oscillation, self.molten))
 
 
 KINDS: dict[str, type[Case]] = {

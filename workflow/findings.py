@@ -17,8 +17,8 @@ DROP_ERROR = 0.01  # of a drop's height and width, against the Young-Laplace sha
 PRESSURE_ERROR = 0.005  # of a drop's mean pressure, against the Young-Laplace shape
 PRESSURE_SCATTER = 0.01  # of the pressures in a drop, over the capillary pressure
 ANGLE_EXCESS = 3.0  # of contact angles beyond the receding and the advancing one [deg]
-PERIOD_ERROR = 0.01  # of a drop that swings, against Rayleigh
-DECAY_ERROR = 0.10  # of its decay rate, against Lamb
+PERIOD_ERROR = 0.01  # of a drop that swings, against Reid: exact at small amplitude
+DECAY_ERROR = 0.10  # of its decay rate, against Reid
 JOINT_ERROR = 0.005  # of a joint's width and waist, against the Young-Laplace shape
 AXIAL_FORCE_ERROR = 0.02  # of a joint, against the Young-Laplace shape, over pi times radius times surface tension
 CAPILLARY_NUMBER = 1.0e-4  # of the largest speed of a surface at rest
@@ -130,7 +130,7 @@ def of_drops(metrics: Numbers, expected: int, effects: Mapping[str, Any]) -> Fin
 
 
 def of_oscillation(metrics: Numbers, effects: Mapping[str, Any]) -> Findings:
-    """Judge a drop that swings by volume, and by Rayleigh's period and Lamb's decay rate."""
+    """Judge a drop that swings by volume, and by Reid's period and decay rate."""
     limits = {"period_error": PERIOD_ERROR, "decay_rate_error": DECAY_ERROR}
     return Findings(_known(metrics), _at_rest(metrics, limits), dict(effects))
 

@@ -35,6 +35,7 @@ BAD_VALUES = {
     "gravity on free drops": (PAIR, "gravity=on", ['gravity = "on"', "no wall"]),
     "amplitude too large": (SWING, "oscillation.amplitude=0.5", ["oscillation.amplitude = 0.5", "<= 0.3"]),
     "fewer than two shells": (SWING, "oscillation.particles_per_radius=1", ["particles_per_radius = 1", ">= 2"]),
+    "too viscous to swing": (SWING, "solder.viscosity=2 Pa*s", ["solder.viscosity", "< 0.9401 Pa*s", "not swing"]),
     "gravity of a swing": (SWING, "solder.gravity=1 m/s^2", ["solder.gravity", "unknown key"]),
     "angle of a full turn": (DROP, "drop.contact_angle=190 deg", ['"190 deg"', "out of range", "< 180 deg"]),
     "angle of zero": (DROP, "drop.contact_angle=0 deg", ["drop.contact_angle", "> 0 deg"]),
