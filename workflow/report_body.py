@@ -153,7 +153,7 @@ def _add_coloured(plotter: pyvista.Plotter, points: np.ndarray, pressure: np.nda
 
 
 def swing_curve(history: Mapping[str, np.ndarray], metrics: Mapping[str, dict]) -> str:
-    """Draw the amplitude of the second mode beside that of Rayleigh and Lamb, and the energies."""
+    """Draw the amplitude of the second mode beside that of Reid at small amplitude, and the energies."""
     time, value = history["time"], {name: metric["value"] for name, metric in metrics.items()}
     period = value["period"] / (1.0 + value["period_error"])
     decay = value["decay_rate"] / (1.0 + value["decay_rate_error"])
@@ -164,7 +164,7 @@ def swing_curve(history: Mapping[str, np.ndarray], metrics: Mapping[str, dict]) 
     with pyplot.rc_context(STYLE):
         figure, axes = pyplot.subplots(1, 2, figsize=(9.2, 3.2), constrained_layout=True)
         axes[0].plot(time / MILLI, amplitude, color="#0b5fa5", label="particles")
-        axes[0].plot(time / MILLI, exact, "--", color="#d1495b", lw=1.0, label="Rayleigh, Lamb")
+        axes[0].plot(time / MILLI, exact, "--", color="#d1495b", lw=1.0, label="Reid")
         axes[0].set_ylabel("amplitude of the second mode / R")
         total, kinetic = history["energy"], history["kinetic_energy"]
         rest = total[0] - kinetic[0]
