@@ -128,7 +128,8 @@ def _add_body(run_folder: Path, kind: str, context: dict, summary: dict) -> None
     if kind == "oscillation":
         context["curves"]["swing"] = report_body.swing_curve(shape.history, summary["metrics"])
     else:
-        context["curves"]["profile"] = report_body.profile_curve(shape.surface_points, meridian)
+        if shape.verdict != "apart":
+            context["curves"]["profile"] = report_body.profile_curve(shape.surface_points, meridian)
         context["curves"]["body_history"] = report_body.history_curve(shape.history)
     path = run_folder / "reflow" / "path.json"
     if path.exists():

@@ -113,7 +113,7 @@ def path_curve(places: Sequence[Mapping]) -> str:
         figure, axes = pyplot.subplots(1, 2, figsize=(9.2, 3.2), constrained_layout=True)
         axes[0].plot(way, [place["axial_force"] / MILLI for place in places], "o", ms=4, label="particles")
         if exact:
-            axes[0].plot(*zip(*exact, strict=True), color="#d1495b", lw=1.2, label="Young-Laplace")
+            axes[0].plot(*zip(*exact, strict=True), color="#d1495b", lw=1.2, marker=".", label="Young-Laplace")
         axes[0].set_ylabel("force on the package, upwards [mN]")
         axes[1].plot(way, [place["waist"] / MILLI for place in places], "o-", ms=4, label="waist")
         axes[1].plot(way, [place["max_width"] / MILLI for place in places], "s-", ms=4, label="width")

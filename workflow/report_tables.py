@@ -271,16 +271,19 @@ def named_quantity(metrics: dict, name: str) -> str:
     return quantity(metrics[name])
 
 
+LONGEST_IN_MS = 0.1
 SHOWN = {
     "Pa": (1e-6, "MPa"), "m": (1e3, "mm"), "m^3": (1e9, "mm^3"), "J": (1e3, "mJ"), "N": (1e3, "mN"), "kg": (1e6, "mg"),
 }  # fmt: skip
 
 
 def quantity(metric: dict) -> str:
-    """Text of a metric record: fractions as per cent, stresses in MPa, lengths in mm."""
+    """Text of a metric record: fractions as per cent, stresses in MPa, lengths in mm, short times in ms."""
     value, unit = metric["value"], metric["unit"]
     if isinstance(value, str):
         return value
+    if unit == "s" and 0.0 < value < LONGEST_IN_MS:
+        return f"{number(1e3 * value)} ms"
     factor, shown = SHOWN.get(unit, (1.0, unit))
     return f"{number(factor * value)} {shown}".strip()
 
@@ -311,4 +314,6 @@ def mega(value: float) -> str:
 
 def percent(value: float) -> str:
     """A fraction as per cent, two digits."""
-    return f"{100.0 * value:.2g} %" if abs(value) >= 1.0e-6 else "< 0.0001 %"
+    if abs(value) < 1.0e-6:
+        return "< 0.0001 %"
+    return f"{100.0 * value:.2g} %" if abs(value) < 1.0 else f"{100.0 * value:.0f} %"

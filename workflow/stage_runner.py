@@ -97,12 +97,19 @@ def execute(name: str, function: StageFunction, run: Run) -> bool:
     try:
         record = run_stage(name, function, run)
     except Exception as error:  # the boundary of a stage: whatever went wrong is told with the stage's name
+        if _is_interrupt(error):
+            raise KeyboardInterrupt from error
         log = run.folder / f".{name}.partial" / "error.txt"
         log.write_text(traceback.format_exc())
         print_error(f"stage {name} failed: {type(error).__name__}: {error}\ntraceback: {log}")
         return False
     health_line(name, record["seconds"], record["health"], record["continued"])
     return True
+
+
+def _is_interrupt(error: BaseException | None) -> bool:
+    """Whether an interrupt is behind an error: compiled functions wrap it."""
+    return error is not None and (isinstance(error, KeyboardInterrupt) or _is_interrupt(error.__cause__))
 
 
 def _remove(folder: Path) -> None:

@@ -50,6 +50,8 @@ def test_a_peak_at_the_end_is_said(history):
     ("name", "metric", "text"),
     [
         ("peak_von_mises", {"value": 1.571e8, "unit": "Pa"}, "157.1 MPa"),
+        ("decay_rate_error", {"value": 1.034, "unit": ""}, "103 %"),
+        ("period", {"value": 4.669e-3, "unit": "s"}, "4.669 ms"),
         ("volume", {"value": 7.5e-10, "unit": "m^3"}, "0.75 mm^3"),
         ("added_mass", {"value": 2.0e-5, "unit": "kg"}, "20 mg"),
         ("critical_joint", {"value": "A10", "unit": ""}, "A10"),

@@ -9,7 +9,7 @@ from tests.support.workflow_command import SMALL_CASE
 from workflow.case import read_case
 from workflow.pipeline import RunFolderBusy, failed_checks, locked
 from workflow.problems import CaseError
-from workflow.stage_runner import Findings, Run, run_stage
+from workflow.stage_runner import Findings, Run, execute, run_stage
 
 
 @pytest.fixture
@@ -64,6 +64,14 @@ def test_a_run_folder_has_one_user(tmp_path):
         pass
     with locked(tmp_path):
         pass
+
+
+def test_an_interrupt_that_compiled_code_wraps_is_one(run):
+    def interrupted(_run: Run, _folder: Path):
+        raise SystemError("returned a result with an exception set") from KeyboardInterrupt()
+
+    with pytest.raises(KeyboardInterrupt):
+        execute("surface", interrupted, run)
 
 
 def test_a_file_is_no_run_folder(tmp_path):
