@@ -123,7 +123,7 @@ def decide(numbers: Numbers, solder: Solder) -> dict[str, Decision]:
         "viscosity": {"on": transient, "why": f"Ohnesorge number {numbers.ohnesorge:.2g}; {rest}"},
         "surface_tension": {
             "on": rival < LARGEST_BOND,
-            "why": f"Bond number {rival:.3g} (off above {LARGEST_BOND:g})",
+            "why": f"Bond number {rival:.3g} (off above {LARGEST_BOND:g})" if rival > 0.0 else "no gravity rivals it",
         },
         "wall_adhesion": {
             "on": rival < LARGEST_BOND,

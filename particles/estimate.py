@@ -30,8 +30,8 @@ def drop_seconds(particles: int) -> float:
     return TYPICAL_STEPS_OF_DROP * _seconds_per_step(particles)
 
 
-def oscillation_seconds(particles: int, steps: int) -> float:
-    """Expected time of `solve_oscillation` on one core [s]."""
+def inertial_seconds(particles: int, steps: int) -> float:
+    """Expected time of steps with inertia or viscosity on one core [s]."""
     growing = SECONDS_PER_INERTIAL_STEP_OF_THOUSAND * (particles / 1000.0) ** INERTIAL_COST_EXPONENT
     return steps * (SECONDS_PER_INERTIAL_STEP + growing)
 

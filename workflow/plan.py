@@ -17,7 +17,7 @@ from workflow.units import from_si
 LONGEST_LIST = 4
 SCHEMES = {
     "energy": "least energy of the tracked surface at exactly the volume",
-    "inertia": "tetrahedra that move with the drop, second order in space and time",
+    "inertia": "tetrahedra that move with the liquid, second order in space and time; cost of all steps allowed",
     "gripc": "pressure correction as Hu et al. print it, for comparison only; its steps are not foreseen in the cost",
 }
 

@@ -68,19 +68,24 @@ def _of_drops(case: DropsCase) -> SceneForecast:
 
 
 def _towards_rest(case: SceneCase, effects: Mapping[str, Any], particles: int, seconds: float) -> SceneForecast:
+    from particles.estimate import inertial_seconds
     from particles.time_step import capillary_limit
 
     solder = case.molten
     numerics = solder.numerics
     limit = capillary_limit(solder.density, numerics.spacing, solder.surface_tension)
     largest = numerics.time_step_limit * limit
+    scheme: str = numerics.scheme
+    if scheme == "energy" and (effects["inertia"]["on"] or effects["viscosity"]["on"]):
+        steps = min(numerics.max_steps, ceil(solder.process_time / largest))
+        scheme, seconds = "inertia", inertial_seconds(particles, steps)
     cost = {"reflow": SECONDS_TO_START + seconds}
-    return SceneForecast(effects, particles, numerics.scheme, numerics.spacing, limit, largest, cost)
+    return SceneForecast(effects, particles, scheme, numerics.spacing, limit, largest, cost)
 
 
 def _of_oscillation(case: OscillationCase) -> SceneForecast:
     from particles.effects import decide_oscillation
-    from particles.estimate import oscillation_seconds
+    from particles.estimate import inertial_seconds
     from particles.oscillation import rayleigh_period
     from particles.time_step import capillary_limit
 
@@ -94,7 +99,7 @@ def _of_oscillation(case: OscillationCase) -> SceneForecast:
         spacing=spacing,
         capillary_limit=capillary_limit(solder.density, spacing, solder.surface_tension),
         largest_step=rayleigh_period(scene, solder) / scene.steps_per_period,
-        seconds={"reflow": SECONDS_TO_START + oscillation_seconds(scene.particles, steps)},
+        seconds={"reflow": SECONDS_TO_START + inertial_seconds(scene.particles, steps)},
     )
 
 

@@ -48,7 +48,8 @@ def reflow(run: Run[BoardDropCase], folder: Path) -> Findings:
     touching = pool.mark_bridges(joints, pads, mirrored=run.case.board.symmetry == "quarter")
     write_shapes(folder / "shapes.h5", shapes | pool.bridge_shapes(touching, groups, shapes, solder))
     write_json(folder / "joints.json", joints)
-    found = findings.of_reflow(joints, decide_effects(next(iter(distinct.values())), solder))
+    highest = max(distinct.values(), key=lambda geometry: geometry.gap)
+    found = findings.of_reflow(joints, decide_effects(highest, solder))
     return replace(found, continued=f"{continued} of {len(distinct)} joints" if continued else "")
 
 

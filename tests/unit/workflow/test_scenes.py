@@ -10,6 +10,7 @@ from workflow.case import BoardDropCase, DropCase, JointCase, display_values, re
 from workflow.case_text import templates, write_new_case
 from workflow.inputs import stage_inputs
 from workflow.problems import CaseError
+from workflow.scene_forecast import forecast_scene
 from workflow.schema import case_schema
 
 CASES = Path(__file__).resolve().parents[3] / "cases"
@@ -180,3 +181,10 @@ def test_the_scheme_is_ours_unless_the_seeds_is_asked_for():
     assert read_case(DROP).molten.numerics.scheme == "energy"
     asked = ["solder.numerics.scheme=gripc", "solder.numerics.time_step_limit=0.5"]
     assert read_case(DROP, asked).molten.numerics.scheme == "gripc"
+
+
+def test_motion_that_matters_costs_all_steps_allowed():
+    calm, moving = (forecast_scene(read_case(DROP, [f"solder.effects.inertia={on}"])) for on in ("off", "on"))
+    longer = forecast_scene(read_case(DROP, ["solder.effects.inertia=on", "solder.numerics.max_steps=4000"]))
+    assert (calm.scheme, moving.scheme) == ("energy", "inertia")
+    assert 5.0 * calm.seconds["reflow"] < moving.seconds["reflow"] < 0.2 * longer.seconds["reflow"]
