@@ -35,8 +35,7 @@ def headline(metrics: dict) -> list[dict]:
 def metric_table(metrics: dict, health: dict) -> dict:
     """All metrics, those with a limit beside it."""
     rows = [
-        [name.replace("_", " "), _text(name, metric), _limit(name, metric, health)]
-        for name, metric in metrics.items()
+        [name.replace("_", " "), _text(name, metric), _limit(name, metric, health)] for name, metric in metrics.items()
     ]
     return {"head": ["metric", "value", "limit"], "rows": rows}
 

@@ -27,9 +27,10 @@ def metrics(name, symmetry):
     return {name: value for name, (value, _) in shape.metrics.items()}
 
 
-@pytest.mark.parametrize("symmetry", ["half", "quarter"])
-@pytest.mark.parametrize("scene", SCENES)
-def test_a_part_of_a_drop_is_the_whole(symmetry, scene):
+@pytest.mark.parametrize(
+    ("scene", "symmetry"), [("uniform wall", "half"), ("uniform wall", "quarter"), ("pad", "quarter")]
+)
+def test_a_part_of_a_drop_is_the_whole(scene, symmetry):
     whole, part = metrics(scene, "none"), metrics(scene, symmetry)
     assert part["particles"] < {"half": 0.6, "quarter": 0.35}[symmetry] * whole["particles"]
     for name in ("volume", "max_width", "contact_radius", "mean_pressure"):
