@@ -111,7 +111,7 @@ def _drop_metrics(scene: Drops, solder: Solder, drop: Drop, reference: Meridian)
     """Numbers of one of the drops that are left; of a sphere also the largest error of a radius."""
     body = drop.flow.body
     profile = fit_profile(body.points, body.triangles, body.span())
-    run = Run(records=drop.records, profiles=[profile], seconds=drop.seconds)
+    run = Run(records=drop.records, profiles=[profile], seconds=drop.seconds, calm=drop.calm)
     own = solder.model_copy(update={"volume": _volume(scene, drop)})
     metrics = body_metrics(own, reference, drop.flow, run)
     if not scene.is_free:

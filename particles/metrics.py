@@ -196,6 +196,7 @@ def _cost_and_rest(solder: Solder, flow: LiquidFlow, run: Run) -> Metrics:
     limit = capillary_limit(solder.density, flow.body.cloud.spacing, solder.surface_tension)
     last, count = run.records[-1], len(flow.body.points)
     return {
+        "at_rest": (float(run.at_rest), ""),
         "capillary_number_at_rest": (solder.viscosity * last.speed / solder.surface_tension, ""),
         "time_step_over_capillary_limit": (max(record.time_step for record in run.records) / limit, ""),
         "particles": (float(count), ""),

@@ -62,6 +62,11 @@ class Run:
     calm: int = 0
     moved: float = 0.0
 
+    @property
+    def at_rest(self) -> bool:
+        """Whether the body came to rest; else the process ended, or the neck ruptured, before it did."""
+        return self.calm >= CALM_STEPS
+
     def history(self, viscosity_over_tension: float) -> dict[str, NDArray]:
         """Columns of the records, with width and capillary number mu v / gamma."""
         names = ("step", "time", "time_step", "binding", "height", "volume", "energy", "displacement", "iterations")
@@ -93,7 +98,7 @@ def run_to_rest(
         NoRest: too many steps; names step, displacement and time.
     """
     run, done = _start(flow, on_snapshot, checkpoint), 0.0
-    while run.calm < CALM_STEPS and flow.time < rule.end_time and not run.ruptured:
+    while not run.at_rest and flow.time < rule.end_time and not run.ruptured:
         _limit_steps(flow, run, rule)
         _advance(run, flow, rule)
         if run.moved > SNAPSHOT_DISPLACEMENT:

@@ -21,7 +21,7 @@ ROW_SHARE = 0.86
 HEADLINE = (
     "height", "max_width", "waist", "contact_angle", "max_width_error", "axial_force", "offset",
     "collapse_height_error", "drops_left", "radius_error", "period", "period_error", "decay_rate", "decay_rate_error",
-    "verdict", "particles", "seconds",
+    "verdict", "at_rest", "particles", "seconds",
 )  # fmt: skip
 
 
@@ -186,4 +186,6 @@ def _colour_limits(pressure: np.ndarray) -> tuple[float, float]:
 def _text(name: str, metric: dict) -> str:
     if metric["unit"] == "" and name.endswith(("_error", "_drift", "_scatter")):
         return percent(metric["value"])
+    if name == "at_rest":
+        return "yes" if metric["value"] else "no"
     return f"{number(metric['value'])} Pa" if metric["unit"] == "Pa" else quantity(metric)

@@ -44,6 +44,12 @@ def test_a_joint_that_failed_says_how():
     assert findings.of_joint({}, "ok", {}).health["joints_not_ok"]["ok"]
 
 
+def test_a_drop_that_still_moves_is_not_judged_by_the_shape_at_rest():
+    metrics = {"volume_drift": (0.0, ""), "height_error": (0.5, ""), "at_rest": (0.0, "")}
+    assert set(findings.of_drop(metrics, "ok", {}).health) == {"volume_drift"}
+    assert set(findings.of_drop(metrics | {"at_rest": (1.0, "")}, "ok", {}).health) == {"volume_drift", "height_error"}
+
+
 def test_they_have_no_mesh(records):
     with pytest.raises(ReflowError, match="A2, A3 bridged"):
         refuse_joints_without_mesh(records)
