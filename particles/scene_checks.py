@@ -119,12 +119,12 @@ def joint_problems(joint: Joint, solder: Solder) -> list[Problem]:
 
 
 def _tilt_problems(joint: Joint) -> list[Problem]:
-    """The edge of the tilted pad must stay above the lower plate."""
+    """The edge of the tilted pad must stay above the lower plate, by a spacing at least."""
     for key, place in (("joint.tilt", joint.geometry), *(("joint.path", place) for place in joint.places)):
-        drop, tilt = joint.pad_top * sin(abs(place.tilt[1])), place.tilt[1]
-        if drop >= place.gap:
-            message = f"the edge of the upper pad is {mm(drop)} lower than its centre, at a standoff of {mm(place.gap)}"
-            return [Problem(key, deg(tilt), f"< {deg(asin(min(1.0, place.gap / joint.pad_top)))}", message)]
+        drop, tilt, room = joint.pad_top * sin(abs(place.tilt[1])), place.tilt[1], place.gap - joint.spacing
+        if tilt and drop >= room:
+            message = f"the edge of the upper pad is {mm(drop)} lower than its centre, in a gap of {mm(place.gap)}"
+            return [Problem(key, deg(tilt), f"< {deg(asin(min(1.0, max(0.0, room / joint.pad_top))))}", message)]
     return []
 
 
