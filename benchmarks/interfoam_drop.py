@@ -22,8 +22,9 @@ from time import process_time
 
 import numpy as np
 
+from particles.drop_at_rest import flow_to_rest
 from particles.parameters import Solder, SolderEffects, SolderNumerics
-from particles.sessile import solve_drop
+from particles.scenes import Drop
 from particles.time_step import capillary_limit
 from particles.young_laplace import Meridian, sessile_meridian
 
@@ -165,9 +166,12 @@ def by_interfoam(solder: Solder, exact: Meridian) -> dict:
 def by_particles(exact: Meridian) -> dict:
     """Time to rest and errors of this program, which leaves inertia out where only the rest is asked for."""
     solder = molten(SolderNumerics(time_step_limit=100.0))
-    solve_drop(solder, 5)
+    coarse, drop = (
+        Drop(volume=VOLUME, contact_angle=solder.pad_contact_angle, particles_per_edge=count) for count in (5, PER_EDGE)
+    )
+    flow_to_rest(coarse, solder)
     start = process_time()
-    flow, run = solve_drop(solder, PER_EDGE)
+    flow, run = flow_to_rest(drop, solder)
     last = run.records[-1]
     number = solder.viscosity * last.speed / solder.surface_tension
     return {

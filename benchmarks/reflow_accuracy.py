@@ -18,12 +18,13 @@ from time import process_time
 
 import numpy as np
 
+from particles.drop_at_rest import flow_to_rest
 from particles.flow import LiquidFlow
 from particles.incompressibility import SolveFailed
 from particles.mls import DegenerateStencil
 from particles.parameters import Solder, SolderEffects, SolderNumerics
 from particles.rest import CALM_STEPS, NoRest, Run
-from particles.sessile import solve_drop
+from particles.scenes import Drop
 from particles.time_step import StepCollapsed
 from particles.young_laplace import sessile_meridian
 from workflow import work_precision
@@ -76,9 +77,10 @@ def measure(job: dict) -> dict:
     """Solve one drop, with `DEFAULTS` but for the choices of the job."""
     row = DEFAULTS | job
     solder, steps = molten(row), Progress()
+    drop = Drop(volume=VOLUME, contact_angle=solder.pad_contact_angle, particles_per_edge=row["per_edge"])
     start = process_time()
     try:
-        flow, run = solve_drop(solder, row["per_edge"], progress=steps)
+        flow, run = flow_to_rest(drop, solder, progress=steps)
     except FAILURES as failure:
         end = f"{type(failure).__name__} in step {steps.count + 1}"
         return row | {"steps": steps.count, "seconds": process_time() - start, "end": end, "message": str(failure)}

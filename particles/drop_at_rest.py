@@ -10,10 +10,11 @@ from particles.cloud import Cloud, box_cloud, free_box_cloud
 from particles.contact_line import ContactLine
 from particles.contact_line_hysteresis import HystereticLine
 from particles.effects import Decision, acting_weight, decide_drop
+from particles.flow import LiquidFlow
 from particles.metrics import Metrics, body_metrics, reference_drop
 from particles.parameters import Solder
 from particles.reflow import collect_shape, contact_line, start_flow, stop_rule
-from particles.rest import run_to_rest
+from particles.rest import Run, run_to_rest
 from particles.scenes import Drop
 from particles.shape import JointShape
 from particles.symmetry import cut
@@ -50,15 +51,25 @@ def drop_to_rest(
         SolveFailed: a linear solve failed.
     """
     effects = decide_drop(solder, drop.is_free)
-    acting = {name: decision["on"] for name, decision in effects.items()}
-    whole = free_box_cloud(drop.edge, drop.count) if drop.is_free else box_cloud(drop.edge, drop.count)
-    cloud = cut(whole, drop.symmetry_axes)
-    flow = start_flow(cloud, solder, acting, _contact_lines(drop, solder, cloud))
-    run = run_to_rest(flow, stop_rule(cloud, solder, acting), progress, checkpoint=checkpoint)
-    is_known = drop.is_free or acting["wall_adhesion"]
+    flow, run = flow_to_rest(drop, solder, progress, checkpoint)
+    is_known = drop.is_free or effects["wall_adhesion"]["on"]
     reference = _reference(drop, solder, acting_weight(solder, effects)) if is_known else None
     metrics = body_metrics(solder, reference, flow, run)
     return DropAtRest(collect_shape(solder, flow, run, metrics | _excess(drop, metrics)), effects, reference)
+
+
+def flow_to_rest(
+    drop: Drop,
+    solder: Solder,
+    progress: Callable[[float], None] | None = None,
+    checkpoint: Checkpoint | None = None,
+) -> tuple[LiquidFlow, Run]:
+    """The flow of a drop at rest, and its run; arguments and errors as `drop_to_rest`."""
+    acting = {name: decision["on"] for name, decision in decide_drop(solder, drop.is_free).items()}
+    whole = free_box_cloud(drop.edge, drop.count) if drop.is_free else box_cloud(drop.edge, drop.count)
+    cloud = cut(whole, drop.symmetry_axes)
+    flow = start_flow(cloud, solder, acting, _contact_lines(drop, solder, cloud))
+    return flow, run_to_rest(flow, stop_rule(cloud, solder, acting), progress, checkpoint=checkpoint)
 
 
 def _contact_lines(drop: Drop, solder: Solder, cloud: Cloud) -> tuple[ContactLine, ...]:

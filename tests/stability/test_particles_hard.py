@@ -11,8 +11,8 @@ from particles.parameters import Solder, SolderEffects, SolderNumerics
 from particles.plate import slide
 from particles.reflow import contact_line, solve_joint, start_flow, stop_rule
 from particles.rest import run_to_rest
-from particles.sessile import solve_drop
 from particles.young_laplace import sessile_meridian
+from tests.support.drops import solve_drop
 
 GAMMA, DENSITY, VOLUME = 0.4985, 8930.0, 1e-9
 NUMERICS = SolderNumerics(time_step_limit=100)

@@ -5,7 +5,7 @@ import pytest
 
 from particles.metrics import drop_metrics
 from particles.parameters import Solder, SolderEffects, SolderNumerics
-from particles.sessile import solve_drop
+from tests.support.drops import solve_drop
 
 PAPER = {"surface_tension": 4.985, "viscosity": 0.227}
 EDGE = 1e-3

@@ -8,7 +8,7 @@ from particles.metrics import reference_drop
 from particles.parameters import Solder, SolderEffects, SolderNumerics
 from particles.reflow import joint_shape, solve_joint, start_joint
 from particles.rest import run_to_rest
-from particles.sessile import solve_drop
+from tests.support.drops import solve_drop
 
 BALL, RADIUS = 0.0724e-9, 0.24e-3
 MM = 1e-3

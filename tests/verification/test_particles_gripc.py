@@ -16,11 +16,11 @@ from particles.parameters import Solder, SolderEffects, SolderNumerics
 from particles.plate import Plate
 from particles.pressure_poisson import Poisson
 from particles.reflow import build_physics, contact_line, start_flow
-from particles.sessile import solve_drop
 from particles.surface_pressure import force_pressure
 from particles.time_step import StepCollapsed, TimeStep, capillary_limit
 from particles.velocity_prediction import predict_velocity
 from particles.young_laplace import sessile_meridian
+from tests.support.drops import solve_drop
 
 COUNTS = (8, 12, 18)
 PAPER = {"surface_tension": 4.985, "viscosity": 0.227, "process_time": 0.1}

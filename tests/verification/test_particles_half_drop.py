@@ -9,8 +9,8 @@ from particles.inertial_step import InertialStep
 from particles.parameters import Solder, SolderEffects, SolderNumerics
 from particles.rayleigh import rayleigh_frequency, viscous_oscillation
 from particles.reflow import build_physics
-from particles.sessile import solve_drop
 from particles.time_step import TimeStep
+from tests.support.drops import solve_drop
 
 DENSITY, GAMMA, VOLUME, OHNESORGE = 8930.0, 0.4985, 1e-9, 0.02
 RADIUS = float(np.cbrt(1.5 * VOLUME / np.pi))

@@ -8,8 +8,8 @@ from particles.metrics import mean_angle, verdict
 from particles.parameters import Solder, SolderEffects, SolderNumerics
 from particles.profile import fit_profile
 from particles.reflow import solve_joint
-from particles.sessile import solve_drop
 from particles.young_laplace import joint_meridian, sessile_meridian
+from tests.support.drops import solve_drop
 
 BALL, RADIUS, GAMMA = 0.0724e-9, 0.24e-3, 0.4985
 WEIGHT = 8930.0 * 9.81

@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from particles.drop_at_rest import drop_to_rest
 from particles.reflow import solve_joint
 from particles.scenes import Drop, Fluid, Joint
-from particles.sessile import drop_shape, solve_drop
 
 REFERENCE = json.loads((Path(__file__).parent / "references" / "surface_evolver.json").read_text())
 MM, GAMMA = 1e-3, 0.4985
@@ -21,7 +21,7 @@ def test_five_volumes_on_a_pad(evolver):
         volume=evolver["volume"] * MM**3, contact_angle=np.radians(5), pad_radius=0.2 * MM, particles_per_edge=7
     )
     solder = Fluid(numerics={"time_step_limit": 100.0}).resolve(drop, "off")
-    shape = drop_shape(solder, drop.edge_radius, *solve_drop(solder, drop.count, drop.edge_radius))
+    shape = drop_to_rest(drop, solder).shape
     assert shape.metrics["height"][0] == pytest.approx(evolver["height"] * MM, rel=0.01)
     assert shape.metrics["max_width"][0] == pytest.approx(evolver["max_width"] * MM, rel=0.01)
     assert abs(shape.metrics["contact_angle_error"][0]) <= 2.0

@@ -1,0 +1,21 @@
+"""Drops on a wall or pad from their solder."""
+
+from math import isfinite
+
+from particles.drop_at_rest import flow_to_rest
+from particles.flow import LiquidFlow
+from particles.parameters import Solder
+from particles.rest import Run
+from particles.scenes import Drop
+
+
+def solve_drop(solder: Solder, count: int, pad_radius: float = float("inf")) -> tuple[LiquidFlow, Run]:
+    """The flow at rest of a cube with `count` particles along an edge, on a pad or a uniform wall, and its run."""
+    drop = Drop(
+        volume=solder.volume,
+        contact_angle=solder.pad_contact_angle,
+        mask_contact_angle=solder.mask_contact_angle,
+        pad_radius=pad_radius if isfinite(pad_radius) else None,
+        particles_per_edge=count,
+    )
+    return flow_to_rest(drop, solder)
