@@ -129,7 +129,8 @@ def _add_body(run_folder: Path, kind: str, context: dict, summary: dict) -> None
         context["curves"]["swing"] = report_body.swing_curve(shape.history, summary["metrics"])
     else:
         if shape.verdict != "apart":
-            context["curves"]["profile"] = report_body.profile_curve(shape.surface_points, meridian)
+            axis = report_body.middle(shape.surface_points) if kind == "drops" else 0.0
+            context["curves"]["profile"] = report_body.profile_curve(shape.surface_points - axis, meridian)
         context["curves"]["body_history"] = report_body.history_curve(shape.history)
     path = run_folder / "reflow" / "path.json"
     if path.exists():

@@ -44,6 +44,11 @@ def _limit(name: str, metric: dict, health: dict) -> str:
     return _text(name, metric | {"value": health[name]["limit"]}) if name in health else ""
 
 
+def middle(points: np.ndarray) -> np.ndarray:
+    """Place `(3,)` of the vertical axis through the middle of a drop that stands anywhere."""
+    return 0.5 * (points.min(axis=0) + points.max(axis=0)) * np.array([1.0, 1.0, 0.0])
+
+
 def profile_curve(points: np.ndarray, meridian: np.ndarray | None) -> str:
     """Draw radius against height of the surface particles `(s, 3)` [m] over the exact meridian `(2, k)` [m]."""
     with pyplot.rc_context(STYLE):

@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 
+from workflow import report_body
 from workflow import report_tables as tables
 from workflow.report_curves import array_map, energy_curves, history_curves
 from workflow.summary import collect_summary, inputs_digest, write_summary
@@ -38,6 +39,11 @@ def test_joints_are_ranked_by_their_worse_pad(history):
     assert [row[0] for row in table["rows"]] == ["A10", "A9"]
     assert table["rows"][0][1:6] == ["100.0", "board", "0.500", "9.0", "150.0"]
     assert table["rows"][1][2] == "package"
+
+
+def test_a_drop_may_stand_anywhere():
+    corners = np.array([[1.0, 2.0, 3.0], [3.0, 6.0, 5.0]])
+    assert report_body.middle(corners) == pytest.approx([2.0, 4.0, 0.0])
 
 
 def test_a_peak_at_the_end_is_said(history):
