@@ -102,7 +102,7 @@ def result(solder: Solder, flow: LiquidFlow, run: Run, seconds: float) -> dict:
     exact = sessile_meridian(VOLUME, solder.pad_contact_angle, solder.surface_tension)
     count, steps = len(flow.body.points), len(run.records)
     return {
-        "height_error": run.records[-1].height / exact.height - 1.0,
+        "height_error": run.profiles[-1].drop_height(walls=1) / exact.height - 1.0,
         "max_width_error": run.profiles[-1].max_width / exact.max_width - 1.0,
         "particles": count,
         "steps": steps,

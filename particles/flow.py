@@ -124,9 +124,10 @@ class LiquidFlow:
                 body.points, body.triangles, (*cloud.rings, *(on for _, on in planes))
             )
         count = cloud.surface_count
-        offset = smoothing_offsets(body.points, body.triangles, count, cloud.rings, planes)
-        offset = np.concatenate((offset, np.zeros((len(body.points) - count, 3))))
-        body.points += self.physics.admit(body, offset)
+        offset = np.zeros_like(body.points)
+        for _ in range(self.solver.smoothing_passes):
+            offset[:count] = smoothing_offsets(body.points, body.triangles, count, cloud.rings, planes)
+            body.points += self.physics.admit(body, offset)
         self.neighbours.update(body.points)
         body.points[count:] += interior_shift(body, self.neighbours)
         return flips

@@ -43,6 +43,11 @@ class GripcStep:
         """Radius of the neighbour list, in spacings."""
         return SUPPORT[self.basis]
 
+    @property
+    def smoothing_passes(self) -> int:
+        """How often the triangles are evened out after a step: the liquid takes them along."""
+        return 1
+
     def prepare(self, body: Body, physics: Physics, _neighbours: NeighbourList) -> "PreparedGripcStep":
         """Fit the operators at the current positions.
 

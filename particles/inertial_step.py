@@ -90,6 +90,11 @@ class InertialStep:
         """Radius of the neighbour list, in spacings: what the shift of the particles needs."""
         return SUPPORT
 
+    @property
+    def smoothing_passes(self) -> int:
+        """How often the triangles are evened out after a step: the liquid takes them along."""
+        return 1
+
     def prepare(self, body: Body, physics: Physics, _neighbours: NeighbourList) -> "PreparedInertialStep":
         """Start a step; tetrahedra need no neighbour list."""
         return self.start(body, physics)

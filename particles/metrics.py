@@ -52,7 +52,8 @@ def drop_metrics(solder: Solder, pad_radius: float, flow: LiquidFlow, run: Run) 
 
 def body_metrics(solder: Solder, reference: Meridian | None, flow: LiquidFlow, run: Run) -> Metrics:
     """Collect the numbers of a drop, with its errors against a reference and its contact angle where it has them."""
-    height, width = run.records[-1].height, run.profiles[-1].max_width
+    profile = run.profiles[-1]
+    height, width = profile.drop_height(len(flow.body.cloud.rings)), profile.max_width
     shape: Metrics = {"height": (height, "m"), "max_width": (width, "m")}
     if reference is not None:
         shape["height_error"] = (height / reference.height - 1.0, "")

@@ -13,6 +13,7 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 from scipy import sparse
+from scipy.sparse.csgraph import connected_components
 
 from particles.body import Body
 from particles.neighbours import NeighbourList
@@ -195,7 +196,18 @@ class PotentialFlow:
         columns, values = _rows(body.points, mirrors, lists, scale, neighbours.radius)
         starts = neighbours.offsets + np.arange(len(body.points) + 1, dtype=np.int32)
         size = len(body.points)
-        return cls(sparse.csr_matrix((values, columns, starts), shape=(size, size)), body, neighbours, mirrors)
+        laplacian = sparse.csr_matrix((values, columns, starts), shape=(size, size))
+        laplacian.eliminate_zeros()
+        return cls(laplacian, body, neighbours, mirrors)
+
+    def balanced(self, flux: Floats) -> Floats:
+        """Fluxes `(n,)` [m^3/s] less their mean, in each group of particles that is apart from the others.
+
+        In a film thinner than the particles are apart there are many: what flows between them has no way.
+        """
+        _, group = connected_components(self.laplacian, directed=False)
+        mean = np.bincount(group, flux) / np.bincount(group, self._body.volumes)
+        return flux - mean[group] * self._body.volumes
 
     def velocity(self, potential: Floats) -> Floats:
         """Gradient of a potential `(n,)` [m^2/s] at the particles below the surface, `(m, 3)` [m/s]."""

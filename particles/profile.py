@@ -16,6 +16,7 @@ Indices = NDArray[np.int32]
 SLICES = 64
 DEGREE = 6
 SAMPLES = 401
+APEX_PASSES = 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,10 +26,12 @@ class Profile:
     Attributes:
         z: `(k,)` heights from foot to head [m].
         radius: `(k,)` radius of the disc of equal area [m].
+        areas: fitted areas of the cross-sections against their height [m^2].
     """
 
     z: Floats
     radius: Floats
+    areas: Legendre
 
     @property
     def max_width(self) -> float:
@@ -39,6 +42,21 @@ class Profile:
     def waist(self) -> float:
         """Smallest diameter [m]."""
         return 2.0 * float(self.radius.min())
+
+    def drop_height(self, walls: int) -> float:
+        """Height of a drop on a wall, or of a free one, to the apex where the fitted areas vanish [m].
+
+        As free of the bias of single vertices as the width is.
+        """
+        foot = float(self.z[0]) if walls else self._apex(self.z[0])
+        return self._apex(self.z[-1]) - foot
+
+    def _apex(self, end: float) -> float:
+        """Zero of the areas next to an end [m], by Newton's method: near its apex a body is a paraboloid."""
+        slope = self.areas.deriv()
+        for _ in range(APEX_PASSES):
+            end = end - self.areas(end) / slope(end)
+        return float(end)
 
 
 def section_areas(points: Floats, triangles: Indices, heights: Floats) -> Floats:
@@ -95,4 +113,4 @@ def fit_profile(points: Floats, triangles: Indices, span: tuple[float, float] | 
     areas = parts * section_areas(points, triangles, heights)
     fit = Legendre.fit(heights, areas, DEGREE, domain=[low, high])
     sample = np.linspace(low, high, SAMPLES)
-    return Profile(sample, np.sqrt(np.maximum(fit(sample), 0.0) / np.pi))
+    return Profile(sample, np.sqrt(np.maximum(fit(sample), 0.0) / np.pi), fit)

@@ -31,6 +31,9 @@ from particles.volume_constraint import solve_volume
 Floats = NDArray[np.float64]
 
 SUPPORT = 2.0
+# The surface moves along its normals and stretches its triangles unevenly, which biases the shape of least energy: one
+# pass leaves 0.05 % of the height of a cap at any spacing.
+SMOOTHING_PASSES = 12
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,6 +52,11 @@ class Relaxation:
         """Radius of the neighbour list, in spacings."""
         return SUPPORT
 
+    @property
+    def smoothing_passes(self) -> int:
+        """How often the triangles are evened out after a step."""
+        return SMOOTHING_PASSES
+
     def prepare(self, body: Body, physics: Physics, neighbours: NeighbourList) -> "PreparedRelaxation":
         """Build the equations of the surface and the operators of the potential flow."""
         surface = body.surface()
@@ -57,7 +65,7 @@ class Relaxation:
 
     def potential(self, flow: PotentialFlow, flux: Floats) -> tuple[Floats, int]:
         """Potential `(n,)` [m^2/s] of the fluxes into the particles `(n,)` [m^3/s], and the iterations."""
-        return self._multigrid.solve(flow.laplacian, flux)
+        return self._multigrid.solve(flow.laplacian, flow.balanced(flux))
 
 
 def _volume_only(surface: Body) -> Discretisation:
@@ -126,10 +134,9 @@ def _limited(inside: Floats, surface: Floats) -> Floats:
 
 
 def _flux(body: Body, surface: Floats, twists: dict[int, Floats]) -> Floats:
-    """Volume that the motion of the boundary takes up, particle by particle `(n,)` [m^3/s]; its sum is zero.
+    """Volume that the motion of the boundary takes up, particle by particle `(n,)` [m^3/s].
 
-    What the surface's particles pass is theirs, what a plate passes is spread over the particles on it, and the rest,
-    by which the volume is corrected, over all.
+    What the surface's particles pass is theirs, what a plate passes is spread over the particles on it.
     """
     flux = np.zeros(len(body.points))
     flux[: body.cloud.surface_count] = surface_flux(body.points, body.triangles, surface)
@@ -139,4 +146,4 @@ def _flux(body: Body, surface: Floats, twists: dict[int, Floats]) -> Floats:
         outward = plate.side * float((plate.rigid_velocity(twist, centre) @ plate.normal)[0])
         share = body.volumes * on_plate
         flux += outward * ring_area(body.points, ring) * share / share.sum()
-    return flux - flux.sum() * body.volumes / body.volumes.sum()
+    return flux

@@ -57,5 +57,9 @@ class StepSolver(Protocol):
     def support(self) -> float:
         """Radius of the neighbour list that it needs, in spacings."""
 
+    @property
+    def smoothing_passes(self) -> int:
+        """How often the triangles are evened out after a step."""
+
     def prepare(self, body: Body, physics: Physics, neighbours: NeighbourList) -> PreparedStep:
         """Build what does not depend on the size of the step."""
