@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from particles.checkpoint import Checkpoint
 from particles.flow import LiquidFlow, StepRecord
+from particles.incompressibility import SolveFailed
 from particles.profile import Profile, fit_profile
 from particles.shape import Snapshot
 
@@ -148,13 +149,22 @@ def _what_helps(flow: LiquidFlow) -> str:
 
 def _advance(run: Run, flow: LiquidFlow, rule: StopRule) -> None:
     start = perf_counter()
-    record = flow.step()
+    record = _step(flow)
     run.records.append(record)
     run.profiles.append(fit_profile(flow.body.points, flow.body.triangles, flow.body.span(), flow.body.cloud.parts))
     run.ruptured = len(flow.body.cloud.rings) == 2 and _ruptures(run.profiles, flow.body.cloud.spacing)
     run.calm = run.calm + 1 if is_calm(run.records, rule) else 0
     run.moved += record.displacement
     run.seconds += perf_counter() - start
+
+
+def _step(flow: LiquidFlow) -> StepRecord:
+    """Advance one step; an error of the solver tells where it happened and what may help."""
+    try:
+        return flow.step()
+    except SolveFailed as error:
+        where = f"step {flow.steps + 1} at time {flow.time:.4g} s"
+        raise SolveFailed(f"{where}: {error}; a smaller spacing or solder.numerics.time_step_limit may help") from error
 
 
 def _ruptures(profiles: list[Profile], spacing: float) -> bool:

@@ -13,7 +13,7 @@ from particles.rayleigh import lamb_decay_rate, rayleigh_frequency
 from particles.scene_drops import Drops
 from particles.scene_oscillation import Oscillation
 from particles.scenes import Drop, Joint
-from particles.young_laplace import sessile_meridian
+from particles.young_laplace import NoMeridian, joint_meridian, sessile_meridian
 
 FEWEST_PER_EDGE = 5
 MOST_PARTICLES = 200_000
@@ -114,7 +114,7 @@ def joint_problems(joint: Joint, solder: Solder) -> list[Problem]:
     if found:
         return [replace(problem, key=KEYS.get(problem.key, problem.key)) for problem in found]
     found = _tilt_problems(joint) or _path_problems(joint) or _package_problems(joint)
-    found = found or _motion_problems(joint, solder)
+    found = found or _load_problems(joint, solder) or _motion_problems(joint, solder)
     return found or _too_many("joint", joint.spacing, particle_count(solder, joint.geometry))
 
 
@@ -152,6 +152,23 @@ def _package_problems(joint: Joint) -> list[Problem]:
         return []
     message = "free to shift and to turn, a package rolls off a single joint"
     return [Problem("joint.package.free", ", ".join(joint.package.free), "lift with shift, or lift with turn", message)]
+
+
+def _load_problems(joint: Joint, solder: Solder) -> list[Problem]:
+    """The solder must bear the package at a gap that particles can fill."""
+    if joint.package is None or "lift" not in joint.package.free:
+        return []
+    lowest, limits = checks.SPACINGS_IN_GAP * joint.spacing, (joint.pad_contact_angle, joint.mask_contact_angle)
+    weight = acting_weight(solder, decide_effects(joint.geometry, solder))
+    discs = (joint.pad_bottom, joint.pad_top, lowest)
+    try:
+        largest = joint_meridian(joint.volume, *discs, solder.surface_tension, weight, angle_limits=limits).axial_force
+    except NoMeridian:
+        return []
+    if joint.package.load < largest:
+        return []
+    message = f"presses the package down to {mm(lowest)}, too low for particles {mm(joint.spacing)} apart"
+    return [Problem("joint.package.load", mn(joint.package.load), f"< {mn(largest)}", message)]
 
 
 def _motion_problems(joint: Joint, solder: Solder) -> list[Problem]:
@@ -233,6 +250,11 @@ def _too_many(scene: str, spacing: float, count: int) -> list[Problem]:
     limit = spacing * (count / MOST_PARTICLES) ** (1.0 / 3.0)
     message = f"would take {count} particles, more than {MOST_PARTICLES}: a volume that cannot fit, or too fine"
     return [Problem(f"{scene}.spacing", mm(spacing), f">= {mm(limit)}", message)]
+
+
+def mn(force: float) -> str:
+    """Write a force [N]."""
+    return f"{1e3 * force:.4g} mN"
 
 
 def deg(angle: float) -> str:

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy import sparse
 
-from particles.incompressibility import SaddlePoint, Solution, check_residuals, petsc
+from particles.incompressibility import SaddlePoint, Solution, SolveFailed, check_residuals, petsc
 
 Floats = NDArray[np.float64]
 
@@ -31,9 +31,16 @@ class _Inverse:
         return self._solver.getConvergedReason()
 
     def __call__(self, right: Floats) -> Floats:
-        """A^-1 x."""
+        """A^-1 x.
+
+        Raises:
+            SolveFailed: no factorisation, which a sound surface always has.
+        """
         self._right.setArray(right)
-        self._solver.solve(self._right, self._solution)
+        try:
+            self._solver.solve(self._right, self._solution)
+        except PETSc.Error as error:
+            raise SolveFailed(f"PETSc cannot factor the surface's matrix (error {error.ierr})") from error
         return self._solution.getArray().copy()
 
 

@@ -24,6 +24,7 @@ BAD_VALUES = {
     "package that rolls off": (JOINT, 'joint.package.free=["shift", "turn"]', ["joint.package.free", "rolls off"]),
     "unknown direction": (JOINT, 'joint.package.free=["lfit"]', ["any of lift, shift, turn", "did you mean lift?"]),
     "no direction": (JOINT, "joint.package.free=[]", ["joint.package.free = []", "at least one item"]),
+    "load too heavy": (JOINT, "joint.package.load=1 N", ["joint.package.load", '"1000 mN"', "< ", "0.12 mm, too low"]),
     "load of a length": (JOINT, "joint.package.load=1 mm", ["joint.package.load", "wanted is a force"]),
     "path to nowhere": (JOINT, "joint.path.steps=3", ["joint.path: leads nowhere"]),
     "path into the pad": (JOINT, "joint.path.standoff=0.05 mm", ["joint.path.standoff", ">= 0.12 mm"]),
