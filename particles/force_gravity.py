@@ -36,5 +36,5 @@ class Gravity:
         return self.weight * 0.25 * float((mean_square * doubled_area_z).sum())
 
     def force(self, body: Body) -> Floats:
-        """Force -rho g z dV/dx, `(n, 3)` [N]."""
+        """Force -rho g z dV/dx, `(n, 3)` [N]: the gradient of the energy to second order in the spacing."""
         return -self.weight * body.points[:, 2:3] * body.volume()[1]

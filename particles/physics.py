@@ -25,7 +25,7 @@ class Force(Protocol):
         """Energy [J]."""
 
     def force(self, body: Body) -> Floats:
-        """Force -dE/dx, `(n, 3)` [N]."""
+        """Force -dE/dx, `(n, 3)` [N]; gravity's to second order in the spacing."""
 
 
 class Operator(Protocol):
