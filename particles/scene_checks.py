@@ -167,7 +167,11 @@ def _load_problems(joint: Joint, solder: Solder) -> list[Problem]:
         return []
     if joint.package.load < largest:
         return []
-    message = f"presses the package down to {mm(lowest)}, too low for particles {mm(joint.spacing)} apart"
+    place = f"the package down to {mm(lowest)}, too low for particles {mm(joint.spacing)} apart"
+    if largest <= 0.0:
+        allowed = "more solder, or a smaller joint.spacing"
+        return [Problem("joint.volume", mm3(joint.volume), allowed, f"the solder alone pulls {place}")]
+    message = f"presses {place}"
     return [Problem("joint.package.load", mn(joint.package.load), f"< {mn(largest)}", message)]
 
 

@@ -117,6 +117,11 @@ def test_a_path_goes_from_rest_to_rest_at_least_energy(setting, key):
     assert key in problems_of(JOINT, "joint.path.standoff=0.3 mm", setting)
 
 
+def test_too_little_solder_pulls_its_package_down():
+    text = problems_of(JOINT, "joint.package.load=1 mN", "joint.volume=0.005 mm^3")
+    assert 'joint.volume = "0.005 mm^3"' in text and "more solder" in text
+
+
 def test_a_tilted_pad_stays_above_the_lower_one():
     text = problems_of(JOINT, "joint.tilt=29 deg", "joint.pad_top=0.9 mm", "joint.volume=0.4 mm^3")
     assert "joint.tilt" in text and "< 20." in text
