@@ -172,13 +172,13 @@ def by_particles(exact: Meridian) -> dict:
     flow_to_rest(coarse, solder)
     start = process_time()
     flow, run = flow_to_rest(drop, solder)
-    last = run.records[-1]
-    number = solder.viscosity * last.speed / solder.surface_tension
+    profile = run.profiles[-1]
+    number = solder.viscosity * run.records[-1].speed / solder.surface_tension
     return {
         "particles": len(flow.body.points),
         "steps": len(run.records),
         "seconds_to_rest": process_time() - start,
-    } | errors(last.height, run.profiles[-1].max_width, exact, number)
+    } | errors(profile.drop_height(walls=1), profile.max_width, exact, number)
 
 
 def errors(height: float, width: float, exact: Meridian, capillary_number: float) -> dict:

@@ -27,7 +27,7 @@ class FlowNumerics(Parameters):
     basis: Literal["linear", "quadratic"] = "quadratic"
     time_step_limit: float = Field(20.0, gt=0, le=100)
     tolerance: float = Field(1.0e-6, gt=0, lt=1)
-    max_steps: int = Field(400, ge=1)
+    max_steps: int = Field(1000, ge=1)
 
 
 class SolderNumerics(FlowNumerics):
