@@ -191,6 +191,6 @@ def test_the_scheme_is_ours_unless_the_seeds_is_asked_for():
 
 def test_motion_that_matters_costs_all_steps_allowed():
     calm, moving = (forecast_scene(read_case(DROP, [f"solder.effects.inertia={on}"])) for on in ("off", "on"))
-    longer = forecast_scene(read_case(DROP, ["solder.effects.inertia=on", "solder.numerics.max_steps=4000"]))
+    longer = forecast_scene(read_case(DROP, ["solder.effects.inertia=on", "solder.numerics.max_steps=10000"]))
     assert (calm.scheme, moving.scheme) == ("energy", "inertia")
     assert 5.0 * calm.seconds["reflow"] < moving.seconds["reflow"] < 0.2 * longer.seconds["reflow"]
