@@ -18,7 +18,7 @@ class _Inverse:
 
     def __init__(self, matrix: sparse.csr_matrix) -> None:
         self._solver = PETSc.KSP().create(PETSc.COMM_SELF)
-        self._solver.setOperators(petsc(matrix))
+        self._solver.setOperators(petsc(_held(matrix)))
         self._solver.setType(PETSc.KSP.Type.CG)
         self._solver.setNormType(PETSc.KSP.NormType.UNPRECONDITIONED)
         self._solver.setTolerances(rtol=RELATIVE_TOLERANCE, max_it=MAX_ITERATIONS)
@@ -42,6 +42,12 @@ class _Inverse:
         except PETSc.Error as error:
             raise SolveFailed(f"PETSc cannot factor the surface's matrix (error {error.ierr})") from error
         return self._solution.getArray().copy()
+
+
+def _held(matrix: sparse.csr_matrix) -> sparse.csr_matrix:
+    """The matrix with ones for what nothing moves, such as the shift of a plate whose edges hold no particle."""
+    idle = matrix.diagonal() == 0.0
+    return (matrix + sparse.diags(idle.astype(float))).tocsr() if idle.any() else matrix
 
 
 def solve_volume(problem: SaddlePoint) -> Solution:

@@ -1,0 +1,18 @@
+"""The surface alone at constant volume: the solve with one constraint."""
+
+import numpy as np
+import pytest
+from scipy import sparse
+
+from particles.incompressibility import SaddlePoint
+from particles.volume_constraint import solve_volume
+
+
+def test_what_nothing_moves_stays_where_it_is():
+    """The last unknown has no stiffness and no load, as the shift of a plate whose edges hold no particle."""
+    operator = sparse.csr_matrix(np.array([[2.0, 1.0, 0.0], [1.0, 3.0, 0.0], [0.0, 0.0, 0.0]]))
+    operator.eliminate_zeros()
+    constraint = sparse.csr_matrix([[1.0, 1.0, 0.0]])
+    solution = solve_volume(SaddlePoint(operator, constraint, np.array([1.0, 2.0, 0.0]), np.array([0.5])))
+    assert solution.velocity[2] == 0.0
+    assert solution.velocity[:2].sum() == pytest.approx(0.5)
