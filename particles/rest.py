@@ -150,6 +150,7 @@ def _what_helps(flow: LiquidFlow) -> str:
 def _advance(run: Run, flow: LiquidFlow, rule: StopRule) -> None:
     start = perf_counter()
     record = _step(flow)
+    _refuse_plates_that_met(flow)
     run.records.append(record)
     run.profiles.append(fit_profile(flow.body.points, flow.body.triangles, flow.body.span(), flow.body.cloud.parts))
     run.ruptured = len(flow.body.cloud.rings) == 2 and _ruptures(run.profiles, flow.body.cloud.spacing)
@@ -165,6 +166,15 @@ def _step(flow: LiquidFlow) -> StepRecord:
     except SolveFailed as error:
         where = f"step {flow.steps + 1} at time {flow.time:.4g} s"
         raise SolveFailed(f"{where}: {error}; a smaller spacing or solder.numerics.time_step_limit may help") from error
+
+
+def _refuse_plates_that_met(flow: LiquidFlow) -> None:
+    low, high = flow.body.span()
+    if len(flow.body.cloud.rings) == 2 and high <= low:
+        raise NoRest(
+            f"step {flow.steps} at time {flow.time:.4g} s: the package has sunk to the board, the solder does not bear "
+            "it; a smaller joint.package.load or a larger joint.volume helps"
+        )
 
 
 def _ruptures(profiles: list[Profile], spacing: float) -> bool:
