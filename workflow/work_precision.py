@@ -58,8 +58,14 @@ def markdown(result: dict) -> str:
     """Table, observed orders and where they were measured, for the README."""
     rows: list[list[str]] = table(result)["rows"]
     lines = ["| " + " | ".join(cells) + " |" for cells in (HEAD, ["---"] * len(HEAD), *rows)]
-    orders = ", ".join(f"{order:.2f} at {name}" for name, order in result["width_orders"].items())
-    return "\n".join(lines) + f"\n\nObserved order of the width's error in the spacing: {orders or 'not measured'}."
+    orders = [
+        f"{order:.2f} in {ERRORS[name]} at {angle}"
+        for name, by_angle in result["orders"].items()
+        for angle, order in by_angle.items()
+    ]
+    return (
+        "\n".join(lines) + f"\n\nOrders of the errors in the spacing: {', '.join(orders) or 'not measured'}."
+    )
 
 
 def publish(result: dict) -> None:

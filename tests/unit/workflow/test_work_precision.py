@@ -16,7 +16,7 @@ ROW = {
 ROW |= {"vary": "spacing", "time_step_limit": 100.0, "steps": 45, "seconds": 4.57}
 GOOD = ROW | {"height_error": 6e-4, "max_width_error": -1e-3}
 FAILED = ROW | {"vary": "scheme", "scheme": "gripc", "end": "StepCollapsed in step 46"}
-RESULT = {"rows": [GOOD, FAILED], "width_orders": {"60 deg": 2.2}}
+RESULT = {"rows": [GOOD, FAILED], "orders": {"max_width_error": {"60 deg": 2.2}}}
 
 
 def test_a_failed_run_is_a_row():
@@ -53,7 +53,7 @@ def test_a_measurement_replaces_what_stood_in_the_readme(tmp_path, monkeypatch):
     work_precision.publish(RESULT)
     text = readme.read_text()
     assert text.startswith("before\n") and text.endswith("\nafter\n") and "old" not in text
-    assert "| 60 deg, 7 per edge | energy" in text and "2.20 at 60 deg" in text
+    assert "| 60 deg, 7 per edge | energy" in text and "2.20 in width at 60 deg" in text
     assert work_precision.stored() == RESULT
     assert (tmp_path / "w.png").stat().st_size > 1000
 
