@@ -38,7 +38,7 @@ class Numbers:
         bond: rho g L H / gamma, weight over surface tension.
         ohnesorge: mu / sqrt(rho gamma L).
         capillary_time: sqrt(rho L^3 / gamma) [s].
-        viscous_time: rho L^2 / mu [s], in which oscillations decay.
+        viscous_time: rho L^2 / (5 mu) [s], in which the slowest oscillation decays (Lamb 1932, mode 2).
     """
 
     bond: float
@@ -65,7 +65,7 @@ def _numbers(solder: Solder, length: float, area: float) -> Numbers:
         bond=density * solder.gravity * area / tension,
         ohnesorge=solder.viscosity / sqrt(density * tension * length),
         capillary_time=sqrt(density * length**3 / tension),
-        viscous_time=density * length**2 / solder.viscosity,
+        viscous_time=density * length**2 / (5.0 * solder.viscosity),
     )
 
 

@@ -11,6 +11,7 @@ from particles.body import Body
 from particles.cloud_level_set import CannotRebuild, cloud_from_level_set
 from particles.level_set import Grid, LevelSet, depths, signed_distance, smooth_union
 from particles.plate import Plate
+from particles.surface_measure import centre_of_volume
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int32]
@@ -73,6 +74,10 @@ def rebuild(*bodies: Body) -> Body:
         union = LevelSet(grid, union.values - CLOSING_SPACINGS * spacing)
     volume = sum(body.volume()[0] for body in bodies)
     result = Body.at_rest(cloud_from_level_set(union, volume, walls))
+    if not walls:
+        # A neck that is closed on one side shifts the centre; no force does.
+        centres = [body.volume()[0] * centre_of_volume(body.points, body.triangles) for body in bodies]
+        result.points += sum(centres) / volume - centre_of_volume(result.points, result.triangles)
     result.velocity = _common_velocity(result, bodies)
     return result
 

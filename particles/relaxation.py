@@ -24,7 +24,7 @@ from particles.plate import slide
 from particles.potential_flow import PotentialFlow
 from particles.step_equations import StepEquations
 from particles.step_solver import Motion
-from particles.surface_measure import ring_area, surface_flux
+from particles.surface_measure import centre_of_volume, ring_area, surface_flux
 from particles.symmetry import fold
 from particles.volume_constraint import solve_volume
 
@@ -36,15 +36,17 @@ SUPPORT = 2.0
 SMOOTHING_PASSES = 12
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Relaxation:
     """Relaxation towards rest.
 
     Attributes:
         density: [kg/m^3].
+        centre: `(3,)` centre of volume of a body without walls and planes at its first step [m], else None.
     """
 
     density: float
+    centre: Floats | None = None
     _multigrid: LaggedMultigrid = field(default_factory=LaggedMultigrid)
 
     @property
@@ -59,6 +61,8 @@ class Relaxation:
 
     def prepare(self, body: Body, physics: Physics, neighbours: NeighbourList) -> "PreparedRelaxation":
         """Build the equations of the surface and the operators of the potential flow."""
+        if self.centre is None and not body.plates and not body.cloud.symmetry:
+            self.centre = centre_of_volume(body.points, body.triangles)
         surface = body.surface()
         equations = StepEquations(surface, physics, _volume_only(surface))
         return PreparedRelaxation(self, body, equations, PotentialFlow.of(body, neighbours))
@@ -105,11 +109,25 @@ class PreparedRelaxation:
         body, density, count = self.body, self.solver.density, self.body.cloud.surface_count
         solution = solve_volume(self.equations.problem(time_step, volume))
         surface, twists = self.equations.expand(solution.velocity, time_step)
+        surface = surface + self._recall(surface, time_step)
         potential, iterations = self.solver.potential(self.flow, _flux(body, surface, twists))
         velocity = np.concatenate((surface, _limited(self._inside(potential, twists), surface)))
         surface_pressure = float(solution.pressure[0])
         pressure = surface_pressure - density / time_step * (potential - potential[:count].mean())
         return Motion(velocity, velocity, pressure, surface_pressure, twists, iterations)
+
+    def _recall(self, surface: Floats, time_step: float) -> Floats:
+        """Velocity `(3,)` [m/s] that brings the centre of a free body back to where it was: no force moves it.
+
+        Each part of the surface passes its flux at its place, and V dc/dt is the integral of x v . n.
+        """
+        body = self.body
+        if self.solver.centre is None:
+            return np.zeros(3)
+        points, triangles = body.points[: body.cloud.surface_count], body.triangles
+        centre = centre_of_volume(points, triangles)
+        drift = surface_flux(points, triangles, surface) @ (points - centre) / body.volume()[0]
+        return (self.solver.centre - centre) / time_step - drift
 
     def _inside(self, potential: Floats, twists: dict[int, Floats]) -> Floats:
         """Velocities below the surface `(m, 3)` [m/s]; on a plate they slip along it and go with it."""

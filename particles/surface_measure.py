@@ -97,6 +97,13 @@ def volume_and_gradient(
     return volume, gradient
 
 
+def centre_of_volume(points: Floats, triangles: Indices) -> Floats:
+    """Centre `(3,)` [m] of the volume in a closed surface, by tetrahedra with the origin."""
+    corner = points[triangles]
+    volumes = np.einsum("td,td->t", corner[:, 0], np.cross(corner[:, 1], corner[:, 2])) / 6.0
+    return (volumes @ corner.sum(axis=1)) / (4.0 * volumes.sum())
+
+
 @njit(cache=True)
 def surface_flux(points, triangles, velocity):
     """Volume that each vertex of the surface sweeps in a unit of time, `(k,)` [m^3/s], for `velocity (k, 3)`.

@@ -63,9 +63,7 @@ def markdown(result: dict) -> str:
         for name, by_angle in result["orders"].items()
         for angle, order in by_angle.items()
     ]
-    return (
-        "\n".join(lines) + f"\n\nOrders of the errors in the spacing: {', '.join(orders) or 'not measured'}."
-    )
+    return "\n".join(lines) + f"\n\nOrders of the errors in the spacing: {', '.join(orders) or 'not measured'}."
 
 
 def publish(result: dict) -> None:

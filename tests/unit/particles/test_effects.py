@@ -15,7 +15,7 @@ def test_numbers_of_the_default_joint():
     numbers = dimensionless_numbers(JOINT, BALL)
     assert numbers.bond == pytest.approx(0.0148, rel=0.01)
     assert numbers.ohnesorge == pytest.approx(2.06e-3, rel=0.01)
-    assert numbers.viscous_time == pytest.approx(0.292, rel=0.01)
+    assert numbers.viscous_time == pytest.approx(0.0585, rel=0.01)
 
 
 def test_a_long_process_is_quasi_static():
