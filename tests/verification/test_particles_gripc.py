@@ -143,7 +143,7 @@ def test_a_cube_flows_with_the_energy_decreasing():
     solder = Solder(
         volume=1e-9,
         pad_contact_angle=2.0 * np.pi / 3.0,
-        effects=SolderEffects(gravity="off"),
+        effects=SolderEffects(gravity="off", inertia="on", viscosity="on"),
         numerics=SolderNumerics(scheme="gripc", time_step_limit=0.5),
         **PAPER,
     )
