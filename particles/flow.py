@@ -123,11 +123,11 @@ class LiquidFlow:
             body.triangles, flips = flip_to_delaunay(
                 body.points, body.triangles, (*cloud.rings, *(on for _, on in planes))
             )
-        count = cloud.surface_count
-        offset = np.zeros_like(body.points)
+        count, surface = cloud.surface_count, body.surface()
         for _ in range(self.solver.smoothing_passes):
-            offset[:count] = smoothing_offsets(body.points, body.triangles, count, cloud.rings, planes)
-            body.points += self.physics.admit(body, offset)
+            offset = smoothing_offsets(surface.points, surface.triangles, count, cloud.rings, planes)
+            surface.points = surface.points + self.physics.admit(surface, offset)
+        body.points[:count] = surface.points
         self.neighbours.update(body.points)
         body.points[count:] += interior_shift(body, self.neighbours)
         return flips
