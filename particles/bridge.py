@@ -8,7 +8,7 @@ import numpy as np
 from particles.body import Body
 from particles.cloud import Cloud
 from particles.drops import run_drops
-from particles.effects import decide_effects
+from particles.effects import decide_effects, switched
 from particles.flow import LiquidFlow
 from particles.geometry import JointGeometry
 from particles.metrics import bridge_metrics
@@ -41,7 +41,7 @@ def solve_bridge(
     Raises: as `run_drops`.
     """
     both = solder.model_copy(update={"volume": 2.0 * solder.volume})
-    effects = {name: decision["on"] for name, decision in decide_effects(geometries[0], solder).items()}
+    effects = switched(decide_effects(geometries[0], solder))
 
     def start(body: Body) -> LiquidFlow:
         return start_flow(body.cloud, both, effects, pad_lines(body.cloud, both))

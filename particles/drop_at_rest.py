@@ -9,7 +9,7 @@ from particles.checkpoint import Checkpoint
 from particles.cloud import Cloud, box_cloud, free_box_cloud
 from particles.contact_line import ContactLine
 from particles.contact_line_hysteresis import HystereticLine
-from particles.effects import Decision, acting_weight, decide_drop
+from particles.effects import Decision, acting_weight, decide_drop, switched
 from particles.flow import LiquidFlow
 from particles.metrics import Metrics, body_metrics, reference_drop
 from particles.parameters import Solder
@@ -65,7 +65,7 @@ def flow_to_rest(
     checkpoint: Checkpoint | None = None,
 ) -> tuple[LiquidFlow, Run]:
     """The flow of a drop at rest, and its run; arguments and errors as `drop_to_rest`."""
-    acting = {name: decision["on"] for name, decision in decide_drop(solder, drop.is_free).items()}
+    acting = switched(decide_drop(solder, drop.is_free))
     whole = free_box_cloud(drop.edge, drop.count) if drop.is_free else box_cloud(drop.edge, drop.count)
     cloud = cut(whole, drop.symmetry_axes)
     flow = start_flow(cloud, solder, acting, _contact_lines(drop, solder, cloud))

@@ -6,13 +6,12 @@ from functools import partial
 from math import inf
 
 import numpy as np
-from numpy.typing import NDArray
 
 from particles.checkpoint import Checkpoint
 from particles.cloud import Cloud, box_cloud
 from particles.cloud_sphere import sphere_cloud
 from particles.drops import Drop, run_drops
-from particles.effects import Decision, acting_weight, decide_drop
+from particles.effects import Decision, acting_weight, decide_drop, switched
 from particles.flow import LiquidFlow
 from particles.metrics import Metrics, body_metrics, particle_pressure, reference_drop
 from particles.parameters import Solder
@@ -20,10 +19,9 @@ from particles.profile import fit_profile
 from particles.reflow import contact_line, start_flow, stop_rule
 from particles.rest import Run
 from particles.scene_drops import Drops
-from particles.shape import JointShape, Snapshot
+from particles.shape import JointShape, Snapshot, numbered_on, together
+from particles.surface_measure import centre_of_volume
 from particles.young_laplace import Meridian, sphere_meridian
-
-Floats = NDArray[np.float64]
 
 WORST = ("_error", "_drift", "_scatter", "_at_rest")
 
@@ -56,7 +54,7 @@ def pair_to_rest(
         SolveFailed: a linear solve failed.
     """
     effects = decide_drop(solder, scene.is_free)
-    acting = {name: decision["on"] for name, decision in effects.items()}
+    acting = switched(effects)
     start = partial(_start, solder, acting)
     flows = [start(cloud) for cloud in start_clouds(scene)]
     rule = stop_rule(flows[0].body.cloud, solder, acting)
@@ -117,7 +115,7 @@ def _drop_metrics(scene: Drops, solder: Solder, drop: Drop, reference: Meridian)
     if not scene.is_free:
         return metrics
     surface = body.points[: body.cloud.surface_count]
-    radius = np.linalg.norm(surface - _centroid(surface, body.triangles), axis=1)
+    radius = np.linalg.norm(surface - centre_of_volume(surface, body.triangles), axis=1)
     return metrics | {"radius_error": (float(np.abs(radius / (0.5 * reference.height) - 1.0).max()), "")}
 
 
@@ -130,25 +128,17 @@ def _worst(results: Sequence[Metrics]) -> Metrics:
     return worst
 
 
-def _centroid(points: Floats, triangles: NDArray[np.int32]) -> Floats:
-    """Centroid `(3,)` [m] of the volume in a closed surface, by tetrahedra with the origin."""
-    corner = points[triangles]
-    sixfold = np.einsum("ij,ij->i", corner[:, 0], np.cross(corner[:, 1], corner[:, 2]))
-    return (sixfold[:, None] * corner.sum(axis=1)).sum(axis=0) / (4.0 * sixfold.sum())
-
-
 def _shape(drops: Sequence[Drop], metrics: Metrics, capillary: float) -> JointShape:
     """All drops that are left as one shape, the history that of the first; `capillary`: mu / gamma."""
     bodies = [drop.flow.body for drop in drops]
-    on_surface = np.concatenate([np.arange(len(body.points)) < body.cloud.surface_count for body in bodies])
-    order = np.argsort(~on_surface, kind="stable")
-    together = _side_by_side([_now(drop) for drop in drops])
+    counts = [body.cloud.surface_count for body in bodies]
+    points = together([body.points for body in bodies], counts)
     return JointShape(
-        points=together.points[order],
-        velocity=np.concatenate([body.velocity for body in bodies])[order],
-        pressure=np.concatenate([particle_pressure(drop.flow) for drop in drops])[order],
-        surface_points=together.points[order][: int(on_surface.sum())],
-        triangles=np.argsort(order)[together.triangles].astype(np.int32),
+        points=points,
+        velocity=together([body.velocity for body in bodies], counts),
+        pressure=together([particle_pressure(drop.flow) for drop in drops], counts),
+        surface_points=points[: sum(counts)],
+        triangles=np.concatenate(numbered_on([body.triangles for body in bodies], counts)),
         rings=(),
         history=Run(records=drops[0].records).history(capillary),
         snapshots=_stages(drops),
@@ -174,7 +164,6 @@ def _now(drop: Drop) -> Snapshot:
 
 def _side_by_side(states: Sequence[Snapshot]) -> Snapshot:
     """States of several drops as one."""
-    firsts = np.cumsum([0, *(len(state.points) for state in states[:-1])])
-    triangles = [state.triangles + first for state, first in zip(states, firsts, strict=True)]
+    triangles = numbered_on([state.triangles for state in states], [len(state.points) for state in states])
     points = np.concatenate([state.points for state in states])
-    return Snapshot(max(state.time for state in states), points, np.concatenate(triangles).astype(np.int32))
+    return Snapshot(max(state.time for state in states), points, np.concatenate(triangles))

@@ -69,6 +69,11 @@ def _numbers(solder: Solder, length: float, area: float) -> Numbers:
     )
 
 
+def switched(effects: Mapping[str, Decision]) -> dict[str, bool]:
+    """Which effects act: name to on or off."""
+    return {name: decision["on"] for name, decision in effects.items()}
+
+
 def acting_weight(solder: Solder, effects: Mapping[str, Decision]) -> float:
     """Weight of the unit volume that acts [N/m^3]."""
     return solder.density * solder.gravity if effects["gravity"]["on"] else 0.0

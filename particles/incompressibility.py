@@ -3,9 +3,9 @@
     A v - C^T p = f,     C v + S p = g
 
 A is the mass over the time step plus implicit viscosity and surface tension, symmetric and positive definite. The rows
-of C are the divergence of every particle below the surface, times its volume, and one global row a . v = dV/dt, a the
-gradient of the enclosed volume: without it every local operator loses volume. The unknowns p are pressures; at rest
-the local ones vanish, the global one is the capillary pressure, and f = -p a makes the discrete energy stationary.
+of C are gradients of volumes, which add up to the gradient a of the enclosed volume: of the particles' dual volumes, or
+of the whole body alone. The unknowns p are pressures; at rest they equal the capillary pressure, and f = -p a makes the
+discrete energy stationary.
 """
 
 from dataclasses import dataclass
@@ -89,7 +89,7 @@ def _cholesky(matrix: sparse.csr_matrix) -> PETSc.KSP:
     return solver
 
 
-class Inverse:
+class _Inverse:
     """x -> A^-1 x on NumPy vectors; only the rows that A couples are factored."""
 
     def __init__(self, matrix: sparse.csr_matrix) -> None:
@@ -114,7 +114,7 @@ class Inverse:
 class _Schur:
     """PETSc shell of C A^-1 C^T + S."""
 
-    def __init__(self, problem: SaddlePoint, inverse: Inverse) -> None:
+    def __init__(self, problem: SaddlePoint, inverse: _Inverse) -> None:
         self._problem, self._transposed, self._inverse = problem, problem.constraint.T.tocsr(), inverse
 
     def mult(self, _matrix: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
@@ -135,14 +135,14 @@ def solve(problem: SaddlePoint) -> Solution:
         SolveFailed: the true residual of either equation stays above the limit.
     """
     operator, constraint = problem.operator, problem.constraint
-    inverse = Inverse(operator)
+    inverse = _Inverse(operator)
     lumped = constraint @ sparse.diags(1.0 / operator.diagonal()) @ constraint.T
     if problem.stabilisation is not None:
         lumped = lumped + problem.stabilisation
     count = constraint.shape[0]
     shell = PETSc.Mat().createPython([count, count], _Schur(problem, inverse), comm=PETSc.COMM_SELF)
     shell.setUp()
-    solver = conjugate_gradients(shell, petsc(lumped.tocsr()))
+    solver = _conjugate_gradients(shell, petsc(lumped.tocsr()))
     solver.getPC().setType(PETSc.PC.Type.CHOLESKY)
     solver.getPC().setFactorSolverType("mumps")
     unconstrained = inverse(problem.load)
@@ -159,7 +159,7 @@ def solve(problem: SaddlePoint) -> Solution:
     return solution
 
 
-def conjugate_gradients(operator: PETSc.Mat, preconditioner: PETSc.Mat) -> PETSc.KSP:
+def _conjugate_gradients(operator: PETSc.Mat, preconditioner: PETSc.Mat) -> PETSc.KSP:
     """Set up conjugate gradients on the pressure."""
     solver = PETSc.KSP().create(PETSc.COMM_SELF)
     solver.setOperators(operator, preconditioner)

@@ -9,7 +9,7 @@ from particles.body import Body
 from particles.checkpoint import Checkpoint
 from particles.cloud import Cloud, TooLittleSolder, box_cloud, joint_cloud
 from particles.contact_line import ContactLine
-from particles.effects import decide_effects
+from particles.effects import decide_effects, switched
 from particles.flow import LiquidFlow
 from particles.force_gravity import Gravity
 from particles.force_surface_tension import SurfaceTension
@@ -74,14 +74,9 @@ def solve_joint(
     return _parted(geometry, solder, flow, shape) if run.ruptured else shape
 
 
-def _acting(geometry: JointGeometry, solder: Solder) -> dict[str, bool]:
-    """Which effects act."""
-    return {name: decision["on"] for name, decision in decide_effects(geometry, solder).items()}
-
-
 def _parted(geometry: JointGeometry, solder: Solder, flow: LiquidFlow, shape: JointShape) -> JointShape:
     """The shape of a joint whose neck has collapsed: a drop at rest on each pad; where that cannot be, as it is."""
-    effects = _acting(geometry, solder) | {"inertia": False, "viscosity": False}
+    effects = switched(decide_effects(geometry, solder)) | {"inertia": False, "viscosity": False}
 
     def start(body: Body) -> LiquidFlow:
         return start_flow(body.cloud, solder, effects, pad_lines(body.cloud, solder))
@@ -94,7 +89,7 @@ def _start_on_board(geometry: JointGeometry, solder: Solder) -> tuple[LiquidFlow
     """Set up the flow of a drop on the board's disc alone."""
     edge = float(np.cbrt(solder.volume))
     cloud = box_cloud(edge, max(FEWEST_PER_EDGE, 1 + round(edge / solder.numerics.spacing)))
-    effects = _acting(geometry, solder)
+    effects = switched(decide_effects(geometry, solder))
     lines = (contact_line(cloud, 0, geometry.radius_board, solder),)
     return start_flow(cloud, solder, effects, lines), stop_rule(cloud, solder, effects)
 
@@ -110,7 +105,7 @@ def _open_shape(geometry: JointGeometry, solder: Solder, flow: LiquidFlow, run: 
 def start_joint(geometry: JointGeometry, solder: Solder) -> tuple[LiquidFlow, StopRule]:
     """Set up the flow of a joint from its double cone, with the effects that are called for, and when it ends."""
     cloud = joint_cloud(geometry, solder.volume, solder.numerics.spacing)
-    effects = _acting(geometry, solder)
+    effects = switched(decide_effects(geometry, solder))
     radii = (geometry.radius_board, geometry.radius_package)
     lines = tuple(contact_line(cloud, wall, radius, solder) for wall, radius in enumerate(radii))
     return start_flow(cloud, solder, effects, lines), stop_rule(cloud, solder, effects)

@@ -1,5 +1,6 @@
 """The result of a reflow: one joint's shape and how it came about. Plain data."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -7,6 +8,18 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int32]
+
+
+def together(arrays: Sequence[NDArray], counts: Sequence[int]) -> NDArray:
+    """Values of the particles of several bodies as of one: those on the surfaces first, `counts` of them."""
+    pairs = list(zip(arrays, counts, strict=True))
+    return np.concatenate([array[:count] for array, count in pairs] + [array[count:] for array, count in pairs])
+
+
+def numbered_on(indices: Sequence[Indices], counts: Sequence[int]) -> list[Indices]:
+    """Indices into each of several arrays, as they are when the arrays, `counts` long, follow each other."""
+    firsts = np.cumsum([0, *counts[:-1]])
+    return [(own + first).astype(np.int32) for own, first in zip(indices, firsts, strict=True)]
 
 
 @dataclass(frozen=True, slots=True)

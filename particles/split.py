@@ -4,7 +4,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from particles.body import Body
 from particles.cloud_level_set import cloud_from_level_set
@@ -15,7 +14,7 @@ from particles.plate import Plate
 from particles.profile import Profile, fit_profile
 from particles.rebuild import closed_surface
 from particles.rest import Run, StopRule, run_to_rest
-from particles.shape import JointShape
+from particles.shape import JointShape, numbered_on, together
 
 # A neck nearer to a plate than this leaves no drop there that particles could fill.
 FEWEST_SPACINGS = 2.0
@@ -75,24 +74,18 @@ def parted_shape(joint: JointShape, drops: Sequence[Flowed]) -> JointShape:
     """
     bodies = [flow.body for flow, _ in drops]
     counts = [body.cloud.surface_count for body in bodies]
-    points = _together([body.points for body in bodies], counts)
+    points = together([body.points for body in bodies], counts)
     kept = {name: number for name, number in joint.metrics.items() if name in KEPT_METRICS}
     return replace(
         joint,
         points=points,
-        velocity=_together([body.velocity for body in bodies], counts),
-        pressure=_together([particle_pressure(flow) for flow, _ in drops], counts),
+        velocity=together([body.velocity for body in bodies], counts),
+        pressure=together([particle_pressure(flow) for flow, _ in drops], counts),
         surface_points=points[: sum(counts)],
-        triangles=np.concatenate((bodies[0].triangles, bodies[1].triangles + np.int32(counts[0]))),
-        rings=(bodies[0].cloud.rings[0], bodies[1].cloud.rings[0] + np.int32(counts[0])),
+        triangles=np.concatenate(numbered_on([body.triangles for body in bodies], counts)),
+        rings=tuple(numbered_on([body.cloud.rings[0] for body in bodies], counts)),
         metrics=kept | _drop_metrics(drops),
     )
-
-
-def _together(arrays: Sequence[NDArray], counts: Sequence[int]) -> NDArray:
-    """Values of the particles of all bodies: those on the surfaces first, `counts` of them."""
-    pairs = list(zip(arrays, counts, strict=True))
-    return np.concatenate([array[:count] for array, count in pairs] + [array[count:] for array, count in pairs])
 
 
 def _drop_metrics(drops: Sequence[Flowed]) -> Metrics:

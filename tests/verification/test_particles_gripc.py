@@ -8,7 +8,7 @@ import pytest
 
 from particles.cloud import box_cloud
 from particles.collocation import collocate
-from particles.effects import decide, drop_numbers
+from particles.effects import decide, drop_numbers, switched
 from particles.flow import LiquidFlow
 from particles.gripc_step import GripcStep
 from particles.mls import DegenerateStencil
@@ -148,7 +148,7 @@ def test_a_cube_flows_with_the_energy_decreasing():
         **PAPER,
     )
     cloud = box_cloud(1e-3, 7)
-    effects = {name: decision["on"] for name, decision in decide(drop_numbers(solder), solder).items()}
+    effects = switched(decide(drop_numbers(solder), solder))
     assert effects["inertia"] and effects["viscosity"]
     flow = start_flow(cloud, solder, effects, (contact_line(cloud, 0, np.inf, solder),))
     records = [flow.step() for _ in range(45)]
