@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 from fem.element import Elements, Geometry, critical_steps, element_geometry, lumped_mass
 from fem.errors import MassError
 from fem.exchange import SharedNodes
-from fem.force import ForceTerm, elastic_terms
+from fem.force import ForceTerm, Kinematics, force_terms
 from fem.local_mesh import LocalMesh
 from fem.materials import elasticity_matrix, material_of_part, role_of_part
-from fem.parameters import Materials
+from fem.parameters import Material, Materials
 from fem.scene import Tables
 from fem.tie import Tie
 
@@ -30,6 +30,7 @@ class Pieces:
         steps: ``(ne,)`` critical step of each element [s].
         roles: ``(ne,)`` material role of each element.
         parts: ``(ne,)`` part of each element.
+        materials: Material of each part.
     """
 
     local: LocalMesh
@@ -38,6 +39,20 @@ class Pieces:
     steps: NDArray[np.float64]
     roles: NDArray[np.str_]
     parts: NDArray[np.int32]
+    materials: tuple[Material, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Response:
+    """What the internal force depends on besides elements and materials.
+
+    Attributes:
+        kinematics: Whether rotations and strains are small.
+        step: dt [s], of laws that depend on the rate; infinity stands for slow.
+    """
+
+    kinematics: Kinematics = "small"
+    step: float = np.inf
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +86,7 @@ def make_pieces(local: LocalMesh, tables: Tables, materials: Materials) -> Piece
     """Give the local elements their materials, and find their critical steps."""
     local = local.with_nodes(*masters_of(local, tables))
     number = tables.part[local.cell_numbers]
-    assigned = [material_of_part(name, materials) for name in tables.part_names]
+    assigned = tuple(material_of_part(name, materials) for name in tables.part_names)
     elements = Elements(
         points=local.points,
         cells=local.cells,
@@ -82,7 +97,7 @@ def make_pieces(local: LocalMesh, tables: Tables, materials: Materials) -> Piece
     geometry = element_geometry(elements.points, elements.cells)
     steps = critical_steps(elements, geometry.nodal_volume)
     roles = np.array([role_of_part(name) for name in tables.part_names])[number]
-    return Pieces(local, elements, geometry, steps, roles, number)
+    return Pieces(local, elements, geometry, steps, roles, number, assigned)
 
 
 def masters_of(local: LocalMesh, tables: Tables) -> tuple[NDArray[np.integer], NDArray[np.float64]]:
@@ -98,7 +113,9 @@ def local_tie(local: LocalMesh, tie: Tie) -> Tie:
     return Tie(slave[here], local.locate(tie.master[here].ravel()).reshape(-1, 4), tie.weight[here])
 
 
-def make_body(comm: MPI.Comm, pieces: Pieces, tables: Tables, mass_factor: NDArray[np.float64]) -> Body:
+def make_body(
+    comm: MPI.Comm, pieces: Pieces, tables: Tables, mass_factor: NDArray[np.float64], response: Response = Response()
+) -> Body:
     """Assemble masses and forces of a model; collective.
 
     Args:
@@ -106,6 +123,7 @@ def make_body(comm: MPI.Comm, pieces: Pieces, tables: Tables, mass_factor: NDArr
         pieces: The rank's elements.
         tables: The model's tables.
         mass_factor: ``(ne,)`` factor on the density of each element.
+        response: Kinematics and step.
     """
     local = pieces.local
     plain = pieces.elements
@@ -118,7 +136,7 @@ def make_body(comm: MPI.Comm, pieces: Pieces, tables: Tables, mass_factor: NDArr
     held = local.locate(tables.held_nodes)
     free[held[held >= 0]] = ~tables.held[held >= 0]
     free[tie.slave] = False
-    terms = elastic_terms(elements)
+    terms = force_terms(elements, pieces.materials, response.kinematics, response.step)
     return Body(
         local, elements, pieces.geometry, terms, tie, shared, local.locate(tables.cut).astype(np.int32), mass, free
     )

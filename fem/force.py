@@ -1,24 +1,49 @@
 """Internal force terms: the contract, and the choice of one for the elements of a mesh."""
 
-from typing import Protocol
+from collections.abc import Sequence
+from typing import Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fem.element import Elements
+from fem.energy import Energy
 from fem.force_assembled import AssembledElements
 from fem.force_congruent import CongruentElements, is_box
+from fem.parameters import Material
+
+Kinematics = Literal["small", "finite"]
 
 
 class ForceTerm(Protocol):
-    """A part of the internal force; a plastic solder or a contact would be another one."""
+    """A part of the internal force."""
+
+    @property
+    def history(self) -> dict[str, NDArray]:
+        """Return the arrays to write and restore in place for a restart; none where force follows from displacement."""
 
     def add(self, displacement: NDArray[np.float64], force: NDArray[np.float64]) -> None:
-        """Add the term's force ``(n, 3)`` [N] at a displacement ``(n, 3)`` [m]; the internal force is subtracted."""
+        """Subtract the internal force ``(n, 3)`` [N] at a displacement ``(n, 3)`` [m].
+
+        A term with a path takes the step from the displacement of the call before: call it exactly once a step.
+        """
+
+    def energy(self, displacement: NDArray[np.float64]) -> Energy:
+        """Return the energies [J] of this rank's elements at the displacement of the latest ``add``."""
 
 
-def elastic_terms(elements: Elements) -> list[ForceTerm]:
-    """Return the force terms of linear elastic hexahedra: boxes share stiffnesses, all others are assembled."""
+def force_terms(
+    elements: Elements, materials: Sequence[Material], kinematics: Kinematics = "small", step: float = np.inf
+) -> list[ForceTerm]:
+    """Return the force terms of elements: linear boxes share stiffnesses, all others are assembled.
+
+    Args:
+        elements: The elements.
+        materials: Material of each index of ``elements.elasticity``.
+        kinematics: Whether rotations and strains are small.
+        step: dt [s], of laws that depend on the rate; infinity stands for slow.
+    """
+    del materials, kinematics, step
     box = is_box(elements.points[elements.cells])
     terms: list[ForceTerm] = []
     if box.any():

@@ -1,12 +1,13 @@
 """Internal force of hexahedra of any shape: one assembled matrix of 3 x 3 blocks."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import scipy.sparse
 from numpy.typing import NDArray
 
 from fem.element import CHUNK, Elements, element_stiffness
+from fem.energy import Energy, linear_energy
 from fem.kernels_force import add_block_force, assemble_upper_blocks
 
 
@@ -17,6 +18,7 @@ class AssembledElements:
     pointer: NDArray[np.int32]
     columns: NDArray[np.int32]
     blocks: NDArray[np.float64]
+    history: dict[str, NDArray] = field(default_factory=dict)
 
     @classmethod
     def build(cls, elements: Elements) -> "AssembledElements":
@@ -31,6 +33,10 @@ class AssembledElements:
     def add(self, displacement: NDArray[np.float64], force: NDArray[np.float64]) -> None:
         """Subtract K u from the force."""
         add_block_force(self.pointer, self.columns, self.blocks, displacement, force)
+
+    def energy(self, displacement: NDArray[np.float64]) -> Energy:
+        """Return the strain energy."""
+        return linear_energy(self, displacement)
 
 
 def upper_pattern(cells: NDArray[np.int32], count: int) -> tuple[NDArray[np.int32], NDArray[np.int32]]:

@@ -5,12 +5,13 @@ the 24 x 24 stiffness falls into eight blocks of 3 x 3, one per parity: the mode
 the index p XOR 2^c. A product costs 216 multiplications and additions instead of 1152, with one small table per shape.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fem.element import Elements, classes, element_stiffness
+from fem.energy import Energy, linear_energy
 from fem.kernels_force import add_box_force
 
 SIGNS = np.array([[(-1.0) ** bin(p & a).count("1") for a in range(8)] for p in range(8)])
@@ -26,11 +27,13 @@ class CongruentElements:
         cells: ``(ne, 8)`` int32.
         shape: ``(ne,)`` int32, class of each element.
         blocks: ``(ns, 8, 6)`` [N/m], see ``kernels_force.add_box_force``.
+        history: Empty.
     """
 
     cells: NDArray[np.int32]
     shape: NDArray[np.int32]
     blocks: NDArray[np.float64]
+    history: dict[str, NDArray] = field(default_factory=dict)
 
     @classmethod
     def build(cls, elements: Elements) -> "CongruentElements":
@@ -47,6 +50,10 @@ class CongruentElements:
     def add(self, displacement: NDArray[np.float64], force: NDArray[np.float64]) -> None:
         """Subtract K u from the force."""
         add_box_force(self.cells, self.blocks, self.shape, displacement, force)
+
+    def energy(self, displacement: NDArray[np.float64]) -> Energy:
+        """Return the strain energy."""
+        return linear_energy(self, displacement)
 
 
 def is_box(corners: NDArray[np.float64]) -> NDArray[np.bool_]:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from fem import dolfinx_api
 from fem.agreement import agreed
-from fem.body import Body, make_body, make_pieces
+from fem.body import Body, Response, make_body, make_pieces
 from fem.communicators import Communicators, Role
 from fem.inputs import RunInput
 from fem.local_mesh import distribute
@@ -31,10 +31,10 @@ def build_models(comms: Communicators, request: RunInput) -> tuple[dict[Role, Mo
         world, lambda: {role: make_pieces(meshes[role], inputs[role][1], request.materials) for role in meshes}
     )
     steps = choose_steps(world, [(pieces[role], inputs[role][1]) for role in pieces], request.shock)
-    models = {
-        role: Model(inputs[role][1], make_body(comms.models[role], pieces[role], inputs[role][1], factor))
-        for role, factor in zip(pieces, steps.mass_factors, strict=True)
-    }
+    models = {}
+    for role, factor in zip(pieces, steps.mass_factors, strict=True):
+        tables, response = inputs[role][1], Response(step=steps.step_of(role))
+        models[role] = Model(tables, make_body(comms.models[role], pieces[role], tables, factor, response))
     return models, steps
 
 

@@ -8,6 +8,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from fem.body import Pieces
+from fem.communicators import Role
 from fem.errors import AgreedError
 from fem.estimate import WindowPlan, window_plan
 from fem.parameters import Materials, Shock
@@ -33,6 +34,10 @@ class Steps:
     cut: float
     added_mass: float
     model_mass: float
+
+    def step_of(self, role: Role) -> float:
+        """Return the time step of a model [s]."""
+        return self.plan.window if role == "macro" else self.plan.step
 
 
 def choose_steps(world: MPI.Comm, models: Sequence[tuple[Pieces, Tables]], shock: Shock) -> Steps:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fem.element import Elements, element_geometry
-from fem.force import elastic_terms
+from fem.force import force_terms
 from fem.materials import elasticity_matrix
 from fem.parameters import FR4, SAC405, Isotropic
 from fem.stress import element_stress
@@ -30,7 +30,7 @@ def test_patch_of_distorted_hexahedra_carries_constant_stress(material):
     gradient = RANDOM.uniform(-1, 1, (3, 3))
     displacement = points @ gradient.T
     force = np.zeros_like(points)
-    for term in elastic_terms(elements):
+    for term in force_terms(elements, [material]):
         term.add(displacement, force)
     inner = np.all((points > 1e-9) & (points < 1 - 1e-9), axis=1)
     assert np.abs(force[inner]).max() < 1e-12 * np.abs(force).max()

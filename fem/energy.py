@@ -1,0 +1,45 @@
+"""Energy that a force term holds or has used up."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, slots=True)
+class Energy:
+    """Energies of the elements of one rank [J].
+
+    Attributes:
+        strain: Elastic strain energy, recoverable.
+        plastic: Work dissipated by plastic flow so far.
+        hourglass: Energy of the hourglass stiffness of elements with one integration point.
+    """
+
+    strain: float = 0.0
+    plastic: float = 0.0
+    hourglass: float = 0.0
+
+    def __add__(self, other: "Energy") -> "Energy":
+        """Add energy by energy."""
+        return Energy(self.strain + other.strain, self.plastic + other.plastic, self.hourglass + other.hourglass)
+
+    @property
+    def total(self) -> float:
+        """Return the work that the internal force has taken up [J]."""
+        return self.strain + self.plastic + self.hourglass
+
+
+class InternalForce(Protocol):
+    """Something that subtracts an internal force; see ``force.ForceTerm``."""
+
+    def add(self, displacement: NDArray[np.float64], force: NDArray[np.float64]) -> None:
+        """Subtract the internal force ``(n, 3)`` [N] at a displacement ``(n, 3)`` [m]."""
+
+
+def linear_energy(term: InternalForce, displacement: NDArray[np.float64]) -> Energy:
+    """Return the strain energy u . K u / 2 of a term that is linear in the displacement ``(n, 3)`` [m]."""
+    force = np.zeros_like(displacement)
+    term.add(displacement, force)
+    return Energy(strain=-0.5 * float(np.vdot(displacement, force)))
