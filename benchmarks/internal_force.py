@@ -1,65 +1,57 @@
-"""Element updates per second of the internal force: this program's two paths, PETSc, and dolfinx, in one run.
+"""Element updates per second of the internal force: this program's paths, PETSc and dolfinx in one run; memory.
 
     python benchmarks/internal_force.py        (one core; writes benchmarks/results/internal_force.json)
 
-All act on the same board of 8-node hexahedra of FR4 and on the same displacement. dolfinx assembles the plain trilinear
-form (degree 2 quadrature), the others the element with incompatible modes: equal work for a user, not equal numbers.
+All act on a cube of 40^3 hexahedra of steel, sides in turns, medians of processor seconds. dolfinx assembles the plain
+trilinear form with 2 x 2 x 2 Gauss points and the best flags of its compiler; ours have incompatible modes, which do not
+lock in bending: equal work for a user, not equal numbers. ``congruent`` knows that the elements are boxes of one shape,
+``assembled`` and ``petsc_baij`` multiply by the matrix of a cube whose inner nodes were shaken by 20 % of an edge.
 """
 
-import json
+import ctypes
+import gc
 import os
-import time
 from collections.abc import Callable
 from pathlib import Path
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
+os.environ.setdefault("NUMBA_NUM_THREADS", "1")
 
 import dolfinx.fem
-import dolfinx.fem.petsc
 import numpy as np
 import ufl
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from benchmarks.support import turns
+from benchmarks.support.cube import STEEL, cube, elements_of, random_displacement
 from fem import dolfinx_api
-from fem.element import Elements, element_stiffness
-from fem.force_assembled import AssembledElements
-from fem.force_congruent import CongruentElements
-from fem.materials import elasticity_matrix
+from fem.element import CHUNK, Elements, element_stiffness
+from fem.force import ForceTerm, force_terms
 from fem.mesh import MeshData
-from fem.parameters import FR4
-from tests.support.fem_models import grid, mesh_of
 
-COUNTS, SIZE = (40, 30, 4), (0.5e-3, 0.5e-3, 0.25e-3)
-SECONDS = 1.0
+BEST_FLAGS = ["-O3", "-march=native", "-ffast-math"]
+PAGE = os.sysconf("SC_PAGE_SIZE")
 
 
-def rate(work: Callable[[], object], elements: int) -> float:
-    """Return element updates per second, best of five batches."""
-    work()
-    begin = time.perf_counter()
-    work()
-    repeats = max(1, int(SECONDS / 5 / (time.perf_counter() - begin)))
-    best = np.inf
-    for _ in range(5):
-        begin = time.perf_counter()
-        for _ in range(repeats):
-            work()
-        best = min(best, (time.perf_counter() - begin) / repeats)
-    return elements / best
+def only_term(elements: Elements) -> ForceTerm:
+    (term,) = force_terms(elements, [STEEL])
+    return term
 
 
-def board() -> MeshData:
-    points, cells = grid(*(np.arange(count + 1) * size for count, size in zip(COUNTS, SIZE, strict=True)))
-    return mesh_of(points, cells, "board", {})
+def force_of(term: ForceTerm, displacement: np.ndarray) -> Callable[[], object]:
+    force = np.zeros_like(displacement)
+    return lambda: term.add(displacement, force)
 
 
 def petsc_product(elements: Elements) -> Callable[[], object]:
     count = len(elements.points)
     matrix = PETSc.Mat().createBAIJ((3 * count, 3 * count), bsize=3, comm=MPI.COMM_SELF)
     matrix.setPreallocationNNZ(27)
-    for nodes, stiffness in zip(elements.cells, element_stiffness(elements), strict=True):
-        matrix.setValuesBlocked(nodes, nodes, stiffness, addv=PETSc.InsertMode.ADD_VALUES)
+    for start in range(0, len(elements.cells), CHUNK):
+        some = elements.subset(np.arange(start, min(start + CHUNK, len(elements.cells))))
+        for nodes, stiffness in zip(some.cells, element_stiffness(some), strict=True):
+            matrix.setValuesBlocked(nodes, nodes, stiffness, addv=PETSc.InsertMode.ADD_VALUES)
     matrix.assemble()
     source, target = matrix.createVecs()
     source.setRandom()
@@ -70,41 +62,66 @@ def dolfinx_assembly(mesh: MeshData) -> Callable[[], object]:
     space = dolfinx_api.vector_space(dolfinx_api.hexahedral_mesh(MPI.COMM_SELF, mesh.points, mesh.cells))
     displacement, test = dolfinx.fem.Function(space), ufl.TestFunction(space)
     displacement.x.array[:] = np.random.default_rng(0).uniform(-1, 1, len(displacement.x.array))
-    elasticity = ufl.as_matrix(elasticity_matrix(FR4).tolist())
-
-    def strain(field):
-        e = ufl.sym(ufl.grad(field))
-        return ufl.as_vector([e[0, 0], e[1, 1], e[2, 2], 2 * e[0, 1], 2 * e[1, 2], 2 * e[0, 2]])
-
+    young, poisson = STEEL.young_modulus, STEEL.poisson_ratio
+    shear = young / (2 * (1 + poisson))
+    lame = 2 * shear * poisson / (1 - 2 * poisson)
+    strain = ufl.sym(ufl.grad(displacement))
+    stress = lame * ufl.tr(strain) * ufl.Identity(3) + 2 * shear * strain
     measure = ufl.dx(metadata={"quadrature_degree": 2})
-    form = dolfinx.fem.form(ufl.inner(elasticity * strain(displacement), strain(test)) * measure)
-    vector = dolfinx.fem.petsc.create_vector(form)
-    return lambda: dolfinx.fem.petsc.assemble_vector(vector, form)
+    form = dolfinx_api.compiled_form(ufl.inner(stress, ufl.sym(ufl.grad(test))) * measure, BEST_FLAGS)
+    vector = np.zeros_like(displacement.x.array)
+    return lambda: dolfinx.fem.assemble_vector(vector, form)
+
+
+def resident() -> int:
+    """Return the resident bytes of this process after all that is free has gone back to the system."""
+    gc.collect()
+    ctypes.CDLL("libc.so.6").malloc_trim(0)
+    return int(Path("/proc/self/statm").read_text().split()[1]) * PAGE
+
+
+def array_bytes(term: ForceTerm) -> int:
+    return sum(value.nbytes for name in term.__slots__ if isinstance(value := getattr(term, name), np.ndarray))
+
+
+def memory(elements: Elements) -> dict[str, float]:
+    """Return the bytes an element that a term holds: counted over its arrays, and as the growth of the process."""
+    warm = elements.subset(np.arange(64))
+    only_term(warm)
+    before = resident()
+    term = only_term(elements)
+    grown, count = resident() - before, len(elements.cells)
+    return {"arrays": array_bytes(term) / count, "resident": grown / count}
 
 
 def main() -> None:
-    mesh = board()
-    count = len(mesh.cells)
-    elements = Elements(mesh.points, mesh.cells, mesh.part, elasticity_matrix(FR4)[None], np.full(count, FR4.density))
-    displacement = np.random.default_rng(0).uniform(-1, 1, mesh.points.shape)
-    force = np.zeros_like(displacement)
-    congruent, assembled = CongruentElements.build(elements), AssembledElements.build(elements)
-    rates = {
-        "congruent": rate(lambda: congruent.add(displacement, force), count),
-        "assembled": rate(lambda: assembled.add(displacement, force), count),
-        "petsc_baij": rate(petsc_product(elements), count),
-        "dolfinx_assemble_vector": rate(dolfinx_assembly(mesh), count),
-    }
-    base = rates["dolfinx_assemble_vector"]
-    result = {
-        "elements": count,
-        "updates_per_second": rates,
-        "ratio_to_dolfinx": {name: value / base for name, value in rates.items()},
-    }
-    path = Path(__file__).parent / "results" / "internal_force.json"
-    path.parent.mkdir(exist_ok=True)
-    path.write_text(json.dumps(result, indent=1))
-    print(json.dumps(result, indent=1))
+    boxes, distorted = elements_of(cube()), elements_of(cube(distorted=True))
+    memories = {"congruent": memory(boxes), "assembled": memory(distorted)}
+    displacement = random_displacement(cube())
+    seconds = turns.in_turns(
+        {
+            "congruent": turns.batch(force_of(only_term(boxes), displacement)),
+            "assembled": turns.batch(force_of(only_term(distorted), displacement)),
+            "petsc_baij": turns.batch(petsc_product(distorted)),
+            "dolfinx": turns.batch(dolfinx_assembly(cube())),
+        }
+    )
+    against = {name: turns.ratio(seconds, name, "dolfinx") for name in seconds}
+    turns.write(
+        "internal_force",
+        {
+            "elements": len(boxes.cells),
+            "updates_per_second": turns.rates(seconds, len(boxes.cells)),
+            "ratio_to_dolfinx": against,
+            "bytes_an_element": memories,
+            "bars": {
+                "congruent_to_dolfinx": turns.bar(against["congruent"], 8.0),
+                "assembled_to_dolfinx": turns.bar(against["assembled"], 4.0),
+                "congruent_bytes": turns.bar(max(memories["congruent"].values()), 400.0, at_least=False),
+                "assembled_bytes": turns.bar(max(memories["assembled"].values()), 2000.0, at_least=False),
+            },
+        },
+    )
 
 
 if __name__ == "__main__":

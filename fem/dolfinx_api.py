@@ -71,6 +71,13 @@ def cell_dofs(space: dolfinx.fem.FunctionSpace) -> NDArray[np.int32]:
     return array.reshape(cells.size_local + cells.num_ghosts, -1)
 
 
+def compiled_form(form: ufl.Form, flags: list[str]):  # its type has another name in each version
+    """Return a form that the C compiler translated with these flags."""
+    if OLD:
+        return dolfinx.fem.form(form, jit_params={"cffi_extra_compile_args": flags})
+    return dolfinx.fem.form(form, jit_options={"cffi_extra_compile_args": flags})
+
+
 def compile_ahead(comm: MPI.Comm) -> None:
     """Let one rank compile the elements of the output before two communicators wait for one cache entry."""
     if comm.rank == 0:

@@ -1,0 +1,65 @@
+"""Processor seconds of several sides of a comparison, measured in turns: a loaded machine slows all of them alike."""
+
+import json
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+RESULTS = Path(__file__).parents[1] / "results"
+ROUNDS = 9
+BATCH_SECONDS = 0.1
+
+Batch = Callable[[], float]  # makes some calls, returns the processor seconds of one
+
+
+def batch(work: Callable[[], object], seconds: float = BATCH_SECONDS) -> Batch:
+    """Return the batch of as many calls as take some seconds, compiled and warm."""
+    work()
+    begin = time.process_time()
+    work()
+    calls = max(1, round(seconds / max(time.process_time() - begin, 1e-7)))
+
+    def run() -> float:
+        begin = time.process_time()
+        for _ in range(calls):
+            work()
+        return (time.process_time() - begin) / calls
+
+    return run
+
+
+def in_turns(batches: dict[str, Batch], rounds: int = ROUNDS) -> dict[str, np.ndarray]:
+    """Return the processor seconds of a call of each side, one value a round."""
+    rows = [[run() for run in batches.values()] for _ in range(rounds)]
+    return dict(zip(batches, np.array(rows).T, strict=True))
+
+
+def rates(seconds: dict[str, np.ndarray], elements: int) -> dict[str, float]:
+    """Return the median element updates per second of each side."""
+    return {name: float(elements / np.median(values)) for name, values in seconds.items()}
+
+
+def ratio(seconds: dict[str, np.ndarray], ours: str, theirs: str) -> float:
+    """Return how many times faster one side is than another: the median over rounds."""
+    return float(np.median(seconds[theirs] / seconds[ours]))
+
+
+def bar(value: float, limit: float, at_least: bool = True) -> dict[str, Any]:
+    """Return a figure with what is asked of it."""
+    return {
+        "value": value,
+        "limit": limit,
+        "holds_if": "at least" if at_least else "at most",
+        "ok": bool(value >= limit if at_least else value <= limit),
+    }
+
+
+def write(name: str, result: dict[str, Any]) -> None:
+    """Write ``results/<name>.json`` and print it."""
+    RESULTS.mkdir(exist_ok=True)
+    text = json.dumps(result, indent=1)
+    (RESULTS / f"{name}.json").write_text(text)
+    print(text)
