@@ -3,9 +3,10 @@
     python benchmarks/internal_force.py        (one core; writes benchmarks/results/internal_force.json)
 
 All act on a cube of 40^3 hexahedra of steel, sides in turns, medians of processor seconds. dolfinx assembles the plain
-trilinear form with 2 x 2 x 2 Gauss points and the best flags of its compiler; ours have incompatible modes, which do not
-lock in bending: equal work for a user, not equal numbers. ``congruent`` knows that the elements are boxes of one shape,
-``assembled`` and ``petsc_baij`` multiply by the matrix of a cube whose inner nodes were shaken by 20 % of an edge.
+trilinear form with 2 x 2 x 2 Gauss points and the best flags of its compiler; ours have incompatible modes, which do
+not lock in bending: equal work for a user, not equal numbers. ``congruent`` knows that the elements are boxes of one
+shape; ``assembled`` and ``petsc_baij`` multiply by the matrix of a cube whose inner nodes were moved by up to 20 % of
+an edge.
 """
 
 import ctypes
