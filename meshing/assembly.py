@@ -10,13 +10,22 @@ from pathlib import Path
 import gmsh
 import numpy as np
 
-from meshing.blocks import MILLI, Block, RoundHole, Surfaces, extrude, plan_surfaces
+from meshing.blocks import (
+    MILLI,
+    TOLERANCE,
+    Block,
+    RoundHole,
+    Surfaces,
+    check_elements,
+    count_elements,
+    extrude,
+    lies_within_hole,
+    plan_surfaces,
+)
 from meshing.gmsh_session import gmsh_model, name_groups, write_msh
 from meshing.pads import lift
 from meshing.parameters import Board, Package, Warpage
 from meshing.plan import blocks_within, board_plan, footprint, hole_rings, package_plan, patch
-
-TOLERANCE = 1.0e-9  # m, far below any length of a package
 
 
 def write_assembly(package: Package, board: Board, warpage: Warpage, path: Path) -> dict[str, int]:
@@ -46,9 +55,9 @@ def write_assembly(package: Package, board: Board, warpage: Warpage, path: Path)
         name_groups(2, facets)
         gmsh.model.mesh.generate(3)
         _lift_package(package, warpage, [tag for _, tag in gmsh.model.getEntities(3) if tag >= first_of_package])
-        _check_elements()
+        check_elements("assembly")
         write_msh(path, MILLI)
-        return {name: sum(_count(tag) for tag in tags) for name, tags in volumes.items()}
+        return {name: count_elements(tags) for name, tags in volumes.items()}
 
 
 def _board_parts(package: Package, board: Board) -> dict[str, list[int]]:
@@ -94,6 +103,7 @@ def _package_parts(package: Package, board: Board) -> dict[str, list[int]]:
 def _planes_and_holes(board: Board) -> dict[str, list[int]]:
     """Find symmetry planes and hole walls by where the surfaces lie."""
     names: dict[str, list[int]] = {"mounting_holes": []}
+    hole = (0.5 * board.length - board.holes.inset_x, 0.5 * board.width - board.holes.inset_y)
     if board.symmetry == "quarter":
         names |= {"symmetry_x": [], "symmetry_y": []}
     for _, tag in gmsh.model.getEntities(2):
@@ -102,16 +112,9 @@ def _planes_and_holes(board: Board) -> dict[str, list[int]]:
             names["symmetry_x"].append(tag)
         elif board.symmetry == "quarter" and max(abs(y0), abs(y1)) < TOLERANCE:
             names["symmetry_y"].append(tag)
-        elif _at_hole(board, (x0, x1), (y0, y1)):
+        elif lies_within_hole(tag, hole, board.holes.diameter):
             names["mounting_holes"].append(tag)
     return names
-
-
-def _at_hole(board: Board, x: tuple[float, float], y: tuple[float, float]) -> bool:
-    """Whether a surface within these limits [m] lies within the circle of one of the four holes."""
-    centre_x, centre_y = 0.5 * board.length - board.holes.inset_x, 0.5 * board.width - board.holes.inset_y
-    off_centre = [abs(value) - centre_x for value in x] + [abs(value) - centre_y for value in y]
-    return max(map(abs, off_centre)) <= 0.5 * board.holes.diameter + TOLERANCE
 
 
 def _lift_package(package: Package, warpage: Warpage, volumes: list[int]) -> None:
@@ -123,20 +126,9 @@ def _lift_package(package: Package, warpage: Warpage, volumes: list[int]) -> Non
         gmsh.model.mesh.setNode(tag, point, [])
 
 
-def _check_elements() -> None:
-    tags = np.concatenate(list(gmsh.model.mesh.getElements(3)[1]))
-    worst = gmsh.model.mesh.getElementQualities(tags, "minSJ").min()
-    if worst <= 0.0:
-        raise ValueError(f"assembly: smallest scaled Jacobian {worst:.3g}, allowed > 0")
-
-
 def _select(surfaces: Surfaces, blocks: Iterable[Block]) -> Surfaces:
     return {block: surfaces[block] for block in sorted(blocks)}
 
 
 def _flat(surfaces: Surfaces) -> list[int]:
     return list(chain.from_iterable(surfaces.values()))
-
-
-def _count(volume: int) -> int:
-    return sum(len(tags) for tags in gmsh.model.mesh.getElements(3, volume)[1])

@@ -18,6 +18,12 @@ COLOURS = {
 SIZE = (1800, 680)  # pixels; two views side by side
 FROM_ABOVE, FROM_THE_SIDE = (-1.0, -1.3, 1.1), (-1.0, -1.3, 0.45)  # quarter models are cut open towards -x and -y
 MARGIN = 1.06
+LAYER_COLOURS = ("#62a876", "#c2971c", "#56626e", "#b5622d", "#98a2af", "#7a5ea8")
+CORNERS_ONLY = {
+    "hexahedron": (pyvista.CellType.HEXAHEDRON, 8),
+    "tetra": (pyvista.CellType.TETRA, 4),
+    "tetra10": (pyvista.CellType.TETRA, 4),
+}
 
 
 def write_preview(paths: list[Path], picture: Path) -> None:
@@ -35,19 +41,37 @@ def write_preview(paths: list[Path], picture: Path) -> None:
     for column, (title, shown, direction, line_width) in enumerate(views):
         plotter.subplot(0, column)
         for name, grid in shown:
-            surface = grid.extract_surface(algorithm="dataset_surface")
-            plotter.add_mesh(
-                surface, color=colour(name), show_edges=True, edge_color="#1d262e", line_width=line_width, ambient=0.3
-            )
+            _add_part(plotter, grid, colour(name), line_width)
         plotter.add_text(title, font_size=12, color="black")
-        _fit(plotter, np.vstack([_corners(grid) for _, grid in shown]), direction)
+        _fit(plotter, np.vstack([_corners(grid) for _, grid in shown]), direction, 0.5 * SIZE[0] / SIZE[1])
     roles = [role for role in COLOURS if any(_role(name) == role for name, _ in parts)]
-    plotter.add_legend(
-        [(role.replace("_", " "), COLOURS[role]) for role in roles],
-        bcolor="white", face="rectangle", size=(0.2, 0.045 * len(roles)), loc="lower right",
-    )  # fmt: skip
+    _add_legend(plotter, [(role.replace("_", " "), COLOURS[role]) for role in roles])
     plotter.screenshot(picture)
     plotter.close()
+
+
+def write_layers_preview(path: Path, picture: Path) -> None:
+    """Render the elements of a Gmsh file, each physical volume in a colour of its own."""
+    parts = _parts(path)
+    colours = [LAYER_COLOURS[k % len(LAYER_COLOURS)] for k in range(len(parts))]
+    plotter = pyvista.Plotter(off_screen=True, window_size=list(SIZE), border=False)
+    plotter.set_background("white")
+    for (_, grid), shown in zip(parts, colours, strict=True):
+        _add_part(plotter, grid, shown, 1.0)
+    _fit(plotter, np.vstack([_corners(grid) for _, grid in parts]), FROM_ABOVE, SIZE[0] / SIZE[1])
+    _add_legend(plotter, [(name, shown) for (name, _), shown in zip(parts, colours, strict=True)])
+    plotter.screenshot(picture)
+    plotter.close()
+
+
+def _add_part(plotter: pyvista.Plotter, grid: pyvista.UnstructuredGrid, shown: str, line_width: float) -> None:
+    surface = grid.extract_surface(algorithm="dataset_surface")
+    plotter.add_mesh(surface, color=shown, show_edges=True, edge_color="#1d262e", line_width=line_width, ambient=0.3)
+
+
+def _add_legend(plotter: pyvista.Plotter, entries: list[tuple[str, str]]) -> None:
+    size = (0.2, 0.045 * len(entries))
+    plotter.add_legend(entries, bcolor="white", face="rectangle", size=size, loc="lower right")
 
 
 def colour(part: str) -> str:
@@ -61,15 +85,17 @@ def _role(part: str) -> str:
 
 
 def _parts(path: Path) -> list[tuple[str, pyvista.UnstructuredGrid]]:
-    """Name and hexahedra [mm] of every physical volume."""
+    """Name and elements [mm], by their corners, of every physical volume."""
     mesh = meshio.read(path)
     names = [name for name, (_, dimension) in mesh.field_data.items() if dimension == 3]
     grids = []
     for name in names:
-        blocks = [b.data[chosen] for b, chosen in zip(mesh.cells, mesh.cell_sets[name], strict=True) if len(chosen)]
-        used, cells = np.unique(np.vstack(blocks), return_inverse=True)
-        hexahedra = {pyvista.CellType.HEXAHEDRON: cells.reshape(-1, 8)}
-        grids.append((name, pyvista.UnstructuredGrid(hexahedra, mesh.points[used] / MILLI)))
+        pairs = zip(mesh.cells, mesh.cell_sets[name], strict=True)
+        blocks = [(block.type, block.data[chosen]) for block, chosen in pairs if len(chosen)]
+        kind, corners = CORNERS_ONLY[blocks[0][0]]
+        used, cells = np.unique(np.vstack([block[:, :corners] for _, block in blocks]), return_inverse=True)
+        elements = {kind: cells.reshape(-1, corners)}
+        grids.append((name, pyvista.UnstructuredGrid(elements, mesh.points[used] / MILLI)))
     return grids
 
 
@@ -79,8 +105,8 @@ def _corners(grid: pyvista.UnstructuredGrid) -> np.ndarray:
     return np.array([(a, b, c) for a in x for b in y for c in z])
 
 
-def _fit(plotter: pyvista.Plotter, points: np.ndarray, direction: tuple[float, float, float]) -> None:
-    """Look at points (n, 3) from a direction, in parallel projection, so that they fill the view."""
+def _fit(plotter: pyvista.Plotter, points: np.ndarray, direction: tuple[float, float, float], aspect: float) -> None:
+    """Look at points (n, 3) from a direction, in parallel projection, so that they fill a view of this aspect."""
     toward = np.array(direction) / np.linalg.norm(direction)
     right = np.cross([0.0, 0.0, 1.0], toward)
     right /= np.linalg.norm(right)
@@ -91,5 +117,5 @@ def _fit(plotter: pyvista.Plotter, points: np.ndarray, direction: tuple[float, f
     camera = plotter.camera
     camera.enable_parallel_projection()
     camera.focal_point, camera.position, camera.up = focus, focus + 4.0 * (depth + half_width) * toward, (0.0, 0.0, 1.0)
-    camera.parallel_scale = MARGIN * max(half_height, half_width * SIZE[1] / (0.5 * SIZE[0]))
+    camera.parallel_scale = MARGIN * max(half_height, half_width / aspect)
     plotter.renderer.reset_camera_clipping_range()

@@ -9,7 +9,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
 from workflow.case import NAME, Case, Title, read_case
-from workflow.fields import allowed, display, literal_names, models_of, unit_of
+from workflow.fields import allowed, display, holds_named_tables, literal_names, models_of, unit_of
 from workflow.problems import CaseError, Problem, as_toml, nearest
 from workflow.validation import NAMES
 
@@ -69,6 +69,8 @@ def _add_table(blocks: list[str], key: str, parameters: BaseModel) -> None:
         value = getattr(parameters, name)
         if isinstance(value, BaseModel):
             tables.append((f"{key}.{name}".lstrip("."), value))
+        elif holds_named_tables(field):
+            tables += [(f"{key}.{name}.{own_name}".lstrip("."), table) for own_name, table in value.items()]
         elif value is None and models_of(field):
             absent.append(_absent_table(f"{key}.{name}", models_of(field)[0]))
         else:
@@ -92,13 +94,20 @@ def _absent_table(key: str, model: type[BaseModel]) -> str:
 def _line(name: str, value: object, field: FieldInfo) -> str:
     if value is None:
         return f"# {name} = ...".ljust(COMMENT_COLUMN) + f" # not given; {allowed(field)}"
-    text = f'"{display(value, field)}"' if unit_of(field) else as_toml(value)
+    text = _value(value, field)
     remarks = [allowed(field)] if len(literal_names(field)) != 1 else []
     if field.default not in (PydanticUndefined, "", None):
         remarks.append(f"default {_default(field)}")
     comment = "; ".join(remark for remark in remarks if remark)
     line = f"{name} = {text}"
     return f"{line:<{COMMENT_COLUMN}} # {comment}" if comment else line
+
+
+def _value(value: object, field: FieldInfo) -> str:
+    """Write a value as TOML, a quantity with its unit."""
+    if isinstance(value, tuple):
+        return "[" + ", ".join(_value(item, field) for item in value) + "]"
+    return f'"{display(value, field)}"' if unit_of(field) else as_toml(value)
 
 
 def _default(field: FieldInfo) -> str:

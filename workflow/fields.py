@@ -21,15 +21,21 @@ BOUNDS: tuple[tuple[type, str, str], ...] = (
 
 
 def unit_of(field: FieldInfo) -> str | None:
-    """Return the display unit of a field, e.g. "mm"; None for pure numbers, names and tables."""
-    return next((item for item in field.metadata if isinstance(item, str)), None)
+    """Return the display unit of a field or of the items of its list, e.g. "mm"; None for numbers, names, tables."""
+    return next((item for item in _metadata(field) if isinstance(item, str)), None)
+
+
+def holds_named_tables(field: FieldInfo) -> bool:
+    """Whether the field's table holds tables by names that the user chooses, such as the layers of a structure."""
+    return typing.get_origin(field.annotation) is dict
 
 
 def models_of(field: FieldInfo) -> tuple[type[BaseModel], ...]:
-    """Return the parameter models that a field's table may follow; empty where it is no table."""
-    annotation = field.annotation
+    """Return the parameter models that a field's table, or each of its named tables, may follow; empty for values."""
+    annotation = typing.get_args(field.annotation)[1] if holds_named_tables(field) else field.annotation
+    annotation = _bare(annotation)
     members = typing.get_args(annotation) if _is_union(annotation) else (annotation,)
-    return tuple(member for member in members if isinstance(member, type) and issubclass(member, BaseModel))
+    return tuple(member for member in map(_bare, members) if isinstance(member, type) and issubclass(member, BaseModel))
 
 
 def model_of(field: FieldInfo, table: dict) -> type[BaseModel] | None:
@@ -38,7 +44,12 @@ def model_of(field: FieldInfo, table: dict) -> type[BaseModel] | None:
     if len(models) < 2:
         return models[0] if models else None
     kind = table.get("kind", getattr(field.default, "kind", None))
-    return next((model for model in models if model.model_fields["kind"].default == kind), None)
+    return next((model for model in models if tag_of(model) == kind), None)
+
+
+def tag_of(model: type[BaseModel]) -> str:
+    """Return the ``kind`` that tells a model from the others that a table may follow."""
+    return str(typing.get_args(model.model_fields["kind"].annotation)[0])
 
 
 def allowed(field: FieldInfo) -> str:
@@ -51,7 +62,7 @@ def allowed(field: FieldInfo) -> str:
     unit = unit_of(field)
     bounds = [
         f"{sign} {from_si(getattr(item, attribute), unit, 6) if unit else f'{getattr(item, attribute):g}'}"
-        for item in field.metadata
+        for item in _metadata(field)
         for kind, attribute, sign in BOUNDS
         if isinstance(item, kind)
     ]
@@ -90,19 +101,36 @@ def to_si_table(model: type[BaseModel], table: dict, prefix: str, problems: list
 
 def _to_si_value(field: FieldInfo, value: object, key: str, problems: list[Problem]) -> object:
     unit = unit_of(field)
+    if unit is not None and isinstance(value, list):
+        return tuple(_quantity(field, unit, (key, item), problems) for item in value)
     if unit is not None:
-        try:
-            return to_si(value, unit)
-        except UnitError as error:
-            problems.append(Problem(key, str(error), value, allowed(field)))
-            return math.nan
+        return _quantity(field, unit, (key, value), problems)
+    if isinstance(value, dict) and holds_named_tables(field):
+        return {name: _of_table(field, item, f"{key}.{name}", problems) for name, item in value.items()}
+    if isinstance(value, dict):
+        return _of_table(field, value, key, problems)
+    return tuple(value) if isinstance(value, list) else value
+
+
+def _quantity(field: FieldInfo, unit: str, given: tuple[str, object], problems: list[Problem]) -> float:
+    """Convert the value of a key, ``given`` as (key, value); nan where it is no such quantity."""
+    key, value = given
+    try:
+        return to_si(value, unit)
+    except UnitError as error:
+        problems.append(Problem(key, str(error), value, allowed(field)))
+        return math.nan
+
+
+def _of_table(field: FieldInfo, value: object, key: str, problems: list[Problem]) -> object:
+    """Convert one table of a field; its model's ``kind`` and defaults are those of the field's default."""
     if isinstance(value, dict):
         model = model_of(field, value)
         if model is None:
             return value
         defaults = field.default.model_dump() if isinstance(field.default, model) else {}
         return defaults | to_si_table(model, value, key + ".", problems)
-    return tuple(value) if isinstance(value, list) else value
+    return value
 
 
 def leaves(parameters: BaseModel, prefix: str = "") -> Iterator[tuple[str, object, FieldInfo]]:
@@ -111,6 +139,9 @@ def leaves(parameters: BaseModel, prefix: str = "") -> Iterator[tuple[str, objec
         value = getattr(parameters, name)
         if isinstance(value, BaseModel):
             yield from leaves(value, f"{prefix}{name}.")
+        elif holds_named_tables(field):
+            for own_name, table in value.items():
+                yield from leaves(table, f"{prefix}{name}.{own_name}.")
         else:
             yield prefix + name, value, field
 
@@ -121,12 +152,25 @@ def display(value: object, field: FieldInfo) -> str:
     if unit is not None and isinstance(value, float):
         return from_si(value, unit)
     if isinstance(value, tuple):
-        return "[" + ", ".join(str(item) for item in value) + "]"
+        return "[" + ", ".join(display(item, field) for item in value) + "]"
     return f"{value:.10g}" if isinstance(value, float) else str(value)
 
 
 def _choice(field: FieldInfo) -> str:
     return "any of " if typing.get_origin(field.annotation) is tuple else "one of "
+
+
+def _metadata(field: FieldInfo) -> Iterator[object]:
+    """Yield units and bounds of a field, or of the items of its list."""
+    yield from field.metadata
+    for item in typing.get_args(field.annotation):
+        for extra in getattr(item, "__metadata__", ()):
+            yield from extra.metadata if isinstance(extra, FieldInfo) else (extra,)
+
+
+def _bare(annotation: object) -> object:
+    """Return a type without its ``Annotated``."""
+    return typing.get_args(annotation)[0] if typing.get_origin(annotation) is typing.Annotated else annotation
 
 
 def _is_union(annotation: object) -> bool:

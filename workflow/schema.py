@@ -36,8 +36,7 @@ def _kind_schema(kind: type[Case]) -> dict:
             unit = unit_of(field)
             if unit is not None:
                 properties["properties"][name] = {
-                    "type": "string",
-                    "pattern": PATTERN,
+                    **_quantities(properties["properties"][name]),
                     "description": f"{dimension(unit)}, e.g. in {unit}; {allowed(field)}",
                     "x-unit": unit,
                     **_default(field),
@@ -45,6 +44,15 @@ def _kind_schema(kind: type[Case]) -> dict:
     # Defaults of whole tables would be repeated in SI floats; each field has its own.
     _drop_table_defaults(schema)
     return schema
+
+
+def _quantities(numbers: dict) -> dict:
+    """Turn the schema of a number, or of a list of them, into that of strings with a unit."""
+    text = {"type": "string", "pattern": PATTERN}
+    if numbers.get("type") != "array":
+        return text
+    sizes = {name: numbers[name] for name in ("minItems", "maxItems") if name in numbers}
+    return {"type": "array", "items": text, **sizes}
 
 
 def _default(field: FieldInfo) -> dict:

@@ -47,11 +47,9 @@ def _problem(root: type[BaseModel], names: list[str], kind: str, text: str, tabl
     if kind == "missing":
         return Problem(key, "is missing", None, fields.allowed(field))
     if fields.models_of(field) and kind.startswith("union_tag"):
-        kinds = [candidate.model_fields["kind"].default for candidate in fields.models_of(field)]
-        given = value.get("kind", "") if isinstance(value, dict) else ""
-        return Problem(f"{key}.kind", "unknown kind", given, "one of " + ", ".join(kinds), nearest(given, kinds))
+        return _kind_problem(key, value, field)
     if fields.models_of(field):
-        return Problem(key, "must be a table", value)
+        return Problem(key, "needs a table of its own" if kind == "too_short" else "must be a table", value)
     if kind == "literal_error":
         return Problem(key, "unknown name", value, fields.allowed(field), _nearest_name(value, field))
     if kind in RANGES:
@@ -61,6 +59,18 @@ def _problem(root: type[BaseModel], names: list[str], kind: str, text: str, tabl
     if kind in ("tuple_type", "too_short"):
         return Problem(key, "must be a list with at least one item", value, fields.allowed(field))
     return Problem(key, text[0].lower() + text[1:], value, fields.allowed(field))
+
+
+def _kind_problem(key: str, value: Any, field: FieldInfo) -> Problem:
+    """Say that a table has no ``kind``, or none that exists."""
+    kinds = [fields.tag_of(candidate) for candidate in fields.models_of(field)]
+    choice = "one of " + ", ".join(kinds)
+    if not isinstance(value, dict):
+        return Problem(key, "must be a table", value)
+    if "kind" not in value:
+        return Problem(f"{key}.kind", "is missing", None, choice)
+    given = str(value["kind"])
+    return Problem(f"{key}.kind", "unknown kind", given, choice, nearest(given, kinds))
 
 
 def _nearest_name(value: Any, field: FieldInfo) -> str:
@@ -74,17 +84,22 @@ def _names(model: type[BaseModel], location: Sequence[int | str]) -> list[str]:
     """Drop from a pydantic location what is no key: tags of unions and positions in lists."""
     names: list[str] = []
     candidates: tuple[type[BaseModel], ...] = (model,)
+    is_own_name = False
     for part in location:
-        if isinstance(part, int) or (len(candidates) > 1 and _is_tag(candidates, part)):
+        if isinstance(part, int) or (not is_own_name and _is_tag(candidates, part)):
             continue
         names.append(part)
+        if is_own_name:
+            is_own_name = False
+            continue
         field = next((c.model_fields[part] for c in candidates if part in c.model_fields), None)
         candidates = fields.models_of(field) if field else ()
+        is_own_name = field is not None and fields.holds_named_tables(field)
     return names
 
 
 def _is_tag(candidates: tuple[type[BaseModel], ...], part: str) -> bool:
-    return part in [candidate.model_fields["kind"].default for candidate in candidates]
+    return len(candidates) > 1 and part in [fields.tag_of(candidate) for candidate in candidates]
 
 
 def _field(root: type[BaseModel], names: list[str], table: dict) -> tuple[type[BaseModel] | None, FieldInfo | None]:
@@ -92,10 +107,13 @@ def _field(root: type[BaseModel], names: list[str], table: dict) -> tuple[type[B
     model: type[BaseModel] | None = root
     field = None
     given: Any = table
+    is_own_name = False
     for position, name in enumerate(names):
-        field = model.model_fields.get(name) if model else None
         given = given.get(name, {}) if isinstance(given, dict) else {}
-        if field is not None and position < len(names) - 1:
+        if not is_own_name:
+            field = model.model_fields.get(name) if model else None
+        is_own_name = not is_own_name and field is not None and fields.holds_named_tables(field)
+        if field is not None and not is_own_name and position < len(names) - 1:
             model = fields.model_of(field, given if isinstance(given, dict) else {})
     return model, field
 
