@@ -11,8 +11,9 @@ from fem.errors import MassError
 from fem.exchange import SharedNodes
 from fem.force import ForceTerm, Kinematics, force_terms
 from fem.local_mesh import LocalMesh
+from fem.material_parameters import Material
+from fem.material_roles import Materials
 from fem.materials import elasticity_matrix, material_of_part, role_of_part
-from fem.parameters import Material, Materials
 from fem.scene import Tables
 from fem.tie import Tie
 

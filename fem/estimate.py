@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from fem.material_parameters import Material
 from fem.materials import elasticity_matrix
-from fem.parameters import Material
 
 # Element updates per second and core of a whole substep (force, update, tie), measured on the bga_drop case on one core
 # of an AMD EPYC (AVX-512): joints, whose matrix is assembled. Boards are boxes, which share their matrices.

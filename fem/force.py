@@ -10,7 +10,7 @@ from fem.element import Elements
 from fem.energy import Energy
 from fem.force_assembled import AssembledElements
 from fem.force_congruent import CongruentElements, is_box
-from fem.parameters import Material
+from fem.material_parameters import Material
 
 Kinematics = Literal["small", "finite"]
 

@@ -5,7 +5,8 @@ from typing import Literal
 
 from pydantic import Field
 
-from fem.parameters import Materials, Parameters, Shock
+from fem.material_roles import Materials
+from fem.parameters import Parameters, Shock
 
 
 class RunInput(Parameters):

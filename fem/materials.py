@@ -3,7 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.parameters import Isotropic, Material, Materials, Orthotropic
+from fem.material_parameters import EngineeringConstants, Material
+from fem.material_roles import Materials
 
 
 def elasticity_matrix(material: Material) -> NDArray[np.float64]:
@@ -15,37 +16,18 @@ def elasticity_matrix(material: Material) -> NDArray[np.float64]:
     Raises:
         ValueError: The elastic constants do not give a positive strain energy.
     """
-    compliance = isotropic_compliance(material) if isinstance(material, Isotropic) else laminate_compliance(material)
+    compliance = compliance_matrix(material.engineering_constants)
     lowest = float(np.linalg.eigvalsh(compliance)[0])
     if lowest <= 0.0:
         raise ValueError(f"elastic constants of {material!r}: compliance has eigenvalue {lowest:.3e} 1/Pa, must be > 0")
     return np.linalg.inv(compliance)
 
 
-def isotropic_compliance(material: Isotropic) -> NDArray[np.float64]:
-    """Return the compliance ``(6, 6)`` [1/Pa] of an isotropic material."""
-    young, poisson = material.young_modulus, material.poisson_ratio
-    compliance = np.diag([1.0, 1.0, 1.0] + [2.0 * (1.0 + poisson)] * 3)
-    compliance[:3, :3] -= poisson * (1.0 - np.eye(3))
-    return compliance / young
-
-
-def laminate_compliance(material: Orthotropic) -> NDArray[np.float64]:
-    """Return the compliance ``(6, 6)`` [1/Pa] of a laminate with its layers normal to z."""
-    in_plane, out_of_plane = material.young_modulus_in_plane, material.young_modulus_out_of_plane
-    nu_xy, nu_xz = material.poisson_ratio_in_plane, material.poisson_ratio_out_of_plane
-    compliance = np.diag(
-        [
-            1.0 / in_plane,
-            1.0 / in_plane,
-            1.0 / out_of_plane,
-            1.0 / material.shear_modulus_in_plane,
-            1.0 / material.shear_modulus_out_of_plane,
-            1.0 / material.shear_modulus_out_of_plane,
-        ]
-    )
-    compliance[0, 1] = compliance[1, 0] = -nu_xy / in_plane
-    compliance[0, 2] = compliance[2, 0] = compliance[1, 2] = compliance[2, 1] = -nu_xz / in_plane
+def compliance_matrix(constants: EngineeringConstants) -> NDArray[np.float64]:
+    """Return the compliance ``(6, 6)`` [1/Pa] of an orthotropic material along its axes."""
+    compliance = np.diag(1.0 / np.array([*constants.young, *constants.shear]))
+    for ratio, (i, j) in zip(constants.poisson, ((0, 1), (1, 2), (0, 2)), strict=True):
+        compliance[i, j] = compliance[j, i] = -ratio / constants.young[i]
     return compliance
 
 

@@ -11,7 +11,8 @@ from fem.body import Pieces
 from fem.communicators import Role
 from fem.errors import AgreedError
 from fem.estimate import WindowPlan, window_plan
-from fem.parameters import Materials, Shock
+from fem.material_roles import Materials
+from fem.parameters import Shock
 from fem.scene import Tables
 
 

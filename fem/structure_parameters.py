@@ -8,7 +8,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from fem.parameters import Material, Parameters
+from fem.material_parameters import Material
+from fem.parameters import Parameters
 
 Axis = Literal["x", "y", "z"]
 ServiceCondition = Literal["A", "B", "C", "D", "E", "F", "G", "H"]

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from pydantic.fields import FieldInfo
 
-from fem.parameters import Materials, Shock
+from fem.material_roles import Materials
+from fem.parameters import Shock
 from meshing.parameters import Board, Package, Warpage
 from particles.parameters import Solder, Switch
 from particles.scene_drops import Drops

@@ -86,7 +86,10 @@ def _add_table(blocks: list[str], key: str, parameters: BaseModel) -> None:
 
 def _absent_table(key: str, model: type[BaseModel]) -> str:
     """Describe a table that is not given, commented out."""
-    lines = [_line(name, field.get_default(), field) for name, field in model.model_fields.items()]
+    lines = [
+        _line(name, None if field.is_required() else field.get_default(), field)
+        for name, field in model.model_fields.items()
+    ]
     commented = [line if line.startswith("#") else f"# {line}" for line in (f"[{key}]", *lines)]
     return "\n".join([*_describe(model, "Not given: "), *commented, ""])
 

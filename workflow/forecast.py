@@ -2,7 +2,8 @@
 
 from dataclasses import dataclass
 
-from fem.parameters import Material, Materials
+from fem.material_parameters import Material
+from fem.material_roles import Materials
 from workflow.case import BoardDropCase, available_cores
 from workflow.reflow_pool import distinct_geometries, joint_geometries
 

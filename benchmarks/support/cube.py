@@ -3,9 +3,9 @@
 import numpy as np
 
 from fem.element import Elements
+from fem.material_parameters import Isotropic
 from fem.materials import elasticity_matrix
 from fem.mesh import MeshData
-from fem.parameters import Isotropic
 from tests.support.fem_models import grid, mesh_of
 
 EDGE = 40

@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 
 from fem.errors import CutError
+from fem.material_library import SAC405, SILICON
+from fem.material_parameters import Isotropic
+from fem.material_roles import Materials
 from fem.mesh import MeshData, append, merge_nodes
-from fem.parameters import SAC405, SILICON, Isotropic, Materials
 from fem.scene import prepare
 from tests.support.fem_models import grid, joint_mesh, mesh_of, on
 from tests.support.fem_window import Window

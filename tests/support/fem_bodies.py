@@ -5,9 +5,11 @@ from mpi4py import MPI
 
 from fem.body import Body, Pieces, make_body, make_pieces
 from fem.local_mesh import distribute
+from fem.material_library import FR4
+from fem.material_parameters import Isotropic
+from fem.material_roles import Materials
 from fem.mesh import MeshData
 from fem.motion import Motion
-from fem.parameters import FR4, Isotropic, Materials
 from fem.scene import Tables, prepare
 
 STEEL = Isotropic(density=8000.0, young_modulus=200e9, poisson_ratio=0.0)

@@ -5,8 +5,9 @@ import pytest
 
 from fem.ledger import Ledger, ledger_sums
 from fem.loads import HalfSineDrop
+from fem.material_library import SAC405
+from fem.material_roles import Materials
 from fem.mesh import MeshData, append
-from fem.parameters import SAC405, Materials
 from tests.support.fem_bodies import dns_body, motion_of
 from tests.support.fem_models import board_mesh, small_assembly
 from tests.support.fem_window import Window

@@ -9,8 +9,8 @@ from fem.estimate import box_critical_step
 from fem.force_assembled import AssembledElements
 from fem.force_congruent import CongruentElements, is_box, parity_blocks
 from fem.kernels_hexahedron import GAUSS, SIDES, shape_derivatives
+from fem.material_library import COPPER, FR4, SAC405, SILICON
 from fem.materials import elasticity_matrix
-from fem.parameters import COPPER, FR4, SAC405, SILICON
 from tests.support.fem_models import grid
 
 RANDOM = np.random.default_rng(7)

@@ -10,9 +10,11 @@ from fem.errors import EnergyError
 from fem.estimate import predict_seconds, window_plan
 from fem.ledger import Ledger
 from fem.loads import HalfSineDrop
+from fem.material_library import COPPER, FR4, SILICON
+from fem.material_parameters import Isotropic, Orthotropic
+from fem.material_roles import Materials
 from fem.materials import elasticity_matrix, material_of_part, role_of_part, wave_speeds
 from fem.mesh import append
-from fem.parameters import COPPER, FR4, SILICON, Isotropic, Materials, Orthotropic
 from fem.stress import principal_strain, von_mises
 from fem.watch_table import centre_nodes, footprint, joint_names, watch_table
 from tests.support.fem_models import BOARD_Z, small_assembly
