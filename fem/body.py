@@ -1,12 +1,14 @@
 """One model on one rank: elements, masses, force terms, tie. All that a substep needs."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from fem.element import Elements, Geometry, critical_steps, element_geometry, lumped_mass
+from fem.element import Elements, critical_steps, element_geometry, element_kind, lumped_mass
+from fem.element_hexahedron import HEXAHEDRON
+from fem.element_kind import Geometry
 from fem.errors import MassError
 from fem.exchange import SharedNodes
 from fem.force import ForceTerm, Kinematics, force_terms
@@ -83,8 +85,15 @@ class Body:
     free: NDArray[np.bool_]
 
 
-def make_pieces(local: LocalMesh, tables: Tables, materials: Materials) -> Pieces:
-    """Give the local elements their materials, and find their critical steps."""
+def make_pieces(local: LocalMesh, tables: Tables, materials: Materials, formulation: str = HEXAHEDRON.name) -> Pieces:
+    """Give the local elements their materials, and find their critical steps.
+
+    Args:
+        local: The rank's mesh.
+        tables: The model's tables.
+        materials: Material of each role.
+        formulation: Of hexahedra, see ``element.element_kind``.
+    """
     local = local.with_nodes(*masters_of(local, tables))
     number = tables.part[local.cell_numbers]
     assigned = tuple(material_of_part(name, materials) for name in tables.part_names)
@@ -94,6 +103,7 @@ def make_pieces(local: LocalMesh, tables: Tables, materials: Materials) -> Piece
         material=number,
         elasticity=np.array([elasticity_matrix(material) for material in assigned]),
         density=np.array([material.density for material in assigned])[number],
+        kind=element_kind(local.cells.shape[1], formulation),
     )
     geometry = element_geometry(elements.points, elements.cells)
     steps = critical_steps(elements, geometry.nodal_volume)
@@ -128,7 +138,7 @@ def make_body(
     """
     local = pieces.local
     plain = pieces.elements
-    elements = Elements(plain.points, plain.cells, plain.material, plain.elasticity, plain.density * mass_factor)
+    elements = replace(plain, density=plain.density * mass_factor)
     shared = SharedNodes(comm, local.nodes)
     tie = local_tie(local, tables.tie)
     mass = assembled_mass(elements, pieces.geometry, tie, shared)

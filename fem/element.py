@@ -1,26 +1,30 @@
-"""Hexahedra with materials: stiffness, lumped mass, critical time steps."""
+"""Elements of one kind with materials: stiffness, lumped mass, critical time steps."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fem.element_hexahedron import HEXAHEDRON
+from fem.element_kind import ElementKind, Geometry
+from fem.element_one_point import ONE_POINT
+from fem.element_tetrahedron import TETRAHEDRON, TETRAHEDRON_QUADRATIC
 from fem.errors import MeshError
-from fem.kernels_hexahedron import geometry, stiffness
 
-CHUNK = 2048  # elements whose 24 x 24 matrices are in memory at a time (9 MiB)
+CHUNK = 2048  # elements whose matrices are in memory at a time (hexahedra: 9 MiB)
 
 
 @dataclass(frozen=True, slots=True)
 class Elements:
-    """Hexahedra and their materials.
+    """Elements and their materials.
 
     Attributes:
         points: ``(n, 3)`` [m].
-        cells: ``(ne, 8)`` int32, tensor order.
+        cells: ``(ne, k)`` int32; node order as in DOLFINx, tensor order for hexahedra.
         material: ``(ne,)`` int32, index into ``elasticity``.
         elasticity: ``(nm, 6, 6)`` [Pa].
         density: ``(ne,)`` [kg/m^3].
+        kind: What the elements are.
     """
 
     points: NDArray[np.float64]
@@ -28,52 +32,45 @@ class Elements:
     material: NDArray[np.int32]
     elasticity: NDArray[np.float64]
     density: NDArray[np.float64]
+    kind: ElementKind = HEXAHEDRON
 
     def subset(self, chosen: NDArray[np.bool_] | NDArray[np.integer]) -> "Elements":
         """Return some of the elements on the same points."""
-        return Elements(self.points, self.cells[chosen], self.material[chosen], self.elasticity, self.density[chosen])
+        return replace(self, cells=self.cells[chosen], material=self.material[chosen], density=self.density[chosen])
 
 
-@dataclass(frozen=True, slots=True)
-class Geometry:
-    """Integrals over hexahedra: nodal volumes ``(ne, 8)`` [m^3] and mean gradients ``(ne, 8, 3)`` [1/m]."""
-
-    nodal_volume: NDArray[np.float64]
-    gradient: NDArray[np.float64]
-
-    @property
-    def volume(self) -> NDArray[np.float64]:
-        """Return ``(ne,)`` [m^3]."""
-        return self.nodal_volume.sum(axis=1)
+def element_kind(nodes: int, formulation: str = HEXAHEDRON.name) -> ElementKind:
+    """Return the kind of elements with so many nodes; only hexahedra have more than one formulation."""
+    if nodes == HEXAHEDRON.nodes:
+        return {kind.name: kind for kind in (HEXAHEDRON, ONE_POINT)}[formulation]
+    return {kind.nodes: kind for kind in (TETRAHEDRON, TETRAHEDRON_QUADRATIC)}[nodes]
 
 
 def element_geometry(points: NDArray[np.float64], cells: NDArray[np.int32]) -> Geometry:
-    """Integrate shape functions and gradients over hexahedra.
+    """Integrate over elements; all formulations with the same nodes have the same integrals.
 
     Raises:
-        MeshError: An element is turned inside out at a Gauss point.
+        MeshError: An element is turned inside out.
     """
-    result = Geometry(np.empty((len(cells), 8)), np.empty((len(cells), 8, 3)))
-    lowest = geometry(points[cells], result.nodal_volume, result.gradient)
+    result = element_kind(cells.shape[1]).geometry(points[cells])
+    lowest = result.lowest
     if np.any(lowest <= 0.0):
         worst = int(np.argmin(lowest))
         centre = ", ".join(f"{value:.6g}" for value in points[cells[worst]].mean(axis=0))
         raise MeshError(
-            f"{np.sum(lowest <= 0.0)} of {len(cells)} hexahedra have a negative Jacobian determinant, the lowest is"
-            f" {lowest[worst]:.3e} m^3 near ({centre}) m"
+            f"{np.sum(lowest <= 0.0)} of {len(cells)} elements have a zero or negative Jacobian determinant, the"
+            f" lowest is {lowest[worst]:.3e} m^3 of element {worst} near ({centre}) m"
         )
     return result
 
 
 def element_stiffness(elements: Elements) -> NDArray[np.float64]:
-    """Return the condensed stiffness ``(ne, 24, 24)`` [N/m] of each element; see ``kernels_hexahedron.stiffness``."""
-    result = np.empty((len(elements.cells), 24, 24))
-    stiffness(elements.points[elements.cells], elements.elasticity, elements.material, result)
-    return result
+    """Return the stiffness ``(ne, 3k, 3k)`` [N/m] of each element."""
+    return elements.kind.stiffness(elements.points[elements.cells], elements.elasticity, elements.material)
 
 
 def lumped_mass(elements: Elements, nodal_volume: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the row-sum lumped mass ``(n,)`` [kg]."""
+    """Return the lumped mass ``(n,)`` [kg] from the nodes' shares ``(ne, k)`` [m^3] in the volumes."""
     mass = np.zeros(len(elements.points))
     np.add.at(mass, elements.cells, elements.density[:, None] * nodal_volume)
     return mass

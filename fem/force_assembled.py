@@ -1,4 +1,4 @@
-"""Internal force of hexahedra of any shape: one assembled matrix of 3 x 3 blocks."""
+"""Internal force of elements of any kind and shape: one assembled matrix of 3 x 3 blocks."""
 
 from dataclasses import dataclass, field
 
@@ -42,7 +42,7 @@ class AssembledElements:
 def upper_pattern(cells: NDArray[np.int32], count: int) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
     """Return row pointers and sorted columns of the upper triangle of the node graph of ``count`` nodes."""
     membership = scipy.sparse.csr_matrix(
-        (np.ones(cells.size, np.int32), (cells.ravel(), np.repeat(np.arange(len(cells)), 8))),
+        (np.ones(cells.size, np.int32), (cells.ravel(), np.repeat(np.arange(len(cells)), cells.shape[1]))),
         shape=(count, len(cells)),
     )
     graph = scipy.sparse.triu(membership @ membership.T, format="csr")

@@ -108,11 +108,11 @@ def add_block_force(pointer, columns, blocks, displacement, force):
 
 @njit(cache=True)
 def assemble_upper_blocks(cells, stiffness, pointer, columns, blocks):
-    """Add element stiffnesses ``(ne, 24, 24)`` into upper block rows with sorted columns; diagonal blocks halved."""
+    """Add element stiffnesses ``(ne, 3k, 3k)`` into upper block rows with sorted columns; diagonal blocks halved."""
     for e in range(len(cells)):
-        for a in range(8):
+        for a in range(cells.shape[1]):
             row = cells[e, a]
-            for b in range(8):
+            for b in range(cells.shape[1]):
                 column = cells[e, b]
                 if column < row:
                     continue
