@@ -9,8 +9,8 @@ from fem.element_one_point import ONE_POINT, OnePoint, hourglass_control
 from fem.element_tetrahedron import EDGES, TETRAHEDRON, TETRAHEDRON_QUADRATIC
 from fem.errors import MeshError
 from fem.kernels_hexahedron import SIDES
-from fem.materials import elasticity_matrix
 from fem.material_library import FR4, SAC405
+from fem.materials import elasticity_matrix
 
 RANDOM = np.random.default_rng(11)
 KINDS = [HEXAHEDRON, ONE_POINT, TETRAHEDRON, TETRAHEDRON_QUADRATIC]
