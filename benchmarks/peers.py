@@ -1,0 +1,152 @@
+"""This program, Akantu and Kratos on the same cube of 40^3 linear hexahedra, one thread each, in turns.
+
+    python benchmarks/peers.py        (a minute; writes benchmarks/results/peers.json)
+
+The peers come from PyPI into an environment of their own under ``build/``. All compute small-strain linear elasticity of
+8-node hexahedra: the peers from 2 x 2 x 2 Gauss points at each call, through strains and stresses; this program, with
+incompatible modes besides, from one matrix that all boxes share (``congruent``), or from the assembled matrix that it
+uses for hexahedra of any shape (``assembled``). ``force`` is the internal force alone, ``step`` a whole step of central
+differences. Kratos offers no force alone. At a homogeneous strain all must give the same nodal forces: this is checked.
+"""
+
+import os
+import subprocess
+import venv
+from pathlib import Path
+
+os.environ["OMP_NUM_THREADS"] = os.environ["NUMBA_NUM_THREADS"] = "1"
+
+import numpy as np
+
+from benchmarks.support import turns
+from benchmarks.support.cube import STEEL, cube, elements_of
+from fem.force_assembled import AssembledElements
+from fem.force_congruent import CongruentElements
+from fem.mesh import MeshData
+from tests.support.fem_bodies import dns_body, motion_of
+
+FOLDER = Path(__file__).parents[1] / "build" / "peers"
+PYTHON = FOLDER / "venv" / "bin" / "python"
+PACKAGES = {
+    "akantu": ["akantu==5.0.7.*"],
+    "kratos": ["KratosMultiphysics==10.4.4", "KratosStructuralMechanicsApplication==10.4.4"],
+}
+WORKS = {"akantu": ("force", "step"), "kratos": ("step",)}
+CYCLIC = [0, 1, 3, 2, 4, 5, 7, 6]
+SAME = 1e-9  # relative: nodal forces at a homogeneous strain
+BAR = 20.0
+ROUNDS = 7
+
+
+class Peer:
+    """A process that works in a peer's environment when asked."""
+
+    def __init__(self, name: str, given: Path) -> None:
+        """Start it and wait until it has written its ``force``."""
+        self._force = FOLDER / f"{name}.npy"
+        script = Path(__file__).parent / "support" / f"peer_{name}.py"
+        self._process = subprocess.Popen(
+            [str(PYTHON), str(script), str(given), str(self._force)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            env={name: value for name, value in os.environ.items() if name != "PYTHONPATH"},
+        )
+        self._answer()
+        self.force = np.load(self._force)
+
+    def ask(self, work: str) -> float:
+        """Return the processor seconds of one call of a work."""
+        print(work, file=self._process.stdin, flush=True)
+        return float(self._answer())
+
+    def end(self) -> None:
+        """End it."""
+        self._process.stdin.close()
+        self._process.wait()
+
+    def _answer(self) -> str:
+        for line in self._process.stdout:
+            if line.startswith("@"):
+                return line[1:].strip()
+        raise RuntimeError(f"the peer ended with exit code {self._process.wait()}")
+
+
+def install() -> list[str]:
+    """Install the peers; return those that are there."""
+    if not PYTHON.exists():
+        venv.create(FOLDER / "venv", with_pip=True)
+    found = []
+    for name, packages in PACKAGES.items():
+        command = [str(PYTHON), "-m", "pip", "install", "--quiet", "--disable-pip-version-check", *packages]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        if done.returncode == 0:
+            found.append(name)
+        else:
+            print(f"{name} is left out, pip cannot install it: {done.stderr.strip().splitlines()[-1]}")
+    return found
+
+
+def write_problem(mesh: MeshData, displacement: np.ndarray, step: float) -> Path:
+    path = FOLDER / "problem.npz"
+    constants = {name: getattr(STEEL, name) for name in ("density", "young_modulus", "poisson_ratio")}
+    np.savez(path, points=mesh.points, cells=mesh.cells[:, CYCLIC], displacement=displacement, step=step, **constants)
+    return path
+
+
+def own_batches(mesh: MeshData, displacement: np.ndarray) -> tuple[dict[str, turns.Batch], np.ndarray, float]:
+    """Return this program's batches, its force at the displacement, and half the critical step [s]."""
+    elements = elements_of(mesh)
+    terms = {"congruent": CongruentElements.build(elements), "assembled": AssembledElements.build(elements)}
+    force = np.zeros_like(displacement)
+    terms["congruent"].add(displacement, force)
+    body, critical = dns_body(mesh, STEEL)
+    motion = motion_of(body, 0.5 * critical)
+    motion.displacement[:] = displacement[motion.body.local.nodes]
+    scratch = np.zeros_like(displacement)
+
+    def step() -> None:
+        motion.advance()
+        motion.update_force()
+
+    batches = {
+        f"{name}_force": turns.batch(lambda term=term: term.add(displacement, scratch)) for name, term in terms.items()
+    }
+    return batches | {"congruent_step": turns.batch(step)}, force, 0.5 * critical
+
+
+def main() -> None:
+    FOLDER.mkdir(parents=True, exist_ok=True)
+    names = install()
+    mesh = cube()
+    gradient = np.random.default_rng(2).uniform(-1e-3, 1e-3, (3, 3))
+    displacement = mesh.points @ gradient.T
+    batches, force, step = own_batches(mesh, displacement)
+    given = write_problem(mesh, displacement, step)
+    peers = {name: Peer(name, given) for name in names}
+    for name, peer in peers.items():
+        difference = float(np.abs(peer.force - force).max() / np.abs(force).max())
+        if not difference < SAME:
+            raise RuntimeError(f"{name} computes other forces at a homogeneous strain: they differ by {difference:.2e}")
+        for work in WORKS[name]:
+            batches[f"{name}_{work}"] = lambda peer=peer, work=work: peer.ask(work)
+    seconds = turns.in_turns(batches, ROUNDS)
+    for peer in peers.values():
+        peer.end()
+    pairs = [(f"congruent_{work}", f"{name}_{work}") for name in peers for work in WORKS[name]]
+    pairs += [("assembled_force", f"{name}_force") for name in peers if "force" in WORKS[name]]
+    ratios = {f"{ours} / {theirs}": turns.ratio(seconds, ours, theirs) for ours, theirs in pairs}
+    turns.write(
+        "peers",
+        {
+            "elements": len(mesh.cells),
+            "packages": [package for name in names for package in PACKAGES[name]],
+            "updates_per_second": turns.rates(seconds, len(mesh.cells)),
+            "ratios": ratios,
+            "bars": {name: turns.bar(value, BAR) for name, value in ratios.items()},
+        },
+    )
+
+
+if __name__ == "__main__":
+    main()
