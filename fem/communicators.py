@@ -8,7 +8,7 @@ from mpi4py import MPI
 from fem.errors import RankError
 from fem.parameters import Ranks
 
-Role = Literal["macro", "meso", "dns"]
+Role = Literal["macro", "meso", "dns", "structure"]
 
 
 class Communicators:
@@ -23,7 +23,7 @@ class Communicators:
         first: Lowest rank of ``world`` that carries each model.
     """
 
-    def __init__(self, world: MPI.Comm, mode: Literal["two_scale", "dns"], ranks: Ranks) -> None:
+    def __init__(self, world: MPI.Comm, mode: Literal["two_scale", "dns", "structure"], ranks: Ranks) -> None:
         """Split ``world``.
 
         Raises:
@@ -35,7 +35,7 @@ class Communicators:
                 f"the input asks for {ranks.macro} macro + {ranks.meso} meso ranks, mpirun started {world.size}"
             )
         self.world = world.Dup()
-        roles: tuple[Role, ...] = ("dns",) if mode == "dns" else ("macro", "meso")
+        roles: tuple[Role, ...] = ("macro", "meso") if mode == "two_scale" else (mode,)
         split = mode == "two_scale" and ranks.placement == "split"
         self.first = {role: ranks.macro if split and role == "meso" else 0 for role in roles}
         if split:

@@ -9,7 +9,7 @@ from fem.communicators import Communicators, Role
 from fem.inputs import RunInput
 from fem.local_mesh import distribute
 from fem.mesh import MeshData, read_meshes
-from fem.scene import Tables, prepare
+from fem.scene import JointTables, prepare
 from fem.steps import Steps, choose_steps
 
 
@@ -17,7 +17,7 @@ from fem.steps import Steps, choose_steps
 class Model:
     """One model on one rank, before it moves."""
 
-    tables: Tables
+    tables: JointTables
     body: Body
 
 
@@ -38,7 +38,7 @@ def build_models(comms: Communicators, request: RunInput) -> tuple[dict[Role, Mo
     return models, steps
 
 
-def read_models(comms: Communicators, request: RunInput) -> dict[Role, tuple[MeshData | None, Tables]]:
+def read_models(comms: Communicators, request: RunInput) -> dict[Role, tuple[MeshData | None, JointTables]]:
     """Read and check all meshes on rank 0, and hand each model its part.
 
     Returns:

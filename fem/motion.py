@@ -70,9 +70,12 @@ class Motion:
         self.body.shared.add(self.force)
 
     def kinetic_energy(self) -> float:
-        """Return the kinetic energy [J] of this rank's share at ``time``: the velocity is half a step on."""
-        velocity = self.velocity + 0.5 * self.step * self._acceleration()
-        return 0.5 * float(self._masses[:, 3] @ np.sum(velocity**2, axis=1))
+        """Return the kinetic energy [J] of this rank's share at ``time``."""
+        return 0.5 * float(self._masses[:, 3] @ np.sum(self.present_velocity() ** 2, axis=1))
+
+    def present_velocity(self) -> NDArray[np.float64]:
+        """Return the velocity ``(n, 3)`` [m/s] at ``time``, half a step after ``velocity``; not that of slaves."""
+        return self.velocity + 0.5 * self.step * self._acceleration()
 
     def strain_energy(self, foreign: NDArray[np.float64]) -> float:
         """Return the strain energy [J] of this rank's share, - u . f / 2 of linear elastic terms.

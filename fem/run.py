@@ -20,7 +20,7 @@ from fem.parameters import Shock
 from fem.participant import Alone, Macro, Meso, Participant
 from fem.result import Timings, write_result
 from fem.steps import Steps
-from fem.watch import Watch
+from fem.watch_joints import JointWatch
 
 PROGRESS_INTERVAL = 0.5  # [s] between two progress lines
 NON_TRIVIAL = 1e-4  # of the energy that the pulse gives a free body: from there on the balance is judged
@@ -73,8 +73,8 @@ def make_history(
     speed = load.velocity_change(shock.duration)
     mass = steps.model_mass + steps.added_mass
     ledger = Ledger(shock.numerics.energy_balance_limit, NON_TRIVIAL * 0.5 * mass * speed**2)
-    watches = {role: Watch(model.tables.watch, model.body) for role, model in models.items()}
-    return History(comms.world, watches, ledger, load)
+    watches = {role: JointWatch(model.tables.watch, model.body) for role, model in models.items()}
+    return History(comms.world, watches, ledger, {"base_acceleration": load.base})
 
 
 def make_fields(comms: Communicators, models: dict[Role, Model], request: RunInput) -> dict[Role, Fields]:

@@ -27,7 +27,6 @@ class Tables:
         held_nodes: ``(k,)`` nodes with a held component.
         held: ``(k, 3)`` which components.
         cut: ``(nc,)`` nodes of the cut, in the same order on both sides.
-        watch: Watch points.
         nodes: Number of nodes of the model.
     """
 
@@ -39,8 +38,14 @@ class Tables:
     held_nodes: NDArray[np.int64]
     held: NDArray[np.bool_]
     cut: NDArray[np.int32]
-    watch: WatchTable
     nodes: int
+
+
+@dataclass(frozen=True, slots=True)
+class JointTables(Tables):
+    """Tables of a package on a board; ``watch`` holds its watch points."""
+
+    watch: WatchTable
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +53,7 @@ class ModelInput:
     """One model before it is distributed: its mesh and its tables."""
 
     mesh: MeshData
-    tables: Tables
+    tables: JointTables
 
 
 def prepare(data: MeshData, mode: Literal["two_scale", "dns"]) -> dict[str, ModelInput]:
@@ -95,7 +100,7 @@ def model_input(
     mesh, tie, moved = tie_joints(mesh)
     held = held_components(mesh)
     held_nodes = np.flatnonzero(held.any(axis=1))
-    tables = Tables(
+    tables = JointTables(
         part=mesh.part,
         part_names=mesh.part_names,
         tie=tie,

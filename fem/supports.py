@@ -1,5 +1,7 @@
 """Supports in the frame of the drop table: which displacement components are held at zero."""
 
+from collections.abc import Mapping, Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -9,9 +11,9 @@ from fem.mesh import MeshData
 HELD = {"mounting_holes": (0, 1, 2), "symmetry_x": (0,), "symmetry_y": (1,)}
 
 
-def held_components(mesh: MeshData) -> NDArray[np.bool_]:
-    """Return ``(n, 3)``: whether a node's displacement component is held."""
+def held_components(mesh: MeshData, rules: Mapping[str, Sequence[int]] = HELD) -> NDArray[np.bool_]:
+    """Return ``(n, 3)``: whether a node's displacement component is held; ``rules`` are as ``HELD``."""
     held = np.zeros((len(mesh.points), 3), dtype=bool)
-    for name, components in HELD.items():
+    for name, components in rules.items():
         held[np.ix_(mesh.facet_nodes(name), np.array(components))] = True
     return held
