@@ -2,11 +2,12 @@
 
     python benchmarks/peers.py        (a minute; writes benchmarks/results/peers.json)
 
-The peers come from PyPI into an environment of their own under ``build/``. All compute small-strain linear elasticity of
-8-node hexahedra: the peers from 2 x 2 x 2 Gauss points at each call, through strains and stresses; this program, with
-incompatible modes besides, from one matrix that all boxes share (``congruent``), or from the assembled matrix that it
-uses for hexahedra of any shape (``assembled``). ``force`` is the internal force alone, ``step`` a whole step of central
-differences. Kratos offers no force alone. At a homogeneous strain all must give the same nodal forces: this is checked.
+The peers come from PyPI into an environment of their own under ``build/``. All compute linear elasticity of small
+strains on 8-node hexahedra: the peers from 2 x 2 x 2 Gauss points at each call, through strains and stresses; this
+program, with incompatible modes besides, from one matrix that all boxes share (``congruent``), or from the assembled
+matrix that it uses for hexahedra of any shape (``assembled``). ``force`` is the internal force alone, ``step`` a whole
+step of central differences. Kratos offers no force alone. At a homogeneous strain all must give the same nodal forces:
+this is checked.
 """
 
 import os
