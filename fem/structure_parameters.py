@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from fem.material_library import LIBRARY
 from fem.material_parameters import Material
 from fem.parameters import Parameters
 
@@ -26,7 +27,7 @@ class Layer(Parameters):
 
 
 class Holes(Parameters):
-    """Four mounting holes at (+-spacing/2): the nodes inside their circles are a facet set, nothing is cut out."""
+    """Four mounting holes at (+-spacing/2), through all layers; their walls are the facet set ``mounting_holes``."""
 
     spacing: Annotated[tuple[float, float], "mm"]
     diameter: Annotated[float, "mm"] = Field(gt=0)
@@ -150,7 +151,7 @@ class DynamicsNumerics(Parameters):
     step_fraction: float = Field(0.9, gt=0, le=0.99)
     critical_step: Literal["element", "power_iteration"] = "element"
     implicit_step: Annotated[float | None, "us"] = Field(None, gt=0)
-    hht_alpha: float = Field(-0.05, ge=-1 / 3, le=0)
+    hht_alpha: float = Field(0.0, ge=-1 / 3, le=0)
     mass_scaled: tuple[str, ...] = ()
     energy_balance_limit: float = Field(0.02, gt=0)
     history_samples: int = Field(600, ge=2)
@@ -185,3 +186,14 @@ class StructureScene(Parameters):
     loads: dict[str, StructureLoad] = Field(default_factory=dict)
     watch: dict[str, WatchPoint] = Field(default_factory=dict)
     dynamics: Dynamics
+
+    @property
+    def known_materials(self) -> dict[str, Material]:
+        """Return the materials that layers may name: those of the scene, then those of the library."""
+        return self.materials | {name: material for name, material in LIBRARY.items() if name not in self.materials}
+
+    @property
+    def layer_materials(self) -> dict[str, Material]:
+        """Return the material of each layer; a name that is not known raises ``KeyError``."""
+        known = self.known_materials
+        return {name: known[layer.material] for name, layer in self.structure.layers.items()}

@@ -1,0 +1,110 @@
+"""Parameters of a structure: what does not fit together is said with key, value, range and nearest name."""
+
+import pytest
+
+from fem.structure_checks import check, problems
+from fem.structure_parameters import StructureScene
+
+TIN = {"kind": "isotropic", "density": 7400.0, "young_modulus": 50e9, "poisson_ratio": 0.36}
+YIELDING = TIN | {"plasticity": {"A": 40e6}}
+
+
+def scene(**changes) -> StructureScene:
+    """Return a board on its holes, dropped; ``changes`` are tables that replace those of it."""
+    board = {"material": "FR4", "thickness": 1e-3, "cells": 2}
+    tables = {
+        "structure": {
+            "length": 0.132,
+            "width": 0.077,
+            "cells": [8, 6],
+            "layers": {"board": board},
+            "symmetry": ["x"],
+            "holes": {"spacing": [0.105, 0.071], "diameter": 3e-3},
+        },
+        "supports": {"holes": {"on": "mounting_holes", "hold": ["x", "y", "z"]}},
+        "loads": {"drop": {"kind": "input_g", "service_condition": "B"}},
+        "watch": {"centre": {"at": [0.0, 0.0, 0.0]}},
+        "dynamics": {"duration": 2e-3},
+    }
+    return StructureScene.model_validate(tables | changes)
+
+
+def layered(material: str, **more) -> dict:
+    layers = {"board": {"material": material, "thickness": 1e-3}}
+    return {"length": 0.1, "width": 0.05, "cells": [8, 6], "layers": layers} | more
+
+
+def test_a_good_scene_has_no_problem_and_survives_its_json():
+    good = scene()
+    assert not problems(good)
+    assert StructureScene.model_validate_json(good.model_dump_json()) == good
+    assert good.structure.corners == ((0.0, -0.0385, 0.0), (0.066, 0.0385, 1e-3))
+
+
+def test_own_materials_go_before_those_of_the_library():
+    own = scene(materials={"FR4": TIN}, structure=layered("FR4"), supports={})
+    assert own.layer_materials["board"].density == 7400.0
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"structure": layered("FR5"), "supports": {}}, "structure.layers.board.material = FR5: no such material"),
+        ({"structure": layered("FR5"), "supports": {}}, "did you mean FR4?"),
+        ({"structure": layered("FR4") | {"layers": {}}, "supports": {}}, "structure.layers: the structure has no"),
+        (
+            {"structure": layered("FR4", element="tetrahedron", formulation="one_point"), "supports": {}},
+            "structure.formulation = one_point: is a choice for hexahedra",
+        ),
+        ({"supports": {"foot": {"on": "zmin", "hold": ["x"]}}}, "supports.foot.on = zmin: no such facet set"),
+        ({"supports": {"foot": {"on": "zmin", "hold": ["x"]}}}, "did you mean z_min?"),
+        ({"supports": {"foot": {"on": "z_min", "hold": []}}}, "supports.foot.hold = []: holds nothing"),
+        ({"loads": {"push": {"kind": "pressure", "on": "top", "peak": 1e6}}}, "loads.push.on = top"),
+        ({"loads": {"push": {"kind": "pressure", "on": "z_max", "peak": 1e6}}}, "loads.push.duration: is missing"),
+        ({"loads": {"drop": {"kind": "input_g"}}}, "loads.drop: is given by nothing; allowed: exactly one of"),
+        (
+            {"loads": {"drop": {"kind": "input_g", "peak": 1e4, "service_condition": "B"}}},
+            "loads.drop: is given by service_condition and peak",
+        ),
+        (
+            {"loads": {"drop": {"kind": "input_g", "service_condition": "B", "duration": 1e-3}}},
+            "loads.drop.duration = 0.001 s: is already given by service_condition",
+        ),
+        (
+            {"loads": {"fall": {"kind": "gravity", "direction": [0.0, 0.0, 0.0]}}},
+            "loads.fall.direction = [0.0, 0.0, 0.0]: has no length",
+        ),
+        (
+            {"supports": {}, "loads": {"drop": {"kind": "input_g", "service_condition": "B", "method": "large_mass"}}},
+            "loads.drop.method = large_mass: needs a support",
+        ),
+        (
+            {"loads": {"pull": {"kind": "motion", "on": "mounting_holes", "component": "z", "table": "v.csv"}}},
+            "loads.pull.component = z: is held by supports.holes",
+        ),
+        ({"loads": {}}, "loads: nothing moves the structure"),
+        (
+            {"watch": {"centre": {"at": [0.0, 0.0, 4e-3]}}},
+            "watch.centre.at = (0, 0, 0.004) m: lies 0.003 m outside the meshed body; the nearest point of it is"
+            " (0, 0, 0.001) m",
+        ),
+        ({"watch": {"left": {"at": [-0.01, 0.0, 0.0]}}}, "allowed: (0, -0.0385, 0) m to (0.066, 0.0385, 0.001) m"),
+        (
+            {"materials": {"tin": YIELDING}, "structure": layered("tin"), "supports": {}}
+            | {"dynamics": {"duration": 1e-3, "solver": "both"}},
+            "structure.layers.board.material = tin: yields, the solver both is linear",
+        ),
+        ({"dynamics": {"duration": 1e-3, "solver": "implicit", "kinematics": "finite"}}, "dynamics.kinematics = fin"),
+        ({"dynamics": {"duration": 1e-3, "damping": {"mass_ratio": 0.01}}}, "dynamics.damping.frequency: is missing"),
+        ({"dynamics": {"duration": 1e-3, "numerics": {"mass_scaled": ["copper"]}}}, "mass_scaled = copper: no such"),
+        ({"dynamics": {"duration": 1e-3, "numerics": {"mass_scaled": ["board"]}}}, "leaves no layer to take the step"),
+    ],
+)  # fmt: skip
+def test_what_does_not_fit_is_said(changes, message):
+    with pytest.raises(ValueError) as error:
+        check(scene(**changes))
+    assert message in str(error.value)
+
+
+def test_gravity_needs_neither_peak_nor_duration():
+    assert not problems(scene(loads={"weight": {"kind": "gravity"}}))
