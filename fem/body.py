@@ -1,5 +1,6 @@
 """One model on one rank: elements, masses, force terms, tie. All that a substep needs."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,7 +16,7 @@ from fem.force import ForceTerm, Kinematics, force_terms
 from fem.local_mesh import LocalMesh
 from fem.material_parameters import Material
 from fem.material_roles import Materials
-from fem.materials import elasticity_matrix, material_of_part, role_of_part
+from fem.materials import elasticity_matrix, materials_of_parts
 from fem.scene import Tables
 from fem.tie import Tie
 
@@ -85,18 +86,23 @@ class Body:
     free: NDArray[np.bool_]
 
 
-def make_pieces(local: LocalMesh, tables: Tables, materials: Materials, formulation: str = HEXAHEDRON.name) -> Pieces:
+def make_pieces(
+    local: LocalMesh,
+    tables: Tables,
+    materials: Materials | Mapping[str, Material],
+    formulation: str = HEXAHEDRON.name,
+) -> Pieces:
     """Give the local elements their materials, and find their critical steps.
 
     Args:
         local: The rank's mesh.
         tables: The model's tables.
-        materials: Material of each role.
+        materials: Material of each role, or of each part.
         formulation: Of hexahedra, see ``element.element_kind``.
     """
     local = local.with_nodes(*masters_of(local, tables))
     number = tables.part[local.cell_numbers]
-    assigned = tuple(material_of_part(name, materials) for name in tables.part_names)
+    names, assigned = materials_of_parts(tables.part_names, materials)
     elements = Elements(
         points=local.points,
         cells=local.cells,
@@ -107,7 +113,7 @@ def make_pieces(local: LocalMesh, tables: Tables, materials: Materials, formulat
     )
     geometry = element_geometry(elements.points, elements.cells)
     steps = critical_steps(elements, geometry.nodal_volume)
-    roles = np.array([role_of_part(name) for name in tables.part_names])[number]
+    roles = np.array(names)[number]
     return Pieces(local, elements, geometry, steps, roles, number, assigned)
 
 

@@ -1,5 +1,7 @@
 """Elastic constants as matrices. Voigt order: xx, yy, zz, xy, yz, xz (engineering shear)."""
 
+from collections.abc import Mapping, Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -53,3 +55,20 @@ def material_of_part(part: str, materials: Materials) -> Material:
         raise ValueError(f"part {part!r} has the role {role!r}; materials exist for {roles}")
     material: Material = getattr(materials, role)
     return material
+
+
+def materials_of_parts(
+    parts: Sequence[str], materials: Materials | Mapping[str, Material]
+) -> tuple[tuple[str, ...], tuple[Material, ...]]:
+    """Return role and material of each part; with a mapping of parts to materials, each part is a role of its own.
+
+    Raises:
+        ValueError: A part has no material.
+    """
+    if isinstance(materials, Materials):
+        assigned = tuple(material_of_part(part, materials) for part in parts)
+        return tuple(role_of_part(part) for part in parts), assigned
+    missing = [part for part in parts if part not in materials]
+    if missing:
+        raise ValueError(f"part {missing[0]!r} has no material; materials exist for {', '.join(materials)}")
+    return tuple(parts), tuple(materials[part] for part in parts)
