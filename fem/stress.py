@@ -6,22 +6,31 @@ from numpy.typing import NDArray
 from fem.element import Elements
 
 
+def mean_strain(gradient: NDArray[np.float64], displacement: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the average strain of elements ``(m, 6)``, shear as engineering strain.
+
+    Args:
+        gradient: ``(m, k, 3)`` [1/m] mean gradients.
+        displacement: ``(m, k, 3)`` [m] at the nodes.
+    """
+    h = np.einsum("mai,maj->mij", displacement, gradient)
+    return np.stack(
+        [h[:, 0, 0], h[:, 1, 1], h[:, 2, 2], h[:, 0, 1] + h[:, 1, 0], h[:, 1, 2] + h[:, 2, 1], h[:, 0, 2] + h[:, 2, 0]],
+        axis=1,
+    )
+
+
 def element_stress(
     gradient: NDArray[np.float64], elasticity: NDArray[np.float64], displacement: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Return the average stress of elements ``(m, 6)`` [Pa].
 
     Args:
-        gradient: ``(m, 8, 3)`` [1/m] mean gradients.
+        gradient: ``(m, k, 3)`` [1/m] mean gradients.
         elasticity: ``(m, 6, 6)`` [Pa].
-        displacement: ``(m, 8, 3)`` [m] at the nodes.
+        displacement: ``(m, k, 3)`` [m] at the nodes.
     """
-    h = np.einsum("mai,maj->mij", displacement, gradient)
-    strain = np.stack(
-        [h[:, 0, 0], h[:, 1, 1], h[:, 2, 2], h[:, 0, 1] + h[:, 1, 0], h[:, 1, 2] + h[:, 2, 1], h[:, 0, 2] + h[:, 2, 0]],
-        axis=1,
-    )
-    return np.einsum("mij,mj->mi", elasticity, strain)
+    return np.einsum("mij,mj->mi", elasticity, mean_strain(gradient, displacement))
 
 
 def von_mises(stress: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -46,7 +55,7 @@ def principal_strain(corners: NDArray[np.float64], displacement: NDArray[np.floa
 
 
 class StressRecovery:
-    """Average stresses of some elements of a rank."""
+    """Average strains and stresses of some elements of a rank."""
 
     def __init__(self, elements: Elements, gradient: NDArray[np.float64]) -> None:
         """Keep what the stresses of ``elements`` with mean gradients ``(ne, 8, 3)`` [1/m] need."""
@@ -57,3 +66,7 @@ class StressRecovery:
     def stress(self, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the stresses ``(ne, 6)`` [Pa] at a displacement ``(n, 3)`` [m]."""
         return element_stress(self._gradient, self._elasticity, displacement[self._cells])
+
+    def strain(self, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the strains ``(ne, 6)`` at a displacement ``(n, 3)`` [m]."""
+        return mean_strain(self._gradient, displacement[self._cells])
