@@ -1,0 +1,73 @@
+"""Implicit steps and natural modes are the same on one and on two ranks."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+SCRIPT = """
+import json, sys
+import numpy as np
+from mpi4py import MPI
+from fem.body import make_body, make_pieces
+from fem.global_matrix import Equations
+from fem.implicit import ImplicitMotion
+from fem.loads import HalfSineDrop
+from fem.local_mesh import distribute
+from fem.mesh import append
+from fem.modal import natural_modes
+from fem.parameters import Materials
+from fem.scene import prepare
+from tests.support.fem_models import small_assembly
+
+comm = MPI.COMM_WORLD
+item = prepare(append(small_assembly(2, size=1e-3)), "dns")["dns"]
+pieces = make_pieces(distribute(comm, item.mesh if comm.rank == 0 else None), item.tables, Materials())
+body = make_body(comm, pieces, item.tables, np.ones(len(pieces.steps)))
+equations = Equations.of(comm, body)
+motion = ImplicitMotion(equations, [HalfSineDrop(1e4, 5e-5)], 2e-6)
+for _ in range(10):
+    motion.advance()
+    motion.update_force()
+owned = body.shared.owned
+displacement = np.zeros((item.tables.nodes, 3))
+displacement[body.local.nodes[owned]] = motion.displacement[owned]
+parts = [motion.kinetic_energy(), motion.strain_energy(np.zeros_like(motion.force)), motion.external_work]
+result = {
+    "displacement": comm.allreduce(displacement).tolist(),
+    "energies": comm.allreduce(np.array(parts)).tolist(),
+    "frequencies": natural_modes(equations, 4).frequency.tolist(),
+}
+if comm.rank == 0:
+    print(json.dumps(result))
+"""
+
+
+def results(directory: Path, ranks: int) -> dict:
+    script = directory / "oracle.py"
+    script.write_text(SCRIPT)
+    done = subprocess.run(
+        ["mpirun", "--allow-run-as-root", "--oversubscribe", "-n", str(ranks), sys.executable, str(script)],
+        cwd=ROOT,
+        env=os.environ | {"PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"},
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+def test_two_ranks_give_the_results_of_one(tmp_path):
+    one, two = results(tmp_path, 1), results(tmp_path, 2)
+    scale = max(abs(value) for point in one["displacement"] for value in point)
+    for first, second in zip(one["displacement"], two["displacement"], strict=True):
+        assert second == pytest.approx(first, abs=1e-8 * scale)
+    assert two["frequencies"] == pytest.approx(one["frequencies"], rel=1e-8)
+    assert two["energies"] == pytest.approx(one["energies"], rel=1e-8)
+    assert sum(two["energies"][:2]) == pytest.approx(two["energies"][2], rel=1e-8)
