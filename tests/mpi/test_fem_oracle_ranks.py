@@ -20,7 +20,7 @@ from fem.loads import HalfSineDrop
 from fem.local_mesh import distribute
 from fem.mesh import append
 from fem.modal import natural_modes
-from fem.parameters import Materials
+from fem.material_roles import Materials
 from fem.scene import prepare
 from tests.support.fem_models import small_assembly
 

@@ -8,8 +8,8 @@ from fem.body import Body
 from fem.global_matrix import Equations
 from fem.implicit import ImplicitMotion
 from fem.loads import HalfSineDrop
+from fem.material_roles import Materials
 from fem.mesh import append
-from fem.parameters import Materials
 from tests.support.fem_bodies import STEEL, dns_body, motion_of
 from tests.support.fem_models import board_mesh, grid, mesh_of, small_assembly
 

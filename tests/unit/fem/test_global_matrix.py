@@ -6,8 +6,8 @@ from petsc4py import PETSc
 from fem.body import Body
 from fem.factorisation import Factorisation
 from fem.global_matrix import Equations
+from fem.material_roles import Materials
 from fem.mesh import append
-from fem.parameters import Materials
 from tests.support.fem_bodies import STEEL, dense_stiffness, dns_body
 from tests.support.fem_models import bar, small_assembly
 
