@@ -98,7 +98,7 @@ class Equations:
 
 
 def tied_stiffness(body: Body) -> scipy.sparse.csr_matrix:
-    """Return T^T K T of this rank's elements ``(3 n, 3 n)`` [N/m], components of all its nodes; the slaves' are zero."""
+    """Return T^T K T of this rank's elements ``(3 n, 3 n)`` [N/m], components of all nodes; the slaves' are zero."""
     upper = AssembledElements.build(body.elements)
     size = 3 * len(body.mass)
     half = scipy.sparse.bsr_matrix((upper.blocks, upper.columns, upper.pointer), shape=(size, size))
