@@ -28,8 +28,7 @@ class Modes:
 
     Attributes:
         frequency: ``(k,)`` [Hz], ascending; about zero for a rigid motion.
-        shape: ``(k, n, 3)`` [1/sqrt(kg)] at the nodes of this rank, x . M x = 1 over all ranks; the largest component
-            is positive.
+        shape: ``(k, n, 3)`` [1/sqrt(kg)] at the nodes of this rank, x . M x = 1 over all ranks; of either sign.
         effective_mass: ``(k, 3)`` [kg] that moves with each mode when the supports are shaken along x, y, z.
     """
 
@@ -60,16 +59,11 @@ def natural_modes(equations: Equations, count: int) -> Modes:
     effective = np.zeros((count, 3))
     for shape, moving, index in zip(shapes, effective, order, strict=True):
         vector = vectors[index]
-        vector.scale(sign_of_largest(vector) / np.sqrt((vector * mass).dot(vector)))
+        vector.scale(1.0 / np.sqrt((vector * mass).dot(vector)))
         equations.spread(vector, shape)
         moving[:] = momentum(equations, shape) ** 2
     frequency = np.sqrt(np.maximum(squared[order], 0.0)) / (2.0 * np.pi)
     return Modes(frequency, shapes, effective)
-
-
-def sign_of_largest(vector: PETSc.Vec) -> float:
-    """Return the sign of the component of largest magnitude, so that a shape does not depend on the solver."""
-    return 1.0 if vector.max()[1] >= -vector.min()[1] else -1.0
 
 
 def momentum(equations: Equations, shape: NDArray[np.float64]) -> NDArray[np.float64]:
