@@ -60,7 +60,7 @@ def petsc_product(elements: Elements) -> Callable[[], object]:
 
 
 def dolfinx_assembly(mesh: MeshData) -> Callable[[], object]:
-    space = dolfinx_api.vector_space(dolfinx_api.hexahedral_mesh(MPI.COMM_SELF, mesh.points, mesh.cells))
+    space = dolfinx_api.vector_space(dolfinx_api.make_mesh(MPI.COMM_SELF, mesh.points, mesh.cells))
     displacement, test = dolfinx.fem.Function(space), ufl.TestFunction(space)
     displacement.x.array[:] = np.random.default_rng(0).uniform(-1, 1, len(displacement.x.array))
     young, poisson = STEEL.young_modulus, STEEL.poisson_ratio

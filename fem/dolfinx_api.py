@@ -11,34 +11,42 @@ import ufl
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from fem.cell_shape import shape_of
+
 OLD = tuple(int(part) for part in dolfinx.__version__.split(".")[:2]) < (0, 8)
 
 
-def hexahedral_mesh(comm: MPI.Comm, points: NDArray[np.float64], cells: NDArray[np.integer]) -> dolfinx.mesh.Mesh:
+def make_mesh(comm: MPI.Comm, points: NDArray[np.float64], cells: NDArray[np.integer]) -> dolfinx.mesh.Mesh:
     """Create a distributed mesh without ghost cells; the arrays of all ranks together are the input.
 
     Args:
         comm: Communicator of the model.
         points: ``(n, 3)`` [m], this rank's share of the nodes in input order.
-        cells: ``(ne, 8)`` input node numbers in tensor order.
+        cells: ``(ne, k)`` input node numbers; k is the same on all ranks and says which shape the cells have.
     """
-    cells = np.ascontiguousarray(cells, np.int64)
+    cells, shape = np.ascontiguousarray(cells, np.int64), shape_of(cells)
     if OLD:
-        domain = ufl.Mesh(ufl.VectorElement("Lagrange", "hexahedron", 1))
+        domain = ufl.Mesh(ufl.VectorElement("Lagrange", shape.cell, shape.degree))
         partitioner = dolfinx.cpp.mesh.create_cell_partitioner()
         ghosts = dolfinx.mesh.GhostMode.none
         return dolfinx.mesh.create_mesh(comm, cells, points, domain, ghost_mode=ghosts, partitioner=partitioner)
     import basix.ufl
 
-    domain = ufl.Mesh(basix.ufl.element("Lagrange", "hexahedron", 1, shape=(3,)))
+    domain = ufl.Mesh(basix.ufl.element("Lagrange", shape.cell, shape.degree, shape=(3,)))
     partitioner = dolfinx.mesh.create_cell_partitioner(dolfinx.mesh.GhostMode.none)
     return dolfinx.mesh.create_mesh(comm, cells, points, domain, partitioner=partitioner)
 
 
 def cell_nodes(mesh: dolfinx.mesh.Mesh) -> NDArray[np.int32]:
-    """Return the local geometry nodes of the local cells, tensor order: ``(ne, 8)``."""
+    """Return the local geometry nodes of the local cells, in the order of the input: ``(ne, k)``."""
     dofmap = mesh.geometry.dofmap
-    return np.asarray(dofmap.array if OLD else dofmap, np.int32).reshape(-1, 8)
+    nodes = mesh.geometry.cmap.create_dof_layout().num_dofs
+    return np.asarray(dofmap.array if OLD else dofmap, np.int32).reshape(-1, nodes)
+
+
+def degree(mesh: dolfinx.mesh.Mesh) -> int:
+    """Return the polynomial degree of the geometry."""
+    return int(mesh.geometry.cmap.degree)
 
 
 def input_nodes(mesh: dolfinx.mesh.Mesh) -> NDArray[np.int64]:
@@ -52,10 +60,10 @@ def input_cells(mesh: dolfinx.mesh.Mesh) -> NDArray[np.int64]:
 
 
 def vector_space(mesh: dolfinx.mesh.Mesh) -> dolfinx.fem.FunctionSpace:
-    """Return the space of trilinear vector fields."""
+    """Return the space of vector fields with a value at each node of the mesh."""
     if OLD:
-        return dolfinx.fem.VectorFunctionSpace(mesh, ("Lagrange", 1))
-    return dolfinx.fem.functionspace(mesh, ("Lagrange", 1, (3,)))
+        return dolfinx.fem.VectorFunctionSpace(mesh, ("Lagrange", degree(mesh)))
+    return dolfinx.fem.functionspace(mesh, ("Lagrange", degree(mesh), (3,)))
 
 
 def cell_space(mesh: dolfinx.mesh.Mesh) -> dolfinx.fem.FunctionSpace:
@@ -78,13 +86,17 @@ def compiled_form(form: ufl.Form, flags: list[str]):  # its type has another nam
     return dolfinx.fem.form(form, jit_options={"cffi_extra_compile_args": flags})
 
 
-def compile_ahead(comm: MPI.Comm) -> None:
-    """Let one rank compile the elements of the output before two communicators wait for one cache entry."""
-    if comm.rank == 0:
-        corners = np.array([[float(a >> d & 1) for d in range(3)] for a in range(8)])
-        cube = hexahedral_mesh(MPI.COMM_SELF, corners, np.arange(8)[None, :])
-        vector_space(cube)
-        cell_space(cube)
+def compile_ahead(comm: MPI.Comm, corners: NDArray[np.float64] | None) -> None:
+    """Let one rank compile the elements of the output before two communicators wait for one cache entry; collective.
+
+    Args:
+        comm: Communicator of all models, whose cells have one shape.
+        corners: ``(k, 3)`` [m] nodes of a cell on that rank, None on the others.
+    """
+    if corners is not None:
+        mesh = make_mesh(MPI.COMM_SELF, corners, np.arange(len(corners))[None, :])
+        vector_space(mesh)
+        cell_space(mesh)
     comm.Barrier()
 
 

@@ -19,7 +19,7 @@ class LocalMesh:
         mesh: The distributed mesh; its geometry nodes are the first ones here.
         nodes: ``(n,)`` input node numbers.
         points: ``(n, 3)`` [m].
-        cells: ``(ne, 8)`` int32 local nodes, tensor order.
+        cells: ``(ne, k)`` int32 local nodes, order as in ``MeshData``.
         cell_numbers: ``(ne,)`` input cell numbers.
     """
 
@@ -61,9 +61,10 @@ def positions(haystack: NDArray[np.int64], needles: NDArray[np.integer]) -> NDAr
 
 def distribute(comm: MPI.Comm, data: MeshData | None) -> LocalMesh:
     """Partition a mesh that rank 0 of ``comm`` holds; collective."""
-    points = np.empty((0, 3)) if data is None else data.points
-    cells = np.empty((0, 8), np.int64) if data is None else data.cells
-    mesh = dolfinx_api.hexahedral_mesh(comm, points, cells)
+    nodes = comm.bcast(data.shape.nodes if data else None)
+    points = data.points if data else np.empty((0, 3))
+    cells = data.cells if data else np.empty((0, nodes), np.int64)
+    mesh = dolfinx_api.make_mesh(comm, points, cells)
     return LocalMesh(
         mesh,
         dolfinx_api.input_nodes(mesh),

@@ -1,31 +1,24 @@
-"""The mesh as the files hold it: points, hexahedra, part names, named facets. Plain NumPy, one process."""
+"""A mesh before it is distributed: points, cells of one shape, part names, named facets. Plain NumPy, one process."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
-import meshio
 import numpy as np
 from numpy.typing import NDArray
 
+from fem.cell_shape import CellShape, shape_of
 from fem.errors import MeshError
-
-# Gmsh and VTK number a hexahedron around its faces; here, as in DOLFINx, bit d of a local index is the side in
-# direction d.
-TENSOR_ORDER = np.array([0, 1, 3, 2, 4, 5, 7, 6])
-FACES = np.array([[0, 1, 2, 3], [4, 5, 6, 7], [0, 1, 4, 5], [2, 3, 6, 7], [0, 2, 4, 6], [1, 3, 5, 7]])
-
 
 @dataclass(frozen=True, slots=True)
 class MeshData:
-    """Hexahedra with named parts and named facets.
+    """Cells of one shape with named parts and named facets.
 
     Attributes:
         points: ``(n, 3)`` [m].
-        cells: ``(ne, 8)`` int32, tensor order (``TENSOR_ORDER``).
+        cells: ``(ne, k)`` int32, node order of DOLFINx (``cell_shape``).
         part: ``(ne,)`` int32, index into ``part_names``.
         part_names: Names of the parts.
-        facets: Name -> ``(nf, 4)`` int32 quadrilaterals in cyclic order.
+        facets: Name -> ``(nf, m)`` int32: quadrilaterals in cyclic order, or triangles with their edges' nodes.
     """
 
     points: NDArray[np.float64]
@@ -34,56 +27,33 @@ class MeshData:
     part_names: tuple[str, ...]
     facets: dict[str, NDArray[np.int32]]
 
+    @property
+    def shape(self) -> CellShape:
+        """Return the shape of the cells."""
+        return shape_of(self.cells)
+
+    def facets_of(self, name: str) -> NDArray[np.int32]:
+        """Return a facet set ``(nf, m)``, empty where the mesh has no such set."""
+        return self.facets.get(name, np.empty((0, self.shape.faces.shape[1]), np.int32))
+
     def facet_nodes(self, name: str) -> NDArray[np.int32]:
         """Return the sorted nodes of a facet set, empty where the mesh has no such set."""
-        return np.unique(self.facets.get(name, np.empty((0, 4), np.int32)))
+        return np.unique(self.facets_of(name))
 
     def in_parts(self, accept: Callable[[str], bool]) -> NDArray[np.bool_]:
         """Return ``(ne,)``: whether the name of a cell's part is accepted."""
         return np.array([accept(name) for name in self.part_names], dtype=bool)[self.part]
 
 
-def read_meshes(paths: Sequence[Path]) -> MeshData:
-    """Read Gmsh files and append them into one mesh; the pieces share no node."""
-    return append([read_mesh(path) for path in paths])
-
-
-def read_mesh(path: Path) -> MeshData:
-    """Read one Gmsh 4.1 file.
+def append(pieces: Sequence[MeshData]) -> MeshData:
+    """Append meshes into one; parts and facet sets of equal name become one.
 
     Raises:
-        MeshError: The file has no hexahedra, other cells of dimension three, or a hexahedron in no or several volumes.
+        MeshError: The meshes have cells of different shapes.
     """
-    mesh = meshio.read(path, file_format="gmsh")
-    foreign = {block.type for block in mesh.cells if block.dim == 3 and block.type != "hexahedron"}
-    blocks = [index for index, block in enumerate(mesh.cells) if block.type == "hexahedron"]
-    if foreign or not blocks:
-        raise MeshError(f"{path}: hexahedra are needed, found {sorted(foreign) or 'no volume cells'}")
-    names = tuple(name for name, (_, dimension) in mesh.field_data.items() if dimension == 3)
-    part = np.concatenate([part_of_block(mesh, index, names, path) for index in blocks])
-    cells = np.concatenate([mesh.cells[index].data for index in blocks])[:, TENSOR_ORDER]
-    quads = [index for index, block in enumerate(mesh.cells) if block.type == "quad"]
-    facets = {
-        name: np.concatenate([mesh.cells[k].data[mesh.cell_sets[name][k]] for k in quads]).astype(np.int32)
-        for name, (_, dimension) in mesh.field_data.items()
-        if dimension == 2 and quads
-    }
-    return without_unused_nodes(
-        MeshData(np.ascontiguousarray(mesh.points, float), cells.astype(np.int32), part.astype(np.int32), names, facets)
-    )[0]
-
-
-def part_of_block(mesh: meshio.Mesh, index: int, names: tuple[str, ...], path: Path) -> NDArray[np.int64]:
-    """Return the part of each cell of one block; see ``read_mesh`` for the errors."""
-    owners = [k for k, name in enumerate(names) if len(mesh.cell_sets[name][index])]
-    if len(owners) != 1:
-        found = [names[k] for k in owners] or "no physical volume"
-        raise MeshError(f"{path}: hexahedra must belong to exactly one physical volume, block {index} is in {found}")
-    return np.full(len(mesh.cells[index].data), owners[0])
-
-
-def append(pieces: Sequence[MeshData]) -> MeshData:
-    """Append meshes into one; parts and facet sets of equal name become one."""
+    shapes = {piece.shape.name for piece in pieces}
+    if len(shapes) > 1:
+        raise MeshError(f"all meshes of a model need cells of one shape, found {', '.join(sorted(shapes))}")
     names = tuple(dict.fromkeys(name for piece in pieces for name in piece.part_names))
     offsets = np.concatenate([[0], np.cumsum([len(piece.points) for piece in pieces])]).astype(np.int32)
     number = [np.array([names.index(name) for name in piece.part_names], np.int32) for piece in pieces]
@@ -145,17 +115,19 @@ def merge_nodes(
 
 
 def boundary_facets(cells: NDArray[np.int32]) -> NDArray[np.int32]:
-    """Return the faces that belong to one cell only: ``(nf, 4)``, nodes in tensor order."""
-    faces = cells[:, FACES].reshape(-1, 4)
+    """Return the faces that belong to one cell only: ``(nf, m)``, nodes as in ``CellShape.faces``."""
+    local = shape_of(cells).faces
+    faces = cells[:, local].reshape(-1, local.shape[1])
     _, first, count = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
     return faces[first[count == 1]]
 
 
 def cells_of_facets(cells: NDArray[np.int32], facets: NDArray[np.int32]) -> NDArray[np.int64]:
     """Return the first cell (among ``cells``) that has each facet: ``(nf,)``, -1 where none has it."""
-    faces = np.sort(cells[:, FACES].reshape(-1, 4), axis=1)
+    local = shape_of(cells).faces
+    faces = np.sort(cells[:, local].reshape(-1, local.shape[1]), axis=1)
     _, label = np.unique(np.concatenate([faces, np.sort(facets, axis=1)]), axis=0, return_inverse=True)
     label = label.reshape(-1)
     owner = np.full(int(label.max(initial=-1)) + 1, -1, np.int64)
-    owner[label[: len(faces)][::-1]] = np.repeat(np.arange(len(cells)), len(FACES))[::-1]
+    owner[label[: len(faces)][::-1]] = np.repeat(np.arange(len(cells)), len(local))[::-1]
     return owner[label[len(faces) :]]

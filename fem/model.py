@@ -8,7 +8,8 @@ from fem.body import Body, Response, make_body, make_pieces
 from fem.communicators import Communicators, Role
 from fem.inputs import RunInput
 from fem.local_mesh import distribute
-from fem.mesh import MeshData, read_meshes
+from fem.mesh import MeshData
+from fem.mesh_file import read_meshes
 from fem.scene import JointTables, prepare
 from fem.steps import Steps, choose_steps
 
@@ -25,7 +26,8 @@ def build_models(comms: Communicators, request: RunInput) -> tuple[dict[Role, Mo
     """Read, prepare and distribute the models of this rank, and choose their steps; collective."""
     world = comms.world
     inputs = read_models(comms, request)
-    dolfinx_api.compile_ahead(world)
+    mine = next((mesh for mesh, _ in inputs.values() if mesh), None) if world.rank == 0 else None
+    dolfinx_api.compile_ahead(world, mine.points[mine.cells[0]] if mine else None)
     meshes = {role: distribute(comms.models[role], mesh) for role, (mesh, _) in inputs.items()}
     pieces = agreed(
         world, lambda: {role: make_pieces(meshes[role], inputs[role][1], request.materials) for role in meshes}

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from fem.cell_shape import HEXAHEDRON
 from fem.errors import TieError
 from fem.kernels_motion import gather_from_slaves, spread_to_slaves
 from fem.mesh import MeshData
@@ -50,8 +51,11 @@ def tie_joints(mesh: MeshData) -> tuple[MeshData, Tie, float]:
         The mesh with its slaves moved onto their facets, the tie, and the largest such move [m].
 
     Raises:
-        TieError: A node has no facet within the tolerance, is tied twice, or is both slave and master.
+        TieError: The mesh has joints but no hexahedra, or a node has no facet within the tolerance, is tied twice, or is
+            both slave and master.
     """
+    if mesh.shape is not HEXAHEDRON and any("@" in name for name in mesh.facets):
+        raise TieError(f"joints are tied to quadrilateral facets only: the mesh needs hexahedra, not {mesh.shape.name}")
     ends = [(name, "board_side") for name in mesh.facets if name.startswith("foot@")]
     ends += [(name, "package_side") for name in mesh.facets if name.startswith("head@")]
     ties = [tie_end(mesh, end, side) for end, side in ends if len(mesh.facets[end])]
@@ -72,7 +76,7 @@ def tie_joints(mesh: MeshData) -> tuple[MeshData, Tie, float]:
 
 def tie_end(mesh: MeshData, end: str, side: str) -> Tie:
     """Tie the nodes of one end of a joint to the facets of a side; errors as ``tie_joints``."""
-    facets = mesh.facets.get(side, np.empty((0, 4), np.int32))
+    facets = mesh.facets_of(side)
     if not len(facets):
         raise TieError(f"{end} has no facet to be tied to: the facet set {side} is empty")
     slaves = mesh.facet_nodes(end)

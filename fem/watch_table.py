@@ -85,7 +85,7 @@ def watch_table(
     solder = [(j, mesh.in_parts(f"solder@{name}".__eq__).nonzero()[0]) for j, name in enumerate(joints)]
     solder = [(j, cells) for j, cells in solder if len(cells)]
     layers = [pad_layer(mesh, joints[j], cells, end) for j, cells in solder for end in (0, 1)]
-    facets = mesh.facets.get("board_bottom", np.empty((0, 4), np.int32))
+    facets = mesh.facets_of("board_bottom")
     low, high = corners
     inside = ((mesh.points[facets][:, :, :2] >= low) & (mesh.points[facets][:, :, :2] <= high)).all(axis=(1, 2))
     facets = facets[inside]
@@ -110,7 +110,7 @@ def pad_layer(
 ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
     """Return the solder elements at one pad of a joint with their shares of the layer's volume and pad area."""
     name = (f"pad_board@{joint}", f"pad_package@{joint}")[end]
-    facets = mesh.facets.get(name, np.empty((0, 4), np.int32))
+    facets = mesh.facets_of(name)
     owner = cells_of_facets(mesh.cells[solder], facets)
     if not len(facets) or (owner < 0).any():
         raise MeshError(f"{name}: {np.sum(owner < 0)} of {len(facets)} facets belong to no element of solder@{joint}")

@@ -6,7 +6,8 @@ from pathlib import Path
 import gmsh
 import numpy as np
 
-from fem.mesh import TENSOR_ORDER, MeshData, append, boundary_facets, without_unused_nodes
+from fem.cell_shape import TENSOR_ORDER
+from fem.mesh import MeshData, append, boundary_facets, without_unused_nodes
 
 CYCLIC = [0, 1, 3, 2]
 FACET_SETS = Callable[[np.ndarray], np.ndarray]

@@ -5,7 +5,8 @@ import pytest
 
 from fem.cut import find_cut
 from fem.errors import CutError, MeshError
-from fem.mesh import MeshData, append, boundary_facets, cells_of_facets, merge_nodes, read_mesh, select
+from fem.mesh import MeshData, append, boundary_facets, cells_of_facets, merge_nodes, select
+from fem.mesh_file import read_mesh
 from fem.scene import prepare
 from tests.support.fem_models import board_mesh, grid, mesh_of, small_assembly, write_msh
 

@@ -1,0 +1,77 @@
+"""Integrals over facets: how a pressure on them becomes nodal forces."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem.errors import MeshError
+from fem.mesh import MeshData, cells_of_facets
+
+GAUSS = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]) / np.sqrt(3.0)
+CYCLIC = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+BARYCENTRIC = np.array([[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]])  # derivatives of the barycentric coordinates
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FacetRule:
+    """Shape functions ``values (q, m)`` and ``derivatives (q, m, 2)`` at points with ``weights (q,)``."""
+
+    values: NDArray[np.float64]
+    derivatives: NDArray[np.float64]
+    weights: NDArray[np.float64]
+
+
+def quadrilateral() -> FacetRule:
+    """Return 2 x 2 Gauss points."""
+    factors = 1.0 + GAUSS[:, None, :] * CYCLIC
+    return FacetRule(0.25 * factors.prod(axis=2), 0.25 * CYCLIC * factors[:, :, ::-1], np.ones(4))
+
+
+def triangle() -> FacetRule:
+    """Return the centroid."""
+    return FacetRule(np.full((1, 3), 1.0 / 3.0), BARYCENTRIC[None], np.full(1, 0.5))
+
+
+def quadratic_triangle() -> FacetRule:
+    """Return the middles of the edges: exact for quadratic integrands, and the vertices carry nothing there."""
+    at = 0.5 * (np.eye(3) + np.roll(np.eye(3), 1, axis=1))  # on ab, bc, ca
+    vertices = (4.0 * at - 1.0)[:, :, None] * BARYCENTRIC
+    turned = np.roll(BARYCENTRIC, -1, axis=0)
+    edges = 4.0 * (at[:, :, None] * turned + np.roll(at, -1, axis=1)[:, :, None] * BARYCENTRIC)
+    values = np.hstack([np.zeros((3, 3)), np.eye(3)])
+    return FacetRule(values, np.concatenate([vertices, edges], axis=1), np.full(3, 1.0 / 6.0))
+
+
+RULES = {4: quadrilateral(), 3: triangle(), 6: quadratic_triangle()}
+
+
+def area_vectors(corners: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the integral of shape function times normal: ``(nf, m, 3)`` [m^2].
+
+    A pressure p on facets gives the nodal forces p times these; their sum over nodes is the area vector.
+
+    Args:
+        corners: ``(nf, m, 3)`` [m], nodes in the order of ``MeshData.facets``; the normal follows from the right-hand
+            rule.
+    """
+    rule = RULES[corners.shape[1]]
+    tangent = np.einsum("fai,qad->fqid", corners, rule.derivatives)
+    normal = np.cross(tangent[..., 0], tangent[..., 1])
+    return np.einsum("q,qa,fqi->fai", rule.weights, rule.values, normal)
+
+
+def outward_area_vectors(mesh: MeshData, name: str) -> NDArray[np.float64]:
+    """Return ``area_vectors`` of a facet set of a mesh, turned outward from the cell of each facet.
+
+    Raises:
+        MeshError: A facet belongs to no cell.
+    """
+    facets = mesh.facets_of(name)
+    owner = cells_of_facets(mesh.cells, facets)
+    if (owner < 0).any():
+        raise MeshError(f"{name}: {np.sum(owner < 0)} of {len(facets)} facets belong to no element")
+    vectors = area_vectors(mesh.points[facets])
+    away = mesh.points[facets].mean(axis=1) - mesh.points[mesh.cells[owner]].mean(axis=1)
+    side = np.sign(np.einsum("fi,fai->f", away, vectors))
+    return vectors * side[:, None, None]
