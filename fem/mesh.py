@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from fem.cell_shape import CellShape, shape_of
 from fem.errors import MeshError
 
+
 @dataclass(frozen=True, slots=True)
 class MeshData:
     """Cells of one shape with named parts and named facets.
