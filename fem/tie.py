@@ -51,8 +51,8 @@ def tie_joints(mesh: MeshData) -> tuple[MeshData, Tie, float]:
         The mesh with its slaves moved onto their facets, the tie, and the largest such move [m].
 
     Raises:
-        TieError: The mesh has joints but no hexahedra, or a node has no facet within the tolerance, is tied twice, or is
-            both slave and master.
+        TieError: The mesh has joints but no hexahedra, or a node has no facet within the tolerance, is tied twice, or
+            is both slave and master.
     """
     if mesh.shape is not HEXAHEDRON and any("@" in name for name in mesh.facets):
         raise TieError(f"joints are tied to quadrilateral facets only: the mesh needs hexahedra, not {mesh.shape.name}")

@@ -107,7 +107,7 @@ def test_dolfinx_keeps_nodes_and_writes_fields(box, tmp_path):
 
 def test_mixed_cells_are_an_error_that_names_them(tmp_path):
     write_box(tmp_path / "box.msh", HEXAHEDRON, mixed=True)
-    with pytest.raises(MeshError, match="one shape are needed .* found hexahedron, tetra"):
+    with pytest.raises(MeshError, match=r"one shape are needed .* found hexahedron, tetra"):
         read_mesh(tmp_path / "box.msh")
 
 
