@@ -75,8 +75,8 @@ def _add_table(blocks: list[str], key: str, parameters: BaseModel) -> None:
             absent.append(_absent_table(f"{key}.{name}", models_of(field)[0]))
         else:
             lines.append(_line(name, value, field))
-    if lines:
-        header = [*_describe(type(parameters)), f"[{key}]"] if key else []
+    header = [*_describe(type(parameters)), *([f"[{key}]"] if lines else [])] if key else []
+    if header or lines:
         blocks.append("\n".join([*header, *lines, ""]))
     blocks.extend(absent)
     own = getattr(parameters, "kind", "")

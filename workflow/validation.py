@@ -5,6 +5,7 @@ from typing import Any
 
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
+from pydantic_core import ErrorDetails
 
 from workflow import fields
 from workflow.problems import Problem, nearest
@@ -30,12 +31,14 @@ def translate(model: type[BaseModel], error: ValidationError, table: dict, known
         names = _names(model, record["loc"])
         key = ".".join(names)
         if key not in known:
-            found.setdefault(key, _problem(model, names, record["type"], record["msg"], table))
+            is_explained = bool({"allowed", "names"} & record.get("ctx", {}).keys())
+            problem = _explained(names, record, table) if is_explained else _problem(model, names, record, table)
+            found.setdefault(key, problem)
     return list(found.values())
 
 
-def _problem(root: type[BaseModel], names: list[str], kind: str, text: str, table: dict) -> Problem:
-    key, value = ".".join(names), _value(table, names)
+def _problem(root: type[BaseModel], names: list[str], record: ErrorDetails, table: dict) -> Problem:
+    key, value, kind, text = ".".join(names), _value(table, names), record["type"], record["msg"]
     model, field = _field(root, names, table)
     if kind == "extra_forbidden":
         siblings = list(model.model_fields) if model else []
@@ -59,6 +62,14 @@ def _problem(root: type[BaseModel], names: list[str], kind: str, text: str, tabl
     if kind in ("tuple_type", "too_short"):
         return Problem(key, "must be a list with at least one item", value, fields.allowed(field))
     return Problem(key, text[0].lower() + text[1:], value, fields.allowed(field))
+
+
+def _explained(names: list[str], record: ErrorDetails, table: dict) -> Problem:
+    """Pass on the error of a check that says itself what is allowed, or which names are."""
+    context, value = record["ctx"], _value(table, names)
+    choices = context.get("names", ())
+    allowed = context.get("allowed", "one of " + ", ".join(choices))
+    return Problem(".".join(names), record["msg"], value, allowed, nearest(str(value), choices))
 
 
 def _kind_problem(key: str, value: Any, field: FieldInfo) -> Problem:

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from fem.material_library import SAC305
 from tests.support.workflow_command import SMALL_CASE
 from workflow.case import available_cores, display_values, read_case
 from workflow.problems import CaseError
@@ -33,6 +34,29 @@ BAD_VALUES = {
         ["materials.solder.kind", "one of isotropic, orthotropic", "did you mean isotropic?"],
     ),
     "value for a table": ("materials.solder=1 GPa", ["materials.solder", "must be a table"]),
+    "unknown material": (
+        "materials.solder=SAC306",
+        ["materials.solder", "one of FR4, copper,", "did you mean SAC305?"],
+    ),
+    "unbalanced orthotropic constants": (
+        "materials.board.poisson_ratio_out_of_plane=1.2",
+        [
+            "materials.board.poisson_ratio_out_of_plane = 1.2",
+            "energy would not be positive",
+            "> -1.00906 and < 1.00906",
+        ],
+    ),
+    "no density": ('materials.copper.density="0 kg/m^3"', ["materials.copper.density", "allowed: > 0 kg/m^3"]),
+    "negative density": ("materials.die.density=-1 g/cm^3", ['"-1 g/cm^3"', "out of range", "> 0 kg/m^3"]),
+    "solder too hot to be solid": (
+        'materials.solder={ plasticity = { A = "38 MPa" }, temperature = "220 degC" }',
+        ['materials.solder.temperature = "220 degC"', "allowed: < 217 degC, the melting_temperature"],
+    ),
+    "plasticity without a yield stress": (
+        'materials.solder.plasticity.B="1 MPa"',
+        ["materials.solder.plasticity.A", "is missing", "> 0 MPa"],
+    ),
+    "unknown constant of plasticity": ("materials.solder.plasticity.D=1", ["unknown key", "one of A, B, n, C"]),
     "table below a value": ("package.rows.all=1", ["package.rows.all", "lies below a value"]),
     "no setting": ("package.rows", ["package.rows", "is no setting", "dotted.key=value"]),
     "more ranks than cores": ("shock.ranks.meso=4096", ["shock.ranks", "4097 MPI ranks", "--oversubscribe"]),
@@ -105,6 +129,16 @@ def test_one_property_of_a_default_material_can_change():
     case = read_case(SMALL_CASE, ["materials.solder.young_modulus=40 GPa"])
     assert case.materials.solder.young_modulus == pytest.approx(40e9)
     assert case.materials.solder.density == 7440.0
+
+
+def test_a_material_is_a_name_of_the_library_or_a_table():
+    materials = read_case(SMALL_CASE, ["materials.solder=SAC305", "materials.die=mould_compound"]).materials
+    assert materials.solder == SAC305
+    assert materials.die.density == 1950.0
+    settings = ['materials.solder.plasticity.A="30 MPa"', "materials.solder.temperature=100 degC"]
+    solder = read_case(SMALL_CASE, settings).materials.solder
+    assert (solder.plasticity.A, solder.temperature) == pytest.approx((30e6, 373.15))
+    assert display_values(read_case(SMALL_CASE, settings))["materials.solder.temperature"] == "100 degC"
 
 
 def test_another_kind_of_material_needs_all_its_properties():
