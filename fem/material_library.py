@@ -17,7 +17,7 @@ FR4 = Orthotropic(
     shear_modulus_in_plane=12.6e9,
     shear_modulus_out_of_plane=5.5e9,
 )
-# H table 5: an average over directions of the crystal, whose E is 130 GPa along <100> and 169 GPa along <110>.
+# H table 5; the crystal has 130 GPa along <100> and 169 GPa along <110>.
 SILICON = Isotropic(density=2330.0, young_modulus=132.46e9, poisson_ratio=0.28)
 # H table 4 as printed. Packaging handbooks give 115-131 GPa for oxygen-free and lead-frame copper (Intel Packaging
 # Databook 2000, table 5-2; TopLine column grid data), 8900-8960 kg/m^3.
