@@ -47,12 +47,11 @@ class Participant(Protocol):
 
 
 class Alone:
-    """A DNS: one model, all steps small."""
+    """One model without a cut: a DNS, all steps small, or a structure."""
 
-    def __init__(self, body: Body, loads: list[Load], plan: WindowPlan) -> None:
-        """Start at rest."""
-        none = np.empty(0, np.int32)
-        self.motion = Motion(body, loads, plan.step, none, np.zeros(len(body.mass)))
+    def __init__(self, motion: Motion, plan: WindowPlan) -> None:
+        """Take a motion that is ready to advance by the plan's steps."""
+        self.motion = motion
         self.interface_work = 0.0
         self.plan = plan
         self._zero = np.zeros_like(self.motion.force)
@@ -153,6 +152,11 @@ class Meso:
     def foreign_force(self) -> NDArray[np.float64]:
         """Return zero: all forces are this model's."""
         return self._zero
+
+
+def uncut_motion(body: Body, loads: list[Load], step: float) -> Motion:
+    """Return the motion from rest of a model without a cut."""
+    return Motion(body, loads, step, np.empty(0, np.int32), np.zeros(len(body.mass)))
 
 
 def counted_cut(body: Body) -> NDArray[np.int32]:

@@ -17,7 +17,7 @@ from fem.ledger import Ledger
 from fem.loads import HalfSineDrop
 from fem.model import Model, build_models
 from fem.parameters import Shock
-from fem.participant import Alone, Macro, Meso, Participant
+from fem.participant import Alone, Macro, Meso, Participant, uncut_motion
 from fem.result import Timings, write_result
 from fem.steps import Steps
 from fem.watch_joints import JointWatch
@@ -54,7 +54,7 @@ def make_crew(
     """Return the participants of this rank, in the order of their turns; collective."""
     bodies = {role: model.body for role, model in models.items()}
     if "dns" in bodies:
-        return {"dns": Alone(bodies["dns"], [load], plan)}
+        return {"dns": Alone(uncut_motion(bodies["dns"], [load], plan.step), plan)}
     absent = np.full_like(next(iter(bodies.values())).cut, -1)
     macro, meso = (bodies[role].cut if role in bodies else absent for role in ("macro", "meso"))
     channels = CutChannels.open(comms.world, macro, meso, receiver_waits=len(comms.models) == 1)
