@@ -6,6 +6,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from fem.mean_strain import MeanStrain
+
 
 @dataclass(frozen=True, slots=True)
 class Energy:
@@ -38,8 +40,16 @@ class InternalForce(Protocol):
         """Subtract the internal force ``(n, 3)`` [N] at a displacement ``(n, 3)`` [m]."""
 
 
-def linear_energy(term: InternalForce, displacement: NDArray[np.float64]) -> Energy:
-    """Return the strain energy u . K u / 2 of a term that is linear in the displacement ``(n, 3)`` [m]."""
+def linear_energy(term: InternalForce, displacement: NDArray[np.float64], mean: MeanStrain | None) -> Energy:
+    """Return the energy u . K u / 2 of a term that is linear in the displacement ``(n, 3)`` [m].
+
+    Args:
+        term: The term.
+        displacement: ``(n, 3)`` [m].
+        mean: Mean strains of elements with hourglass control, whose energy is what the mean strains do not hold.
+    """
     force = np.zeros_like(displacement)
     term.add(displacement, force)
-    return Energy(strain=-0.5 * float(np.vdot(displacement, force)))
+    total = -0.5 * float(np.vdot(displacement, force))
+    strain = mean.energy(displacement) if mean else total
+    return Energy(strain=strain, hourglass=total - strain)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from fem.element import CHUNK, Elements, element_stiffness
 from fem.energy import Energy, linear_energy
 from fem.kernels_force import add_block_force, assemble_upper_blocks
+from fem.mean_strain import MeanStrain
 
 
 @dataclass(frozen=True, slots=True)
@@ -18,6 +19,7 @@ class AssembledElements:
     pointer: NDArray[np.int32]
     columns: NDArray[np.int32]
     blocks: NDArray[np.float64]
+    mean: MeanStrain | None = None
     history: dict[str, NDArray] = field(default_factory=dict)
 
     @classmethod
@@ -28,7 +30,7 @@ class AssembledElements:
         for start in range(0, len(elements.cells), CHUNK):
             some = elements.subset(np.arange(start, min(start + CHUNK, len(elements.cells))))
             assemble_upper_blocks(some.cells, element_stiffness(some), pointer, columns, blocks)
-        return cls(pointer, columns, blocks)
+        return cls(pointer, columns, blocks, MeanStrain.of(elements))
 
     def add(self, displacement: NDArray[np.float64], force: NDArray[np.float64]) -> None:
         """Subtract K u from the force."""
@@ -36,7 +38,7 @@ class AssembledElements:
 
     def energy(self, displacement: NDArray[np.float64]) -> Energy:
         """Return the strain energy."""
-        return linear_energy(self, displacement)
+        return linear_energy(self, displacement, self.mean)
 
 
 def upper_pattern(cells: NDArray[np.int32], count: int) -> tuple[NDArray[np.int32], NDArray[np.int32]]:

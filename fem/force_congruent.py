@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from fem.element import Elements, classes, element_stiffness
 from fem.energy import Energy, linear_energy
 from fem.kernels_force import add_box_force
+from fem.mean_strain import MeanStrain
 
 SIGNS = np.array([[(-1.0) ** bin(p & a).count("1") for a in range(8)] for p in range(8)])
 UPPER = np.triu_indices(3)
@@ -27,12 +28,14 @@ class CongruentElements:
         cells: ``(ne, 8)`` int32.
         shape: ``(ne,)`` int32, class of each element.
         blocks: ``(ns, 8, 6)`` [N/m], see ``kernels_force.add_box_force``.
+        mean: Mean strains of elements with hourglass control.
         history: Empty.
     """
 
     cells: NDArray[np.int32]
     shape: NDArray[np.int32]
     blocks: NDArray[np.float64]
+    mean: MeanStrain | None = None
     history: dict[str, NDArray] = field(default_factory=dict)
 
     @classmethod
@@ -42,7 +45,7 @@ class CongruentElements:
         first, shape = classes(replace(turned, density=np.zeros(len(turned.cells))))
         blocks = parity_blocks(element_stiffness(turned.subset(first)))
         order = np.argsort(turned.cells.min(axis=1), kind="stable")
-        return cls(np.ascontiguousarray(turned.cells[order]), shape[order], blocks)
+        return cls(np.ascontiguousarray(turned.cells[order]), shape[order], blocks, MeanStrain.of(elements))
 
     def add(self, displacement: NDArray[np.float64], force: NDArray[np.float64]) -> None:
         """Subtract K u from the force."""
@@ -50,7 +53,7 @@ class CongruentElements:
 
     def energy(self, displacement: NDArray[np.float64]) -> Energy:
         """Return the strain energy."""
-        return linear_energy(self, displacement)
+        return linear_energy(self, displacement, self.mean)
 
 
 def is_box(corners: NDArray[np.float64]) -> NDArray[np.bool_]:

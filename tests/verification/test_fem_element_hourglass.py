@@ -1,0 +1,56 @@
+"""Hourglass energy of one-point hexahedra: what the ledger shows is what the hourglass stiffness holds."""
+
+import numpy as np
+import pytest
+
+from fem.element import Elements, element_kind
+from fem.element_one_point import ONE_POINT, hourglass_control
+from fem.force import force_terms
+from fem.material_library import FR4
+from fem.materials import elasticity_matrix
+from tests.support.fem_models import grid
+
+RANDOM = np.random.default_rng(5)
+
+
+def cube(distortion: float, formulation: str) -> Elements:
+    points, cells = grid(*[np.linspace(0, 1, 4)] * 3)
+    points[np.all((points > 0) & (points < 1), axis=1)] += distortion
+    count = len(cells)
+    elasticity = elasticity_matrix(FR4)[None]
+    return Elements(points, cells, np.zeros(count, np.int32), elasticity, np.ones(count), element_kind(8, formulation))
+
+
+def energy_of(elements: Elements, displacement: np.ndarray):
+    energies = []
+    for term in force_terms(elements, (FR4,)):
+        term.add(displacement, np.zeros_like(displacement))
+        energies.append(term.energy(displacement))
+    return sum(energies[1:], energies[0])
+
+
+@pytest.mark.parametrize("distortion", [0.0, 0.05], ids=["congruent", "assembled"])
+def test_hourglass_energy_is_that_of_the_hourglass_stiffness(distortion):
+    elements = cube(distortion, "one_point")
+    displacement = RANDOM.uniform(-1e-3, 1e-3, elements.points.shape)
+    gamma, resistance = hourglass_control(elements.points[elements.cells], elements.elasticity, elements.material)
+    amplitude = np.einsum("eak,eai->eki", gamma, displacement[elements.cells]).reshape(-1, 12)
+    exact = 0.5 * np.einsum("em,emn,en->", amplitude, resistance, amplitude)
+    found = energy_of(elements, displacement)
+    assert found.hourglass == pytest.approx(exact, rel=1e-10)
+    assert found.total == pytest.approx(
+        energy_of(cube(distortion, "incompatible_modes"), displacement).strain, rel=1e-12
+    )
+
+
+@pytest.mark.parametrize("distortion", [0.0, 0.05], ids=["congruent", "assembled"])
+def test_affine_fields_have_no_hourglass_energy(distortion):
+    elements = cube(distortion, "one_point")
+    found = energy_of(elements, elements.points @ RANDOM.uniform(-1e-3, 1e-3, (3, 3)))
+    assert abs(found.hourglass) < 1e-12 * found.strain
+
+
+def test_full_integration_has_no_hourglass_energy():
+    assert not element_kind(8).hourglass and ONE_POINT.hourglass
+    elements = cube(0.0, "incompatible_modes")
+    assert energy_of(elements, RANDOM.uniform(-1, 1, elements.points.shape)).hourglass == 0.0
