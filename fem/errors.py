@@ -21,6 +21,18 @@ class MassError(ValueError):
     """Lumped masses that do not add up to density times volume."""
 
 
+class PulseError(ValueError):
+    """A tabulated pulse that cannot be read."""
+
+
+class LoadError(ValueError):
+    """A load or support that acts on nothing, or that does not go with another one."""
+
+
+class StepError(ValueError):
+    """A time step above the critical one."""
+
+
 class EnergyError(RuntimeError):
     """A run whose energies do not balance, or are not numbers."""
 

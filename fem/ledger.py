@@ -1,6 +1,6 @@
 """Energies and force residuals at a sample: what the ranks of all models add up, and what must hold."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,25 +9,34 @@ from fem.errors import EnergyError
 from fem.participant import Participant
 from fem.tie import net_load
 
-ENERGIES = ("kinetic", "internal", "external", "interface", "balance")
+ENERGIES = ("kinetic", "internal", "plastic", "hourglass", "damping", "external", "interface")
+SUMS = len(ENERGIES) + 1 + 16
+JUDGED = 1e-6  # of the largest energy: a step energy below it is round-off
+EXPLANATION = "most likely the time step is too large for this mesh and material, or a load acts on what nothing holds"
 
 
 def ledger_sums(participant: Participant, sign: float) -> NDArray[np.float64]:
-    """Return this rank's part of the ledger: ``(20,)``.
+    """Return this rank's part of the ledger: ``(24,)``.
 
-    Kinetic, internal, external energy, interface work (put in by the macro model minus received by the meso model) [J];
-    net force and moment of the cut, meso minus macro, and their scales; the same of the tie.
+    The energies of ``ENERGIES`` [J], where internal is elastic strain energy and interface the work put in by the macro
+    model minus that received by the meso model; the step energy (``Motion.step_energy``); net force and moment of the
+    cut, meso minus macro, and their scales; the same of the tie.
 
     Args:
         participant: The model on this rank.
         sign: +1 for the macro model, -1 for the meso model, 0 without a cut.
     """
     motion = participant.motion
+    held = motion.internal_energy()
     energies = [
         motion.kinetic_energy(),
-        motion.strain_energy(participant.foreign_force()),
+        held.strain,
+        held.plastic,
+        held.hourglass,
+        motion.damping_energy,
         motion.external_work,
         sign * participant.interface_work,
+        motion.step_energy(participant.foreign_force()),
     ]
     points, owned = motion.body.local.points, motion.body.shared.owned
     cut = participant.cut_force()[owned]
@@ -44,12 +53,9 @@ def load_scale(points: NDArray[np.float64], force: NDArray[np.float64]) -> NDArr
 
 def tie_residual(participant: Participant) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return net force and moment ``(6,)`` of the slaves minus those that arrive at their masters, and the scales."""
-    body, motion = participant.motion.body, participant.motion
-    force = np.zeros_like(motion.force)
-    for term in body.terms:
-        term.add(motion.displacement, force)
-    slaves = np.zeros_like(force)
-    slaves[body.tie.slave] = force[body.tie.slave]
+    body = participant.motion.body
+    slaves = np.zeros_like(participant.motion.force)
+    slaves[body.tie.slave] = participant.motion.slave_force
     before, scale = net_load(body.local.points, slaves), load_scale(body.local.points, slaves)
     body.tie.gather(slaves)
     return before - net_load(body.local.points, slaves), scale
@@ -62,38 +68,83 @@ class Ledger:
     Attributes:
         limit: Allowed |balance| as a fraction of the largest energy so far.
         trivial: Energy [J] below which a balance has no meaning.
+        step: dt [s], and ``critical`` the estimated critical step [s], for messages.
         largest: Largest energy so far [J].
         balance_error: Largest |balance| / largest energy seen.
         force_residual: Largest relative force or moment residual seen.
+        initial: Energy at time zero [J].
+        latest: Energies of the sample before.
     """
 
     limit: float
     trivial: float
+    step: float = np.nan
+    critical: float = np.nan
     largest: float = 0.0
     balance_error: float = 0.0
     force_residual: float = 0.0
+    initial: float = 0.0
+    latest: dict[str, float] = field(default_factory=dict)
 
     def judge(self, sums: NDArray[np.float64], time: float) -> dict[str, float]:
         """Check a sample of ``ledger_sums`` added up over all ranks.
 
+        Returns:
+            ``ENERGIES`` and the balance [J]: all energy that is there or was taken, minus the initial and the external.
+
         Raises:
-            EnergyError: An energy is not a number, or the balance exceeds the limit.
+            EnergyError: An energy is not a number, the step is above the critical one, or the balance exceeds the limit.
         """
-        kinetic, internal, external, interface = (float(value) for value in sums[:4])
-        balance = kinetic + internal - external
-        largest = max(kinetic, internal, abs(external))
-        if not np.isfinite(balance) or not np.isfinite(interface):
-            raise EnergyError(f"energies are not numbers at time {time:.6e} s: the time step is not stable")
-        self.largest = max(self.largest, largest)
+        found = dict(zip(ENERGIES, sums.tolist(), strict=False))
+        present = sum(found[name] for name in ENERGIES[:5]) - found["external"]
+        if not np.isfinite(present) or not np.isfinite(found["interface"]):
+            raise EnergyError(f"energies are not numbers {self._when(time)}: {self._cause(found)}")
+        self.initial = present if time == 0.0 else self.initial
+        balance = present - self.initial
+        self.largest = max(self.largest, *(abs(found[name]) for name in ENERGIES[:6]))
+        self._judge_step(found, float(sums[len(ENERGIES)]), time)
         if self.largest > self.trivial:
             self.balance_error = max(self.balance_error, abs(balance) / self.largest)
         if self.balance_error > self.limit:
             raise EnergyError(
-                f"energy balance {balance:.3e} J at time {time:.6e} s is {self.balance_error:.2%} of the largest energy"
-                f" {self.largest:.3e} J, allowed are {self.limit:.2%} (shock.numerics.energy_balance_limit)"
+                f"energy balance {balance:.3e} J {self._when(time)} is {self.balance_error:.2%} of the largest energy"
+                f" {self.largest:.3e} J, allowed are {self.limit:.2%} (numerics.energy_balance_limit):"
+                f" {self._cause(found)}"
             )
-        for load in (sums[4:12], sums[12:20]):
+        self._judge_forces(sums[len(ENERGIES) + 1 :])
+        self.latest = found
+        return found | {"balance": balance}
+
+    def _judge_step(self, found: dict[str, float], step_energy: float, time: float) -> None:
+        """Refuse a motion whose step energy shows that the step is above the critical one of modes that move."""
+        strain = found["internal"] + found["hourglass"]
+        if self.largest <= self.trivial:
+            return
+        if found["damping"] < -JUDGED * self.largest:
+            raise EnergyError(
+                f"the time step is not stable {self._when(time)}: damping makes energy, {self._cause(found)}"
+            )
+        if step_energy > strain and step_energy > JUDGED * self.largest:
+            raise EnergyError(
+                f"the time step is not stable {self._when(time)}: modes that move need a step"
+                f" {np.sqrt(step_energy / strain) if strain > 0.0 else np.inf:.3g} times smaller; {self._cause(found)}"
+            )
+
+    def _judge_forces(self, loads: NDArray[np.float64]) -> None:
+        """Note the residuals of cut and tie: two times net force, moment ``(6,)`` and scales ``(2,)``."""
+        for load in (loads[:8], loads[8:]):
             scale = np.repeat(load[6:8], 3)
             ratio = np.divide(np.abs(load[:6]), scale, out=np.zeros(6), where=scale > 0.0)
             self.force_residual = max(self.force_residual, float(ratio.max()))
-        return dict(zip(ENERGIES, (kinetic, internal, external, interface, balance), strict=True))
+
+    def _when(self, time: float) -> str:
+        """Return time and step of a sample in words."""
+        return f"at time {time:.6e} s (step {time / self.step:.0f})" if self.step > 0.0 else f"at time {time:.6e} s"
+
+    def _cause(self, found: dict[str, float]) -> str:
+        """Return in words what grew since the sample before, the steps, and what that hints at."""
+        growth = {name: abs(found[name] - self.latest.get(name, 0.0)) for name in ENERGIES[:6]}
+        fastest = max(growth, key=lambda name: np.nan_to_num(growth[name], nan=np.inf))
+        steps = f"; step {self.step:.3e} s, estimated critical step {self.critical:.3e} s" if self.step > 0.0 else ""
+        now = f"{self.latest.get(fastest, 0.0):.3e} J to {found[fastest]:.3e} J since the sample before"
+        return f"the {fastest} energy went from {now}{steps}; {EXPLANATION}"

@@ -1,21 +1,92 @@
-"""Loads of the shock: objects in a list, each a body acceleration in the frame of the drop table."""
+"""Loads: objects in a list, each with its part in a step and the work that it does.
 
-from dataclasses import dataclass
-from typing import Protocol
+A step asks every load in turn: ``drive`` prescribes velocities, ``add`` adds forces at nodes, ``collect`` takes half a
+step's work. The work of a force over a step is the mean of its values at both ends times the displacement between
+them, so that with ``Motion.kinetic_energy`` the ledger of a linear model is exact at any step.
+"""
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
+from mpi4py import MPI
 from numpy.typing import NDArray
 
+from fem.body import Body
+from fem.errors import LoadError
+from fem.pulse import HalfSine, Pulse
 
-class Load(Protocol):
-    """A body force per mass."""
+if TYPE_CHECKING:
+    from fem.motion import Motion
+
+MASS_RATIO = 1e6  # large mass over the model's: the base deviates from its pulse by about one part in this
+
+
+class Load:
+    """What acts on one model on one rank; each kind overrides its part. By itself it does nothing.
+
+    Attributes:
+        account: Where the ledger puts the work.
+        kept: What changes with time, by name.
+        work: Work done on this rank's share of the model so far [J].
+    """
+
+    account: ClassVar[Literal["external", "damping"]] = "external"
+    kept: ClassVar[tuple[str, ...]] = ()
+    work: float = 0.0
 
     def acceleration(self, time: float) -> NDArray[np.float64]:
         """Return the acceleration ``(3,)`` [m/s^2] that acts on every kilogram at a time [s]."""
+        return np.zeros(3)
+
+    def base_displacement(self) -> NDArray[np.float64]:
+        """Return the displacement ``(3,)`` [m] of the frame in which results are told."""
+        return np.zeros(3)
+
+    def begin(self, motion: "Motion") -> None:
+        """Take part in the masses and free components of a motion at rest."""
+
+    def drive(self, velocity: NDArray[np.float64], time: float) -> None:
+        """Prescribe rows of the mean velocity ``(n, 3)`` [m/s] of the step that begins at a time [s]."""
+
+    def add(self, motion: "Motion") -> None:
+        """Add the force at the motion's time to ``motion.force``, which is already summed over ranks."""
+
+    def remove(self, force: NDArray[np.float64]) -> None:
+        """Subtract from a copy of ``motion.force`` what ``add`` added last."""
+
+    def collect(self, motion: "Motion") -> None:
+        """Add half a step's work of the force at the motion's time at its velocity; all forces are complete."""
+
+    def state(self) -> dict[str, Any]:
+        """Return all that changes with time, for a checkpoint."""
+        return {name: getattr(self, name) for name in self.kept}
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Continue from what ``state`` returned."""
+        for name, value in state.items():
+            setattr(self, name, value)
 
 
-@dataclass(frozen=True, slots=True)
-class HalfSineDrop:
+@dataclass(frozen=True)
+class BodyAcceleration(Load):
+    """A uniform acceleration: gravity, or input-G in the frame of the supports, which are held.
+
+    Attributes:
+        direction: ``(3,)`` unit vector in which the body is pushed.
+        pulse: Acceleration [m/s^2].
+    """
+
+    direction: NDArray[np.float64]
+    pulse: Pulse
+
+    def acceleration(self, time: float) -> NDArray[np.float64]:
+        """Return the acceleration ``(3,)`` [m/s^2]."""
+        return self.direction * self.pulse.value(time)
+
+
+@dataclass(frozen=True)
+class HalfSineDrop(Load):
     """Input-G at the mounting holes as direct acceleration input (JESD22-B111, package facing down).
 
     The package looks towards the ground, so the table's upward acceleration points along -z and the board, seen from
@@ -31,7 +102,7 @@ class HalfSineDrop:
 
     def base(self, time: float) -> float:
         """Return the table's upward acceleration A sin(pi t / tau) [m/s^2], zero after the pulse."""
-        return float(self.peak * np.sin(np.pi * time / self.pulse)) if 0.0 < time < self.pulse else 0.0
+        return HalfSine(self.peak, self.pulse).value(time)
 
     def acceleration(self, time: float) -> NDArray[np.float64]:
         """Return the body acceleration ``(3,)`` [m/s^2]."""
@@ -39,5 +110,179 @@ class HalfSineDrop:
 
     def velocity_change(self, duration: float) -> float:
         """Return the integral of the pulse up to a time [m/s]; 2 A tau / pi for all of it."""
-        angle = np.pi * min(duration, self.pulse) / self.pulse
-        return float(self.peak * self.pulse / np.pi * (1.0 - np.cos(angle)))
+        return HalfSine(self.peak, self.pulse).integral(duration)
+
+
+@dataclass
+class NodalForces(Load):
+    """Dead forces at nodes: a pattern times a pulse.
+
+    Attributes:
+        nodes: ``(k,)`` local nodes.
+        pattern: ``(k, 3)`` force [N] at a pulse of one, summed over ranks and equal on all that hold the node.
+        pulse: Its course.
+        owned: ``(k,)`` whether the node counts on this rank.
+    """
+
+    nodes: NDArray[np.int32]
+    pattern: NDArray[np.float64]
+    pulse: Pulse
+    owned: NDArray[np.bool_]
+    kept: ClassVar[tuple[str, ...]] = ("work", "_factor")
+    work: float = 0.0
+    _factor: float = 0.0
+
+    @classmethod
+    def build(cls, body: Body, nodes: NDArray[np.integer], forces: NDArray[np.float64], pulse: Pulse) -> "NodalForces":
+        """Move forces ``(k, 3)`` [N] at input nodes ``(k,)`` to a rank's nodes, slaves' to their masters; collective."""
+        local = body.local.locate(nodes)
+        here = np.flatnonzero(local >= 0)
+        here = here[body.shared.owned[local[here]]]
+        pattern = np.zeros((len(body.mass), 3))
+        pattern[local[here]] = forces[here]
+        body.tie.gather(pattern)
+        body.shared.add(pattern)
+        rows = np.flatnonzero(pattern.any(axis=1)).astype(np.int32)
+        return cls(rows, pattern[rows], pulse, body.shared.owned[rows])
+
+    def add(self, motion: "Motion") -> None:
+        """Add the force of the motion's time."""
+        self._factor = self.pulse.value(motion.time)
+        motion.force[self.nodes] += self._factor * self.pattern
+
+    def remove(self, force: NDArray[np.float64]) -> None:
+        """Subtract it from a copy."""
+        force[self.nodes] -= self._factor * self.pattern
+
+    def collect(self, motion: "Motion") -> None:
+        """Add half a step's work."""
+        power = np.sum(self.pattern[self.owned] * motion.velocity[self.nodes[self.owned]])
+        self.work += 0.5 * motion.step * self._factor * float(power)
+
+
+@dataclass
+class PrescribedMotion(Load):
+    """One velocity component of some nodes follows a pulse; its work is that of the reaction.
+
+    Attributes:
+        nodes: ``(k,)`` local nodes.
+        component: 0, 1 or 2.
+        pulse: Velocity [m/s].
+    """
+
+    nodes: NDArray[np.int32]
+    component: int
+    pulse: Pulse
+    kept: ClassVar[tuple[str, ...]] = ("work",)
+    step: float = field(default=0.0, init=False)
+    work: float = field(default=0.0, init=False)
+
+    def begin(self, motion: "Motion") -> None:
+        """Take the component out of the free ones.
+
+        Raises:
+            LoadError: A node is held or tied in this component.
+        """
+        if not motion.body.free[self.nodes, self.component].all():
+            raise LoadError(
+                f"prescribed motion along {'xyz'[self.component]} acts on nodes that are held or tied there"
+            )
+        self.step = motion.step
+        motion.hold(self.nodes, self.component)
+
+    def drive(self, velocity: NDArray[np.float64], time: float) -> None:
+        """Set the mean velocity of the step, so that displacements are exact."""
+        velocity[self.nodes, self.component] = self.mean(time)
+
+    def mean(self, time: float) -> float:
+        """Return the mean velocity [m/s] of the step that begins at a time [s]; before the start, the mirror image."""
+        if time < -0.5 * self.step:
+            return 2.0 * self.pulse.value(0.0) - self.mean(0.0)
+        return (self.pulse.integral(time + self.step) - self.pulse.integral(time)) / self.step
+
+    def collect(self, motion: "Motion") -> None:
+        """Add half a step's work of the reaction m a - f - m g."""
+        before, after = self.mean(motion.time - self.step), self.mean(motion.time)
+        acceleration = (after - before) / self.step - motion.gravity[self.component]
+        mass = motion.ledger_mass[self.nodes]
+        owned = motion.body.shared.owned[self.nodes]
+        reaction = mass * acceleration - np.where(owned, motion.force[self.nodes, self.component], 0.0)
+        self.work += 0.5 * self.step * float(reaction @ motion.velocity[self.nodes, self.component])
+
+
+@dataclass
+class LargeMass(Load):
+    """Input-G by a large mass on the support nodes and the force that moves it; displacements are absolute.
+
+    The ledger leaves the large mass out: external work is what its nodes pass on to the model.
+
+    Attributes:
+        nodes: ``(k,)`` local nodes.
+        mass: ``(k,)`` [kg] added to each.
+        direction: ``(3,)`` unit vector against which the base moves, as ``BodyAcceleration`` pushes the body.
+        pulse: Acceleration [m/s^2].
+    """
+
+    nodes: NDArray[np.int32]
+    mass: NDArray[np.float64]
+    direction: NDArray[np.float64]
+    pulse: Pulse
+    kept: ClassVar[tuple[str, ...]] = ("work", "_force", "_base")
+    work: float = 0.0
+    _force: NDArray[np.float64] = field(init=False)
+    _base: NDArray[np.float64] = field(init=False)  # displacement at the motion's time, velocity half a step later
+
+    @classmethod
+    def build(
+        cls, comm: MPI.Comm, body: Body, nodes: NDArray[np.integer], direction: NDArray[np.float64], pulse: Pulse
+    ) -> "LargeMass":
+        """Share ``MASS_RATIO`` times the model's mass among input nodes ``(k,)`` by their masses; collective.
+
+        Raises:
+            LoadError: There is no such node, or one is held or tied.
+        """
+        local = body.local.locate(nodes)
+        local = local[local >= 0]
+        owned = body.shared.owned
+        count, wrong, support, total = comm.allreduce(
+            np.array(
+                [
+                    len(local),
+                    np.sum(~body.free[local]),
+                    body.mass[local][owned[local]].sum(),
+                    body.mass[owned].sum(),
+                ]
+            )
+        )
+        if not count or wrong:
+            found = f"{int(wrong)} of their components are held or tied" if count else "there are none"
+            raise LoadError(f"a large mass needs support nodes that are free to move: {found}")
+        return cls(local, body.mass[local] * (MASS_RATIO * total / support), direction, pulse)
+
+    def base_displacement(self) -> NDArray[np.float64]:
+        """Return the displacement ``(3,)`` [m] of the base, integrated in the motion's own steps."""
+        return -self.direction * self._base[0]
+
+    def begin(self, motion: "Motion") -> None:
+        """Add the masses."""
+        motion.add_mass(self.nodes, self.mass)
+        kick = 0.5 * motion.step * self.pulse.value(0.0)
+        self._base = np.array([motion.step * kick, -kick])
+
+    def add(self, motion: "Motion") -> None:
+        """Add the force that gives the masses the base's acceleration against all body forces."""
+        value = self.pulse.value(motion.time)
+        self._base[0] += motion.step * self._base[1]
+        self._base[1] += motion.step * value
+        self._force = np.outer(self.mass, -self.direction * value - motion.gravity)
+        motion.force[self.nodes] += self._force
+
+    def remove(self, force: NDArray[np.float64]) -> None:
+        """Subtract it from a copy."""
+        force[self.nodes] -= self._force
+
+    def collect(self, motion: "Motion") -> None:
+        """Add half a step's work of what is left of the force after moving the mass itself."""
+        owned = motion.body.shared.owned[self.nodes]
+        passed = self._force - self.mass[:, None] * (motion.acceleration(self.nodes) - motion.gravity)
+        self.work += 0.5 * motion.step * float(np.sum((passed * motion.velocity[self.nodes])[owned]))

@@ -1,11 +1,13 @@
 """Central differences on one rank: velocities live half a step behind displacements."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fem.body import Body
+from fem.energy import Energy
 from fem.kernels_motion import advance
 from fem.loads import Load
 
@@ -20,7 +22,9 @@ class Motion:
         displacement: ``(n, 3)`` [m] at ``time``.
         velocity: ``(n, 3)`` [m/s] at ``time - dt / 2``.
         force: ``(n, 3)`` [N] at ``time``, summed over ranks, slaves' moved to their masters; without body force.
-        external_work: Work of the body force on this rank's share of the mass [J].
+        slave_force: ``(ns, 3)`` [N] of this rank's elements on the slaves, before it is moved.
+        gravity: ``(3,)`` [m/s^2], sum of the loads' accelerations at ``time``.
+        ledger_mass: ``(n,)`` [kg] that counts in the ledger of this rank.
     """
 
     def __init__(
@@ -30,13 +34,13 @@ class Motion:
 
         Args:
             body: The model.
-            loads: Body accelerations.
+            loads: What acts on it; damping comes last, since it needs all other forces.
             step: dt [s].
             held: Local nodes whose velocity another model prescribes; their mass is in that model's ledger.
             extra_mass: ``(n,)`` [kg] that another model adds at the cut.
         """
-        self.body, self.step, self.time, self.external_work = body, step, 0.0, 0.0
-        self._loads = loads
+        self.body, self.step, self.time, self._body_work = body, step, 0.0, 0.0
+        self._loads = sorted(loads, key=lambda load: load.account == "damping")
         mass = body.mass + extra_mass
         free = body.free.copy()
         free[held] = False
@@ -44,48 +48,135 @@ class Motion:
         self._masses[:, :3] = np.where(free, 1.0 / np.where(mass > 0.0, mass, np.inf)[:, None], 0.0)
         self._masses[:, 3] = np.where(body.shared.owned, mass, 0.0)
         self._masses[held, 3] = 0.0
+        self.ledger_mass = self._masses[:, 3]
         self._state = np.zeros((3, len(mass), 3))
         self.displacement, self.velocity, self.force = self._state
-        self._gravity = self.body_acceleration(0.0)
-        self.velocity -= 0.5 * step * self._acceleration()
+        self.slave_force = np.zeros((len(body.tie.slave), 3))
+        self.gravity = self.body_acceleration(0.0)
+        for load in self._loads:
+            load.begin(self)
+        for load in self._loads:
+            load.add(self)
+        for load in self._loads:
+            load.drive(self.velocity, -step)
+        self.velocity -= 0.5 * step * self.acceleration()
+
+    @property
+    def external_work(self) -> float:
+        """Return the work of all loads on this rank's share of the mass [J]."""
+        return self._body_work + sum(load.work for load in self._loads if load.account == "external")
+
+    @property
+    def damping_energy(self) -> float:
+        """Return the energy that damping has taken from this rank's share [J]."""
+        return -sum(load.work for load in self._loads if load.account == "damping")
 
     def body_acceleration(self, time: float) -> NDArray[np.float64]:
-        """Return the sum of all loads ``(3,)`` [m/s^2] at a time [s]."""
+        """Return the sum of all loads' accelerations ``(3,)`` [m/s^2] at a time [s]."""
         return sum((load.acceleration(time) for load in self._loads), np.zeros(3))
+
+    def base_displacement(self) -> NDArray[np.float64]:
+        """Return the displacement ``(3,)`` [m] of the frame in which results are told; zero but with a large mass."""
+        return sum((load.base_displacement() for load in self._loads), np.zeros(3))
+
+    def hold(self, nodes: NDArray[np.integer], component: int) -> None:
+        """Let a velocity component of local nodes no longer follow from forces."""
+        self._masses[nodes, component] = 0.0
+
+    def add_mass(self, nodes: NDArray[np.integer], mass: NDArray[np.float64]) -> None:
+        """Add masses ``(k,)`` [kg] that the ledger does not count to local nodes, all of whose components are free."""
+        self._masses[nodes, :3] = 1.0 / (1.0 / self._masses[nodes, :3] + mass[:, None])
+
+    def launch(self, velocity: NDArray[np.float64]) -> None:
+        """Give all free components an initial velocity ``(3,)`` [m/s]; before the first step."""
+        self.velocity += np.where(self.mobility > 0.0, velocity, 0.0)
+
+    @property
+    def mobility(self) -> NDArray[np.float64]:
+        """Return the inverse masses ``(n, 3)`` [1/kg], zero where the velocity is prescribed."""
+        return self._masses[:, :3]
 
     def advance(self) -> None:
         """Move from ``time`` to ``time + dt``, slaves with their masters; the force is then out of date."""
-        momentum = advance(self._state, self._masses, self._gravity, self.step)
+        for load in self._loads:
+            load.drive(self.velocity, self.time)
+        momentum = advance(self._state, self._masses, self.gravity, self.step)
+        for load in self._loads:
+            load.collect(self)
         self.body.tie.spread(self.displacement)
         self.time += self.step
-        before, self._gravity = self._gravity, self.body_acceleration(self.time)
-        self.external_work += 0.5 * self.step * float((before + self._gravity) @ np.array(momentum))
+        before, self.gravity = self.gravity, self.body_acceleration(self.time)
+        self._body_work += 0.5 * self.step * float((before + self.gravity) @ np.array(momentum))
 
     def update_force(self) -> None:
-        """Evaluate the internal force at the present displacement, summed over ranks."""
+        """Evaluate the force at the present displacement, summed over ranks; once a step, for terms with a path."""
         self.force.fill(0.0)
         for term in self.body.terms:
             term.add(self.displacement, self.force)
+        np.take(self.force, self.body.tie.slave, axis=0, out=self.slave_force)
         self.body.tie.gather(self.force)
         self.body.shared.add(self.force)
+        for load in self._loads:
+            load.add(self)
+        for load in self._loads:
+            load.collect(self)
+
+    def acceleration(self, nodes: NDArray[np.integer] | slice = slice(None)) -> NDArray[np.float64]:
+        """Return the acceleration ``(k, 3)`` [m/s^2] of some local nodes, zero where it does not follow from forces."""
+        inverse = self._masses[nodes, :3]
+        return self.force[nodes] * inverse + np.where(inverse > 0.0, self.gravity, 0.0)
 
     def kinetic_energy(self) -> float:
-        """Return the kinetic energy [J] of this rank's share at ``time``."""
-        return 0.5 * float(self._masses[:, 3] @ np.sum(self.present_velocity() ** 2, axis=1))
+        """Return the kinetic energy [J] of this rank's share at ``time``: v(t - dt/2) . M v(t + dt/2) / 2.
+
+        With this product its change over a step is exactly the work of the forces (central differences conserve it
+        together with the strain energy), while m v^2 / 2 of the mean velocity is larger by m (a dt)^2 / 8.
+        """
+        return 0.5 * float(self.ledger_mass @ np.sum(self.velocity * self._following_velocity(), axis=1))
 
     def present_velocity(self) -> NDArray[np.float64]:
         """Return the velocity ``(n, 3)`` [m/s] at ``time``, half a step after ``velocity``; not that of slaves."""
-        return self.velocity + 0.5 * self.step * self._acceleration()
+        return 0.5 * (self.velocity + self._following_velocity())
 
-    def strain_energy(self, foreign: NDArray[np.float64]) -> float:
-        """Return the strain energy [J] of this rank's share, - u . f / 2 of linear elastic terms.
+    def _following_velocity(self) -> NDArray[np.float64]:
+        """Return the velocity ``(n, 3)`` [m/s] at ``time + dt / 2``."""
+        following = self.velocity + self.step * self.acceleration()
+        for load in self._loads:
+            load.drive(following, self.time)
+        return following
+
+    def internal_energy(self) -> Energy:
+        """Return the energies [J] of this rank's elements."""
+        return sum((term.energy(self.displacement) for term in self.body.terms), Energy())
+
+    def step_energy(self, foreign: NDArray[np.float64]) -> float:
+        """Return dt^2 f . M^-1 f / 8 [J] of this rank's share, f the internal force.
+
+        For f = -K u this is (dt omega / 2)^2 times the strain energy in each mode of frequency omega: where the sum is
+        larger than the strain energy, the step is above 2 / omega of a mode that moves, and that mode grows.
 
         Args:
             foreign: ``(n, 3)`` [N], part of the force that is not this model's.
         """
+        force = self.force - foreign
+        for load in self._loads:
+            load.remove(force)
         owned = self.body.shared.owned
-        return -0.5 * float(np.sum(self.displacement[owned] * (self.force - foreign)[owned]))
+        return 0.125 * self.step**2 * float(np.sum((force**2 * self._masses[:, :3])[owned]))
 
-    def _acceleration(self) -> NDArray[np.float64]:
-        inverse = self._masses[:, :3]
-        return self.force * inverse + np.where(inverse > 0.0, self._gravity, 0.0)
+    def state(self) -> dict[str, Any]:
+        """Return all that changes with time, for a checkpoint."""
+        terms = [term.history for term in self.body.terms]
+        arrays = {"state": self._state, "slave_force": self.slave_force, "gravity": self.gravity, "terms": terms}
+        loads = [load.state() for load in self._loads]
+        return arrays | {"loads": loads, "time": self.time, "body_work": self._body_work}
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Continue from what ``state`` returned, in a motion that was built alike."""
+        self._state[:], self.slave_force[:] = state["state"], state["slave_force"]
+        self.gravity, self.time, self._body_work = state["gravity"], state["time"], state["body_work"]
+        for term, history in zip(self.body.terms, state["terms"], strict=True):
+            for name, values in history.items():
+                term.history[name][...] = values
+        for load, kept in zip(self._loads, state["loads"], strict=True):
+            load.restore(kept)

@@ -1,0 +1,99 @@
+"""Rayleigh damping C = alpha M + beta K: a force at the nodes, and the energy that it takes."""
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem.energy import InternalForce
+from fem.loads import Load
+
+if TYPE_CHECKING:
+    from fem.motion import Motion
+
+
+class RayleighDamping(Load):
+    """Damping of the velocity: -alpha M v at the middle of the step, -beta K v half a step late.
+
+    The mass term is implicit, -alpha M (v(t - dt/2) + v(t + dt/2)) / 2, which needs no smaller step. The stiffness term
+    takes v(t - dt/2), since K v(t) would need a solve; it lowers the critical step, see ``damped_critical_step``.
+
+    Attributes:
+        force: ``(n, 3)`` [N] at the motion's time, summed over ranks.
+    """
+
+    account: ClassVar[Literal["external", "damping"]] = "damping"
+    kept: ClassVar[tuple[str, ...]] = ("work", "force")
+
+    def __init__(self, mass: float, stiffness: float, terms: Sequence[InternalForce]) -> None:
+        """Make damping from coefficients.
+
+        Args:
+            mass: alpha [1/s].
+            stiffness: beta [s].
+            terms: Terms that are linear in the displacement, whose stiffness is K.
+        """
+        self.mass, self.stiffness = mass, stiffness
+        self._terms = terms if stiffness else ()
+        self.force = np.empty((0, 3))
+        self._velocity = np.empty((0, 3))
+
+    def begin(self, motion: "Motion") -> None:
+        """Make room."""
+        self.force = np.zeros_like(motion.force)
+        if self._terms:
+            self._velocity = np.empty_like(motion.velocity)
+
+    def add(self, motion: "Motion") -> None:
+        """Add both forces; those of the loads are there, those of elements too."""
+        self.force.fill(0.0)
+        if self._terms:
+            np.multiply(motion.velocity, self.stiffness, out=self._velocity)
+            motion.body.tie.spread(self._velocity)
+            for term in self._terms:
+                term.add(self._velocity, self.force)
+            motion.body.tie.gather(self.force)
+            motion.body.shared.add(self.force)
+            motion.force += self.force
+        if self.mass:
+            drag = self._drag(motion)
+            self.force += drag
+            motion.force += drag
+
+    def _drag(self, motion: "Motion") -> NDArray[np.float64]:
+        """Return -alpha M v ``(n, 3)`` [N], v(t) = (v(t - dt/2) + dt a / 2) / (1 + alpha dt / 2), a without drag."""
+        middle = motion.velocity + 0.5 * motion.step * motion.acceleration()
+        mobility = motion.mobility
+        mass = np.divide(1.0, mobility, out=np.zeros_like(mobility), where=mobility > 0.0)
+        return -self.mass / (1.0 + 0.5 * self.mass * motion.step) * mass * middle
+
+    def remove(self, force: NDArray[np.float64]) -> None:
+        """Subtract both from a copy."""
+        force -= self.force
+
+    def collect(self, motion: "Motion") -> None:
+        """Add half a step's work."""
+        owned = motion.body.shared.owned
+        self.work += 0.5 * motion.step * float(np.sum((self.force * motion.velocity)[owned]))
+
+
+def rayleigh_coefficients(mass_ratio: float, stiffness_ratio: float, frequency: float) -> tuple[float, float]:
+    """Return alpha [1/s] and beta [s] that have given ratios of critical damping at a frequency [Hz].
+
+    A mode of angular frequency w has the ratio alpha / (2 w) + beta w / 2.
+    """
+    angular = 2.0 * math.pi * frequency
+    return 2.0 * angular * mass_ratio, 2.0 * stiffness_ratio / angular
+
+
+def damped_critical_step(critical: float, stiffness: float) -> float:
+    """Return the critical step [s] with stiffness-proportional damping: dt (sqrt(1 + xi^2) - xi).
+
+    Args:
+        critical: 2 / omega_max without damping [s].
+        stiffness: beta [s]; the highest mode has xi = beta omega_max / 2.
+    """
+    ratio = stiffness / critical
+    return critical * (math.sqrt(1.0 + ratio**2) - ratio)

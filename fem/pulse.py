@@ -1,0 +1,137 @@
+"""Pulses: the course in time of a load, with its first and second integral, which are exact."""
+
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+STANDARD_GRAVITY = 9.80665
+
+# JESD22-B104C and JESD22-B110A, table 1: peak acceleration [G] and duration [ms] of the half sine; B is also the pulse
+# of JESD22-B111. The velocity changes of that table, 2 A tau / pi, agree (e.g. 1500 G, 0.5 ms: 4.68 m/s).
+SERVICE_CONDITIONS: dict[str, tuple[float, float]] = {
+    "A": (500.0, 1.0),
+    "B": (1500.0, 0.5),
+    "C": (100.0, 2.0),
+    "D": (200.0, 1.5),
+    "E": (340.0, 1.2),
+    "F": (900.0, 0.7),
+    "G": (2000.0, 0.4),
+    "H": (2900.0, 0.3),
+}
+
+
+class Pulse(Protocol):
+    """A value over time, from rest at time zero."""
+
+    def value(self, time: float) -> float:
+        """Return the value at a time [s]."""
+
+    def integral(self, time: float) -> float:
+        """Return the integral of the value from zero to a time [s]."""
+
+    def double_integral(self, time: float) -> float:
+        """Return the integral of ``integral`` from zero to a time [s]."""
+
+
+@dataclass(frozen=True, slots=True)
+class HalfSine:
+    """A sin(pi t / tau) up to the time tau, then nothing.
+
+    Attributes:
+        peak: A, in the unit of the load.
+        duration: tau [s].
+    """
+
+    peak: float
+    duration: float
+
+    def value(self, time: float) -> float:
+        """Return the value at a time [s]."""
+        return float(self.peak * np.sin(np.pi * time / self.duration)) if 0.0 < time < self.duration else 0.0
+
+    def integral(self, time: float) -> float:
+        """Return the integral up to a time [s]; 2 A tau / pi for all of it."""
+        angle = np.pi * min(max(time, 0.0), self.duration) / self.duration
+        return float(self.peak * self.duration / np.pi * (1.0 - np.cos(angle)))
+
+    def double_integral(self, time: float) -> float:
+        """Return the second integral up to a time [s]."""
+        inside = min(max(time, 0.0), self.duration)
+        scale = self.duration / np.pi
+        within = self.peak * scale * (inside - scale * np.sin(inside / scale))
+        return float(within + self.integral(time) * max(time - self.duration, 0.0))
+
+
+@dataclass(frozen=True, slots=True)
+class Constant:
+    """A constant value from time zero on, up to a duration [s]."""
+
+    peak: float
+    duration: float = np.inf
+
+    def value(self, time: float) -> float:
+        """Return the value at a time [s]; at time zero it acts already."""
+        return self.peak if 0.0 <= time < self.duration else 0.0
+
+    def integral(self, time: float) -> float:
+        """Return the integral up to a time [s]."""
+        return self.peak * min(max(time, 0.0), self.duration)
+
+    def double_integral(self, time: float) -> float:
+        """Return the second integral up to a time [s]."""
+        inside = min(max(time, 0.0), self.duration)
+        return 0.5 * self.peak * inside**2 + self.peak * inside * max(time - inside, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Tabulated:
+    """Values at times, linear between them, zero before the first and after the last.
+
+    Attributes:
+        times: ``(n,)`` [s], increasing, not negative.
+        values: ``(n,)``.
+    """
+
+    times: NDArray[np.float64]
+    values: NDArray[np.float64]
+    _integrals: NDArray[np.float64] = field(init=False)
+    _doubles: NDArray[np.float64] = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Integrate up to each time."""
+        width, low, high = np.diff(self.times), self.values[:-1], self.values[1:]
+        integrals = np.concatenate([[0.0], np.cumsum(0.5 * width * (low + high))])
+        within = integrals[:-1] * width + width**2 * (2.0 * low + high) / 6.0
+        object.__setattr__(self, "_integrals", integrals)
+        object.__setattr__(self, "_doubles", np.concatenate([[0.0], np.cumsum(within)]))
+
+    def value(self, time: float) -> float:
+        """Return the value at a time [s]."""
+        return float(np.interp(time, self.times, self.values, left=0.0, right=0.0))
+
+    def integral(self, time: float) -> float:
+        """Return the integral up to a time [s]."""
+        place, past = self._place(time)
+        return float(self._integrals[place] + 0.5 * past * (self.values[place] + self.value(self.times[place] + past)))
+
+    def double_integral(self, time: float) -> float:
+        """Return the second integral up to a time [s]."""
+        place, past = self._place(time)
+        last = self.value(self.times[place] + past)
+        inside = self._integrals[place] * past + past**2 * (2.0 * self.values[place] + last) / 6.0
+        beyond = self.integral(time) * max(time - float(self.times[-1]), 0.0)
+        return float(self._doubles[place] + inside + beyond)
+
+    def _place(self, time: float) -> tuple[int, float]:
+        """Return the last tabulated time that has passed, and the time [s] since then inside the table."""
+        inside = min(max(time, float(self.times[0])), float(self.times[-1]))
+        place = int(np.searchsorted(self.times, inside, side="right")) - 1
+        return place, inside - float(self.times[place])
+
+
+def service_condition(name: str) -> HalfSine:
+    """Return the acceleration pulse [m/s^2] of a JEDEC service condition, a key of ``SERVICE_CONDITIONS``."""
+    peak, milliseconds = SERVICE_CONDITIONS[name]
+    return HalfSine(peak * STANDARD_GRAVITY, milliseconds * 1e-3)
