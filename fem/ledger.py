@@ -93,7 +93,7 @@ class Ledger:
             ``ENERGIES`` and the balance [J]: all energy that is there or was taken, minus the initial and the external.
 
         Raises:
-            EnergyError: An energy is not a number, the step is above the critical one, or the balance exceeds the limit.
+            EnergyError: An energy is no number, the step is above the critical one, or the balance exceeds the limit.
         """
         found = dict(zip(ENERGIES, sums.tolist(), strict=False))
         present = sum(found[name] for name in ENERGIES[:5]) - found["external"]

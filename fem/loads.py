@@ -134,7 +134,7 @@ class NodalForces(Load):
 
     @classmethod
     def build(cls, body: Body, nodes: NDArray[np.integer], forces: NDArray[np.float64], pulse: Pulse) -> "NodalForces":
-        """Move forces ``(k, 3)`` [N] at input nodes ``(k,)`` to a rank's nodes, slaves' to their masters; collective."""
+        """Take forces ``(k, 3)`` [N] at input nodes ``(k,)`` to local nodes, slaves' to their masters; collective."""
         local = body.local.locate(nodes)
         here = np.flatnonzero(local >= 0)
         here = here[body.shared.owned[local[here]]]

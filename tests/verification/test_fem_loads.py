@@ -8,9 +8,9 @@ from fem.body import Body
 from fem.damping import RayleighDamping, damped_critical_step, rayleigh_coefficients
 from fem.facet_areas import outward_areas
 from fem.loads import BodyAcceleration, LargeMass, Load, NodalForces, PrescribedMotion
+from fem.material_parameters import Isotropic
 from fem.mesh import MeshData
 from fem.motion import Motion
-from fem.material_parameters import Isotropic
 from fem.pulse import Constant, HalfSine
 from tests.support.fem_bodies import STEEL, dns_body, motion_of
 from tests.support.fem_models import grid, mesh_of, on
