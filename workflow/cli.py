@@ -11,7 +11,8 @@ from typing import Annotated
 import typer
 
 from workflow import __version__
-from workflow.case import Case, available_cores, read_case
+from workflow.case import available_cores, read_case
+from workflow.case_kind import Case
 from workflow.inputs import CASE, examine, read_case_of_run, write_inputs
 from workflow.pipeline import RunFolderBusy, drive, failed_checks, locked
 from workflow.problems import CaseError

@@ -74,9 +74,15 @@ def allowed(field: FieldInfo) -> str:
 def literal_names(field: FieldInfo) -> tuple[str, ...]:
     """Return the names that a field, or each item of its list, may take; empty where it is not so limited."""
     annotation = field.annotation
-    if typing.get_origin(annotation) is tuple:
+    if typing.get_origin(annotation) is tuple or _is_union(annotation):
         annotation = typing.get_args(annotation)[0]
     return typing.get_args(annotation) if typing.get_origin(annotation) is typing.Literal else ()
+
+
+def wanted_items(field: FieldInfo) -> str:
+    """Say how many items the list of a field must have."""
+    items = typing.get_args(field.annotation)
+    return "must be a list with at least one item" if Ellipsis in items else f"must be a list of {len(items)} items"
 
 
 def to_si_table(model: type[BaseModel], table: dict, prefix: str, problems: list[Problem]) -> dict:
@@ -156,6 +162,11 @@ def display(value: object, field: FieldInfo) -> str:
     return f"{value:.10g}" if isinstance(value, float) else str(value)
 
 
+def shown(value: object, field: FieldInfo | None) -> object:
+    """Write an SI value as its field is shown to users; other values stay as they are."""
+    return display(value, field) if field is not None and unit_of(field) else value
+
+
 def _choice(field: FieldInfo) -> str:
     return "any of " if typing.get_origin(field.annotation) is tuple else "one of "
 
@@ -163,7 +174,7 @@ def _choice(field: FieldInfo) -> str:
 def _metadata(field: FieldInfo) -> Iterator[object]:
     """Yield units and bounds of a field, or of the items of its list."""
     yield from field.metadata
-    for item in typing.get_args(field.annotation):
+    for item in typing.get_args(field.annotation)[:1]:
         for extra in getattr(item, "__metadata__", ()):
             yield from extra.metadata if isinstance(extra, FieldInfo) else (extra,)
 

@@ -4,7 +4,8 @@ from dataclasses import dataclass
 
 from fem.material_parameters import Material
 from fem.material_roles import Materials
-from workflow.case import BoardDropCase, available_cores
+from workflow.board_drop_case import BoardDropCase
+from workflow.case import available_cores
 from workflow.reflow_pool import distinct_geometries, joint_geometries
 
 MACRO = "board"  # the part of the macro model; all others belong to the meso model

@@ -1,12 +1,14 @@
 """Staleness by content: what each stage used, what it would use now, and so whether it has to run."""
 
+import hashlib
 import json
 import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from workflow.case import Case, kind_of
+from workflow.case import kind_of
+from workflow.case_kind import Case
 from workflow.stage_table import Stage
 
 CASE = "inputs/case.json"
@@ -39,12 +41,17 @@ class Verdict:
 
 
 def stage_inputs(case: Case, stage: Stage) -> dict:
-    """Return the parameters that a stage depends on, as dotted key -> SI value."""
+    """Return the parameters that a stage depends on, as dotted key -> SI value; of files, also what they hold."""
+    contents = [(f"{key}.sha256", _digest(path)) for key, path in case.files.items()]
     return {
         key: value
-        for key, value in _flat(case.model_dump(mode="json"))
+        for key, value in [*_flat(case.model_dump(mode="json")), *contents]
         if any(key == prefix or key.startswith(prefix + ".") for prefix in stage.parameters)
     }
+
+
+def _digest(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else "no such file"
 
 
 def write_inputs(run_folder: Path, case: Case) -> None:

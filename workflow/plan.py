@@ -7,12 +7,17 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from workflow.case import BoardDropCase, Case, available_cores
-from workflow.fields import display, leaves, unit_of
+from workflow import structure_plan
+from workflow.board_drop_case import BoardDropCase
+from workflow.case import available_cores
+from workflow.case_kind import Case
+from workflow.fields import display, leaves
 from workflow.forecast import MACRO, Forecast, forecast
 from workflow.inputs import Change, Verdict, examine
+from workflow.plan_table import duration, new_table, short
 from workflow.scene_forecast import SceneForecast, forecast_scene
-from workflow.units import from_si
+from workflow.structure_case import StructureCase
+from workflow.structure_forecast import StructureForecast, forecast_structure
 
 LONGEST_LIST = 4
 SCHEMES = {
@@ -27,26 +32,33 @@ def show_plan(case: Case, run_folder: Path, console: Console) -> None:
     console.print(f"[bold]{case.case.name}[/]  {case.case.title}\n")
     if isinstance(case, BoardDropCase):
         outlook = forecast(case)
-        _show(case, run_folder, outlook, console)
+        _show(case, run_folder, outlook, console, "reflow")
         console.print(_sizes(outlook))
         console.print(_shock(case, outlook))
         rate = f"{outlook.shock.updates_per_second:.1e} element updates per second and rank (fem/estimate.py)"
         console.print(f"\n[dim]Costs assume {rate}")
         console.print("[dim]and the reflow speed in particles/estimate.py, both as benchmarks/ measured them.")
+    elif isinstance(case, StructureCase):
+        motion = forecast_structure(case)
+        _show(case, run_folder, motion, console, "motion")
+        for shown in (structure_plan.layers(motion), structure_plan.motion(case, motion)):
+            console.print(shown)
     else:
         body = forecast_scene(case)
-        _show(case, run_folder, body, console)
+        _show(case, run_folder, body, console, "reflow")
         console.print(_particles(body))
         console.print("\n[dim]Costs assume the reflow speed in particles/estimate.py, as benchmarks/ measured it.")
 
 
-def _show(case: Case, run_folder: Path, outlook: Forecast | SceneForecast, console: Console) -> None:
+def _show(
+    case: Case, run_folder: Path, outlook: Forecast | SceneForecast | StructureForecast, console: Console, what: str
+) -> None:
     console.print(_stages(case, run_folder, outlook.seconds))
-    console.print(_effects(outlook.effects))
+    console.print(_effects(outlook.effects, what))
 
 
 def _particles(outlook: SceneForecast) -> Table:
-    table = _table("\nReflow", "what", "value", "remark")
+    table = new_table("\nReflow", "what", "value", "remark")
     table.add_row("particles", f"{outlook.particles}", f"{1e6 * outlook.spacing:.3g} um apart at the start")
     table.add_row("scheme", outlook.scheme, SCHEMES[outlook.scheme])
     table.add_row(
@@ -60,14 +72,13 @@ def _particles(outlook: SceneForecast) -> Table:
 def change_text(change: Change, case: Case) -> str:
     """Say what a parameter changed from and to, in the user's unit."""
     fields = {key: field for key, _, field in leaves(case)}
-    unit = unit_of(fields[change.key]) if change.key in fields else None
 
     def text(value: object) -> str:
         if value is None:
             return "nothing"
         if change.key not in fields:
             return str(value)
-        return from_si(value, unit) if unit and isinstance(value, float) else display(value, fields[change.key])
+        return display(tuple(value) if isinstance(value, list) else value, fields[change.key])
 
     return f"{change.key}: {text(change.old)} -> {text(change.new)}"
 
@@ -86,16 +97,8 @@ def reason(verdict: Verdict, case: Case) -> str:
     return "\n".join(changes)
 
 
-def _table(title: str, *columns: str) -> Table:
-    table = Table(title=title, title_justify="left", title_style="bold", expand=True, show_edge=False, pad_edge=False)
-    for position, name in enumerate(columns):
-        last = position == len(columns) - 1
-        table.add_column(name, no_wrap=not last, ratio=1 if last else None)
-    return table
-
-
 def _stages(case: Case, run_folder: Path, predicted: dict[str, float]) -> Table:
-    table = _table(f"Stages, in {run_folder}", "stage", "", "cost", "why")
+    table = new_table(f"Stages, in {run_folder}", "stage", "", "cost", "why")
     for name, verdict in examine(run_folder, case).items():
         mark = "[yellow]run[/]" if verdict.stale else "[green]skip[/]"
         seconds = predicted.get(name)
@@ -104,8 +107,8 @@ def _stages(case: Case, run_folder: Path, predicted: dict[str, float]) -> Table:
     return table
 
 
-def _effects(effects: Mapping[str, Any]) -> Table:
-    table = _table("\nEffects of the reflow", "effect", "", "why")
+def _effects(effects: Mapping[str, Any], of_what: str) -> Table:
+    table = new_table(f"\nEffects of the {of_what}", "effect", "", "why")
     for name, decision in effects.items():
         mark = "[green]on[/]" if decision["on"] else "[dim]off[/]"
         table.add_row(name.replace("_", " "), mark, decision["why"])
@@ -115,7 +118,7 @@ def _effects(effects: Mapping[str, Any]) -> Table:
 def _sizes(outlook: Forecast) -> Table:
     smallest, largest = outlook.particles
     particles = f"{smallest}" if smallest == largest else f"{smallest} to {largest}"
-    table = _table("\nSizes and critical time steps", "part", "hexahedra", "critical step", "belongs to")
+    table = new_table("\nSizes and critical time steps", "part", "hexahedra", "critical step", "belongs to")
     for name, part in outlook.parts.items():
         remark = "macro model" if name == MACRO else "meso model"
         if part.mass_scaled:
@@ -130,7 +133,7 @@ def _sizes(outlook: Forecast) -> Table:
 
 def _shock(case: BoardDropCase, outlook: Forecast) -> Table:
     shock, every = outlook.shock, case.shock.ranks.macro + case.shock.ranks.meso
-    table = _table("\nShock", "what", "value", "remark")
+    table = new_table("\nShock", "what", "value", "remark")
     table.add_row("window", short(shock.window), f"step of the macro model, {shock.windows} windows")
     table.add_row("step ratio m", f"{shock.substeps}", f"meso step {short(shock.window / shock.substeps)}")
     table.add_row("two-scale", f"about {duration(shock.two_scale)}", _placement(case) + _absent("two_scale", case))
@@ -154,14 +157,3 @@ def _span(first: int, count: int) -> str:
 
 def _absent(mode: str, case: BoardDropCase) -> str:
     return "" if mode in case.shock.numerics.modes else "; not in shock.numerics.modes"
-
-
-def duration(seconds: float) -> str:
-    """Write a wall time with two digits."""
-    return f"{seconds:.2g} s" if seconds < 100 else f"{seconds / 60:.2g} min"
-
-
-def short(seconds: float) -> str:
-    """Write a time step in the unit that makes its figure readable."""
-    factor, unit = next(((f, u) for f, u in ((1e9, "ns"), (1e6, "us")) if f * seconds < 1e3), (1e3, "ms"))
-    return f"{factor * seconds:.3g} {unit}"

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 from math import ceil
 from typing import Any
 
-from workflow.case import Case, DropCase, DropsCase, JointCase, OscillationCase, SceneCase
+from workflow.case_kind import Case
+from workflow.scene_cases import DropCase, DropsCase, JointCase, OscillationCase, SceneCase
 
 SECONDS_TO_START = 2.0  # until a stage has loaded its libraries and kernels
 

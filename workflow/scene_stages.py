@@ -4,9 +4,9 @@ from dataclasses import replace
 from pathlib import Path
 
 from workflow import findings
-from workflow.case import DropCase, DropsCase, JointCase, OscillationCase
 from workflow.products import write_json
 from workflow.progress import progress_bar
+from workflow.scene_cases import DropCase, DropsCase, JointCase, OscillationCase
 from workflow.stage_runner import Findings, Run, StageFunction
 
 

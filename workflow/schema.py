@@ -2,12 +2,14 @@
 
 import re
 from collections.abc import Iterator
+from typing import Any
 
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
-from workflow.case import KINDS, Case
+from workflow.case import KINDS
+from workflow.case_kind import Case
 from workflow.fields import allowed, display, models_of, unit_of
 from workflow.units import QUANTITY, dimension
 
@@ -16,16 +18,36 @@ PATTERN = re.sub(r"\?P<\w+>", "", f"^{QUANTITY.pattern}$")
 
 def case_schema() -> dict:
     """Return the JSON schema (draft 2020-12) of a case file: that of any kind."""
-    kinds = [_kind_schema(kind) for kind in KINDS.values()]
+    kinds: list[dict] = []
     definitions: dict = {}
-    for kind in kinds:
-        definitions |= kind.pop("$defs")
+    for name, kind in KINDS.items():
+        schema = _with_own_names(_kind_schema(kind), name, definitions)
+        definitions |= schema.pop("$defs")
+        kinds.append(schema)
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "reflowshock case",
         "anyOf": kinds,
         "$defs": definitions,
     }
+
+
+def _with_own_names(schema: dict, kind: str, taken: dict) -> dict:
+    """Put the kind before the names of its definitions, if another kind has one of them for something else."""
+    own = schema["$defs"]
+    if all(taken.get(name, definition) == definition for name, definition in own.items()):
+        return schema
+    renamed = _replaced(schema, {f"#/$defs/{name}": f"#/$defs/{kind}.{name}" for name in own})
+    return renamed | {"$defs": {f"{kind}.{name}": definition for name, definition in renamed["$defs"].items()}}
+
+
+def _replaced(node: Any, texts: dict[str, str]) -> Any:
+    """Replace texts wherever they stand as values."""
+    if isinstance(node, dict):
+        return {key: _replaced(value, texts) for key, value in node.items()}
+    if isinstance(node, list):
+        return [_replaced(value, texts) for value in node]
+    return texts.get(node, node) if isinstance(node, str) else node
 
 
 def _kind_schema(kind: type[Case]) -> dict:

@@ -1,4 +1,4 @@
-"""One mode of the shock: input file, MPI run, result."""
+"""One run of the package fem: input file, MPI run, result; and the modes of the board's shock as such runs."""
 
 import json
 import sys
@@ -23,19 +23,33 @@ def run_mode(run: Run, folder: Path, mode: str) -> None:
     Raises:
         LaunchError: the run failed; the message has its last words.
     """
-    folder.mkdir()
     request = {
         "mode": mode,
         "meshes": [str(run.folder.resolve() / name) for name in ("geometry/assembly.msh", "solder_mesh/joints.msh")],
         "shock": run.case.shock.model_dump(mode="json"),
         "materials": run.case.materials.model_dump(mode="json"),
-        "output": str(folder.resolve()),
     }
+    run_fem(run, folder, request, f"shock, {MODES[mode]}")
+
+
+def run_fem(run: Run, folder: Path, request: dict, title: str) -> None:
+    """Run the package fem on the MPI ranks of the case, showing its progress.
+
+    Args:
+        run: case, cores.
+        folder: where its products go; made here.
+        request: what it reads as input, but for ``output``.
+        title: what the user sees.
+
+    Raises:
+        LaunchError: the run failed; the message has its last words.
+    """
+    folder.mkdir()
     path = folder / "input.json"
-    path.write_text(json.dumps(request, indent=1) + "\n")
-    ranks = run.case.shock.ranks.macro + run.case.shock.ranks.meso
+    path.write_text(json.dumps(request | {"output": str(folder.resolve())}, indent=1) + "\n")
+    ranks = run.case.ranks
     command = mpi_command(ranks, [sys.executable, "-m", "fem", str(path)], run.oversubscribe)
-    with progress_bar(f"shock, {MODES[mode]} on {ranks} ranks") as progress:
+    with progress_bar(f"{title} on {ranks} ranks") as progress:
         launch(command, lambda line: _pass_on(line, progress), folder / "log.txt")
 
 

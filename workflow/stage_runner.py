@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
-from workflow.case import Case
+from workflow.case_kind import Case
 from workflow.inputs import stage_inputs
 from workflow.terminal import health_line, print_error
 

@@ -102,3 +102,17 @@ DROP = _one_body("drop")
 JOINT = _one_body("joint")
 DROPS = _one_body("drops")
 OSCILLATION = _one_body("oscillation")
+
+MESHED = ("length", "width", "cells", "symmetry", "element", "layers", "holes")
+STRUCTURE = Pipeline(
+    (
+        Stage(
+            "geometry",
+            tuple(f"structure.{name}" for name in MESHED),
+            (),
+            ("geometry/structure.msh", "geometry/preview.png"),
+        ),
+        Stage("shock", ("structure", "materials", "supports", "loads", "watch", "dynamics"), ("geometry",), ()),
+        Stage("report", ("case",), ("geometry", "shock"), ("report.html", "summary.json")),
+    )
+)

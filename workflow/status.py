@@ -5,7 +5,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from workflow.case import Case
+from workflow.case_kind import Case
 from workflow.inputs import Verdict, examine, read_record
 from workflow.units import from_si
 

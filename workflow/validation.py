@@ -47,20 +47,20 @@ def _problem(root: type[BaseModel], names: list[str], record: ErrorDetails, tabl
         return Problem(key, "unknown key", value, "one of " + ", ".join(siblings), hint and prefix + hint)
     if field is None:
         return Problem(key, text, value)
+    if kind in ("tuple_type", "too_short", "too_long") or (kind == "missing" and isinstance(record["loc"][-1], int)):
+        return Problem(key, fields.wanted_items(field), value, fields.allowed(field))
     if kind == "missing":
         return Problem(key, "is missing", None, fields.allowed(field))
     if fields.models_of(field) and kind.startswith("union_tag"):
         return _kind_problem(key, value, field)
     if fields.models_of(field):
-        return Problem(key, "needs a table of its own" if kind == "too_short" else "must be a table", value)
+        return Problem(key, "must be a table", value)
     if kind == "literal_error":
         return Problem(key, "unknown name", value, fields.allowed(field), _nearest_name(value, field))
     if kind in RANGES:
         return Problem(key, "is out of range", value, fields.allowed(field))
     if kind == "string_pattern_mismatch":
         return Problem(key, "is no name", value, NAMES)
-    if kind in ("tuple_type", "too_short"):
-        return Problem(key, "must be a list with at least one item", value, fields.allowed(field))
     return Problem(key, text[0].lower() + text[1:], value, fields.allowed(field))
 
 

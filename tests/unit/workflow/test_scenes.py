@@ -6,10 +6,12 @@ from pathlib import Path
 import jsonschema
 import pytest
 
-from workflow.case import BoardDropCase, DropCase, JointCase, display_values, read_case
+from workflow.board_drop_case import BoardDropCase
+from workflow.case import display_values, read_case
 from workflow.case_text import templates, write_new_case
 from workflow.inputs import stage_inputs
 from workflow.problems import CaseError
+from workflow.scene_cases import DropCase, JointCase
 from workflow.scene_forecast import forecast_scene
 from workflow.schema import case_schema
 

@@ -1,0 +1,52 @@
+"""Critical step of the elements into which a box is cut: known before anything is meshed."""
+
+from itertools import permutations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem.element import Elements, critical_steps, element_geometry, element_kind
+from fem.element_tetrahedron import EDGES
+from fem.material_parameters import Material
+from fem.materials import elasticity_matrix
+
+CORNERS = np.array([[k & 1, k >> 1 & 1, k >> 2] for k in range(8)], dtype=float)  # tensor order
+NODES = {"hexahedron": 8, "tetrahedron": 4, "tetrahedron_quadratic": 10}
+
+
+def box_element_step(element: str, formulation: str, material: Material, size: NDArray[np.float64]) -> float:
+    """Return the smallest element critical step [s] of a box with edges ``size (3,)`` [m], cut into elements.
+
+    Tetrahedra are the six around a diagonal of the box; those of a mesh may share its other diagonals.
+    """
+    points, cells = (CORNERS, np.arange(8)[None]) if element == "hexahedron" else diagonal_tetrahedra()
+    if element == "tetrahedron_quadratic":
+        points, cells = with_middle_nodes(points, cells)
+    elements = Elements(
+        points=points * size,
+        cells=cells.astype(np.int32),
+        material=np.zeros(len(cells), np.int32),
+        elasticity=elasticity_matrix(material)[None],
+        density=np.full(len(cells), material.density),
+        kind=element_kind(NODES[element], formulation),
+    )
+    geometry = element_geometry(elements.points, elements.cells)
+    return float(critical_steps(elements, geometry.nodal_volume).min())
+
+
+def diagonal_tetrahedra() -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Cut the unit cube into the six tetrahedra around its diagonal (Kuhn): one path along its edges each."""
+    cells = np.array([[0, 1 << a, 1 << a | 1 << b, 7] for a, b, _ in permutations(range(3))])
+    edges = CORNERS[cells[:, 1:]] - CORNERS[cells[:, :1]]
+    inside_out = np.linalg.det(edges) < 0.0
+    cells[inside_out] = cells[inside_out][:, [0, 2, 1, 3]]
+    return CORNERS, cells
+
+
+def with_middle_nodes(
+    points: NDArray[np.float64], cells: NDArray[np.int64]
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Add the middle of every edge; nodes of neighbours are not joined, for the step that does not matter."""
+    middles = points[cells[:, EDGES]].mean(axis=2)
+    numbers = len(points) + np.arange(middles.shape[0] * middles.shape[1]).reshape(middles.shape[:2])
+    return np.concatenate([points, middles.reshape(-1, 3)]), np.concatenate([cells, numbers], axis=1)

@@ -1,0 +1,122 @@
+"""Structures as cases: units in named tables and lists, refused with key, value, range and nearest name, foreseen."""
+
+import tomllib
+from pathlib import Path
+
+import jsonschema
+import pytest
+
+from workflow.case import display_values, read_case
+from workflow.case_text import case_text
+from workflow.inputs import compare, stage_inputs
+from workflow.problems import CaseError
+from workflow.schema import case_schema
+from workflow.structure_forecast import forecast_structure, structure_effects
+
+BOARD = Path(__file__).resolve().parents[2] / "pipeline" / "structure.toml"
+SECOND_LAYER = "structure.layers.cover.material=coper"
+BAD_VALUES = {
+    "unknown key of a load": ("loads.drop.pekk=3 G", ["loads.drop.pekk", "unknown key", "mean loads.drop.peak?"]),
+    "wrong dimension": ("loads.drop.peak=3 mm", ["loads.drop.peak", "is a length; wanted is an acceleration", "> 0 G"]),
+    "unknown kind": ("loads.drop.kind=inputg", ["loads.drop.kind", "input_g, pressure, motion, gravity", "input_g?"]),
+    "no kind": ("loads.push.peak=3 MPa", ["loads.push.kind: is missing", "one of input_g"]),
+    "no table": ("loads.drop=3", ["loads.drop = 3: must be a table"]),
+    "no tables": ("loads=3", ["loads = 3: must be a table"]),
+    "out of range": ("structure.layers.board.thickness=-1 mm", ["layers.board.thickness", '"-1 mm"', "> 0 mm"]),
+    "incomplete layer": ("structure.layers.top.material=copper", ["structure.layers.top.thickness: is missing"]),
+    "unknown material": (SECOND_LAYER, ["layers.cover.material", '"coper"', "FR4", "did you mean copper?"]),
+    "list too short": ('structure.holes.spacing=["1 mm"]', ["structure.holes.spacing", "list of 2 items", "in mm"]),
+    "list too long": ('watch.centre.at=["1 mm","1 mm","1 mm","1 mm"]', ["watch.centre.at", "list of 3 items"]),
+    "item without unit": ('structure.holes.spacing=["24 mm","3"]', ["structure.holes.spacing", 'such as "3 mm"']),
+    "item out of range": ("structure.cells=[0,3]", ["structure.cells = [0, 3]", ">= 1 and <= 2000"]),
+    "item unknown": ('structure.symmetry=["z"]', ["structure.symmetry", "any of x, y"]),
+    "unknown name": ("structure.element=hexahedra", ["structure.element", "did you mean hexahedron?"]),
+    "unknown condition": ("loads.drop.service_condition=X", ["service_condition", "one of A, B, C"]),
+    "facet set": ("supports.holes.on=mounting_hole", ["supports.holes.on", "did you mean mounting_holes?"]),
+    "point outside": ('watch.centre.at=["1 m","0 m","0 m"]', ["watch.centre.at", "outside the meshed body"]),
+    "holes outside": ('structure.holes.spacing=["29 mm","14 mm"]', ["holes.spacing", '"29 mm"', "4 mm to 27 mm"]),
+    "unknown solver": ("dynamics.solver=implict", ["dynamics.solver", "did you mean implicit?"]),
+    "too many ranks": ("dynamics.ranks=4096", ["dynamics.ranks", "4096 MPI ranks", "--oversubscribe"]),
+    "value in a material": ("materials.cover.density=3 mm", ["materials.cover.density", "is a length"]),
+    "layer named as a face": (
+        "structure.layers.z_max={material='FR4',thickness='1 mm'}",
+        ["structure.layers.z_max", "is no name of a layer"],
+    ),
+}
+
+
+@pytest.mark.parametrize(("setting", "words"), BAD_VALUES.values(), ids=BAD_VALUES.keys())
+def test_bad_values_are_named(setting, words):
+    with pytest.raises(CaseError) as caught:
+        read_case(BOARD, [setting])
+    text = "\n".join(caught.value.lines())
+    assert [word for word in words if word not in text] == []
+
+
+def test_units_in_lists_and_named_tables():
+    case = read_case(BOARD, ["loads.drop.peak=1200 G", "structure.layers.board.thickness=0.8 mm"])
+    assert case.loads["drop"].peak == pytest.approx(1200 * 9.80665)
+    assert case.structure.layers["board"].thickness == pytest.approx(8e-4)
+    assert case.structure.holes.spacing == pytest.approx((24e-3, 14e-3))
+    assert list(case.structure.layers) == ["board", "cover"]
+    shown = display_values(case)
+    assert shown["structure.holes.spacing"] == "[24 mm, 14 mm]"
+    assert shown["loads.drop.peak"] == "1200 G"
+
+
+def test_a_new_case_is_equal_to_its_template(tmp_path):
+    case = read_case(BOARD)
+    path = tmp_path / "again.toml"
+    path.write_text(case_text(case, "structure"))
+    assert display_values(read_case(path)) == display_values(case)
+    jsonschema.validate(tomllib.loads(path.read_text()), case_schema())
+
+
+def test_the_schema_refuses_a_number_without_unit():
+    table = tomllib.loads(BOARD.read_text())
+    table["structure"]["holes"]["spacing"] = [24.0, 14.0]
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.validate(table, case_schema())
+
+
+def test_a_stage_depends_on_what_it_reads():
+    case = read_case(BOARD)
+    louder, longer = read_case(BOARD, ["loads.drop.peak=900 G"]), read_case(BOARD, ["structure.length=31 mm"])
+    geometry, shock = case.pipeline["geometry"], case.pipeline["shock"]
+    assert stage_inputs(louder, geometry) == stage_inputs(case, geometry)
+    changes = compare(stage_inputs(case, shock), stage_inputs(louder, shock))
+    assert [change.key for change in changes] == ["loads.drop.peak"]
+    assert stage_inputs(longer, geometry) != stage_inputs(case, geometry)
+
+
+def test_what_a_table_of_a_load_holds_is_a_parameter(tmp_path):
+    path = tmp_path / "case.toml"
+    text = BOARD.read_text().replace('peak = "1000 G"\nduration = "0.1 ms"\n', 'table = "pulse.csv"\n')
+    path.write_text(text)
+    (tmp_path / "pulse.csv").write_text("0,0\n1e-4,9806.65\n")
+    before = stage_inputs(read_case(path), read_case(path).pipeline["shock"])
+    assert before["loads.drop.table"] == str(tmp_path / "pulse.csv")
+    (tmp_path / "pulse.csv").write_text("0,0\n1e-4,980.665\n")
+    after = stage_inputs(read_case(path), read_case(path).pipeline["shock"])
+    assert [change.key for change in compare(before, after)] == ["loads.drop.table.sha256"]
+
+
+@pytest.mark.parametrize(
+    ("setting", "step"),
+    [
+        ("structure.element=hexahedron", 1.0),
+        ("structure.element=tetrahedron", 0.7),
+        ("structure.formulation=one_point", 1.0),
+    ],
+)
+def test_sizes_and_steps_are_foreseen(setting, step):
+    outlook, plain = forecast_structure(read_case(BOARD, [setting])), forecast_structure(read_case(BOARD))
+    share = 6 if "tetra" in setting else 1
+    assert outlook.layers["board"].elements == share * plain.layers["board"].elements
+    assert outlook.step == pytest.approx(step * plain.step, rel=0.15)
+
+
+def test_effects_have_reasons():
+    effects = structure_effects(read_case(BOARD, ["dynamics.damping.mass_coefficient=10 Hz"]))
+    assert effects["damping"] == {"on": True, "why": "dynamics.damping: mass_coefficient"}
+    assert not effects["finite_rotation"]["on"]

@@ -1,0 +1,68 @@
+"""What all kinds of case have in common."""
+
+from abc import abstractmethod
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, ClassVar
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from workflow.problems import Problem
+from workflow.stage_table import Pipeline
+
+if TYPE_CHECKING:
+    from particles.checks import Problem as ParticlesProblem
+
+NAME = r"^[A-Za-z0-9][A-Za-z0-9_.-]*$"
+
+
+class Title(BaseModel):
+    """Name and title of a case; the name is also that of its run folder."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    name: Annotated[str, Field(pattern=NAME)]
+    title: str = ""
+
+
+class Case(BaseModel):
+    """Everything that a run depends on, in SI floats.
+
+    Attributes:
+        kind: the table that makes a file a case of this kind.
+        pipeline: its stages.
+        ranks_key: key of the MPI ranks that it asks for.
+        case: its name.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    kind: ClassVar[str]
+    pipeline: ClassVar[Pipeline]
+    ranks_key: ClassVar[str] = ""
+
+    case: Title
+
+    @abstractmethod
+    def problems(self) -> list[Problem]:
+        """Find parameters that are each allowed, but impossible together."""
+
+    @property
+    def ranks(self) -> int:
+        """MPI ranks that it asks for."""
+        return 1
+
+    @classmethod
+    def located(cls, table: dict, folder: Path) -> dict:
+        """Take names of files in a table of SI values as relative to the folder of the case file."""
+        return table
+
+    @property
+    def files(self) -> dict[str, Path]:
+        """Files that its parameters name, by key: what they hold counts as a parameter, too."""
+        return {}
+
+
+def of_particles(found: "Sequence[ParticlesProblem]") -> list[Problem]:
+    """Say what the checks of the particles found, in the words of a case file."""
+    return [Problem(problem.key, problem.message, problem.value or None, problem.allowed) for problem in found]

@@ -1,0 +1,36 @@
+"""One solver of a structure: input file, MPI run, result."""
+
+import json
+from pathlib import Path
+
+from workflow.shock_launch import run_fem
+from workflow.stage_runner import Run
+from workflow.structure_case import StructureCase
+
+SOLVERS = ("explicit", "implicit")
+
+
+def run_solver(run: Run[StructureCase], folder: Path, solver: str) -> None:
+    """Run one solver on its MPI ranks, showing its progress.
+
+    Args:
+        run: run folder with the mesh, case, cores.
+        folder: where the solver's products go.
+        solver: "explicit" or "implicit".
+
+    Raises:
+        LaunchError: the run failed; the message has its last words.
+    """
+    request = {
+        "mode": "structure",
+        "solver": solver,
+        "mesh": str(run.folder.resolve() / "geometry/structure.msh"),
+        "scene": run.case.scene.model_dump(mode="json"),
+    }
+    run_fem(run, folder, request, f"shock, {solver} solver")
+
+
+def read_results(folder: Path) -> dict[str, dict]:
+    """Return ``result.json`` of each solver that ran, explicit first."""
+    present = [solver for solver in SOLVERS if (folder / solver).is_dir()]
+    return {solver: json.loads((folder / solver / "result.json").read_text()) for solver in present}
