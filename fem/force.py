@@ -35,7 +35,7 @@ class ForceTerm(Protocol):
 def force_terms(
     elements: Elements, materials: Sequence[Material], kinematics: Kinematics = "small", step: float = np.inf
 ) -> list[ForceTerm]:
-    """Return the force terms of elements: linear boxes share stiffnesses, all others are assembled.
+    """Return the force terms of elements.
 
     Args:
         elements: The elements.
@@ -44,6 +44,11 @@ def force_terms(
         step: dt [s], of laws that depend on the rate; infinity stands for slow.
     """
     del materials, kinematics, step
+    return linear_terms(elements)
+
+
+def linear_terms(elements: Elements) -> list[ForceTerm]:
+    """Return the force terms of elements that stay elastic and turn little: boxes share stiffnesses."""
     box = is_box(elements.points[elements.cells])
     terms: list[ForceTerm] = []
     if box.any():
