@@ -1,0 +1,175 @@
+"""Every kind of element: patch tests, orders in h, Irons' bound, pressures of nearly incompressible bodies."""
+
+import numpy as np
+import pytest
+import scipy.sparse
+from scipy.sparse.linalg import eigsh
+
+from fem.element import Elements, critical_steps, element_geometry
+from fem.facet import area_vectors
+from fem.force import force_terms
+from fem.material_library import FR4, SAC405
+from fem.material_parameters import Isotropic
+from fem.mesh import boundary_facets
+from fem.mesh_quality import scaled_jacobians
+from fem.stress import element_stress, mean_strain
+from tests.support.fem_elements import KINDS, box, elements_of, mass_of, solve, stiffness_matrix
+from tests.support.fem_models import CYCLIC
+
+RANDOM = np.random.default_rng(3)
+LINE = np.linspace(0, 1, 4)
+every_kind = pytest.mark.parametrize("kind", KINDS.values(), ids=KINDS)
+
+
+def inside(points: np.ndarray) -> np.ndarray:
+    return np.all((points > 1e-9) & (points < 1 - 1e-9), axis=1)
+
+
+def shaken(points: np.ndarray) -> np.ndarray:
+    return points + inside(points)[:, None] * RANDOM.uniform(-0.08, 0.08, points.shape)
+
+
+def skewed(points: np.ndarray) -> np.ndarray:
+    return points + 4.9 * points[:, 1:2] * [1.0, 0.0, 0.0]
+
+
+def internal_force(elements: Elements, displacement: np.ndarray) -> np.ndarray:
+    force = np.zeros_like(displacement)
+    for term in force_terms(elements, ()):
+        term.add(displacement, force)
+    return force
+
+
+def check_patch(elements: Elements, inner: np.ndarray) -> None:
+    """An affine field leaves inner nodes without force and gives its stress everywhere."""
+    gradient = RANDOM.uniform(-1, 1, (3, 3))
+    displacement = elements.points @ gradient.T
+    force = internal_force(elements, displacement)
+    assert np.abs(force[inner]).max() < 1e-12 * np.abs(force).max()
+    strain = np.array([*np.diag(gradient), *(gradient + gradient.T)[[0, 1, 0], [1, 2, 2]]])
+    exact = elements.elasticity[0] @ strain
+    mean = element_geometry(elements.points, elements.cells).gradient
+    stress = element_stress(
+        mean, np.repeat(elements.elasticity, len(elements.cells), axis=0), displacement[elements.cells]
+    )
+    assert np.abs(stress - exact).max() < 1e-12 * np.abs(exact).max()
+
+
+@every_kind
+@pytest.mark.parametrize("material", [FR4, SAC405], ids=["orthotropic", "isotropic"])
+def test_patch_of_distorted_elements_carries_constant_stress(kind, material):
+    points, cells = box(kind, LINE, LINE, LINE, move=shaken)
+    check_patch(elements_of(kind, points, cells, [material]), inside(points))
+
+
+def test_patch_of_curved_tetrahedra_carries_constant_stress():
+    kind = KINDS["tetrahedron_quadratic"]
+    points, cells = box(kind, LINE, LINE, LINE)
+    middles = np.arange(len(points)) >= len(LINE) ** 3
+    points = points + (inside(points) & middles)[:, None] * RANDOM.uniform(-0.03, 0.03, points.shape)
+    check_patch(elements_of(kind, points, cells, [FR4]), inside(points))
+
+
+@pytest.mark.parametrize("name", ["incompatible_modes", "one_point"])
+def test_patch_of_hexahedra_with_scaled_jacobian_of_a_fifth(name):
+    points, cells = box(KINDS[name], LINE, LINE, LINE)
+    inner, points = inside(points), skewed(points)
+    assert scaled_jacobians(points[cells]).max() == pytest.approx(0.2, rel=1e-3)
+    elements = elements_of(KINDS[name], points, cells, [FR4])
+    check_patch(elements, inner)
+    values = np.linalg.eigvalsh(KINDS[name].stiffness(points[cells[:1]], elements.elasticity, elements.material[:1])[0])
+    assert np.sum(values < 1e-10 * values[-1]) == 6
+
+
+def exact_displacement(points: np.ndarray, poisson: float) -> np.ndarray:
+    """Papkovich and Neuber with one harmonic potential psi e_x, mu = 1: u = (grad(x psi) - 4 (1 - nu) psi e_x) / 2."""
+    a, b = 1.3, 0.8
+    x, y, z = points.T
+    psi = np.sin(a * x) * np.sin(b * y + 0.4) * np.exp(np.hypot(a, b) * z)
+    along_x = a * np.cos(a * x) * np.sin(b * y + 0.4) * np.exp(np.hypot(a, b) * z)
+    gradient = np.stack([along_x, psi * b / np.tan(b * y + 0.4), psi * np.hypot(a, b)], axis=1)
+    result = x[:, None] * gradient
+    result[:, 0] += psi - 4.0 * (1.0 - poisson) * psi
+    return 0.5 * result
+
+
+def exact_strain(points: np.ndarray, poisson: float) -> np.ndarray:
+    step = 1e-5
+    sides = [step * axis for axis in np.eye(3)]
+    h = [exact_displacement(points + s, poisson) - exact_displacement(points - s, poisson) for s in sides]
+    x, y, z = (column / (2 * step) for column in h)
+    return np.stack([x[:, 0], y[:, 1], z[:, 2], x[:, 1] + y[:, 0], y[:, 2] + z[:, 1], x[:, 2] + z[:, 0]], axis=1)
+
+
+def wavy(points: np.ndarray) -> np.ndarray:
+    waves = np.sin(np.pi * points)
+    return points + waves.prod(axis=1)[:, None] * (
+        [0.08, -0.08, 0.06] + 0.05 * np.sin(2 * np.pi * points[:, [1, 2, 0]])
+    )
+
+
+ORDERS = [("incompatible_modes", 2, 2), ("one_point", 2, 2), ("tetrahedron", 2, 1), ("tetrahedron_quadratic", 3, 2)]
+
+
+@pytest.mark.parametrize("name, of_displacement, of_strain", ORDERS, ids=KINDS)
+def test_order_in_h_on_distorted_meshes(name, of_displacement, of_strain):
+    kind, poisson = KINDS[name], 0.3
+    material = Isotropic(density=1.0, young_modulus=2 * (1 + poisson), poisson_ratio=poisson)
+    counts = {4: (9, 13, 18), 8: (6, 9, 13), 10: (3, 5, 7)}[kind.nodes]
+    errors = []
+    for count in counts:
+        points, cells = box(kind, *[np.linspace(0, 1, count + 1)] * 3, move=wavy)
+        elements = elements_of(kind, points, cells, [material])
+        exact = exact_displacement(points, poisson)
+        found = solve(elements, exact, np.repeat(~inside(points)[:, None], 3, axis=1))
+        geometry = element_geometry(points, cells)
+        strain = mean_strain(geometry.gradient, found[cells])
+        centres = points[cells[:, : 8 if kind.nodes == 8 else 4]].mean(axis=1)
+        of_strains = geometry.volume @ (strain - exact_strain(centres, poisson)) ** 2
+        errors.append([np.sqrt(mass_of(elements) @ np.sum((found - exact) ** 2, axis=1)), np.sqrt(of_strains.sum())])
+    orders = -np.polyfit(np.log(counts), np.log(errors), 1)[0]
+    assert orders[0] > of_displacement - 0.25
+    assert orders[1] > of_strain - 0.15
+
+
+@every_kind
+def test_no_assembled_model_has_a_smaller_critical_step_than_its_elements(kind):
+    """Irons and Treharne: the element bound holds, and is not far from the assembled step."""
+    points, cells = box(kind, LINE, LINE, LINE, move=shaken)
+    elements = elements_of(kind, points, cells, [FR4, SAC405], np.arange(len(cells)) % 2)
+    root = scipy.sparse.diags(1.0 / np.sqrt(np.repeat(mass_of(elements), 3)))
+    squared = eigsh(root @ stiffness_matrix(elements) @ root, 1, which="LA", return_eigenvectors=False)[0]
+    assembled = 2.0 / np.sqrt(squared)
+    bound = critical_steps(elements, element_geometry(points, cells).nodal_volume).min()
+    assert bound < assembled < 2.0 * bound
+
+
+def pressures(kind, count: int, poisson: float) -> np.ndarray:
+    """Element pressures, (count, count, count), of a confined cube under a smooth pressure on its top."""
+    points, cells = box(kind, *[np.linspace(0, 1, count + 1)] * 3)
+    elements = elements_of(kind, points, cells, [Isotropic(density=1.0, young_modulus=1.0, poisson_ratio=poisson)])
+    held = np.abs(points) < 1e-9
+    held[:, :2] |= points[:, :2] > 1 - 1e-9
+    quads = boundary_facets(cells)[:, CYCLIC]
+    top = quads[np.all(points[quads][:, :, 2] > 1 - 1e-9, axis=1)]
+    centres = points[top].mean(axis=1)
+    peak = 1e-3 * np.prod(0.5 + 0.5 * np.cos(np.pi * centres[:, :2]), axis=1)
+    load = np.zeros_like(points)
+    np.add.at(load, top, -peak[:, None, None] * np.abs(area_vectors(points[top])))
+    displacement = solve(elements, np.zeros_like(points), held, load)
+    strain = mean_strain(element_geometry(points, cells).gradient, displacement[cells])
+    return -(strain @ elements.elasticity[0])[:, :3].mean(axis=1).reshape([count] * 3)
+
+
+def alternation(values: np.ndarray) -> float:
+    """The largest second difference between neighbours, over the range: 1 for a checkerboard, O(h^2) without."""
+    return max(np.abs(np.diff(values, 2, axis=axis)).max() for axis in range(3)) / (4 * np.ptp(values))
+
+
+@pytest.mark.parametrize("name", ["incompatible_modes", "one_point"])
+def test_pressure_of_nearly_incompressible_bodies_has_no_checkerboard(name):
+    coarse, fine, soft = (
+        alternation(pressures(KINDS[name], count, nu)) for count, nu in [(6, 0.499), (12, 0.499), (12, 0.3)]
+    )
+    assert fine < 0.4 * coarse
+    assert fine < 1.1 * soft < 0.02
