@@ -50,7 +50,11 @@ def box(kind: ElementKind, *lines: Sequence[float], move: Callable = lambda x: x
 
 
 def elements_of(
-    kind: ElementKind, points: np.ndarray, cells: np.ndarray, materials: Sequence[Material], number: np.ndarray | int = 0
+    kind: ElementKind,
+    points: np.ndarray,
+    cells: np.ndarray,
+    materials: Sequence[Material],
+    number: np.ndarray | int = 0,
 ) -> Elements:
     """Return elements of materials, (ne,) ``number`` among them."""
     number = np.broadcast_to(np.asarray(number, np.int32), len(cells))
