@@ -1,19 +1,40 @@
-"""The input file of a run: which models, meshes, materials, shock, and where the results go."""
+"""The input file of a run: which models, meshes, materials and loads, and where the results go."""
 
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import Field, TypeAdapter
 
 from fem.material_roles import Materials
 from fem.parameters import Parameters, Shock
+from fem.structure_parameters import StructureScene
 
 
 class RunInput(Parameters):
-    """What ``python -m fem INPUT.json`` reads; SI floats."""
+    """A package on a board, dropped; SI floats."""
 
     mode: Literal["two_scale", "dns"]
     meshes: tuple[Path, ...] = Field(min_length=1)
     shock: Shock
     materials: Materials = Materials()
     output: Path
+
+
+class StructureInput(StructureScene):
+    """A structure and one of its solvers; SI floats."""
+
+    mode: Literal["structure"]
+    mesh: Path
+    solver: Literal["explicit", "implicit"]
+    output: Path
+
+    @property
+    def finds_modes(self) -> bool:
+        """Return whether this run is the one of the scene's solvers that finds the natural modes."""
+        return self.dynamics.modes > 0 and self.solver == self.dynamics.solvers[0]
+
+
+# What ``python -m fem INPUT.json`` reads.
+INPUT: TypeAdapter[RunInput | StructureInput] = TypeAdapter(
+    Annotated[RunInput | StructureInput, Field(discriminator="mode")]
+)

@@ -55,6 +55,9 @@ class Load:
     def remove(self, force: NDArray[np.float64]) -> None:
         """Subtract from a copy of ``motion.force`` what ``add`` added last."""
 
+    def release(self, force: NDArray[np.float64]) -> None:
+        """Subtract from a copy of ``motion.force`` what a support puts into it."""
+
     def collect(self, motion: "Motion") -> None:
         """Add half a step's work of the force at the motion's time at its velocity; all forces are complete."""
 
@@ -280,6 +283,10 @@ class LargeMass(Load):
     def remove(self, force: NDArray[np.float64]) -> None:
         """Subtract it from a copy."""
         force[self.nodes] -= self._force
+
+    def release(self, force: NDArray[np.float64]) -> None:
+        """Subtract all of it: the mass stands for a support."""
+        self.remove(force)
 
     def collect(self, motion: "Motion") -> None:
         """Add half a step's work of what is left of the force after moving the mass itself."""

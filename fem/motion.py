@@ -145,6 +145,14 @@ class Motion:
             load.drive(following, self.time)
         return following
 
+    def reaction(self) -> NDArray[np.float64]:
+        """Return the forces ``(n, 3)`` [N] of supports and prescribed motion on the nodes that this rank counts."""
+        force = self.force.copy()
+        for load in self._loads:
+            load.release(force)
+        acceleration = (self._following_velocity() - self.velocity) / self.step - self.gravity
+        return self.ledger_mass[:, None] * acceleration - force
+
     def internal_energy(self) -> Energy:
         """Return the energies [J] of this rank's elements."""
         return sum((term.energy(self.displacement) for term in self.body.terms), Energy())

@@ -18,20 +18,23 @@ from fem.exchange import CutChannels
 from fem.kernels_motion import add_impulse
 from fem.loads import Load
 from fem.motion import Motion
+from fem.moving import Moving
 
 
 class Participant(Protocol):
     """One model on one rank.
 
     Attributes:
-        motion: Its state.
         plan: Window and substeps.
         interface_work: Work [J] of this rank's share across the cut: put in by the macro, received by the meso model.
     """
 
-    motion: Motion
     plan: WindowPlan
     interface_work: float
+
+    @property
+    def motion(self) -> Moving:
+        """Return its state."""
 
     def begin_window(self) -> None:
         """Do what must come before other models of the rank have their turn."""
@@ -49,7 +52,7 @@ class Participant(Protocol):
 class Alone:
     """One model without a cut: a DNS, all steps small, or a structure."""
 
-    def __init__(self, motion: Motion, plan: WindowPlan) -> None:
+    def __init__(self, motion: Moving, plan: WindowPlan) -> None:
         """Take a motion that is ready to advance by the plan's steps."""
         self.motion = motion
         self.interface_work = 0.0

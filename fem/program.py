@@ -9,15 +9,20 @@ from mpi4py import MPI
 
 from fem.agreement import agreed
 from fem.errors import AgreedError, EnergyError, RankError
-from fem.inputs import RunInput
+from fem.inputs import INPUT, RunInput, StructureInput
 from fem.run import run
+from fem.structure import run_structure
+from fem.structure_checks import check
 
 
 def main(world: MPI.Comm, arguments: list[str]) -> int:
     """Run the input file named by the only argument on all ranks of ``world``; return the exit code."""
     try:
         request = agreed(world, lambda: read_input(arguments))
-        run(world, request)
+        if isinstance(request, StructureInput):
+            run_structure(world, request)
+        else:
+            run(world, request)
     except (AgreedError, EnergyError, RankError) as error:  # raised on every rank
         if world.rank == 0:
             print(f"error: {error}", file=sys.stderr, flush=True)
@@ -28,10 +33,12 @@ def main(world: MPI.Comm, arguments: list[str]) -> int:
     return 0
 
 
-def read_input(arguments: list[str]) -> RunInput:
-    """Read the input file, and make the output directory."""
+def read_input(arguments: list[str]) -> RunInput | StructureInput:
+    """Read and check the input file, and make the output directory."""
     if len(arguments) != 1:
         raise ValueError("usage: mpirun -n N python -m fem INPUT.json")
-    request = RunInput.model_validate(json.loads(Path(arguments[0]).read_text()))
+    request = INPUT.validate_python(json.loads(Path(arguments[0]).read_text()))
+    if isinstance(request, StructureInput):
+        check(request)
     request.output.mkdir(parents=True, exist_ok=True)
     return request

@@ -1,6 +1,7 @@
 """``history.npz`` and ``result.json``: what a run leaves besides its fields."""
 
 import json
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -124,6 +125,11 @@ def health(history: History, summary: dict[str, Any], request: RunInput) -> dict
         "interface_force_residual": (history.ledger.force_residual, FORCE_RESIDUAL_LIMIT),
         "added_mass_fraction": (summary["added_mass"] / summary["model_mass"], ADDED_MASS_LIMIT),
     }
+    return checked(checks)
+
+
+def checked(checks: Mapping[str, tuple[float, float]]) -> dict[str, Any]:
+    """Return checks as the report reads them: name -> value and limit, which it must not exceed."""
     return {name: {"value": value, "limit": limit, "ok": value <= limit} for name, (value, limit) in checks.items()}
 
 

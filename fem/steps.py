@@ -1,6 +1,6 @@
 """Critical steps of the models, mass scaling, and the windows that follow."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -96,10 +96,9 @@ def is_macro(pieces: Pieces, tables: Tables) -> NDArray[np.bool_]:
     return macro | at_cut
 
 
-def critical_by_role(world: MPI.Comm, models: Sequence[Pieces]) -> dict[str, float]:
+def critical_by_role(
+    world: MPI.Comm, models: Sequence[Pieces], roles: Iterable[str] = tuple(Materials.model_fields)
+) -> dict[str, float]:
     """Return the smallest element critical step [s] of each material role over all ranks."""
-    found = {
-        role: agreed_minimum(world, [pieces.steps[pieces.roles == role] for pieces in models])
-        for role in Materials.model_fields
-    }
+    found = {role: agreed_minimum(world, [pieces.steps[pieces.roles == role] for pieces in models]) for role in roles}
     return {role: step for role, step in found.items() if np.isfinite(step)}

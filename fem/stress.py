@@ -39,6 +39,12 @@ def von_mises(stress: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.sqrt(0.5 * ((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2) + 3.0 * (xy**2 + yz**2 + xz**2))
 
 
+def principal_strains(strain: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the principal strains ``(m, 3)``, ascending, of strains ``(m, 6)`` with engineering shear."""
+    xx, yy, zz, xy, yz, xz = (strain * [1.0, 1.0, 1.0, 0.5, 0.5, 0.5]).T
+    return np.linalg.eigvalsh(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]).transpose(2, 0, 1))
+
+
 def principal_strain(corners: NDArray[np.float64], displacement: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the largest and the smallest in-plane principal strain at the centres of facets normal to z: ``(2, f)``.
 

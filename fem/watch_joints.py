@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from fem.body import Body
 from fem.local_mesh import positions
-from fem.motion import Motion
+from fem.moving import Moving
 from fem.stress import StressRecovery, principal_strain, von_mises
 from fem.watch_table import WatchTable
 
@@ -34,7 +34,7 @@ class JointWatch:
         self._facets = local.locate(facets.ravel()).reshape(-1, 4)
         self._corners = local.points[self._facets][:, :, :2]
 
-    def sample(self, motion: Motion) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def sample(self, motion: Moving) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return this rank's parts.
 
         Returns:

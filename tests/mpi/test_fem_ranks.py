@@ -12,6 +12,7 @@ import pytest
 
 from fem.mesh import append
 from tests.support.fem_models import board_mesh, package_mesh, small_assembly, write_msh, write_small_assembly
+from tests.support.fem_program import run_program
 
 ROOT = Path(__file__).resolve().parents[2]
 SHOCK = {
@@ -28,25 +29,7 @@ def start(directory: Path, ranks: int, **changes) -> subprocess.CompletedProcess
     request = {"mode": "dns", "meshes": meshes, "shock": SHOCK, "output": str(directory / "out")} | changes
     path = directory / "input.json"
     path.write_text(json.dumps(request))
-    command = [
-        "mpirun",
-        "--allow-run-as-root",
-        "--oversubscribe",
-        "--mca",
-        "mpi_yield_when_idle",
-        "1",
-        "-n",
-        str(ranks),
-    ]
-    return subprocess.run(
-        [*command, sys.executable, "-m", "fem", str(path)],
-        cwd=ROOT,
-        env=os.environ | {"OMP_NUM_THREADS": "1"},
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=False,
-    )
+    return run_program(path, ranks)
 
 
 def history(directory: Path, ranks: tuple[int, int], mode: str, placement: str = "split") -> dict[str, np.ndarray]:

@@ -1,0 +1,67 @@
+"""One run of a structure, from its mesh to its results: what every rank does, in order."""
+
+import time
+
+import numpy as np
+from mpi4py import MPI
+
+from fem.agreement import agreed
+from fem.communicators import Communicators, Role
+from fem.fields import Fields
+from fem.history import History
+from fem.inputs import StructureInput
+from fem.ledger import Ledger
+from fem.parameters import Ranks
+from fem.participant import Alone, Participant, uncut_motion
+from fem.pulse import Pulse
+from fem.result import Timings
+from fem.run import march
+from fem.structure_loads import damping_loads, pulse_durations, pulses_of, structure_loads
+from fem.structure_model import StructureModel, build_structure
+from fem.structure_modes import find_modes
+from fem.structure_result import write_result
+from fem.watch_points import PointWatch
+
+
+def run_structure(world: MPI.Comm, request: StructureInput) -> None:
+    """Run one solver on a structure and write its results; collective over ``world``.
+
+    Raises:
+        AgreedError: Input or mesh that does not fit; on every rank.
+        EnergyError: Energies that do not balance; on every rank.
+    """
+    start = time.perf_counter()
+    pulses = agreed(world, lambda: pulses_of(request.loads))
+    with Communicators(world, "structure", Ranks()) as comms:
+        comm = comms.models["structure"]
+        model = build_structure(comm, request, pulse_durations(pulses))
+        modes = find_modes(comm, model, request)
+        crew: dict[Role, Participant] = {"structure": make_participant(comm, model, request, pulses)}
+        history = make_history(comm, model, request, pulses)
+        part = model.tables.part[model.body.local.cell_numbers]
+        fields: dict[Role, Fields] = {"structure": Fields(comm, model.body, part, request.output / "structure.pvd")}
+        ready = time.perf_counter()
+        output_seconds = march(comms, crew, history, fields, request.dynamics.numerics.field_samples)
+        timings = Timings(ready - start, time.perf_counter() - ready - output_seconds, output_seconds)
+        write_result(comm, request, model, (history, modes), timings)
+        agreed(comm, lambda: None)
+
+
+def make_participant(comm: MPI.Comm, model: StructureModel, request: StructureInput, pulses: dict[str, Pulse]) -> Alone:
+    """Return the structure with its loads and initial velocity, ready to move; collective."""
+    loads = structure_loads(comm, model.body, model.tables, request, pulses)
+    loads += damping_loads(request.dynamics.damping, model.body)
+    plan = model.steps.plan
+    motion = uncut_motion(model.body, loads, plan.step)
+    if any(request.dynamics.initial_velocity):
+        motion.launch(np.array(request.dynamics.initial_velocity))
+    return Alone(motion, plan)
+
+
+def make_history(comm: MPI.Comm, model: StructureModel, request: StructureInput, pulses: dict[str, Pulse]) -> History:
+    """Return the empty history of this run, with the value of each load as ``load@<name>``."""
+    plan, steps = model.steps.plan, model.steps
+    # The balance is exact at any step, so that there is no energy too small to be judged.
+    ledger = Ledger(request.dynamics.numerics.energy_balance_limit, 0.0, plan.step, steps.cut)
+    signals = {f"load@{name}": pulse.value for name, pulse in pulses.items()}
+    return History(comm, {"structure": PointWatch(model.tables.watch, model.body)}, ledger, signals)

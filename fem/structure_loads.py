@@ -1,0 +1,89 @@
+"""Loads and damping of a structure: from their parameters to the objects that act on a motion."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from fem.body import Body
+from fem.damping import RayleighDamping, rayleigh_coefficients
+from fem.loads import BodyAcceleration, LargeMass, Load, NodalForces, PrescribedMotion
+from fem.pulse import Constant, HalfSine, Pulse, Tabulated, service_condition
+from fem.pulse_table import read_pulse
+from fem.structure_parameters import Damping, Gravity, InputG, Pressure, StructureLoad, StructureScene
+from fem.structure_tables import AXES, StructureTables, shaken_supports
+
+QUANTITY = {"input_g": "acceleration", "gravity": "acceleration", "pressure": "pressure", "motion": "velocity"}
+
+
+def pulses_of(loads: Mapping[str, StructureLoad]) -> dict[str, Pulse]:
+    """Return the pulse of each load.
+
+    Raises:
+        PulseError: A table cannot be read.
+    """
+    return {name: pulse_of(load) for name, load in loads.items()}
+
+
+def pulse_of(load: StructureLoad) -> Pulse:
+    """Return the pulse of a load, in its own unit; errors as ``pulses_of``."""
+    if load.table is not None:
+        return read_pulse(Path(load.table), QUANTITY[load.kind])
+    if isinstance(load, InputG) and load.service_condition is not None:
+        return service_condition(load.service_condition)
+    if load.peak is None:
+        raise ValueError(f"a load of kind {load.kind} has neither peak nor table")
+    if load.pulse == "half_sine" and load.duration is not None:
+        return HalfSine(load.peak, load.duration)
+    return Constant(load.peak, load.duration or np.inf)
+
+
+def pulse_durations(pulses: Mapping[str, Pulse]) -> list[float]:
+    """Return the durations [s] of those pulses that have a course of their own."""
+    sines = [pulse.duration for pulse in pulses.values() if isinstance(pulse, HalfSine)]
+    return sines + [float(np.ptp(pulse.times)) for pulse in pulses.values() if isinstance(pulse, Tabulated)]
+
+
+def structure_loads(
+    comm: MPI.Comm, body: Body, tables: StructureTables, scene: StructureScene, pulses: Mapping[str, Pulse]
+) -> list[Load]:
+    """Return the loads of a structure on this rank, in the order of the scene; collective."""
+    made: list[Load] = []
+    for name, load in scene.loads.items():
+        pulse = pulses[name]
+        if isinstance(load, Pressure):
+            nodes, areas = tables.areas[load.on]
+            made.append(NodalForces.build(body, nodes, -areas, pulse))
+        elif isinstance(load, InputG) and load.method == "large_mass":
+            shaken = [tables.nodes_of[scene.supports[support].on] for support in shaken_supports(scene)]
+            nodes = np.unique(np.concatenate(shaken))
+            made.append(LargeMass.build(comm, body, nodes, -unit(load.direction), pulse))
+        elif isinstance(load, InputG | Gravity):
+            push = -1.0 if isinstance(load, InputG) else 1.0  # seen from the supports, the body is pushed the other way
+            made.append(BodyAcceleration(push * unit(load.direction), pulse))
+        else:
+            local = body.local.locate(tables.nodes_of[load.on])
+            made.append(PrescribedMotion(local[local >= 0], AXES.index(load.component), pulse))
+    return made
+
+
+def unit(direction: tuple[float, float, float]) -> NDArray[np.float64]:
+    """Return a vector ``(3,)`` of length one."""
+    return np.array(direction) / np.linalg.norm(direction)
+
+
+def damping_coefficients(damping: Damping) -> tuple[float, float]:
+    """Return alpha [1/s] and beta [s] of Rayleigh damping."""
+    mass, stiffness = damping.mass_coefficient, damping.stiffness_coefficient
+    if damping.frequency is None:
+        return mass, stiffness
+    by_ratio = rayleigh_coefficients(damping.mass_ratio, damping.stiffness_ratio, damping.frequency)
+    return mass + by_ratio[0], stiffness + by_ratio[1]
+
+
+def damping_loads(damping: Damping, body: Body) -> list[Load]:
+    """Return the damping of a structure, an empty list where there is none."""
+    mass, stiffness = damping_coefficients(damping)
+    return [RayleighDamping(mass, stiffness, body.terms)] if mass or stiffness else []

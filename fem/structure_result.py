@@ -1,0 +1,131 @@
+"""``history.npz`` and ``result.json`` of a structure."""
+
+import json
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from fem.history import History
+from fem.inputs import StructureInput
+from fem.result import ADDED_MASS_LIMIT, Timings, checked, quantity
+from fem.stress import principal_strains, von_mises
+from fem.structure_effects import effects
+from fem.structure_model import StructureModel
+from fem.structure_modes import ModeTable
+
+# Above it the hourglass stiffness carries a part of the load; 10 % is the usual bound (Belytschko, Liu, Moran &
+# Elkhodary, Nonlinear Finite Elements, 2nd ed., 8.7).
+HOURGLASS_LIMIT = 0.1
+
+
+def write_result(
+    comm: MPI.Comm,
+    request: StructureInput,
+    model: StructureModel,
+    found: tuple[History, ModeTable | None],
+    timings: Timings,
+) -> None:
+    """Write both files on rank 0; collective. ``found`` are the history and the modes."""
+    summary = model_summary(comm, request, model)
+    history, modes = found
+    if comm.rank == 0:
+        history.write(request.output)
+        arrays = history.arrays()
+        result = {
+            "metrics": cost_metrics(summary, timings)
+            | {"energy_balance_error": quantity(history.ledger.balance_error)}
+            | energy_metrics(arrays)
+            | point_metrics(arrays)
+            | mode_metrics(modes),
+            "health": health(history, arrays, summary, request),
+            "effects": effects(request, summary["added_mass"]),
+            "timings": asdict(timings),
+            "model": summary,
+            "parts": list(model.tables.part_names),
+        }
+        (request.output / "result.json").write_text(json.dumps(result, indent=1))
+
+
+def model_summary(comm: MPI.Comm, request: StructureInput, model: StructureModel) -> dict[str, Any]:
+    """Return sizes, steps, masses and where the watch points are; collective, complete on all ranks."""
+    steps, watch = model.steps, model.tables.watch
+    return {
+        "mode": "structure",
+        "solver": request.solver,
+        "element": request.structure.element,
+        "formulation": request.structure.formulation if request.structure.element == "hexahedron" else "",
+        "ranks": comm.size,
+        "elements": comm.allreduce(len(model.body.local.cells)),
+        "nodes": model.tables.nodes,
+        "critical_steps": steps.critical,
+        "critical_step": steps.cut,
+        "step": steps.plan.step,
+        "steps": steps.plan.windows * steps.plan.substeps,
+        "samples": steps.plan.windows,
+        "added_mass": steps.added_mass,
+        "model_mass": steps.model_mass,
+        "watch": {
+            name: {"node_at": watch.points[k].tolist(), "strain_at": watch.strain_points[k].tolist()}
+            for k, name in enumerate(watch.names)
+        },
+    }
+
+
+def cost_metrics(summary: dict[str, Any], timings: Timings) -> dict[str, Any]:
+    """Return steps, speed and masses of a run."""
+    rate = summary["steps"] / timings.windows
+    return {
+        "critical_step": quantity(summary["critical_step"], "s"),
+        "step": quantity(summary["step"], "s"),
+        "steps": quantity(summary["steps"]),
+        "steps_per_second": quantity(rate, "1/s"),
+        "element_updates_per_second": quantity(rate * summary["elements"], "1/s"),
+        "model_mass": quantity(summary["model_mass"], "kg"),
+        "added_mass": quantity(summary["added_mass"], "kg"),
+    }
+
+
+def energy_metrics(arrays: dict[str, NDArray]) -> dict[str, Any]:
+    """Return the largest value of each energy that the ledger keeps and that is not zero throughout."""
+    names = ("kinetic", "internal", "plastic", "hourglass", "damping", "external")
+    peaks = {name: float(np.abs(arrays[name]).max()) for name in names if name in arrays}
+    return {f"peak_{name}_energy": quantity(peak, "J") for name, peak in peaks.items() if peak > 0.0}
+
+
+def point_metrics(arrays: dict[str, NDArray]) -> dict[str, Any]:
+    """Return peaks at watch points and supports: ``<metric>@<name>``."""
+    metrics: dict[str, Any] = {}
+    for name in arrays["watch"]:
+        displacement, stress = arrays[f"displacement@{name}"], arrays[f"stress@{name}"]
+        metrics |= {
+            f"peak_displacement@{name}": quantity(float(np.linalg.norm(displacement, axis=1).max()), "m"),
+            f"displacement_range@{name}": quantity(float(np.ptp(displacement, axis=0).max()), "m"),
+            f"peak_strain@{name}": quantity(float(np.abs(principal_strains(arrays[f"strain@{name}"])).max())),
+            f"peak_von_mises@{name}": quantity(float(von_mises(stress).max()), "Pa"),
+        }
+    for name in arrays["supports"]:
+        reaction = np.linalg.norm(arrays[f"reaction@{name}"], axis=1)
+        metrics[f"peak_reaction@{name}"] = quantity(float(reaction.max()), "N")
+    return metrics
+
+
+def mode_metrics(modes: ModeTable | None) -> dict[str, Any]:
+    """Return the first natural frequency, if modes were found."""
+    return {} if modes is None else {"first_frequency": quantity(float(modes.frequency[0]), "Hz")}
+
+
+def health(
+    history: History, arrays: dict[str, NDArray], summary: dict[str, Any], request: StructureInput
+) -> dict[str, Any]:
+    """Return the checks of a finished run."""
+    checks = {
+        "energy_balance_error": (history.ledger.balance_error, request.dynamics.numerics.energy_balance_limit),
+        "added_mass_fraction": (summary["added_mass"] / summary["model_mass"], ADDED_MASS_LIMIT),
+    }
+    hourglass = float(np.abs(arrays["hourglass"]).max())
+    if hourglass > 0.0:
+        checks["hourglass_energy_fraction"] = (hourglass / history.ledger.largest, HOURGLASS_LIMIT)
+    return checked(checks)

@@ -1,0 +1,77 @@
+"""Time steps of a structure: the critical one with mass scaling, and windows that end at the samples."""
+
+import math
+from collections.abc import Iterable
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from fem.body import Pieces
+from fem.damping import damped_critical_step
+from fem.estimate import WindowPlan
+from fem.steps import Steps, agreed_minimum, critical_by_role, mass_factor
+from fem.structure_loads import damping_coefficients
+from fem.structure_parameters import Dynamics
+
+PULSE_STEPS = 200  # implicit steps in the shortest pulse: 3e-4 of the period of what swings twice in it
+RUN_STEPS = 1000  # implicit steps in a run without a pulse
+ROUNDING = 1e-9
+
+
+def explicit_steps(comm: MPI.Comm, pieces: Pieces, dynamics: Dynamics) -> Steps:
+    """Choose the steps of central differences from the elements' critical steps; collective.
+
+    Mass scaling raises them, stiffness-proportional damping lowers them.
+    """
+    scaled = dynamics.numerics.mass_scaled
+    target = agreed_minimum(comm, [pieces.steps[~np.isin(pieces.roles, scaled)]])
+    factor = mass_factor(pieces, scaled, target)
+    critical = agreed_minimum(comm, [pieces.steps * np.sqrt(factor)])
+    critical = damped_critical_step(critical, damping_coefficients(dynamics.damping)[1])
+    plan = window_plan(dynamics, dynamics.numerics.step_fraction * critical)
+    return make_steps(comm, pieces, factor, (plan, critical))
+
+
+def implicit_steps(comm: MPI.Comm, pieces: Pieces, dynamics: Dynamics, pulses: Iterable[float]) -> Steps:
+    """Choose the steps of the implicit solver: as given, or so many in the shortest of some pulses [s]; collective."""
+    largest = dynamics.numerics.implicit_step
+    if largest is None:
+        largest = min([dynamics.duration / RUN_STEPS, *(pulse / PULSE_STEPS for pulse in pulses)])
+    critical = agreed_minimum(comm, [pieces.steps])
+    return make_steps(comm, pieces, np.ones(len(pieces.steps)), (window_plan(dynamics, largest), critical))
+
+
+def window_plan(dynamics: Dynamics, largest: float) -> WindowPlan:
+    """Return windows that end at the samples, fewer where the steps are; no step is above ``largest`` [s].
+
+    Runs of one scene by different solvers so have their samples at the same times, unless one has fewer steps.
+    """
+    windows = min(dynamics.numerics.history_samples, at_least(dynamics.duration / largest))
+    return WindowPlan(dynamics.duration / windows, at_least(dynamics.duration / windows / largest), windows, 1)
+
+
+def at_least(count: float) -> int:
+    """Return the next whole number, whatever the rounding of a ratio that should be one."""
+    return max(1, math.ceil(count * (1.0 - ROUNDING)))
+
+
+def make_steps(comm: MPI.Comm, pieces: Pieces, factor: NDArray[np.float64], chosen: tuple[WindowPlan, float]) -> Steps:
+    """Return the steps with the masses; collective.
+
+    Args:
+        comm: All ranks.
+        pieces: The rank's elements.
+        factor: ``(ne,)`` on the density of each element.
+        chosen: Windows, and the critical step of explicit steps [s].
+    """
+    plan, critical = chosen
+    mass = pieces.elements.density * pieces.geometry.volume
+    return Steps(
+        plan=plan,
+        mass_factors=[factor],
+        critical=critical_by_role(comm, [pieces], sorted(set(comm.allreduce(sorted(set(pieces.roles.tolist())))))),
+        cut=critical,
+        added_mass=comm.allreduce(float(mass @ (factor - 1.0))),
+        model_mass=comm.allreduce(float(mass.sum())),
+    )

@@ -1,0 +1,90 @@
+"""From the mesh of a structure to its tables: the work of one rank before anything is distributed."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem.errors import MeshError
+from fem.facet_areas import facet_set, outward_areas
+from fem.mesh import MeshData
+from fem.scene import Tables
+from fem.structure_parameters import InputG, PrescribedMotion, Pressure, StructureScene
+from fem.tie import Tie
+from fem.watch_points import PointTable, point_table
+
+AXES = "xyz"
+
+
+@dataclass(frozen=True, slots=True)
+class StructureTables(Tables):
+    """Tables of a structure.
+
+    Attributes:
+        nodes_of: Name -> nodes of a facet set that supports or motions act on.
+        areas: Name -> nodes and outward areas of a facet set under pressure, see ``facet_areas.outward_areas``.
+        watch: Watch points and supports.
+    """
+
+    nodes_of: dict[str, NDArray[np.int32]]
+    areas: dict[str, tuple[NDArray[np.int64], NDArray[np.float64]]]
+    watch: PointTable
+
+
+def structure_tables(mesh: MeshData, scene: StructureScene) -> StructureTables:
+    """Build the tables of a structure.
+
+    Raises:
+        MeshError: Layers without elements or elements without layers, watch points outside.
+        LoadError: A facet set without facets.
+    """
+    check_layers(mesh, scene)
+    moved = [load.on for load in scene.loads.values() if isinstance(load, PrescribedMotion)]
+    sets = [*(support.on for support in scene.supports.values()), *moved]
+    nodes_of = {name: np.unique(facet_set(mesh, name)) for name in sets}
+    pressed = {load.on for load in scene.loads.values() if isinstance(load, Pressure)}
+    held = held_by_supports(mesh, scene)
+    held_nodes = np.flatnonzero(held.any(axis=1))
+    supports = {name: nodes_of[support.on] for name, support in scene.supports.items()}
+    return StructureTables(
+        part=mesh.part,
+        part_names=mesh.part_names,
+        tie=Tie.none(),
+        master_points=np.empty((0, 4, 3)),
+        moved=0.0,
+        held_nodes=held_nodes,
+        held=held[held_nodes],
+        cut=np.empty(0, np.int32),
+        nodes=len(mesh.points),
+        nodes_of=nodes_of,
+        areas={name: outward_areas(mesh, name) for name in sorted(pressed)},
+        watch=point_table(mesh, {name: point.at for name, point in scene.watch.items()}, supports),
+    )
+
+
+def check_layers(mesh: MeshData, scene: StructureScene) -> None:
+    """Compare the parts of the mesh with the layers; errors as ``structure_tables``."""
+    layers, parts = set(scene.structure.layers), set(mesh.part_names)
+    if layers != parts:
+        empty, foreign = ", ".join(sorted(layers - parts)), ", ".join(sorted(parts - layers))
+        raise MeshError(
+            f"layers and parts of the mesh differ: layers without elements: {empty or 'none'}; parts that are no layer:"
+            f" {foreign or 'none'}"
+        )
+
+
+def shaken_supports(scene: StructureScene) -> list[str]:
+    """Return the supports that a large mass moves: those that hold all components, where an input-G asks for it."""
+    by_mass = any(isinstance(load, InputG) and load.method == "large_mass" for load in scene.loads.values())
+    return [name for name, support in scene.supports.items() if by_mass and set(support.hold) == set(AXES)]
+
+
+def held_by_supports(mesh: MeshData, scene: StructureScene) -> NDArray[np.bool_]:
+    """Return ``(n, 3)``: components that supports and planes of symmetry hold at zero."""
+    shaken = shaken_supports(scene)
+    rules = [(support.on, support.hold) for name, support in scene.supports.items() if name not in shaken]
+    rules += [(f"{axis}_min", (axis,)) for axis in scene.structure.symmetry]
+    held = np.zeros((len(mesh.points), 3), dtype=bool)
+    for name, components in rules:
+        held[np.ix_(np.unique(facet_set(mesh, name)), np.array([AXES.index(axis) for axis in components]))] = True
+    return held

@@ -1,0 +1,138 @@
+"""Watch points of a structure: displacement, velocity, strain and stress at a node, and the reactions of supports."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem.body import Body
+from fem.errors import MeshError
+from fem.mesh import MeshData
+from fem.moving import Moving
+from fem.recovery import fit, patch
+from fem.stress import StressRecovery
+
+COMPONENTS = {"displacement": 3, "velocity": 3, "strain": 6, "stress": 6}
+
+
+@dataclass(frozen=True, slots=True)
+class PointTable:
+    """Watch points and supports in input numbers.
+
+    Attributes:
+        names: Of the points.
+        nodes: ``(p,)`` the node nearest to each point.
+        points: ``(p, 3)`` [m] where these nodes are.
+        strain_points: ``(p, 3)`` [m] where strain and stress are taken.
+        cells: ``(k,)`` elements whose means give strain and stress.
+        owner: ``(k,)`` the point that each belongs to.
+        weight: ``(k,)`` of each in its point's value.
+        supports: Name -> nodes of a support.
+    """
+
+    names: tuple[str, ...]
+    nodes: NDArray[np.int64]
+    points: NDArray[np.float64]
+    strain_points: NDArray[np.float64]
+    cells: NDArray[np.int64]
+    owner: NDArray[np.int64]
+    weight: NDArray[np.float64]
+    supports: dict[str, NDArray[np.int32]]
+
+
+def point_table(
+    mesh: MeshData, wanted: Mapping[str, tuple[float, float, float]], supports: dict[str, NDArray[np.int32]]
+) -> PointTable:
+    """Find the nodes and the elements of watch points.
+
+    Args:
+        mesh: The whole mesh.
+        wanted: Name -> place [m].
+        supports: Name -> nodes.
+
+    Raises:
+        MeshError: A point lies outside the mesh.
+    """
+    nodes = np.array([nearest_node(mesh, name, np.array(place)) for name, place in wanted.items()], np.int64)
+    patches = [patch(mesh, int(node)) for node in nodes]
+    centres = [mesh.points[mesh.cells[cells]].mean(axis=1) for cells in patches]
+    touching = [int((mesh.cells[cells] == node).any(axis=1).sum()) for cells, node in zip(patches, nodes, strict=True)]
+    weights = [
+        fit(around, count, mesh.points[node]) for around, count, node in zip(centres, touching, nodes, strict=True)
+    ]
+    places = [weight @ around for weight, around in zip(weights, centres, strict=True)]
+    return PointTable(
+        names=tuple(wanted),
+        nodes=nodes,
+        points=mesh.points[nodes],
+        strain_points=np.array(places).reshape(-1, 3),
+        cells=np.concatenate([np.empty(0, np.int64), *patches]),
+        owner=np.repeat(np.arange(len(nodes)), [len(cells) for cells in patches]),
+        weight=np.concatenate([np.empty(0), *weights]),
+        supports=supports,
+    )
+
+
+def nearest_node(mesh: MeshData, name: str, place: NDArray[np.float64]) -> int:
+    """Return the node nearest to a place [m]; errors as ``point_table``."""
+    distance = np.linalg.norm(mesh.points - place, axis=1)
+    node = int(np.argmin(distance))
+    around = mesh.points[mesh.cells[(mesh.cells == node).any(axis=1)]]
+    size = float(np.linalg.norm(np.ptp(around, axis=1), axis=1).max())
+    if distance[node] > size:
+        at, there = (", ".join(f"{value:.6g}" for value in point) for point in (place, mesh.points[node]))
+        raise MeshError(
+            f"watch.{name}.at = ({at}) m lies outside the mesh: the nearest node is ({there}) m, {distance[node]:.3g} m"
+            f" away, more than the size {size:.3g} m of its elements"
+        )
+    return node
+
+
+class PointWatch:
+    """The watch points and supports of one rank; a ``watch.Watch``."""
+
+    def __init__(self, table: PointTable, body: Body) -> None:
+        """Find this rank's share of the table."""
+        self._table = table
+        self.labels: dict[str, NDArray] = {
+            "watch": np.array(table.names, dtype=str),
+            "watch_points": table.points,
+            "strain_points": table.strain_points,
+            "supports": np.array(list(table.supports), dtype=str),
+        }
+        local = body.local.locate(table.nodes)
+        here = (local >= 0) & body.shared.owned[local]
+        self._slots, self._nodes = np.flatnonzero(here), local[here]
+        cells = body.local.locate_cells(table.cells)
+        self._owner, self._weight = table.owner[cells >= 0], table.weight[cells >= 0]
+        cells = cells[cells >= 0]
+        self._recovery = StressRecovery(body.elements.subset(cells), body.geometry.gradient[cells])
+        supports = [body.local.locate(nodes) for nodes in table.supports.values()]
+        self._supports = [nodes[(nodes >= 0) & body.shared.owned[nodes]] for nodes in supports]
+
+    def sample(self, motion: Moving) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return this rank's parts of the sums: the values of all points by ``COMPONENTS``, then the reactions [N]."""
+        count = len(self._table.names)
+        at_nodes = np.zeros((2, count, 3))
+        at_nodes[0, self._slots] = motion.displacement[self._nodes] - motion.base_displacement()
+        at_nodes[1, self._slots] = motion.present_velocity()[self._nodes]
+        means = self._recovery.strain(motion.displacement), self._recovery.stress(motion.displacement)
+        recovered = np.zeros((2, count, 6))
+        for values, mean in zip(recovered, means, strict=True):
+            np.add.at(values, self._owner, self._weight[:, None] * mean)
+        reaction = motion.reaction()
+        reactions = [reaction[nodes].sum(axis=0) for nodes in self._supports]
+        return np.concatenate([at_nodes.ravel(), recovered.ravel(), *reactions]), np.empty(0)
+
+    def row(self, sums: NDArray[np.float64], maxima: NDArray[np.float64]) -> dict[str, NDArray[np.float64] | float]:
+        """Name the parts that all ranks have combined: ``<quantity>@<point>`` and ``reaction@<support>``."""
+        del maxima
+        count, start = len(self._table.names), 0
+        result: dict[str, NDArray[np.float64] | float] = {}
+        for quantity, components in COMPONENTS.items():
+            values = sums[start : start + count * components].reshape(count, components)
+            result |= {f"{quantity}@{name}": value for name, value in zip(self._table.names, values, strict=True)}
+            start += count * components
+        reactions = sums[start:].reshape(-1, 3)
+        return result | {f"reaction@{name}": value for name, value in zip(self._table.supports, reactions, strict=True)}

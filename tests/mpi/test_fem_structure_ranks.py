@@ -1,0 +1,56 @@
+"""A structure gives the same on one and on two ranks, and an error ends both."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.support.fem_program import run_program
+from tests.support.fem_structures import LENGTH, WIDTH, write_structure
+
+LOADS = {
+    "drop": {"kind": "input_g", "peak": 1e4, "duration": 4e-5, "direction": [0.0, 0.0, 1.0]},
+    "push": {"kind": "pressure", "on": "z_max", "peak": 1e5, "pulse": "constant"},
+    "pull": {"kind": "motion", "on": "x_max", "component": "x", "peak": 0.1, "duration": 4e-5},
+}
+WATCH = {
+    "tip": {"at": [LENGTH / 2, 0.0, 0.0]},
+    "middle": {"at": [0.0, WIDTH / 6, 1e-3]},
+    "side": {"at": [LENGTH / 4, WIDTH / 2, 1e-3]},
+}
+DYNAMICS = {
+    "duration": 5e-5,
+    "damping": {"mass_ratio": 0.01, "stiffness_ratio": 0.01, "frequency": 1e4},
+    "numerics": {"history_samples": 20, "field_samples": 2},
+}
+
+
+def history(directory: Path, ranks: int) -> dict[str, np.ndarray]:
+    directory.mkdir()
+    done = run_program(write_structure(directory, loads=LOADS, watch=WATCH, dynamics=DYNAMICS), ranks)
+    assert done.returncode == 0, done.stderr
+    result = json.loads((directory / "out" / "result.json").read_text())
+    assert result["model"]["ranks"] == ranks
+    with np.load(directory / "out" / "history.npz") as arrays:
+        return {name: array for name, array in arrays.items() if array.dtype.kind == "f"}
+
+
+def test_two_ranks_give_what_one_gives(tmp_path):
+    one, two = history(tmp_path / "one", 1), history(tmp_path / "two", 2)
+    assert "reaction@clamp" in one
+    for name in one.keys() - {"balance"}:
+        assert np.abs(one[name] - two[name]).max() <= 1e-8 * np.abs(one[name]).max(), name
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"watch": {"far": {"at": [1.0, 0.0, 0.0]}}}, "lies 0.99 m outside"),
+        ({"supports": {"clamp": {"on": "mounting_holes", "hold": ["x"]}}}, "no such facet set"),
+    ],
+)
+def test_bad_input_ends_both_ranks(tmp_path, changes, message):
+    done = run_program(write_structure(tmp_path, **changes), 2)
+    assert done.returncode == 1
+    assert message in done.stderr

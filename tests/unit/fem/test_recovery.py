@@ -1,0 +1,47 @@
+"""Values at nodes from the means of elements."""
+
+import numpy as np
+import pytest
+
+from fem.errors import MeshError
+from fem.recovery import fit, patch
+from fem.watch_points import point_table
+from tests.support.fem_structures import LENGTH, THICKNESS, strip_mesh
+
+SURFACE = (0.0, -4e-3 / 3, THICKNESS)
+
+
+def around(mesh, node):
+    cells = patch(mesh, node)
+    centres = mesh.points[mesh.cells[cells]].mean(axis=1)
+    return cells, centres, int((mesh.cells[cells] == node).any(axis=1).sum())
+
+
+@pytest.mark.parametrize("place", [SURFACE, (LENGTH / 2, 4e-3, 0.0), (0.0, 4e-3 / 3, THICKNESS / 2)])
+def test_linear_field_is_recovered_at_surfaces_corners_and_inside(place):
+    mesh = strip_mesh()
+    node = int(np.argmin(np.linalg.norm(mesh.points - place, axis=1)))
+    cells, centres, nearest = around(mesh, node)
+    weight = fit(centres, nearest, mesh.points[node])
+    field = centres @ [3.0, -2.0, 500.0] + 0.7
+    assert weight @ field == pytest.approx(mesh.points[node] @ [3.0, -2.0, 500.0] + 0.7, rel=1e-12)
+    assert len(cells) <= 32
+
+
+def test_one_layer_of_elements_gives_the_value_of_its_middle():
+    table = point_table(strip_mesh((8, 3, 1)), {"top": SURFACE}, {})
+    assert np.allclose(table.points, [SURFACE])
+    assert np.allclose(table.strain_points[0], [*SURFACE[:2], THICKNESS / 2])
+    assert table.weight.sum() == pytest.approx(1.0)
+
+
+def test_patch_stays_in_the_lower_of_two_layers():
+    mesh = strip_mesh((8, 3, 4), layers=("lower", "upper"))
+    node = int(np.argmin(np.linalg.norm(mesh.points - [0.0, 4e-3 / 3, THICKNESS / 2], axis=1)))
+    cells = patch(mesh, node)
+    assert {mesh.part_names[part] for part in mesh.part[cells]} == {"lower"}
+
+
+def test_point_outside_the_mesh_is_named_with_its_distance():
+    with pytest.raises(MeshError, match=r"watch\.far\.at = .* nearest node is .* 0\.99 m\s+away"):
+        point_table(strip_mesh(), {"far": (1.0, 0.0, 0.0)}, {})

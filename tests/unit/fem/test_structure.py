@@ -1,0 +1,149 @@
+"""A run of a structure from its input to its results, on one rank."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from fem.errors import AgreedError, EnergyError
+from fem.program import main
+from fem.structure import run_structure
+from tests.support.fem_structures import (
+    LENGTH,
+    STEEL,
+    THICKNESS,
+    WIDTH,
+    strip_mesh,
+    structure_input,
+    structure_tables_of,
+    write_structure,
+)
+
+GRAVITY = 9.80665
+
+
+def run(directory: Path, mesh=None, **changes) -> tuple[dict, dict[str, np.ndarray]]:
+    """Run a structure; return its result and its history."""
+    request = structure_input(directory, mesh, **changes)
+    run_structure(MPI.COMM_SELF, request)
+    with np.load(request.output / "history.npz") as arrays:
+        return json.loads((request.output / "result.json").read_text()), dict(arrays)
+
+
+def test_program_reads_its_input_and_writes_all_products(tmp_path, capsys):
+    assert main(MPI.COMM_SELF, [str(write_structure(tmp_path))]) == 0
+    result = json.loads((tmp_path / "out" / "result.json").read_text())
+    assert all(check["ok"] for check in result["health"].values())
+    assert result["model"]["elements"] == 48
+    assert result["effects"]["input_g"] == {"on": True, "why": "loads.drop"}
+    assert not result["effects"]["plasticity"]["on"]
+    assert (tmp_path / "out" / "structure.pvd").exists()
+    with np.load(tmp_path / "out" / "history.npz") as history:
+        assert len(history["time"]) == 41
+        assert history["time"][-1] == pytest.approx(8e-5)
+        assert history["displacement@tip"].shape == (41, 3)
+        assert history["strain@root"].shape == (41, 6)
+        assert history["load@drop"].max() == pytest.approx(1e4)
+        assert np.ptp(history["kinetic"]) > 0.0
+        peak = np.linalg.norm(history["displacement@tip"], axis=1).max()
+    assert result["metrics"]["peak_displacement@tip"] == {"value": pytest.approx(peak), "unit": "m"}
+
+
+def test_hanging_rod_at_rest(tmp_path):
+    """Damped to rest under its weight along x: u = rho g L^2 / 2E at the end, E eps = rho g x, reaction = weight."""
+    density, young = STEEL["density"], STEEL["young_modulus"]
+    sound = np.sqrt(young / density)
+    mode = 2 * np.pi * sound / (4 * LENGTH)
+    _, history = run(
+        tmp_path,
+        materials={"steel": STEEL | {"poisson_ratio": 0.0}},
+        loads={"weight": {"kind": "gravity", "direction": [3.0, 0.0, 0.0]}},
+        watch={"tip": {"at": [LENGTH / 2, 0.0, 0.0]}, "middle": {"at": [0.0, WIDTH / 6, THICKNESS]}},
+        dynamics={
+            "duration": 25 / mode,
+            "damping": {"mass_ratio": 1.0 - 1e-9, "frequency": mode / (2 * np.pi)},
+            "numerics": {"history_samples": 5, "field_samples": 2},
+        },
+    )
+    force = density * GRAVITY
+    assert history["displacement@tip"][-1, 0] == pytest.approx(force * LENGTH**2 / (2 * young), rel=1e-7)
+    assert history["strain@middle"][-1, 0] == pytest.approx(force * LENGTH / 2 / young, rel=1e-7)
+    assert history["stress@middle"][-1, 0] == pytest.approx(force * LENGTH / 2, rel=1e-7)
+    assert history["reaction@clamp"][-1, 0] == pytest.approx(-force * LENGTH * WIDTH * THICKNESS, rel=1e-7)
+
+
+def test_rigid_flight_has_no_strain(tmp_path):
+    result, history = run(
+        tmp_path,
+        supports={},
+        loads={},
+        dynamics={
+            "duration": 1e-4,
+            "initial_velocity": [1.0, -2.0, 0.5],
+            "numerics": {"history_samples": 4, "field_samples": 2},
+        },
+    )
+    assert np.allclose(history["displacement@tip"][-1], 1e-4 * np.array([1.0, -2.0, 0.5]), rtol=1e-12)
+    assert np.allclose(history["velocity@tip"], [1.0, -2.0, 0.5], rtol=1e-12)
+    assert np.abs(history["strain@tip"]).max() < 1e-12
+    assert result["effects"]["initial_velocity"]["on"]
+
+
+def test_layers_have_their_materials_and_mass_scaling_is_reported(tmp_path):
+    """The stiff layer is scaled to the step of the soft one."""
+    soft = STEEL | {"young_modulus": 2e9}
+    body = structure_tables_of()["structure"]
+    layers = {name: {"material": name, "thickness": THICKNESS / 2} for name in ("soft", "steel")}
+    result, _ = run(
+        tmp_path,
+        strip_mesh(layers=("soft", "steel")),
+        structure=body | {"layers": layers},
+        materials={"steel": STEEL, "soft": soft},
+        dynamics={
+            "duration": 2e-5,
+            "numerics": {"mass_scaled": ["steel"], "history_samples": 5, "field_samples": 2},
+        },
+    )
+    critical = result["model"]["critical_steps"]
+    assert critical["soft"] == pytest.approx(10 * critical["steel"], rel=1e-6)
+    mass = STEEL["density"] * LENGTH * WIDTH * THICKNESS
+    assert result["metrics"]["added_mass"]["value"] == pytest.approx(99 * mass / 2, rel=1e-6)
+    assert not result["health"]["added_mass_fraction"]["ok"]
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"supports": {"clamp": {"on": "x_mni", "hold": ["x"]}}}, "did you mean x_min?"),
+        ({"watch": {"tip": {"at": [1.0, 0.0, 0.0]}}}, "lies 0.99 m outside the meshed body"),
+        ({"loads": {"drop": {"kind": "input_g", "table": "nowhere.csv"}}}, "nowhere.csv"),
+        ({"loads": {"push": {"kind": "preassure"}}}, "preassure"),
+        ({"solver": "explizit"}, "explizit"),
+    ],
+)
+def test_bad_input_is_said_before_anything_is_computed(tmp_path, capsys, changes, message):
+    assert main(MPI.COMM_SELF, [str(write_structure(tmp_path, **changes))]) == 1
+    assert message in capsys.readouterr().err
+    assert not (tmp_path / "out" / "history.npz").exists()
+
+
+def test_mesh_that_does_not_fit_the_layers(tmp_path):
+    request = structure_input(tmp_path, strip_mesh(layers=("board", "cover")))
+    with pytest.raises(AgreedError, match="parts that are no layer: cover"):
+        run_structure(MPI.COMM_SELF, request)
+
+
+def test_facet_set_that_the_mesh_has_not(tmp_path):
+    mesh = strip_mesh()
+    del mesh.facets["x_min"]
+    with pytest.raises(AgreedError, match="x_min"):
+        run_structure(MPI.COMM_SELF, structure_input(tmp_path, mesh))
+
+
+def test_run_ends_where_energies_do_not_balance(tmp_path):
+    numerics = {"history_samples": 40, "field_samples": 2, "energy_balance_limit": 1e-20}
+    request = structure_input(tmp_path, dynamics={"duration": 8e-5, "numerics": numerics})
+    with pytest.raises(EnergyError, match="energy_balance_limit"):
+        run_structure(MPI.COMM_SELF, request)
