@@ -135,13 +135,21 @@ def _metres(point: Iterable[float]) -> str:
     return "(" + ", ".join(f"{value:.6g}" for value in point) + ") m"
 
 
-def _plastic_layers(scene: StructureScene) -> Iterator[Problem]:
+def _yielding(scene: StructureScene) -> Iterator[tuple[str, str]]:
+    """Yield key and material of the layers that yield."""
     for name, layer in scene.structure.layers.items():
         material = scene.known_materials.get(layer.material)
         if material is not None and getattr(material, "plasticity", None) is not None:
-            message = f"yields, the solver {scene.dynamics.solver} is linear"
-            key = f"structure.layers.{name}.material"
-            yield Problem(key, layer.material, message, "an elastic material, or dynamics.solver = explicit")
+            yield f"structure.layers.{name}.material", layer.material
+
+
+def _nonlinear_damping(scene: StructureScene) -> Iterator[Problem]:
+    """Stiffness-proportional damping takes the stiffness of linear layers."""
+    key = "dynamics.damping.stiffness_" + ("ratio" if scene.dynamics.damping.stiffness_ratio else "coefficient")
+    if scene.dynamics.kinematics == "finite":
+        yield Problem(key, None, "needs a constant stiffness, dynamics.kinematics = finite has none", "mass_ratio")
+    for layer, material in _yielding(scene):
+        yield Problem(key, None, f"needs a constant stiffness, {layer} = {material} yields", "mass_ratio")
 
 
 def _dynamics(scene: StructureScene) -> Iterator[Problem]:
@@ -150,9 +158,14 @@ def _dynamics(scene: StructureScene) -> Iterator[Problem]:
     if "implicit" in dynamics.solvers and dynamics.kinematics == "finite":
         yield Problem("dynamics.kinematics", "finite", "the implicit solver is linear", "small, or solver = explicit")
     if "implicit" in dynamics.solvers:
-        yield from _plastic_layers(scene)
+        yield from (
+            Problem(key, material, f"yields, the solver {dynamics.solver} is linear", "dynamics.solver = explicit")
+            for key, material in _yielding(scene)
+        )
     if (damping.mass_ratio or damping.stiffness_ratio) and damping.frequency is None:
         yield Problem("dynamics.damping.frequency", None, "is missing: at which the ratios hold", "> 0 Hz")
+    if damping.stiffness_ratio or damping.stiffness_coefficient:
+        yield from _nonlinear_damping(scene)
     for name in dynamics.numerics.mass_scaled:
         yield from unknown_name("dynamics.numerics.mass_scaled", name, scene.structure.layers, "layer")
     if scene.structure.layers and set(dynamics.numerics.mass_scaled) >= set(scene.structure.layers):

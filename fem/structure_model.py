@@ -7,12 +7,14 @@ from mpi4py import MPI
 from fem.agreement import agreed
 from fem.body import Body, Pieces, Response, make_body, make_pieces
 from fem.errors import AgreedError
+from fem.force import Kinematics, linear_terms
 from fem.inputs import StructureInput
 from fem.local_mesh import distribute
 from fem.mesh import MeshData
 from fem.mesh_file import read_mesh
+from fem.power_iteration import highest_frequency
 from fem.steps import Steps
-from fem.structure_steps import explicit_steps, implicit_steps
+from fem.structure_steps import explicit_steps, implicit_steps, with_critical
 from fem.structure_tables import StructureTables, structure_tables
 
 
@@ -41,8 +43,21 @@ def build_structure(comm: MPI.Comm, request: StructureInput, pulses: list[float]
     formulation = request.structure.formulation
     pieces = agreed(comm, lambda: make_pieces(local, tables, request.layer_materials, formulation))
     steps = choose_steps(comm, pieces, request, pulses)
-    response = Response(request.dynamics.kinematics, steps.plan.step)
-    return StructureModel(tables, make_body(comm, pieces, tables, steps.mass_factors[0], response), steps)
+    kinematics = request.dynamics.kinematics
+    model = assemble(comm, pieces, tables, steps, kinematics)
+    if request.solver == "explicit" and request.dynamics.numerics.critical_step == "power_iteration":
+        found = highest_frequency(comm, model.body, linear_terms(model.body.elements), model.body.mass)
+        # Made anew, since a law that depends on the rate knows the step.
+        model = assemble(comm, pieces, tables, with_critical(steps, found.critical_step, request.dynamics), kinematics)
+    return model
+
+
+def assemble(
+    comm: MPI.Comm, pieces: Pieces, tables: StructureTables, steps: Steps, kinematics: Kinematics
+) -> StructureModel:
+    """Return the model that moves by given steps; collective."""
+    body = make_body(comm, pieces, tables, steps.mass_factors[0], Response(kinematics, steps.plan.step))
+    return StructureModel(tables, body, steps)
 
 
 def read_structure(comm: MPI.Comm, request: StructureInput) -> tuple[MeshData | None, StructureTables]:

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
 from mpi4py import MPI
@@ -28,9 +29,19 @@ def explicit_steps(comm: MPI.Comm, pieces: Pieces, dynamics: Dynamics) -> Steps:
     target = agreed_minimum(comm, [pieces.steps[~np.isin(pieces.roles, scaled)]])
     factor = mass_factor(pieces, scaled, target)
     critical = agreed_minimum(comm, [pieces.steps * np.sqrt(factor)])
-    critical = damped_critical_step(critical, damping_coefficients(dynamics.damping)[1])
-    plan = window_plan(dynamics, dynamics.numerics.step_fraction * critical)
-    return make_steps(comm, pieces, factor, (plan, critical))
+    return make_steps(comm, pieces, factor, explicit_plan(dynamics, critical))
+
+
+def explicit_plan(dynamics: Dynamics, undamped: float) -> tuple[WindowPlan, float]:
+    """Return windows and the critical step [s] with damping, from that without."""
+    critical = damped_critical_step(undamped, damping_coefficients(dynamics.damping)[1])
+    return window_plan(dynamics, dynamics.numerics.step_fraction * critical), critical
+
+
+def with_critical(steps: Steps, undamped: float, dynamics: Dynamics) -> Steps:
+    """Return explicit steps with another critical step without damping [s]."""
+    plan, critical = explicit_plan(dynamics, undamped)
+    return replace(steps, plan=plan, cut=critical)
 
 
 def implicit_steps(comm: MPI.Comm, pieces: Pieces, dynamics: Dynamics, pulses: Iterable[float]) -> Steps:

@@ -113,6 +113,13 @@ def test_layers_have_their_materials_and_mass_scaling_is_reported(tmp_path):
     assert not result["health"]["added_mass_fraction"]["ok"]
 
 
+def test_power_iteration_gives_a_larger_step_that_is_stable(tmp_path):
+    numerics = {"critical_step": "power_iteration", "history_samples": 4, "field_samples": 2, "step_fraction": 0.99}
+    result, _ = run(tmp_path, dynamics={"duration": 2e-4, "numerics": numerics})
+    assert result["metrics"]["critical_step"]["value"] > 1.005 * result["model"]["critical_steps"]["board"]
+    assert result["health"]["energy_balance_error"]["value"] < 1e-10
+
+
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
