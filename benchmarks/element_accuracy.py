@@ -1,0 +1,260 @@
+"""Work-precision of the elements: error against cost for kind, size and solver, on a cantilever and a plate.
+
+Run: .venv/bin/python benchmarks/element_accuracy.py --quick     (some seconds; coarse meshes)
+     .venv/bin/python benchmarks/element_accuracy.py             (some minutes; to benchmarks/results)
+     .venv/bin/python benchmarks/element_accuracy.py --publish   (and to the README of cases/cantilever)
+     .venv/bin/python benchmarks/element_accuracy.py --publish --stored   (writes what is stored again)
+Seconds are those of one core, to follow one period of the first mode: explicit steps of 0.9 of the smallest element
+critical step at the measured speed of a whole step; implicit steps (trapezoidal rule) of a fortieth of the period,
+whose error in the period is 0.2 %, with the measured factorisation. Errors are relative to the finest hexahedra, whose
+plate is compared with Mindlin's. The linear one-point hexahedron has the stiffness of the incompatible-modes one
+(`fem/element_one_point.py`), so one row stands for both.
+"""
+
+import argparse
+import json
+import os
+import platform
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from time import process_time
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+import numpy as np
+from mpi4py import MPI
+
+from fem.body import Body, make_body, make_pieces
+from fem.element import critical_steps
+from fem.facet import area_vectors
+from fem.factorisation import Factorisation
+from fem.global_matrix import Equations
+from fem.implicit import ImplicitMotion
+from fem.local_mesh import distribute
+from fem.material_parameters import Isotropic
+from fem.mesh import MeshData, boundary_facets
+from fem.modal import natural_modes
+from fem.motion import Motion
+from fem.scene import prepare
+from tests.support.fem_elements import KINDS, box
+from tests.support.fem_models import CYCLIC
+
+RESULTS = Path(__file__).parent / "results" / "element_accuracy.json"
+README = Path(__file__).parents[1] / "cases" / "cantilever" / "README.md"
+BEGIN, END = "<!-- work-precision: written by benchmarks/element_accuracy.py -->", "<!-- work-precision: end -->"
+HEAD = ["problem", "mesh", "deflection", "frequency", "critical step", "steps", "updates", "explicit", "implicit"]
+NAMES = {
+    "incompatible_modes": "hexahedra",
+    "tetrahedron": "tetrahedra",
+    "tetrahedron_quadratic": "quadratic tetrahedra",
+}
+STEP_FRACTION, STEPS_PER_PERIOD = 0.9, 40
+SECONDS = 0.2  # that a speed is measured for
+YOUNG, DENSITY = 24e9, 1900.0
+STRIP = np.array([0.1, 0.004])  # [m] length and thickness of the cantilever
+SIDE, THICKNESS = 0.1, 0.002  # [m] of the square plate
+
+
+@dataclass(frozen=True, slots=True)
+class Ladder:
+    """Sizes of one problem, cells along and across; errors are against the finest hexahedra."""
+
+    problem: str
+    poisson: float
+    cells: tuple[tuple[int, int], ...]
+    finest: tuple[int, int]
+
+
+QUICK = (
+    Ladder("cantilever", 0.3, ((10, 1), (20, 2)), (80, 8)),
+    Ladder("plate", 0.3, ((4, 1), (8, 1)), (16, 2)),
+)
+FULL = (
+    *(Ladder("cantilever", nu, ((10, 1), (20, 2), (40, 4), (80, 8)), (240, 24)) for nu in (0.3, 0.499)),
+    Ladder("plate", 0.3, ((4, 1), (8, 1), (16, 2), (24, 2)), (48, 4)),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """A problem on one mesh: name, Poisson ratio, cells along and across, kind of element."""
+
+    name: str
+    poisson: float
+    cells: tuple[int, int]
+    kind: str
+
+    def body(self) -> Body:
+        """The body with its supports; the plate is a quarter of it, the cantilever a strip of plane strain."""
+        along, across = self.cells
+        if self.name == "plate":
+            side = np.linspace(0, SIDE / 2, along + 1)
+            lines = [side, side, np.linspace(0, THICKNESS, across + 1)]
+        else:
+            length = np.linspace(0, STRIP[0], along + 1)
+            lines = [length, length[:2], np.linspace(0, STRIP[1], across + 1)]
+        points, cells = box(KINDS[self.kind], *lines)
+        material = Isotropic(density=DENSITY, young_modulus=YOUNG, poisson_ratio=self.poisson)
+        mesh = MeshData(points, cells, np.zeros(len(cells), np.int32), ("board",), {})
+        item = prepare(mesh, "dns")["dns"]
+        pieces = make_pieces(distribute(MPI.COMM_SELF, mesh), item.tables, {"board": material})
+        body = make_body(MPI.COMM_SELF, pieces, item.tables, np.ones(len(pieces.steps)))
+        body.free[self.held(body.local.points)] = False
+        return body
+
+    def held(self, points: np.ndarray) -> np.ndarray:
+        if self.name == "plate":
+            held = np.abs(points) < 1e-12
+            held[:, 2] = False
+            for axis in (0, 1):
+                held[np.ix_(points[:, axis] > SIDE / 2 - 1e-9, [1 - axis, 2])] = True
+            return held
+        held = np.zeros(points.shape, dtype=bool)
+        held[:, 1] = True
+        held[points[:, 0] < 1e-12] = True
+        return held
+
+
+def deflection(body: Body, equations: Equations) -> float:
+    """Largest deflection under a uniform pressure of 1 Pa on the top."""
+    local = body.local
+    facets = boundary_facets(local.cells)[:, CYCLIC if local.cells.shape[1] == 8 else slice(None)]
+    top = facets[np.all(local.points[facets][:, :, 2] > local.points[:, 2].max() - 1e-9, axis=1)]
+    load = np.zeros_like(local.points)
+    np.add.at(load, top, -np.abs(area_vectors(local.points[top])))
+    right, displacement = equations.vector(load), np.zeros_like(load)
+    solution = right.duplicate()
+    Factorisation(equations.stiffness()).solve(right, solution)
+    equations.spread(solution, displacement)
+    return float(np.abs(displacement[:, 2]).max())
+
+
+def answers(body: Body) -> dict:
+    """Deflection [m] and first frequency [Hz]."""
+    equations = Equations.of(MPI.COMM_SELF, body)
+    frequency = float(natural_modes(equations, 1).frequency[0])
+    return {"deflection": deflection(body, equations), "frequency": frequency}
+
+
+def seconds_a_step(motion: Motion | ImplicitMotion) -> float:
+    """Processor seconds of a whole step, force included; best of three batches."""
+
+    def batch(steps: int) -> float:
+        begin = process_time()
+        for _ in range(steps):
+            motion.advance()
+            motion.update_force()
+        return (process_time() - begin) / steps
+
+    steps = max(2, int(SECONDS / 3 / batch(2)))
+    return min(batch(steps) for _ in range(3))
+
+
+def costs(body: Body, period: float) -> dict:
+    """What one period [s] costs either solver."""
+    count = len(body.local.cells)
+    critical = float(critical_steps(body.elements, body.geometry.nodal_volume).min())
+    steps = int(np.ceil(period / (STEP_FRACTION * critical)))
+    explicit = seconds_a_step(Motion(body, [], period / steps, np.empty(0, np.int32), np.zeros(len(body.mass))))
+    begin = process_time()
+    implicit = ImplicitMotion(Equations.of(MPI.COMM_SELF, body), [], period / STEPS_PER_PERIOD)
+    factor = process_time() - begin
+    return {
+        "elements": count,
+        "unknowns": int(body.free.sum()),
+        "critical_step": critical,
+        "explicit_steps": steps,
+        "updates_per_second": count / explicit,
+        "explicit_seconds": steps * explicit,
+        "factor_seconds": factor,
+        "implicit_seconds": factor + STEPS_PER_PERIOD * seconds_a_step(implicit),
+    }
+
+
+def mindlin_frequency(poisson: float) -> float:
+    """First frequency [Hz] of the simply supported square plate, shear factor 5/6 (Mindlin 1951)."""
+    wave = 2 * (np.pi / SIDE) ** 2
+    shear = 5 / 6 * YOUNG / (2 * (1 + poisson)) * THICKNESS
+    rigidity = YOUNG * THICKNESS**3 / (12 * (1 - poisson**2))
+    mass, inertia = DENSITY * THICKNESS, DENSITY * THICKNESS**3 / 12
+    linear = -(inertia * shear * wave + mass * (rigidity * wave + shear))
+    squared = np.roots([mass * inertia, linear, shear * rigidity * wave**2]).min()
+    return float(np.sqrt(squared) / (2 * np.pi))
+
+
+def measure(ladder: Ladder) -> Iterator[dict]:
+    """Rows of one ladder: every kind at every size, against the finest hexahedra."""
+    exact = answers(Problem(ladder.problem, ladder.poisson, ladder.finest, "incompatible_modes").body())
+    for kind in NAMES:
+        for cells in ladder.cells:
+            body = Problem(ladder.problem, ladder.poisson, cells, kind).body()
+            errors = {f"{name}_error": value / exact[name] - 1.0 for name, value in answers(body).items()}
+            row = {"problem": ladder.problem, "poisson_ratio": ladder.poisson, "kind": kind, "cells": list(cells)}
+            yield row | errors | costs(body, 1.0 / exact["frequency"])
+
+
+def reference_check(ladders: tuple[Ladder, ...]) -> dict:
+    """How far the finest plate is from Mindlin's frequency."""
+    plate = next(ladder for ladder in ladders if ladder.problem == "plate")
+    found = answers(Problem("plate", plate.poisson, plate.finest, "incompatible_modes").body())["frequency"]
+    return {"finest_plate_over_mindlin": found / mindlin_frequency(plate.poisson) - 1.0}
+
+
+def run_all(ladders: tuple[Ladder, ...]) -> dict:
+    """Measure the ladders; what is measured is on disk after each row."""
+    next(measure(Ladder("plate", 0.3, ((2, 1),), (3, 1))))  # compiles what all rows use
+    result = {"machine": platform.machine(), "rows": [], **reference_check(ladders)}
+    RESULTS.parent.mkdir(exist_ok=True)
+    for ladder in ladders:
+        for row in measure(ladder):
+            result["rows"].append(row)
+            RESULTS.write_text(json.dumps(result, indent=1) + "\n")
+            print(" | ".join(cells_of(row)), flush=True)
+    return result
+
+
+def cells_of(row: dict) -> list[str]:
+    """One row of the table as text."""
+    return [
+        f"{row['problem']}, nu {row['poisson_ratio']:g}",
+        f"{row['elements']} {NAMES[row['kind']]}, {row['cells'][0]} x {row['cells'][1]}",
+        f"{100 * row['deflection_error']:+.2f} %",
+        f"{100 * row['frequency_error']:+.2f} %",
+        f"{1e9 * row['critical_step']:.0f} ns",
+        f"{row['explicit_steps']}",
+        f"{row['updates_per_second']:.1e}/s",
+        f"{row['explicit_seconds']:.2g} s",
+        f"{row['implicit_seconds']:.2g} s",
+    ]
+
+
+def markdown(result: dict) -> str:
+    """The table for the README."""
+    lines = [HEAD, ["---"] * len(HEAD), *map(cells_of, result["rows"])]
+    table = "\n".join("| " + " | ".join(cells) + " |" for cells in lines)
+    return (
+        f"{table}\n\nThe finest plate is {100 * result['finest_plate_over_mindlin']:+.2f} % from Mindlin's frequency."
+    )
+
+
+def publish(result: dict) -> None:
+    """Write the table into the README of the case."""
+    before, rest = README.read_text().split(BEGIN)
+    README.write_text(f"{before}{BEGIN}\n{markdown(result)}\n{END}{rest.split(END)[1]}")
+
+
+def main() -> None:
+    """Measure, or take what is stored; write JSON and table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--quick", action="store_true", help="coarse meshes only")
+    parser.add_argument("--stored", action="store_true", help="measure nothing, take the stored rows")
+    parser.add_argument("--publish", action="store_true", help="write to cases/cantilever as well")
+    options = parser.parse_args()
+    result = json.loads(RESULTS.read_text()) if options.stored else run_all(QUICK if options.quick else FULL)
+    if options.publish:
+        publish(result)
+
+
+if __name__ == "__main__":
+    main()
