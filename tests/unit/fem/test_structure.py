@@ -113,6 +113,27 @@ def test_layers_have_their_materials_and_mass_scaling_is_reported(tmp_path):
     assert not result["health"]["added_mass_fraction"]["ok"]
 
 
+def test_modes_of_a_cantilever(tmp_path):
+    """First bending: (1.8751^2 / 2 pi) sqrt(E I / (rho A L^4)), between a beam's and a wide plate's."""
+    dynamics = {"duration": 1e-5, "modes": 3, "numerics": {"history_samples": 4, "field_samples": 2}}
+    result, _ = run(tmp_path, dynamics=dynamics)
+    modes = json.loads((tmp_path / "out" / "modes.json").read_text())
+    beam = (
+        1.8751**2 / (2 * np.pi) * np.sqrt(STEEL["young_modulus"] * THICKNESS**2 / (12 * STEEL["density"] * LENGTH**4))
+    )
+    assert [mode["mode"] for mode in modes] == [1, 2, 3]
+    assert beam < modes[0]["frequency"] < 1.05 * beam
+    assert modes[0]["mass_fraction"]["z"] == pytest.approx(0.613, abs=0.02)  # of a beam: 4 (0.7340 / 1.8751)^2
+    assert result["metrics"]["first_frequency"]["value"] == modes[0]["frequency"]
+    assert (tmp_path / "out" / "modes.pvd").exists()
+
+
+def test_more_modes_than_there_are_is_an_error(tmp_path):
+    request = structure_input(tmp_path, dynamics={"duration": 1e-5, "modes": 200}, mesh=strip_mesh((2, 1, 1)))
+    with pytest.raises(AgreedError, match=r"dynamics\.modes: 200 modes are wanted, allowed are 1 to"):
+        run_structure(MPI.COMM_SELF, request)
+
+
 def test_power_iteration_gives_a_larger_step_that_is_stable(tmp_path):
     numerics = {"critical_step": "power_iteration", "history_samples": 4, "field_samples": 2, "step_fraction": 0.99}
     result, _ = run(tmp_path, dynamics={"duration": 2e-4, "numerics": numerics})
