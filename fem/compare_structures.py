@@ -36,7 +36,7 @@ def solver_differences(ours: Arrays, reference: Arrays) -> dict[str, float]:
             f" the other {', '.join(names)} up to {ends[1]:.6e} s"
         )
     times = min(ours["time"], reference["time"], key=len)
-    result = {}
+    result: dict[str, float] = {}
     for quantity in COMPARED if names else ():
         pairs = {
             name: tuple(at_times(times, arrays["time"], arrays[f"{quantity}@{name}"]) for arrays in (ours, reference))
