@@ -2,7 +2,8 @@
 
 A box of a material whose axes it shares has three mirror planes. In the Walsh-Hadamard basis of its eight nodes
 the 24 x 24 stiffness falls into eight blocks of 3 x 3, one per parity: the modes of component c with parity p have
-the index p XOR 2^c. A product costs 216 multiplications and additions instead of 1152, with one small table per shape.
+the index p XOR 2^c. A product costs 216 multiplications and additions instead of 1152, with one small table per shape,
+and half of them are shared by the neighbours in a row of boxes (``box_rows``, ``kernels_box_rows``).
 """
 
 from dataclasses import dataclass, field, replace
@@ -10,50 +11,70 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from fem.box_rows import BoxRows
 from fem.element import Elements, classes, element_stiffness
 from fem.energy import Energy, linear_energy
-from fem.kernels_force import add_box_force
+from fem.kernels_box_rows import PAD, add_row_forces, read_lines, subtract_lines
 from fem.mean_strain import MeanStrain
 
 SIGNS = np.array([[(-1.0) ** bin(p & a).count("1") for a in range(8)] for p in range(8)])
 UPPER = np.triu_indices(3)
+VOIGT = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))
+TURNS = ((0, 1, 2), (1, 2, 0), (2, 0, 1))  # proper rotations that bring each axis to the front
 BOX_TOLERANCE = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
 class CongruentElements:
-    """Boxes that share stiffnesses.
+    """Boxes that share stiffnesses, in rows along the axis that has the longest ones.
 
     Attributes:
-        cells: ``(ne, 8)`` int32.
-        shape: ``(ne,)`` int32, class of each element.
-        blocks: ``(ns, 8, 6)`` [N/m], see ``kernels_force.add_box_force``.
+        axes: ``(3,)`` coordinate directions in the order of the rows' frame.
+        nodes: ``(p,)`` int32, node at each position of the lines.
+        rows: ``(nr, 6)`` int32, see ``kernels_box_rows.add_row_forces``.
+        blocks: ``(ns, 8, 6)`` [N/m], in the rows' frame.
+        lines: ``(2, 3, p + PAD)`` displacements [m] and forces [N] at the positions, between calls of no meaning.
         mean: Mean strains of elements with hourglass control.
         history: Empty.
     """
 
-    cells: NDArray[np.int32]
-    shape: NDArray[np.int32]
+    axes: NDArray[np.int64]
+    nodes: NDArray[np.int32]
+    rows: NDArray[np.int32]
     blocks: NDArray[np.float64]
+    lines: NDArray[np.float64]
     mean: MeanStrain | None = None
     history: dict[str, NDArray] = field(default_factory=dict)
 
     @classmethod
     def build(cls, elements: Elements) -> "CongruentElements":
-        """Group boxes (``is_box``) into classes and diagonalise the stiffness of each."""
-        turned = aligned(elements)
-        first, shape = classes(replace(turned, density=np.zeros(len(turned.cells))))
-        blocks = parity_blocks(element_stiffness(turned.subset(first)))
-        order = np.argsort(turned.cells.min(axis=1), kind="stable")
-        return cls(np.ascontiguousarray(turned.cells[order]), shape[order], blocks, MeanStrain.of(elements))
+        """Group boxes (``is_box``) into classes and rows, and diagonalise the stiffness of each class."""
+        first, shape = classes(replace(aligned(elements), density=np.zeros(len(elements.cells))))
+        candidates = []
+        for axes in TURNS:
+            ahead = aligned(turned(elements, axes))
+            candidates.append((ahead, axes, BoxRows.find(ahead.points, ahead.cells, shape)))
+        ahead, axes, found = min(candidates, key=lambda candidate: len(candidate[2].rows))
+        blocks = parity_blocks(element_stiffness(ahead.subset(first)))
+        lines = np.zeros((2, 3, len(found.nodes) + PAD))
+        return cls(np.array(axes), found.nodes, found.rows, blocks, lines, MeanStrain.of(elements))
 
     def add(self, displacement: NDArray[np.float64], force: NDArray[np.float64]) -> None:
         """Subtract K u from the force."""
-        add_box_force(self.cells, self.blocks, self.shape, displacement, force)
+        read_lines(self.nodes, self.axes, displacement, self.lines[0])
+        add_row_forces(self.rows, self.blocks, self.lines[0], self.lines[1])
+        subtract_lines(self.nodes, self.axes, self.lines[1], force)
 
     def energy(self, displacement: NDArray[np.float64]) -> Energy:
         """Return the strain energy."""
         return linear_energy(self, displacement, self.mean)
+
+
+def turned(elements: Elements, axes: tuple[int, int, int]) -> Elements:
+    """Return elements in a frame whose directions are the given coordinate directions."""
+    voigt = [VOIGT.index((min(axes[i], axes[j]), max(axes[i], axes[j]))) for i, j in VOIGT]
+    elasticity = np.ascontiguousarray(elements.elasticity[:, voigt][:, :, voigt])
+    return replace(elements, points=np.ascontiguousarray(elements.points[:, axes]), elasticity=elasticity)
 
 
 def is_box(corners: NDArray[np.float64]) -> NDArray[np.bool_]:

@@ -1,77 +1,8 @@
-"""Numba kernels of the internal force. Both subtract K u from the force, one element or node pair at a time."""
+"""Numba kernels of the internal force from an assembled matrix of 3 x 3 blocks."""
 
 from numba import njit
 
 from fem.kernels_hexahedron import FINITE
-
-
-@njit(cache=True, fastmath=FINITE)
-def walsh_hadamard(values):
-    """Return the Walsh-Hadamard transform of eight values: entry p is the sum over a of (-1)^|p AND a| values[a]."""
-    a, b, c, d, e, f, g, h = values
-    a, b, c, d, e, f, g, h = a + b, a - b, c + d, c - d, e + f, e - f, g + h, g - h
-    a, b, c, d, e, f, g, h = a + c, b + d, a - c, b - d, e + g, f + h, e - g, f - h
-    return a + e, b + f, c + g, d + h, a - e, b - f, c - g, d - h
-
-
-@njit(cache=True, fastmath=FINITE)
-def component(values, nodes, c):
-    """Return component c at the eight nodes of an element."""
-    return (
-        values[nodes[0], c],
-        values[nodes[1], c],
-        values[nodes[2], c],
-        values[nodes[3], c],
-        values[nodes[4], c],
-        values[nodes[5], c],
-        values[nodes[6], c],
-        values[nodes[7], c],
-    )
-
-
-@njit(cache=True, fastmath=FINITE)
-def mix(block, x, y, z):
-    """Return a symmetric 3 x 3 block times (x, y, z); the block is (xx, xy, xz, yy, yz, zz)."""
-    return (
-        block[0] * x + block[1] * y + block[2] * z,
-        block[1] * x + block[3] * y + block[4] * z,
-        block[2] * x + block[4] * y + block[5] * z,
-    )
-
-
-@njit(cache=True, fastmath=FINITE)
-def add_box_force(cells, blocks, shape, displacement, force):
-    """Subtract K u of boxes, K block diagonal in the Walsh-Hadamard basis (see ``force_congruent``).
-
-    Args:
-        cells: ``(ne, 8)`` int32.
-        blocks: ``(ns, 8, 6)`` [N/m] per shape and parity, symmetric storage, divided by 8.
-        shape: ``(ne,)`` int32, index into ``blocks``.
-        displacement: ``(n, 3)`` [m].
-        force: ``(n, 3)`` [N], added to.
-    """
-    for e in range(len(cells)):
-        nodes = cells[e]
-        x = walsh_hadamard(component(displacement, nodes, 0))
-        y = walsh_hadamard(component(displacement, nodes, 1))
-        z = walsh_hadamard(component(displacement, nodes, 2))
-        block = blocks[shape[e]]
-        p0 = mix(block[0], x[1], y[2], z[4])
-        p1 = mix(block[1], x[0], y[3], z[5])
-        p2 = mix(block[2], x[3], y[0], z[6])
-        p3 = mix(block[3], x[2], y[1], z[7])
-        p4 = mix(block[4], x[5], y[6], z[0])
-        p5 = mix(block[5], x[4], y[7], z[1])
-        p6 = mix(block[6], x[7], y[4], z[2])
-        p7 = mix(block[7], x[6], y[5], z[3])
-        x = walsh_hadamard((p1[0], p0[0], p3[0], p2[0], p5[0], p4[0], p7[0], p6[0]))
-        y = walsh_hadamard((p2[1], p3[1], p0[1], p1[1], p6[1], p7[1], p4[1], p5[1]))
-        z = walsh_hadamard((p4[2], p5[2], p6[2], p7[2], p0[2], p1[2], p2[2], p3[2]))
-        for a in range(8):
-            node = nodes[a]
-            force[node, 0] -= x[a]
-            force[node, 1] -= y[a]
-            force[node, 2] -= z[a]
 
 
 @njit(cache=True, fastmath=FINITE)

@@ -1,0 +1,74 @@
+"""Rows of equal boxes along lines of nodes: the order in which their force is computed."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem.kernels_box_rows import LONGEST
+
+SAME_PLANE = 1e-9  # of the model's extent
+
+
+@dataclass(frozen=True, slots=True)
+class BoxRows:
+    """Lines of nodes and the rows of boxes between them; see ``kernels_box_rows.add_row_forces``.
+
+    Attributes:
+        nodes: ``(p,)`` int32, node at each position; those of a line follow each other.
+        rows: ``(nr, 6)`` int32.
+    """
+
+    nodes: NDArray[np.int32]
+    rows: NDArray[np.int32]
+
+    @classmethod
+    def find(cls, points: NDArray[np.float64], cells: NDArray[np.int32], shape: NDArray[np.int32]) -> "BoxRows":
+        """Find the rows along the first coordinate.
+
+        Args:
+            points: ``(n, 3)`` [m].
+            cells: ``(ne, 8)`` boxes; bit d of a local index is the side in coordinate direction d.
+            shape: ``(ne,)`` class of each; the boxes of a row are of one.
+        """
+        nodes = lines(points, cells)
+        position = np.full(len(points), -1)
+        position[nodes] = np.arange(len(nodes))
+        corners = position[cells]
+        in_line = (corners[:, 1::2] == corners[:, ::2] + 1).all(axis=1)
+        rows = runs(corners[in_line, ::2], shape[in_line])
+        apart = cells[~in_line]  # a node with two next ones, where meshes do not match: lines of their own
+        own = len(nodes) + 8 * np.arange(len(apart))[:, None] + np.arange(0, 8, 2)
+        single = np.column_stack([own, np.ones(len(apart)), shape[~in_line]])
+        return cls(
+            np.concatenate([nodes, apart.ravel()]).astype(np.int32), np.concatenate([rows, single]).astype(np.int32)
+        )
+
+
+def lines(points: NDArray[np.float64], cells: NDArray[np.int32]) -> NDArray[np.int64]:
+    """Return the nodes of the boxes, line by line along the first coordinate, neighbouring lines close."""
+    first = np.arange(len(points))
+    first[cells[:, 1::2].ravel()] = cells[:, ::2].ravel()
+    while np.any(first != first[first]):
+        first = first[first]
+    used = np.unique(cells)
+    plane = np.round(points[first[used], 1:] / (SAME_PLANE * np.ptp(points, axis=0).max()))
+    return used[np.lexsort((points[used, 0], first[used], plane[:, 0], plane[:, 1]))]
+
+
+def runs(starts: NDArray[np.int64], shape: NDArray[np.int32]) -> NDArray[np.int64]:
+    """Join boxes whose four lines continue each other's: rows ``(nr, 6)`` of at most ``LONGEST`` boxes.
+
+    Args:
+        starts: ``(ne, 4)`` positions of the low corners of each box.
+        shape: ``(ne,)`` class of each box.
+    """
+    order = np.argsort(starts[:, 0], kind="stable")
+    starts, shape = starts[order], shape[order]
+    begins = np.ones(len(starts), dtype=bool)
+    begins[1:] = (np.diff(starts, axis=0) != 1).any(axis=1) | (np.diff(shape) != 0)
+    begin = np.flatnonzero(begins)
+    along = np.arange(len(starts)) - begin[np.cumsum(begins) - 1]
+    begin = np.flatnonzero(along % LONGEST == 0)
+    count = np.diff(np.append(begin, len(starts)))
+    return np.column_stack([starts[begin], count, shape[begin]])
