@@ -27,7 +27,7 @@ COLUMNS = LONGEST + 3 * LANES
 
 @njit(cache=True)
 def read_lines(nodes, axes, values, lines):
-    """Copy the rows of ``values (n, 3)`` at ``nodes (p,)`` into ``lines (3, >= p)``, components in the order of axes."""
+    """Copy ``values (n, 3)`` at ``nodes (p,)`` into ``lines (3, >= p)``, components in the order of ``axes``."""
     x, y, z = axes[0], axes[1], axes[2]
     for p in range(len(nodes)):
         node = nodes[p]
