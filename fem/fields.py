@@ -13,7 +13,11 @@ from fem.stress import StressRecovery, von_mises
 
 
 class Fields:
-    """A time series of one model's fields."""
+    """A time series of one model's fields.
+
+    Attributes:
+        peaks: Part -> largest von Mises stress [Pa] of a local element at the times written so far.
+    """
 
     def __init__(self, comm: MPI.Comm, body: Body, part: NDArray[np.integer], path: Path) -> None:
         """Open ``path`` (``.pvd``) for the model on ``comm``; ``part (ne,)`` numbers the parts of the local cells."""
@@ -29,11 +33,16 @@ class Fields:
         self._nodes = body.local.cells.ravel()[first]
         self._recovery = StressRecovery(body.elements, body.geometry.gradient)
         self._file = dolfinx_api.FieldFile(comm, path)
+        self._local_part = part
+        self.peaks = dict.fromkeys(np.unique(part).tolist(), 0.0)
 
     def write(self, displacement: NDArray[np.float64], time: float) -> None:
         """Append the fields at a displacement ``(n, 3)`` [m] and a time [s]; collective over the model."""
         self._displacement.x.array.reshape(-1, 3)[self._dofs] = displacement[self._nodes]
-        self._von_mises.x.array[self._cell_dofs] = von_mises(self._recovery.stress(displacement))
+        stress = von_mises(self._recovery.stress(displacement))
+        self._von_mises.x.array[self._cell_dofs] = stress
+        for part, peak in self.peaks.items():
+            self.peaks[part] = max(peak, float(stress[self._local_part == part].max()))
         self._file.write([self._displacement, self._von_mises, self._part], time)
 
     def close(self) -> None:

@@ -19,7 +19,7 @@ from fem.run import march
 from fem.structure_loads import damping_loads, pulse_durations, pulses_of, structure_loads
 from fem.structure_model import StructureModel, build_structure
 from fem.structure_modes import find_modes
-from fem.structure_result import write_result
+from fem.structure_result import Found, element_peaks, write_result
 from fem.watch_points import PointWatch
 
 
@@ -43,7 +43,8 @@ def run_structure(world: MPI.Comm, request: StructureInput) -> None:
         ready = time.perf_counter()
         output_seconds = march(comms, crew, history, fields, request.dynamics.numerics.field_samples)
         timings = Timings(ready - start, time.perf_counter() - ready - output_seconds, output_seconds)
-        write_result(comm, request, model, (history, modes), timings)
+        peaks = element_peaks(comm, fields["structure"], model.tables.part_names)
+        write_result(comm, request, model, Found(history, modes, peaks), timings)
         agreed(comm, lambda: None)
 
 

@@ -1,13 +1,15 @@
 """``history.npz`` and ``result.json`` of a structure."""
 
 import json
-from dataclasses import asdict
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from fem.fields import Fields
 from fem.history import History
 from fem.inputs import StructureInput
 from fem.result import ADDED_MASS_LIMIT, Timings, checked, quantity
@@ -21,16 +23,31 @@ from fem.structure_modes import ModeTable
 HOURGLASS_LIMIT = 0.1
 
 
+@dataclass(frozen=True, slots=True)
+class Found:
+    """What a run has found.
+
+    Attributes:
+        history: Samples and ledger.
+        modes: Natural modes, if this run was asked for them.
+        peaks: Largest von Mises stress [Pa] of an element of each layer at the times of the fields.
+    """
+
+    history: History
+    modes: ModeTable | None
+    peaks: dict[str, float]
+
+
+def element_peaks(comm: MPI.Comm, fields: Fields, parts: Sequence[str]) -> dict[str, float]:
+    """Return the largest von Mises stress [Pa] of each part over all ranks and field samples; collective."""
+    return {name: comm.allreduce(fields.peaks.get(part, 0.0), MPI.MAX) for part, name in enumerate(parts)}
+
+
 def write_result(
-    comm: MPI.Comm,
-    request: StructureInput,
-    model: StructureModel,
-    found: tuple[History, ModeTable | None],
-    timings: Timings,
+    comm: MPI.Comm, request: StructureInput, model: StructureModel, found: Found, timings: Timings
 ) -> None:
-    """Write both files on rank 0; collective. ``found`` are the history and the modes."""
-    summary = model_summary(comm, request, model)
-    history, modes = found
+    """Write both files on rank 0; collective."""
+    summary, history = model_summary(comm, request, model), found.history
     if comm.rank == 0:
         history.write(request.output)
         arrays = history.arrays()
@@ -39,7 +56,8 @@ def write_result(
             | {"energy_balance_error": quantity(history.ledger.balance_error)}
             | energy_metrics(arrays)
             | point_metrics(arrays)
-            | mode_metrics(modes),
+            | {f"peak_element_stress@{name}": quantity(peak, "Pa") for name, peak in found.peaks.items()}
+            | mode_metrics(found.modes),
             "health": health(history, arrays, summary, request),
             "effects": effects(request, summary["added_mass"]),
             "timings": asdict(timings),

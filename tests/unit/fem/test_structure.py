@@ -48,6 +48,7 @@ def test_program_reads_its_input_and_writes_all_products(tmp_path, capsys):
         assert history["load@drop"].max() == pytest.approx(1e4)
         assert np.ptp(history["kinetic"]) > 0.0
         peak = np.linalg.norm(history["displacement@tip"], axis=1).max()
+    assert result["metrics"]["peak_element_stress@board"]["value"] > result["metrics"]["peak_von_mises@tip"]["value"]
     assert result["metrics"]["peak_displacement@tip"] == {"value": pytest.approx(peak), "unit": "m"}
 
 
