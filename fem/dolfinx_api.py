@@ -40,8 +40,9 @@ def make_mesh(comm: MPI.Comm, points: NDArray[np.float64], cells: NDArray[np.int
 def cell_nodes(mesh: dolfinx.mesh.Mesh) -> NDArray[np.int32]:
     """Return the local geometry nodes of the local cells, in the order of the input: ``(ne, k)``."""
     dofmap = mesh.geometry.dofmap
-    nodes = mesh.geometry.cmap.create_dof_layout().num_dofs
-    return np.asarray(dofmap.array if OLD else dofmap, np.int32).reshape(-1, nodes)
+    if OLD:
+        return np.asarray(dofmap.array, np.int32).reshape(-1, mesh.geometry.cmap.create_dof_layout().num_dofs)
+    return np.asarray(dofmap, np.int32)
 
 
 def degree(mesh: dolfinx.mesh.Mesh) -> int:

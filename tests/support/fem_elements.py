@@ -1,12 +1,12 @@
 """Every kind of element on structured boxes, and the linear problems they are judged by; SciPy only."""
 
 from collections.abc import Callable, Sequence
-from itertools import permutations
 
 import numpy as np
 import scipy.sparse
 from scipy.sparse.linalg import eigsh, splu
 
+from fem.box_step import diagonal_tetrahedra
 from fem.element import Elements, element_geometry, element_kind, element_stiffness, lumped_mass
 from fem.element_kind import ElementKind
 from fem.element_tetrahedron import EDGES
@@ -22,16 +22,6 @@ KINDS = {
 }
 
 
-def split(cells: np.ndarray) -> np.ndarray:
-    """Return six tetrahedra per hexahedron, (6 ne, 4), one a permutation of the axes; neighbours fit in a grid."""
-    paths = []
-    for axes in permutations((1, 2, 4)):
-        path = [0, axes[0], axes[0] + axes[1], 7]
-        turns = np.linalg.det(np.array([[a >> d & 1 for d in range(3)] for a in path[1:]]))
-        paths.append(path if turns > 0 else [path[0], path[2], path[1], path[3]])
-    return cells[:, paths].reshape(-1, 4)
-
-
 def with_middles(points: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return points and 10-node tetrahedra with nodes at the middles of the edges."""
     edges, number = np.unique(np.sort(cells[:, EDGES].reshape(-1, 2), axis=1), axis=0, return_inverse=True)
@@ -45,7 +35,7 @@ def box(kind: ElementKind, *lines: Sequence[float], move: Callable = lambda x: x
     points = move(points)
     if kind.nodes == 8:
         return points, cells
-    tetrahedra = split(cells).astype(np.int32)
+    tetrahedra = cells[:, diagonal_tetrahedra()[1]].reshape(-1, 4)
     return (points, tetrahedra) if kind.nodes == 4 else with_middles(points, tetrahedra)
 
 

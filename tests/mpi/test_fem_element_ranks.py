@@ -1,0 +1,83 @@
+"""Bodies of every kind of element move alike on one and on two ranks, and their fields are written."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.support.fem_elements import KINDS
+
+ROOT = Path(__file__).resolve().parents[2]
+SCRIPT = """
+import json, sys
+from pathlib import Path
+import numpy as np
+from mpi4py import MPI
+from fem.body import make_body, make_pieces
+from fem.energy import Energy
+from fem.fields import Fields
+from fem.loads import HalfSineDrop
+from fem.local_mesh import distribute
+from fem.material_roles import Materials
+from fem.mesh import MeshData
+from fem.motion import Motion
+from fem.scene import prepare
+from tests.support.fem_elements import KINDS, box
+
+comm, result = MPI.COMM_WORLD, {}
+for name, kind in KINDS.items():
+    points, cells = box(kind, np.linspace(0, 4e-3, 5), np.linspace(0, 2e-3, 3), np.linspace(0, 1e-3, 3))
+    item = prepare(MeshData(points, cells, np.zeros(len(cells), np.int32), ("board",), {}), "dns")["dns"]
+    local = distribute(comm, item.mesh if comm.rank == 0 else None)
+    pieces = make_pieces(local, item.tables, Materials(), name if kind.nodes == 8 else "incompatible_modes")
+    body = make_body(comm, pieces, item.tables, np.ones(len(pieces.steps)))
+    body.free[body.local.points[:, 0] < 1e-9] = False
+    step = 0.9 * comm.allreduce(float(pieces.steps.min(initial=np.inf)), MPI.MIN)
+    motion = Motion(body, [HalfSineDrop(1e4, 5e-5)], step, np.empty(0, np.int32), np.zeros(len(body.mass)))
+    for _ in range(100):
+        motion.advance()
+        motion.update_force()
+    fields = Fields(comm, body, item.tables.part[local.cell_numbers], Path(sys.argv[1]) / f"{name}.pvd")
+    fields.write(motion.displacement, motion.time)
+    fields.close()
+    owned = body.shared.owned
+    displacement = np.zeros((item.tables.nodes, 3))
+    displacement[body.local.nodes[owned]] = motion.displacement[owned]
+    held = sum((term.energy(motion.displacement) for term in body.terms), Energy())
+    parts = np.array([held.strain, held.hourglass, motion.kinetic_energy(), motion.external_work])
+    result[name] = {"displacement": comm.allreduce(displacement).tolist(), "energies": comm.allreduce(parts).tolist()}
+if comm.rank == 0:
+    print(json.dumps(result))
+"""
+
+
+def results(directory: Path, ranks: int) -> dict:
+    script = directory / "elements.py"
+    script.write_text(SCRIPT)
+    done = subprocess.run(
+        ["mpirun", "--allow-run-as-root", "--oversubscribe", "-n", str(ranks), sys.executable, script, directory],
+        cwd=ROOT,
+        env=os.environ | {"PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"},
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+def test_two_ranks_give_the_results_of_one(tmp_path):
+    one, two = results(tmp_path, 1), results(tmp_path, 2)
+    for name in KINDS:
+        first, second = (np.array(run[name]["displacement"]) for run in (one, two))
+        assert np.abs(second - first).max() < 1e-10 * np.abs(first).max(), name
+        assert two[name]["energies"] == pytest.approx(one[name]["energies"], rel=1e-9, abs=0.0), name
+        strain, hourglass, kinetic, work = two[name]["energies"]
+        assert strain + hourglass + kinetic == pytest.approx(work, rel=1e-9), name
+        assert (hourglass > 0.0) == (name == "one_point")
+        assert list(tmp_path.glob(f"{name}*.vtu"))
