@@ -1,40 +1,37 @@
 """Numba kernels of a substep apart from the internal force: update, tie, packing of messages."""
 
+import numpy as np
 from numba import njit
 
 from fem.kernels_hexahedron import FINITE
 
+STRIP = 384  # degrees of freedom: whole nodes and whole vectors
+
 
 @njit(cache=True, fastmath=FINITE)
-def advance(state, masses, acceleration, step):
+def advance(state, mobility, acceleration, step):
     """Take one step of central differences: v += dt (f / m + g), u += dt v, at free degrees of freedom.
+
+    The loop runs over strips of all components together, which fill vectors; g comes from a strip of its own.
 
     Args:
         state: ``(3, n, 3)``: displacement [m], velocity half a step back [m/s], force [N].
-        masses: ``(n, 4)``: inverse mass per direction [1/kg], zero where the velocity is prescribed; mass that counts
-            in the energy ledger of this rank [kg].
+        mobility: ``(n, 3)`` inverse mass [1/kg], zero where the velocity is prescribed.
         acceleration: ``(3,)`` [m/s^2], of the body force.
         step: dt [s].
-
-    Returns:
-        Momentum of the ledger's mass at the new velocity, 3 floats [kg m/s].
     """
-    displacement, velocity, force = state[0], state[1], state[2]
-    gx, gy, gz = acceleration[0], acceleration[1], acceleration[2]
-    px = py = pz = 0.0
-    for i in range(len(masses)):
-        ix, iy, iz, mass = masses[i, 0], masses[i, 1], masses[i, 2], masses[i, 3]
-        vx = velocity[i, 0] + step * (force[i, 0] * ix + (gx if ix > 0.0 else 0.0))
-        vy = velocity[i, 1] + step * (force[i, 1] * iy + (gy if iy > 0.0 else 0.0))
-        vz = velocity[i, 2] + step * (force[i, 2] * iz + (gz if iz > 0.0 else 0.0))
-        velocity[i, 0], velocity[i, 1], velocity[i, 2] = vx, vy, vz
-        displacement[i, 0] += step * vx
-        displacement[i, 1] += step * vy
-        displacement[i, 2] += step * vz
-        px += mass * vx
-        py += mass * vy
-        pz += mass * vz
-    return px, py, pz
+    flat, inverse = state.reshape(3, -1), mobility.reshape(-1)
+    kick = np.empty(STRIP)
+    for i in range(STRIP):
+        kick[i] = step * acceleration[i % 3]
+    for begin in range(0, len(inverse), STRIP):
+        end = min(begin + STRIP, len(inverse))
+        displacement, velocity, force = flat[0, begin:end], flat[1, begin:end], flat[2, begin:end]
+        factor = inverse[begin:end]
+        for i in range(end - begin):
+            new = velocity[i] + (step * factor[i] * force[i] + (kick[i] if factor[i] > 0.0 else 0.0))
+            velocity[i] = new
+            displacement[i] += step * new
 
 
 @njit(cache=True)

@@ -24,6 +24,7 @@ class Motion:
         force: ``(n, 3)`` [N] at ``time``, summed over ranks, slaves' moved to their masters; without body force.
         slave_force: ``(ns, 3)`` [N] of this rank's elements on the slaves, before it is moved.
         gravity: ``(3,)`` [m/s^2], sum of the loads' accelerations at ``time``.
+        mobility: ``(n, 3)`` [1/kg] inverse masses, zero where the velocity is prescribed.
         ledger_mass: ``(n,)`` [kg] that counts in the ledger of this rank.
     """
 
@@ -44,11 +45,9 @@ class Motion:
         mass = body.mass + extra_mass
         free = body.free.copy()
         free[held] = False
-        self._masses = np.zeros((len(mass), 4))
-        self._masses[:, :3] = np.where(free, 1.0 / np.where(mass > 0.0, mass, np.inf)[:, None], 0.0)
-        self._masses[:, 3] = np.where(body.shared.owned, mass, 0.0)
-        self._masses[held, 3] = 0.0
-        self.ledger_mass = self._masses[:, 3]
+        self.mobility = np.where(free, 1.0 / np.where(mass > 0.0, mass, np.inf)[:, None], 0.0)
+        self.ledger_mass = np.where(body.shared.owned, mass, 0.0)
+        self.ledger_mass[held] = 0.0
         self._state = np.zeros((3, len(mass), 3))
         self.displacement, self.velocity, self.force = self._state
         self.slave_force = np.zeros((len(body.tie.slave), 3))
@@ -81,32 +80,29 @@ class Motion:
 
     def hold(self, nodes: NDArray[np.integer], component: int) -> None:
         """Let a velocity component of local nodes no longer follow from forces."""
-        self._masses[nodes, component] = 0.0
+        self.mobility[nodes, component] = 0.0
 
     def add_mass(self, nodes: NDArray[np.integer], mass: NDArray[np.float64]) -> None:
         """Add masses ``(k,)`` [kg] that the ledger does not count to local nodes, all of whose components are free."""
-        self._masses[nodes, :3] = 1.0 / (1.0 / self._masses[nodes, :3] + mass[:, None])
+        self.mobility[nodes] = 1.0 / (1.0 / self.mobility[nodes] + mass[:, None])
 
     def launch(self, velocity: NDArray[np.float64]) -> None:
         """Give all free components an initial velocity ``(3,)`` [m/s]; before the first step."""
         self.velocity += np.where(self.mobility > 0.0, velocity, 0.0)
 
-    @property
-    def mobility(self) -> NDArray[np.float64]:
-        """Return the inverse masses ``(n, 3)`` [1/kg], zero where the velocity is prescribed."""
-        return self._masses[:, :3]
-
     def advance(self) -> None:
         """Move from ``time`` to ``time + dt``, slaves with their masters; the force is then out of date."""
         for load in self._loads:
             load.drive(self.velocity, self.time)
-        momentum = advance(self._state, self._masses, self.gravity, self.step)
+        advance(self._state, self.mobility, self.gravity, self.step)
         for load in self._loads:
             load.collect(self)
         self.body.tie.spread(self.displacement)
         self.time += self.step
         before, self.gravity = self.gravity, self.body_acceleration(self.time)
-        self._body_work += 0.5 * self.step * float((before + self.gravity) @ np.array(momentum))
+        mean = 0.5 * (before + self.gravity)
+        if mean.any():
+            self._body_work += self.step * float(mean @ (self.ledger_mass @ self.velocity))
 
     def update_force(self) -> None:
         """Evaluate the force at the present displacement, summed over ranks; once a step, for terms with a path."""
@@ -123,7 +119,7 @@ class Motion:
 
     def acceleration(self, nodes: NDArray[np.integer] | slice = slice(None)) -> NDArray[np.float64]:
         """Return the acceleration ``(k, 3)`` [m/s^2] of some local nodes, zero where it does not follow from forces."""
-        inverse = self._masses[nodes, :3]
+        inverse = self.mobility[nodes]
         return self.force[nodes] * inverse + np.where(inverse > 0.0, self.gravity, 0.0)
 
     def kinetic_energy(self) -> float:
@@ -170,7 +166,7 @@ class Motion:
         for load in self._loads:
             load.remove(force)
         owned = self.body.shared.owned
-        return 0.125 * self.step**2 * float(np.sum((force**2 * self._masses[:, :3])[owned]))
+        return 0.125 * self.step**2 * float(np.sum((force**2 * self.mobility)[owned]))
 
     def state(self) -> dict[str, Any]:
         """Return all that changes with time, for a checkpoint."""
