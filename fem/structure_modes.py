@@ -15,7 +15,8 @@ from fem.global_matrix import Equations
 from fem.inputs import StructureInput
 from fem.modal import Modes, natural_modes
 from fem.structure_model import StructureModel
-from fem.structure_tables import shaken_supports
+from fem.structure_parameters import PrescribedMotion
+from fem.structure_tables import AXES, shaken_supports
 
 SHOWN = 0.05  # largest displacement of a shape in a field file, in lengths of the structure
 
@@ -54,11 +55,13 @@ def find_modes(comm: MPI.Comm, model: StructureModel, request: StructureInput) -
 
 
 def at_rest_supports(model: StructureModel, request: StructureInput) -> Body:
-    """Return the body with all supports held, also those that a large mass moves."""
+    """Return the body with all held that a large mass or a prescribed motion moves."""
+    moved = [(request.supports[name].on, slice(None)) for name in shaken_supports(request)]
+    loads = [load for load in request.loads.values() if isinstance(load, PrescribedMotion)]
     free = model.body.free.copy()
-    for name in shaken_supports(request):
-        nodes = model.body.local.locate(model.tables.watch.supports[name])
-        free[nodes[nodes >= 0]] = False
+    for on, components in [*moved, *((load.on, AXES.index(load.component)) for load in loads)]:
+        nodes = model.body.local.locate(model.tables.nodes_of[on])
+        free[nodes[nodes >= 0], components] = False
     return replace(model.body, free=free)
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.errors import MeshError
+from fem.errors import LoadError, MeshError
 from fem.facet_areas import facet_set, outward_areas
 from fem.mesh import MeshData
 from fem.scene import Tables
@@ -36,7 +36,7 @@ def structure_tables(mesh: MeshData, scene: StructureScene) -> StructureTables:
 
     Raises:
         MeshError: Layers without elements or elements without layers, watch points outside.
-        LoadError: A facet set without facets.
+        LoadError: A facet set without facets, or a prescribed motion of what is held.
     """
     check_layers(mesh, scene)
     moved = [load.on for load in scene.loads.values() if isinstance(load, PrescribedMotion)]
@@ -44,6 +44,7 @@ def structure_tables(mesh: MeshData, scene: StructureScene) -> StructureTables:
     nodes_of = {name: np.unique(facet_set(mesh, name)) for name in sets}
     pressed = {load.on for load in scene.loads.values() if isinstance(load, Pressure)}
     held = held_by_supports(mesh, scene)
+    check_motions(scene, nodes_of, held)
     held_nodes = np.flatnonzero(held.any(axis=1))
     supports = {name: nodes_of[support.on] for name, support in scene.supports.items()}
     return StructureTables(
@@ -71,6 +72,20 @@ def check_layers(mesh: MeshData, scene: StructureScene) -> None:
             f"layers and parts of the mesh differ: layers without elements: {empty or 'none'}; parts that are no layer:"
             f" {foreign or 'none'}"
         )
+
+
+def check_motions(scene: StructureScene, nodes_of: dict[str, NDArray[np.int32]], held: NDArray[np.bool_]) -> None:
+    """Refuse prescribed motions of held components ``(n, 3)``; errors as ``structure_tables``."""
+    for name, load in scene.loads.items():
+        if not isinstance(load, PrescribedMotion):
+            continue
+        nodes = nodes_of[load.on]
+        count = int(held[nodes, AXES.index(load.component)].sum())
+        if count:
+            raise LoadError(
+                f"loads.{name} moves {load.on} along {load.component}, where a support or a plane of symmetry holds"
+                f" {count} of its {len(nodes)} nodes"
+            )
 
 
 def shaken_supports(scene: StructureScene) -> list[str]:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from fem.compare_structures import solver_differences
 from fem.errors import AgreedError, EnergyError
 from fem.program import main
 from fem.structure import run_structure
@@ -114,6 +115,19 @@ def test_layers_have_their_materials_and_mass_scaling_is_reported(tmp_path):
     assert not result["health"]["added_mass_fraction"]["ok"]
 
 
+def test_large_mass_gives_what_direct_input_gives(tmp_path):
+    """Displacements are told relative to the supports; seen from them, the strip is pushed against the acceleration."""
+    drop = structure_tables_of()["loads"]["drop"]
+    _, direct = run(tmp_path)
+    _, large = run(tmp_path, loads={"drop": drop | {"method": "large_mass"}})
+    assert direct["displacement@tip"][:, 2].min() < -10 * direct["displacement@tip"][:, 2].max()
+    found = solver_differences(large, direct)
+    assert found["displacement_difference"] < 5e-3
+    assert found["strain_difference"] < 5e-3
+    peak = np.abs(direct["reaction@clamp"]).max()
+    assert np.abs(large["reaction@clamp"] - direct["reaction@clamp"]).max() < 5e-3 * peak
+
+
 def test_modes_of_a_cantilever(tmp_path):
     """First bending: (1.8751^2 / 2 pi) sqrt(E I / (rho A L^4)), between a beam's and a wide plate's."""
     dynamics = {"duration": 1e-5, "modes": 3, "numerics": {"history_samples": 4, "field_samples": 2}}
@@ -169,6 +183,12 @@ def test_facet_set_that_the_mesh_has_not(tmp_path):
     del mesh.facets["x_min"]
     with pytest.raises(AgreedError, match="x_min"):
         run_structure(MPI.COMM_SELF, structure_input(tmp_path, mesh))
+
+
+def test_motion_of_what_is_held(tmp_path):
+    pull = {"kind": "motion", "on": "z_max", "component": "y", "peak": 1.0, "pulse": "constant"}
+    with pytest.raises(AgreedError, match=r"loads\.pull moves z_max along y, where .* holds 4 of its 36 nodes"):
+        run_structure(MPI.COMM_SELF, structure_input(tmp_path, loads={"pull": pull}))
 
 
 def test_run_ends_where_energies_do_not_balance(tmp_path):
