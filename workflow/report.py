@@ -9,6 +9,7 @@ import jinja2
 import numpy as np
 
 from workflow import report_tables as tables
+from workflow.structure_case import StructureCase
 from workflow.summary import collect_summary, write_summary
 
 TEMPLATES = Path(__file__).parent / "templates"
@@ -55,6 +56,7 @@ def _context(run_folder: Path, case, summary: dict) -> dict:
             "effects": tables.effects(summary["effects"]),
             "versions": tables.versions(),
         },
+        "preview_caption": "Mesh of board and package, coloured by part. Joints are meshed after reflow.",
         "curves": {},
         "pictures": {},
     }
@@ -65,7 +67,10 @@ def _context(run_folder: Path, case, summary: dict) -> dict:
     _add_preview(run_folder, context)
     _add_joints(run_folder, context)
     _add_body(run_folder, case.kind, context, summary)
-    _add_shock(run_folder, context, summary)
+    if isinstance(case, StructureCase):
+        _add_structure(run_folder, case, context, summary)
+    else:
+        _add_shock(run_folder, context, summary)
     return context
 
 
@@ -139,6 +144,13 @@ def _add_body(run_folder: Path, kind: str, context: dict, summary: dict) -> None
         picture = Path(folder) / "body.png"
         report_body.render_stages(report_body.stages(kind, shape), shape, picture)
         context["pictures"]["body"] = _base64(picture)
+
+
+def _add_structure(run_folder: Path, case: StructureCase, context: dict, summary: dict) -> None:
+    from workflow.structure_report import add_structure
+
+    context["preview_caption"] = "Mesh, coloured by layer."
+    add_structure(run_folder, case, context, summary["metrics"])
 
 
 def _add_shock(run_folder: Path, context: dict, summary: dict) -> None:

@@ -109,7 +109,7 @@ def render_board(folder: Path, history: dict, picture: Path) -> str:
     grid, time = _fields_near(folder, ("macro", "dns"), float(history["time"][np.argmax(deflection)]))
     grid["deflection [mm]"] = grid.point_data["displacement"][:, 2] / MILLI
     length = max(grid.bounds[1] - grid.bounds[0], grid.bounds[3] - grid.bounds[2])
-    factor = _round_down(0.12 * length / float(np.abs(grid.point_data["displacement"][:, 2]).max()))
+    factor = round_down(0.12 * length / float(np.abs(grid.point_data["displacement"][:, 2]).max()))
     bent = grid.warp_by_vector("displacement", factor=factor)
     bent.points = bent.points / MILLI
     plotter = new_plotter((1800, 900))
@@ -188,7 +188,7 @@ def _linear(grid: pyvista.UnstructuredGrid) -> pyvista.UnstructuredGrid:
     return plain
 
 
-def _round_down(factor: float) -> float:
+def round_down(factor: float) -> float:
     """Round down to 1, 2 or 5 times a power of ten."""
     power = 10.0 ** np.floor(np.log10(factor))
     return float(max(step * power for step in (1.0, 2.0, 5.0) if step * power <= factor))

@@ -259,7 +259,7 @@ def _cell(value) -> str:
 
 
 def _mode(mode: str) -> str:
-    return {"two_scale": "two-scale", "dns": "DNS"}[mode]
+    return {"two_scale": "two-scale", "dns": "DNS"}.get(mode, mode)
 
 
 def named_quantity(metrics: dict, name: str) -> str:

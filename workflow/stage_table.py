@@ -113,6 +113,7 @@ STRUCTURE = Pipeline(
             ("geometry/structure.msh", "geometry/preview.png"),
         ),
         Stage("shock", ("structure", "materials", "supports", "loads", "watch", "dynamics"), ("geometry",), ()),
-        Stage("report", ("case",), ("geometry", "shock"), ("report.html", "summary.json")),
+        Stage("comparison", ("references",), ("shock",), ("comparison/comparison.json",)),
+        Stage("report", ("case",), ("geometry", "shock", "comparison"), ("report.html", "summary.json")),
     )
 )

@@ -1,7 +1,8 @@
 """The pipelines, one function a stage; which kind of case has which stages stands at the end.
 
 Board drop: geometry -> reflow -> surface -> solder_mesh -> shock -> report. Scenes of solder alone (their reflow is in
-`scene_stages.py`): reflow -> report. Structures (`structure_stages.py`): geometry -> shock -> report.
+`scene_stages.py`): reflow -> report. Structures (`structure_stages.py`): geometry -> shock ->
+comparison -> report.
 
 Each reads products of earlier stages from ``run.folder``, writes its own into ``folder``, and returns what it found.
 Packages are imported inside the functions, so that a stage loads only what it uses.
@@ -10,13 +11,14 @@ Packages are imported inside the functions, so that a stage loads only what it u
 from dataclasses import replace
 from pathlib import Path
 
-from workflow import findings, structure_stages
+from workflow import findings
 from workflow.board_drop_case import BoardDropCase
 from workflow.products import read_json, write_json
 from workflow.progress import progress_bar
 from workflow.scene_stages import REFLOW_SCENES
 from workflow.stage_runner import Findings, Run, StageFunction
 from workflow.structure_case import StructureCase
+from workflow.structure_stages import STRUCTURE_STAGES
 
 
 def geometry(run: Run[BoardDropCase], folder: Path) -> Findings:
@@ -118,6 +120,6 @@ STAGE_FUNCTIONS: dict[str, dict[str, StageFunction]] = {
         "shock": shock,
         "report": report,
     },
-    StructureCase.kind: {"geometry": structure_stages.geometry, "shock": structure_stages.shock, "report": report},
+    StructureCase.kind: {**STRUCTURE_STAGES, "report": report},
     **{kind: {"reflow": reflow_scene, "report": report} for kind, reflow_scene in REFLOW_SCENES.items()},
 }

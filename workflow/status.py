@@ -11,7 +11,7 @@ from workflow.units import from_si
 
 SHOWN_UNITS = {"m": "mm", "m^3": "mm^3", "Pa": "MPa", "J": "mJ", "kg": "mg", "s": "ns"}
 FIGURES = {
-    "geometry": ("joint_count", "elements_board", "elements_board_patch"),
+    "geometry": ("joint_count", "elements_board", "elements_board_patch", "elements"),
     "reflow": (
         "distinct_shapes", "joint_width_min", "joint_width_max", "joint_width_error_max",
         "height", "max_width", "waist", "contact_angle", "height_error", "max_width_error", "verdict",
@@ -20,7 +20,11 @@ FIGURES = {
     "solder_mesh": ("joint_volume_error_max", "joint_scaled_jacobian_min", "joint_critical_time_step"),
     "shock": (
         "critical_joint", "peak_von_mises", "peak_board_strain", "step_ratio", "critical_joint_stress_error",
-        "two_scale_dns_time_ratio", "energy_balance_error",
+        "two_scale_dns_time_ratio", "first_frequency", "steps", "energy_balance_error",
+    ),
+    "comparison": (
+        "solver_displacement_difference", "solver_strain_difference", "wave_speed_error", "transmitted_velocity_error",
+        "reflected_velocity_error", "tip_deflection_error", "swing_frequency_error",
     ),
     "report": (),
 }  # fmt: skip

@@ -9,6 +9,7 @@ from fem.structure_parameters import Dynamics, Structure, StructureLoad, Structu
 from meshing.box_plan import Box, BoxHoles, BoxLayer
 from workflow.case_kind import Case
 from workflow.problems import Problem
+from workflow.references import AnyReference, reference_problems
 from workflow.stage_table import STRUCTURE
 
 
@@ -25,6 +26,7 @@ class StructureCase(Case):
     loads: dict[str, StructureLoad] = Field(default_factory=dict)
     watch: dict[str, WatchPoint] = Field(default_factory=dict)
     dynamics: Dynamics
+    references: dict[str, AnyReference] = Field(default_factory=dict)
 
     @classmethod
     def located(cls, table: dict, folder: Path) -> dict:
@@ -60,10 +62,14 @@ class StructureCase(Case):
         from meshing.box_checks import box_problems
 
         boxes = [Problem(found.key, found.message, found.value, found.allowed) for found in box_problems(self.box)]
-        return boxes + [
-            Problem(found.key, found.message, found.value, found.allowed, found.hint)
-            for found in structure_checks.problems(self.scene)
-        ]
+        return (
+            boxes
+            + [
+                Problem(found.key, found.message, found.value, found.allowed, found.hint)
+                for found in structure_checks.problems(self.scene)
+            ]
+            + list(reference_problems(self.references, self.scene))
+        )
 
     @property
     def ranks(self) -> int:

@@ -25,12 +25,16 @@ def run_solver(run: Run[StructureCase], folder: Path, solver: str) -> None:
         "mode": "structure",
         "solver": solver,
         "mesh": str(run.folder.resolve() / "geometry/structure.msh"),
-        "scene": run.case.scene.model_dump(mode="json"),
+        **run.case.scene.model_dump(mode="json"),
     }
     run_fem(run, folder, request, f"shock, {solver} solver")
 
 
+def solver_folders(folder: Path) -> dict[str, Path]:
+    """Return the folder of each solver that ran, explicit first."""
+    return {solver: folder / solver for solver in SOLVERS if (folder / solver).is_dir()}
+
+
 def read_results(folder: Path) -> dict[str, dict]:
     """Return ``result.json`` of each solver that ran, explicit first."""
-    present = [solver for solver in SOLVERS if (folder / solver).is_dir()]
-    return {solver: json.loads((folder / solver / "result.json").read_text()) for solver in present}
+    return {solver: json.loads((own / "result.json").read_text()) for solver, own in solver_folders(folder).items()}

@@ -1,13 +1,12 @@
-"""The stages of a structure: its mesh, and one run of the package fem for each solver."""
+"""The stages of a structure: its mesh, one run of the package fem for each solver, what its motion compares with."""
 
 from pathlib import Path
 
 from workflow import structure_findings
-from workflow.stage_runner import Findings, Run
+from workflow.products import write_json
+from workflow.stage_runner import Findings, Run, StageFunction
 from workflow.structure_case import StructureCase
-from workflow.structure_launch import read_results, run_solver
-
-MESH = "geometry/structure.msh"
+from workflow.structure_launch import read_results, run_solver, solver_folders
 
 
 def geometry(run: Run[StructureCase], folder: Path) -> Findings:
@@ -21,7 +20,17 @@ def geometry(run: Run[StructureCase], folder: Path) -> Findings:
 
 
 def shock(run: Run[StructureCase], folder: Path) -> Findings:
-    """Move the structure: each solver is one MPI run of the package fem; two solvers are compared."""
+    """Move the structure: each solver is one MPI run of the package fem."""
     for solver in run.case.dynamics.solvers:
         run_solver(run, folder / solver, solver)
     return structure_findings.of_motion(read_results(folder))
+
+
+def comparison(run: Run[StructureCase], folder: Path) -> Findings:
+    """Compare the motion with exact solutions and bounds, and two solvers with each other."""
+    found = structure_findings.of_comparison(run.case, solver_folders(run.folder / "shock"))
+    write_json(folder / "comparison.json", found.metrics)
+    return found
+
+
+STRUCTURE_STAGES: dict[str, StageFunction] = {"geometry": geometry, "shock": shock, "comparison": comparison}

@@ -7,7 +7,7 @@ from typing import Any
 
 from workflow import __version__
 
-STAGES_WITH_RECORD = ("geometry", "reflow", "surface", "solder_mesh", "shock")
+STAGES_WITH_RECORD = ("geometry", "reflow", "surface", "solder_mesh", "shock", "comparison")
 
 
 def collect_summary(run_folder: Path, case_name: str) -> dict:
