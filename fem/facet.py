@@ -5,9 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.errors import MeshError
-from fem.mesh import MeshData, cells_of_facets
-
 GAUSS = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]) / np.sqrt(3.0)
 CYCLIC = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 BARYCENTRIC = np.array([[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]])  # derivatives of the barycentric coordinates
@@ -59,19 +56,3 @@ def area_vectors(corners: NDArray[np.float64]) -> NDArray[np.float64]:
     tangent = np.einsum("fai,qad->fqid", corners, rule.derivatives)
     normal = np.cross(tangent[..., 0], tangent[..., 1])
     return np.einsum("q,qa,fqi->fai", rule.weights, rule.values, normal)
-
-
-def outward_area_vectors(mesh: MeshData, name: str) -> NDArray[np.float64]:
-    """Return ``area_vectors`` of a facet set of a mesh, turned outward from the cell of each facet.
-
-    Raises:
-        MeshError: A facet belongs to no cell.
-    """
-    facets = mesh.facets_of(name)
-    owner = cells_of_facets(mesh.cells, facets)
-    if (owner < 0).any():
-        raise MeshError(f"{name}: {np.sum(owner < 0)} of {len(facets)} facets belong to no element")
-    vectors = area_vectors(mesh.points[facets])
-    away = mesh.points[facets].mean(axis=1) - mesh.points[mesh.cells[owner]].mean(axis=1)
-    side = np.sign(np.einsum("fi,fai->f", away, vectors))
-    return vectors * side[:, None, None]

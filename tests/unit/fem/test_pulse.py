@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from fem.errors import LoadError, PulseError
-from fem.facet_areas import outward_areas, quadrilateral_areas, triangle_areas
+from fem.facet import area_vectors
+from fem.facet_areas import outward_areas
 from fem.pulse import SERVICE_CONDITIONS, Constant, HalfSine, Tabulated, service_condition
 from fem.pulse_table import read_pulse
 from tests.support.fem_models import bar
@@ -74,10 +75,10 @@ def test_missing_table(tmp_path):
 
 def test_areas_of_facets():
     square = np.array([[[0.0, 0, 0], [2, 0, 0], [2, 1, 0], [0, 1, 0]]])
-    assert quadrilateral_areas(square)[0] == pytest.approx(np.tile([0, 0, 0.5], (4, 1)))
+    assert area_vectors(square)[0] == pytest.approx(np.tile([0, 0, 0.5], (4, 1)))
     trapezium = np.array([[[0.0, 0, 0], [3, 0, 0], [1, 1, 0], [0, 1, 0]]])
-    two = triangle_areas(np.concatenate([trapezium[:, [0, 1, 2]], trapezium[:, [0, 2, 3]]]))
-    assert quadrilateral_areas(trapezium).sum(axis=(0, 1)) == pytest.approx(two.sum(axis=(0, 1)))
+    two = area_vectors(np.concatenate([trapezium[:, [0, 1, 2]], trapezium[:, [0, 2, 3]]]))
+    assert area_vectors(trapezium).sum(axis=(0, 1)) == pytest.approx(two.sum(axis=(0, 1)))
     mesh = bar(1.0, 4, 0.5)
     for name, sign in (("low", -1.0), ("high", 1.0)):
         nodes, areas = outward_areas(mesh, name)
