@@ -12,7 +12,7 @@ from fem.element_hexahedron import HEXAHEDRON
 from fem.element_kind import Geometry
 from fem.errors import MassError
 from fem.exchange import SharedNodes
-from fem.force import ForceTerm, Kinematics, force_terms
+from fem.force import ForceTerm, Kinematics, force_terms, linear_terms
 from fem.local_mesh import LocalMesh
 from fem.material_parameters import Material
 from fem.material_roles import Materials
@@ -131,7 +131,11 @@ def local_tie(local: LocalMesh, tie: Tie) -> Tie:
 
 
 def make_body(
-    comm: MPI.Comm, pieces: Pieces, tables: Tables, mass_factor: NDArray[np.float64], response: Response = Response()
+    comm: MPI.Comm,
+    pieces: Pieces,
+    tables: Tables,
+    mass_factor: NDArray[np.float64],
+    response: Response | None = Response(),
 ) -> Body:
     """Assemble masses and forces of a model; collective.
 
@@ -140,7 +144,7 @@ def make_body(
         pieces: The rank's elements.
         tables: The model's tables.
         mass_factor: ``(ne,)`` factor on the density of each element.
-        response: Kinematics and step.
+        response: Kinematics and step; None for elastic terms at small strains whatever the materials.
     """
     local = pieces.local
     plain = pieces.elements
@@ -153,7 +157,11 @@ def make_body(
     held = local.locate(tables.held_nodes)
     free[held[held >= 0]] = ~tables.held[held >= 0]
     free[tie.slave] = False
-    terms = force_terms(elements, pieces.materials, response.kinematics, response.step)
+    terms = (
+        force_terms(elements, pieces.materials, response.kinematics, response.step)
+        if response
+        else linear_terms(elements)
+    )
     return Body(
         local, elements, pieces.geometry, terms, tie, shared, local.locate(tables.cut).astype(np.int32), mass, free
     )

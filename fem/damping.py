@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from fem.body import Body
 from fem.energy import InternalForce
+from fem.force import linear_terms
 from fem.loads import Load
 
 if TYPE_CHECKING:
@@ -39,6 +41,15 @@ class RayleighDamping(Load):
         self._terms = terms if stiffness else ()
         self.force = np.empty((0, 3))
         self._velocity = np.empty((0, 3))
+
+    @classmethod
+    def build(cls, body: Body, coefficients: tuple[float, float]) -> "RayleighDamping":
+        """Make the damping of a body from alpha [1/s] and beta [s]; K is that of its elastic elements.
+
+        The terms of the body serve for it unless they have a path.
+        """
+        paths = any(term.history for term in body.terms)
+        return cls(*coefficients, linear_terms(body.elements) if paths and coefficients[1] else body.terms)
 
     def begin(self, motion: "Motion") -> None:
         """Make room."""
@@ -77,15 +88,6 @@ class RayleighDamping(Load):
         """Add half a step's work."""
         owned = motion.body.shared.owned
         self.work += 0.5 * motion.step * float(np.sum((self.force * motion.velocity)[owned]))
-
-
-def rayleigh_coefficients(mass_ratio: float, stiffness_ratio: float, frequency: float) -> tuple[float, float]:
-    """Return alpha [1/s] and beta [s] that have given ratios of critical damping at a frequency [Hz].
-
-    A mode of angular frequency w has the ratio alpha / (2 w) + beta w / 2.
-    """
-    angular = 2.0 * math.pi * frequency
-    return 2.0 * angular * mass_ratio, 2.0 * stiffness_ratio / angular
 
 
 def damped_critical_step(critical: float, stiffness: float) -> float:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
@@ -37,18 +38,31 @@ class History:
         Raises:
             EnergyError: On every rank, see ``Ledger.judge``.
         """
-        ledgers, sums, maxima = [], [], []
+        energies = self.check(crew)
+        sums, maxima = [], []
         for role, participant in crew.items():
             time = participant.motion.time
             watched, largest = self._watches[role].sample(participant.motion)
-            ledgers.append(ledger_sums(participant, SIDE[role]))
             sums.append(watched)
             maxima.append(largest)
-        energies = self.ledger.judge(self._combine(np.sum(ledgers, axis=0)), time)
         total, most = self._combine(np.sum(sums, axis=0)), self._combine(np.max(maxima, axis=0), MPI.MAX)
         if self._world.rank == 0:
             signals = {name: signal(time) for name, signal in self._signals.items()}
             self._rows.append({"time": time, **signals, **self._watch.row(total, most), **energies})
+
+    def check(self, crew: Mapping[Role, Participant]) -> dict[str, float]:
+        """Judge the energies without a sample, and return them; collective over all models; errors as ``sample``."""
+        ledgers = [ledger_sums(participant, SIDE[role]) for role, participant in crew.items()]
+        time = next(iter(crew.values())).motion.time
+        return self.ledger.judge(self._combine(np.sum(ledgers, axis=0)), time)
+
+    def state(self) -> dict[str, Any]:
+        """Return ledger and samples, for a checkpoint."""
+        return {"ledger": self.ledger, "rows": self._rows}
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Continue from what ``state`` returned."""
+        self.ledger, self._rows = state["ledger"], state["rows"]
 
     def _combine(self, part: NDArray[np.float64], operation: MPI.Op = MPI.SUM) -> NDArray[np.float64]:
         result = np.empty_like(part)

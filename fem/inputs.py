@@ -11,22 +11,24 @@ from fem.structure_parameters import StructureScene
 
 
 class RunInput(Parameters):
-    """A package on a board, dropped; SI floats."""
+    """A package on a board, dropped; SI floats. ``checkpoints`` is a folder from which a run continues."""
 
     mode: Literal["two_scale", "dns"]
     meshes: tuple[Path, ...] = Field(min_length=1)
     shock: Shock
     materials: Materials = Materials()
     output: Path
+    checkpoints: Path | None = None
 
 
 class StructureInput(StructureScene):
-    """A structure and one of its solvers; SI floats."""
+    """A structure and one of its solvers; SI floats. ``checkpoints`` is a folder from which a run continues."""
 
     mode: Literal["structure"]
     mesh: Path
     solver: Literal["explicit", "implicit"]
     output: Path
+    checkpoints: Path | None = None
 
     @property
     def finds_modes(self) -> bool:

@@ -12,6 +12,7 @@ from fem.mesh import MeshData
 from fem.mesh_file import read_meshes
 from fem.scene import JointTables, prepare
 from fem.steps import Steps, choose_steps
+from fem.supports import HELD, SYMMETRY
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +33,8 @@ def build_models(comms: Communicators, request: RunInput) -> tuple[dict[Role, Mo
     pieces = agreed(
         world, lambda: {role: make_pieces(meshes[role], inputs[role][1], request.materials) for role in meshes}
     )
-    steps = choose_steps(world, [(pieces[role], inputs[role][1]) for role in pieces], request.shock)
+    candidates = {role: (pieces[role], inputs[role][1]) for role in pieces}
+    steps = choose_steps(world, candidates, request.shock, comms.models)
     models = {}
     for role, factor in zip(pieces, steps.mass_factors, strict=True):
         tables, response = inputs[role][1], Response(step=steps.step_of(role))
@@ -47,7 +49,10 @@ def read_models(comms: Communicators, request: RunInput) -> dict[Role, tuple[Mes
         Per model of this rank: its mesh on the first rank that carries it, None on the others; its tables.
     """
     world = comms.world
-    inputs = agreed(world, lambda: prepare(read_meshes(request.meshes), request.mode) if world.rank == 0 else None)
+    rules = HELD if request.shock.method == "direct" else SYMMETRY
+    inputs = agreed(
+        world, lambda: prepare(read_meshes(request.meshes), request.mode, rules) if world.rank == 0 else None
+    )
     tables = world.bcast({role: item.tables for role, item in inputs.items()} if inputs else None)
     meshes: dict[Role, MeshData | None] = dict.fromkeys(comms.models)
     for role, first in comms.first.items():

@@ -1,6 +1,6 @@
 """What a run asks of a motion, be it explicit or implicit."""
 
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,6 +61,12 @@ class Moving(Protocol):
 
     def internal_energy(self) -> Energy:
         """Return the energies of the elements."""
+
+    def state(self) -> dict[str, Any]:
+        """Return all that changes with time, for a checkpoint."""
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Continue from what ``state`` returned."""
 
     def step_energy(self, foreign: NDArray[np.float64]) -> float:
         """Return what exceeds the strain energy where the step is too large for stability, see ``motion.Motion``."""

@@ -3,9 +3,12 @@
 All values are SI floats; see ``meshing.parameters`` for what the unit strings mean.
 """
 
+import math
 from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
+
+ServiceCondition = Literal["A", "B", "C", "D", "E", "F", "G", "H"]
 
 
 class Parameters(BaseModel):
@@ -26,22 +29,51 @@ class Ranks(Parameters):
     placement: Literal["split", "shared"] = "split"
 
 
+class Damping(Parameters):
+    """Rayleigh damping C = alpha M + beta K, given as coefficients or as ratios of critical damping at a frequency."""
+
+    mass_coefficient: Annotated[float, "Hz"] = Field(0.0, ge=0)
+    stiffness_coefficient: Annotated[float, "us"] = Field(0.0, ge=0)
+    mass_ratio: float = Field(0.0, ge=0, lt=1)
+    stiffness_ratio: float = Field(0.0, ge=0, lt=1)
+    frequency: Annotated[float | None, "Hz"] = Field(None, gt=0)
+
+    @property
+    def coefficients(self) -> tuple[float, float]:
+        """Return alpha [1/s] and beta [s]; a mode of angular frequency w has the ratio alpha / (2 w) + beta w / 2."""
+        angular = 2.0 * math.pi * (self.frequency or math.inf)
+        by_mass = 2.0 * angular * self.mass_ratio if self.mass_ratio else 0.0
+        return self.mass_coefficient + by_mass, self.stiffness_coefficient + 2.0 * self.stiffness_ratio / angular
+
+
 class ShockNumerics(Parameters):
     """How the shock is computed."""
 
     modes: tuple[Literal["two_scale", "dns"], ...] = ("two_scale", "dns")
     step_fraction: float = Field(0.9, gt=0, le=0.95)
+    critical_step: Literal["element", "power_iteration"] = "element"
     mass_scaled: tuple[Literal["board", "substrate", "die", "copper", "solder"], ...] = ()
     history_samples: int = Field(600, ge=2)
     field_samples: int = Field(12, ge=2)
     energy_balance_limit: float = Field(0.02, gt=0)
+    checkpoint_seconds: Annotated[float, "s"] = Field(60.0, gt=0)
 
 
 class Shock(Parameters):
-    """Half-sine input-G at the mounting holes (JESD22-B111; H 4.4)."""
+    """Input-G at the mounting holes, package facing down (JESD22-B111; H 4.4).
 
-    peak_acceleration: Annotated[float, "G"] = Field(gt=0)
-    pulse_duration: Annotated[float, "ms"] = Field(gt=0)
+    The pulse is that of a JEDEC service condition, or a half sine of ``peak_acceleration`` and ``pulse_duration``, or a
+    table of times and accelerations (CSV). ``method`` gives it to the board as body acceleration, its holes held, or
+    to a large mass at the holes. Gravity is left out by ``auto`` where it is less than a thousandth of the peak.
+    """
+
+    service_condition: ServiceCondition | None = None
+    peak_acceleration: Annotated[float | None, "G"] = Field(None, gt=0)
+    pulse_duration: Annotated[float | None, "ms"] = Field(None, gt=0)
+    table: str | None = None
     duration: Annotated[float, "ms"] = Field(gt=0)
+    method: Literal["direct", "large_mass"] = "direct"
+    gravity: Literal["auto", "on", "off"] = "auto"
+    damping: Damping = Damping()
     ranks: Ranks = Ranks()
     numerics: ShockNumerics = ShockNumerics()

@@ -7,7 +7,7 @@ end. Messages go through two channels and nothing else; ``Macro.begin_window`` a
 one rank can also carry both models and take turns.
 """
 
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,6 +48,12 @@ class Participant(Protocol):
     def foreign_force(self) -> NDArray[np.float64]:
         """Return the part ``(n, 3)`` [N] of ``motion.force`` that belongs to the other model."""
 
+    def state(self) -> dict[str, Any]:
+        """Return all that changes from window to window, for a checkpoint."""
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Continue from what ``state`` returned."""
+
 
 class Alone:
     """One model without a cut: a DNS, all steps small, or a structure."""
@@ -75,6 +81,15 @@ class Alone:
     def foreign_force(self) -> NDArray[np.float64]:
         """Return zero: all forces are this model's."""
         return self._zero
+
+    def state(self) -> dict[str, Any]:
+        """Return the motion's state and the work across the cut."""
+        return {"motion": self.motion.state(), "interface_work": self.interface_work}
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Continue from what ``state`` returned."""
+        self.motion.restore(state["motion"])
+        self.interface_work = state["interface_work"]
 
 
 class Macro:
@@ -113,6 +128,16 @@ class Macro:
     def foreign_force(self) -> NDArray[np.float64]:
         """Return the received force: it is in ``motion.force``."""
         return self._received
+
+    def state(self) -> dict[str, Any]:
+        """Return the motion's state, the work across the cut and the received force."""
+        return {"motion": self.motion.state(), "interface_work": self.interface_work, "received": self._received}
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Continue from what ``state`` returned."""
+        self.motion.restore(state["motion"])
+        self.interface_work = state["interface_work"]
+        self._received[:] = state["received"]
 
 
 class Meso:
@@ -155,6 +180,15 @@ class Meso:
     def foreign_force(self) -> NDArray[np.float64]:
         """Return zero: all forces are this model's."""
         return self._zero
+
+    def state(self) -> dict[str, Any]:
+        """Return the motion's state and the work across the cut."""
+        return {"motion": self.motion.state(), "interface_work": self.interface_work}
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Continue from what ``state`` returned."""
+        self.motion.restore(state["motion"])
+        self.interface_work = state["interface_work"]
 
 
 def uncut_motion(body: Body, loads: list[Load], step: float) -> Motion:

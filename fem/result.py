@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,19 +13,27 @@ from fem.communicators import Communicators, Role
 from fem.history import History
 from fem.inputs import RunInput
 from fem.model import Model
+from fem.shock_loads import shock_pulse
 from fem.steps import Steps
 
 FORCE_RESIDUAL_LIMIT = 1e-10
 ADDED_MASS_LIMIT = 0.05
+METHODS = {"direct": "direct acceleration input", "large_mass": "large mass at the mounting holes"}
 
 
 @dataclass(frozen=True, slots=True)
 class Timings:
-    """Wall seconds of the parts of a run on rank 0."""
+    """Wall seconds of the parts of a run on rank 0; ``first`` is the window from which it continued, or zero."""
 
     setup: float
     windows: float
     fields: float
+    first: int = 0
+
+    @property
+    def seconds(self) -> dict[str, float]:
+        """Return the wall seconds by name."""
+        return {"setup": self.setup, "windows": self.windows, "fields": self.fields}
 
 
 def write_result(
@@ -40,7 +48,8 @@ def write_result(
             "metrics": cost_metrics(summary, timings) | health_metrics(history) | shock_metrics(history.arrays()),
             "health": health(history, summary, request),
             "effects": effects(request, summary),
-            "timings": asdict(timings),
+            "timings": timings.seconds,
+            "continued_from": timings.first,
             "model": summary,
             "parts": list(next(iter(models.values())).tables.part_names),
         }
@@ -79,7 +88,7 @@ def model_summary(comms: Communicators, request: RunInput, models: dict[Role, Mo
 
 def cost_metrics(summary: dict[str, Any], timings: Timings) -> dict[str, Any]:
     """Return the speed of a run."""
-    windows, substeps = summary["windows"], summary["substeps"]
+    windows, substeps = summary["windows"] - timings.first, summary["substeps"]
     updates = sum(count * (1 if role == "macro" else substeps) for role, count in summary["elements"].items())
     return {
         "steps_per_second": quantity(windows * substeps / timings.windows, "1/s"),
@@ -137,6 +146,7 @@ def effects(request: RunInput, summary: dict[str, Any]) -> dict[str, Any]:
     """Return which effects the run simulated, and why."""
     scaled, tied = request.shock.numerics.mass_scaled, summary["tied_nodes"]
     ratio = f"step ratio m = {summary['substeps']}"
+    pulse, damping = shock_pulse(request.shock), request.shock.damping.coefficients
     return {
         "two_scale": {"on": request.mode == "two_scale", "why": f"mode {request.mode}; {ratio}"},
         "tie": {"on": tied > 0, "why": f"{tied} joint nodes lie on facets that do not match them"},
@@ -146,6 +156,12 @@ def effects(request: RunInput, summary: dict[str, Any]) -> dict[str, Any]:
         },
         "input_g": {
             "on": True,
-            "why": "direct acceleration input, package facing down: the board is pushed along +z of the table's frame",
+            "why": f"{pulse.source}, {METHODS[request.shock.method]}; package facing down: the board is pushed along +z"
+            " of the table's frame",
+        },
+        "gravity": {"on": pulse.gravity, "why": pulse.why},
+        "damping": {
+            "on": any(damping),
+            "why": f"Rayleigh damping, alpha = {damping[0]:.4g} 1/s, beta = {damping[1]:.4g} s",
         },
     }

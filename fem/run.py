@@ -1,12 +1,13 @@
 """One shock run, from meshes to results: what every rank does, in order."""
 
-import json
 import time
+from pathlib import Path
 
 import numpy as np
 from mpi4py import MPI
 
 from fem.agreement import agreed
+from fem.checkpoint import Checkpoints, digest_of_files
 from fem.communicators import Communicators, Role
 from fem.estimate import WindowPlan
 from fem.exchange import CutChannels
@@ -14,15 +15,17 @@ from fem.fields import Fields
 from fem.history import History
 from fem.inputs import RunInput
 from fem.ledger import Ledger
-from fem.loads import HalfSineDrop
+from fem.march import Outputs, march
 from fem.model import Model, build_models
 from fem.parameters import Shock
 from fem.participant import Alone, Macro, Meso, Participant, uncut_motion
+from fem.pulse import Pulse
 from fem.result import Timings, write_result
+from fem.shock_loads import shock_loads, shock_pulse
 from fem.steps import Steps
 from fem.watch_joints import JointWatch
 
-PROGRESS_INTERVAL = 0.5  # [s] between two progress lines
+SPEEDS = 201  # times at which the largest velocity of the table is looked for
 NON_TRIVIAL = 1e-4  # of the energy that the pulse gives a free body: from there on the balance is judged
 
 
@@ -37,44 +40,50 @@ def run(world: MPI.Comm, request: RunInput) -> None:
     start = time.perf_counter()
     with Communicators(world, request.mode, request.shock.ranks) as comms:
         models, steps = build_models(comms, request)
-        load = HalfSineDrop(request.shock.peak_acceleration, request.shock.pulse_duration)
-        crew = make_crew(comms, models, steps.plan, load)
-        history = make_history(comms, models, steps, load, request.shock)
-        fields = make_fields(comms, models, request)
+        pulse = agreed(comms.world, lambda: shock_pulse(request.shock)).pulse
+        crew = make_crew(comms, models, steps.plan, request.shock)
+        history = make_history(comms, models, steps, pulse, request.shock)
+        numerics, fields = request.shock.numerics, make_fields(comms, models, request)
+        tables = [Path(request.shock.table)] if request.shock.table else []
+        inputs = request.model_dump_json(exclude={"output"}), digest_of_files(*request.meshes, *tables)
+        checkpoints = Checkpoints(comms.world, request.checkpoints, inputs, numerics.checkpoint_seconds)
         ready = time.perf_counter()
-        output_seconds = march(comms, crew, history, fields, request.shock.numerics.field_samples)
-        timings = Timings(ready - start, time.perf_counter() - ready - output_seconds, output_seconds)
+        output_seconds = march(comms.world, crew, Outputs(history, fields, numerics.field_samples, checkpoints))
+        seconds = time.perf_counter() - ready - output_seconds
+        timings = Timings(ready - start, seconds, output_seconds, checkpoints.continued or 0)
         write_result(comms, request, (models, steps), history, timings)
         agreed(comms.world, lambda: None)
 
 
 def make_crew(
-    comms: Communicators, models: dict[Role, Model], plan: WindowPlan, load: HalfSineDrop
+    comms: Communicators, models: dict[Role, Model], plan: WindowPlan, shock: Shock
 ) -> dict[Role, Participant]:
     """Return the participants of this rank, in the order of their turns; collective."""
     bodies = {role: model.body for role, model in models.items()}
+    loads = {
+        role: shock_loads(comms.models[role], role, model.body, model.tables, shock) for role, model in models.items()
+    }
     if "dns" in bodies:
-        return {"dns": Alone(uncut_motion(bodies["dns"], [load], plan.step), plan)}
+        return {"dns": Alone(uncut_motion(bodies["dns"], loads["dns"], plan.step), plan)}
     absent = np.full_like(next(iter(bodies.values())).cut, -1)
     macro, meso = (bodies[role].cut if role in bodies else absent for role in ("macro", "meso"))
     channels = CutChannels.open(comms.world, macro, meso, receiver_waits=len(comms.models) == 1)
     made: dict[Role, Participant] = {}
     if "meso" in bodies:  # first: it sends the interface mass that the macro model waits for
-        made["meso"] = Meso(bodies["meso"], [load], plan, channels)
+        made["meso"] = Meso(bodies["meso"], loads["meso"], plan, channels)
     if "macro" in bodies:
-        made["macro"] = Macro(bodies["macro"], [load], plan, channels)
+        made["macro"] = Macro(bodies["macro"], loads["macro"], plan, channels)
     return {role: made[role] for role in comms.models}
 
 
-def make_history(
-    comms: Communicators, models: dict[Role, Model], steps: Steps, load: HalfSineDrop, shock: Shock
-) -> History:
+def make_history(comms: Communicators, models: dict[Role, Model], steps: Steps, pulse: Pulse, shock: Shock) -> History:
     """Return the empty history of this run."""
-    speed = load.velocity_change(shock.duration)
-    mass = steps.model_mass + steps.added_mass
-    ledger = Ledger(shock.numerics.energy_balance_limit, NON_TRIVIAL * 0.5 * mass * speed**2)
+    speed = max(abs(pulse.integral(time)) for time in np.linspace(0.0, shock.duration, SPEEDS))
+    mass, plan = steps.model_mass + steps.added_mass, steps.plan
+    trivial = NON_TRIVIAL * 0.5 * mass * speed**2
+    ledger = Ledger(shock.numerics.energy_balance_limit, trivial, plan.step, min(steps.critical.values()))
     watches = {role: JointWatch(model.tables.watch, model.body) for role, model in models.items()}
-    return History(comms.world, watches, ledger, {"base_acceleration": load.base})
+    return History(comms.world, watches, ledger, {"base_acceleration": pulse.value})
 
 
 def make_fields(comms: Communicators, models: dict[Role, Model], request: RunInput) -> dict[Role, Fields]:
@@ -88,46 +97,3 @@ def make_fields(comms: Communicators, models: dict[Role, Model], request: RunInp
         )
         for role, model in models.items()
     }
-
-
-def march(
-    comms: Communicators,
-    crew: dict[Role, Participant],
-    history: History,
-    fields: dict[Role, Fields],
-    field_samples: int,
-) -> float:
-    """Run all windows with their samples; return the seconds spent on fields."""
-    any_participant = next(iter(crew.values()))
-    plan = any_participant.plan
-    field_windows = set(np.linspace(0, plan.windows, field_samples).round().astype(int).tolist())
-    output_seconds, told = 0.0, time.perf_counter()
-    for window in range(plan.windows + 1):
-        if window:
-            run_window(crew)
-        if window % plan.stride == 0 or window == plan.windows:
-            history.sample(crew)
-        if window in field_windows:
-            output_seconds += write_fields(crew, fields)
-        if comms.world.rank == 0 and time.perf_counter() - told > PROGRESS_INTERVAL:
-            told = time.perf_counter()
-            print(json.dumps({"progress": window / plan.windows, "time": any_participant.motion.time}), flush=True)
-    for file in fields.values():
-        file.close()
-    return output_seconds
-
-
-def run_window(crew: dict[Role, Participant]) -> None:
-    """Advance all models of this rank by one window, each at its turn."""
-    for participant in crew.values():
-        participant.begin_window()
-    for participant in crew.values():
-        participant.finish_window()
-
-
-def write_fields(crew: dict[Role, Participant], fields: dict[Role, Fields]) -> float:
-    """Write the fields of all models of this rank; return the seconds it took."""
-    begin = time.perf_counter()
-    for role, participant in crew.items():
-        fields[role].write(participant.motion.displacement, participant.motion.time)
-    return time.perf_counter() - begin

@@ -1,5 +1,6 @@
 """From mesh files to the tables of each model: the work of one rank before anything is distributed."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -9,7 +10,7 @@ from numpy.typing import NDArray
 from fem.cut import MACRO, check_buffer, find_cut
 from fem.errors import MeshError
 from fem.mesh import MeshData, merge_nodes, select
-from fem.supports import held_components
+from fem.supports import HELD, held_components
 from fem.tie import Tie, tie_joints
 from fem.watch_table import WatchTable, centre_nodes, footprint, joint_names, watch_table
 
@@ -43,9 +44,15 @@ class Tables:
 
 @dataclass(frozen=True, slots=True)
 class JointTables(Tables):
-    """Tables of a package on a board; ``watch`` holds its watch points."""
+    """Tables of a package on a board.
+
+    Attributes:
+        watch: Its watch points.
+        shaken: ``(k,)`` nodes of the mounting holes.
+    """
 
     watch: WatchTable
+    shaken: NDArray[np.int32]
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,8 +63,10 @@ class ModelInput:
     tables: JointTables
 
 
-def prepare(data: MeshData, mode: Literal["two_scale", "dns"]) -> dict[str, ModelInput]:
-    """Split a mesh into the models of a mode.
+def prepare(
+    data: MeshData, mode: Literal["two_scale", "dns"], rules: Mapping[str, Sequence[int]] = HELD
+) -> dict[str, ModelInput]:
+    """Split a mesh into the models of a mode; ``rules`` say what is held, as ``supports.HELD``.
 
     Returns:
         ``macro`` and ``meso``, or ``dns``.
@@ -68,7 +77,7 @@ def prepare(data: MeshData, mode: Literal["two_scale", "dns"]) -> dict[str, Mode
     macro_nodes, meso_nodes = find_cut(data)
     if mode == "dns":
         merged, number = merge_nodes(data, meso_nodes, macro_nodes)
-        return {"dns": model_input(merged, number[macro_nodes], watch_scene(merged), centre_nodes(merged))}
+        return {"dns": model_input(merged, number[macro_nodes], watch_scene(merged), centre_nodes(merged), rules)}
     if not len(macro_nodes):
         raise MeshError(f"two_scale needs the parts {MACRO} and board_patch; the mesh has {', '.join(data.part_names)}")
     scene, centres = watch_scene(data), centre_nodes(data)
@@ -77,8 +86,8 @@ def prepare(data: MeshData, mode: Literal["two_scale", "dns"]) -> dict[str, Mode
     macro_centres = np.where(centres >= 0, macro_number[centres], -1)
     meso_centres = np.where((centres >= 0) & (macro_centres < 0), meso_number[centres], -1)
     result = {
-        "macro": model_input(macro, macro_number[macro_nodes], scene, macro_centres),
-        "meso": model_input(meso, meso_number[meso_nodes], scene, meso_centres),
+        "macro": model_input(macro, macro_number[macro_nodes], scene, macro_centres, rules),
+        "meso": model_input(meso, meso_number[meso_nodes], scene, meso_centres, rules),
     }
     tables = result["meso"].tables
     check_buffer(meso, tables.cut, np.unique(tables.tie.master, axis=0))
@@ -95,10 +104,11 @@ def model_input(
     cut: NDArray[np.int32],
     scene: tuple[tuple[str, ...], NDArray[np.float64]],
     centres: NDArray[np.integer],
+    rules: Mapping[str, Sequence[int]],
 ) -> ModelInput:
     """Build the tables of one model: tie, supports, watch points."""
     mesh, tie, moved = tie_joints(mesh)
-    held = held_components(mesh)
+    held = held_components(mesh, rules)
     held_nodes = np.flatnonzero(held.any(axis=1))
     tables = JointTables(
         part=mesh.part,
@@ -110,6 +120,7 @@ def model_input(
         held=held[held_nodes],
         cut=cut,
         watch=watch_table(mesh, *scene, centres),
+        shaken=mesh.facet_nodes("mounting_holes"),
         nodes=len(mesh.points),
     )
     return ModelInput(mesh, tables)

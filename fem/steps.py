@@ -1,18 +1,21 @@
 """Critical steps of the models, mass scaling, and the windows that follow."""
 
-from collections.abc import Iterable, Sequence
+import math
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from fem.body import Pieces
+from fem.body import Pieces, make_body
 from fem.communicators import Role
+from fem.damping import damped_critical_step
 from fem.errors import AgreedError
 from fem.estimate import WindowPlan, window_plan
 from fem.material_roles import Materials
 from fem.parameters import Shock
+from fem.power_iteration import highest_frequency
 from fem.scene import Tables
 
 
@@ -41,42 +44,68 @@ class Steps:
         return self.plan.window if role == "macro" else self.plan.step
 
 
-def choose_steps(world: MPI.Comm, models: Sequence[tuple[Pieces, Tables]], shock: Shock) -> Steps:
+def choose_steps(
+    world: MPI.Comm, models: Mapping[Role, tuple[Pieces, Tables]], shock: Shock, comms: Mapping[Role, MPI.Comm]
+) -> Steps:
     """Agree on steps and mass scaling over all models; collective.
 
-    In a DNS run the elements of ``board`` take the place of the macro model, so that both modes use the same dt and
-    sample at the same times.
+    In a DNS run the elements of ``board`` take the place of the macro model, so that both modes sample at the same
+    times. The window always follows the elements at the cut; power iteration lets the substeps be larger.
 
     Args:
         world: Communicator of all models.
         models: The models of this rank.
         shock: Duration and numerics.
+        comms: Their communicators.
 
     Raises:
         AgreedError: Every role is mass scaled.
     """
-    numerics = shock.numerics
-    unscaled = [pieces.steps[~np.isin(pieces.roles, numerics.mass_scaled)] for pieces, _ in models]
-    target = agreed_minimum(world, unscaled)
+    numerics, stiffness = shock.numerics, shock.damping.coefficients[1]
+    pieces = [item for item, _ in models.values()]
+    target = agreed_minimum(world, [item.steps[~np.isin(item.roles, numerics.mass_scaled)] for item in pieces])
     if not np.isfinite(target):
         raise AgreedError(f"shock.numerics.mass_scaled = {numerics.mass_scaled} leaves no role to take the step from")
-    factors = [mass_factor(pieces, numerics.mass_scaled, target) for pieces, _ in models]
-    steps = [pieces.steps * np.sqrt(factor) for (pieces, _), factor in zip(models, factors, strict=True)]
+    factors = [mass_factor(item, numerics.mass_scaled, target) for item in pieces]
+    steps = [item.steps * np.sqrt(factor) for item, factor in zip(pieces, factors, strict=True)]
     meso_step = agreed_minimum(world, steps)
-    slow = [some[is_macro(pieces, tables)] for (pieces, tables), some in zip(models, steps, strict=True)]
+    slow = [some[is_macro(*model)] for model, some in zip(models.values(), steps, strict=True)]
     macro_step = agreed_minimum(world, slow)
+    if numerics.critical_step == "power_iteration":
+        found = [
+            assembled_step(comms[role], role, models[role], some) for role, some in zip(models, factors, strict=True)
+        ]
+        meso_step = max(meso_step, agreed_minimum(world, [np.array(found)]))
     if not np.isfinite(macro_step):
         macro_step = meso_step
-    masses = [pieces.elements.density * pieces.geometry.volume for pieces, _ in models]
+    macro_step, meso_step = (damped_critical_step(step, stiffness) for step in (macro_step, meso_step))
+    masses = [item.elements.density * item.geometry.volume for item in pieces]
     added = sum(float(mass @ (factor - 1.0)) for mass, factor in zip(masses, factors, strict=True))
     return Steps(
         plan=window_plan(macro_step, meso_step, numerics.step_fraction, shock.duration, numerics.history_samples),
         mass_factors=factors,
-        critical=critical_by_role(world, [pieces for pieces, _ in models]),
+        critical=critical_by_role(world, pieces),
         cut=macro_step,
         added_mass=world.allreduce(added),
         model_mass=world.allreduce(sum(float(mass.sum()) for mass in masses)),
     )
+
+
+def assembled_step(comm: MPI.Comm, role: Role, model: tuple[Pieces, Tables], mass_factor: NDArray[np.float64]) -> float:
+    """Return the critical step [s] of a model from its highest frequency, elastic at small strains; collective.
+
+    With the certainty of ``power_iteration`` it is not above the true one, and it is never below the elements'. A macro
+    model keeps the step of its elements, on which the stability of the window rests: infinity.
+    """
+    if role == "macro":
+        return math.inf
+    pieces, tables = model
+    body = make_body(comm, pieces, tables, mass_factor, None)
+    if role == "meso":
+        body.free[body.cut[body.cut >= 0]] = False
+    found = highest_frequency(comm, body, body.terms, body.mass)
+    body.shared.free()
+    return max(found.critical_step, agreed_minimum(comm, [pieces.steps * np.sqrt(mass_factor)]))
 
 
 def agreed_minimum(world: MPI.Comm, values: Sequence[NDArray[np.float64]]) -> float:

@@ -1,21 +1,23 @@
 """One run of a structure, from its mesh to its results: what every rank does, in order."""
 
 import time
+from pathlib import Path
 
 import numpy as np
 from mpi4py import MPI
 
 from fem.agreement import agreed
+from fem.checkpoint import Checkpoints, digest_of_files
 from fem.communicators import Communicators, Role
 from fem.fields import Fields
 from fem.history import History
 from fem.inputs import StructureInput
 from fem.ledger import Ledger
+from fem.march import Outputs, march
 from fem.parameters import Ranks
 from fem.participant import Alone, Participant, uncut_motion
 from fem.pulse import Pulse
 from fem.result import Timings
-from fem.run import march
 from fem.structure_loads import damping_loads, pulse_durations, pulses_of, structure_loads
 from fem.structure_model import StructureModel, build_structure
 from fem.structure_modes import find_modes
@@ -40,9 +42,14 @@ def run_structure(world: MPI.Comm, request: StructureInput) -> None:
         history = make_history(comm, model, request, pulses)
         part = model.tables.part[model.body.local.cell_numbers]
         fields: dict[Role, Fields] = {"structure": Fields(comm, model.body, part, request.output / "structure.pvd")}
+        numerics, tables = request.dynamics.numerics, [load.table for load in request.loads.values()]
+        contents = digest_of_files(request.mesh, *(Path(table) for table in tables if table is not None))
+        inputs = request.model_dump_json(exclude={"output"}), contents
+        checkpoints = Checkpoints(comm, request.checkpoints, inputs, numerics.checkpoint_seconds)
         ready = time.perf_counter()
-        output_seconds = march(comms, crew, history, fields, request.dynamics.numerics.field_samples)
-        timings = Timings(ready - start, time.perf_counter() - ready - output_seconds, output_seconds)
+        output_seconds = march(comm, crew, Outputs(history, fields, numerics.field_samples, checkpoints))
+        seconds = time.perf_counter() - ready - output_seconds
+        timings = Timings(ready - start, seconds, output_seconds, checkpoints.continued or 0)
         peaks = element_peaks(comm, fields["structure"], model.tables.part_names)
         write_result(comm, request, model, Found(history, modes, peaks), timings)
         agreed(comm, lambda: None)

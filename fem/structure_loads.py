@@ -8,11 +8,12 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from fem.body import Body
-from fem.damping import RayleighDamping, rayleigh_coefficients
+from fem.damping import RayleighDamping
 from fem.loads import BodyAcceleration, LargeMass, Load, NodalForces, PrescribedMotion
+from fem.parameters import Damping
 from fem.pulse import Constant, HalfSine, Pulse, Tabulated, service_condition
 from fem.pulse_table import read_pulse
-from fem.structure_parameters import Damping, Gravity, InputG, Pressure, StructureLoad, StructureScene
+from fem.structure_parameters import Gravity, InputG, Pressure, StructureLoad, StructureScene
 from fem.structure_tables import AXES, StructureTables, shaken_supports
 
 QUANTITY = {"input_g": "acceleration", "gravity": "acceleration", "pressure": "pressure", "motion": "velocity"}
@@ -74,16 +75,6 @@ def unit(direction: tuple[float, float, float]) -> NDArray[np.float64]:
     return np.array(direction) / np.linalg.norm(direction)
 
 
-def damping_coefficients(damping: Damping) -> tuple[float, float]:
-    """Return alpha [1/s] and beta [s] of Rayleigh damping."""
-    mass, stiffness = damping.mass_coefficient, damping.stiffness_coefficient
-    if damping.frequency is None:
-        return mass, stiffness
-    by_ratio = rayleigh_coefficients(damping.mass_ratio, damping.stiffness_ratio, damping.frequency)
-    return mass + by_ratio[0], stiffness + by_ratio[1]
-
-
 def damping_loads(damping: Damping, body: Body) -> list[Load]:
     """Return the damping of a structure, an empty list where there is none."""
-    mass, stiffness = damping_coefficients(damping)
-    return [RayleighDamping(mass, stiffness, body.terms)] if mass or stiffness else []
+    return [RayleighDamping.build(body, damping.coefficients)] if any(damping.coefficients) else []

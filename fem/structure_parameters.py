@@ -10,10 +10,9 @@ from pydantic import Field
 
 from fem.material_library import LIBRARY
 from fem.material_parameters import Material
-from fem.parameters import Parameters
+from fem.parameters import Damping, Parameters, ServiceCondition
 
 Axis = Literal["x", "y", "z"]
-ServiceCondition = Literal["A", "B", "C", "D", "E", "F", "G", "H"]
 Direction = tuple[float, float, float]
 Cells = Annotated[int, Field(ge=1, le=2000)]
 
@@ -133,16 +132,6 @@ class WatchPoint(Parameters):
     """A point whose displacement, velocity, strain and stress are recorded."""
 
     at: Annotated[tuple[float, float, float], "mm"]
-
-
-class Damping(Parameters):
-    """Rayleigh damping C = alpha M + beta K, given as coefficients or as ratios of critical damping at a frequency."""
-
-    mass_coefficient: Annotated[float, "Hz"] = Field(0.0, ge=0)
-    stiffness_coefficient: Annotated[float, "us"] = Field(0.0, ge=0)
-    mass_ratio: float = Field(0.0, ge=0, lt=1)
-    stiffness_ratio: float = Field(0.0, ge=0, lt=1)
-    frequency: Annotated[float | None, "Hz"] = Field(None, gt=0)
 
 
 class DynamicsNumerics(Parameters):

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -60,7 +60,8 @@ def write_result(
             | mode_metrics(found.modes),
             "health": health(history, arrays, summary, request),
             "effects": effects(request, summary["added_mass"]),
-            "timings": asdict(timings),
+            "timings": timings.seconds,
+            "continued_from": timings.first,
             "model": summary,
             "parts": list(model.tables.part_names),
         }
@@ -94,7 +95,7 @@ def model_summary(comm: MPI.Comm, request: StructureInput, model: StructureModel
 
 def cost_metrics(summary: dict[str, Any], timings: Timings) -> dict[str, Any]:
     """Return steps, speed and masses of a run."""
-    rate = summary["steps"] / timings.windows
+    rate = summary["steps"] * (1.0 - timings.first / summary["samples"]) / timings.windows
     return {
         "critical_step": quantity(summary["critical_step"], "s"),
         "step": quantity(summary["step"], "s"),

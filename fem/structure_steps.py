@@ -12,7 +12,6 @@ from fem.body import Pieces
 from fem.damping import damped_critical_step
 from fem.estimate import WindowPlan
 from fem.steps import Steps, agreed_minimum, critical_by_role, mass_factor
-from fem.structure_loads import damping_coefficients
 from fem.structure_parameters import Dynamics
 
 PULSE_STEPS = 200  # implicit steps in the shortest pulse: 3e-4 of the period of what swings twice in it
@@ -34,7 +33,7 @@ def explicit_steps(comm: MPI.Comm, pieces: Pieces, dynamics: Dynamics) -> Steps:
 
 def explicit_plan(dynamics: Dynamics, undamped: float) -> tuple[WindowPlan, float]:
     """Return windows and the critical step [s] with damping, from that without."""
-    critical = damped_critical_step(undamped, damping_coefficients(dynamics.damping)[1])
+    critical = damped_critical_step(undamped, dynamics.damping.coefficients[1])
     return window_plan(dynamics, dynamics.numerics.step_fraction * critical), critical
 
 

@@ -11,6 +11,9 @@ from fem.mesh import MeshData
 HELD = {"mounting_holes": (0, 1, 2), "symmetry_x": (0,), "symmetry_y": (1,)}
 
 
+SYMMETRY = {name: components for name, components in HELD.items() if name != "mounting_holes"}
+
+
 def held_components(mesh: MeshData, rules: Mapping[str, Sequence[int]] = HELD) -> NDArray[np.bool_]:
     """Return ``(n, 3)``: whether a node's displacement component is held; ``rules`` are as ``HELD``."""
     held = np.zeros((len(mesh.points), 3), dtype=bool)

@@ -41,7 +41,7 @@ class JointWatch:
             Sums: centres (6) [m], then von Mises and peel [Pa] per end and joint. Maxima: von Mises per joint [Pa],
             largest and minus smallest strain of the board.
         """
-        displacement = motion.displacement
+        displacement = motion.displacement - motion.base_displacement()
         stress = self._recovery.stress(displacement)
         return self._sums(displacement, stress), self._maxima(displacement, stress)
 

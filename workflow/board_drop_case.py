@@ -1,5 +1,7 @@
 """The case of a package on a board: its joints reflowed, then the board dropped."""
 
+from pathlib import Path
+
 from fem.material_roles import Materials
 from fem.parameters import Shock
 from meshing.parameters import Board, Package, Warpage
@@ -24,8 +26,22 @@ class BoardDropCase(Case):
     materials: Materials = Materials()
     shock: Shock
 
+    @classmethod
+    def located(cls, table: dict, folder: Path) -> dict:
+        """Take the shock's table as relative to the folder of the case file."""
+        shock = table.get("shock")
+        if isinstance(shock, dict) and isinstance(shock.get("table"), str):
+            shock["table"] = str((folder / shock["table"]).resolve())
+        return table
+
+    @property
+    def files(self) -> dict[str, Path]:
+        """The shock's table."""
+        return {"shock.table": Path(self.shock.table)} if self.shock.table is not None else {}
+
     def problems(self) -> list[Problem]:
-        """Find parameters that make no possible package, joint or board together."""
+        """Find parameters that make no possible package, joint, board or shock together."""
+        from fem import shock_checks
         from meshing import checks as meshing_checks
         from meshing.pads import pad_table
         from particles import checks as particles_checks
@@ -38,8 +54,11 @@ class BoardDropCase(Case):
                 Problem(found.key, found.message, fields.shown(found.value, known.get(found.key)), found.allowed)
                 for found in contradictions
             ]
+        impossible = [
+            Problem(found.key, found.message, found.value, found.allowed) for found in shock_checks.problems(self.shock)
+        ]
         geometries = joint_geometries(pad_table(self.package, self.board, self.warpage))
-        return of_particles(particles_checks.problems(self.solder, geometries, self.package.pitch))
+        return impossible + of_particles(particles_checks.problems(self.solder, geometries, self.package.pitch))
 
     @property
     def ranks(self) -> int:

@@ -190,7 +190,9 @@ def of_shock(results: Mapping[str, dict], folder: Path) -> Findings:
     if len(results) == 2:
         metrics |= _comparison(results, folder)
         health["critical_joint_stress_error"] = at_most(metrics["critical_joint_stress_error"]["value"], STRESS_ERROR)
-    return Findings(metrics, health, dict(results[first]["effects"]))
+    windows = {mode: result.get("continued_from", 0) for mode, result in results.items()}
+    continued = ", ".join(f"{mode} from window {window}" for mode, window in windows.items() if window)
+    return Findings(metrics, health, dict(results[first]["effects"]), continued)
 
 
 def _comparison(results: Mapping[str, dict], folder: Path) -> dict:
@@ -198,6 +200,6 @@ def _comparison(results: Mapping[str, dict], folder: Path) -> dict:
     from fem.compare import compare_histories
 
     errors = compare_histories(folder / "two_scale/history.npz", folder / "dns/history.npz")
-    seconds = {mode: result["timings"]["windows"] for mode, result in results.items()}
+    seconds = {mode: result["metrics"]["window_seconds"]["value"] for mode, result in results.items()}
     ratio = {"two_scale_dns_time_ratio": metric(seconds["two_scale"] / seconds["dns"])}
     return {name: metric(value) for name, value in errors.items()} | ratio

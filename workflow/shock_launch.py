@@ -28,6 +28,7 @@ def run_mode(run: Run, folder: Path, mode: str) -> None:
         "meshes": [str(run.folder.resolve() / name) for name in ("geometry/assembly.msh", "solder_mesh/joints.msh")],
         "shock": run.case.shock.model_dump(mode="json"),
         "materials": run.case.materials.model_dump(mode="json"),
+        "checkpoints": str(run.checkpoints("shock").resolve() / mode),
     }
     run_fem(run, folder, request, f"shock, {MODES[mode]}")
 

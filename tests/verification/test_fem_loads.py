@@ -5,12 +5,13 @@ import pytest
 from mpi4py import MPI
 
 from fem.body import Body
-from fem.damping import RayleighDamping, damped_critical_step, rayleigh_coefficients
+from fem.damping import RayleighDamping, damped_critical_step
 from fem.facet_areas import outward_areas
 from fem.loads import BodyAcceleration, LargeMass, Load, NodalForces, PrescribedMotion
 from fem.material_parameters import Isotropic
 from fem.mesh import MeshData
 from fem.motion import Motion
+from fem.parameters import Damping
 from fem.pulse import Constant, HalfSine
 from tests.support.fem_bodies import STEEL, dns_body, motion_of
 from tests.support.fem_models import grid, mesh_of, on
@@ -151,10 +152,9 @@ def test_damping_ratio_is_that_of_the_exact_decay(kind):
     ratio, mesh = 0.02, bar(held=True)
     body, critical = dns_body(mesh, STEEL)
     frequency = SPEED / (4 * LENGTH)
-    ratios = (ratio, 0.0) if kind == "mass" else (0.0, ratio)
-    mass, stiffness = rayleigh_coefficients(*ratios, frequency)
-    step = 0.5 * damped_critical_step(critical, stiffness)
-    motion = motion_of(body, step, [RayleighDamping(mass, stiffness, body.terms)])
+    coefficients = Damping(**{f"{kind}_ratio": ratio}, frequency=frequency).coefficients
+    step = 0.5 * damped_critical_step(critical, coefficients[1])
+    motion = motion_of(body, step, [RayleighDamping.build(body, coefficients)])
     mode = np.sin(np.pi * body.local.points[:, 0] / (2 * LENGTH))
     motion.displacement[:, 0] = 1e-6 * mode
     motion.update_force()

@@ -1,0 +1,113 @@
+"""The march of all models through their windows: samples, fields, checkpoints, progress."""
+
+import json
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+
+from fem.checkpoint import Checkpoints
+from fem.communicators import Role
+from fem.fields import Fields
+from fem.history import History
+from fem.participant import Participant
+
+PROGRESS_INTERVAL = 0.5  # [s] between two progress lines
+GUARD = 500  # steps between two looks at the energies, whatever the samples
+
+Crew = Mapping[Role, Participant]
+
+
+@dataclass(frozen=True, slots=True)
+class Outputs:
+    """Where a run writes to.
+
+    Attributes:
+        history: Samples and ledger.
+        fields: A field file per model of this rank.
+        field_samples: How many times each of them is written.
+        checkpoints: From which the run continues, and to which it writes.
+    """
+
+    history: History
+    fields: dict[Role, Fields]
+    field_samples: int
+    checkpoints: Checkpoints
+
+
+def march(world: MPI.Comm, crew: Crew, outputs: Outputs) -> float:
+    """Run all windows, from the latest checkpoint where there is one; return the seconds spent on fields. Collective.
+
+    Raises:
+        EnergyError: On every rank, see ``Ledger.judge``.
+    """
+    plan, history = next(iter(crew.values())).plan, outputs.history
+    field_windows = set(np.linspace(0, plan.windows, outputs.field_samples).round().astype(int).tolist())
+    guard = max(1, GUARD // plan.substeps)
+    told, output_seconds, first = time.perf_counter(), 0.0, 0
+    state = outputs.checkpoints.read()
+    if state is not None:
+        first = state["window"] + 1
+        output_seconds += resume(crew, outputs, state, [window for window in sorted(field_windows) if window < first])
+    for window in range(first, plan.windows + 1):
+        if window:
+            run_window(crew)
+        sampled = window % plan.stride == 0 or window == plan.windows
+        if sampled:
+            history.sample(crew)
+        elif window % guard == 0:
+            history.check(crew)
+        if window in field_windows:
+            output_seconds += write_fields(crew, outputs, window)
+        if sampled and window < plan.windows and outputs.checkpoints.is_due():
+            save(crew, outputs, window)
+        if world.rank == 0 and time.perf_counter() - told > PROGRESS_INTERVAL:
+            told = time.perf_counter()
+            print(json.dumps({"progress": window / plan.windows, "time": time_of(crew)}), flush=True)
+    for file in outputs.fields.values():
+        file.close()
+    return output_seconds
+
+
+def run_window(crew: Crew) -> None:
+    """Advance all models of this rank by one window, each at its turn."""
+    for participant in crew.values():
+        participant.begin_window()
+    for participant in crew.values():
+        participant.finish_window()
+
+
+def time_of(crew: Crew) -> float:
+    """Return the time [s] that the models have reached."""
+    return next(iter(crew.values())).motion.time
+
+
+def write_fields(crew: Crew, outputs: Outputs, window: int) -> float:
+    """Write the fields of all models of this rank, and keep what they are made from; return the seconds it took."""
+    begin = time.perf_counter()
+    for role, participant in crew.items():
+        values = participant.motion.displacement, participant.motion.time
+        outputs.fields[role].write(*values)
+        outputs.checkpoints.keep(f"{role}-{window}", values)
+    return time.perf_counter() - begin
+
+
+def save(crew: Crew, outputs: Outputs, window: int) -> None:
+    """Write a checkpoint at the end of a window."""
+    states = {role: participant.state() for role, participant in crew.items()}
+    outputs.checkpoints.write(window, {"window": window, "crew": states, "history": outputs.history.state()})
+
+
+def resume(crew: Crew, outputs: Outputs, state: dict[str, Any], field_windows: list[int]) -> float:
+    """Continue from a checkpoint, and write its earlier fields anew; return the seconds that these took."""
+    for role, participant in crew.items():
+        participant.restore(state["crew"][role])
+    outputs.history.restore(state["history"])
+    begin = time.perf_counter()
+    for window in field_windows:
+        for role in crew:
+            outputs.fields[role].write(*outputs.checkpoints.kept(f"{role}-{window}"))
+    return time.perf_counter() - begin

@@ -1,0 +1,49 @@
+"""Parameters of a drop shock that are each allowed but do not fit together. Loads neither numba nor DOLFINx."""
+
+from collections.abc import Iterator
+
+from fem.parameters import Damping, Shock
+from fem.structure_checks import Problem
+
+
+def problems(shock: Shock) -> list[Problem]:
+    """Find what cannot work before anything is meshed or computed."""
+    return [*_pulse(shock), *_damping(shock.damping), *_large_mass(shock)]
+
+
+def _pulse(shock: Shock) -> Iterator[Problem]:
+    sine = {"shock.peak_acceleration": shock.peak_acceleration, "shock.pulse_duration": shock.pulse_duration}
+    ways = {"shock.service_condition": shock.service_condition, "shock.table": shock.table} | sine
+    given = [key for key, value in ways.items() if value is not None]
+    if not given:
+        yield Problem(
+            "shock.peak_acceleration",
+            None,
+            "is missing",
+            "peak_acceleration and pulse_duration, service_condition, table",
+        )
+    elif set(given) <= set(sine):
+        for key in set(sine) - set(given):
+            yield Problem(key, None, "is missing", "> 0; a half sine has peak_acceleration and pulse_duration")
+    elif len(given) > 1:
+        extra = given[1]
+        yield Problem(extra, ways[extra], f"does not go with {given[0]}, which says what the pulse is", "one of them")
+
+
+def _damping(damping: Damping) -> Iterator[Problem]:
+    ratios = {"mass_ratio": damping.mass_ratio, "stiffness_ratio": damping.stiffness_ratio}
+    used = [name for name, value in ratios.items() if value]
+    if used and damping.frequency is None:
+        yield Problem(
+            "shock.damping.frequency", None, f"is missing: {' and '.join(used)} hold at a frequency", "> 0 Hz"
+        )
+
+
+def _large_mass(shock: Shock) -> Iterator[Problem]:
+    if shock.method == "large_mass" and shock.damping.coefficients[0]:
+        yield Problem(
+            "shock.method",
+            shock.method,
+            "does not go with mass-proportional damping, which would brake the moving table",
+            "direct, or stiffness-proportional damping",
+        )

@@ -1,0 +1,84 @@
+"""Loads of a drop shock: from its parameters to the objects that act on each model."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from mpi4py import MPI
+
+from fem.body import Body
+from fem.communicators import Role
+from fem.damping import RayleighDamping
+from fem.loads import BodyAcceleration, LargeMass, Load
+from fem.parameters import Shock
+from fem.pulse import STANDARD_GRAVITY, Constant, HalfSine, Pulse, Tabulated, service_condition
+from fem.pulse_table import read_pulse
+from fem.scene import JointTables
+
+# The package looks towards the ground, so the table's upward acceleration points along -z and the board, seen from the
+# table, is pushed along +z; so does its weight.
+DOWN = np.array([0.0, 0.0, 1.0])
+NEGLIGIBLE = 1e-3  # of the peak: weight below it is left out
+
+
+@dataclass(frozen=True, slots=True)
+class ShockPulse:
+    """The course of the shock, and whether weight acts beside it.
+
+    Attributes:
+        pulse: Upward acceleration of the table [m/s^2].
+        source: Where it comes from, in words.
+        gravity: Whether weight acts, and ``why``.
+    """
+
+    pulse: Pulse
+    source: str
+    gravity: bool
+    why: str
+
+
+def shock_pulse(shock: Shock) -> ShockPulse:
+    """Return the pulse of a shock.
+
+    Raises:
+        PulseError: A table cannot be read.
+    """
+    pulse, source = input_pulse(shock)
+    peak = float(np.abs(pulse.values).max()) if isinstance(pulse, Tabulated) else pulse.peak
+    ratio = STANDARD_GRAVITY / peak if peak > 0.0 else np.inf
+    if shock.gravity == "auto":
+        reason = f"1 G is {ratio:.2g} of the peak acceleration, {'at least' if ratio >= NEGLIGIBLE else 'below'}"
+        return ShockPulse(pulse, source, ratio >= NEGLIGIBLE, f"{reason} {NEGLIGIBLE:g}")
+    return ShockPulse(pulse, source, shock.gravity == "on", f"shock.gravity = {shock.gravity}")
+
+
+def input_pulse(shock: Shock) -> tuple[HalfSine | Tabulated, str]:
+    """Return the acceleration of the drop table [m/s^2], and where it comes from; errors as ``shock_pulse``."""
+    if shock.table is not None:
+        return read_pulse(Path(shock.table), "acceleration"), f"table {Path(shock.table).name}"
+    if shock.service_condition is not None:
+        return service_condition(shock.service_condition), f"JEDEC service condition {shock.service_condition}"
+    if shock.peak_acceleration is None or shock.pulse_duration is None:
+        raise ValueError("a shock needs peak_acceleration and pulse_duration, a service_condition, or a table")
+    return HalfSine(shock.peak_acceleration, shock.pulse_duration), "half sine"
+
+
+def shock_loads(comm: MPI.Comm, role: Role, body: Body, tables: JointTables, shock: Shock) -> list[Load]:
+    """Return the loads and the damping of one model on this rank; collective over the model.
+
+    Args:
+        comm: Communicator of the model.
+        role: A large mass acts on the holes of all models but the meso model, which has none.
+        body: The model.
+        tables: Its support nodes.
+        shock: Pulse, method, gravity, damping.
+    """
+    chosen = shock_pulse(shock)
+    made: list[Load] = [BodyAcceleration(DOWN, Constant(STANDARD_GRAVITY))] if chosen.gravity else []
+    if shock.method == "direct":
+        made.append(BodyAcceleration(DOWN, chosen.pulse))
+    elif role != "meso":
+        made.append(LargeMass.build(comm, body, tables.shaken, DOWN, chosen.pulse))
+    if any(shock.damping.coefficients):
+        made.append(RayleighDamping.build(body, shock.damping.coefficients))
+    return made

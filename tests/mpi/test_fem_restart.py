@@ -1,0 +1,117 @@
+"""A run that is killed continues from its checkpoints to the same bits, on all ranks, fields included."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from fem.checkpoint import Checkpoints
+from tests.support.fem_models import write_small_assembly
+
+ROOT = Path(__file__).resolve().parents[2]
+SHOCK = {
+    "service_condition": "B",
+    "duration": 4e-5,
+    "gravity": "on",
+    "damping": {"stiffness_coefficient": 1e-10, "mass_coefficient": 10.0},
+    "ranks": {"macro": 1, "meso": 1},
+    "numerics": {"mass_scaled": ["copper"], "history_samples": 200, "field_samples": 4, "checkpoint_seconds": 1e-9},
+}
+
+
+@pytest.fixture(scope="module")
+def assembly(tmp_path_factory) -> Path:
+    directory = tmp_path_factory.mktemp("restart")
+    write_small_assembly(directory, 1, size=1e-3)
+    return directory
+
+
+def start(directory: Path, mode: str, output: Path) -> subprocess.Popen:
+    meshes = [str(directory / "assembly.msh"), str(directory / "joints.msh")]
+    request = {"mode": mode, "meshes": meshes, "shock": SHOCK, "output": str(output)}
+    path = directory / f"{output.name}.json"
+    path.write_text(json.dumps(request | {"checkpoints": str(directory / f"{mode}.checkpoints")}))
+    command = ["mpirun", "--allow-run-as-root", "--oversubscribe", "--mca", "mpi_yield_when_idle", "1", "-n", "2"]
+    return subprocess.Popen(
+        [*command, sys.executable, "-m", "fem", str(path)],
+        cwd=ROOT,
+        env=os.environ | {"OMP_NUM_THREADS": "1"},
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+
+
+def finish(process: subprocess.Popen) -> None:
+    _, errors = process.communicate(timeout=120)
+    assert process.returncode == 0, errors
+
+
+def kill_after_some_checkpoints(process: subprocess.Popen, folder: Path, count: int) -> None:
+    seen: set[tuple[str, int]] = set()
+    while len(seen) < count:
+        assert process.poll() is None, f"ended before it was killed: {process.stderr and process.stderr.read()}"
+        for path in folder.glob("state-0001-*"):
+            seen.add((path.name, path.stat().st_mtime_ns))
+        time.sleep(0.001)
+    os.killpg(process.pid, signal.SIGKILL)
+    process.communicate(timeout=60)
+
+
+def test_killed_run_continues_to_the_same_bits(assembly):
+    mode = "two_scale"
+    whole, broken = assembly / f"{mode}_whole", assembly / f"{mode}_broken"
+    folder = assembly / f"{mode}.checkpoints"
+    process = start(assembly, mode, broken)
+    kill_after_some_checkpoints(process, folder, 60)
+    assert not (broken / "history.npz").exists()
+    finish(start(assembly, mode, broken))
+    assert json.loads((broken / "result.json").read_text())["continued_from"] > 0
+    for path in folder.iterdir():
+        path.unlink()
+    finish(start(assembly, mode, whole))
+    with np.load(whole / "history.npz") as expected, np.load(broken / "history.npz") as found:
+        assert set(expected) == set(found)
+        for name in expected:
+            assert np.array_equal(expected[name], found[name]), name
+    files = sorted(whole.glob("*.vtu")) + sorted(whole.glob("*.pvd"))
+    assert len(files) >= 2 * 4
+    for path in files:
+        assert path.read_bytes() == (broken / path.name).read_bytes(), path.name
+
+
+def checkpoints(folder: Path, inputs: object = "one") -> Checkpoints:
+    return Checkpoints(MPI.COMM_SELF, folder, inputs, 0.0)
+
+
+def test_latest_whole_generation_of_the_same_inputs_is_read(tmp_path):
+    files = checkpoints(tmp_path)
+    assert files.read() is None
+    assert files.is_due()
+    for window in (3, 5, 8):
+        files.write(window, {"window": window})
+    assert checkpoints(tmp_path).read() == {"window": 8}
+    assert checkpoints(tmp_path, "other").read() is None
+    newest = max(tmp_path.glob("state-*"), key=lambda path: path.stat().st_mtime_ns)
+    newest.write_bytes(newest.read_bytes()[:-1])
+    again = checkpoints(tmp_path)
+    assert again.read() == {"window": 5}
+    assert again.continued == 5
+    again.write(9, {"window": 9})
+    assert checkpoints(tmp_path).read() == {"window": 9}
+
+
+def test_without_a_folder_nothing_is_kept():
+    files = Checkpoints(MPI.COMM_SELF, None, "one", 0.0)
+    files.keep("fields", 1)
+    files.write(1, {})
+    assert not files.is_due()
+    assert files.read() is None
