@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Iterator
 from typing import Any
 
+from fem.material_parameters import JohnsonCook
 from fem.structure_parameters import StructureScene
 
 
@@ -28,13 +29,18 @@ def _loads(scene: StructureScene) -> Iterator[tuple[str, bool, str]]:
 
 
 def _laws(scene: StructureScene) -> Iterator[tuple[str, bool, str]]:
-    laws = {name: getattr(material, "plasticity", None) for name, material in scene.layer_materials.items()}
-    plastic = {name: law for name, law in laws.items() if law is not None}
+    plastic = plastic_laws(scene)
     yield "plasticity", bool(plastic), _named("layers with a yield stress", plastic)
     rates = [name for name, law in plastic.items() if law.C > 0.0]
     yield "strain_rate", bool(rates), _named("layers whose yield stress has a rate term C > 0", rates)
     finite = scene.dynamics.kinematics == "finite"
     yield "finite_rotation", finite, f"dynamics.kinematics = {scene.dynamics.kinematics}"
+
+
+def plastic_laws(scene: StructureScene) -> dict[str, JohnsonCook]:
+    """Return the yield stress of the layers that have one, by the name of the layer."""
+    laws = {name: getattr(material, "plasticity", None) for name, material in scene.layer_materials.items()}
+    return {name: law for name, law in laws.items() if law is not None}
 
 
 def _scheme(scene: StructureScene, added_mass: float) -> Iterator[tuple[str, bool, str]]:

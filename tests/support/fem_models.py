@@ -10,6 +10,9 @@ from fem.cell_shape import TENSOR_ORDER
 from fem.mesh import MeshData, append, boundary_facets, without_unused_nodes
 
 CYCLIC = [0, 1, 3, 2]
+# Of cells and facets with so many nodes: Gmsh's type, and its order of our nodes.
+GMSH_TYPES = {8: 5, 4: 4, 10: 11}, {4: 3, 3: 2, 6: 9}
+GMSH_ORDER = {8: np.argsort(TENSOR_ORDER), 4: np.arange(4), 10: np.array([0, 1, 2, 3, 9, 6, 8, 7, 4, 5])}
 FACET_SETS = Callable[[np.ndarray], np.ndarray]
 
 
@@ -27,9 +30,9 @@ def mesh_of(points: np.ndarray, cells: np.ndarray, part: str | np.ndarray, facet
     """Return a mesh; ``facets`` maps a name to a test of boundary facet centres (nf, 3) -> (nf,)."""
     names = np.full(len(cells), part) if isinstance(part, str) else part
     part_names, number = np.unique(names, return_inverse=True)
-    quads = boundary_facets(cells)[:, CYCLIC]
-    centres = points[quads].mean(axis=1)
-    sets = {name: quads[test(centres)] for name, test in facets.items()}
+    outside = boundary_facets(cells)[:, CYCLIC if cells.shape[1] == 8 else slice(None)]
+    centres = points[outside].mean(axis=1)
+    sets = {name: outside[test(centres)] for name, test in facets.items()}
     return MeshData(points, cells, number.astype(np.int32), tuple(str(name) for name in part_names), sets)
 
 
@@ -110,11 +113,13 @@ def write_msh(mesh: MeshData, path: Path) -> None:
     try:
         gmsh.option.setNumber("General.Terminal", 0)
         gmsh.model.add("test")
+        volumes, surfaces = GMSH_TYPES
+        nodes, of_facets = mesh.cells.shape[1], mesh.shape.faces.shape[1]
         parts = [
-            (3, 5, name, mesh.cells[mesh.part == part][:, np.argsort(TENSOR_ORDER)])
+            (3, volumes[nodes], name, mesh.cells[mesh.part == part][:, GMSH_ORDER[nodes]])
             for part, name in enumerate(mesh.part_names)
         ]
-        parts += [(2, 3, name, quads) for name, quads in mesh.facets.items() if len(quads)]
+        parts += [(2, surfaces[of_facets], name, facets) for name, facets in mesh.facets.items() if len(facets)]
         entities = [gmsh.model.addDiscreteEntity(dimension) for dimension, *_ in parts]
         gmsh.model.mesh.addNodes(3, entities[0], np.arange(1, len(mesh.points) + 1), mesh.points.ravel())
         for entity, (dimension, kind, name, nodes) in zip(entities, parts, strict=True):
