@@ -23,15 +23,17 @@ def add_block_force(pointer, columns, blocks, displacement, force):
         vx, vy, vz = displacement[row, 0], displacement[row, 1], displacement[row, 2]
         x = y = z = 0.0
         for k in range(pointer[row], pointer[row + 1]):
-            block = blocks[k]
-            node = columns[k]
+            block, node = blocks[k], columns[k]
+            xx, xy, xz = block[0, 0], block[0, 1], block[0, 2]  # all read before the force is written, which might
+            yx, yy, yz = block[1, 0], block[1, 1], block[1, 2]  # overlap for all the compiler knows
+            zx, zy, zz = block[2, 0], block[2, 1], block[2, 2]
             ux, uy, uz = displacement[node, 0], displacement[node, 1], displacement[node, 2]
-            x += block[0, 0] * ux + block[0, 1] * uy + block[0, 2] * uz
-            y += block[1, 0] * ux + block[1, 1] * uy + block[1, 2] * uz
-            z += block[2, 0] * ux + block[2, 1] * uy + block[2, 2] * uz
-            force[node, 0] -= block[0, 0] * vx + block[1, 0] * vy + block[2, 0] * vz
-            force[node, 1] -= block[0, 1] * vx + block[1, 1] * vy + block[2, 1] * vz
-            force[node, 2] -= block[0, 2] * vx + block[1, 2] * vy + block[2, 2] * vz
+            x += xx * ux + xy * uy + xz * uz
+            y += yx * ux + yy * uy + yz * uz
+            z += zx * ux + zy * uy + zz * uz
+            force[node, 0] -= xx * vx + yx * vy + zx * vz
+            force[node, 1] -= xy * vx + yy * vy + zy * vz
+            force[node, 2] -= xz * vx + yz * vy + zz * vz
         force[row, 0] -= x
         force[row, 1] -= y
         force[row, 2] -= z
