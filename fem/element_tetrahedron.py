@@ -54,7 +54,7 @@ class Tetrahedron:
 
     def geometry(self, corners: NDArray[np.float64]) -> Geometry:
         """Integrate the gradients; nodal volumes are fixed shares of the volume."""
-        gradient, determinant = self._gradients(corners)
+        gradient, determinant = self.gradients(corners)
         volume = determinant @ self.weights
         shares = determinant * self.weights / np.where(volume == 0.0, 1.0, volume)[:, None]
         mean = np.einsum("eq,eqai->eai", shares, gradient)
@@ -64,7 +64,7 @@ class Tetrahedron:
         self, corners: NDArray[np.float64], elasticity: NDArray[np.float64], material: NDArray[np.int32]
     ) -> NDArray[np.float64]:
         """Return the stiffness ``(ne, 3k, 3k)`` [N/m]: the sum over integration points of B^T C B."""
-        gradient, determinant = self._gradients(corners)
+        gradient, determinant = self.gradients(corners)
         result = np.zeros((len(corners), 3 * self.nodes, 3 * self.nodes))
         for q, weight in enumerate(self.weights):
             strain = strain_matrix(gradient[:, q])
@@ -72,7 +72,7 @@ class Tetrahedron:
             result += strain.transpose(0, 2, 1) @ stress
         return result
 
-    def _gradients(self, corners: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def gradients(self, corners: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the gradients ``(ne, q, k, 3)`` [1/m] and Jacobian determinants ``(ne, q)`` [m^3]."""
         jacobian = np.einsum("eai,qad->eqid", corners, self.derivatives, optimize=True)
         determinant = np.linalg.det(jacobian)

@@ -39,3 +39,7 @@ class EnergyError(RuntimeError):
 
 class AgreedError(RuntimeError):
     """An error of one rank, raised on all ranks of the run."""
+
+
+class InvertedElementError(RuntimeError):
+    """An element that the motion has turned inside out."""

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from fem import dolfinx_api
 from fem.body import Body
-from fem.stress import StressRecovery, von_mises
+from fem.stress import von_mises
+from fem.stress_recovery import StressRecovery
 
 
 class Fields:
@@ -31,7 +32,7 @@ class Fields:
         # Vertices of a cell have the same order in geometry and dofmap, whatever their numbers.
         self._dofs, first = np.unique(dolfinx_api.cell_dofs(space), return_index=True)
         self._nodes = body.local.cells.ravel()[first]
-        self._recovery = StressRecovery(body.elements, body.geometry.gradient)
+        self._recovery = StressRecovery(body, np.arange(len(body.elements.cells)))
         self._file = dolfinx_api.FieldFile(comm, path)
         self._local_part = part
         self.peaks = dict.fromkeys(np.unique(part).tolist(), 0.0)

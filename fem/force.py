@@ -10,6 +10,9 @@ from fem.element import Elements
 from fem.energy import Energy
 from fem.force_assembled import AssembledElements
 from fem.force_congruent import CongruentElements, is_box
+from fem.force_nonlinear import NonlinearElements
+from fem.kernels_nonlinear import Path
+from fem.kernels_plasticity import FIRST_YIELD, plastic_constants
 from fem.material_parameters import Material
 
 Kinematics = Literal["small", "finite"]
@@ -35,7 +38,7 @@ class ForceTerm(Protocol):
 def force_terms(
     elements: Elements, materials: Sequence[Material], kinematics: Kinematics = "small", step: float = np.inf
 ) -> list[ForceTerm]:
-    """Return the force terms of elements.
+    """Return the force terms of elements: linear ones, and one with a path where the scene calls for it.
 
     Args:
         elements: The elements.
@@ -43,8 +46,13 @@ def force_terms(
         kinematics: Whether rotations and strains are small.
         step: dt [s], of laws that depend on the rate; infinity stands for slow.
     """
-    del materials, kinematics, step
-    return linear_terms(elements)
+    plastic = np.array([plastic_constants(material) for material in materials])
+    finite = kinematics == "finite"
+    nonlinear = np.isfinite(plastic[elements.material, FIRST_YIELD]) | finite
+    terms = linear_terms(elements.subset(~nonlinear))
+    if nonlinear.any():
+        terms.append(NonlinearElements.build(elements, np.flatnonzero(nonlinear), plastic, Path(finite, step)))
+    return terms
 
 
 def linear_terms(elements: Elements) -> list[ForceTerm]:

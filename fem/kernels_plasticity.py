@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from fem.material_parameters import Isotropic, Material
 
+FIRST_YIELD = 1  # column of the yield stress at no plastic strain, infinite where a material never yields
 ITERATIONS = 100  # far more than any admissible constants need; typical are 2
 CONVERGED = 1e-7  # relative correction after which the error, at most half its square, is below 1e-14
 LARGEST_EXPONENT = 700.0  # of exp, that is finite

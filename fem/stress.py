@@ -3,8 +3,6 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.element import Elements
-
 
 def mean_strain(gradient: NDArray[np.float64], displacement: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the average strain of elements ``(m, 6)``, shear as engineering strain.
@@ -41,8 +39,18 @@ def von_mises(stress: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def principal_strains(strain: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the principal strains ``(m, 3)``, ascending, of strains ``(m, 6)`` with engineering shear."""
-    xx, yy, zz, xy, yz, xz = (strain * [1.0, 1.0, 1.0, 0.5, 0.5, 0.5]).T
-    return np.linalg.eigvalsh(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]).transpose(2, 0, 1))
+    return np.linalg.eigvalsh(symmetric(strain * [1.0, 1.0, 1.0, 0.5, 0.5, 0.5]))
+
+
+def symmetric(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return symmetric matrices ``(m, 3, 3)`` from their components ``(m, 6)``."""
+    xx, yy, zz, xy, yz, xz = values.T
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]).transpose(2, 0, 1)
+
+
+def voigt(matrices: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the components ``(m, 6)`` of symmetric matrices ``(m, 3, 3)``."""
+    return matrices[:, [0, 1, 2, 0, 1, 0], [0, 1, 2, 1, 2, 2]]
 
 
 def principal_strain(corners: NDArray[np.float64], displacement: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -58,21 +66,3 @@ def principal_strain(corners: NDArray[np.float64], displacement: NDArray[np.floa
     mean = 0.5 * (gradient[:, 0, 0] + gradient[:, 1, 1])
     radius = np.hypot(0.5 * (gradient[:, 0, 0] - gradient[:, 1, 1]), 0.5 * (gradient[:, 0, 1] + gradient[:, 1, 0]))
     return np.array([mean + radius, mean - radius])
-
-
-class StressRecovery:
-    """Average strains and stresses of some elements of a rank."""
-
-    def __init__(self, elements: Elements, gradient: NDArray[np.float64]) -> None:
-        """Keep what the stresses of ``elements`` with mean gradients ``(ne, 8, 3)`` [1/m] need."""
-        self._cells = elements.cells
-        self._gradient = gradient
-        self._elasticity = elements.elasticity[elements.material]
-
-    def stress(self, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the stresses ``(ne, 6)`` [Pa] at a displacement ``(n, 3)`` [m]."""
-        return element_stress(self._gradient, self._elasticity, displacement[self._cells])
-
-    def strain(self, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the strains ``(ne, 6)`` at a displacement ``(n, 3)`` [m]."""
-        return mean_strain(self._gradient, displacement[self._cells])

@@ -6,7 +6,8 @@ from numpy.typing import NDArray
 from fem.body import Body
 from fem.local_mesh import positions
 from fem.moving import Moving
-from fem.stress import StressRecovery, principal_strain, von_mises
+from fem.stress import principal_strain, von_mises
+from fem.stress_recovery import StressRecovery
 from fem.watch_table import WatchTable
 
 LAYERS = ("von_mises_board", "von_mises_package", "peel_board", "peel_package")
@@ -24,7 +25,7 @@ class JointWatch:
         self._centres = [(k, int(node)) for k, node in enumerate(centres) if node >= 0 and body.shared.owned[node]]
         solder = local.locate_cells(table.solder_cells)
         self._joint, solder = table.solder_joint[solder >= 0], solder[solder >= 0]
-        self._recovery = StressRecovery(body.elements.subset(solder), body.geometry.gradient[solder])
+        self._recovery = StressRecovery(body, solder)
         layer = local.locate_cells(table.layer_cells)
         here = layer >= 0
         self._layer = positions(solder.astype(np.int64), layer[here])

@@ -11,7 +11,7 @@ from fem.errors import MeshError
 from fem.mesh import MeshData
 from fem.moving import Moving
 from fem.recovery import fit, patch
-from fem.stress import StressRecovery
+from fem.stress_recovery import StressRecovery
 
 COMPONENTS = {"displacement": 3, "velocity": 3, "strain": 6, "stress": 6}
 
@@ -107,7 +107,7 @@ class PointWatch:
         cells = body.local.locate_cells(table.cells)
         self._owner, self._weight = table.owner[cells >= 0], table.weight[cells >= 0]
         cells = cells[cells >= 0]
-        self._recovery = StressRecovery(body.elements.subset(cells), body.geometry.gradient[cells])
+        self._recovery = StressRecovery(body, cells)
         supports = [body.local.locate(nodes) for nodes in table.supports.values()]
         self._supports = [nodes[(nodes >= 0) & body.shared.owned[nodes]] for nodes in supports]
 

@@ -7,7 +7,7 @@ from scipy.sparse.linalg import eigsh
 
 from fem.element import Elements, critical_steps, element_geometry
 from fem.facet import area_vectors
-from fem.force import force_terms
+from fem.force import linear_terms
 from fem.material_library import FR4, SAC405
 from fem.material_parameters import Isotropic
 from fem.mesh import boundary_facets
@@ -35,7 +35,7 @@ def skewed(points: np.ndarray) -> np.ndarray:
 
 def internal_force(elements: Elements, displacement: np.ndarray) -> np.ndarray:
     force = np.zeros_like(displacement)
-    for term in force_terms(elements, ()):
+    for term in linear_terms(elements):
         term.add(displacement, force)
     return force
 

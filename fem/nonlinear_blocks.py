@@ -1,0 +1,155 @@
+"""Elements in blocks of sixteen lanes for the nonlinear kernels: the order of elements, shapes, initial state."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem.element import Elements, classes
+from fem.element_one_point import hourglass_control
+from fem.element_tetrahedron import QUADRATIC_SHARE, TETRAHEDRON, Tetrahedron, quadratic_derivatives
+from fem.kernels_hexahedron import CENTRE_DERIVATIVES, GAUSS, GAUSS_DERIVATIVES
+from fem.kernels_lanes import LANES
+from fem.kernels_nonlinear import STATE_SLOTS, STRETCH
+from fem.kernels_nonlinear_gradient import Blocks
+from fem.kernels_nonlinear_hexahedron import HexahedronBlocks
+
+# Degree 2 (Hammer, Marlowe & Stroud 1956): exact for the stiffness of straight-edged 10-node tetrahedra.
+FOUR_POINTS = np.full((4, 4), (5.0 - np.sqrt(5.0)) / 20.0) + np.eye(4) / np.sqrt(5.0)
+TEN_NODES = Tetrahedron(
+    "tetrahedron_quadratic", quadratic_derivatives(FOUR_POINTS), np.full(4, 1.0 / 24.0), QUADRATIC_SHARE
+)
+SYMMETRIC = (np.array([0, 1, 2, 0, 1, 0]), np.array([0, 1, 2, 1, 2, 2]))  # rows and columns of xx yy zz xy yz xz
+ORTHOTROPIC = (np.append(SYMMETRIC[0], [3, 4, 5]), np.append(SYMMETRIC[1], [3, 4, 5]))
+
+
+@dataclass(frozen=True, slots=True)
+class Lanes:
+    """The order of elements in blocks.
+
+    Attributes:
+        element: ``(nb, 16)`` element of each lane; lanes past the last one of a material repeat it.
+        filled: ``(nb,)`` int32 elements of each block.
+        pattern: ``(nb,)`` int32; blocks of equal shapes have the same.
+        shape: ``(ns,)`` an element of each different shape.
+        place: ``(np, 16)`` index into ``shape`` of each lane of a pattern.
+    """
+
+    element: NDArray[np.int64]
+    filled: NDArray[np.int32]
+    pattern: NDArray[np.int32]
+    shape: NDArray[np.int64]
+    place: NDArray[np.int64]
+
+    @property
+    def valid(self) -> NDArray[np.bool_]:
+        """Return which lanes ``(nb, 16)`` count."""
+        return np.arange(LANES) < self.filled[:, None]
+
+    def spread(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return values of shapes ``(ns, m, k)`` as those of patterns, lanes innermost: ``(np, m, 16 k)``."""
+        moved = values[self.place].transpose(0, 2, 3, 1)
+        return np.ascontiguousarray(moved).reshape(*moved.shape[:2], -1)
+
+
+def arrange(elements: Elements) -> Lanes:
+    """Sort elements into blocks of one material, equal shapes together."""
+    first, shape = classes(replace(elements, density=np.zeros(len(elements.cells))))
+    order = np.lexsort((elements.cells.min(axis=1), shape, elements.material))
+    ends = np.flatnonzero(np.diff(elements.material[order], append=-1)) + 1
+    rows, count = [], []
+    for start, end in zip(np.concatenate([[0], ends[:-1]]), ends, strict=True):
+        padded = np.arange(start, start + -(-(end - start) // LANES) * LANES)
+        rows.append(order[np.minimum(padded, end - 1)].reshape(-1, LANES))
+        count.append(np.minimum(end - padded[::LANES], LANES))
+    element = np.concatenate(rows)
+    place, pattern = np.unique(shape[element], axis=0, return_inverse=True)
+    return Lanes(element, np.concatenate(count).astype(np.int32), pattern.reshape(-1).astype(np.int32), first, place)
+
+
+def gradient_blocks(elements: Elements, lanes: Lanes, plastic: NDArray[np.float64], finite: bool) -> Blocks:
+    """Return one-point hexahedra or tetrahedra without stress; ``plastic (nm, 6)`` as in ``kernels_plasticity``."""
+    corners, kind = elements.points[elements.cells[lanes.shape]], elements.kind
+    hourglass = np.empty((len(corners), 1, 0))
+    if kind.hourglass:
+        geometry = kind.geometry(corners)
+        gradient, weight = geometry.gradient[:, None], geometry.volume[:, None]
+        gamma, resistance = hourglass_control(corners, elements.elasticity, elements.material[lanes.shape])
+        parts = gamma.transpose(0, 2, 1).reshape(len(corners), 1, -1), resistance.reshape(len(corners), 1, -1)
+        hourglass = np.concatenate(parts, axis=2)
+    else:
+        gradient, determinant = (TETRAHEDRON if kind.nodes == 4 else TEN_NODES).gradients(corners)
+        weight = determinant / (6.0 * determinant.shape[1])
+    points = gradient.shape[1]
+    return Blocks(
+        **common_arrays(elements, lanes, plastic),
+        gradient=lanes.spread(gradient.reshape(len(corners), points, -1)),
+        weight=lanes.spread(weight[:, :, None]),
+        hourglass=lanes.spread(hourglass)[:, 0],
+        state=initial_state(len(lanes.filled), points, finite),
+        plastic_work=np.zeros(lanes.element.shape),
+        hourglass_energy=np.zeros(lanes.element.shape),
+    )
+
+
+def hexahedron_blocks(elements: Elements, lanes: Lanes, plastic: NDArray[np.float64], finite: bool) -> HexahedronBlocks:
+    """Return fully integrated hexahedra without stress; ``plastic (nm, 6)`` as in ``kernels_plasticity``."""
+    corners = elements.points[elements.cells[lanes.shape]]
+    count = len(corners)
+    jacobian = np.einsum("eai,gad->egid", corners, GAUSS_DERIVATIVES, optimize=True)
+    weight = np.linalg.det(jacobian)
+    centre = np.einsum("eai,ad->eid", corners, CENTRE_DERIVATIVES, optimize=True)
+    inverse = np.linalg.inv(centre)
+    normal = -2.0 * np.linalg.det(centre)[:, None, None] * inverse
+    coupling = np.einsum("gk,gl,eg->ekl", GAUSS, GAUSS, 1.0 / weight)[:, SYMMETRIC[0], SYMMETRIC[1]]
+    return HexahedronBlocks(
+        **common_arrays(elements, lanes, plastic),
+        inverse=lanes.spread(np.linalg.inv(jacobian).reshape(count, 8, 9)),
+        weight=lanes.spread(weight[:, None])[:, 0],
+        basis=lanes.spread(orthonormal_basis(weight).reshape(count, 1, -1))[:, 0],
+        centre=lanes.spread(inverse.reshape(count, 1, -1))[:, 0],
+        normal=lanes.spread(normal.reshape(count, 1, -1))[:, 0],
+        coupling=lanes.spread(coupling[:, None])[:, 0],
+        state=initial_state(len(lanes.filled), 8, finite),
+        modes=np.zeros((len(lanes.filled), 9 * LANES)),
+        plastic_work=np.zeros(lanes.element.shape),
+    )
+
+
+def common_arrays(elements: Elements, lanes: Lanes, plastic: NDArray[np.float64]) -> dict[str, NDArray]:
+    """Return the arrays that blocks of all kinds have."""
+    return {
+        "cells": np.ascontiguousarray(elements.cells[lanes.element].transpose(0, 2, 1)),
+        "filled": lanes.filled,
+        "pattern": lanes.pattern,
+        "material": np.ascontiguousarray(elements.material[lanes.element[:, 0]]),
+        "elastic": elastic_constants(elements.elasticity),
+        "plastic": plastic,
+    }
+
+
+def orthonormal_basis(weight: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return 1, xi, eta, zeta at the Gauss points, orthonormal under weights ``(ns, 8)``: ``(ns, 4, 8)``."""
+    functions = np.column_stack([np.ones(8), GAUSS])
+    root = np.sqrt(weight)[:, :, None]
+    return (np.linalg.qr(functions * root)[0] / root).transpose(0, 2, 1)
+
+
+def elastic_constants(elasticity: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the nine constants of orthotropic materials ``(nm, 9)`` [Pa]; see ``kernels_nonlinear.elastic_stress``.
+
+    Raises:
+        ValueError: A material couples normal strain and shear.
+    """
+    rest = elasticity.copy()
+    rest[:, ORTHOTROPIC[0], ORTHOTROPIC[1]] = rest[:, ORTHOTROPIC[1], ORTHOTROPIC[0]] = 0.0
+    if np.abs(rest).max(initial=0.0) > 1e-9 * np.abs(elasticity).max(initial=0.0):
+        raise ValueError("elasticity couples normal strain and shear; nonlinear elements take axes along x, y, z only")
+    return np.ascontiguousarray(elasticity[:, ORTHOTROPIC[0], ORTHOTROPIC[1]])
+
+
+def initial_state(blocks: int, points: int, finite: bool) -> NDArray[np.float64]:
+    """Return the state without stress ``(nb, m, 16 * 13)``: no strain, or the unit stretch."""
+    state = np.zeros((blocks, points, STATE_SLOTS))
+    state[:, :, STRETCH : STRETCH + 3 * LANES] = float(finite)
+    return state
