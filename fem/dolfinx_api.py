@@ -47,7 +47,7 @@ def cell_nodes(mesh: dolfinx.mesh.Mesh) -> NDArray[np.int32]:
 
 def degree(mesh: dolfinx.mesh.Mesh) -> int:
     """Return the polynomial degree of the geometry."""
-    return int(mesh.geometry.cmap.degree)
+    return shape_of(cell_nodes(mesh)).degree
 
 
 def input_nodes(mesh: dolfinx.mesh.Mesh) -> NDArray[np.int64]:
