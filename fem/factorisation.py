@@ -4,7 +4,8 @@ from dataclasses import dataclass
 
 from petsc4py import PETSc
 
-RELAXATION = 50  # [%] of working memory beyond MUMPS' estimate, which ties and many ranks exceed
+PREFIX = "factor_"
+SETTINGS = {14: 50}  # ICNTL of MUMPS: working memory beyond its estimate [%], which ties and many ranks exceed
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,8 +29,7 @@ class Factorisation:
         matrix.setOption(PETSc.Mat.Option.SPD, True)
         self._solver = PETSc.KSP().create(matrix.comm)
         self._solver.setOperators(matrix)
-        self._solver.setType(PETSc.KSP.Type.PREONLY)
-        prepare_cholesky(self._solver.getPC())
+        make_direct(self._solver)
         self._solver.setUp()
         self._factor = self._solver.getPC().getFactorMatrix()
         status, negative = self._factor.getMumpsInfog(1), self._factor.getMumpsInfog(12)
@@ -59,9 +59,11 @@ class Factorisation:
         self._solver.destroy()
 
 
-def prepare_cholesky(preconditioner: PETSc.PC) -> None:
-    """Make a preconditioner that has its matrix a MUMPS Cholesky factorisation."""
-    preconditioner.setType(PETSc.PC.Type.CHOLESKY)
-    preconditioner.setFactorSolverType("mumps")
-    preconditioner.setFactorSetUpSolverType()
-    preconditioner.getFactorMatrix().setMumpsIcntl(14, RELAXATION)
+def make_direct(solver: PETSc.KSP) -> None:
+    """Make a linear solver one MUMPS Cholesky factorisation."""
+    for number, value in SETTINGS.items():  # MUMPS 5.5 under PETSc 3.18 takes them as options only
+        PETSc.Options()[f"{PREFIX}mat_mumps_icntl_{number}"] = value
+    solver.setOptionsPrefix(PREFIX)
+    solver.setType(PETSc.KSP.Type.PREONLY)
+    solver.getPC().setType(PETSc.PC.Type.CHOLESKY)
+    solver.getPC().setFactorSolverType("mumps")

@@ -1,6 +1,6 @@
 """Implicit time integration of linear elastic models: Newmark's method with the HHT-alpha average of forces.
 
-    M a' + (1 + alpha) K u' - alpha K u = (1 + alpha) F' - alpha F,
+    M a' = (1 + alpha) (F' - C v' - K u') - alpha (F - C v - K u),
     u' = u + h v + h^2 ((1/2 - beta) a + beta a'),   v' = v + h ((1 - gamma) a + gamma a'),
     beta = (1 - alpha)^2 / 4,   gamma = 1/2 - alpha                       (Hilber, Hughes & Taylor, EESD 5, 1977)
 
@@ -10,14 +10,47 @@ Negative alpha damps what the step does not resolve, for loads that start with a
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, cast
 
 import numpy as np
+from mpi4py import MPI
 from numpy.typing import NDArray
 
 from fem.body import Body
+from fem.damping import RayleighDamping
+from fem.energy import Energy
 from fem.factorisation import Factorisation
+from fem.force_assembled import AssembledElements
+from fem.force_congruent import CongruentElements
 from fem.global_matrix import Equations
 from fem.loads import Load
+from fem.motion import Motion
+
+
+@dataclass(frozen=True, slots=True)
+class Scheme:
+    """Coefficients of one step: h [s], alpha."""
+
+    step: float
+    alpha: float
+
+    def __post_init__(self) -> None:
+        """Raise ``ValueError`` where they are out of range."""
+        if not self.step > 0.0:
+            raise ValueError(f"the implicit time step is {self.step:g} s, must be > 0")
+        if not -1.0 / 3.0 <= self.alpha <= 0.0:
+            raise ValueError(f"alpha of the HHT method is {self.alpha:g}, allowed are -1/3 to 0")
+
+    @property
+    def beta(self) -> float:
+        """Return Newmark's beta."""
+        return 0.25 * (1.0 - self.alpha) ** 2
+
+    @property
+    def gamma(self) -> float:
+        """Return Newmark's gamma."""
+        return 0.5 - self.alpha
 
 
 class ImplicitMotion:
@@ -29,87 +62,225 @@ class ImplicitMotion:
         time: [s].
         displacement: ``(n, 3)`` [m] at ``time``.
         velocity: ``(n, 3)`` [m/s] at ``time``.
-        force: ``(n, 3)`` [N] at ``time`` after ``update_force``: internal, summed over ranks, slaves' moved to masters.
-        external_work: Work of the loads on this rank's share of the nodes [J].
+        force: ``(n, 3)`` [N] at ``time`` after ``update_force``, summed over ranks, without body force.
+        slave_force: ``(ns, 3)`` [N] of this rank's elements on the slaves, before it is moved.
+        gravity: ``(3,)`` [m/s^2], sum of the loads' accelerations at ``time``.
+        ledger_mass: ``(n,)`` [kg] that counts in the ledger of this rank.
         factor: The factored matrix of a step.
     """
 
-    def __init__(self, equations: Equations, loads: Sequence[Load], step: float, alpha: float = 0.0) -> None:
+    def __init__(self, comm: MPI.Comm, body: Body, loads: Sequence[Load], step: float, alpha: float = 0.0) -> None:
         """Start at rest; collective.
 
         Args:
-            equations: The model.
-            loads: Body accelerations.
+            comm: Communicator of the model.
+            body: The model.
+            loads: What acts on it.
             step: h [s].
             alpha: Of the HHT method, from -1/3 to 0.
 
         Raises:
-            ValueError: Step or alpha out of range.
+            ValueError: Step or alpha out of range, or a material or kinematics that is not linear.
         """
-        if not step > 0.0:
-            raise ValueError(f"the implicit time step is {step:g} s, must be > 0")
-        if not -1.0 / 3.0 <= alpha <= 0.0:
-            raise ValueError(f"alpha of the HHT method is {alpha:g}, allowed are -1/3 to 0")
-        self.body: Body = equations.body
-        self.step, self.time, self.external_work = step, 0.0, 0.0
-        self._equations, self._loads, self._alpha = equations, loads, alpha
-        self._beta, self._gamma = 0.25 * (1.0 - alpha) ** 2, 0.5 - alpha
-        mass = equations.mass()
-        matrix = equations.stiffness()
-        matrix.scale((1.0 + alpha) * self._beta * step**2)
-        matrix.setDiagonal(matrix.getDiagonal() + mass)
-        self.factor = Factorisation(matrix)
-        self._right, self._solution = mass.duplicate(), mass.duplicate()
-        self.displacement, self.velocity, self.force, self._acceleration = np.zeros((4, len(self.body.mass), 3))
-        self._external = self.external_force(0.0)
+        self._scheme = Scheme(step, alpha)
+        check_linear(body)
+        self.body, self.step, self.time = body, step, 0.0
+        self._loads = [load for load in loads if not isinstance(load, RayleighDamping)]
+        damping = [load for load in loads if isinstance(load, RayleighDamping)]
+        self._mass_damping = sum(load.mass for load in damping)
+        self._stiffness_damping = sum(load.stiffness for load in damping)
+        count, owned = len(body.mass), body.shared.owned
+        self._state = np.zeros((6, count, 3))
+        self.displacement, self.velocity, self.force, self._acceleration, self._drag, self._nodal = self._state
+        self.slave_force = np.zeros((len(body.tie.slave), 3))
+        self.ledger_mass = np.where(owned, body.mass, 0.0)
+        self._extra, self._free = np.zeros(count), body.free.copy()
+        self.gravity = self.body_acceleration(0.0)
+        for load in self._loads:
+            load.begin(cast(Motion, self))
+        self._prescribed = body.free & ~self._free
+        self._equations = Equations.of(comm, replace(body, free=self._free))
+        self.factor = self._factorise()
+        self._works = np.zeros(3)  # of external forces, by damping, of the start
+        self._begin()
+
+    def _factorise(self) -> Factorisation:
+        """Return the factor of M + (1 + alpha) (gamma h C + beta h^2 K), C = a M + b K; collective."""
+        h, scheme = self.step, self._scheme
+        weight = 1.0 + scheme.alpha
+        mass = self._equations.vector(np.repeat(self.body.mass[:, None], 3, axis=1))
+        extra = self._equations.vector(np.repeat(self._extra[:, None], 3, axis=1))
+        matrix = self._equations.stiffness()
+        matrix.scale(weight * (scheme.beta * h**2 + scheme.gamma * h * self._stiffness_damping))
+        scaled = mass * (1.0 + weight * scheme.gamma * h * self._mass_damping) + extra
+        matrix.setDiagonal(matrix.getDiagonal() + scaled)
+        self._right, self._solution = mass, extra
+        return Factorisation(matrix)
+
+    def hold(self, nodes: NDArray[np.integer], component: int) -> None:
+        """Let a velocity component of local nodes no longer follow from forces."""
+        self._free[nodes, component] = False
+
+    def add_mass(self, nodes: NDArray[np.integer], mass: NDArray[np.float64]) -> None:
+        """Add masses ``(k,)`` [kg] that the ledger does not count to local nodes."""
+        self._extra[nodes] += mass
+
+    def launch(self, velocity: NDArray[np.float64]) -> None:
+        """Give all free components an initial velocity ``(3,)`` [m/s]; before the first step."""
+        self.velocity += np.where(self._free, velocity, 0.0)
+        self.restart()
+
+    def _begin(self) -> None:
+        """Take the loads and prescribed velocities of time zero."""
+        for load in self._loads:
+            load.add(cast(Motion, self))
+        self._nodal[:] = self.force
+        mean, following = self._driven(-self.step), self._driven(0.0)
+        self.velocity += 0.5 * (mean + following)
         self.restart()
 
     def restart(self) -> None:
-        """Take displacement and velocity as they are now for the state at ``time``."""
-        self.body.tie.spread(self.displacement)
-        self.body.tie.spread(self.velocity)
-        self.update_force()
-        mass = np.where(self.body.mass > 0.0, self.body.mass, np.inf)[:, None]
-        self._acceleration[:] = np.where(self.body.free, (self._external + self.force) / mass, 0.0)
-        self.body.tie.spread(self._acceleration)
-
-    def external_force(self, time: float) -> NDArray[np.float64]:
-        """Return the force of all loads ``(n, 3)`` [N] at a time [s]."""
-        acceleration = sum((load.acceleration(time) for load in self._loads), np.zeros(3))
-        return self.body.mass[:, None] * acceleration
+        """Take displacement and velocity as they are now for the state at ``time``, the start of the ledger."""
+        self._update_force()
+        mass = (self.body.mass + self._extra)[:, None]
+        self._acceleration[:] = np.where(self._free, self._total_force() / np.where(mass > 0.0, mass, np.inf), 0.0)
+        self._before = self._ledger_fields()
+        self._works[:] = 0.0, 0.0, self._stored_apart()
 
     def advance(self) -> None:
         """Move from ``time`` to ``time + h``; the force is then out of date. Collective."""
-        h, alpha, before = self.step, self._alpha, self.displacement.copy()
-        self.displacement += h * self.velocity + h**2 * (0.5 - self._beta) * self._acceleration
-        self.velocity += h * (1.0 - self._gamma) * self._acceleration
+        h, scheme, before = self.step, self._scheme, self._total_force()
+        mean, following = self._driven(self.time), self._driven(self.time + h)
+        start = self.displacement[self._prescribed]
+        self.displacement += h * self.velocity + h**2 * (0.5 - scheme.beta) * self._acceleration
+        self.velocity += h * (1.0 - scheme.gamma) * self._acceleration
+        self.displacement[self._prescribed] = start + h * mean[self._prescribed]
+        self.velocity[self._prescribed] = 0.5 * (mean + following)[self._prescribed]
         self.time += h
-        external, force = self._external, self.force.copy()
-        self._external = self.external_force(self.time)
-        self.update_force()  # of the predicted displacement
-        total = (1.0 + alpha) * (self._external + self.force) - alpha * (external + force)
-        self._right.array = total[self._equations.own]
+        self.gravity = self.body_acceleration(self.time)
+        self.force.fill(0.0)
+        for load in self._loads:
+            load.add(cast(Motion, self))
+        self._nodal[:] = self.force
+        self._update_force()  # of the predicted motion
+        right = (1.0 + scheme.alpha) * self._total_force() - scheme.alpha * before
+        self._right.array = right[self._equations.own]
         self.factor.solve(self._right, self._solution)
         self._equations.spread(self._solution, self._acceleration)
-        self.velocity += h * self._gamma * self._acceleration
-        self.displacement += h**2 * self._beta * self._acceleration
-        change = (self.displacement - before)[self._equations.own]
-        self.external_work += 0.5 * float((external + self._external)[self._equations.own] @ change)
+        self.displacement += h**2 * scheme.beta * self._acceleration
+        self.velocity += h * scheme.gamma * self._acceleration
+        self._acceleration[self._prescribed] = ((following - mean) / h)[self._prescribed]
 
     def update_force(self) -> None:
-        """Evaluate the internal force at the present displacement, summed over ranks."""
-        self.force.fill(0.0)
+        """Evaluate the force of the motion at ``time``, summed over ranks, and the work of the step before."""
+        self._update_force()
+        before, self._before = self._before, self._ledger_fields()
+        change, external, drag, held = self._before - before
+        external, drag, held = before[1:] + 0.5 * np.array([external, drag, held])
+        owned, solved = self.body.shared.owned, self._equations.own
+        prescribed = self._prescribed & owned[:, None]
+        self._works[0] += float(external[solved] @ change[solved] - held[prescribed] @ change[prescribed])
+        self._works[1] -= float(np.sum((drag * change)[owned]))
+
+    def _ledger_fields(self) -> NDArray[np.float64]:
+        """Return displacement, forces of the loads, of damping, and of elements with damping: ``(4, n, 3)``."""
+        external = self._total_force() - (self.force - self._nodal)
+        return np.array([self.displacement, external, self._drag, self.force - self._nodal])
+
+    def _stored_apart(self) -> float:
+        """Return the kinetic energy [J] of prescribed components less that of masses the ledger does not count."""
+        owned = self.body.shared.owned[:, None]
+        mass = np.where(self._prescribed, self.body.mass[:, None], 0.0) - self._extra[:, None]
+        return 0.5 * float(np.sum(np.where(owned, mass, 0.0) * self.velocity**2))
+
+    def _driven(self, time: float) -> NDArray[np.float64]:
+        """Return the mean velocity ``(n, 3)`` [m/s] of prescribed components over the step that begins at a time."""
+        velocity = np.zeros_like(self.velocity)
+        for load in self._loads:
+            load.drive(velocity, time)
+        return velocity
+
+    def _total_force(self) -> NDArray[np.float64]:
+        """Return all forces but inertia ``(n, 3)`` [N]."""
+        return self.force + (self.body.mass + self._extra)[:, None] * self.gravity
+
+    def _update_force(self) -> None:
+        """Write the force of elements, damping and nodal loads; slaves go with their masters."""
+        self.body.tie.spread(self.displacement)
+        self.body.tie.spread(self.velocity)
+        self.slave_force = self._add_internal(self.displacement, self.force)
+        self._drag[:] = -self._mass_damping * self.body.mass[:, None] * self.velocity
+        if self._stiffness_damping:
+            elastic = np.empty_like(self._drag)
+            self._add_internal(self.velocity, elastic)
+            self._drag += self._stiffness_damping * elastic
+        self.force += self._drag + self._nodal
+
+    def _add_internal(self, field: NDArray[np.float64], force: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Write -K times a field into ``force``, summed over ranks; return this rank's part at the slaves."""
+        force.fill(0.0)
         for term in self.body.terms:
-            term.add(self.displacement, self.force)
-        self.body.tie.gather(self.force)
-        self.body.shared.add(self.force)
+            term.add(field, force)
+        at_slaves = force[self.body.tie.slave]
+        self.body.tie.gather(force)
+        self.body.shared.add(force)
+        return at_slaves
+
+    def body_acceleration(self, time: float) -> NDArray[np.float64]:
+        """Return the sum of all loads' accelerations ``(3,)`` [m/s^2] at a time [s]."""
+        return sum((load.acceleration(time) for load in self._loads), np.zeros(3))
+
+    def base_displacement(self) -> NDArray[np.float64]:
+        """Return the displacement ``(3,)`` [m] of the frame in which results are told; zero but with a large mass."""
+        return sum((load.base_displacement() for load in self._loads), np.zeros(3))
+
+    def present_velocity(self) -> NDArray[np.float64]:
+        """Return the velocity ``(n, 3)`` [m/s] at ``time``."""
+        return self.velocity
+
+    @property
+    def external_work(self) -> float:
+        """Return the work of all loads on this rank's share [J]; of a large mass, what it passes on."""
+        return float(self._works[0] + self._stored_apart() - self._works[2])
+
+    @property
+    def damping_energy(self) -> float:
+        """Return the energy that damping has taken from this rank's share [J]."""
+        return float(self._works[1])
 
     def kinetic_energy(self) -> float:
         """Return the kinetic energy [J] of this rank's share."""
-        owned = self.body.shared.owned
-        return 0.5 * float(self.body.mass[owned] @ np.sum(self.velocity[owned] ** 2, axis=1))
+        return 0.5 * float(self.ledger_mass @ np.sum(self.velocity**2, axis=1))
 
-    def strain_energy(self, foreign: NDArray[np.float64]) -> float:
-        """Return the strain energy [J] of this rank's share; ``foreign (n, 3)`` [N] is no part of the model's force."""
-        owned = self.body.shared.owned
-        return -0.5 * float(np.sum(self.displacement[owned] * (self.force - foreign)[owned]))
+    def internal_energy(self) -> Energy:
+        """Return the energies [J] of this rank's elements."""
+        return sum((term.energy(self.displacement) for term in self.body.terms), Energy())
+
+    def step_energy(self, foreign: NDArray[np.float64]) -> float:
+        """Return zero: no step is too large for stability."""
+        return 0.0
+
+    def state(self) -> dict[str, Any]:
+        """Return all that changes with time, for a checkpoint."""
+        loads = [load.state() for load in self._loads]
+        arrays = {"state": self._state, "slave_force": self.slave_force, "before": self._before, "works": self._works}
+        return arrays | {"loads": loads, "time": self.time}
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Continue from what ``state`` returned, in a motion that was built alike."""
+        self._state[:], self._works[:] = state["state"], state["works"]
+        self.slave_force, self._before, self.time = state["slave_force"], state["before"], state["time"]
+        self.gravity = self.body_acceleration(self.time)
+        for load, kept in zip(self._loads, state["loads"], strict=True):
+            load.restore(kept)
+
+
+def check_linear(body: Body) -> None:
+    """Raise ``ValueError`` where the force of an element is not a matrix times the displacement."""
+    foreign = [term for term in body.terms if not isinstance(term, CongruentElements | AssembledElements)]
+    if foreign:
+        names = ", ".join(type(term).__name__ for term in foreign)
+        raise ValueError(
+            f"the implicit solver is linear and cannot take {names}: materials must be elastic and kinematics small, or"
+            " the solver explicit"
+        )

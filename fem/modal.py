@@ -8,7 +8,7 @@ import scipy.sparse.linalg
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from fem.factorisation import prepare_cholesky
+from fem.factorisation import make_direct
 from fem.global_matrix import Equations
 
 try:
@@ -85,12 +85,7 @@ def slepc_modes(
     solver.setTarget(shift)
     transform = solver.getST()
     transform.setType(SLEPc.ST.Type.SINVERT)
-    linear = transform.getKSP()
-    linear.setType(PETSc.KSP.Type.PREONLY)
-    linear.getPC().setType(PETSc.PC.Type.CHOLESKY)
-    linear.getPC().setFactorSolverType("mumps")
-    transform.getOperator()  # makes the matrix to factor, and hands it to the solver
-    prepare_cholesky(linear.getPC())
+    make_direct(transform.getKSP())
     solver.solve()
     if solver.getConverged() < count:
         raise RuntimeError(

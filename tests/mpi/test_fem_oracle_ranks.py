@@ -29,14 +29,14 @@ item = prepare(append(small_assembly(2, size=1e-3)), "dns")["dns"]
 pieces = make_pieces(distribute(comm, item.mesh if comm.rank == 0 else None), item.tables, Materials())
 body = make_body(comm, pieces, item.tables, np.ones(len(pieces.steps)))
 equations = Equations.of(comm, body)
-motion = ImplicitMotion(equations, [HalfSineDrop(1e4, 5e-5)], 2e-6)
+motion = ImplicitMotion(comm, body, [HalfSineDrop(1e4, 5e-5)], 2e-6)
 for _ in range(10):
     motion.advance()
     motion.update_force()
 owned = body.shared.owned
 displacement = np.zeros((item.tables.nodes, 3))
 displacement[body.local.nodes[owned]] = motion.displacement[owned]
-parts = [motion.kinetic_energy(), motion.strain_energy(np.zeros_like(motion.force)), motion.external_work]
+parts = [motion.kinetic_energy(), motion.internal_energy().total, motion.external_work]
 result = {
     "displacement": comm.allreduce(displacement).tolist(),
     "energies": comm.allreduce(np.array(parts)).tolist(),
