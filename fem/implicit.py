@@ -248,6 +248,13 @@ class ImplicitMotion:
         """Return the energy that damping has taken from this rank's share [J]."""
         return float(self._works[1])
 
+    def reaction(self) -> NDArray[np.float64]:
+        """Return the forces ``(n, 3)`` [N] of supports and prescribed motion on the nodes that this rank counts."""
+        force = self.force.copy()
+        for load in self._loads:
+            load.release(force)
+        return self.ledger_mass[:, None] * (self._acceleration - self.gravity) - force
+
     def kinetic_energy(self) -> float:
         """Return the kinetic energy [J] of this rank's share."""
         return 0.5 * float(self.ledger_mass @ np.sum(self.velocity**2, axis=1))

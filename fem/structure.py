@@ -11,9 +11,12 @@ from fem.checkpoint import Checkpoints, digest_of_files
 from fem.communicators import Communicators, Role
 from fem.fields import Fields
 from fem.history import History
+from fem.implicit import ImplicitMotion
 from fem.inputs import StructureInput
 from fem.ledger import Ledger
+from fem.loads import Load
 from fem.march import Outputs, march
+from fem.moving import Moving
 from fem.parameters import Ranks
 from fem.participant import Alone, Participant, uncut_motion
 from fem.pulse import Pulse
@@ -59,11 +62,18 @@ def make_participant(comm: MPI.Comm, model: StructureModel, request: StructureIn
     """Return the structure with its loads and initial velocity, ready to move; collective."""
     loads = structure_loads(comm, model.body, model.tables, request, pulses)
     loads += damping_loads(request.dynamics.damping, model.body)
-    plan = model.steps.plan
-    motion = uncut_motion(model.body, loads, plan.step)
+    plan, motion = model.steps.plan, make_motion(comm, model, request, loads)
     if any(request.dynamics.initial_velocity):
         motion.launch(np.array(request.dynamics.initial_velocity))
     return Alone(motion, plan)
+
+
+def make_motion(comm: MPI.Comm, model: StructureModel, request: StructureInput, loads: list[Load]) -> Moving:
+    """Return the motion from rest by the run's solver; collective."""
+    step = model.steps.plan.step
+    if request.solver == "implicit":
+        return ImplicitMotion(comm, model.body, loads, step, request.dynamics.numerics.hht_alpha)
+    return uncut_motion(model.body, loads, step)
 
 
 def make_history(comm: MPI.Comm, model: StructureModel, request: StructureInput, pulses: dict[str, Pulse]) -> History:

@@ -6,7 +6,6 @@ from mpi4py import MPI
 
 from fem.agreement import agreed
 from fem.body import Body, Pieces, Response, make_body, make_pieces
-from fem.errors import AgreedError
 from fem.force import Kinematics, linear_terms
 from fem.inputs import StructureInput
 from fem.local_mesh import distribute
@@ -76,6 +75,5 @@ def read_structure(comm: MPI.Comm, request: StructureInput) -> tuple[MeshData | 
 def choose_steps(comm: MPI.Comm, pieces: Pieces, request: StructureInput, pulses: list[float]) -> Steps:
     """Choose the steps of the run's solver."""
     if request.solver == "implicit":
-        raise AgreedError("the implicit solver of structures is not connected yet: dynamics.solver = explicit")
         return implicit_steps(comm, pieces, request.dynamics, pulses)
     return explicit_steps(comm, pieces, request.dynamics)

@@ -1,0 +1,86 @@
+"""All loads and damping in implicit steps: the ledger is exact to round-off, the motion that of explicit steps."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from fem.body import Body
+from fem.implicit import ImplicitMotion
+from fem.loads import Load
+from fem.mesh import MeshData
+from fem.moving import Moving
+from tests.support.fem_bodies import STEEL, dns_body, motion_of
+from tests.verification.test_fem_loads import bar, largest_imbalance, loads_of
+
+KINDS = ["pressure", "motion", "large_mass", "damped"]
+
+
+def model(kind: str) -> tuple[Body, MeshData, float]:
+    mesh = bar(held=kind == "damped")
+    body, critical = dns_body(mesh, STEEL)
+    return body, mesh, critical
+
+
+@pytest.mark.parametrize("fraction", [0.5, 5.0])
+@pytest.mark.parametrize("kind", KINDS)
+def test_energy_is_exact(kind, fraction):
+    body, mesh, critical = model(kind)
+    motion = ImplicitMotion(MPI.COMM_SELF, body, loads_of(kind, body, mesh, 0.1 * critical), fraction * critical)
+    error, work = largest_imbalance(motion, 100)
+    assert error < (1e-8 if kind == "large_mass" else 1e-11) * work
+
+
+def run(motion: Moving, end: float) -> Moving:
+    while motion.time < end - 0.5 * motion.step:
+        motion.advance()
+        motion.update_force()
+    return motion
+
+
+def shape_of(motion: Moving) -> np.ndarray:
+    return motion.displacement - motion.base_displacement()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_motion_is_that_of_small_explicit_steps(kind):
+    body, mesh, critical = model(kind)
+
+    def loads() -> list[Load]:
+        return loads_of(kind, body, mesh, 0.0)
+
+    end = 50 * critical
+    exact = run(motion_of(body, critical / 32, loads()), end)
+    implicit = run(ImplicitMotion(MPI.COMM_SELF, body, loads(), critical / 32), end)
+    force = body.mass.sum() * 1e4  # reactions of a free body are round-off of this
+    for values, reference, least in (
+        (shape_of(implicit), shape_of(exact), 0.0),
+        (implicit.present_velocity(), exact.present_velocity(), 0.0),
+        (implicit.external_work, exact.external_work, 0.0),
+        (implicit.damping_energy, exact.damping_energy, 0.0),
+        (implicit.reaction(), exact.reaction(), 1e-3 * force),
+    ):
+        assert values == pytest.approx(reference, abs=0.01 * max(np.abs(reference).max(), least))
+
+
+def test_initial_velocity_starts_the_ledger():
+    body, _, critical = model("damped")
+    motion = ImplicitMotion(MPI.COMM_SELF, body, [], 2 * critical)
+    motion.launch(np.array([1.0, 0.0, 0.0]))
+    start = motion.kinetic_energy()
+    assert start == pytest.approx(0.5 * body.mass[body.free[:, 0]].sum(), rel=1e-12)
+    run(motion, 40 * critical)
+    assert motion.kinetic_energy() + motion.internal_energy().total == pytest.approx(start, rel=1e-11)
+    assert motion.external_work == 0.0
+
+
+def test_state_continues_to_the_same_bits():
+    body, mesh, critical = model("motion")
+    first, second = (
+        ImplicitMotion(MPI.COMM_SELF, body, loads_of("motion", body, mesh, 0.0), 2 * critical) for _ in range(2)
+    )
+    run(first, 20 * critical)
+    second.restore(first.state())
+    run(first, 40 * critical)
+    run(second, 40 * critical)
+    assert np.array_equal(first.displacement, second.displacement)
+    assert first.external_work == second.external_work
