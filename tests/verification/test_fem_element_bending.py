@@ -74,8 +74,9 @@ def ratio(name: str, size: tuple[float, float, float], counts: tuple[int, int, i
 
 @NOT_LOCKING
 @pytest.mark.parametrize("aspect", [1.0, 25.0])
-def test_bending_does_not_lock_with_the_aspect_of_the_elements(name, aspect):
-    assert ratio(name, (16 * aspect, 1.0, 4.0), (16, 1, 4)) == pytest.approx(1.0, abs=0.02)
+@pytest.mark.parametrize("poisson", [0.0, 0.499])
+def test_bending_does_not_lock_with_the_aspect_of_the_elements(name, aspect, poisson):
+    assert ratio(name, (16 * aspect, 4.0, 4.0), (16, 2, 4), poisson) == pytest.approx(1.0, abs=0.02)
 
 
 @NOT_LOCKING
