@@ -12,6 +12,7 @@ from fem.tie import net_load
 ENERGIES = ("kinetic", "internal", "plastic", "hourglass", "damping", "external", "interface")
 SUMS = len(ENERGIES) + 1 + 16
 JUDGED = 1e-6  # of the largest energy: a step energy below it is round-off
+OVERDRAWN = 1.01  # energy taken by damping over energy given: more is possible only above the damped critical step
 EXPLANATION = "most likely the time step is too large for this mesh and material, or a load acts on what nothing holds"
 
 
@@ -120,9 +121,11 @@ class Ledger:
         strain = found["internal"] + found["hourglass"]
         if self.largest <= self.trivial:
             return
-        if found["damping"] < -JUDGED * self.largest:
+        given = found["external"] + self.initial
+        if found["damping"] > OVERDRAWN * max(given, 0.0) + JUDGED * self.largest:
             raise EnergyError(
-                f"the time step is not stable {self._when(time)}: damping makes energy, {self._cause(found)}"
+                f"the time step is not stable {self._when(time)}: damping has taken {found['damping']:.3e} J, more than"
+                f" was given, {given:.3e} J; {self._cause(found)}"
             )
         if step_energy > strain and step_energy > JUDGED * self.largest:
             raise EnergyError(

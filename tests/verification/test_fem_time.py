@@ -1,0 +1,117 @@
+"""Waves through a change of impedance, and second order in time under every kind of load."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from fem.damping import RayleighDamping
+from fem.facet_areas import outward_areas
+from fem.loads import BodyAcceleration, LargeMass, Load, NodalForces, PrescribedMotion
+from fem.material_parameters import Isotropic
+from fem.material_roles import Materials
+from fem.mesh import MeshData
+from fem.pulse import HalfSine, Tabulated
+from tests.support.fem_bodies import STEEL, dns_body, motion_of
+from tests.support.fem_models import grid, mesh_of, on
+
+SPEED = np.sqrt(STEEL.young_modulus / STEEL.density)
+ALONG = np.array([1.0, 0.0, 0.0])
+
+
+def smooth_pulse(peak: float, duration: float) -> Tabulated:
+    """Return peak times sin^2, tabulated."""
+    times = np.linspace(0.0, duration, 201)
+    return Tabulated(times, peak * np.sin(np.pi * times / duration) ** 2)
+
+
+@pytest.mark.parametrize("ratio", [3.0, 1.0 / 3.0])
+def test_wave_through_a_change_of_impedance(ratio):
+    """Stress is transmitted by 2 Z2 / (Z1 + Z2) and reflected by (Z2 - Z1) / (Z1 + Z2), Z = rho c."""
+    count, size = 200, 1e-4
+    other = Isotropic(density=STEEL.density * ratio**2, young_modulus=STEEL.young_modulus, poisson_ratio=0.0)
+    # The second bar's elements are as long as the wave is slower in it, so that both have the same critical step.
+    x = np.concatenate([np.linspace(0, count, count + 1), count + np.linspace(0, count, count + 1)[1:] / ratio]) * size
+    points, cells = grid(x, [0, size], [0, size])
+    second = points[cells][:, :, 0].mean(axis=1) > count * size
+    mesh = mesh_of(points, cells, np.where(second, "copper", "board"), {"low": on(0, 0.0)})
+    body, critical = dns_body(mesh, materials=Materials(board=STEEL, copper=other))
+    unit = size / SPEED
+    driven = body.local.locate(mesh.facet_nodes("low"))
+    motion = motion_of(body, 0.9 * critical, [PrescribedMotion(driven, 0, smooth_pulse(1.0, 60 * unit))])
+    before, behind = (int(np.argmin(np.abs(body.local.points[:, 0] - x[k]))) for k in (count // 2, count + 60))
+    times, gauges = [], []
+    while motion.time < 380 * unit:
+        motion.advance()
+        motion.update_force()
+        times.append(motion.time / unit)
+        gauges.append(motion.velocity[[before, behind], 0])
+    gauge, clock = np.array(gauges), np.array(times)
+    incident = gauge[(clock > 90) & (clock < 200), 0].max()
+    back = gauge[clock > 280, 0]
+    reflected = back[np.argmax(np.abs(back))]
+    transmitted = gauge[:, 1].max()
+    assert incident == pytest.approx(1.0, rel=0.005)
+    assert ratio * transmitted / incident == pytest.approx(2 * ratio / (1 + ratio), rel=0.01)
+    assert -reflected / incident == pytest.approx((ratio - 1) / (1 + ratio), rel=0.01)
+
+
+def box(held: bool) -> MeshData:
+    points, cells = grid(np.linspace(0, 6e-3, 7), [0, 1e-3], [0, 1e-3])
+    facets = {"symmetry_x": on(0, 0.0)} if held else {}
+    return mesh_of(points, cells, "board", facets | {"low": on(0, 0.0), "high": on(0, 6e-3)})
+
+
+LOADS = ("direct", "large_mass", "pressure", "motion", "damping")
+
+
+def loads_of(kind: str, body, mesh: MeshData, duration: float) -> list[Load]:
+    pulse = HalfSine(1e4, 0.6 * duration)
+    low = mesh.facet_nodes("low")
+    if kind == "direct":
+        return [BodyAcceleration(ALONG, pulse)]
+    if kind == "large_mass":
+        return [LargeMass.build(MPI.COMM_SELF, body, low, ALONG, pulse)]
+    if kind == "pressure":
+        nodes, areas = outward_areas(mesh, "high")
+        return [NodalForces.build(body, nodes, -areas, smooth_pulse(1e6, 0.6 * duration))]
+    if kind == "motion":
+        return [PrescribedMotion(body.local.locate(low), 0, smooth_pulse(1.0, 0.6 * duration))]
+    return [BodyAcceleration(ALONG, pulse), RayleighDamping(2e5, 0.0, body.terms)]
+
+
+@pytest.mark.parametrize("kind", LOADS)
+def test_second_order_in_time(kind):
+    mesh = box(held=kind not in ("large_mass", "motion"))
+    body, critical = dns_body(mesh, STEEL)
+    duration = 40 * critical
+
+    def field(steps: int) -> np.ndarray:
+        motion = motion_of(body, duration / steps, loads_of(kind, body, mesh, duration))
+        for _ in range(steps):
+            motion.advance()
+            motion.update_force()
+        return motion.displacement - motion.base_displacement()
+
+    exact = field(6400)
+    errors = [np.linalg.norm(field(steps) - exact) for steps in (100, 200)]
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(2.0, abs=0.2)
+
+
+def test_stiffness_damping_half_a_step_late_is_of_first_order():
+    """Its error is the ratio of critical damping times the step, small against the damping itself."""
+    mesh = box(held=True)
+    body, critical = dns_body(mesh, STEEL)
+    duration, stiffness = 40 * critical, 0.2 * critical
+
+    def field(steps: int) -> np.ndarray:
+        loads = [BodyAcceleration(ALONG, HalfSine(1e4, 0.6 * duration)), RayleighDamping(0.0, stiffness, body.terms)]
+        motion = motion_of(body, duration / steps, loads)
+        for _ in range(steps):
+            motion.advance()
+            motion.update_force()
+        return motion.displacement
+
+    exact = field(25600)
+    errors = [np.linalg.norm(field(steps) - exact) for steps in (400, 800)]
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(1.0, abs=0.2)
+    assert errors[0] < 0.01 * np.linalg.norm(exact)
