@@ -1,0 +1,122 @@
+"""Pulse, gravity and loads of a package's shock, what does not fit together, and loads that act on nothing."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+from pydantic import ValidationError
+
+from fem import shock_checks
+from fem.body import Body
+from fem.errors import EnergyError, LoadError
+from fem.ledger import SUMS, Ledger
+from fem.loads import BodyAcceleration, LargeMass, PrescribedMotion
+from fem.mesh import MeshData
+from fem.parameters import Damping, Shock
+from fem.pulse import Constant
+from fem.shock_loads import shock_pulse
+from tests.support.fem_bodies import STEEL, dns_body, motion_of
+from tests.support.fem_models import grid, mesh_of, on
+
+G = 9.80665
+
+
+def shock(**changes) -> Shock:
+    return Shock(**({"peak_acceleration": 1500 * G, "pulse_duration": 5e-4, "duration": 1e-3} | changes))
+
+
+def test_half_sine_and_service_condition_b_are_the_same():
+    by_name = shock_pulse(shock(peak_acceleration=None, pulse_duration=None, service_condition="B"))
+    given = shock_pulse(shock())
+    assert by_name.source == "JEDEC service condition B"
+    for time in (0.0, 1e-4, 2.5e-4, 6e-4):
+        assert by_name.pulse.value(time) == pytest.approx(given.pulse.value(time), rel=1e-12)
+
+
+def test_tabulated_shock(tmp_path):
+    path = tmp_path / "drop.csv"
+    path.write_text("time [ms], acceleration [G]\n0, 0\n0.25, 1500\n0.5, 0\n")
+    found = shock_pulse(shock(peak_acceleration=None, pulse_duration=None, table=str(path)))
+    assert found.source == "table drop.csv"
+    assert found.pulse.value(1.25e-4) == pytest.approx(750 * G)
+
+
+@pytest.mark.parametrize(
+    ("changes", "on"),
+    [({}, False), ({"peak_acceleration": 100 * G}, True), ({"gravity": "on"}, True), ({"gravity": "off"}, False)],
+)
+def test_gravity_is_left_out_where_it_is_negligible(changes, on):
+    found = shock_pulse(shock(**changes))
+    assert found.gravity is on
+    assert found.why
+
+
+PROBLEMS = {
+    "shock.peak_acceleration": {"peak_acceleration": None, "pulse_duration": None},
+    "shock.pulse_duration": {"pulse_duration": None},
+    "shock.table": {"peak_acceleration": None, "pulse_duration": None, "service_condition": "B", "table": "a.csv"},
+    "shock.damping.frequency": {"damping": Damping(mass_ratio=0.01)},
+    "shock.method": {"method": "large_mass", "damping": Damping(mass_coefficient=10.0)},
+}
+
+
+@pytest.mark.parametrize("key", PROBLEMS)
+def test_what_does_not_fit_together_is_named(key):
+    assert [problem.key for problem in shock_checks.problems(shock(**PROBLEMS[key]))] == [key]
+
+
+def test_possible_shock_has_no_problem():
+    assert not shock_checks.problems(shock(damping=Damping(stiffness_ratio=0.01, frequency=1e3)))
+    with pytest.raises(ValidationError, match="service_condition"):
+        shock(service_condition="J")
+
+
+def box(held: bool) -> tuple[MeshData, Body]:
+    points, cells = grid([0.0, 1e-3, 2e-3], [0, 1e-3], [0, 1e-3])
+    facets = {"low": on(0, 0.0), "high": on(0, 2e-3)} | ({"symmetry_x": on(0, 0.0)} if held else {})
+    mesh = mesh_of(points, cells, "board", facets)
+    return mesh, dns_body(mesh, STEEL)[0]
+
+
+def test_large_mass_needs_nodes_that_are_free():
+    mesh, body = box(held=True)
+    up = np.array([0.0, 0.0, 1.0])
+    with pytest.raises(LoadError, match="support nodes that are free to move: there are none"):
+        LargeMass.build(MPI.COMM_SELF, body, np.empty(0, int), up, Constant(1.0))
+    with pytest.raises(LoadError, match="4 of their components are held"):
+        LargeMass.build(MPI.COMM_SELF, body, mesh.facet_nodes("low"), up, Constant(1.0))
+
+
+def test_motion_of_a_held_component_is_refused():
+    mesh, body = box(held=True)
+    with pytest.raises(LoadError, match="prescribed motion along x acts on nodes that are held"):
+        motion_of(body, 1e-8, [PrescribedMotion(body.local.locate(mesh.facet_nodes("low")), 0, Constant(1.0))])
+
+
+def test_weight_of_the_large_mass_does_not_move_the_base():
+    mesh, body = box(held=False)
+    low = mesh.facet_nodes("low")
+    along = np.array([1.0, 0.0, 0.0])
+    motion = motion_of(
+        body,
+        1e-8,
+        [LargeMass.build(MPI.COMM_SELF, body, low, along, Constant(1e3)), BodyAcceleration(along, Constant(G))],
+    )
+    for _ in range(50):
+        motion.advance()
+        motion.update_force()
+    base = motion.displacement[body.local.locate(low), 0]
+    assert base == pytest.approx(-0.5 * 1e3 * motion.time**2, rel=1e-4)
+    assert motion.base_displacement()[0] == pytest.approx(-0.5 * 1e3 * motion.time**2, rel=1e-10)
+
+
+def test_ledger_says_what_grew_and_which_step_it_was():
+    ledger = Ledger(limit=0.02, trivial=0.0, step=1e-9, critical=9e-10)
+    sums = np.zeros(SUMS)
+    ledger.judge(sums, 0.0)
+    sums[1] = np.inf
+    expected = (
+        r"energies are not numbers at time 1\.0+e-06 s \(step 1000\): the internal energy went from 0\.000e\+00 J to"
+        r" inf J since the sample before; step 1\.000e-09 s, estimated critical step 9\.000e-10 s; most likely the time"
+    )
+    with pytest.raises(EnergyError, match=expected):
+        ledger.judge(sums, 1e-6)
