@@ -1,17 +1,11 @@
 """Bodies of every kind of element move alike on one and on two ranks, and their fields are written."""
 
-import json
-import os
-import subprocess
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from tests.support.fem_elements import KINDS
+from tests.support.fem_program import run_script
 
-ROOT = Path(__file__).resolve().parents[2]
 SCRIPT = """
 import json, sys
 from pathlib import Path
@@ -55,24 +49,8 @@ if comm.rank == 0:
 """
 
 
-def results(directory: Path, ranks: int) -> dict:
-    script = directory / "elements.py"
-    script.write_text(SCRIPT)
-    done = subprocess.run(
-        ["mpirun", "--allow-run-as-root", "--oversubscribe", "-n", str(ranks), sys.executable, script, directory],
-        cwd=ROOT,
-        env=os.environ | {"PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"},
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout)
-
-
 def test_two_ranks_give_the_results_of_one(tmp_path):
-    one, two = results(tmp_path, 1), results(tmp_path, 2)
+    one, two = (run_script(SCRIPT, tmp_path, ranks) for ranks in (1, 2))
     for name in KINDS:
         first, second = (np.array(run[name]["displacement"]) for run in (one, two))
         assert np.abs(second - first).max() < 1e-10 * np.abs(first).max(), name

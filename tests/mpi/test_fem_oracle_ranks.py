@@ -1,14 +1,9 @@
 """Implicit steps and natural modes are the same on one and on two ranks."""
 
-import json
-import os
-import subprocess
-import sys
-from pathlib import Path
-
 import pytest
 
-ROOT = Path(__file__).resolve().parents[2]
+from tests.support.fem_program import run_script
+
 SCRIPT = """
 import json, sys
 import numpy as np
@@ -47,24 +42,8 @@ if comm.rank == 0:
 """
 
 
-def results(directory: Path, ranks: int) -> dict:
-    script = directory / "oracle.py"
-    script.write_text(SCRIPT)
-    done = subprocess.run(
-        ["mpirun", "--allow-run-as-root", "--oversubscribe", "-n", str(ranks), sys.executable, str(script)],
-        cwd=ROOT,
-        env=os.environ | {"PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"},
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout)
-
-
 def test_two_ranks_give_the_results_of_one(tmp_path):
-    one, two = results(tmp_path, 1), results(tmp_path, 2)
+    one, two = (run_script(SCRIPT, tmp_path, ranks) for ranks in (1, 2))
     scale = max(abs(value) for point in one["displacement"] for value in point)
     for first, second in zip(one["displacement"], two["displacement"], strict=True):
         assert second == pytest.approx(first, abs=1e-8 * scale)

@@ -1,5 +1,6 @@
-"""The fem program on several ranks."""
+"""The fem program, and scripts, on several ranks."""
 
+import json
 import os
 import subprocess
 import sys
@@ -11,10 +12,24 @@ MPIRUN = ["mpirun", "--allow-run-as-root", "--oversubscribe", "--mca", "mpi_yiel
 
 def run_program(path: Path, ranks: int) -> subprocess.CompletedProcess:
     """Run ``python -m fem`` on an input file."""
+    return run_python(["-m", "fem", str(path)], ranks)
+
+
+def run_script(text: str, directory: Path, ranks: int) -> dict:
+    """Run a script that is given the directory and prints its results as JSON."""
+    script = directory / "script.py"
+    script.write_text(text)
+    done = run_python([str(script), str(directory)], ranks)
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+def run_python(arguments: list[str], ranks: int) -> subprocess.CompletedProcess:
+    """Run Python on several ranks, with this tree's packages."""
     return subprocess.run(
-        [*MPIRUN, str(ranks), sys.executable, "-m", "fem", str(path)],
+        [*MPIRUN, str(ranks), sys.executable, *arguments],
         cwd=ROOT,
-        env=os.environ | {"OMP_NUM_THREADS": "1"},
+        env=os.environ | {"PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"},
         capture_output=True,
         text=True,
         timeout=120,
