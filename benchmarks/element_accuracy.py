@@ -42,6 +42,7 @@ from tests.support.fem_models import CYCLIC
 
 RESULTS = Path(__file__).parent / "results" / "element_accuracy.json"
 README = Path(__file__).parents[1] / "cases" / "cantilever" / "README.md"
+STORED = README.with_name("work_precision.json")
 BEGIN, END = "<!-- work-precision: written by benchmarks/element_accuracy.py -->", "<!-- work-precision: end -->"
 HEAD = ["problem", "mesh", "deflection", "frequency", "critical step", "steps", "updates", "explicit", "implicit"]
 NAMES = {
@@ -239,7 +240,8 @@ def markdown(result: dict) -> str:
 
 
 def publish(result: dict) -> None:
-    """Write the table into the README of the case."""
+    """Store a measurement with the case, and its table in the README."""
+    STORED.write_text(json.dumps(result, indent=1) + "\n")
     before, rest = README.read_text().split(BEGIN)
     README.write_text(f"{before}{BEGIN}\n{markdown(result)}\n{END}{rest.split(END)[1]}")
 
@@ -251,7 +253,7 @@ def main() -> None:
     parser.add_argument("--stored", action="store_true", help="measure nothing, take the stored rows")
     parser.add_argument("--publish", action="store_true", help="write to cases/cantilever as well")
     options = parser.parse_args()
-    result = json.loads(RESULTS.read_text()) if options.stored else run_all(QUICK if options.quick else FULL)
+    result = json.loads(STORED.read_text()) if options.stored else run_all(QUICK if options.quick else FULL)
     if options.publish:
         publish(result)
 
