@@ -21,9 +21,10 @@ from fem.parameters import Ranks
 from fem.participant import Alone, Participant, uncut_motion
 from fem.pulse import Pulse
 from fem.result import Timings
-from fem.structure_loads import damping_loads, pulse_durations, pulses_of, structure_loads
+from fem.structure_loads import damping_loads, structure_loads
 from fem.structure_model import StructureModel, build_structure
 from fem.structure_modes import find_modes
+from fem.structure_pulses import pulse_durations, pulses_of
 from fem.structure_result import Found, element_peaks, write_result
 from fem.watch_points import PointWatch
 

@@ -11,11 +11,10 @@ from numpy.typing import NDArray
 from fem.body import Pieces
 from fem.damping import damped_critical_step
 from fem.estimate import WindowPlan
+from fem.solver_cost import implicit_step
 from fem.steps import Steps, agreed_minimum, critical_by_role, mass_factor
 from fem.structure_parameters import Dynamics
 
-PULSE_STEPS = 200  # implicit steps in the shortest pulse: 3e-4 of the period of what swings twice in it
-RUN_STEPS = 1000  # implicit steps in a run without a pulse
 ROUNDING = 1e-9
 
 
@@ -45,11 +44,10 @@ def with_critical(steps: Steps, undamped: float, dynamics: Dynamics) -> Steps:
 
 def implicit_steps(comm: MPI.Comm, pieces: Pieces, dynamics: Dynamics, pulses: Iterable[float]) -> Steps:
     """Choose the steps of the implicit solver: as given, or so many in the shortest of some pulses [s]; collective."""
-    largest = dynamics.numerics.implicit_step
-    if largest is None:
-        largest = min([dynamics.duration / RUN_STEPS, *(pulse / PULSE_STEPS for pulse in pulses)])
     critical = agreed_minimum(comm, [pieces.steps])
-    return make_steps(comm, pieces, np.ones(len(pieces.steps)), (window_plan(dynamics, largest), critical))
+    return make_steps(
+        comm, pieces, np.ones(len(pieces.steps)), (window_plan(dynamics, implicit_step(dynamics, pulses)), critical)
+    )
 
 
 def window_plan(dynamics: Dynamics, largest: float) -> WindowPlan:
