@@ -41,7 +41,7 @@ def show_plan(case: Case, run_folder: Path, console: Console) -> None:
     elif isinstance(case, StructureCase):
         motion = forecast_structure(case)
         _show(case, run_folder, motion, console, "motion")
-        for shown in (structure_plan.layers(motion), structure_plan.motion(case, motion)):
+        for shown in (structure_plan.layers(motion), structure_plan.solvers(case, motion)):
             console.print(shown)
     else:
         body = forecast_scene(case)

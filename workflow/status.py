@@ -23,7 +23,7 @@ FIGURES = {
         "two_scale_dns_time_ratio", "first_frequency", "steps", "energy_balance_error",
     ),
     "comparison": (
-        "solver_displacement_difference", "solver_strain_difference", "wave_speed_error", "transmitted_velocity_error",
+        "displacement_difference", "strain_difference", "wave_speed_error", "transmitted_velocity_error",
         "reflected_velocity_error", "tip_deflection_error", "swing_frequency_error",
     ),
     "report": (),

@@ -1,5 +1,6 @@
 """The case of a structure: a box of layers, held and loaded, whose motion is computed."""
 
+from collections.abc import Iterator
 from pathlib import Path
 
 from pydantic import Field
@@ -57,19 +58,26 @@ class StructureCase(Case):
         return Box((body.length, body.width), body.cells, layers, body.symmetry, body.element, holes)
 
     def problems(self) -> list[Problem]:
-        """Find what does not fit together: materials, places, facet sets, loads."""
+        """Find what does not fit together: materials, places, facet sets, loads, references."""
         from fem import structure_checks
         from meshing.box_checks import box_problems
 
         boxes = [Problem(found.key, found.message, found.value, found.allowed) for found in box_problems(self.box)]
-        return (
-            boxes
-            + [
-                Problem(found.key, found.message, found.value, found.allowed, found.hint)
-                for found in structure_checks.problems(self.scene)
-            ]
-            + list(reference_problems(self.references, self.scene))
-        )
+        scenes = [
+            Problem(found.key, found.message, found.value, found.allowed, found.hint)
+            for found in structure_checks.problems(self.scene)
+        ]
+        return [*boxes, *scenes, *self._unreadable_tables(), *reference_problems(self.references, self.scene)]
+
+    def _unreadable_tables(self) -> Iterator[Problem]:
+        from fem.errors import PulseError
+        from fem.structure_pulses import pulse_of
+
+        for key, path in self.files.items():
+            try:
+                pulse_of(self.loads[key.split(".")[1]])
+            except PulseError as error:
+                yield Problem(key, str(error), str(path))
 
     @property
     def ranks(self) -> int:

@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workflow import exact_bar, exact_cantilever
-from workflow.findings import at_least, at_most, in_words_continued, metric
+from workflow.findings import at_least, at_most, metric
 from workflow.references import BarWave, Cantilever, FrequencyRange
 from workflow.stage_runner import Findings
 from workflow.structure_case import StructureCase
 
 SOLVER_DIFFERENCE = 0.01  # of the histories of watch points, explicit against implicit, relative L2
-COMPARED = ("displacement", "strain")
+JUDGED = ("displacement_difference", "strain_difference")
 UNITS = {"wave_speed": "m/s", "tip_deflection": "m", "swing_frequency": "Hz"}
 
 Arrays = Mapping[str, NDArray]
@@ -34,8 +34,7 @@ def of_motion(results: Mapping[str, dict]) -> Findings:
         prefix = "" if solver == next(iter(results)) else f"{solver}_"
         metrics |= {prefix + name: value for name, value in result["metrics"].items()}
         health |= {prefix + name: value for name, value in result["health"].items()}
-    effects = dict(next(iter(results.values()))["effects"])
-    return Findings(metrics, health, effects, in_words_continued(results))
+    return Findings(metrics, health, dict(next(iter(results.values()))["effects"]))
 
 
 def of_comparison(case: StructureCase, folders: Mapping[str, Path]) -> Findings:
@@ -45,6 +44,8 @@ def of_comparison(case: StructureCase, folders: Mapping[str, Path]) -> Findings:
         case: the case.
         folders: folder of each solver's products, the one whose figures count first.
     """
+    from fem.compare_structures import solver_differences
+
     histories = {solver: read_history(folder) for solver, folder in folders.items()}
     metrics: dict = {}
     health: dict = {}
@@ -54,8 +55,9 @@ def of_comparison(case: StructureCase, folders: Mapping[str, Path]) -> Findings:
         metrics |= {prefix + name: value for name, value in found.items()}
         health |= {prefix + name: value for name, value in checks.items()}
     if len(folders) == 2:
-        for name, error in solver_differences(case, *histories.values()).items():
-            metrics[name], health[name] = metric(error), at_most(error, SOLVER_DIFFERENCE)
+        differences = solver_differences(*histories.values())
+        metrics |= {name: metric(value) for name, value in differences.items()}
+        health |= {name: at_most(differences[name], SOLVER_DIFFERENCE) for name in JUDGED if name in differences}
     return Findings(metrics, health)
 
 
@@ -111,20 +113,6 @@ def strip_of(case: StructureCase, reference: Cantilever) -> exact_cantilever.Str
     (material,) = case.scene.layer_materials.values()
     pressure, body = case.loads[reference.load].peak or 0.0, case.structure
     return exact_cantilever.Strip(body.length, body.thickness, elasticity_matrix(material), material.density, pressure)
-
-
-def solver_differences(case: StructureCase, ours: Arrays, other: Arrays) -> dict[str, float]:
-    """Compare the histories of all watch points: relative L2 norms over time and components."""
-    from fem.compare import relative_error
-
-    def difference(name: str) -> float:
-        columns = [np.interp(ours["time"], other["time"], column) for column in other[name].T]
-        return relative_error(ours[name], np.column_stack(columns))
-
-    return {
-        f"solver_{quantity}_difference": max((difference(f"{quantity}@{point}") for point in case.watch), default=0.0)
-        for quantity in COMPARED
-    }
 
 
 def _bar_wave(case: StructureCase, reference: BarWave, history: Arrays) -> tuple:

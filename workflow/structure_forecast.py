@@ -1,11 +1,16 @@
 """Size, time steps and cost of a structure's motion, from its parameters alone."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from math import ceil
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from workflow.structure_case import StructureCase
+
+if TYPE_CHECKING:
+    from fem.solver_cost import SolverForecast
+
+SECONDS_TO_START = 4.0  # until the ranks of a solver have loaded their libraries and kernels
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,24 +30,36 @@ class StructureForecast:
     Attributes:
         effects: effect -> {"on", "why"}.
         layers: layer -> size and step.
-        step: explicit time step [s].
-        steps: number of explicit steps.
+        steps: time step [s] of each solver.
+        solvers: their cost on one core, and which is cheaper.
         seconds: stage -> predicted wall time [s].
     """
 
     effects: Mapping[str, Any]
     layers: dict[str, LayerForecast]
-    step: float
-    steps: int
+    steps: dict[str, float]
+    solvers: "SolverForecast"
     seconds: dict[str, float]
 
 
 def forecast_structure(case: StructureCase) -> StructureForecast:
     """Predict sizes, steps and cost."""
-    layers = forecast_layers(case)
-    numerics = case.dynamics.numerics
-    step = numerics.step_fraction * min(layer.critical_step for layer in layers.values() if not layer.mass_scaled)
-    return StructureForecast(structure_effects(case), layers, step, ceil(case.dynamics.duration / step), {})
+    from fem.solver_cost import forecast_solvers, implicit_step
+    from fem.structure_effects import effects
+    from fem.structure_pulses import pulse_durations, pulses_of
+
+    layers, dynamics = forecast_layers(case), case.dynamics
+    critical = min(layer.critical_step for layer in layers.values() if not layer.mass_scaled)
+    steps = {
+        "explicit": dynamics.numerics.step_fraction * critical,
+        "implicit": implicit_step(dynamics, pulse_durations(pulses_of(case.loads))),
+    }
+    counts = {solver: ceil(dynamics.duration / step) for solver, step in steps.items()}
+    elements = sum(layer.elements for layer in layers.values())
+    solvers = forecast_solvers(case.scene, elements, counts["explicit"], counts["implicit"])
+    cost = {"explicit": solvers.explicit.seconds / case.ranks, "implicit": solvers.implicit.seconds}
+    shock = sum(SECONDS_TO_START + cost[solver] for solver in dynamics.solvers)
+    return StructureForecast(effects(case.scene, added_mass(case, layers)), layers, steps, solvers, {"shock": shock})
 
 
 def forecast_layers(case: StructureCase) -> dict[str, LayerForecast]:
@@ -61,27 +78,16 @@ def forecast_layers(case: StructureCase) -> dict[str, LayerForecast]:
     return layers
 
 
-def structure_effects(case: StructureCase) -> dict[str, dict]:
-    """Say which effects are simulated, and why."""
-    dynamics, damping = case.dynamics, case.dynamics.damping
-    yielding = [name for name, material in case.scene.layer_materials.items() if getattr(material, "plasticity", None)]
-    damped = [name for name, value in damping if value and name != "frequency"]
-    return {
-        "finite_rotation": _effect(dynamics.kinematics == "finite", f"dynamics.kinematics = {dynamics.kinematics}"),
-        "plasticity": _effect(bool(yielding), f"layers with a plastic material: {_names(yielding)}"),
-        "damping": _effect(bool(damped), f"dynamics.damping: {_names(damped)}"),
-        "mass_scaling": _effect(
-            bool(dynamics.numerics.mass_scaled), f"layers: {_names(dynamics.numerics.mass_scaled)}"
-        ),
-        "gravity": _effect(
-            any(load.kind == "gravity" for load in case.loads.values()), "a load of kind gravity, or none"
-        ),
-    }
-
-
-def _effect(on: bool, why: str) -> dict:
-    return {"on": on, "why": why}
-
-
-def _names(names: Iterable[str]) -> str:
-    return ", ".join(names) or "none"
+def added_mass(case: StructureCase, layers: Mapping[str, LayerForecast]) -> float:
+    """Predict the mass [kg] that scaling adds: it raises the steps of some layers to the smallest of the others."""
+    body, materials = case.structure, case.scene.layer_materials
+    target = min(layer.critical_step for layer in layers.values() if not layer.mass_scaled)
+    area = case.box.extent(0) * case.box.extent(1)
+    return sum(
+        (max(1.0, (target / layer.critical_step) ** 2) - 1.0)
+        * materials[name].density
+        * area
+        * body.layers[name].thickness
+        for name, layer in layers.items()
+        if layer.mass_scaled
+    )

@@ -1,10 +1,17 @@
 """Tables of the plan of a structure: its layers, and what either solver would cost."""
 
+from typing import TYPE_CHECKING
+
 from rich.table import Table
 
-from workflow.plan_table import new_table, short
+from workflow.plan_table import duration, new_table, short
 from workflow.structure_case import StructureCase
 from workflow.structure_forecast import StructureForecast
+
+if TYPE_CHECKING:
+    from fem.solver_cost import SolverCost
+
+MEGA = 1.0e6
 
 
 def layers(outlook: StructureForecast) -> Table:
@@ -17,10 +24,22 @@ def layers(outlook: StructureForecast) -> Table:
     return table
 
 
-def motion(case: StructureCase, outlook: StructureForecast) -> Table:
-    """Steps and cost of both solvers."""
-    table = new_table("\nMotion", "what", "value", "remark")
-    fraction = case.dynamics.numerics.step_fraction
-    table.add_row("explicit step", short(outlook.step), f"{fraction:g} of the smallest critical step")
-    table.add_row("explicit steps", f"{outlook.steps}", f"{short(case.dynamics.duration)} in all")
+def solvers(case: StructureCase, outlook: StructureForecast) -> Table:
+    """Steps, cost and memory of both solvers, and which to take."""
+    table = new_table("\nSolvers, on one core", "solver", "step", "steps", "cost", "memory", "remark")
+    numerics, found = case.dynamics.numerics, outlook.solvers
+    fraction = f"{numerics.step_fraction:g} of the smallest critical step"
+    factor = f"of it {duration(found.implicit.setup)} for the factor"
+    for name, cost, remark in (("explicit", found.explicit, fraction), ("implicit", found.implicit, factor)):
+        unused = "" if name in case.dynamics.solvers else "; not in dynamics.solver"
+        table.add_row(name, short(outlook.steps[name]), f"{cost.steps}", _about(cost), _memory(cost), remark + unused)
+    table.caption, table.caption_justify = found.sentence, "left"
     return table
+
+
+def _about(cost: "SolverCost") -> str:
+    return f"about {duration(cost.seconds)}"
+
+
+def _memory(cost: "SolverCost") -> str:
+    return f"{cost.memory / MEGA:.2g} MB" if cost.memory < 100.0 * MEGA else f"{cost.memory / (1000.0 * MEGA):.2g} GB"

@@ -15,8 +15,8 @@ from workflow.structure_findings import read_history, read_modes
 from workflow.structure_launch import read_results
 
 HEADLINE = (
-    "first_frequency", "peak_displacement", "displacement_range", "peak_strain", "solver_displacement_difference",
-    "solver_strain_difference", "wave_speed_error", "transmitted_velocity_error", "reflected_velocity_error",
+    "first_frequency", "peak_displacement", "displacement_range", "peak_strain", "displacement_difference",
+    "strain_difference", "wave_speed_error", "transmitted_velocity_error", "reflected_velocity_error",
     "tip_deflection_error", "swing_frequency_error", "energy_balance_error",
 )  # fmt: skip
 FRACTIONS = ("_error", "_difference", "_fraction")

@@ -11,9 +11,10 @@ from workflow.case_text import case_text
 from workflow.inputs import compare, stage_inputs
 from workflow.problems import CaseError
 from workflow.schema import case_schema
-from workflow.structure_forecast import forecast_structure, structure_effects
+from workflow.structure_forecast import forecast_structure
 
 BOARD = Path(__file__).resolve().parents[2] / "pipeline" / "structure.toml"
+FINITE = ["dynamics.solver=explicit", "dynamics.kinematics=finite"]
 SECOND_LAYER = "structure.layers.cover.material=coper"
 BAD_VALUES = {
     "unknown key of a load": ("loads.drop.pekk=3 G", ["loads.drop.pekk", "unknown key", "mean loads.drop.peak?"]),
@@ -93,12 +94,19 @@ def test_what_a_table_of_a_load_holds_is_a_parameter(tmp_path):
     path = tmp_path / "case.toml"
     text = BOARD.read_text().replace('peak = "1000 G"\nduration = "0.1 ms"\n', 'table = "pulse.csv"\n')
     path.write_text(text)
-    (tmp_path / "pulse.csv").write_text("0,0\n1e-4,9806.65\n")
+    (tmp_path / "pulse.csv").write_text("time [ms], acceleration [G]\n0,0\n0.1,1000\n")
     before = stage_inputs(read_case(path), read_case(path).pipeline["shock"])
     assert before["loads.drop.table"] == str(tmp_path / "pulse.csv")
-    (tmp_path / "pulse.csv").write_text("0,0\n1e-4,980.665\n")
+    (tmp_path / "pulse.csv").write_text("time [ms], acceleration [G]\n0,0\n0.1,100\n")
     after = stage_inputs(read_case(path), read_case(path).pipeline["shock"])
     assert [change.key for change in compare(before, after)] == ["loads.drop.table.sha256"]
+
+
+def test_an_unreadable_table_is_refused(tmp_path):
+    path = tmp_path / "case.toml"
+    path.write_text(BOARD.read_text().replace('peak = "1000 G"\nduration = "0.1 ms"\n', 'table = "pulse.csv"\n'))
+    with pytest.raises(CaseError, match=r"loads\.drop\.table = .*No such file"):
+        read_case(path)
 
 
 @pytest.mark.parametrize(
@@ -113,10 +121,19 @@ def test_sizes_and_steps_are_foreseen(setting, step):
     outlook, plain = forecast_structure(read_case(BOARD, [setting])), forecast_structure(read_case(BOARD))
     share = 6 if "tetra" in setting else 1
     assert outlook.layers["board"].elements == share * plain.layers["board"].elements
-    assert outlook.step == pytest.approx(step * plain.step, rel=0.15)
+    assert outlook.steps["explicit"] == pytest.approx(step * plain.steps["explicit"], rel=0.15)
+
+
+def test_either_solver_has_a_cost():
+    outlook = forecast_structure(read_case(BOARD, ["dynamics.solver=explicit"]))
+    both = forecast_structure(read_case(BOARD))
+    assert outlook.seconds["shock"] < both.seconds["shock"]
+    assert outlook.solvers.only_explicit == ()
+    assert forecast_structure(read_case(BOARD, FINITE)).solvers.only_explicit[0].startswith("finite rotations")
 
 
 def test_effects_have_reasons():
-    effects = structure_effects(read_case(BOARD, ["dynamics.damping.mass_coefficient=10 Hz"]))
-    assert effects["damping"] == {"on": True, "why": "dynamics.damping: mass_coefficient"}
+    effects = forecast_structure(read_case(BOARD, ['dynamics.numerics.mass_scaled=["cover"]'])).effects
+    assert effects["input_g"] == {"on": True, "why": "loads.drop"}
     assert not effects["finite_rotation"]["on"]
+    assert effects["mass_scaling"]["why"].startswith("dynamics.numerics.mass_scaled = ['cover']")

@@ -1,0 +1,61 @@
+"""Structures from case file to report, shortened."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+CASES = Path(__file__).resolve().parents[2] / "cases"
+COARSE_BOARD = ("structure.cells=[12,8]", "structure.layers.board.cells=1", "dynamics.duration=0.5 ms")
+SHORT = {
+    "bar_wave": ("structure.layers.lower.cells=150", "structure.layers.upper.cells=90"),
+    "cantilever": ("structure.layers.strip.thickness=1 mm", "dynamics.duration=7 ms"),
+}
+ERRORS = {
+    "bar_wave": {"wave_speed_error", "transmitted_velocity_error", "reflected_velocity_error"},
+    "cantilever": {"tip_deflection_error", "swing_frequency_error"},
+}
+
+
+def command(what: str, name: str, folder: Path, *settings: str, until: str = "") -> subprocess.CompletedProcess:
+    line = [sys.executable, "-m", "workflow", what, str(CASES / name / "case.toml"), "--out", str(folder)]
+    line += ["--until", until] if until else []
+    line += [item for setting in settings for item in ("--set", setting)]
+    return subprocess.run(line, capture_output=True, text=True, timeout=240, check=False)
+
+
+def test_both_solvers_of_a_board_from_case_file_to_report(tmp_path):
+    result = command("run", "jedec_board", tmp_path, *COARSE_BOARD)
+    assert result.returncode == 0, result.stdout + result.stderr
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    assert set(summary["timings"]) == {"geometry", "shock", "comparison"}
+    assert set(summary["health"]) >= {
+        "energy_balance_error", "implicit_energy_balance_error", "displacement_difference", "strain_difference",
+        "frequency_1_low", "frequency_1_high",
+    }  # fmt: skip
+    assert summary["metrics"]["peak_strain@centre"]["value"] > 0.0
+    assert all(effect["why"] for effect in summary["effects"].values())
+    page = (tmp_path / "report.html").read_text()
+    assert page.count("<svg") >= 4 and page.count("data:image/png") == 3
+    assert "Fuchs" in page and "Natural modes" in page
+    assert "nothing to do" in command("run", "jedec_board", tmp_path, *COARSE_BOARD).stdout
+    plan = command("plan", "jedec_board", tmp_path, *COARSE_BOARD, "references.first_mode.at_most=300 Hz").stdout
+    assert "references.first_mode.at_most: 350 Hz -> 300 Hz" in plan
+
+
+@pytest.mark.parametrize("name", SHORT)
+def test_motion_against_its_exact_solution(name, tmp_path):
+    result = command("run", name, tmp_path, *SHORT[name], until="comparison")
+    assert result.returncode == 0, result.stdout + result.stderr
+    health = json.loads((tmp_path / "comparison" / "stage.json").read_text())["health"]
+    assert set(health) == ERRORS[name]
+
+
+def test_bad_input_is_refused_before_anything_is_computed(tmp_path):
+    result = command("run", "bar_wave", tmp_path, "references.wave.transmitted=beyon", "loads.push.on=z_mid")
+    assert result.returncode == 2
+    assert "references.wave.transmitted" in result.stderr and "did you mean beyond?" in result.stderr
+    assert "loads.push.on" in result.stderr and "did you mean z_min?" in result.stderr
+    assert not (tmp_path / "geometry").exists()
