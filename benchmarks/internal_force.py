@@ -1,12 +1,17 @@
 """Element updates per second of the internal force: this program's paths, PETSc and dolfinx in one run; memory.
 
-    python benchmarks/internal_force.py        (one core; writes benchmarks/results/internal_force.json)
+    python benchmarks/internal_force.py        (a minute, one core; writes benchmarks/results/internal_force.json)
 
-All act on a cube of 40^3 hexahedra of steel, sides in turns, medians of processor seconds. dolfinx assembles the plain
-trilinear form with 2 x 2 x 2 Gauss points and the best flags of its compiler; ours have incompatible modes, which do
-not lock in bending: equal work for a user, not equal numbers. ``congruent`` knows that the elements are boxes of one
-shape; ``assembled`` and ``petsc_baij`` multiply by the matrix of a cube whose inner nodes were moved by up to 20 % of
-an edge.
+All act on a cube of 40^3 hexahedra, sides in turns, medians of processor seconds. dolfinx assembles the plain trilinear
+form of linear elasticity with 2 x 2 x 2 Gauss points and the best flags of its compiler; ours have incompatible modes,
+which do not lock in bending: equal work for a user, not equal numbers.
+- ``congruent`` knows that the elements are boxes of one shape.
+- ``assembled`` and ``petsc_baij`` multiply by the matrix of a cube whose inner nodes were moved by up to 20 % of an
+  edge.
+- ``yielding`` returns to the yield surface of a rate-dependent solder at every point in every call, which turns strains
+  of 0.5 % round; ``below_yield`` has the same law at small strains. All Gauss points or one, on boxes; small or finite
+  rotations and strains.
+- Tetrahedra are a sixth of each distorted hexahedron; their rates are of tetrahedra.
 """
 
 import ctypes
@@ -25,12 +30,18 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from benchmarks.support import turns
-from benchmarks.support.cube import STEEL, cube, elements_of, random_displacement
+from benchmarks.support.cube import SOLDER, STEEL, cube, elements_of, random_displacement
 from fem import dolfinx_api
 from fem.element import CHUNK, Elements, element_stiffness
-from fem.force import ForceTerm, force_terms
+from fem.force import ForceTerm, Kinematics, force_terms
 from fem.mesh import MeshData
 
+KINDS = ("incompatible_modes", "one_point")
+PLASTIC = [f"{name}_{kind}_small" for name in ("below_yield", "yielding") for kind in KINDS]
+BARS = {"congruent": 8.0, "assembled": 4.0} | dict.fromkeys(PLASTIC, 1.5)
+BYTES = {"congruent": 400.0, "assembled": 2000.0}
+STRAINS = {"below_yield": 1e-5, "yielding": 5e-3}
+STEP = 1e-6  # [s] of the rate-dependent law
 BEST_FLAGS = ["-O3", "-march=native", "-ffast-math"]
 PAGE = os.sysconf("SC_PAGE_SIZE")
 
@@ -40,9 +51,24 @@ def only_term(elements: Elements) -> ForceTerm:
     return term
 
 
-def force_of(term: ForceTerm, displacement: np.ndarray) -> Callable[[], object]:
+def linear(elements: Elements) -> Callable[[], object]:
+    """Return a call of the force of linear elements."""
+    term, displacement = only_term(elements), random_displacement(elements.points)
     force = np.zeros_like(displacement)
     return lambda: term.add(displacement, force)
+
+
+def plastic(elements: Elements, kinematics: Kinematics, strain: float) -> Callable[[], object]:
+    """Return a call of the force of elements of solder; each call turns the displacement round."""
+    (term,) = force_terms(elements, [SOLDER], kinematics, STEP)
+    state = random_displacement(elements.points, strain)
+    force = np.zeros_like(state)
+
+    def work() -> None:
+        np.negative(state, out=state)
+        term.add(state, force)
+
+    return work
 
 
 def petsc_product(elements: Elements) -> Callable[[], object]:
@@ -95,32 +121,49 @@ def memory(elements: Elements) -> dict[str, float]:
     return {"arrays": array_bytes(term) / count, "resident": grown / count}
 
 
+def sides() -> tuple[dict[str, Callable[[], object]], dict[str, int]]:
+    """Return the works and how many elements each updates."""
+    boxes, mesh = cube(), cube(distorted=True)
+    linear_elements = {
+        "congruent": elements_of(boxes),
+        "assembled": elements_of(mesh),
+        "tetrahedra": elements_of(mesh, "tetrahedron"),
+        "quadratic_tetrahedra": elements_of(mesh, "tetrahedron_quadratic"),
+    }
+    plastic_elements = {kind: elements_of(boxes, kind, SOLDER) for kind in KINDS}
+    works = {name: linear(elements) for name, elements in linear_elements.items()}
+    counts = {name: len(elements.cells) for name, elements in linear_elements.items()}
+    for kind, elements in plastic_elements.items():
+        for kinematics in ("small", "finite"):
+            for name, strain in STRAINS.items():
+                works[f"{name}_{kind}_{kinematics}"] = plastic(elements, kinematics, strain)
+    works["petsc_baij"] = petsc_product(linear_elements["assembled"])
+    works["petsc_baij_tetrahedra"] = petsc_product(linear_elements["tetrahedra"])
+    works["dolfinx"] = dolfinx_assembly(mesh)
+    counts["petsc_baij_tetrahedra"] = counts["tetrahedra"]
+    return works, dict.fromkeys(works, len(mesh.cells)) | counts
+
+
 def main() -> None:
-    boxes, distorted = elements_of(cube()), elements_of(cube(distorted=True))
-    memories = {"congruent": memory(boxes), "assembled": memory(distorted)}
-    displacement = random_displacement(cube())
-    seconds = turns.in_turns(
-        {
-            "congruent": turns.batch(force_of(only_term(boxes), displacement)),
-            "assembled": turns.batch(force_of(only_term(distorted), displacement)),
-            "petsc_baij": turns.batch(petsc_product(distorted)),
-            "dolfinx": turns.batch(dolfinx_assembly(cube())),
-        }
-    )
-    against = {name: turns.ratio(seconds, name, "dolfinx") for name in seconds}
+    memories = {"congruent": memory(elements_of(cube())), "assembled": memory(elements_of(cube(distorted=True)))}
+    works, counts = sides()
+    seconds = turns.in_turns({name: turns.batch(work) for name, work in works.items()})
+    hexahedra = [name for name in works if counts[name] == counts["dolfinx"]]
+    against = {name: turns.ratio(seconds, name, "dolfinx") for name in hexahedra}
+    bars = {f"{name} / dolfinx": turns.bar(against[name], limit) for name, limit in BARS.items()}
+    bars |= {
+        f"{name} bytes an element": turns.bar(max(memories[name].values()), limit, at_least=False)
+        for name, limit in BYTES.items()
+    }
     turns.write(
         "internal_force",
         {
-            "elements": len(boxes.cells),
-            "updates_per_second": turns.rates(seconds, len(boxes.cells)),
+            "elements": counts,
+            "updates_per_second": turns.rates(seconds, counts),
             "ratio_to_dolfinx": against,
+            "tetrahedra / petsc_baij": turns.ratio(seconds, "tetrahedra", "petsc_baij_tetrahedra"),
             "bytes_an_element": memories,
-            "bars": {
-                "congruent_to_dolfinx": turns.bar(against["congruent"], 8.0),
-                "assembled_to_dolfinx": turns.bar(against["assembled"], 4.0),
-                "congruent_bytes": turns.bar(max(memories["congruent"].values()), 400.0, at_least=False),
-                "assembled_bytes": turns.bar(max(memories["assembled"].values()), 2000.0, at_least=False),
-            },
+            "bars": bars,
         },
     )
 

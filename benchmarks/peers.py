@@ -142,7 +142,7 @@ def main() -> None:
         {
             "elements": len(mesh.cells),
             "packages": [package for name in names for package in PACKAGES[name]],
-            "updates_per_second": turns.rates(seconds, len(mesh.cells)),
+            "updates_per_second": turns.rates(seconds, dict.fromkeys(seconds, len(mesh.cells))),
             "ratios": ratios,
             "bars": {name: turns.bar(value, BAR) for name, value in ratios.items()},
         },

@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 from fem.material_parameters import Material
 from fem.materials import elasticity_matrix
 
-# Element updates per second and core of a whole substep (force, update, tie), measured on the bga_drop case on one core
-# of an AMD EPYC (AVX-512): joints, whose matrix is assembled. Boards are boxes, which share their matrices.
+# Element updates per second and core of a whole substep (force, update, tie) of elements whose matrix is assembled, as
+# those of joints, on one core of an AMD EPYC (AVX-512); boards are boxes in rows, which share their matrices.
 UPDATES_PER_SECOND = 1.2e7
-BOARD_ADVANTAGE = 2.2
+BOARD_ADVANTAGE = 4.3
 WINDOW_OVERHEAD = 3.0e-5  # [s] messages and interpreter per window, same source
 
 

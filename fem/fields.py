@@ -37,10 +37,14 @@ class Fields:
         self._local_part = part
         self.peaks = dict.fromkeys(np.unique(part).tolist(), 0.0)
 
-    def write(self, displacement: NDArray[np.float64], time: float) -> None:
-        """Append the fields at a displacement ``(n, 3)`` [m] and a time [s]; collective over the model."""
-        self._displacement.x.array.reshape(-1, 3)[self._dofs] = displacement[self._nodes]
-        stress = von_mises(self._recovery.stress(displacement))
+    def values(self, displacement: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return what there is to write now, at a displacement ``(n, 3)`` [m]: it at dofs, and stresses ``(ne,)``."""
+        return displacement[self._nodes], von_mises(self._recovery.stress(displacement))
+
+    def write(self, values: tuple[NDArray[np.float64], NDArray[np.float64]], time: float) -> None:
+        """Append values of a time [s]; collective over the model."""
+        displacement, stress = values
+        self._displacement.x.array.reshape(-1, 3)[self._dofs] = displacement
         self._von_mises.x.array[self._cell_dofs] = stress
         for part, peak in self.peaks.items():
             self.peaks[part] = max(peak, float(stress[self._local_part == part].max()))

@@ -86,12 +86,12 @@ def time_of(crew: Crew) -> float:
 
 
 def write_fields(crew: Crew, outputs: Outputs, window: int) -> float:
-    """Write the fields of all models of this rank, and keep what they are made from; return the seconds it took."""
+    """Write the fields of all models of this rank, and keep what they show; return the seconds it took."""
     begin = time.perf_counter()
     for role, participant in crew.items():
-        values = participant.motion.displacement, participant.motion.time
-        outputs.fields[role].write(*values)
-        outputs.checkpoints.keep(f"{role}-{window}", values)
+        sample = outputs.fields[role].values(participant.motion.displacement), participant.motion.time
+        outputs.fields[role].write(*sample)
+        outputs.checkpoints.keep(f"{role}-{window}", sample)
     return time.perf_counter() - begin
 
 

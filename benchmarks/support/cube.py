@@ -2,15 +2,23 @@
 
 import numpy as np
 
+from fem.box_step import diagonal_tetrahedra
 from fem.element import Elements
-from fem.material_parameters import Isotropic
-from fem.materials import elasticity_matrix
+from fem.material_parameters import Isotropic, JohnsonCook, Material
 from fem.mesh import MeshData
+from tests.support.fem_elements import KINDS, with_middles
+from tests.support.fem_elements import elements_of as material_elements
 from tests.support.fem_models import grid, mesh_of
 
 EDGE = 40
 LENGTH = 0.04  # [m]
 STEEL = Isotropic(density=7850.0, young_modulus=210e9, poisson_ratio=0.3)
+SOLDER = Isotropic(
+    density=7400.0,
+    young_modulus=50e9,
+    poisson_ratio=0.36,
+    plasticity=JohnsonCook(A=38e6, B=275e6, n=0.71, C=0.0713, reference_rate=1e-3),
+)
 SHAKE = 0.2  # of an edge: inner nodes of the distorted cube
 
 
@@ -25,12 +33,16 @@ def cube(distorted: bool = False, edge: int = EDGE) -> MeshData:
     return mesh_of(points, cells, "board", {})
 
 
-def elements_of(mesh: MeshData) -> Elements:
-    """Return the elements of a mesh of steel."""
-    density = np.full(len(mesh.cells), STEEL.density)
-    return Elements(mesh.points, mesh.cells, mesh.part, elasticity_matrix(STEEL)[None], density)
+def elements_of(mesh: MeshData, kind: str = "incompatible_modes", material: Material = STEEL) -> Elements:
+    """Return the elements of a mesh of hexahedra, each cut into six tetrahedra where the kind asks for that."""
+    points, cells = mesh.points, mesh.cells
+    if KINDS[kind].nodes != 8:
+        cells = cells[:, diagonal_tetrahedra()[1]].reshape(-1, 4)
+    if KINDS[kind].nodes == 10:
+        points, cells = with_middles(points, cells)
+    return material_elements(KINDS[kind], points, cells, [material])
 
 
-def random_displacement(mesh: MeshData) -> np.ndarray:
-    """Return displacements ``(n, 3)`` [m] that strain the elements by about 1e-4."""
-    return np.random.default_rng(1).uniform(-1.0, 1.0, mesh.points.shape) * 1e-7
+def random_displacement(points: np.ndarray, strain: float = 1e-4) -> np.ndarray:
+    """Return displacements ``(n, 3)`` [m] of neighbours that differ by about a strain of an edge."""
+    return np.random.default_rng(1).uniform(-0.5, 0.5, points.shape) * strain * LENGTH / EDGE

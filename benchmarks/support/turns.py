@@ -37,9 +37,9 @@ def in_turns(batches: dict[str, Batch], rounds: int = ROUNDS) -> dict[str, np.nd
     return dict(zip(batches, np.array(rows).T, strict=True))
 
 
-def rates(seconds: dict[str, np.ndarray], elements: int) -> dict[str, float]:
+def rates(seconds: dict[str, np.ndarray], elements: dict[str, int]) -> dict[str, float]:
     """Return the median element updates per second of each side."""
-    return {name: float(elements / np.median(values)) for name, values in seconds.items()}
+    return {name: float(elements[name] / np.median(values)) for name, values in seconds.items()}
 
 
 def ratio(seconds: dict[str, np.ndarray], ours: str, theirs: str) -> float:

@@ -112,16 +112,17 @@ def test_mixed_cells_are_an_error_that_names_them(tmp_path):
         read_mesh(tmp_path / "box.msh")
 
 
-@pytest.mark.parametrize(
-    "height, fault", [(0.0, "without volume"), (-1.0, "turned inside out"), (1e-5, "too distorted")]
-)
-def test_bad_cell_is_an_error_with_number_part_and_place(tmp_path, height, fault):
+FAULTS = [(shape, *fault) for shape in SHAPES for fault in [(0.0, "without volume"), (-1.0, "turned inside out")]]
+
+
+@pytest.mark.parametrize("shape, height, fault", [*FAULTS, (TETRAHEDRON, 1e-5, "too distorted")])
+def test_bad_cell_is_an_error_with_number_part_and_place(tmp_path, shape, height, fault):
     def spoil():
         nodes, points, _ = gmsh.model.mesh.getNodes()
         for node, point in zip(nodes, points.reshape(-1, 3), strict=True):
             gmsh.model.mesh.setNode(int(node), point * [1.0, 1.0, height], [])
 
-    write_box(tmp_path / "box.msh", TETRAHEDRON, spoil=spoil)
+    write_box(tmp_path / "box.msh", shape, spoil=spoil)
     with pytest.raises(MeshError, match=rf"element \d+ of part board at \(.*\) m is {fault}"):
         read_mesh(tmp_path / "box.msh")
 
