@@ -190,9 +190,13 @@ def of_shock(results: Mapping[str, dict], folder: Path) -> Findings:
     if len(results) == 2:
         metrics |= _comparison(results, folder)
         health["critical_joint_stress_error"] = at_most(metrics["critical_joint_stress_error"]["value"], STRESS_ERROR)
-    windows = {mode: result.get("continued_from", 0) for mode, result in results.items()}
-    continued = ", ".join(f"{mode} from window {window}" for mode, window in windows.items() if window)
-    return Findings(metrics, health, dict(results[first]["effects"]), continued)
+    return Findings(metrics, health, dict(results[first]["effects"]), in_words_continued(results))
+
+
+def in_words_continued(results: Mapping[str, dict]) -> str:
+    """Say which runs continued from a checkpoint; empty where none did."""
+    windows = {name: result.get("continued_from", 0) for name, result in results.items()}
+    return ", ".join(f"{name} from window {window}" for name, window in windows.items() if window)
 
 
 def _comparison(results: Mapping[str, dict], folder: Path) -> dict:

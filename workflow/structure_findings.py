@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workflow import exact_bar, exact_cantilever
-from workflow.findings import at_least, at_most, metric
+from workflow.findings import at_least, at_most, in_words_continued, metric
 from workflow.references import BarWave, Cantilever, FrequencyRange
 from workflow.stage_runner import Findings
 from workflow.structure_case import StructureCase
@@ -34,7 +34,8 @@ def of_motion(results: Mapping[str, dict]) -> Findings:
         prefix = "" if solver == next(iter(results)) else f"{solver}_"
         metrics |= {prefix + name: value for name, value in result["metrics"].items()}
         health |= {prefix + name: value for name, value in result["health"].items()}
-    return Findings(metrics, health, dict(next(iter(results.values()))["effects"]))
+    effects = dict(next(iter(results.values()))["effects"])
+    return Findings(metrics, health, effects, in_words_continued(results))
 
 
 def of_comparison(case: StructureCase, folders: Mapping[str, Path]) -> Findings:
