@@ -81,7 +81,7 @@ def make_history(comms: Communicators, models: dict[Role, Model], steps: Steps, 
     speed = max(abs(pulse.integral(time)) for time in np.linspace(0.0, shock.duration, SPEEDS))
     mass, plan = steps.model_mass + steps.added_mass, steps.plan
     trivial = NON_TRIVIAL * 0.5 * mass * speed**2
-    ledger = Ledger(shock.numerics.energy_balance_limit, trivial, plan.step, min(steps.critical.values()))
+    ledger = Ledger(shock.numerics.energy_balance_limit, trivial, plan.step, steps.smallest)
     watches = {role: JointWatch(model.tables.watch, model.body) for role, model in models.items()}
     return History(comms.world, watches, ledger, {"base_acceleration": pulse.value})
 

@@ -1,6 +1,5 @@
 """Critical steps of the models, mass scaling, and the windows that follow."""
 
-import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -27,6 +26,7 @@ class Steps:
         plan: Window, substeps.
         mass_factors: Per model of this rank the density factor ``(ne,)`` of its elements.
         critical: Role -> smallest element critical step before mass scaling [s].
+        smallest: Smallest critical step that the substeps follow, mass scaling and damping included [s].
         cut: Smallest element critical step among those that touch the cut or belong to the macro model [s].
         added_mass: Mass that scaling adds [kg].
         model_mass: Mass without scaling [kg].
@@ -36,6 +36,7 @@ class Steps:
     mass_factors: list[NDArray[np.float64]]
     critical: dict[str, float]
     cut: float
+    smallest: float
     added_mass: float
     model_mass: float
 
@@ -50,7 +51,7 @@ def choose_steps(
     """Agree on steps and mass scaling over all models; collective.
 
     In a DNS run the elements of ``board`` take the place of the macro model, so that both modes sample at the same
-    times. The window always follows the elements at the cut; power iteration lets the substeps be larger.
+    times. The window always follows the elements at the cut; power iteration lets the substeps of a DNS be larger.
 
     Args:
         world: Communicator of all models.
@@ -61,24 +62,18 @@ def choose_steps(
     Raises:
         AgreedError: Every role is mass scaled.
     """
-    numerics, stiffness = shock.numerics, shock.damping.coefficients[1]
-    pieces = [item for item, _ in models.values()]
-    target = agreed_minimum(world, [item.steps[~np.isin(item.roles, numerics.mass_scaled)] for item in pieces])
-    if not np.isfinite(target):
-        raise AgreedError(f"shock.numerics.mass_scaled = {numerics.mass_scaled} leaves no role to take the step from")
-    factors = [mass_factor(item, numerics.mass_scaled, target) for item in pieces]
+    numerics, pieces = shock.numerics, [item for item, _ in models.values()]
+    factors = mass_factors(world, pieces, numerics.mass_scaled)
     steps = [item.steps * np.sqrt(factor) for item, factor in zip(pieces, factors, strict=True)]
     meso_step = agreed_minimum(world, steps)
+    if "dns" in models and numerics.critical_step == "power_iteration":
+        meso_step = max(meso_step, assembled_step(comms["dns"], models["dns"], factors[0]))
     slow = [some[is_macro(*model)] for model, some in zip(models.values(), steps, strict=True)]
     macro_step = agreed_minimum(world, slow)
-    if numerics.critical_step == "power_iteration":
-        found = [
-            assembled_step(comms[role], role, models[role], some) for role, some in zip(models, factors, strict=True)
-        ]
-        meso_step = max(meso_step, agreed_minimum(world, [np.array(found)]))
-    if not np.isfinite(macro_step):
-        macro_step = meso_step
-    macro_step, meso_step = (damped_critical_step(step, stiffness) for step in (macro_step, meso_step))
+    macro_step = macro_step if np.isfinite(macro_step) else meso_step
+    macro_step, meso_step = (
+        damped_critical_step(step, shock.damping.coefficients[1]) for step in (macro_step, meso_step)
+    )
     masses = [item.elements.density * item.geometry.volume for item in pieces]
     added = sum(float(mass @ (factor - 1.0)) for mass, factor in zip(masses, factors, strict=True))
     return Steps(
@@ -86,26 +81,34 @@ def choose_steps(
         mass_factors=factors,
         critical=critical_by_role(world, pieces),
         cut=macro_step,
+        smallest=meso_step,
         added_mass=world.allreduce(added),
         model_mass=world.allreduce(sum(float(mass.sum()) for mass in masses)),
     )
 
 
-def assembled_step(comm: MPI.Comm, role: Role, model: tuple[Pieces, Tables], mass_factor: NDArray[np.float64]) -> float:
-    """Return the critical step [s] of a model from its highest frequency, elastic at small strains; collective.
+def assembled_step(comm: MPI.Comm, model: tuple[Pieces, Tables], mass_factor: NDArray[np.float64]) -> float:
+    """Return the critical step [s] of a whole model from its highest frequency, elastic at small strains; collective.
 
-    With the certainty of ``power_iteration`` it is not above the true one, and it is never below the elements'. A macro
-    model keeps the step of its elements, on which the stability of the window rests: infinity.
+    With the certainty of ``power_iteration`` it is not above the true one. It is not for the models of a window, whose
+    stability rests on the steps of elements: with the assembled step of a meso model of one joint a window grew by 13 %.
     """
-    if role == "macro":
-        return math.inf
-    pieces, tables = model
-    body = make_body(comm, pieces, tables, mass_factor, None)
-    if role == "meso":
-        body.free[body.cut[body.cut >= 0]] = False
+    body = make_body(comm, *model, mass_factor, None)
     found = highest_frequency(comm, body, body.terms, body.mass)
     body.shared.free()
-    return max(found.critical_step, agreed_minimum(comm, [pieces.steps * np.sqrt(mass_factor)]))
+    return found.critical_step
+
+
+def mass_factors(world: MPI.Comm, pieces: Sequence[Pieces], scaled: Sequence[str]) -> list[NDArray[np.float64]]:
+    """Return per model the density factor ``(ne,)`` that raises the steps of some roles to the others'; collective.
+
+    Raises:
+        AgreedError: Every role is mass scaled.
+    """
+    target = agreed_minimum(world, [item.steps[~np.isin(item.roles, scaled)] for item in pieces])
+    if not np.isfinite(target):
+        raise AgreedError(f"shock.numerics.mass_scaled = {tuple(scaled)} leaves no role to take the step from")
+    return [mass_factor(item, scaled, target) for item in pieces]
 
 
 def agreed_minimum(world: MPI.Comm, values: Sequence[NDArray[np.float64]]) -> float:

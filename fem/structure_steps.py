@@ -39,7 +39,7 @@ def explicit_plan(dynamics: Dynamics, undamped: float) -> tuple[WindowPlan, floa
 def with_critical(steps: Steps, undamped: float, dynamics: Dynamics) -> Steps:
     """Return explicit steps with another critical step without damping [s]."""
     plan, critical = explicit_plan(dynamics, undamped)
-    return replace(steps, plan=plan, cut=critical)
+    return replace(steps, plan=plan, cut=critical, smallest=critical)
 
 
 def implicit_steps(comm: MPI.Comm, pieces: Pieces, dynamics: Dynamics, pulses: Iterable[float]) -> Steps:
@@ -80,6 +80,7 @@ def make_steps(comm: MPI.Comm, pieces: Pieces, factor: NDArray[np.float64], chos
         mass_factors=[factor],
         critical=critical_by_role(comm, [pieces], sorted(set(comm.allreduce(sorted(set(pieces.roles.tolist())))))),
         cut=critical,
+        smallest=critical,
         added_mass=comm.allreduce(float(mass @ (factor - 1.0))),
         model_mass=comm.allreduce(float(mass.sum())),
     )
