@@ -29,16 +29,16 @@ class LoadError(ValueError):
     """A load or support that acts on nothing, or that does not go with another one."""
 
 
-class StepError(ValueError):
-    """A time step above the critical one."""
-
-
 class EnergyError(RuntimeError):
     """A run whose energies do not balance, or are not numbers."""
 
 
 class AgreedError(RuntimeError):
     """An error of one rank, raised on all ranks of the run."""
+
+
+class StepError(AgreedError):
+    """A time step above the critical one, which all ranks know."""
 
 
 class InvertedElementError(RuntimeError):

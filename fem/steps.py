@@ -91,7 +91,7 @@ def assembled_step(comm: MPI.Comm, model: tuple[Pieces, Tables], mass_factor: ND
     """Return the critical step [s] of a whole model from its highest frequency, elastic at small strains; collective.
 
     With the certainty of ``power_iteration`` it is not above the true one. It is not for the models of a window, whose
-    stability rests on the steps of elements: with the assembled step of a meso model of one joint a window grew by 13 %.
+    stability rests on the steps of elements: at the assembled step of a meso model of one joint a window grew by 13 %.
     """
     body = make_body(comm, *model, mass_factor, None)
     found = highest_frequency(comm, body, body.terms, body.mass)

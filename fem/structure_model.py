@@ -13,7 +13,7 @@ from fem.mesh import MeshData
 from fem.mesh_file import read_mesh
 from fem.power_iteration import highest_frequency
 from fem.steps import Steps
-from fem.structure_steps import explicit_steps, implicit_steps, with_critical
+from fem.structure_steps import check_step, explicit_steps, implicit_steps, with_critical
 from fem.structure_tables import StructureTables, structure_tables
 
 
@@ -48,6 +48,8 @@ def build_structure(comm: MPI.Comm, request: StructureInput, pulses: list[float]
         found = highest_frequency(comm, model.body, linear_terms(model.body.elements), model.body.mass)
         # Made anew, since a law that depends on the rate knows the step.
         model = assemble(comm, pieces, tables, with_critical(steps, found.critical_step, request.dynamics), kinematics)
+    if request.solver == "explicit":
+        check_step(request.dynamics, model.steps.smallest)
     return model
 
 

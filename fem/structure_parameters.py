@@ -135,10 +135,11 @@ class WatchPoint(Parameters):
 
 
 class DynamicsNumerics(Parameters):
-    """How the motion is computed; ``mass_scaled`` names layers."""
+    """How the motion is computed; ``mass_scaled`` names layers, ``explicit_step`` goes before ``step_fraction``."""
 
     step_fraction: float = Field(0.9, gt=0, le=0.99)
     critical_step: Literal["element", "power_iteration"] = "element"
+    explicit_step: Annotated[float | None, "us"] = Field(None, gt=0)
     implicit_step: Annotated[float | None, "us"] = Field(None, gt=0)
     hht_alpha: float = Field(0.0, ge=-1 / 3, le=0)
     mass_scaled: tuple[str, ...] = ()

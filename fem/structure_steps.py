@@ -10,11 +10,13 @@ from numpy.typing import NDArray
 
 from fem.body import Pieces
 from fem.damping import damped_critical_step
+from fem.errors import StepError
 from fem.estimate import WindowPlan
 from fem.solver_cost import implicit_step
 from fem.steps import Steps, agreed_minimum, critical_by_role, mass_factor
 from fem.structure_parameters import Dynamics
 
+STEP_LIMIT = 0.99  # of the critical step
 ROUNDING = 1e-9
 
 
@@ -33,7 +35,23 @@ def explicit_steps(comm: MPI.Comm, pieces: Pieces, dynamics: Dynamics) -> Steps:
 def explicit_plan(dynamics: Dynamics, undamped: float) -> tuple[WindowPlan, float]:
     """Return windows and the critical step [s] with damping, from that without."""
     critical = damped_critical_step(undamped, dynamics.damping.coefficients[1])
-    return window_plan(dynamics, dynamics.numerics.step_fraction * critical), critical
+    given = dynamics.numerics.explicit_step
+    return window_plan(dynamics, given or dynamics.numerics.step_fraction * critical), critical
+
+
+def check_step(dynamics: Dynamics, critical: float) -> None:
+    """Refuse a given explicit step above the critical step [s].
+
+    Raises:
+        StepError: With both.
+    """
+    given, estimate = dynamics.numerics.explicit_step, dynamics.numerics.critical_step
+    if given is not None and given > critical:
+        hint = "" if estimate == "power_iteration" else "; critical_step = power_iteration may allow more"
+        raise StepError(
+            f"dynamics.numerics.explicit_step = {given:.4g} s is above the critical step {critical:.4g} s ({estimate}),"
+            f" beyond which every motion grows; at most {STEP_LIMIT * critical:.4g} s is advised{hint}"
+        )
 
 
 def with_critical(steps: Steps, undamped: float, dynamics: Dynamics) -> Steps:

@@ -1,0 +1,26 @@
+"""A step that the user gives: taken as it is below the critical one, refused above it with both numbers."""
+
+import pytest
+from mpi4py import MPI
+
+from fem.errors import StepError
+from fem.structure_model import build_structure
+from tests.support.fem_structures import structure_input
+
+
+def steps_of(directory, **numerics):
+    request = structure_input(directory, dynamics={"duration": 8e-5, "numerics": {"history_samples": 40} | numerics})
+    return build_structure(MPI.COMM_SELF, request, []).steps
+
+
+def test_given_step_is_taken_or_refused(tmp_path):
+    critical = steps_of(tmp_path).smallest
+    taken = steps_of(tmp_path, explicit_step=0.5 * critical)
+    assert 0.4 * critical < taken.plan.step <= 0.5 * critical
+    with pytest.raises(StepError, match=r"explicit_step = .* is above the critical step .* \(element\)"):
+        steps_of(tmp_path, explicit_step=1.003 * critical)
+    larger = steps_of(tmp_path, critical_step="power_iteration")
+    assert larger.smallest > 1.003 * critical
+    steps_of(tmp_path, critical_step="power_iteration", explicit_step=1.003 * critical)
+    with pytest.raises(StepError, match=r"explicit_step = .* \(power_iteration\)"):
+        steps_of(tmp_path, critical_step="power_iteration", explicit_step=1.01 * larger.smallest)
