@@ -8,7 +8,7 @@ Seconds are those of one core, to follow one period of the first mode: explicit 
 critical step at the measured speed of a whole step; implicit steps (trapezoidal rule) of a fortieth of the period,
 whose error in the period is 0.2 %, with the measured factorisation. Errors are relative to the finest hexahedra, whose
 plate is compared with Mindlin's. The linear one-point hexahedron has the stiffness of the incompatible-modes one
-(`fem/element_one_point.py`), so one row stands for both.
+(`fem/element_one_point.py`), so one row stands for both; what it saves in finite strains is in the second table.
 """
 
 import argparse
@@ -25,10 +25,11 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 import numpy as np
 from mpi4py import MPI
 
-from fem.body import Body, make_body, make_pieces
+from fem.body import Body, Response, make_body, make_pieces
 from fem.element import critical_steps
 from fem.facet import area_vectors
 from fem.factorisation import Factorisation
+from fem.force import Kinematics
 from fem.global_matrix import Equations
 from fem.implicit import ImplicitMotion
 from fem.local_mesh import distribute
@@ -51,6 +52,7 @@ NAMES = {
     "tetrahedron_quadratic": "quadratic tetrahedra",
 }
 STEP_FRACTION, STEPS_PER_PERIOD = 0.9, 40
+KINEMATICS: tuple[Kinematics, ...] = ("small", "finite")
 SECONDS = 0.2  # that a speed is measured for
 YOUNG, DENSITY = 24e9, 1900.0
 STRIP = np.array([0.1, 0.004])  # [m] length and thickness of the cantilever
@@ -86,7 +88,7 @@ class Problem:
     cells: tuple[int, int]
     kind: str
 
-    def body(self) -> Body:
+    def body(self, kinematics: Kinematics = "small") -> Body:
         """The body with its supports; the plate is a quarter of it, the cantilever a strip of plane strain."""
         along, across = self.cells
         if self.name == "plate":
@@ -99,8 +101,9 @@ class Problem:
         material = Isotropic(density=DENSITY, young_modulus=YOUNG, poisson_ratio=self.poisson)
         mesh = MeshData(points, cells, np.zeros(len(cells), np.int32), ("board",), {})
         item = prepare(mesh, "dns")["dns"]
-        pieces = make_pieces(distribute(MPI.COMM_SELF, mesh), item.tables, {"board": material})
-        body = make_body(MPI.COMM_SELF, pieces, item.tables, np.ones(len(pieces.steps)))
+        formulation = self.kind if KINDS[self.kind].nodes == 8 else "incompatible_modes"
+        pieces = make_pieces(distribute(MPI.COMM_SELF, mesh), item.tables, {"board": material}, formulation)
+        body = make_body(MPI.COMM_SELF, pieces, item.tables, np.ones(len(pieces.steps)), Response(kinematics))
         body.free[self.held(body.local.points)] = False
         return body
 
@@ -152,14 +155,30 @@ def seconds_a_step(motion: Motion | ImplicitMotion) -> float:
     return min(batch(steps) for _ in range(3))
 
 
+def explicit_motion(body: Body, step: float) -> Motion:
+    """The motion of a body by explicit steps [s]."""
+    return Motion(body, [], step, np.empty(0, np.int32), np.zeros(len(body.mass)))
+
+
+def speeds(cells: tuple[int, int]) -> dict:
+    """Element updates per second of whole steps with small and with finite strains, for every kind of element."""
+    found = {}
+    for kind in KINDS:
+        bodies = {name: Problem("plate", 0.3, cells, kind).body(name) for name in KINEMATICS}
+        found[kind] = {
+            name: len(body.local.cells) / seconds_a_step(explicit_motion(body, 1e-9)) for name, body in bodies.items()
+        }
+    return found
+
+
 def costs(body: Body, period: float) -> dict:
     """What one period [s] costs either solver."""
     count = len(body.local.cells)
     critical = float(critical_steps(body.elements, body.geometry.nodal_volume).min())
     steps = int(np.ceil(period / (STEP_FRACTION * critical)))
-    explicit = seconds_a_step(Motion(body, [], period / steps, np.empty(0, np.int32), np.zeros(len(body.mass))))
+    explicit = seconds_a_step(explicit_motion(body, period / steps))
     begin = process_time()
-    implicit = ImplicitMotion(Equations.of(MPI.COMM_SELF, body), [], period / STEPS_PER_PERIOD)
+    implicit = ImplicitMotion(MPI.COMM_SELF, body, [], period / STEPS_PER_PERIOD)
     factor = process_time() - begin
     return {
         "elements": count,
@@ -205,7 +224,8 @@ def reference_check(ladders: tuple[Ladder, ...]) -> dict:
 def run_all(ladders: tuple[Ladder, ...]) -> dict:
     """Measure the ladders; what is measured is on disk after each row."""
     next(measure(Ladder("plate", 0.3, ((2, 1),), (3, 1))))  # compiles what all rows use
-    result = {"machine": platform.machine(), "rows": [], **reference_check(ladders)}
+    speed = speeds(ladders[-1].cells[-1])
+    result = {"machine": platform.machine(), "rows": [], "speeds": speed, **reference_check(ladders)}
     RESULTS.parent.mkdir(exist_ok=True)
     for ladder in ladders:
         for row in measure(ladder):
@@ -231,12 +251,22 @@ def cells_of(row: dict) -> list[str]:
 
 
 def markdown(result: dict) -> str:
-    """The table for the README."""
-    lines = [HEAD, ["---"] * len(HEAD), *map(cells_of, result["rows"])]
-    table = "\n".join("| " + " | ".join(cells) + " |" for cells in lines)
-    return (
-        f"{table}\n\nThe finest plate is {100 * result['finest_plate_over_mindlin']:+.2f} % from Mindlin's frequency."
+    """The tables for the README."""
+    speed = [[kind, *(f"{found[name]:.1e}/s" for name in KINEMATICS)] for kind, found in result["speeds"].items()]
+    check = f"The finest plate is {100 * result['finest_plate_over_mindlin']:+.2f} % from Mindlin's frequency."
+    return "\n\n".join(
+        [
+            lines_of([HEAD, *map(cells_of, result["rows"])]),
+            f"{check} Element updates per second of whole steps, on the finest plate of the table:",
+            lines_of([["kind", "small strains", "finite strains"], *speed]),
+        ]
     )
+
+
+def lines_of(table: list[list[str]]) -> str:
+    """A table in Markdown, its head first."""
+    rows = [table[0], ["---"] * len(table[0]), *table[1:]]
+    return "\n".join("| " + " | ".join(cells) + " |" for cells in rows)
 
 
 def publish(result: dict) -> None:
