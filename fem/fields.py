@@ -1,5 +1,6 @@
-"""Fields for ParaView: displacement, and per cell von Mises stress and part."""
+"""Fields for ParaView: displacement, and per cell von Mises stress [Pa], plastic strain where it may be, and part."""
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import dolfinx.fem
@@ -13,42 +14,70 @@ from fem.stress import von_mises
 from fem.stress_recovery import StressRecovery
 
 
+@dataclass(frozen=True, slots=True)
+class FieldSample:
+    """The fields of one rank at a time.
+
+    Attributes:
+        time: [s].
+        displacement: ``(n, 3)`` [m].
+        cells: Cell field -> values ``(ne,)``.
+    """
+
+    time: float
+    displacement: NDArray[np.float64]
+    cells: dict[str, NDArray[np.float64]]
+
+
 class Fields:
     """A time series of one model's fields.
 
     Attributes:
-        peaks: Part -> largest von Mises stress [Pa] of a local element at the times written so far.
+        peaks: Cell field -> part -> largest value in a local element at the times written so far.
     """
 
-    def __init__(self, comm: MPI.Comm, body: Body, part: NDArray[np.integer], path: Path) -> None:
-        """Open ``path`` (``.pvd``) for the model on ``comm``; ``part (ne,)`` numbers the parts of the local cells."""
+    def __init__(self, comm: MPI.Comm, body: Body, part: NDArray[np.integer], path: Path, yields: bool = False) -> None:
+        """Open a file for the model on ``comm``; collective.
+
+        Args:
+            comm: Communicator of the model.
+            body: The model.
+            part: ``(ne,)`` part of each local cell.
+            path: ``.pvd`` file.
+            yields: Whether to write the plastic strain; the same on all ranks.
+        """
         mesh = body.local.mesh
         space, cells = dolfinx_api.vector_space(mesh), dolfinx_api.cell_space(mesh)
+        names = ("von_mises", "plastic_strain") if yields else ("von_mises",)
         self._displacement = dolfinx.fem.Function(space, name="displacement")
-        self._von_mises = dolfinx.fem.Function(cells, name="von_mises")
+        self._cell_functions = {name: dolfinx.fem.Function(cells, name=name) for name in names}
         self._part = dolfinx.fem.Function(cells, name="part")
-        self._part.x.array[dolfinx_api.cell_dofs(cells)[:, 0]] = part
         self._cell_dofs = dolfinx_api.cell_dofs(cells)[:, 0]
+        self._part.x.array[self._cell_dofs] = part
         # Vertices of a cell have the same order in geometry and dofmap, whatever their numbers.
         self._dofs, first = np.unique(dolfinx_api.cell_dofs(space), return_index=True)
         self._nodes = body.local.cells.ravel()[first]
         self._recovery = StressRecovery(body, np.arange(len(body.elements.cells)))
         self._file = dolfinx_api.FieldFile(comm, path)
         self._local_part = part
-        self.peaks = dict.fromkeys(np.unique(part).tolist(), 0.0)
+        self.peaks = {name: dict.fromkeys(np.unique(part).tolist(), 0.0) for name in names}
 
-    def values(self, displacement: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return what there is to write now, at a displacement ``(n, 3)`` [m]: it at dofs, and stresses ``(ne,)``."""
-        return displacement[self._nodes], von_mises(self._recovery.stress(displacement))
+    def sample(self, displacement: NDArray[np.float64], time: float) -> FieldSample:
+        """Return the fields at a displacement ``(n, 3)`` [m] and a time [s]."""
+        cells = {"von_mises": von_mises(self._recovery.stress(displacement))}
+        if "plastic_strain" in self._cell_functions:
+            cells["plastic_strain"] = self._recovery.plastic_strain()
+        return FieldSample(time, displacement.copy(), cells)
 
-    def write(self, values: tuple[NDArray[np.float64], NDArray[np.float64]], time: float) -> None:
-        """Append values of a time [s]; collective over the model."""
-        displacement, stress = values
-        self._displacement.x.array.reshape(-1, 3)[self._dofs] = displacement
-        self._von_mises.x.array[self._cell_dofs] = stress
-        for part, peak in self.peaks.items():
-            self.peaks[part] = max(peak, float(stress[self._local_part == part].max()))
-        self._file.write([self._displacement, self._von_mises, self._part], time)
+    def write(self, sample: FieldSample) -> None:
+        """Append a sample; collective over the model."""
+        self._displacement.x.array.reshape(-1, 3)[self._dofs] = sample.displacement[self._nodes]
+        for name, function in self._cell_functions.items():
+            values, peaks = sample.cells[name], self.peaks[name]
+            function.x.array[self._cell_dofs] = values
+            for part, peak in peaks.items():
+                peaks[part] = max(peak, float(values[self._local_part == part].max()))
+        self._file.write([self._displacement, *self._cell_functions.values(), self._part], sample.time)
 
     def close(self) -> None:
         """Close the file."""

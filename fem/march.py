@@ -86,11 +86,12 @@ def time_of(crew: Crew) -> float:
 
 
 def write_fields(crew: Crew, outputs: Outputs, window: int) -> float:
-    """Write the fields of all models of this rank, and keep what they show; return the seconds it took."""
+    """Write the fields of all models of this rank, and keep them for a restart; return the seconds it took."""
     begin = time.perf_counter()
     for role, participant in crew.items():
-        sample = outputs.fields[role].values(participant.motion.displacement), participant.motion.time
-        outputs.fields[role].write(*sample)
+        motion, fields = participant.motion, outputs.fields[role]
+        sample = fields.sample(motion.displacement - motion.base_displacement(), motion.time)
+        fields.write(sample)
         outputs.checkpoints.keep(f"{role}-{window}", sample)
     return time.perf_counter() - begin
 
@@ -109,5 +110,5 @@ def resume(crew: Crew, outputs: Outputs, state: dict[str, Any], field_windows: l
     begin = time.perf_counter()
     for window in field_windows:
         for role in crew:
-            outputs.fields[role].write(*outputs.checkpoints.kept(f"{role}-{window}"))
+            outputs.fields[role].write(outputs.checkpoints.kept(f"{role}-{window}"))
     return time.perf_counter() - begin

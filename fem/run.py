@@ -16,6 +16,7 @@ from fem.history import History
 from fem.inputs import RunInput
 from fem.ledger import Ledger
 from fem.march import Outputs, march
+from fem.materials import materials_of_parts
 from fem.model import Model, build_models
 from fem.parameters import Shock
 from fem.participant import Alone, Macro, Meso, Participant, uncut_motion
@@ -88,12 +89,10 @@ def make_history(comms: Communicators, models: dict[Role, Model], steps: Steps, 
 
 def make_fields(comms: Communicators, models: dict[Role, Model], request: RunInput) -> dict[Role, Fields]:
     """Open a field file per model of this rank; collective."""
-    return {
-        role: Fields(
-            comms.models[role],
-            model.body,
-            model.tables.part[model.body.local.cell_numbers],
-            request.output / f"{role}.pvd",
-        )
-        for role, model in models.items()
-    }
+    made = {}
+    for role, model in models.items():
+        _, materials = materials_of_parts(model.tables.part_names, request.materials)
+        yields = any(getattr(material, "plasticity", None) is not None for material in materials)
+        part = model.tables.part[model.body.local.cell_numbers]
+        made[role] = Fields(comms.models[role], model.body, part, request.output / f"{role}.pvd", yields)
+    return made

@@ -21,6 +21,7 @@ from fem.parameters import Ranks
 from fem.participant import Alone, Participant, uncut_motion
 from fem.pulse import Pulse
 from fem.result import Timings
+from fem.structure_effects import plastic_laws
 from fem.structure_loads import damping_loads, structure_loads
 from fem.structure_model import StructureModel, build_structure
 from fem.structure_modes import find_modes
@@ -45,7 +46,8 @@ def run_structure(world: MPI.Comm, request: StructureInput) -> None:
         crew: dict[Role, Participant] = {"structure": make_participant(comm, model, request, pulses)}
         history = make_history(comm, model, request, pulses)
         part = model.tables.part[model.body.local.cell_numbers]
-        fields: dict[Role, Fields] = {"structure": Fields(comm, model.body, part, request.output / "structure.pvd")}
+        path, yields = request.output / "structure.pvd", bool(plastic_laws(request))
+        fields: dict[Role, Fields] = {"structure": Fields(comm, model.body, part, path, yields)}
         numerics, tables = request.dynamics.numerics, [load.table for load in request.loads.values()]
         contents = digest_of_files(request.mesh, *(Path(table) for table in tables if table is not None))
         inputs = request.model_dump_json(exclude={"output"}), contents

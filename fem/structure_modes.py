@@ -83,5 +83,5 @@ def write_shapes(comm: MPI.Comm, model: StructureModel, request: StructureInput,
     fields = Fields(comm, model.body, part, request.output / "modes.pvd")
     for number, shape in enumerate(modes.shape, start=1):
         largest = comm.allreduce(float(np.abs(shape).max(initial=0.0)), MPI.MAX)
-        fields.write(fields.values(shape * (SHOWN * request.structure.length / largest)), float(number))
+        fields.write(fields.sample(shape * (SHOWN * request.structure.length / largest), float(number)))
     fields.close()

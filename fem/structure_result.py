@@ -30,17 +30,20 @@ class Found:
     Attributes:
         history: Samples and ledger.
         modes: Natural modes, if this run was asked for them.
-        peaks: Largest von Mises stress [Pa] of an element of each layer at the times of the fields.
+        peaks: Cell field -> layer -> largest value of an element at the times of the fields.
     """
 
     history: History
     modes: ModeTable | None
-    peaks: dict[str, float]
+    peaks: dict[str, dict[str, float]]
 
 
-def element_peaks(comm: MPI.Comm, fields: Fields, parts: Sequence[str]) -> dict[str, float]:
-    """Return the largest von Mises stress [Pa] of each part over all ranks and field samples; collective."""
-    return {name: comm.allreduce(fields.peaks.get(part, 0.0), MPI.MAX) for part, name in enumerate(parts)}
+def element_peaks(comm: MPI.Comm, fields: Fields, parts: Sequence[str]) -> dict[str, dict[str, float]]:
+    """Return the largest value of each cell field in each part over all ranks and field samples; collective."""
+    return {
+        field: {name: comm.allreduce(peaks.get(part, 0.0), MPI.MAX) for part, name in enumerate(parts)}
+        for field, peaks in fields.peaks.items()
+    }
 
 
 def write_result(
@@ -56,7 +59,7 @@ def write_result(
             | {"energy_balance_error": quantity(history.ledger.balance_error)}
             | energy_metrics(arrays)
             | point_metrics(arrays)
-            | {f"peak_element_stress@{name}": quantity(peak, "Pa") for name, peak in found.peaks.items()}
+            | layer_metrics(found.peaks)
             | mode_metrics(found.modes),
             "health": health(history, arrays, summary, request),
             "effects": effects(request, summary["added_mass"]),
@@ -125,10 +128,22 @@ def point_metrics(arrays: dict[str, NDArray]) -> dict[str, Any]:
             f"peak_strain@{name}": quantity(float(np.abs(principal_strains(arrays[f"strain@{name}"])).max())),
             f"peak_von_mises@{name}": quantity(float(von_mises(stress).max()), "Pa"),
         }
+        if f"plastic_strain@{name}" in arrays:
+            metrics[f"peak_plastic_strain@{name}"] = quantity(float(arrays[f"plastic_strain@{name}"].max()))
     for name in arrays["supports"]:
         reaction = np.linalg.norm(arrays[f"reaction@{name}"], axis=1)
         metrics[f"peak_reaction@{name}"] = quantity(float(reaction.max()), "N")
     return metrics
+
+
+def layer_metrics(peaks: dict[str, dict[str, float]]) -> dict[str, Any]:
+    """Return the largest element values of each layer at the times of the fields."""
+    names = {"von_mises": ("peak_element_stress", "Pa"), "plastic_strain": ("peak_element_plastic_strain", "")}
+    return {
+        f"{names[field][0]}@{layer}": quantity(peak, names[field][1])
+        for field, layers in peaks.items()
+        for layer, peak in layers.items()
+    }
 
 
 def mode_metrics(modes: ModeTable | None) -> dict[str, Any]:

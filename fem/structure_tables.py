@@ -9,6 +9,7 @@ from fem.errors import LoadError, MeshError
 from fem.facet_areas import facet_set, outward_areas
 from fem.mesh import MeshData
 from fem.scene import Tables
+from fem.structure_effects import plastic_laws
 from fem.structure_parameters import InputG, PrescribedMotion, Pressure, StructureScene
 from fem.tie import Tie
 from fem.watch_points import PointTable, point_table
@@ -45,6 +46,7 @@ def structure_tables(mesh: MeshData, scene: StructureScene) -> StructureTables:
     pressed = {load.on for load in scene.loads.values() if isinstance(load, Pressure)}
     held = held_by_supports(mesh, scene)
     check_motions(scene, nodes_of, held)
+    points = {name: point.at for name, point in scene.watch.items()}
     held_nodes = np.flatnonzero(held.any(axis=1))
     supports = {name: nodes_of[support.on] for name, support in scene.supports.items()}
     return StructureTables(
@@ -59,7 +61,7 @@ def structure_tables(mesh: MeshData, scene: StructureScene) -> StructureTables:
         nodes=len(mesh.points),
         nodes_of=nodes_of,
         areas={name: outward_areas(mesh, name) for name in sorted(pressed)},
-        watch=point_table(mesh, {name: point.at for name, point in scene.watch.items()}, supports),
+        watch=point_table(mesh, points, supports, yields=bool(plastic_laws(scene))),
     )
 
 

@@ -13,7 +13,7 @@ from fem.moving import Moving
 from fem.recovery import fit, patch
 from fem.stress_recovery import StressRecovery
 
-COMPONENTS = {"displacement": 3, "velocity": 3, "strain": 6, "stress": 6}
+COMPONENTS = {"displacement": 3, "velocity": 3, "strain": 6, "stress": 6, "plastic_strain": 1}
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,6 +29,7 @@ class PointTable:
         owner: ``(k,)`` the point that each belongs to.
         weight: ``(k,)`` of each in its point's value.
         supports: Name -> nodes of a support.
+        quantities: What is watched, of ``COMPONENTS``.
     """
 
     names: tuple[str, ...]
@@ -39,10 +40,14 @@ class PointTable:
     owner: NDArray[np.int64]
     weight: NDArray[np.float64]
     supports: dict[str, NDArray[np.int32]]
+    quantities: tuple[str, ...]
 
 
 def point_table(
-    mesh: MeshData, wanted: Mapping[str, tuple[float, float, float]], supports: dict[str, NDArray[np.int32]]
+    mesh: MeshData,
+    wanted: Mapping[str, tuple[float, float, float]],
+    supports: dict[str, NDArray[np.int32]],
+    yields: bool = False,
 ) -> PointTable:
     """Find the nodes and the elements of watch points.
 
@@ -50,6 +55,7 @@ def point_table(
         mesh: The whole mesh.
         wanted: Name -> place [m].
         supports: Name -> nodes.
+        yields: Whether plastic strain is watched, too.
 
     Raises:
         MeshError: A point lies outside the mesh.
@@ -71,6 +77,7 @@ def point_table(
         owner=np.repeat(np.arange(len(nodes)), [len(cells) for cells in patches]),
         weight=np.concatenate([np.empty(0), *weights]),
         supports=supports,
+        quantities=tuple(name for name in COMPONENTS if yields or name != "plastic_strain"),
     )
 
 
@@ -112,25 +119,37 @@ class PointWatch:
         self._supports = [nodes[(nodes >= 0) & body.shared.owned[nodes]] for nodes in supports]
 
     def sample(self, motion: Moving) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return this rank's parts of the sums: the values of all points by ``COMPONENTS``, then the reactions [N]."""
-        count = len(self._table.names)
-        at_nodes = np.zeros((2, count, 3))
-        at_nodes[0, self._slots] = motion.displacement[self._nodes] - motion.base_displacement()
-        at_nodes[1, self._slots] = motion.present_velocity()[self._nodes]
-        means = self._recovery.strain(motion.displacement), self._recovery.stress(motion.displacement)
-        recovered = np.zeros((2, count, 6))
-        for values, mean in zip(recovered, means, strict=True):
-            np.add.at(values, self._owner, self._weight[:, None] * mean)
+        """Return this rank's parts of the sums: the values of all points by quantity, then the reactions [N]."""
+        parts = [self._value(quantity, motion).ravel() for quantity in self._table.quantities]
         reaction = motion.reaction()
-        reactions = [reaction[nodes].sum(axis=0) for nodes in self._supports]
-        return np.concatenate([at_nodes.ravel(), recovered.ravel(), *reactions]), np.empty(0)
+        return np.concatenate([*parts, *(reaction[nodes].sum(axis=0) for nodes in self._supports)]), np.empty(0)
+
+    def _value(self, quantity: str, motion: Moving) -> NDArray[np.float64]:
+        """Return this rank's part of a quantity at all points."""
+        result = np.zeros((len(self._table.names), COMPONENTS[quantity]))
+        if quantity == "displacement":
+            result[self._slots] = motion.displacement[self._nodes] - motion.base_displacement()
+        elif quantity == "velocity":
+            result[self._slots] = motion.present_velocity()[self._nodes]
+        else:
+            np.add.at(result, self._owner, self._weight[:, None] * self._mean(quantity, motion.displacement))
+        return result
+
+    def _mean(self, quantity: str, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return a quantity's means over this rank's elements around the points."""
+        if quantity == "strain":
+            return self._recovery.strain(displacement)
+        if quantity == "stress":
+            return self._recovery.stress(displacement)
+        return self._recovery.plastic_strain()[:, None]
 
     def row(self, sums: NDArray[np.float64], maxima: NDArray[np.float64]) -> dict[str, NDArray[np.float64] | float]:
         """Name the parts that all ranks have combined: ``<quantity>@<point>`` and ``reaction@<support>``."""
         del maxima
         count, start = len(self._table.names), 0
         result: dict[str, NDArray[np.float64] | float] = {}
-        for quantity, components in COMPONENTS.items():
+        for quantity in self._table.quantities:
+            components = COMPONENTS[quantity]
             values = sums[start : start + count * components].reshape(count, components)
             result |= {f"{quantity}@{name}": value for name, value in zip(self._table.names, values, strict=True)}
             start += count * components

@@ -36,7 +36,7 @@ for name, kind in KINDS.items():
         motion.advance()
         motion.update_force()
     fields = Fields(comm, body, item.tables.part[local.cell_numbers], Path(sys.argv[1]) / f"{name}.pvd")
-    fields.write(fields.values(motion.displacement), motion.time)
+    fields.write(fields.sample(motion.displacement, motion.time))
     fields.close()
     owned = body.shared.owned
     displacement = np.zeros((item.tables.nodes, 3))

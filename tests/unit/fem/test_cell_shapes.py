@@ -101,7 +101,7 @@ def test_dolfinx_keeps_nodes_and_writes_fields(box, tmp_path):
     pieces = make_pieces(local, item.tables, Materials())
     body = make_body(MPI.COMM_SELF, pieces, item.tables, np.ones(len(pieces.steps)))
     fields = Fields(MPI.COMM_SELF, body, item.tables.part[local.cell_numbers], tmp_path / "fields.pvd")
-    fields.write(fields.values(1e-3 * local.points), 0.0)
+    fields.write(fields.sample(1e-3 * local.points, 0.0))
     fields.close()
     assert list(tmp_path.glob("fields*.vtu"))
 
