@@ -7,7 +7,7 @@ import jsonschema
 import pytest
 
 from workflow.case import display_values, read_case
-from workflow.case_text import case_text
+from workflow.case_text import case_text, templates
 from workflow.inputs import compare, stage_inputs
 from workflow.problems import CaseError
 from workflow.schema import case_schema
@@ -50,6 +50,32 @@ BAD_VALUES = {
 def test_bad_values_are_named(setting, words):
     with pytest.raises(CaseError) as caught:
         read_case(BOARD, [setting])
+    text = "\n".join(caught.value.lines())
+    assert [word for word in words if word not in text] == []
+
+
+BAD_REFERENCES = {
+    "no such point": ("bar_wave", "references.wave.transmitted=beyon", ["wave.transmitted", "did you mean beyond?"]),
+    "wrong order": (
+        "bar_wave",
+        'references.wave.incident=["second","first"]',
+        ["references.wave", "below 60 mm, upwards"],
+    ),
+    "no pressure": ("jedec_board", "references.x={kind='cantilever',load='drop',tip='centre'}", ["is no pressure"]),
+    "no such load": ("cantilever", "references.tip.load=wnd", ["references.tip.load", "did you mean wind?"]),
+    "too many layers": (
+        "cantilever",
+        "structure.layers.top={material='FR4',thickness='1 mm'}",
+        ["references.tip.kind", "2 layers", "1 in structure.layers"],
+    ),
+    "no such mode": ("jedec_board", "references.first_mode.mode=9", ["references.first_mode.mode = 9", "<= 6"]),
+}
+
+
+@pytest.mark.parametrize(("name", "setting", "words"), BAD_REFERENCES.values(), ids=BAD_REFERENCES.keys())
+def test_references_that_cannot_be(name, setting, words):
+    with pytest.raises(CaseError) as caught:
+        read_case(templates()[name], [setting])
     text = "\n".join(caught.value.lines())
     assert [word for word in words if word not in text] == []
 
