@@ -62,10 +62,10 @@ def energy_curves(histories: Histories) -> str:
             for name, colour in ENERGIES.items():
                 if np.abs(history[name]).max() > 1e-6 * largest:
                     left.plot(time, history[name] / factor, label=name, color=colour)
-            left.set(ylabel=f"energy [{prefix}J]", title=solver)
-            left.legend(frameon=False, fontsize=7)
+            left.set_ylabel(f"{solver}: energy [{prefix}J]")
+            left.legend(frameon=False, fontsize=7, ncols=4, loc="lower center", bbox_to_anchor=(0.5, 1.0))
             right.plot(time, 100.0 * history["balance"] / (largest or 1.0), color="#d1495b")
-            right.set(ylabel="balance [% of the largest energy]", title=solver)
+            right.set_ylabel(f"{solver}: balance [%]")
         for axis in axes[-1]:
             axis.set_xlabel("time [ms]")
         return svg(figure)

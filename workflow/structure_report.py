@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from workflow import structure_curves
+from workflow.plan_table import short
 from workflow.references import Published
-from workflow.report_tables import costs, nano, number, percent, quantity
+from workflow.report_tables import costs, number, percent, quantity
 from workflow.structure_case import StructureCase
 from workflow.structure_findings import read_history, read_modes
 from workflow.structure_launch import read_results
@@ -24,8 +25,8 @@ MODEL_ROWS = (
     ("elements", lambda model: f"{number(model['elements'])} ({model['element']} {model['formulation']})"),
     ("nodes", lambda model: number(model["nodes"])),
     ("MPI ranks", lambda model: number(model["ranks"])),
-    ("critical time step", lambda model: nano(model["critical_step"])),
-    ("time step", lambda model: nano(model["step"])),
+    ("critical time step", lambda model: short(model["critical_step"])),
+    ("time step", lambda model: short(model["step"])),
     ("steps", lambda model: number(model["steps"])),
     ("mass", lambda model: f"{number(1e3 * model['model_mass'])} g"),
     ("mass added by mass scaling", lambda model: f"{number(1e3 * model['added_mass'])} g"),
