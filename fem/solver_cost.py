@@ -25,7 +25,7 @@ NONLINEAR_RATE = {
 }
 FACTOR_RATE = 3.0e9  # operations per second of the factorisation
 SOLVE_RATE = 6.8e8  # entries of the factor per second of a solution
-STEP_OVERHEAD = 5.0e-5  # [s] a step, interpreter
+EXPLICIT_OVERHEAD, IMPLICIT_OVERHEAD = 2.5e-5, 2.0e-4  # [s] a step, interpreter
 ENTRY_MEMORY, EQUATION_MEMORY = 11.0, 3.0e3  # [B] factor; matrix while it is assembled
 ELEMENT_MEMORY, NODE_MEMORY = 300.0, 500.0  # [B] explicit
 PULSE_STEPS = 200  # implicit steps in the shortest pulse: 3e-4 of the period of what swings twice in it
@@ -94,14 +94,14 @@ def forecast_solvers(scene: StructureScene, elements: int, explicit_steps: int, 
 def explicit_cost(elements: int, nodes: int, steps: int, rate: float) -> SolverCost:
     """Predict the cost of explicit steps at a rate of element updates per second."""
     memory = ELEMENT_MEMORY * elements + NODE_MEMORY * nodes
-    return SolverCost(steps, steps * (elements / rate + STEP_OVERHEAD), 0.0, memory)
+    return SolverCost(steps, steps * (elements / rate + EXPLICIT_OVERHEAD), 0.0, memory)
 
 
 def implicit_cost(nodes: tuple[int, int, int], steps: int) -> SolverCost:
     """Predict the cost of implicit steps of a box of nodes: one factorisation, and a solution a step."""
     factor, equations = box_factor(nodes), 3 * math.prod(nodes)
     setup = factor.operations / FACTOR_RATE
-    seconds = setup + steps * (factor.entries / SOLVE_RATE + STEP_OVERHEAD)
+    seconds = setup + steps * (factor.entries / SOLVE_RATE + IMPLICIT_OVERHEAD)
     return SolverCost(steps, seconds, setup, ENTRY_MEMORY * factor.entries + EQUATION_MEMORY * equations)
 
 

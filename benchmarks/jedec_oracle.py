@@ -1,0 +1,253 @@
+"""The bare JEDEC board at 1500 G, 0.5 ms: explicit against implicit steps, error against cost, forecast against both.
+
+    python benchmarks/jedec_oracle.py [--quick]    (one core, some minutes; writes benchmarks/results/jedec_oracle.json)
+
+Three tables, all of histories at the centre of the board (relative L2 norms over 2 ms):
+``steps``  one mesh, implicit steps of many sizes and explicit ones: against explicit steps a tenth as large.
+``meshes`` kind of element x size x solver: against the finest hexahedra, seconds beside error.
+``factor`` operations, entries, speed and memory of MUMPS' factor for plates and cubes, and what was forecast of them.
+Seconds are process CPU seconds of set-up (assembly and factorisation) and steps, without meshing and output.
+"""
+
+import argparse
+import json
+import os
+import platform
+import tempfile
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from time import process_time
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+import numpy as np
+from mpi4py import MPI
+
+from fem.compare_structures import solver_differences
+from fem.factor_cost import box_factor
+from fem.factorisation import Factorisation
+from fem.global_matrix import Equations
+from fem.implicit import ImplicitMotion
+from fem.inputs import INPUT, StructureInput
+from fem.material_library import FR4
+from fem.solver_cost import forecast_solvers
+from fem.structure import make_history, make_participant
+from fem.structure_model import build_structure
+from fem.structure_pulses import pulse_durations, pulses_of
+from meshing.box import write_box
+from meshing.box_plan import Box, BoxHoles, BoxLayer
+from tests.support.fem_bodies import dns_body
+from tests.support.fem_models import grid, mesh_of
+
+RESULTS = Path(__file__).parent / "results" / "jedec_oracle.json"
+LENGTH, WIDTH, THICKNESS, SPACING, HOLE = 132e-3, 77e-3, 1e-3, (105e-3, 71e-3), 3e-3
+PULSE, DURATION, SAMPLES = 0.5e-3, 2e-3, 400
+KINDS = {
+    "incompatible_modes": ("hexahedron", "incompatible_modes"),
+    "one_point": ("hexahedron", "one_point"),
+    "tetrahedron": ("tetrahedron", "incompatible_modes"),
+    "tetrahedron_quadratic": ("tetrahedron_quadratic", "incompatible_modes"),
+}
+SIZES = {
+    "incompatible_modes": [(11, 6, 2), (22, 13, 2), (33, 19, 2), (33, 19, 4)],
+    "one_point": [(22, 13, 2), (33, 19, 2)],
+    "tetrahedron": [(22, 13, 2), (44, 26, 4)],
+    "tetrahedron_quadratic": [(11, 6, 1), (17, 10, 1)],
+}
+FINEST = (50, 29, 4)
+BOXES = [(40, 40, 1), (80, 80, 1), (24, 24, 4), (40, 40, 4), (80, 60, 4), (12, 12, 12), (16, 16, 16), (20, 20, 20)]
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """One run: kind of element, cells of the quarter board (x, y, z), solver, numerics."""
+
+    kind: str
+    cells: tuple[int, int, int]
+    solver: str
+    numerics: dict
+
+
+def input_of(setting: Setting, directory: Path) -> StructureInput:
+    """Mesh the board and return the input of its run."""
+    element, formulation = KINDS[setting.kind]
+    layer = BoxLayer("board", THICKNESS, setting.cells[2])
+    box = Box((LENGTH, WIDTH), setting.cells[:2], (layer,), ("x", "y"), element, BoxHoles(SPACING, HOLE))
+    write_box(box, directory / "structure.msh")
+    tables = {
+        "mode": "structure",
+        "mesh": str(directory / "structure.msh"),
+        "output": str(directory),
+        "solver": setting.solver,
+        "structure": {
+            "length": LENGTH,
+            "width": WIDTH,
+            "cells": setting.cells[:2],
+            "symmetry": ["x", "y"],
+            "element": element,
+            "formulation": formulation,
+            "holes": {"spacing": SPACING, "diameter": HOLE},
+            "layers": {"board": {"material": "FR4", "thickness": THICKNESS, "cells": setting.cells[2]}},
+        },
+        "supports": {"holes": {"on": "mounting_holes", "hold": ["x", "y", "z"]}},
+        "loads": {"drop": {"kind": "input_g", "service_condition": "B"}},
+        "watch": {"centre": {"at": [0.0, 0.0, 0.0]}},
+        "dynamics": {"duration": DURATION, "numerics": {"history_samples": SAMPLES} | setting.numerics},
+    }
+    request = INPUT.validate_json(json.dumps(tables))
+    assert isinstance(request, StructureInput)
+    return request
+
+
+def run(setting: Setting) -> tuple[dict, dict[str, np.ndarray]]:
+    """Run a setting; return its costs, forecast and measured, and its history."""
+    with tempfile.TemporaryDirectory() as directory:
+        request = input_of(setting, Path(directory))
+        pulses = pulses_of(request.loads)
+        model = build_structure(MPI.COMM_SELF, request, pulse_durations(pulses))
+    begin = process_time()
+    participant = make_participant(MPI.COMM_SELF, model, request, pulses)
+    setup = process_time() - begin
+    history, plan, seconds = make_history(MPI.COMM_SELF, model, request, pulses), participant.plan, 0.0
+    history.sample({"structure": participant})
+    for _ in range(plan.windows):
+        begin = process_time()
+        participant.begin_window()
+        participant.finish_window()
+        seconds += process_time() - begin
+        history.sample({"structure": participant})
+    steps, elements = plan.windows * plan.substeps, len(model.body.local.cells)
+    forecast = getattr(forecast_solvers(request, elements, steps, steps), setting.solver)
+    costs = {
+        "kind": setting.kind,
+        "cells": setting.cells,
+        "solver": setting.solver,
+        "elements": elements,
+        "equations": int(model.body.free.sum()),
+        "step_us": 1e6 * plan.step,
+        "steps": steps,
+        "setup_seconds": setup,
+        "seconds_per_step": seconds / steps,
+        "seconds": setup + seconds,
+        "forecast_seconds": forecast.seconds,
+        "energy_balance_error": history.ledger.balance_error,
+    }
+    motion = participant.motion
+    if isinstance(motion, ImplicitMotion):
+        costs["factor"] = asdict(motion.factor.cost)
+        motion.factor.free()
+    else:
+        costs["updates_per_second"] = elements * steps / seconds
+    return costs, history.arrays()
+
+
+def with_errors(found: tuple[dict, dict], reference: dict) -> dict:
+    """Return the costs of a run with its differences to a reference history."""
+    costs, history = found
+    errors = solver_differences(history, reference)
+    named = {name: errors[f"{name}_difference@centre"] for name in ("displacement", "strain")}
+    row = costs | {f"{name}_error": value for name, value in named.items()}
+    print(
+        f"{row['kind']:22} {row['cells']!s:12} {row['solver']:8} step {row['step_us']:7.3f} us  {row['seconds']:8.2f} s"
+        f" (forecast {row['forecast_seconds']:8.2f} s)  displacement {row['displacement_error']:.2e}"
+        f"  strain {row['strain_error']:.2e}",
+        flush=True,
+    )
+    return row
+
+
+def step_table(quick: bool) -> list[dict]:
+    """Return errors and costs of one mesh over the steps."""
+    cells = (11, 6, 2) if quick else (33, 19, 2)
+    explicit = Setting("incompatible_modes", cells, "explicit", {})
+    _, reference = run(Setting("incompatible_modes", cells, "explicit", {"step_fraction": 0.09}))
+    settings = [explicit]
+    damped = {"hht_alpha": -0.05, "energy_balance_limit": 0.5}  # what alpha takes is in no account of the ledger
+    for count in (25, 50, 100, 200, 400):
+        settings.append(Setting("incompatible_modes", cells, "implicit", {"implicit_step": PULSE / count}))
+    for count in (50, 100):
+        settings.append(Setting("incompatible_modes", cells, "implicit", {"implicit_step": PULSE / count} | damped))
+    return [with_errors(run(setting), reference) | {"numerics": setting.numerics} for setting in settings]
+
+
+def mesh_table(quick: bool) -> list[dict]:
+    """Return errors and costs of kinds of elements, sizes and solvers."""
+    _, reference = run(Setting("incompatible_modes", (22, 13, 2) if quick else FINEST, "implicit", {}))
+    return [with_errors(run(setting), reference) for setting in mesh_settings(quick)]
+
+
+def mesh_settings(quick: bool) -> Iterator[Setting]:
+    """Yield the runs of ``mesh_table``."""
+    for kind, sizes in SIZES.items():
+        for cells in sizes[:1] if quick else sizes:
+            yield Setting(kind, cells, "explicit", {})
+            yield Setting(kind, cells, "implicit", {"implicit_step": PULSE / 100})
+
+
+def factor_table(quick: bool) -> list[dict]:
+    """Return what MUMPS needs for boxes held on one side, and its forecast."""
+    return [factor_row(cells) for cells in (BOXES[:3] if quick else BOXES)]
+
+
+def factor_row(cells: tuple[int, int, int]) -> dict:
+    """Return one row of ``factor_table``."""
+    points, hexahedra = grid(*(np.arange(count + 1) * 1e-3 for count in cells))
+    body, _ = dns_body(mesh_of(points, hexahedra, "board", {}), FR4)
+    body.free[body.local.points[:, 0] < 1e-9] = False
+    equations = Equations.of(MPI.COMM_SELF, body)
+    begin = process_time()
+    matrix = equations.stiffness()
+    assembly, begin = process_time() - begin, process_time()
+    factor = Factorisation(matrix)
+    seconds = process_time() - begin
+    right = equations.mass()
+    solution = right.duplicate()
+    begin = process_time()
+    for _ in range(3):
+        factor.solve(right, solution)
+    solve, cost = (process_time() - begin) / 3, factor.cost
+    factor.free()
+    forecast = box_factor((cells[0], cells[1] + 1, cells[2] + 1))
+    row = {
+        "cells": cells,
+        "equations": equations.total,
+        "assembly_seconds": assembly,
+        "factor_seconds": seconds,
+        "solve_seconds": solve,
+        **asdict(cost),
+        "operations_per_second": cost.operations / seconds,
+        "entries_per_second": cost.entries / solve,
+        "memory_per_entry": cost.memory / cost.entries,
+        "operations_forecast_ratio": forecast.operations / cost.operations,
+        "entries_forecast_ratio": forecast.entries / cost.entries,
+    }
+    print(
+        f"{cells!s:14} {row['equations']:7} equations  factor {seconds:6.2f} s at {row['operations_per_second']:.2e}/s"
+        f"  solve {solve:.4f} s at {row['entries_per_second']:.2e}/s  forecast x{row['operations_forecast_ratio']:.2f}"
+        f" x{row['entries_forecast_ratio']:.2f}",
+        flush=True,
+    )
+    return row
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--quick", action="store_true", help="coarse meshes; some seconds; writes nothing")
+    quick = parser.parse_args().quick
+    tables = {"steps": step_table(quick), "meshes": mesh_table(quick), "factor": factor_table(quick)}
+    rows = tables["steps"] + tables["meshes"]
+    ratios = [row["forecast_seconds"] / row["seconds"] for row in rows]
+    result = {
+        "machine": platform.processor() or platform.machine(),
+        **tables,
+        "forecast_ratio": [min(ratios), max(ratios)],
+    }
+    print("forecast over measured seconds:", *(f"{value:.2f}" for value in result["forecast_ratio"]))
+    if not quick:
+        RESULTS.parent.mkdir(exist_ok=True)
+        RESULTS.write_text(json.dumps(result, indent=1))
+
+
+if __name__ == "__main__":
+    main()
