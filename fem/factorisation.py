@@ -4,6 +4,8 @@ from dataclasses import dataclass
 
 from petsc4py import PETSc
 
+from fem.errors import AgreedError
+
 PREFIX = "factor_"
 SETTINGS = {14: 50}  # ICNTL of MUMPS: working memory beyond its estimate [%], which ties and many ranks exceed
 
@@ -24,7 +26,7 @@ class Factorisation:
         """Factor; collective.
 
         Raises:
-            RuntimeError: The matrix is not positive definite, or memory ran out.
+            AgreedError: The matrix is not positive definite, or memory ran out; on every rank.
         """
         matrix.setOption(PETSc.Mat.Option.SPD, True)
         self._solver = PETSc.KSP().create(matrix.comm)
@@ -34,7 +36,7 @@ class Factorisation:
         self._factor = self._solver.getPC().getFactorMatrix()
         status, negative = self._factor.getMumpsInfog(1), self._factor.getMumpsInfog(12)
         if status < 0 or negative > 0:
-            raise RuntimeError(
+            raise AgreedError(
                 f"MUMPS cannot factor {matrix.size[0]} equations: INFOG(1) = {status}, INFOG(2) ="
                 f" {self._factor.getMumpsInfog(2)} (-10: singular; -9, -13, -19: out of memory), {negative} pivots are"
                 " negative"

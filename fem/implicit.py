@@ -17,6 +17,7 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from fem.agreement import agreed
 from fem.body import Body
 from fem.damping import RayleighDamping
 from fem.energy import Energy
@@ -80,10 +81,11 @@ class ImplicitMotion:
             alpha: Of the HHT method, from -1/3 to 0.
 
         Raises:
-            ValueError: Step or alpha out of range, or a material or kinematics that is not linear.
+            ValueError: Step or alpha out of range.
+            AgreedError: A material or kinematics is not linear, or memory ran out; on every rank.
         """
         self._scheme = Scheme(step, alpha)
-        check_linear(body)
+        agreed(comm, lambda: check_linear(body))
         self.body, self.step, self.time = body, step, 0.0
         self._loads = [load for load in loads if not isinstance(load, RayleighDamping)]
         damping = [load for load in loads if isinstance(load, RayleighDamping)]

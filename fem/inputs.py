@@ -20,6 +20,11 @@ class RunInput(Parameters):
     output: Path
     checkpoints: Path | None = None
 
+    @property
+    def implicit(self) -> bool:
+        """Whether the run takes implicit steps."""
+        return self.mode == "dns" and self.shock.numerics.dns_solver == "implicit"
+
 
 class StructureInput(StructureScene):
     """A structure and one of its solvers; SI floats. ``checkpoints`` is a folder from which a run continues."""

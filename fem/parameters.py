@@ -47,9 +47,10 @@ class Damping(Parameters):
 
 
 class ShockNumerics(Parameters):
-    """How the shock is computed."""
+    """How the shock is computed; implicit steps are for elastic materials, at most from sample to sample."""
 
     modes: tuple[Literal["two_scale", "dns"], ...] = ("two_scale", "dns")
+    dns_solver: Literal["explicit", "implicit"] = "explicit"
     step_fraction: float = Field(0.9, gt=0, le=0.95)
     critical_step: Literal["element", "power_iteration"] = "element"
     mass_scaled: tuple[Literal["board", "substrate", "die", "copper", "solder"], ...] = ()

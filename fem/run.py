@@ -1,6 +1,7 @@
 """One shock run, from meshes to results: what every rank does, in order."""
 
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,10 +10,11 @@ from mpi4py import MPI
 from fem.agreement import agreed
 from fem.checkpoint import Checkpoints, digest_of_files
 from fem.communicators import Communicators, Role
-from fem.estimate import WindowPlan
+from fem.estimate import WindowPlan, implicit_plan, largest_implicit_step
 from fem.exchange import CutChannels
 from fem.fields import Fields
 from fem.history import History
+from fem.implicit import ImplicitMotion
 from fem.inputs import RunInput
 from fem.ledger import Ledger
 from fem.march import Outputs, march
@@ -24,6 +26,7 @@ from fem.pulse import Pulse
 from fem.result import Timings, write_result
 from fem.shock_loads import shock_loads, shock_pulse
 from fem.steps import Steps
+from fem.structure_pulses import pulse_durations
 from fem.watch_joints import JointWatch
 
 SPEEDS = 201  # times at which the largest velocity of the table is looked for
@@ -42,6 +45,9 @@ def run(world: MPI.Comm, request: RunInput) -> None:
     with Communicators(world, request.mode, request.shock.ranks) as comms:
         models, steps = build_models(comms, request)
         pulse = agreed(comms.world, lambda: shock_pulse(request.shock)).pulse
+        if request.implicit:
+            largest = largest_implicit_step(request.shock.duration, pulse_durations({"drop": pulse}))
+            steps = replace(steps, plan=implicit_plan(steps.plan, largest))
         crew = make_crew(comms, models, steps.plan, request.shock)
         history = make_history(comms, models, steps, pulse, request.shock)
         numerics, fields = request.shock.numerics, make_fields(comms, models, request)
@@ -65,7 +71,9 @@ def make_crew(
         role: shock_loads(comms.models[role], role, model.body, model.tables, shock) for role, model in models.items()
     }
     if "dns" in bodies:
-        return {"dns": Alone(uncut_motion(bodies["dns"], loads["dns"], plan.step), plan)}
+        model = bodies["dns"], loads["dns"], plan.step
+        implicit = shock.numerics.dns_solver == "implicit"
+        return {"dns": Alone(ImplicitMotion(comms.models["dns"], *model) if implicit else uncut_motion(*model), plan)}
     absent = np.full_like(next(iter(bodies.values())).cut, -1)
     macro, meso = (bodies[role].cut if role in bodies else absent for role in ("macro", "meso"))
     channels = CutChannels.open(comms.world, macro, meso, receiver_waits=len(comms.models) == 1)

@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from fem.estimate import largest_implicit_step
 from fem.factor_cost import box_factor
 from fem.structure_effects import plastic_laws
 from fem.structure_parameters import Dynamics, StructureScene
@@ -28,8 +29,6 @@ SOLVE_RATE = 6.8e8  # entries of the factor per second of a solution
 EXPLICIT_OVERHEAD, IMPLICIT_OVERHEAD = 2.5e-5, 2.0e-4  # [s] a step, interpreter
 ENTRY_MEMORY, EQUATION_MEMORY = 11.0, 3.0e3  # [B] factor; matrix while it is assembled
 ELEMENT_MEMORY, NODE_MEMORY = 300.0, 500.0  # [B] explicit
-PULSE_STEPS = 200  # implicit steps in the shortest pulse: 3e-4 of the period of what swings twice in it
-RUN_STEPS = 1000  # implicit steps in a run without a pulse
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,11 +121,5 @@ def nonlinearities(scene: StructureScene) -> tuple[str, ...]:
 
 
 def implicit_step(dynamics: Dynamics, pulses: Iterable[float]) -> float:
-    """Return the largest implicit step [s]: as given, or so many in the shortest of some pulses [s].
-
-    On the JEDEC board under its half sine of 0.5 ms, steps of 1/50, 1/100 and 1/200 of the pulse are 7e-4, 2e-4 and
-    4e-5 (relative L2) off in the displacement of the centre, 7e-3, 2e-3 and 6e-4 in its strain
-    (benchmarks/jedec_oracle.py).
-    """
-    given = dynamics.numerics.implicit_step
-    return given or min([dynamics.duration / RUN_STEPS, *(pulse / PULSE_STEPS for pulse in pulses)])
+    """Return the largest implicit step [s]: as given, or that of ``estimate.largest_implicit_step``."""
+    return dynamics.numerics.implicit_step or largest_implicit_step(dynamics.duration, pulses)

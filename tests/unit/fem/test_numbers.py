@@ -7,7 +7,7 @@ import pytest
 
 from fem.compare import compare_histories
 from fem.errors import EnergyError
-from fem.estimate import BOARD_ADVANTAGE, predict_seconds, window_plan
+from fem.estimate import BOARD_ADVANTAGE, implicit_plan, largest_implicit_step, predict_seconds, window_plan
 from fem.ledger import SUMS, Ledger
 from fem.loads import HalfSineDrop
 from fem.material_library import COPPER, FR4, SILICON
@@ -73,6 +73,20 @@ def test_window_is_below_both_limits_and_divides_the_duration():
     assert plan.step <= 0.9 * 1.1e-8
     assert plan.windows * plan.window == pytest.approx(1.5e-3, rel=1e-12)
     assert 600 <= plan.windows / plan.stride < 1200
+    assert plan.windows % plan.stride == 0
+
+
+def test_implicit_steps_have_the_samples_of_the_windows():
+    plan = window_plan(8.4e-8, 1.1e-8, 0.9, 1.5e-3, 600)
+    implicit = implicit_plan(plan, 1e-6)
+    assert implicit.window == pytest.approx(plan.stride * plan.window, rel=1e-12)
+    assert implicit.windows * implicit.window == pytest.approx(1.5e-3, rel=1e-12)
+    assert 0.5e-6 < implicit.step <= 1e-6
+
+
+def test_implicit_step_follows_the_shortest_pulse():
+    assert largest_implicit_step(1e-3, []) == pytest.approx(1e-6)
+    assert largest_implicit_step(1e-3, [4e-6, 1.0]) == pytest.approx(2e-8)
 
 
 def test_prediction_of_equal_ranks():

@@ -3,7 +3,7 @@ import math
 import pytest
 
 from fem.factor_cost import box_factor
-from fem.solver_cost import forecast_solvers, implicit_step
+from fem.solver_cost import forecast_solvers
 from fem.structure_parameters import StructureScene
 from tests.support.fem_structures import structure_tables_of
 
@@ -53,11 +53,3 @@ def test_what_only_explicit_steps_can_do():
     layers = {"joint": {"material": "SAC305", "thickness": 1e-3, "cells": 2}}
     forecast = forecast_solvers(scene(structure=structure_tables_of()["structure"] | {"layers": layers}), 48, 10, 1000)
     assert forecast.only_explicit == ("plasticity (layers joint)",)
-
-
-def test_implicit_step():
-    dynamics = scene().dynamics
-    assert implicit_step(dynamics, []) == pytest.approx(dynamics.duration / 1000)
-    assert implicit_step(dynamics, [4e-6, 1.0]) == pytest.approx(2e-8)
-    given = scene(dynamics={"duration": 1e-3, "numerics": {"implicit_step": 3e-6}}).dynamics
-    assert implicit_step(given, [4e-6]) == 3e-6
