@@ -9,6 +9,7 @@ from mpi4py import MPI
 from fem.agreement import agreed
 from fem.checkpoint import Checkpoints, digest_of_files
 from fem.communicators import Communicators, Role
+from fem.errors import AgreedError
 from fem.fields import Fields
 from fem.history import History
 from fem.implicit import ImplicitMotion
@@ -72,11 +73,18 @@ def make_participant(comm: MPI.Comm, model: StructureModel, request: StructureIn
 
 
 def make_motion(comm: MPI.Comm, model: StructureModel, request: StructureInput, loads: list[Load]) -> Moving:
-    """Return the motion from rest by the run's solver; collective."""
+    """Return the motion from rest by the run's solver; collective.
+
+    Raises:
+        AgreedError: There is nothing to solve for; on every rank.
+    """
     step = model.steps.plan.step
-    if request.solver == "implicit":
+    if request.solver == "explicit":
+        return uncut_motion(model.body, loads, step)
+    try:
         return ImplicitMotion(comm, model.body, loads, step, request.dynamics.numerics.hht_alpha)
-    return uncut_motion(model.body, loads, step)
+    except ValueError as error:  # of what all ranks know alike
+        raise AgreedError(f"implicit solver: {error}") from error
 
 
 def make_history(comm: MPI.Comm, model: StructureModel, request: StructureInput, pulses: dict[str, Pulse]) -> History:

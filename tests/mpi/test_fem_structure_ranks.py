@@ -26,9 +26,10 @@ DYNAMICS = {
 }
 
 
-def history(directory: Path, ranks: int) -> dict[str, np.ndarray]:
+def history(directory: Path, ranks: int, solver: str) -> dict[str, np.ndarray]:
     directory.mkdir()
-    done = run_program(write_structure(directory, loads=LOADS, watch=WATCH, dynamics=DYNAMICS), ranks)
+    tables = {"solver": solver, "loads": LOADS, "watch": WATCH, "dynamics": DYNAMICS}
+    done = run_program(write_structure(directory, **tables), ranks)
     assert done.returncode == 0, done.stderr
     result = json.loads((directory / "out" / "result.json").read_text())
     assert result["model"]["ranks"] == ranks
@@ -36,8 +37,9 @@ def history(directory: Path, ranks: int) -> dict[str, np.ndarray]:
         return {name: array for name, array in arrays.items() if array.dtype.kind == "f"}
 
 
-def test_two_ranks_give_what_one_gives(tmp_path):
-    one, two = history(tmp_path / "one", 1), history(tmp_path / "two", 2)
+@pytest.mark.parametrize("solver", ["explicit", "implicit"])
+def test_two_ranks_give_what_one_gives(tmp_path, solver):
+    one, two = history(tmp_path / "one", 1, solver), history(tmp_path / "two", 2, solver)
     assert "reaction@clamp" in one
     for name in one.keys() - {"balance"}:
         assert np.abs(one[name] - two[name]).max() <= 1e-8 * np.abs(one[name]).max(), name

@@ -128,6 +128,33 @@ def test_large_mass_gives_what_direct_input_gives(tmp_path):
     assert np.abs(large["reaction@clamp"] - direct["reaction@clamp"]).max() < 5e-3 * peak
 
 
+def test_both_solvers_agree_under_all_loads(tmp_path):
+    drop = structure_tables_of()["loads"]["drop"]
+    loads = {
+        "drop": drop,
+        "push": {"kind": "pressure", "on": "z_max", "peak": 1e5, "duration": 6e-5},
+        "pull": {"kind": "motion", "on": "x_max", "component": "x", "peak": 0.1, "duration": 4e-5},
+    }
+    numerics = {"history_samples": 100, "field_samples": 2, "implicit_step": 2e-7}
+    changes = {"loads": loads, "dynamics": {"duration": 1e-4, "numerics": numerics}}
+    _, explicit = run(tmp_path, **changes)
+    result, implicit = run(tmp_path, **changes, solver="implicit")
+    assert result["metrics"]["step"]["value"] == pytest.approx(2e-7)
+    assert result["health"]["energy_balance_error"]["value"] < 1e-10
+    found = solver_differences(explicit, implicit)
+    assert found["displacement_difference"] < 1e-3
+    assert found["strain_difference"] < 5e-3
+    reactions = explicit["reaction@clamp"], implicit["reaction@clamp"]
+    assert np.linalg.norm(reactions[0] - reactions[1]) < 5e-3 * np.linalg.norm(reactions[1])
+
+
+def test_implicit_solver_with_nothing_to_solve(tmp_path):
+    supports = {side: {"on": side, "hold": ["x", "y", "z"]} for side in ("z_min", "z_max")}
+    request = structure_input(tmp_path, strip_mesh((4, 2, 1)), supports=supports, solver="implicit")
+    with pytest.raises(AgreedError, match="implicit solver: the supports hold every node"):
+        run_structure(MPI.COMM_SELF, request)
+
+
 def test_modes_of_a_cantilever(tmp_path):
     """First bending: (1.8751^2 / 2 pi) sqrt(E I / (rho A L^4)), between a beam's and a wide plate's."""
     dynamics = {"duration": 1e-5, "modes": 3, "numerics": {"history_samples": 4, "field_samples": 2}}
