@@ -68,7 +68,7 @@ def shock_loads(comm: MPI.Comm, role: Role, body: Body, tables: JointTables, sho
 
     Args:
         comm: Communicator of the model.
-        role: A large mass acts on the holes of all models but the meso model, which has none.
+        role: The meso model has no holes for a large mass to act on, and only tells its results from that frame.
         body: The model.
         tables: Its support nodes.
         shock: Pulse, method, gravity, damping.
@@ -77,7 +77,9 @@ def shock_loads(comm: MPI.Comm, role: Role, body: Body, tables: JointTables, sho
     made: list[Load] = [BodyAcceleration(DOWN, Constant(STANDARD_GRAVITY))] if chosen.gravity else []
     if shock.method == "direct":
         made.append(BodyAcceleration(DOWN, chosen.pulse))
-    elif role != "meso":
+    elif role == "meso":
+        made.append(LargeMass(np.empty(0, np.int32), np.empty(0), DOWN, chosen.pulse))
+    else:
         made.append(LargeMass.build(comm, body, tables.shaken, DOWN, chosen.pulse))
     if any(shock.damping.coefficients):
         made.append(RayleighDamping.build(body, shock.damping.coefficients))

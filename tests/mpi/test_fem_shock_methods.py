@@ -1,0 +1,69 @@
+"""A package's shock given in other ways: large mass for direct acceleration, power iteration for the DNS."""
+
+import json
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+import fem.run
+from fem.inputs import RunInput
+from tests.support.fem_models import write_small_assembly
+from tests.support.fem_program import run_program
+
+SHOCK = {
+    "service_condition": "H",
+    "duration": 6e-5,
+    "numerics": {"mass_scaled": ["copper"], "history_samples": 60, "field_samples": 2},
+}
+
+
+@pytest.fixture(scope="module")
+def assembly(tmp_path_factory) -> Path:
+    directory = tmp_path_factory.mktemp("methods")
+    write_small_assembly(directory, 1, size=1e-3)
+    return directory
+
+
+def run(directory: Path, mode: Literal["two_scale", "dns"], **changes) -> tuple[dict, dict[str, np.ndarray]]:
+    meshes = [str(directory / "assembly.msh"), str(directory / "joints.msh")]
+    output = directory / "_".join([mode, *changes])
+    request = {"mode": mode, "meshes": meshes, "shock": SHOCK | changes, "output": str(output)}
+    if mode == "dns":
+        output.mkdir()
+        fem.run.run(MPI.COMM_SELF, RunInput.model_validate(request))
+    else:
+        path = directory / "input.json"
+        path.write_text(json.dumps(request))
+        done = run_program(path, 2)
+        assert done.returncode == 0, done.stderr
+    result = json.loads((output / "result.json").read_text())
+    assert all(check["ok"] for check in result["health"].values()), result["health"]
+    with np.load(output / "history.npz") as arrays:
+        return result, dict(arrays)
+
+
+def difference(first: dict[str, np.ndarray], second: dict[str, np.ndarray]) -> float:
+    names = ("die_centre", "board_strain", "von_mises_board")
+    return max(float(np.linalg.norm(first[k] - second[k]) / np.linalg.norm(second[k])) for k in names)
+
+
+def test_large_mass_at_the_holes_is_direct_acceleration(assembly):
+    result, direct = run(assembly, "two_scale")
+    assert result["effects"]["input_g"]["why"].startswith("JEDEC service condition H, direct acceleration")
+    assert not result["effects"]["gravity"]["on"]
+    result, large = run(assembly, "two_scale", method="large_mass")
+    assert "large mass" in result["effects"]["input_g"]["why"]
+    assert difference(large, direct) < 5e-3
+
+
+def test_power_iteration_allows_larger_substeps_of_a_dns(assembly):
+    numerics = {"history_samples": 20, "field_samples": 2}
+    result, element = run(assembly, "dns", duration=2e-5, numerics=numerics)
+    numerics["critical_step"] = "power_iteration"
+    larger, assembled = run(assembly, "dns", numerics=numerics, duration=2e-5)
+    assert larger["model"]["substeps"] < 0.5 * result["model"]["substeps"]
+    assert assembled["time"] == pytest.approx(element["time"], rel=1e-12)
+    assert difference(assembled, element) < 5e-3
