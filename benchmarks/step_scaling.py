@@ -25,7 +25,7 @@ from mpi4py import MPI
 from benchmarks.support import turns
 from benchmarks.support.cube import STEEL, cube
 from fem.body import make_body, make_pieces
-from fem.loads import HalfSineDrop, Load
+from fem.loads import Load, half_sine_drop
 from fem.local_mesh import distribute
 from fem.material_roles import Materials
 from fem.motion import Motion
@@ -35,7 +35,7 @@ from workflow.launch import mpi_command, own_environment
 
 ROUNDS, CALLS = 25, 20
 FRACTION = 0.5  # of the critical step
-PULSE = HalfSineDrop(peak=1.5e4, pulse=5e-4)
+PULSE = half_sine_drop(peak=1.5e4, duration=5e-4)
 NAP = 1e-3  # [s]
 
 

@@ -9,15 +9,12 @@ from mpi4py import MPI
 from fem.body import Body
 from fem.communicators import Role
 from fem.damping import RayleighDamping
-from fem.loads import BodyAcceleration, LargeMass, Load
+from fem.loads import DOWN, BodyAcceleration, LargeMass, Load
 from fem.parameters import Shock
 from fem.pulse import STANDARD_GRAVITY, Constant, HalfSine, Pulse, Tabulated, service_condition
 from fem.pulse_table import read_pulse
 from fem.scene import JointTables
 
-# The package looks towards the ground, so the table's upward acceleration points along -z and the board, seen from the
-# table, is pushed along +z; so does its weight.
-DOWN = np.array([0.0, 0.0, 1.0])
 NEGLIGIBLE = 1e-3  # of the peak: weight below it is left out
 
 

@@ -14,7 +14,7 @@ from mpi4py import MPI
 from fem.body import make_body, make_pieces
 from fem.energy import Energy
 from fem.fields import Fields
-from fem.loads import HalfSineDrop
+from fem.loads import half_sine_drop
 from fem.local_mesh import distribute
 from fem.material_roles import Materials
 from fem.mesh import MeshData
@@ -31,7 +31,7 @@ for name, kind in KINDS.items():
     body = make_body(comm, pieces, item.tables, np.ones(len(pieces.steps)))
     body.free[body.local.points[:, 0] < 1e-9] = False
     step = 0.9 * comm.allreduce(float(pieces.steps.min(initial=np.inf)), MPI.MIN)
-    motion = Motion(body, [HalfSineDrop(1e4, 5e-5)], step, np.empty(0, np.int32), np.zeros(len(body.mass)))
+    motion = Motion(body, [half_sine_drop(1e4, 5e-5)], step, np.empty(0, np.int32), np.zeros(len(body.mass)))
     for _ in range(100):
         motion.advance()
         motion.update_force()

@@ -11,7 +11,7 @@ from mpi4py import MPI
 from fem.body import make_body, make_pieces
 from fem.global_matrix import Equations
 from fem.implicit import ImplicitMotion
-from fem.loads import HalfSineDrop
+from fem.loads import half_sine_drop
 from fem.local_mesh import distribute
 from fem.mesh import append
 from fem.modal import natural_modes
@@ -24,7 +24,7 @@ item = prepare(append(small_assembly(2, size=1e-3)), "dns")["dns"]
 pieces = make_pieces(distribute(comm, item.mesh if comm.rank == 0 else None), item.tables, Materials())
 body = make_body(comm, pieces, item.tables, np.ones(len(pieces.steps)))
 equations = Equations.of(comm, body)
-motion = ImplicitMotion(comm, body, [HalfSineDrop(1e4, 5e-5)], 2e-6)
+motion = ImplicitMotion(comm, body, [half_sine_drop(1e4, 5e-5)], 2e-6)
 for _ in range(10):
     motion.advance()
     motion.update_force()

@@ -6,7 +6,7 @@ from mpi4py import MPI
 
 from fem.body import Body
 from fem.implicit import ImplicitMotion
-from fem.loads import HalfSineDrop
+from fem.loads import half_sine_drop
 from fem.material_roles import Materials
 from fem.mesh import append
 from tests.support.fem_bodies import STEEL, dns_body, motion_of
@@ -53,7 +53,7 @@ def test_order_in_time(spring, alpha):
     middle = int(np.flatnonzero(body.free[:, 2])[0])
     errors = []
     for steps in (128, 256):
-        motion = run(implicit(body, end / steps, alpha, [HalfSineDrop(PEAK, pulse)]), steps)
+        motion = run(implicit(body, end / steps, alpha, [half_sine_drop(PEAK, pulse)]), steps)
         errors.append(abs(motion.displacement[middle, 2] - half_sine_response(omega, pulse, motion.time)))
     assert errors[0] < 5e-3 * PEAK / omega**2
     assert np.log2(errors[0] / errors[1]) == pytest.approx(2.0, abs=0.1)
@@ -94,7 +94,7 @@ def total_energy(motion) -> float:
 def test_equals_the_explicit_solver_in_the_limit_and_keeps_its_energy():
     """A tied package under a short pulse: the difference shrinks with the square of the step."""
     body, critical = dns_body(append(small_assembly(1, size=1e-3)), materials=Materials())
-    load, steps = HalfSineDrop(PEAK, 3e-6), int(np.ceil(4e-6 / (0.9 * critical)))
+    load, steps = half_sine_drop(PEAK, 3e-6), int(np.ceil(4e-6 / (0.9 * critical)))
     end = steps * 0.9 * critical
     explicit = run(motion_of(body, end / (4 * steps), [load]), 4 * steps)
     errors = []
@@ -109,9 +109,9 @@ def test_equals_the_explicit_solver_in_the_limit_and_keeps_its_energy():
 
 def test_energy_of_a_board_balances_at_any_step():
     body, critical = dns_body(board_mesh(1e-3, layers=2))
-    motion = run(implicit(body, 100 * critical, loads=[HalfSineDrop(PEAK, 5e-5)]), 40)
+    motion = run(implicit(body, 100 * critical, loads=[half_sine_drop(PEAK, 5e-5)]), 40)
     assert total_energy(motion) == pytest.approx(motion.external_work, rel=1e-9)
-    damped = run(implicit(body, 100 * critical, -0.1, [HalfSineDrop(PEAK, 5e-5)]), 40)
+    damped = run(implicit(body, 100 * critical, -0.1, [half_sine_drop(PEAK, 5e-5)]), 40)
     assert total_energy(damped) < damped.external_work
 
 

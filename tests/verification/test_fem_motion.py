@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fem.loads import HalfSineDrop
+from fem.loads import half_sine_drop
 from fem.mesh import MeshData
 from tests.support.fem_bodies import STEEL, dns_body, motion_of
 from tests.support.fem_models import bar, grid, mesh_of, on
@@ -88,7 +88,7 @@ def test_half_sine_shock_response():
     frequency, peak = omega / (2 * np.pi), 1e4
     for ratio in (0.2, 0.8, 1.2):
         pulse = ratio / frequency
-        motion = motion_of(body, 0.02 * critical, [HalfSineDrop(peak, pulse)])
+        motion = motion_of(body, 0.02 * critical, [half_sine_drop(peak, pulse)])
         residual = []
         while motion.time < pulse + 1.5 / frequency:
             motion.advance()

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fem.ledger import Ledger, ledger_sums
-from fem.loads import HalfSineDrop
+from fem.loads import half_sine_drop
 from fem.material_library import SAC405
 from fem.material_roles import Materials
 from fem.mesh import MeshData, append
@@ -12,7 +12,7 @@ from tests.support.fem_bodies import dns_body, motion_of
 from tests.support.fem_models import board_mesh, small_assembly
 from tests.support.fem_window import Window
 
-PULSE = HalfSineDrop(peak=1.5e4, pulse=2e-5)
+PULSE = half_sine_drop(peak=1.5e4, duration=2e-5)
 HEAVY = SAC405.elastic.model_copy(update={"density": 4e5})  # as mass scaling does: m stays near 5
 THICK_COPPER = Materials(copper=HEAVY)
 
