@@ -51,3 +51,8 @@ class Materials(Parameters):
     die: NamedMaterial = SILICON
     copper: NamedMaterial = COPPER
     solder: NamedMaterial = SAC405.elastic
+
+    @property
+    def by_role(self) -> dict[str, Material]:
+        """Return role -> its material."""
+        return {role: getattr(self, role) for role in type(self).model_fields}

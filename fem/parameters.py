@@ -60,6 +60,16 @@ class ShockNumerics(Parameters):
     checkpoint_seconds: Annotated[float, "s"] = Field(60.0, gt=0)
 
 
+class Failure(Parameters):
+    """What the solder at the pads of a joint may bear; a criterion without a limit is not computed.
+
+    ``peel_stress`` is the average over a pad, ``plastic_work_density`` that of the layer of elements at it.
+    """
+
+    peel_stress: Annotated[float | None, "MPa"] = Field(None, gt=0)
+    plastic_work_density: Annotated[float | None, "kJ/m^3"] = Field(None, gt=0)
+
+
 class Shock(Parameters):
     """Input-G at the mounting holes, package facing down (JESD22-B111; H 4.4).
 
@@ -76,5 +86,6 @@ class Shock(Parameters):
     method: Literal["direct", "large_mass"] = "direct"
     gravity: Literal["auto", "on", "off"] = "auto"
     damping: Damping = Damping()
+    failure: Failure = Failure()
     ranks: Ranks = Ranks()
     numerics: ShockNumerics = ShockNumerics()

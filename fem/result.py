@@ -10,8 +10,10 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from fem.communicators import Communicators, Role
+from fem.failure import Verdicts, failed_joints, failure_criteria, judge, worst
 from fem.history import History
 from fem.inputs import RunInput
+from fem.material_effects import failure_effect, material_effects
 from fem.model import Model
 from fem.shock_loads import shock_pulse
 from fem.steps import Steps
@@ -44,10 +46,16 @@ def write_result(
     summary = model_summary(comms, request, models, steps)
     if comms.world.rank == 0:
         history.write(request.output)
+        arrays = history.arrays()
+        verdicts = judge(failure_criteria(request.shock.failure), arrays)
         result = {
-            "metrics": cost_metrics(summary, timings) | health_metrics(history) | shock_metrics(history.arrays()),
-            "health": health(history, summary, request),
+            "metrics": cost_metrics(summary, timings)
+            | health_metrics(history)
+            | shock_metrics(arrays)
+            | failure_metrics(verdicts),
+            "health": health(history, summary, request) | worst(verdicts),
             "effects": effects(request, summary),
+            "failure": verdicts,
             "timings": timings.seconds,
             "continued_from": timings.first,
             "model": summary,
@@ -127,6 +135,11 @@ def shock_metrics(arrays: dict[str, NDArray]) -> dict[str, Any]:
     }
 
 
+def failure_metrics(verdicts: Verdicts) -> dict[str, Any]:
+    """Return how many joints fail, where they are judged."""
+    return {"failed_joints": quantity(len(failed_joints(verdicts)))} if verdicts else {}
+
+
 def health(history: History, summary: dict[str, Any], request: RunInput) -> dict[str, Any]:
     """Return the checks of a finished run."""
     checks = {
@@ -164,4 +177,6 @@ def effects(request: RunInput, summary: dict[str, Any]) -> dict[str, Any]:
             "on": any(damping),
             "why": f"Rayleigh damping, alpha = {damping[0]:.4g} 1/s, beta = {damping[1]:.4g} s",
         },
+        **material_effects(request.materials.by_role),
+        **failure_effect(request.shock.failure),
     }

@@ -58,7 +58,18 @@ class BoardDropCase(Case):
             Problem(found.key, found.message, found.value, found.allowed) for found in shock_checks.problems(self.shock)
         ]
         geometries = joint_geometries(pad_table(self.package, self.board, self.warpage))
-        return impossible + of_particles(particles_checks.problems(self.solder, geometries, self.package.pitch))
+        found = impossible + of_particles(particles_checks.problems(self.solder, geometries, self.package.pitch))
+        return found + self._failure_problems()
+
+    def _failure_problems(self) -> list[Problem]:
+        """Find a limit of plastic work where nothing yields."""
+        failure = self.shock.failure
+        if failure.plastic_work_density is None or getattr(self.materials.solder, "plasticity", None) is not None:
+            return []
+        message = "limits the plastic work of solder that does not yield"
+        allowed = 'materials.solder of the library, such as "SAC405", or with a table plasticity'
+        limit = fields.shown(failure.plastic_work_density, type(failure).model_fields["plastic_work_density"])
+        return [Problem("shock.failure.plastic_work_density", message, limit, allowed)]
 
     @property
     def ranks(self) -> int:

@@ -46,7 +46,7 @@ class Forecast:
     """What a run will be like.
 
     Attributes:
-        effects: effect of the reflow -> {"on", "why"}, at the joint with the largest gap.
+        effects: effect -> {"on", "why"}; those of the reflow at the joint with the largest gap.
         joints: number of joints.
         distinct: number of joints that have to be computed.
         particles: smallest and largest number of particles of a joint.
@@ -66,6 +66,7 @@ class Forecast:
 
 def forecast(case: BoardDropCase) -> Forecast:
     """Predict sizes, time steps and cost of a run."""
+    from fem.material_effects import failure_effect, material_effects
     from meshing.pads import pad_table
     from particles.effects import decide_effects
     from particles.estimate import particle_count, reflow_seconds
@@ -80,7 +81,9 @@ def forecast(case: BoardDropCase) -> Forecast:
     modes = case.shock.numerics.modes
     wall = sum(seconds for mode, seconds in (("two_scale", shock.two_scale), ("dns", shock.dns)) if mode in modes)
     return Forecast(
-        effects=decide_effects(max(distinct, key=lambda geometry: geometry.gap), case.solder),
+        effects=decide_effects(max(distinct, key=lambda geometry: geometry.gap), case.solder)
+        | material_effects(case.materials.by_role)
+        | failure_effect(case.shock.failure),
         joints=len(geometries),
         distinct=len(distinct),
         particles=(min(counts), max(counts)),

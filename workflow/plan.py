@@ -32,7 +32,7 @@ def show_plan(case: Case, run_folder: Path, console: Console) -> None:
     console.print(f"[bold]{case.case.name}[/]  {case.case.title}\n")
     if isinstance(case, BoardDropCase):
         outlook = forecast(case)
-        _show(case, run_folder, outlook, console, "reflow")
+        _show(case, run_folder, outlook, console, "reflow and shock")
         console.print(_sizes(outlook))
         console.print(_shock(case, outlook))
         rate = f"{outlook.shock.updates_per_second:.1e} element updates per second and rank (fem/estimate.py)"

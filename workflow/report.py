@@ -173,7 +173,9 @@ def _add_shock(run_folder: Path, context: dict, summary: dict) -> None:
     context["tables"].update(
         model=tables.models(results),
         comparison=tables.comparison(summary["metrics"]),
-        joints=tables.ranked_joints(histories[main_mode], tables.joint_records(run_folder)),
+        joints=tables.ranked_joints(
+            histories[main_mode], tables.joint_records(run_folder), results[main_mode]["failure"]
+        ),
         energy=tables.energies(histories),
         cost=tables.costs(results),
     )

@@ -1,6 +1,7 @@
 """Tables of the report: products turned into rows of text with units."""
 
 import json
+from collections.abc import Mapping
 from importlib import metadata
 from pathlib import Path
 
@@ -157,8 +158,14 @@ def verdicts(run_folder: Path) -> dict:
     return {"head": ["joint", "verdict", "touches", "standoff [µm]", "max. width alone [µm]"], "rows": rows}
 
 
-def ranked_joints(history: dict, joints: list[dict]) -> dict:
-    """Joints ranked by peak von Mises stress at their pads."""
+def ranked_joints(history: dict, joints: list[dict], failure: Mapping[str, dict]) -> dict:
+    """Joints ranked by peak von Mises stress at their pads.
+
+    Args:
+        history: of one mode.
+        joints: ``joint_records``.
+        failure: criterion -> joint -> value, limit, ok; of the same mode.
+    """
     shape = {joint["name"]: joint for joint in joints}
     at_pads = np.maximum(history["von_mises_board"], history["von_mises_package"])
     peel = np.maximum(history["peel_board"], history["peel_package"])
@@ -176,6 +183,7 @@ def ranked_joints(history: dict, joints: list[dict]) -> dict:
                 mega(history["von_mises_max"][:, column].max()),
                 micro(shape[name]["standoff"]),
                 micro(shape[name]["max_width"]),
+                *failure_cells(history, column, failure),
             ]
         )
     head = [
@@ -187,8 +195,23 @@ def ranked_joints(history: dict, joints: list[dict]) -> dict:
         "largest in an element [MPa]",
         "standoff [µm]",
         "width [µm]",
+        *(["plastic work at pad [kJ/m³]"] if "plastic_work_board" in history else []),
+        *(["fails by"] if failure else []),
     ]
     return {"head": head, "rows": rows}
+
+
+def failure_cells(history: dict, column: int, failure: Mapping[str, dict]) -> list[str]:
+    """Plastic work and failed criteria of the joint in a column of the history: only what the run has."""
+    cells = []
+    if "plastic_work_board" in history:
+        work = max(history[f"plastic_work_{end}"][:, column].max() for end in ("board", "package"))
+        cells.append(number(1e-3 * work))
+    if failure:
+        joint = str(history["joints"][column])
+        failed = [name.replace("_", " ") for name, verdicts in failure.items() if not verdicts[joint]["ok"]]
+        cells.append(", ".join(failed) or "–")
+    return cells
 
 
 def late_peak(history: dict) -> str:
@@ -273,7 +296,8 @@ def named_quantity(metrics: dict, name: str) -> str:
 
 LONGEST_IN_MS = 0.1
 SHOWN = {
-    "Pa": (1e-6, "MPa"), "m": (1e3, "mm"), "m^3": (1e9, "mm^3"), "J": (1e3, "mJ"), "N": (1e3, "mN"), "kg": (1e6, "mg"),
+    "Pa": (1e-6, "MPa"), "m": (1e3, "mm"), "m^3": (1e9, "mm^3"), "J": (1e3, "mJ"), "J/m^3": (1e-3, "kJ/m^3"),
+    "N": (1e3, "mN"), "kg": (1e6, "mg"),
 }  # fmt: skip
 
 

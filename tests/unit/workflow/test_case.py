@@ -56,6 +56,10 @@ BAD_VALUES = {
         'materials.solder.plasticity.B="1 MPa"',
         ["materials.solder.plasticity.A", "is missing", "> 0 MPa"],
     ),
+    "plastic work of elastic solder": (
+        "shock.failure.plastic_work_density=2 MJ/m^3",
+        ['shock.failure.plastic_work_density = "2000 kJ/m^3"', "does not yield", '"SAC405"'],
+    ),
     "unknown constant of plasticity": ("materials.solder.plasticity.D=1", ["unknown key", "one of A, B, n, C"]),
     "table below a value": ("package.rows.all=1", ["package.rows.all", "lies below a value"]),
     "no setting": ("package.rows", ["package.rows", "is no setting", "dotted.key=value"]),

@@ -5,6 +5,8 @@ import json
 import numpy as np
 import pytest
 
+from fem.failure import failure_criteria, judge
+from fem.parameters import Failure
 from workflow import report_body
 from workflow import report_tables as tables
 from workflow.report_curves import array_map, energy_curves, history_curves
@@ -35,10 +37,21 @@ def history():
 
 
 def test_joints_are_ranked_by_their_worse_pad(history):
-    table = tables.ranked_joints(history, [{"name": name, **JOINT} for name in ("A9", "A10")])
+    table = tables.ranked_joints(history, [{"name": name, **JOINT} for name in ("A9", "A10")], {})
     assert [row[0] for row in table["rows"]] == ["A10", "A9"]
     assert table["rows"][0][1:6] == ["100.0", "board", "0.500", "9.0", "150.0"]
     assert table["rows"][1][2] == "package"
+
+
+def test_joints_that_fail_say_by_what(history):
+    work = np.outer(history["time"], [1e8, 2e8])
+    yielding = history | {"plastic_work_board": work, "plastic_work_package": 0.5 * work}
+    joints = [{"name": name, **JOINT} for name in ("A9", "A10")]
+    found = judge(failure_criteria(Failure(peel_stress=8e6, plastic_work_density=3e5)), yielding)
+    table = tables.ranked_joints(yielding, joints, found)
+    assert table["head"][-2:] == ["plastic work at pad [kJ/m³]", "fails by"]
+    assert [row[0] for row in table["rows"]] == ["A10", "A9"]
+    assert [row[-2:] for row in table["rows"]] == [["200", "peel stress"], ["100", "–"]]
 
 
 def test_a_drop_may_stand_anywhere():
