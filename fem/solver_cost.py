@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from fem.estimate import largest_implicit_step
 from fem.factor_cost import box_factor
-from fem.structure_effects import plastic_laws
+from fem.material_effects import plastic_laws
 from fem.structure_parameters import Dynamics, StructureScene
 
 # Measured by benchmarks/jedec_oracle.py on one core of an AMD EPYC (AVX-512), Debian 12: element updates per second of
@@ -114,7 +114,7 @@ def node_counts(scene: StructureScene) -> tuple[int, int, int]:
 
 def nonlinearities(scene: StructureScene) -> tuple[str, ...]:
     """Return what makes a scene nonlinear, in words."""
-    plastic = ", ".join(plastic_laws(scene))
+    plastic = ", ".join(plastic_laws(scene.layer_materials))
     reasons = [f"plasticity (layers {plastic})"] if plastic else []
     finite = scene.dynamics.kinematics == "finite"
     return tuple(reasons + (["finite rotations (dynamics.kinematics)"] if finite else []))

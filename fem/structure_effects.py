@@ -1,9 +1,9 @@
 """Which effects a run of a structure simulates, and why."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
-from fem.material_parameters import JohnsonCook
+from fem.material_effects import material_effects
 from fem.structure_parameters import StructureScene
 
 
@@ -14,8 +14,8 @@ def effects(scene: StructureScene, added_mass: float) -> dict[str, Any]:
         scene: The structure.
         added_mass: Mass that scaling has added [kg].
     """
-    return {
-        name: {"on": on, "why": why} for name, on, why in [*_loads(scene), *_laws(scene), *_scheme(scene, added_mass)]
+    return material_effects(scene.layer_materials) | {
+        name: {"on": on, "why": why} for name, on, why in [*_loads(scene), *_scheme(scene, added_mass)]
     }
 
 
@@ -28,22 +28,9 @@ def _loads(scene: StructureScene) -> Iterator[tuple[str, bool, str]]:
     yield "initial_velocity", any(velocity), f"dynamics.initial_velocity = {list(velocity)} m/s"
 
 
-def _laws(scene: StructureScene) -> Iterator[tuple[str, bool, str]]:
-    plastic = plastic_laws(scene)
-    yield "plasticity", bool(plastic), _named("layers with a yield stress", plastic)
-    rates = [name for name, law in plastic.items() if law.C > 0.0]
-    yield "strain_rate", bool(rates), _named("layers whose yield stress has a rate term C > 0", rates)
+def _scheme(scene: StructureScene, added_mass: float) -> Iterator[tuple[str, bool, str]]:
     finite = scene.dynamics.kinematics == "finite"
     yield "finite_rotation", finite, f"dynamics.kinematics = {scene.dynamics.kinematics}"
-
-
-def plastic_laws(scene: StructureScene) -> dict[str, JohnsonCook]:
-    """Return the yield stress of the layers that have one, by the name of the layer."""
-    laws = {name: getattr(material, "plasticity", None) for name, material in scene.layer_materials.items()}
-    return {name: law for name, law in laws.items() if law is not None}
-
-
-def _scheme(scene: StructureScene, added_mass: float) -> Iterator[tuple[str, bool, str]]:
     damping, numerics = scene.dynamics.damping, scene.dynamics.numerics
     given = {name: value for name, value in damping.model_dump().items() if value and name != "frequency"}
     yield "damping", bool(given), ", ".join(f"{name} = {value:g}" for name, value in given.items()) or "none is given"
@@ -51,7 +38,3 @@ def _scheme(scene: StructureScene, added_mass: float) -> Iterator[tuple[str, boo
     yield "mass_scaling", added_mass > 0.0, scaled
     one_point = scene.structure.formulation == "one_point"
     yield "hourglass_stiffness", one_point, f"structure.formulation = {scene.structure.formulation}"
-
-
-def _named(what: str, names: Iterable[str]) -> str:
-    return f"{what}: {', '.join(names) or 'none'}"
