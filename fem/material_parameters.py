@@ -76,7 +76,7 @@ class Isotropic(Parameters):
     young_modulus: Pressure = Field(gt=0)
     poisson_ratio: float = Field(gt=-1, lt=0.5)
     plasticity: JohnsonCook | None = None
-    temperature: Temperature = Field(298.15, gt=0)
+    temperature: Temperature = Field(298.15, gt=0, validate_default=True)
 
     @field_validator("temperature")
     @classmethod

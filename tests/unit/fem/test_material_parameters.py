@@ -72,6 +72,8 @@ def test_plastic_material_must_be_solid():
     law = JohnsonCook(A=38e6, melting_temperature=490.15)
     values = SAC405.model_dump() | {"plasticity": law}
     assert refused(type(SAC405), **(values | {"temperature": 495.0}))["loc"] == ("temperature",)
+    cold = JohnsonCook(A=38e6, room_temperature=250.0, melting_temperature=290.0)
+    assert refused(type(SAC405), **(SAC405.model_dump(exclude={"temperature"}) | {"plasticity": cold}))
     error = refused(JohnsonCook, A=38e6, melting_temperature=290.0)
     assert error["ctx"]["allowed"] == "> 25 degC, the room_temperature"
     assert type(SAC405)(**(values | {"temperature": 489.0})).elastic.plasticity is None
