@@ -29,8 +29,7 @@ def plastic_constants(material: Material) -> NDArray[np.float64]:
     """
     if not isinstance(material, Isotropic) or material.plasticity is None:
         return np.array([1.0, np.inf, 0.0, 1.0, 0.0, 1.0])
-    law = material.plasticity
-    softening = law.softening(material.temperature)
+    law, softening = material.plasticity, material.softening
     shear = 3.0 * material.shear_modulus
     return np.array([shear, law.A * softening, law.B * softening, law.n, law.C, law.reference_rate])
 

@@ -16,14 +16,14 @@ def material_effects(materials: Mapping[str, Material]) -> dict[str, dict[str, A
     Returns:
         Effect -> on, why.
     """
-    isotropic = {name: item for name, item in materials.items() if isinstance(item, Isotropic)}
-    laws = {name: item.plasticity for name, item in isotropic.items() if item.plasticity}
+    laws = plastic_laws(materials)
     if not laws:
         why = "all materials are elastic"
         return {name: {"on": False, "why": why} for name in ("plasticity", "strain_rate", "thermal_softening")}
     fast = {name: law for name, law in laws.items() if law.C > 0.0}
-    soft = {name: law.softening(isotropic[name].temperature) for name, law in laws.items()}
-    soft = {name: factor for name, factor in soft.items() if factor < 1.0}
+    soft = {
+        name: item.softening for name, item in materials.items() if isinstance(item, Isotropic) and item.softening < 1.0
+    }
     return {
         "plasticity": {"on": True, "why": "; ".join(yields(name, law) for name, law in laws.items())},
         "strain_rate": {
@@ -40,6 +40,11 @@ def material_effects(materials: Mapping[str, Material]) -> dict[str, dict[str, A
             or "at the temperature at which A and B are measured",
         },
     }
+
+
+def plastic_laws(materials: Mapping[str, Material]) -> dict[str, JohnsonCook]:
+    """Return the yield stress of the materials that have one, by name."""
+    return {name: material.plasticity for name, material in materials.items() if material.plasticity is not None}
 
 
 def yields(name: str, law: JohnsonCook) -> str:

@@ -4,7 +4,7 @@ All values are SI floats; see ``meshing.parameters`` for what the unit strings m
 """
 
 import math
-from typing import Annotated, Literal, NamedTuple, Self
+from typing import Annotated, ClassVar, Literal, NamedTuple, Self
 
 from pydantic import Field, ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
@@ -99,6 +99,11 @@ class Isotropic(Parameters):
         return self.young_modulus / (2.0 * (1.0 + self.poisson_ratio))
 
     @property
+    def softening(self) -> float:
+        """Return the factor on the yield stress at the material's temperature."""
+        return 1.0 if self.plasticity is None else self.plasticity.softening(self.temperature)
+
+    @property
     def elastic(self) -> Self:
         """Return the material without its plasticity."""
         return self.model_copy(update={"plasticity": None})
@@ -110,6 +115,7 @@ class Orthotropic(Parameters):
     ``poisson_ratio_out_of_plane`` is nu_xz: contraction in z under tension in x.
     """
 
+    plasticity: ClassVar[None] = None
     kind: Literal["orthotropic"] = "orthotropic"
     density: Density = Field(gt=0)
     young_modulus_in_plane: Pressure = Field(gt=0)
@@ -148,6 +154,7 @@ class GeneralOrthotropic(Parameters):
     ``poisson_ratio_xy`` is the contraction in y under tension in x, the others likewise.
     """
 
+    plasticity: ClassVar[None] = None
     kind: Literal["general_orthotropic"] = "general_orthotropic"
     density: Density = Field(gt=0)
     young_modulus_x: Pressure = Field(gt=0)

@@ -17,6 +17,7 @@ from fem.material_effects import failure_effect, material_effects
 from fem.model import Model
 from fem.shock_loads import shock_pulse
 from fem.steps import Steps
+from fem.watch_joints import FLOW_LAYERS
 
 FORCE_RESIDUAL_LIMIT = 1e-10
 ADDED_MASS_LIMIT = 0.05
@@ -132,6 +133,18 @@ def shock_metrics(arrays: dict[str, NDArray]) -> dict[str, Any]:
         "peak_von_mises": quantity(float(peak[critical]), "Pa"),
         "peak_peel_stress": quantity(float(peel[critical]), "Pa"),
         "peak_element_stress": quantity(float(arrays["von_mises_max"].max()), "Pa"),
+        **flow_metrics(arrays),
+    }
+
+
+def flow_metrics(arrays: dict[str, NDArray]) -> dict[str, Any]:
+    """Return how far the solder has flowed, where it yields."""
+    if "plastic_strain_max" not in arrays:
+        return {}
+    work = max(float(arrays[name].max()) for name in FLOW_LAYERS)
+    return {
+        "peak_plastic_strain": quantity(float(arrays["plastic_strain_max"].max())),
+        "peak_plastic_work_density": quantity(work, "J/m^3"),
     }
 
 

@@ -49,7 +49,7 @@ def run(world: MPI.Comm, request: RunInput) -> None:
             largest = largest_implicit_step(request.shock.duration, pulse_durations({"drop": pulse}))
             steps = replace(steps, plan=implicit_plan(steps.plan, largest))
         crew = make_crew(comms, models, steps.plan, request.shock)
-        history = make_history(comms, models, steps, pulse, request.shock)
+        history = make_history(comms, models, steps, pulse, request)
         numerics, fields = request.shock.numerics, make_fields(comms, models, request)
         tables = [Path(request.shock.table)] if request.shock.table else []
         inputs = request.model_dump_json(exclude={"output"}), digest_of_files(*request.meshes, *tables)
@@ -85,13 +85,16 @@ def make_crew(
     return {role: made[role] for role in comms.models}
 
 
-def make_history(comms: Communicators, models: dict[Role, Model], steps: Steps, pulse: Pulse, shock: Shock) -> History:
+def make_history(
+    comms: Communicators, models: dict[Role, Model], steps: Steps, pulse: Pulse, request: RunInput
+) -> History:
     """Return the empty history of this run."""
+    shock, yields = request.shock, request.materials.solder.plasticity is not None
     speed = max(abs(pulse.integral(time)) for time in np.linspace(0.0, shock.duration, SPEEDS))
     mass, plan = steps.model_mass + steps.added_mass, steps.plan
     trivial = NON_TRIVIAL * 0.5 * mass * speed**2
     ledger = Ledger(shock.numerics.energy_balance_limit, trivial, plan.step, steps.smallest)
-    watches = {role: JointWatch(model.tables.watch, model.body) for role, model in models.items()}
+    watches = {role: JointWatch(model.tables.watch, model.body, yields) for role, model in models.items()}
     return History(comms.world, watches, ledger, {"base_acceleration": pulse.value})
 
 
@@ -100,7 +103,7 @@ def make_fields(comms: Communicators, models: dict[Role, Model], request: RunInp
     made = {}
     for role, model in models.items():
         _, materials = materials_of_parts(model.tables.part_names, request.materials)
-        yields = any(getattr(material, "plasticity", None) is not None for material in materials)
+        yields = any(material.plasticity is not None for material in materials)
         part = model.tables.part[model.body.local.cell_numbers]
         made[role] = Fields(comms.models[role], model.body, part, request.output / f"{role}.pvd", yields)
     return made

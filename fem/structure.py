@@ -17,12 +17,12 @@ from fem.inputs import StructureInput
 from fem.ledger import Ledger
 from fem.loads import Load
 from fem.march import Outputs, march
+from fem.material_effects import plastic_laws
 from fem.moving import Moving
 from fem.parameters import Ranks
 from fem.participant import Alone, Participant, uncut_motion
 from fem.pulse import Pulse
 from fem.result import Timings
-from fem.structure_effects import plastic_laws
 from fem.structure_loads import damping_loads, structure_loads
 from fem.structure_model import StructureModel, build_structure
 from fem.structure_modes import find_modes
@@ -47,7 +47,7 @@ def run_structure(world: MPI.Comm, request: StructureInput) -> None:
         crew: dict[Role, Participant] = {"structure": make_participant(comm, model, request, pulses)}
         history = make_history(comm, model, request, pulses)
         part = model.tables.part[model.body.local.cell_numbers]
-        path, yields = request.output / "structure.pvd", bool(plastic_laws(request))
+        path, yields = request.output / "structure.pvd", bool(plastic_laws(request.layer_materials))
         fields: dict[Role, Fields] = {"structure": Fields(comm, model.body, part, path, yields)}
         numerics, tables = request.dynamics.numerics, [load.table for load in request.loads.values()]
         contents = digest_of_files(request.mesh, *(Path(table) for table in tables if table is not None))

@@ -139,7 +139,7 @@ def _yielding(scene: StructureScene) -> Iterator[tuple[str, str]]:
     """Yield key and material of the layers that yield."""
     for name, layer in scene.structure.layers.items():
         material = scene.known_materials.get(layer.material)
-        if material is not None and getattr(material, "plasticity", None) is not None:
+        if material is not None and material.plasticity is not None:
             yield f"structure.layers.{name}.material", layer.material
 
 

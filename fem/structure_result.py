@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from fem.fields import Fields
 from fem.history import History
 from fem.inputs import StructureInput
+from fem.material_effects import plastic_laws
 from fem.result import ADDED_MASS_LIMIT, Timings, checked, quantity
 from fem.stress import principal_strains, von_mises
-from fem.material_effects import plastic_laws
 from fem.structure_effects import effects
 from fem.structure_model import StructureModel
 from fem.structure_modes import ModeTable
@@ -161,6 +161,6 @@ def health(
         "added_mass_fraction": (summary["added_mass"] / summary["model_mass"], ADDED_MASS_LIMIT),
     }
     hourglass = float(np.abs(arrays["hourglass"]).max())
-    if hourglass > 0.0 and plastic_laws(request.layer_materials):  # that of elastic elements is no error: it is their bending
+    if hourglass > 0.0 and plastic_laws(request.layer_materials):  # of elastic elements it is their bending, no error
         checks["hourglass_energy_fraction"] = (hourglass / history.ledger.largest, HOURGLASS_LIMIT)
     return checked(checks)

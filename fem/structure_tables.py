@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 
 from fem.errors import LoadError, MeshError
 from fem.facet_areas import facet_set, outward_areas
+from fem.material_effects import plastic_laws
 from fem.mesh import MeshData
 from fem.scene import Tables
-from fem.structure_effects import plastic_laws
 from fem.structure_parameters import InputG, PrescribedMotion, Pressure, StructureScene
 from fem.tie import Tie
 from fem.watch_points import PointTable, point_table
@@ -61,7 +61,7 @@ def structure_tables(mesh: MeshData, scene: StructureScene) -> StructureTables:
         nodes=len(mesh.points),
         nodes_of=nodes_of,
         areas={name: outward_areas(mesh, name) for name in sorted(pressed)},
-        watch=point_table(mesh, points, supports, yields=bool(plastic_laws(scene))),
+        watch=point_table(mesh, points, supports, yields=bool(plastic_laws(scene.layer_materials))),
     )
 
 

@@ -11,13 +11,15 @@ from fem.stress_recovery import StressRecovery
 from fem.watch_table import WatchTable
 
 LAYERS = ("von_mises_board", "von_mises_package", "peel_board", "peel_package")
+FLOW_LAYERS = ("plastic_work_board", "plastic_work_package")
 
 
 class JointWatch:
     """Centres of board and die, joints and board strain on one rank; a ``watch.Watch``."""
 
-    def __init__(self, table: WatchTable, body: Body) -> None:
-        """Find this rank's share of the table."""
+    def __init__(self, table: WatchTable, body: Body, yields: bool) -> None:
+        """Find this rank's share of the table; ``yields`` says whether solder flows, in all models of a run alike."""
+        self._yields = yields
         local = body.local
         self.joints = table.joints
         self.labels: dict[str, NDArray] = {"joints": np.array(table.joints, dtype=str)}
@@ -39,8 +41,8 @@ class JointWatch:
         """Return this rank's parts.
 
         Returns:
-            Sums: centres (6) [m], then von Mises and peel [Pa] per end and joint. Maxima: von Mises per joint [Pa],
-            largest and minus smallest strain of the board.
+            Sums: centres (6) [m], then von Mises, peel [Pa], plastic work density [J/m^3] per end and joint. Maxima:
+            von Mises [Pa], plastic strain per joint, largest and minus smallest strain of the board.
         """
         displacement = motion.displacement - motion.base_displacement()
         stress = self._recovery.stress(displacement)
@@ -48,27 +50,36 @@ class JointWatch:
 
     def row(self, sums: NDArray[np.float64], maxima: NDArray[np.float64]) -> dict[str, NDArray[np.float64] | float]:
         """Name the parts that all ranks have combined."""
-        layers = dict(zip(LAYERS, sums[6:].reshape(len(LAYERS), -1), strict=True))
+        layers = LAYERS + FLOW_LAYERS if self._yields else LAYERS
+        joints = ("von_mises_max", "plastic_strain_max") if self._yields else ("von_mises_max",)
         return {
             "board_centre": sums[:3],
             "die_centre": sums[3:6],
-            "von_mises_max": maxima[:-2],
             "board_strain": max(maxima[-2:]),
-        } | layers
+            **dict(zip(joints, maxima[:-2].reshape(len(joints), -1), strict=True)),
+            **dict(zip(layers, sums[6:].reshape(len(layers), -1), strict=True)),
+        }
 
     def _sums(self, displacement: NDArray[np.float64], stress: NDArray[np.float64]) -> NDArray[np.float64]:
         centres = np.zeros((2, 3))
         for k, node in self._centres:
             centres[k] = displacement[node]
-        layer, slots = stress[self._layer], 2 * len(self.joints)
-        mises = np.bincount(self._slot, self._volume * von_mises(layer), minlength=slots)
-        peel = np.bincount(self._slot, self._area * layer[:, 2], minlength=slots)
-        return np.concatenate([centres.ravel(), mises, peel])
+        layer = stress[self._layer]
+        values = [self._volume * von_mises(layer), self._area * layer[:, 2]]
+        if self._yields:
+            values.append(self._volume * self._recovery.plastic_work()[self._layer])
+        slots = 2 * len(self.joints)
+        return np.concatenate([centres.ravel(), *(np.bincount(self._slot, value, slots) for value in values)])
 
     def _maxima(self, displacement: NDArray[np.float64], stress: NDArray[np.float64]) -> NDArray[np.float64]:
-        result = np.zeros(len(self.joints) + 2)
-        np.maximum.at(result, self._joint, von_mises(stress))
+        values = [von_mises(stress)]
+        if self._yields:
+            values.append(self._recovery.plastic_strain())
+        joints = np.zeros((len(values), len(self.joints)))
+        for row, value in zip(joints, values, strict=True):
+            np.maximum.at(row, self._joint, value)
+        strains = np.zeros(2)
         if len(self._facets):
             largest, smallest = principal_strain(self._corners, displacement[self._facets][:, :, :2])
-            result[-2:] = largest.max(), -smallest.min()
-        return result
+            strains[:] = largest.max(), -smallest.min()
+        return np.concatenate([joints.ravel(), strains])

@@ -64,7 +64,7 @@ class BoardDropCase(Case):
     def _failure_problems(self) -> list[Problem]:
         """Find a limit of plastic work where nothing yields."""
         failure = self.shock.failure
-        if failure.plastic_work_density is None or getattr(self.materials.solder, "plasticity", None) is not None:
+        if failure.plastic_work_density is None or self.materials.solder.plasticity is not None:
             return []
         message = "limits the plastic work of solder that does not yield"
         allowed = 'materials.solder of the library, such as "SAC405", or with a table plasticity'

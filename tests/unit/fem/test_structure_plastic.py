@@ -51,7 +51,8 @@ def test_stress_follows_strain_on_the_yield_line(whole):
     assert strain == pytest.approx(end, rel=0.05)
     assert stress == pytest.approx(YIELD + SLOPE * plastic, rel=5e-3)
     assert strain == pytest.approx(stress / STEEL["young_modulus"] + plastic, rel=5e-3)
-    assert result["effects"]["plasticity"] == {"on": True, "why": "layers with a yield stress: board"}
+    why = "board yields from 200 MPa on, hardening 2000 MPa p^1"
+    assert result["effects"]["plasticity"] == {"on": True, "why": why}
     assert result["metrics"]["peak_plastic_strain@middle"]["value"] == pytest.approx(plastic, rel=1e-9)
     assert result["metrics"]["peak_element_plastic_strain@board"]["value"] > plastic * 0.99
     assert result["metrics"]["peak_plastic_energy"]["value"] > 0.0
