@@ -11,6 +11,7 @@ from mpi4py import MPI
 
 from fem.checkpoint import Checkpoints
 from fem.communicators import Role
+from fem.errors import InvertedElementError
 from fem.fields import Fields
 from fem.history import History
 from fem.participant import Participant
@@ -73,11 +74,18 @@ def march(world: MPI.Comm, crew: Crew, outputs: Outputs) -> float:
 
 
 def run_window(crew: Crew) -> None:
-    """Advance all models of this rank by one window, each at its turn."""
-    for participant in crew.values():
-        participant.begin_window()
-    for participant in crew.values():
-        participant.finish_window()
+    """Advance all models of this rank by one window, each at its turn.
+
+    Raises:
+        InvertedElementError: On the rank that has the element, with the time.
+    """
+    try:
+        for participant in crew.values():
+            participant.begin_window()
+        for participant in crew.values():
+            participant.finish_window()
+    except InvertedElementError as error:
+        raise InvertedElementError(f"time {time_of(crew):.6e} s: {error}") from error
 
 
 def time_of(crew: Crew) -> float:

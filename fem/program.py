@@ -8,7 +8,7 @@ from pathlib import Path
 from mpi4py import MPI
 
 from fem.agreement import agreed
-from fem.errors import AgreedError, EnergyError, RankError
+from fem.errors import AgreedError, EnergyError, InvertedElementError, RankError
 from fem.inputs import INPUT, RunInput, StructureInput
 from fem.run import run
 from fem.structure import run_structure
@@ -27,10 +27,17 @@ def main(world: MPI.Comm, arguments: list[str]) -> int:
         if world.rank == 0:
             print(f"error: {error}", file=sys.stderr, flush=True)
         return 1
-    except Exception:  # only this rank knows: tell the user, and end the ranks that wait for it
-        print(f"error on rank {world.rank}:\n{traceback.format_exc()}", file=sys.stderr, flush=True)
-        world.Abort(1)
+    except InvertedElementError as error:
+        end_all(world, str(error))
+    except Exception:
+        end_all(world, f"\n{traceback.format_exc()}")
     return 0
+
+
+def end_all(world: MPI.Comm, message: str) -> None:
+    """Tell of an error that only this rank knows, and end the ranks that wait for it."""
+    print(f"error on rank {world.rank}: {message}", file=sys.stderr, flush=True)
+    world.Abort(1)
 
 
 def read_input(arguments: list[str]) -> RunInput | StructureInput:

@@ -26,6 +26,12 @@ DYNAMICS = {
 }
 
 
+CRUSHED = {
+    "loads": {"push": {"kind": "pressure", "on": "z_max", "peak": 1e12, "pulse": "constant"}},
+    "dynamics": {"duration": 1e-4, "kinematics": "finite"},
+}
+
+
 def history(directory: Path, ranks: int, solver: str) -> dict[str, np.ndarray]:
     directory.mkdir()
     tables = {"solver": solver, "loads": LOADS, "watch": WATCH, "dynamics": DYNAMICS}
@@ -50,9 +56,10 @@ def test_two_ranks_give_what_one_gives(tmp_path, solver):
     [
         ({"watch": {"far": {"at": [1.0, 0.0, 0.0]}}}, "lies 0.99 m outside"),
         ({"supports": {"clamp": {"on": "mounting_holes", "hold": ["x"]}}}, "no such facet set"),
+        (CRUSHED, "m, is turned inside out"),
     ],
 )
-def test_bad_input_ends_both_ranks(tmp_path, changes, message):
+def test_error_ends_both_ranks(tmp_path, changes, message):
     done = run_program(write_structure(tmp_path, **changes), 2)
     assert done.returncode == 1
     assert message in done.stderr
