@@ -87,11 +87,14 @@ def sum_in_rank_order(rows, pointer, source, buffer, values):
     """
     for i in range(len(rows)):
         row = rows[i]
-        for c in range(3):
-            total = 0.0
-            for k in range(pointer[i], pointer[i + 1]):
-                total += values[row, c] if source[k] < 0 else buffer[source[k], c]
-            values[row, c] = total
+        x = y = z = 0.0
+        for k in range(pointer[i], pointer[i + 1]):
+            part = source[k]
+            if part < 0:
+                x, y, z = x + values[row, 0], y + values[row, 1], z + values[row, 2]
+            else:
+                x, y, z = x + buffer[part, 0], y + buffer[part, 1], z + buffer[part, 2]
+        values[row, 0], values[row, 1], values[row, 2] = x, y, z
 
 
 @njit(cache=True)

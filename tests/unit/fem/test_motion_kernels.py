@@ -1,9 +1,10 @@
-"""The update of a step against plain NumPy."""
+"""The update of a step and the sums over shared nodes against plain NumPy."""
 
 import numpy as np
 import pytest
 
-from fem.kernels_motion import STRIP, advance
+from fem.exchange import rank_order
+from fem.kernels_motion import STRIP, advance, sum_in_rank_order
 
 
 @pytest.mark.parametrize("count", [1, 2, STRIP // 3, STRIP // 3 + 1, STRIP + 5])
@@ -18,3 +19,16 @@ def test_step_of_central_differences(count):
     advance(state, mobility, gravity, step)
     assert np.allclose(state, [displacement, velocity, force], rtol=1e-14, atol=1e-15)
     assert np.array_equal(state[2], force)
+
+
+def test_sums_over_shared_nodes_are_taken_in_the_order_of_ranks():
+    """Rank 1 of three: it receives nodes 4 and 2 from rank 0, 2 and 5 from rank 2."""
+    random = np.random.default_rng(0)
+    rows, ranks = np.array([4, 2, 2, 5], np.int32), np.array([0, 0, 2, 2])
+    values, received = random.uniform(-1, 1, (6, 3)), random.uniform(-1, 1, (4, 3))
+    exact = values.copy()
+    exact[2] = received[1] + values[2] + received[2]
+    exact[4] = received[0] + values[4]
+    exact[5] = values[5] + received[3]
+    sum_in_rank_order(*rank_order(rows, ranks, 1), received, values)
+    assert np.array_equal(values, exact)
