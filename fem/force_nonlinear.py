@@ -64,7 +64,9 @@ class NonlinearElements:
             kernel = partial(add_hexahedron_force, full, path)
             return cls(elements, chosen, finite, lanes, full, kernel, history)
         blocks = gradient_blocks(elements, lanes, plastic, finite)
-        history = {"state": blocks.state, "work": blocks.plastic_work, "hourglass": blocks.hourglass_energy}
+        history = {"state": blocks.state, "work": blocks.plastic_work}
+        if elements.kind.hourglass:
+            history |= {"hourglass": blocks.hourglass_energy, "slip": blocks.slip}
         kernel = partial(add_gradient_force, blocks, tuple(range(elements.kind.nodes)), path)
         return cls(elements, chosen, finite, lanes, blocks, kernel, history)
 

@@ -193,6 +193,8 @@ def elastic_stress(w, state, elastic):
 def plastic_flow(w, state, law, weight, work):
     """Return the stress to the yield surface where the elastic trial state lies outside (radial return).
 
+    Its von Mises stress is then that after the step.
+
     Plastic work is the mean of the stress before and after the step times the plastic strain increment, as the elastic
     energy s : C^-1 : s / 2 is integrated by the mean stress exactly: the sum of both is the work of the internal force.
 
@@ -220,6 +222,7 @@ def plastic_flow(w, state, law, weight, work):
             at = STRESS + LANES * k + lane
             state[at] = mean + (state[at] - mean) * mises / trial
         state[PLASTIC + lane] += flow
+        w[MISES + lane] = mises
 
 
 @njit(cache=True, error_model="numpy")

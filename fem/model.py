@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from fem import dolfinx_api
 from fem.agreement import agreed
-from fem.body import Body, Response, make_body, make_pieces
+from fem.body import Body, Pieces, Response, make_body, make_pieces
 from fem.communicators import Communicators, Role
 from fem.inputs import RunInput
 from fem.local_mesh import distribute
@@ -30,14 +30,17 @@ def build_models(comms: Communicators, request: RunInput) -> tuple[dict[Role, Mo
     mine = next((mesh for mesh, _ in inputs.values() if mesh), None) if world.rank == 0 else None
     dolfinx_api.compile_ahead(world, mine.points[mine.cells[0]] if mine else None)
     meshes = {role: distribute(comms.models[role], mesh) for role, (mesh, _) in inputs.items()}
-    pieces = agreed(
-        world, lambda: {role: make_pieces(meshes[role], inputs[role][1], request.materials) for role in meshes}
-    )
+    numerics = request.shock.numerics
+
+    def pieces_of(role: Role) -> Pieces:
+        return make_pieces(meshes[role], inputs[role][1], request.materials, numerics.formulation)
+
+    pieces = agreed(world, lambda: {role: pieces_of(role) for role in meshes})
     candidates = {role: (pieces[role], inputs[role][1]) for role in pieces}
     steps = choose_steps(world, candidates, request.shock, comms.models)
     models = {}
     for role, factor in zip(pieces, steps.mass_factors, strict=True):
-        tables, response = inputs[role][1], Response(step=steps.step_of(role))
+        tables, response = inputs[role][1], Response(numerics.kinematics, steps.step_of(role))
         models[role] = Model(tables, make_body(comms.models[role], pieces[role], tables, factor, response))
     return models, steps
 

@@ -89,6 +89,8 @@ def gradient_blocks(elements: Elements, lanes: Lanes, plastic: NDArray[np.float6
         state=initial_state(len(lanes.filled), points, finite),
         plastic_work=np.zeros(lanes.element.shape),
         hourglass_energy=np.zeros(lanes.element.shape),
+        slip=np.zeros((len(lanes.filled), 12 * LANES if kind.hourglass else 0)),
+        modulus=1.0 / np.linalg.inv(elements.elasticity)[:, 0, 0],
     )
 
 

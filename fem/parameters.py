@@ -47,12 +47,18 @@ class Damping(Parameters):
 
 
 class ShockNumerics(Parameters):
-    """How the shock is computed; implicit steps are for elastic materials, at most from sample to sample."""
+    """How the shock is computed; implicit steps are for elastic materials, at most from sample to sample.
+
+    ``kinematics`` and ``formulation`` of hexahedra as for a structure. Elastic hexahedra are the same in both
+    formulations; those that yield are ten times cheaper with one point, and a few per cent stronger in bending.
+    """
 
     modes: tuple[Literal["two_scale", "dns"], ...] = ("two_scale", "dns")
     dns_solver: Literal["explicit", "implicit"] = "explicit"
     step_fraction: float = Field(0.9, gt=0, le=0.95)
     critical_step: Literal["element", "power_iteration"] = "element"
+    kinematics: Literal["small", "finite"] = "small"
+    formulation: Literal["incompatible_modes", "one_point"] = "incompatible_modes"
     mass_scaled: tuple[Literal["board", "substrate", "die", "copper", "solder"], ...] = ()
     history_samples: int = Field(600, ge=2)
     field_samples: int = Field(12, ge=2)
