@@ -44,7 +44,8 @@ def run_structure(world: MPI.Comm, request: StructureInput) -> None:
         comm = comms.models["structure"]
         model = build_structure(comm, request, pulse_durations(pulses))
         modes = find_modes(comm, model, request)
-        crew: dict[Role, Participant] = {"structure": make_participant(comm, model, request, pulses)}
+        structure = make_participant(comm, model, request, pulses)
+        crew: dict[Role, Participant] = {"structure": structure}
         history = make_history(comm, model, request, pulses)
         part = model.tables.part[model.body.local.cell_numbers]
         path, yields = request.output / "structure.pvd", bool(plastic_laws(request.layer_materials))
@@ -58,7 +59,8 @@ def run_structure(world: MPI.Comm, request: StructureInput) -> None:
         seconds = time.perf_counter() - ready - output_seconds
         timings = Timings(ready - start, seconds, output_seconds, checkpoints.continued or 0)
         peaks = element_peaks(comm, fields["structure"], model.tables.part_names)
-        write_result(comm, request, model, Found(history, modes, peaks), timings)
+        cost = structure.motion.factor.cost if isinstance(structure.motion, ImplicitMotion) else None
+        write_result(comm, request, model, Found(history, modes, peaks, cost), timings)
         agreed(comm, lambda: None)
 
 

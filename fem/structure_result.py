@@ -9,6 +9,7 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from fem.factorisation import FactorCost
 from fem.fields import Fields
 from fem.history import History
 from fem.inputs import StructureInput
@@ -18,6 +19,7 @@ from fem.stress import principal_strains, von_mises
 from fem.structure_effects import effects
 from fem.structure_model import StructureModel
 from fem.structure_modes import ModeTable
+from fem.watch_points import PointTable
 
 # Above it the hourglass stiffness carries a part of the load; 10 % is the usual bound (Belytschko, Liu, Moran &
 # Elkhodary, Nonlinear Finite Elements, 2nd ed., 8.7).
@@ -32,11 +34,13 @@ class Found:
         history: Samples and ledger.
         modes: Natural modes, if this run was asked for them.
         peaks: Cell field -> layer -> largest value of an element at the times of the fields.
+        factor: What the factorisation of an implicit solver took.
     """
 
     history: History
     modes: ModeTable | None
     peaks: dict[str, dict[str, float]]
+    factor: FactorCost | None
 
 
 def element_peaks(comm: MPI.Comm, fields: Fields, parts: Sequence[str]) -> dict[str, dict[str, float]]:
@@ -57,13 +61,14 @@ def write_result(
         arrays = history.arrays()
         result = {
             "metrics": cost_metrics(summary, timings)
+            | factor_metrics(found.factor)
             | {"energy_balance_error": quantity(history.ledger.balance_error)}
             | energy_metrics(arrays)
             | point_metrics(arrays)
             | layer_metrics(found.peaks)
             | mode_metrics(found.modes),
             "health": health(history, arrays, summary, request),
-            "effects": effects(request, summary["added_mass"]),
+            "effects": effects(request, summary["added_mass"]) | strain_effect(model.tables.watch),
             "timings": timings.seconds,
             "continued_from": timings.first,
             "model": summary,
@@ -109,6 +114,21 @@ def cost_metrics(summary: dict[str, Any], timings: Timings) -> dict[str, Any]:
         "model_mass": quantity(summary["model_mass"], "kg"),
         "added_mass": quantity(summary["added_mass"], "kg"),
     }
+
+
+def factor_metrics(cost: FactorCost | None) -> dict[str, Any]:
+    """Return the size of a factored matrix, if there is one."""
+    if cost is None:
+        return {}
+    return {"factor_entries": quantity(cost.entries), "factor_memory": quantity(cost.memory / 1e6, "MB")}
+
+
+def strain_effect(watch: PointTable) -> dict[str, Any]:
+    """Return whether strain and stress of all watch points are those of the points themselves."""
+    away = watch.displaced
+    places = [f"{name} at z = {watch.strain_points[watch.names.index(name), 2]:.4g} m" for name in away]
+    why = f"one layer of elements, which gives the value of its middle: {', '.join(places)}"
+    return {"strain_at_surface": {"on": not away, "why": why if away else "a linear fit to the means of elements"}}
 
 
 def energy_metrics(arrays: dict[str, NDArray]) -> dict[str, Any]:

@@ -15,6 +15,7 @@ from fem.tie import Tie
 from fem.watch_points import PointTable, point_table
 
 AXES = "xyz"
+NODES = {"hexahedron": 8, "tetrahedron": 4, "tetrahedron_quadratic": 10}
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +37,7 @@ def structure_tables(mesh: MeshData, scene: StructureScene) -> StructureTables:
     """Build the tables of a structure.
 
     Raises:
-        MeshError: Layers without elements or elements without layers, watch points outside.
+        MeshError: Cells of another shape, layers without elements or elements without layers, watch points outside.
         LoadError: A facet set without facets, or a prescribed motion of what is held.
     """
     check_layers(mesh, scene)
@@ -66,7 +67,13 @@ def structure_tables(mesh: MeshData, scene: StructureScene) -> StructureTables:
 
 
 def check_layers(mesh: MeshData, scene: StructureScene) -> None:
-    """Compare the parts of the mesh with the layers; errors as ``structure_tables``."""
+    """Compare the cells and the parts of the mesh with elements and layers; errors as ``structure_tables``."""
+    element = scene.structure.element
+    if mesh.shape.nodes != NODES[element]:
+        raise MeshError(
+            f"structure.element = {element} has {NODES[element]} nodes, the cells of the mesh ({mesh.shape.name}) have"
+            f" {mesh.shape.nodes}"
+        )
     layers, parts = set(scene.structure.layers), set(mesh.part_names)
     if layers != parts:
         empty, foreign = ", ".join(sorted(layers - parts)), ", ".join(sorted(parts - layers))

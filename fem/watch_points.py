@@ -13,6 +13,7 @@ from fem.moving import Moving
 from fem.recovery import fit, patch
 from fem.stress_recovery import StressRecovery
 
+ROUNDING = 1e-9  # of the mesh: closer than that is the same place
 COMPONENTS = {"displacement": 3, "velocity": 3, "strain": 6, "stress": 6, "plastic_strain": 1}
 
 
@@ -30,6 +31,7 @@ class PointTable:
         weight: ``(k,)`` of each in its point's value.
         supports: Name -> nodes of a support.
         quantities: What is watched, of ``COMPONENTS``.
+        extent: Of the mesh [m].
     """
 
     names: tuple[str, ...]
@@ -41,6 +43,14 @@ class PointTable:
     weight: NDArray[np.float64]
     supports: dict[str, NDArray[np.int32]]
     quantities: tuple[str, ...]
+    extent: float
+
+    @property
+    def displaced(self) -> list[str]:
+        """Return the names of the points whose strain and stress are those of another place than their node."""
+        away = np.linalg.norm(self.strain_points - self.points, axis=1)
+        names = zip(self.names, away.tolist(), strict=True)
+        return [name for name, distance in names if distance > ROUNDING * self.extent]
 
 
 def point_table(
@@ -78,6 +88,7 @@ def point_table(
         weight=np.concatenate([np.empty(0), *weights]),
         supports=supports,
         quantities=tuple(name for name in COMPONENTS if yields or name != "plastic_strain"),
+        extent=float(np.ptp(mesh.points, axis=0).max()),
     )
 
 

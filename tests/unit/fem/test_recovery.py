@@ -33,6 +33,9 @@ def test_one_layer_of_elements_gives_the_value_of_its_middle():
     assert np.allclose(table.points, [SURFACE])
     assert np.allclose(table.strain_points[0], [*SURFACE[:2], THICKNESS / 2])
     assert table.weight.sum() == pytest.approx(1.0)
+    assert table.displaced == ["top"]
+    middle = {"top": SURFACE, "origin": (0.0, -4e-3 / 3, 0.0)}
+    assert not point_table(strip_mesh(), middle, {}).displaced
 
 
 def test_patch_stays_in_the_lower_of_two_layers():

@@ -141,6 +141,8 @@ def test_both_solvers_agree_under_all_loads(tmp_path):
     result, implicit = run(tmp_path, **changes, solver="implicit")
     assert result["metrics"]["step"]["value"] == pytest.approx(2e-7)
     assert result["health"]["energy_balance_error"]["value"] < 1e-10
+    assert result["metrics"]["factor_entries"]["value"] > 0
+    assert result["effects"]["strain_at_surface"]["on"]
     found = solver_differences(explicit, implicit)
     assert found["displacement_difference"] < 1e-3
     assert found["strain_difference"] < 5e-3
@@ -203,6 +205,12 @@ def test_mesh_that_does_not_fit_the_layers(tmp_path):
     request = structure_input(tmp_path, strip_mesh(layers=("board", "cover")))
     with pytest.raises(AgreedError, match="parts that are no layer: cover"):
         run_structure(MPI.COMM_SELF, request)
+
+
+def test_mesh_of_other_elements(tmp_path):
+    body = structure_tables_of()["structure"] | {"element": "tetrahedron"}
+    with pytest.raises(AgreedError, match=r"structure\.element = tetrahedron has 4 nodes, the cells of the mesh .* 8"):
+        run_structure(MPI.COMM_SELF, structure_input(tmp_path, structure=body))
 
 
 def test_facet_set_that_the_mesh_has_not(tmp_path):
