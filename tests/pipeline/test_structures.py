@@ -8,7 +8,10 @@ from pathlib import Path
 import pytest
 
 CASES = Path(__file__).resolve().parents[2] / "cases"
-COARSE_BOARD = ("structure.cells=[12,8]", "structure.layers.board.cells=1", "dynamics.duration=0.5 ms")
+COARSE_BOARD = (
+    "structure.cells=[12,8]", "dynamics.duration=0.5 ms", "dynamics.modes=3", "dynamics.numerics.field_samples=4",
+    "dynamics.numerics.implicit_step=2.5 us",
+)  # fmt: skip
 SHORT = {
     "bar_wave": ("structure.layers.lower.cells=150", "structure.layers.upper.cells=90"),
     "cantilever": ("structure.layers.strip.thickness=1 mm", "dynamics.duration=7 ms"),
