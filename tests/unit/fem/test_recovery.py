@@ -28,6 +28,28 @@ def test_linear_field_is_recovered_at_surfaces_corners_and_inside(place):
     assert len(cells) <= 32
 
 
+@pytest.mark.parametrize("place", [SURFACE, (LENGTH / 2, 4e-3, 0.0)])
+def test_order_at_surfaces_and_corners(place):
+    """A bending strain that varies along the strip: the error of its value falls with the square of the size."""
+
+    def strain(points):
+        return np.sin(150.0 * points[:, 0] + 0.4) * np.cos(200.0 * points[:, 1]) * (points[:, 2] - THICKNESS / 2)
+
+    errors = []
+    for refined in (4, 8):
+        mesh = strip_mesh((2 * refined, 3 * refined // 2, refined))
+        node = int(np.argmin(np.linalg.norm(mesh.points - place, axis=1)))
+        _, centres, nearest = around(mesh, node)
+        size = LENGTH / (2 * refined), 8e-3 / (3 * refined // 2), THICKNESS / refined
+        gauss = [0.5 * s * np.array([-1, 1]) / np.sqrt(3) for s in size]
+        corners = np.stack(np.meshgrid(*gauss), axis=-1).reshape(-1, 3)
+        means = np.mean([strain(centres + corner) for corner in corners], axis=0)
+        exact = strain(mesh.points[node][None, :])[0]
+        errors.append(abs(fit(centres, nearest, mesh.points[node]) @ means - exact) / THICKNESS)
+    assert errors[1] < 0.02
+    assert np.log2(errors[0] / errors[1]) > 1.7
+
+
 def test_one_layer_of_elements_gives_the_value_of_its_middle():
     table = point_table(strip_mesh((8, 3, 1)), {"top": SURFACE}, {})
     assert np.allclose(table.points, [SURFACE])
