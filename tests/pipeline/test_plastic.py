@@ -1,0 +1,67 @@
+"""Solder that yields, through the whole pipeline: both modes, energy ledger, failure criteria, report."""
+
+import json
+import shutil
+
+import numpy as np
+import pytest
+
+from tests.support.workflow_command import reflowshock
+
+# A pulse as short as the small case's hardly bends the board: only an absurd peak lets its solder yield.
+SETTINGS = (
+    "materials.solder=SAC405",
+    "shock.peak_acceleration=300000 G",
+    "shock.failure.peel_stress=100 MPa",
+    "shock.failure.plastic_work_density=0.3 MJ/m^3",
+)
+
+
+@pytest.fixture(scope="module")
+def plastic_run(first_run, tmp_path_factory):
+    """The run folder, how its run ended, the summary and the histories of both modes."""
+    folder = shutil.copytree(first_run[0], tmp_path_factory.mktemp("plastic") / "small")
+    result = reflowshock("run", folder, settings=SETTINGS)
+    histories = {mode: dict(np.load(folder / "shock" / mode / "history.npz")) for mode in ("two_scale", "dns")}
+    return folder, result, json.loads((folder / "summary.json").read_text()), histories
+
+
+def test_a_joint_that_fails_is_told_and_the_run_is_not_healthy(plastic_run):
+    folder, result, summary, _ = plastic_run
+    assert result.returncode == 1
+    assert "plastic work density" in result.stderr
+    failed = {name for name, check in summary["health"].items() if not check["ok"]}
+    assert failed == {"plastic_work_density", "dns_plastic_work_density"}
+    assert 1 <= summary["metrics"]["failed_joints"]["value"] < 4
+    page = (folder / "report.html").read_text()
+    assert "fails by" in page
+    assert "plastic work at pad" in page
+
+
+def test_effects_say_why_they_are_on(plastic_run):
+    effects = plastic_run[2]["effects"]
+    on = {name for name in ("plasticity", "strain_rate", "thermal_softening", "failure") if effects[name]["on"]}
+    assert on == {"plasticity", "strain_rate", "failure"}
+    assert effects["plasticity"]["why"].startswith("solder yields from 38 MPa on")
+
+
+def test_energy_balances_and_both_modes_flow_alike(plastic_run):
+    _, _, summary, histories = plastic_run
+    assert summary["metrics"]["energy_balance_error"]["value"] < 2e-3
+    assert summary["health"]["dns_energy_balance_error"]["value"] < 1e-5
+    assert summary["metrics"]["critical_joint_stress_error"]["value"] < 0.05
+    ours, exact = (np.stack([item["plastic_work_board"], item["plastic_work_package"]]) for item in histories.values())
+    assert (np.diff(exact, axis=1) >= 0.0).all()
+    assert np.abs(ours[:, -1] - exact[:, -1]).max() < 0.05 * exact[:, -1].max()
+    for item in histories.values():
+        assert item["plastic"][-1] > 0.0
+        assert item["plastic_strain_max"].max() == pytest.approx(
+            summary["metrics"]["peak_plastic_strain"]["value"], rel=0.05
+        )
+
+
+def test_stress_stays_on_the_yield_surface_of_its_rate(plastic_run):
+    """No element is stressed beyond its yield stress at the largest plastic strain and 1e5 1/s."""
+    history = plastic_run[3]["dns"]
+    strain = history["plastic_strain_max"].max()
+    assert history["von_mises_max"].max() < (38e6 + 275e6 * strain**0.71) * (1.0 + 0.0713 * np.log(1e8))
