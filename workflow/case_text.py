@@ -97,7 +97,7 @@ def _absent_table(key: str, model: type[BaseModel]) -> str:
 
 def _line(name: str, value: object, field: FieldInfo) -> str:
     if value is None:
-        return f"# {name} = ...".ljust(COMMENT_COLUMN) + f" # not given; {allowed(field)}"
+        return f"# {name} = ...".ljust(COMMENT_COLUMN) + f" # {'; '.join(filter(None, ('not given', allowed(field))))}"
     text = _value(value, field)
     remarks = [allowed(field)] if len(literal_names(field)) != 1 else []
     if field.default not in (PydanticUndefined, "", None):

@@ -77,6 +77,7 @@ KINDS = {
     "length": "m",
     "volume": "m^3",
     "time": "s",
+    "velocity": "m/s",
     "acceleration": "m/s^2",
     "density": "kg/m^3",
     "pressure": "Pa",
@@ -85,6 +86,7 @@ KINDS = {
     "temperature": "K",
     "mass": "kg",
     "force": "N",
+    "frequency": "Hz",
 }
 
 
