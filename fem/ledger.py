@@ -28,17 +28,18 @@ def ledger_sums(participant: Participant, sign: float) -> NDArray[np.float64]:
         sign: +1 for the macro model, -1 for the meso model, 0 without a cut.
     """
     motion = participant.motion
-    held = motion.internal_energy()
-    energies = [
-        motion.kinetic_energy(),
-        held.strain,
-        held.plastic,
-        held.hourglass,
-        motion.damping_energy,
-        motion.external_work,
-        sign * participant.interface_work,
-        motion.step_energy(participant.foreign_force()),
-    ]
+    with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is told by the judge
+        held = motion.internal_energy()
+        energies = [
+            motion.kinetic_energy(),
+            held.strain,
+            held.plastic,
+            held.hourglass,
+            motion.damping_energy,
+            motion.external_work,
+            sign * participant.interface_work,
+            motion.step_energy(participant.foreign_force()),
+        ]
     points, owned = motion.body.local.points, motion.body.shared.owned
     cut = participant.cut_force()[owned]
     cut_load = -sign * net_load(points[owned], cut)

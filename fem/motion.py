@@ -50,6 +50,7 @@ class Motion:
         self.ledger_mass[held] = 0.0
         self._state = np.zeros((3, len(mass), 3))
         self.displacement, self.velocity, self.force = self._state
+        self._tied = len(body.tie.slave) > 0
         self.slave_force = np.zeros((len(body.tie.slave), 3))
         self.gravity = self.body_acceleration(0.0)
         for load in self._loads:
@@ -97,7 +98,8 @@ class Motion:
         advance(self._state, self.mobility, self.gravity, self.step)
         for load in self._loads:
             load.collect(self)
-        self.body.tie.spread(self.displacement)
+        if self._tied:
+            self.body.tie.spread(self.displacement)
         self.time += self.step
         before, self.gravity = self.gravity, self.body_acceleration(self.time)
         mean = 0.5 * (before + self.gravity)
@@ -109,8 +111,9 @@ class Motion:
         self.force.fill(0.0)
         for term in self.body.terms:
             term.add(self.displacement, self.force)
-        np.take(self.force, self.body.tie.slave, axis=0, out=self.slave_force)
-        self.body.tie.gather(self.force)
+        if self._tied:
+            np.take(self.force, self.body.tie.slave, axis=0, out=self.slave_force)
+            self.body.tie.gather(self.force)
         self.body.shared.add(self.force)
         for load in self._loads:
             load.add(self)

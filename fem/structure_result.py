@@ -92,7 +92,8 @@ def model_summary(comm: MPI.Comm, request: StructureInput, model: StructureModel
         "critical_step": steps.cut,
         "step": steps.plan.step,
         "steps": steps.plan.windows * steps.plan.substeps,
-        "samples": steps.plan.windows,
+        "windows": steps.plan.windows,
+        "samples": steps.plan.windows // steps.plan.stride,
         "added_mass": steps.added_mass,
         "model_mass": steps.model_mass,
         "watch": {
@@ -104,7 +105,7 @@ def model_summary(comm: MPI.Comm, request: StructureInput, model: StructureModel
 
 def cost_metrics(summary: dict[str, Any], timings: Timings) -> dict[str, Any]:
     """Return steps, speed and masses of a run."""
-    rate = summary["steps"] * (1.0 - timings.first / summary["samples"]) / timings.windows
+    rate = summary["steps"] * (1.0 - timings.first / summary["windows"]) / timings.windows
     return {
         "critical_step": quantity(summary["critical_step"], "s"),
         "step": quantity(summary["step"], "s"),

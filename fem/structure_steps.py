@@ -16,6 +16,7 @@ from fem.solver_cost import implicit_step
 from fem.steps import Steps, agreed_minimum, critical_by_role, mass_factor
 from fem.structure_parameters import Dynamics
 
+LONGEST_WINDOW = 250  # steps: after each window a run can be judged, stopped and continued
 STEP_LIMIT = 0.99  # of the critical step
 ROUNDING = 1e-9
 
@@ -73,8 +74,10 @@ def window_plan(dynamics: Dynamics, largest: float) -> WindowPlan:
 
     Runs of one scene by different solvers so have their samples at the same times, unless one has fewer steps.
     """
-    windows = min(dynamics.numerics.history_samples, at_least(dynamics.duration / largest))
-    return WindowPlan(dynamics.duration / windows, at_least(dynamics.duration / windows / largest), windows, 1)
+    samples = min(dynamics.numerics.history_samples, at_least(dynamics.duration / largest))
+    stride = at_least(dynamics.duration / samples / largest / LONGEST_WINDOW)
+    windows = samples * stride
+    return WindowPlan(dynamics.duration / windows, at_least(dynamics.duration / windows / largest), windows, stride)
 
 
 def at_least(count: float) -> int:
