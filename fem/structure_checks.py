@@ -144,12 +144,10 @@ def _yielding(scene: StructureScene) -> Iterator[tuple[str, str]]:
 
 
 def _nonlinear_damping(scene: StructureScene) -> Iterator[Problem]:
-    """Stiffness-proportional damping takes the stiffness of linear layers."""
+    """Stiffness-proportional damping takes the elastic stiffness, which must not turn."""
     key = "dynamics.damping.stiffness_" + ("ratio" if scene.dynamics.damping.stiffness_ratio else "coefficient")
     if scene.dynamics.kinematics == "finite":
         yield Problem(key, None, "needs a constant stiffness, dynamics.kinematics = finite has none", "mass_ratio")
-    for layer, material in _yielding(scene):
-        yield Problem(key, None, f"needs a constant stiffness, {layer} = {material} yields", "mass_ratio")
 
 
 def _dynamics(scene: StructureScene) -> Iterator[Problem]:
