@@ -8,7 +8,7 @@ from mpi4py import MPI
 
 from fem.agreement import agreed
 from fem.checkpoint import Checkpoints, digest_of_files
-from fem.communicators import Communicators, Role
+from fem.communicators import Communicators
 from fem.errors import AgreedError
 from fem.fields import Fields
 from fem.history import History
@@ -20,7 +20,7 @@ from fem.march import Outputs, march
 from fem.material_effects import plastic_laws
 from fem.moving import Moving
 from fem.parameters import Ranks
-from fem.participant import Alone, Participant, uncut_motion
+from fem.participant import Alone, uncut_motion
 from fem.pulse import Pulse
 from fem.result import Timings
 from fem.structure_loads import damping_loads, structure_loads
@@ -45,22 +45,14 @@ def run_structure(world: MPI.Comm, request: StructureInput) -> None:
         model = build_structure(comm, request, pulse_durations(pulses))
         modes = find_modes(comm, model, request)
         structure = make_participant(comm, model, request, pulses)
-        crew: dict[Role, Participant] = {"structure": structure}
-        history = make_history(comm, model, request, pulses)
-        part = model.tables.part[model.body.local.cell_numbers]
-        path, yields = request.output / "structure.pvd", bool(plastic_laws(request.layer_materials))
-        fields: dict[Role, Fields] = {"structure": Fields(comm, model.body, part, path, yields)}
-        numerics, tables = request.dynamics.numerics, [load.table for load in request.loads.values()]
-        contents = digest_of_files(request.mesh, *(Path(table) for table in tables if table is not None))
-        inputs = request.model_dump_json(exclude={"output"}), contents
-        checkpoints = Checkpoints(comm, request.checkpoints, inputs, numerics.checkpoint_seconds)
+        outputs = make_outputs(comm, model, request, pulses)
         ready = time.perf_counter()
-        output_seconds = march(comm, crew, Outputs(history, fields, numerics.field_samples, checkpoints))
+        output_seconds = march(comm, {"structure": structure}, outputs)
         seconds = time.perf_counter() - ready - output_seconds
-        timings = Timings(ready - start, seconds, output_seconds, checkpoints.continued or 0)
-        peaks = element_peaks(comm, fields["structure"], model.tables.part_names)
+        timings = Timings(ready - start, seconds, output_seconds, outputs.checkpoints.continued or 0)
+        peaks = element_peaks(comm, outputs.fields["structure"], model.tables.part_names)
         cost = structure.motion.factor.cost if isinstance(structure.motion, ImplicitMotion) else None
-        write_result(comm, request, model, Found(history, modes, peaks, cost), timings)
+        write_result(comm, request, model, Found(outputs.history, modes, peaks, cost), timings)
         agreed(comm, lambda: None)
 
 
@@ -87,6 +79,19 @@ def make_motion(comm: MPI.Comm, model: StructureModel, request: StructureInput, 
         return ImplicitMotion(comm, model.body, loads, step, request.dynamics.numerics.hht_alpha)
     except ValueError as error:  # of what all ranks know alike
         raise AgreedError(f"implicit solver: {error}") from error
+
+
+def make_outputs(comm: MPI.Comm, model: StructureModel, request: StructureInput, pulses: dict[str, Pulse]) -> Outputs:
+    """Open the files of a run, and name what its checkpoints depend on; collective."""
+    part = model.tables.part[model.body.local.cell_numbers]
+    yields = bool(plastic_laws(request.layer_materials))
+    fields = Fields(comm, model.body, part, request.output / "structure.pvd", yields)
+    tables = [Path(load.table) for load in request.loads.values() if load.table is not None]
+    inputs = request.model_dump_json(exclude={"output"}), digest_of_files(request.mesh, *tables)
+    numerics = request.dynamics.numerics
+    checkpoints = Checkpoints(comm, request.checkpoints, inputs, numerics.checkpoint_seconds)
+    history = make_history(comm, model, request, pulses)
+    return Outputs(history, {"structure": fields}, numerics.field_samples, checkpoints)
 
 
 def make_history(comm: MPI.Comm, model: StructureModel, request: StructureInput, pulses: dict[str, Pulse]) -> History:
