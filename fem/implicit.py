@@ -147,6 +147,7 @@ class ImplicitMotion:
         mass = (self.body.mass + self._extra)[:, None]
         self._acceleration[:] = np.where(self._free, self._total_force() / np.where(mass > 0.0, mass, np.inf), 0.0)
         self._before = self._ledger_fields()
+        self._older = self._total_force()
         self._works[:] = 0.0, 0.0, self._stored_apart()
 
     def advance(self) -> None:
@@ -177,17 +178,38 @@ class ImplicitMotion:
         """Evaluate the force of the motion at ``time``, summed over ranks, and the work of the step before."""
         self._update_force()
         before, self._before = self._before, self._ledger_fields()
-        change, external, drag, held = self._before - before
-        external, drag, held = before[1:] + 0.5 * np.array([external, drag, held])
-        owned, solved = self.body.shared.owned, self._equations.own
-        prescribed = self._prescribed & owned[:, None]
-        self._works[0] += float(external[solved] @ change[solved] - held[prescribed] @ change[prescribed])
-        self._works[1] -= float(np.sum((drag * change)[owned]))
+        change, mean = self._before - before, 0.5 * (before + self._before)
+        solved, prescribed = self._equations.own, self._prescribed & self.body.shared.owned[:, None]
+        moved, held = change[0], mean[4] + mean[5]
+        self._works[0] += float(mean[3][solved] @ moved[solved] - held[prescribed] @ moved[prescribed])
+        self._works[1] -= float(np.sum((mean[4] * moved)[self.body.shared.owned])) + self._gain(change, mean)
+        self._older = before[3:].sum(axis=0)
+
+    def _gain(self, change: NDArray[np.float64], mean: NDArray[np.float64]) -> float:
+        """Return the energy [J] that alpha adds to this rank's share in a step (negative: it takes some).
+
+        With R all forces but inertia, bars for means over the step and D for changes, Newmark's formulas give
+        D(v.Mv)/2 - R_bar.Du = h v_bar.(M a_bar - R_bar + (gamma - 1/2) M Da) - h^2 (beta - gamma/2) R_bar.Da, and the
+        HHT method M a_bar - R_bar = alpha (R' - R_older) / 2, older by two steps.
+
+        Args:
+            change: ``(6, n, 3)`` change of ``_ledger_fields`` over the step.
+            mean: Their means.
+        """
+        h, scheme, solved = self.step, self._scheme, self._equations.own
+        if not scheme.alpha:
+            return 0.0
+        mass = (self.body.mass + self._extra)[:, None]
+        unbalanced = 0.5 * scheme.alpha * (self._before[3:].sum(axis=0) - self._older)
+        unbalanced += (scheme.gamma - 0.5) * mass * change[2]
+        apart = h**2 * (scheme.beta - 0.5 * scheme.gamma) * mean[3:].sum(axis=0) * change[2]
+        return float(np.sum((h * mean[1] * unbalanced - apart)[solved]))
 
     def _ledger_fields(self) -> NDArray[np.float64]:
-        """Return displacement, forces of the loads, of damping, and of elements with damping: ``(4, n, 3)``."""
-        external = self._total_force() - (self.force - self._nodal)
-        return np.array([self.displacement, external, self._drag, self.force - self._nodal])
+        """Return displacement, velocity, acceleration, forces of loads, damping, elements: ``(6, n, 3)``."""
+        elastic = self.force - self._nodal - self._drag
+        external = self._total_force() - elastic - self._drag
+        return np.array([self.displacement, self.velocity, self._acceleration, external, self._drag, elastic])
 
     def _stored_apart(self) -> float:
         """Return the kinetic energy [J] of prescribed components less that of masses the ledger does not count."""
@@ -247,7 +269,7 @@ class ImplicitMotion:
 
     @property
     def damping_energy(self) -> float:
-        """Return the energy that damping has taken from this rank's share [J]."""
+        """Return the energy that damping and a negative alpha have taken from this rank's share [J]."""
         return float(self._works[1])
 
     def reaction(self) -> NDArray[np.float64]:
@@ -272,13 +294,14 @@ class ImplicitMotion:
     def state(self) -> dict[str, Any]:
         """Return all that changes with time, for a checkpoint."""
         loads = [load.state() for load in self._loads]
-        arrays = {"state": self._state, "slave_force": self.slave_force, "before": self._before, "works": self._works}
-        return arrays | {"loads": loads, "time": self.time}
+        arrays = {"state": self._state, "slave_force": self.slave_force, "before": self._before}
+        return arrays | {"loads": loads, "time": self.time, "works": self._works, "older": self._older}
 
     def restore(self, state: dict[str, Any]) -> None:
         """Continue from what ``state`` returned, in a motion that was built alike."""
         self._state[:], self._works[:] = state["state"], state["works"]
         self.slave_force, self._before, self.time = state["slave_force"], state["before"], state["time"]
+        self._older = state["older"]
         self.gravity = self.body_acceleration(self.time)
         for load, kept in zip(self._loads, state["loads"], strict=True):
             load.restore(kept)

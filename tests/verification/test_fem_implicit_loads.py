@@ -5,10 +5,14 @@ import pytest
 from mpi4py import MPI
 
 from fem.body import Body
+from fem.damping import RayleighDamping
+from fem.global_matrix import Equations
 from fem.implicit import ImplicitMotion
 from fem.loads import Load
 from fem.mesh import MeshData
+from fem.modal import natural_modes
 from fem.moving import Moving
+from fem.parameters import Damping
 from tests.support.fem_bodies import STEEL, dns_body, motion_of
 from tests.verification.test_fem_loads import bar, largest_imbalance, loads_of
 
@@ -21,13 +25,14 @@ def model(kind: str) -> tuple[Body, MeshData, float]:
     return body, mesh, critical
 
 
-@pytest.mark.parametrize("fraction", [0.5, 5.0])
+@pytest.mark.parametrize(("fraction", "alpha"), [(0.5, 0.0), (5.0, 0.0), (5.0, -0.1), (8.0, -1 / 3)])
 @pytest.mark.parametrize("kind", KINDS)
-def test_energy_is_exact(kind, fraction):
+def test_energy_is_exact(kind, fraction, alpha):
     body, mesh, critical = model(kind)
-    motion = ImplicitMotion(MPI.COMM_SELF, body, loads_of(kind, body, mesh, 0.1 * critical), fraction * critical)
+    loads = loads_of(kind, body, mesh, 0.1 * critical)
+    motion = ImplicitMotion(MPI.COMM_SELF, body, loads, fraction * critical, alpha)
     error, work = largest_imbalance(motion, 100)
-    assert error < (1e-8 if kind == "large_mass" else 1e-11) * work
+    assert error < (1e-8 if kind == "large_mass" else 1e-10) * work
 
 
 def run(motion: Moving, end: float) -> Moving:
@@ -84,3 +89,26 @@ def test_state_continues_to_the_same_bits():
     run(second, 40 * critical)
     assert np.array_equal(first.displacement, second.displacement)
     assert first.external_work == second.external_work
+
+
+@pytest.mark.parametrize("terms", [(0.1, 0.0), (0.0, 0.1)])
+def test_free_vibration_decays_as_its_ratio_says(terms):
+    """One mode of a bar: x = exp(-xi w t) (cos w' t + xi / s sin w' t), s^2 = 1 - xi^2, w' = s w."""
+    body, _, _ = model("damped")
+    equations = Equations.of(MPI.COMM_SELF, body)
+    modes = natural_modes(equations, 12)
+    along = int(np.argmax(modes.effective_mass[:, 0]))
+    omega, shape = 2 * np.pi * modes.frequency[along], modes.shape[along]
+    given = Damping(mass_ratio=terms[0], stiffness_ratio=terms[1], frequency=omega / (2 * np.pi))
+    ratio, period = sum(terms), 2 * np.pi / omega
+    damping = RayleighDamping.build(body, given.coefficients)
+    motion = ImplicitMotion(MPI.COMM_SELF, body, [damping], period / 400)
+    motion.displacement[:] = shape
+    motion.restart()
+    root = np.sqrt(1 - ratio**2)
+    for _ in range(3):
+        run(motion, motion.time + 0.7 * period)
+        phase = root * omega * motion.time
+        exact = np.exp(-ratio * omega * motion.time) * (np.cos(phase) + ratio / root * np.sin(phase))
+        found = np.einsum("ni,n,ni->", motion.displacement, body.mass, shape)
+        assert found == pytest.approx(exact, abs=1e-3)
