@@ -25,8 +25,10 @@ NONLINEAR_RATE = {
     "tetrahedron_quadratic": 4.5e6,
 }
 FACTOR_RATE = 3.0e9  # operations per second of the factorisation
-SOLVE_RATE = 6.8e8  # entries of the factor per second of a solution
-EXPLICIT_OVERHEAD, IMPLICIT_OVERHEAD = 2.5e-5, 2.0e-4  # [s] a step, interpreter
+SOLVE_RATE = 6.0e8  # entries of the factor per second of a solution
+ASSEMBLY_SECONDS = 2.0e-5  # [s] an equation
+EXPLICIT_OVERHEAD, IMPLICIT_OVERHEAD = 2.5e-5, 4.0e-4  # [s] a step, interpreter
+IMPLICIT_UPDATE = 3.0e-7  # [s] a step and node: forces, vectors, ledger
 ENTRY_MEMORY, EQUATION_MEMORY = 11.0, 3.0e3  # [B] factor; matrix while it is assembled
 ELEMENT_MEMORY, NODE_MEMORY = 300.0, 500.0  # [B] explicit
 
@@ -99,8 +101,9 @@ def explicit_cost(elements: int, nodes: int, steps: int, rate: float) -> SolverC
 def implicit_cost(nodes: tuple[int, int, int], steps: int) -> SolverCost:
     """Predict the cost of implicit steps of a box of nodes: one factorisation, and a solution a step."""
     factor, equations = box_factor(nodes), 3 * math.prod(nodes)
-    setup = factor.operations / FACTOR_RATE
-    seconds = setup + steps * (factor.entries / SOLVE_RATE + IMPLICIT_OVERHEAD)
+    setup = factor.operations / FACTOR_RATE + ASSEMBLY_SECONDS * equations
+    step = factor.entries / SOLVE_RATE + IMPLICIT_UPDATE * math.prod(nodes) + IMPLICIT_OVERHEAD
+    seconds = setup + steps * step
     return SolverCost(steps, seconds, setup, ENTRY_MEMORY * factor.entries + EQUATION_MEMORY * equations)
 
 

@@ -22,7 +22,7 @@ WATCH = {
 DYNAMICS = {
     "duration": 5e-5,
     "damping": {"mass_ratio": 0.01, "stiffness_ratio": 0.01, "frequency": 1e4},
-    "numerics": {"history_samples": 20, "field_samples": 2},
+    "numerics": {"history_samples": 20, "field_samples": 2, "implicit_step": 5e-6},
 }
 
 
