@@ -22,6 +22,10 @@ STYLE = {
     "font.family": "sans-serif",
 }
 MILLI, MICRO = 1.0e-3, 1.0e-6
+ENERGIES = {
+    "external": "#333333", "kinetic": "#0b5fa5", "internal": "#e09f3e", "plastic": "#d1495b", "hourglass": "#7a5ea8",
+    "damping": "#2a7d4f",
+}  # fmt: skip
 
 
 def array_map(joints: list[dict]) -> str:
@@ -73,8 +77,9 @@ def energy_curves(history: dict) -> str:
     time = history["time"] / MILLI
     with pyplot.rc_context(STYLE):
         figure, (left, right) = pyplot.subplots(1, 2, figsize=(9.2, 3.1), constrained_layout=True)
-        for name, color in (("external", "#333333"), ("kinetic", "#0b5fa5"), ("internal", "#e09f3e")):
-            left.plot(time, history[name] / MILLI, label=name, color=color)
+        for name, color in ENERGIES.items():
+            if name in history and np.any(history[name]):
+                left.plot(time, history[name] / MILLI, label=name, color=color)
         left.set(xlabel="time [ms]", ylabel="energy [mJ]")
         left.legend(frameon=False)
         largest = max(float(np.max(np.abs(history[name]))) for name in ("external", "kinetic", "internal"))

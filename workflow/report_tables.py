@@ -234,9 +234,17 @@ def comparison(metrics: dict) -> dict | None:
 
 def energies(histories: dict[str, dict]) -> dict:
     """Largest value of every term of the ledger, each mode a column."""
-    terms = ("kinetic", "internal", "external", "interface", "balance")
+    terms = ("kinetic", "internal", "plastic", "hourglass", "damping", "external", "interface", "balance")
+    largest = {
+        term: [float(np.max(np.abs(history[term]))) for history in histories.values()]
+        for term in terms
+        if all(term in history for history in histories.values())
+    }
+    always = ("kinetic", "internal", "external", "interface", "balance")
     rows = [
-        [term, *(f"{1e3 * np.max(np.abs(history[term])):.4g} mJ" for history in histories.values())] for term in terms
+        [term, *(f"{1e3 * value:.4g} mJ" for value in values)]
+        for term, values in largest.items()
+        if any(values) or term in always
     ]
     return {"head": ["largest magnitude", *(_mode(mode) for mode in histories)], "rows": rows}
 

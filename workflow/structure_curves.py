@@ -8,7 +8,7 @@ from matplotlib import pyplot
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from workflow.report_curves import MILLI, STYLE, svg
+from workflow.report_curves import ENERGIES, MILLI, STYLE, svg
 
 SOLVER_STYLE: dict[str, dict[str, Any]] = {
     "explicit": {"color": "#0b5fa5", "linestyle": "-", "linewidth": 1.6, "label": "explicit"},
@@ -17,10 +17,6 @@ SOLVER_STYLE: dict[str, dict[str, Any]] = {
 COMPONENTS = {3: ("x", "y", "z"), 6: ("xx", "yy", "zz", "xy", "yz", "xz")}
 UNITS = {"displacement": "m", "velocity": "m/s", "strain": "", "stress": "Pa", "reaction": "N"}
 PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
-ENERGIES = {
-    "external": "#333333", "kinetic": "#0b5fa5", "internal": "#e09f3e", "plastic": "#d1495b", "hourglass": "#7a5ea8",
-    "damping": "#2a7d4f", "interface": "#5f6c7b",
-}  # fmt: skip
 
 Histories = Mapping[str, Mapping[str, NDArray]]
 
