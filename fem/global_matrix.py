@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from fem.body import Body
-from fem.errors import AgreedError
 from fem.force_assembled import AssembledElements
 
 
@@ -36,13 +35,13 @@ class Equations:
         """Number the free components of a model; collective.
 
         Raises:
-            AgreedError: No component is free; on every rank.
+            ValueError: No component is free; on every rank.
         """
         own = body.free & body.shared.owned[:, None]
         counts = comm.allgather(int(own.sum()))
         total, first = sum(counts), sum(counts[: comm.rank])
         if not total:
-            raise AgreedError("the supports hold every node: there is no equation to solve")
+            raise ValueError("the supports hold every node: there is no equation to solve")
         number = np.where(own, first + np.cumsum(own).reshape(own.shape) - 1.0, 0.0)
         body.shared.add(number)
         return cls(comm, body, np.where(body.free, number, -1.0).astype(np.int32), own, total)
