@@ -5,9 +5,9 @@
 The script starts itself on two MPI ranks. Rank 0 first measures a model of its own (``COMM_SELF``) while rank 1
 sleeps, then both step the same cube cut in two by DOLFINx, and so on in turns. A step is Motion.advance and
 Motion.update_force: update of velocities and displacements, internal force, sum over the copies of shared nodes;
-``drop`` is the same step under a body force, whose work needs the momentum. On one rank times are processor seconds,
-medians of rounds. Two ranks wait for each other, so that on a loaded machine what other programs take counts twice:
-there they are the least wall seconds of single calls, against the same of one rank.
+``drop`` is the same step under a body force, whose work needs the momentum. Ranks wait for each other, so that on a
+loaded machine what other programs take counts twice: times are the least wall seconds of single calls, of the slower
+rank, at a moment when no other program came between.
 """
 
 import json
@@ -65,17 +65,16 @@ def force(motion: Motion) -> Callable[[], None]:
     return work
 
 
-def seconds_of(comm: MPI.Comm, work: Callable[[], None]) -> tuple[float, float]:
-    """Return the mean processor seconds of this rank's calls and the least wall seconds of one call on all ranks."""
-    walls, begin = np.empty(CALLS), time.process_time()
+def least_wall(comm: MPI.Comm, work: Callable[[], None]) -> float:
+    """Return the least wall seconds of a call, of the slower rank."""
+    walls = np.empty(CALLS)
     for k in range(CALLS):
         comm.Barrier()
         start = time.perf_counter()
         work()
         walls[k] = time.perf_counter() - start
-    processor = (time.process_time() - begin) / CALLS
     comm.Allreduce(MPI.IN_PLACE, walls, MPI.MAX)
-    return processor, float(walls.min())
+    return float(walls.min())
 
 
 def asleep(comm: MPI.Comm) -> None:
@@ -85,8 +84,8 @@ def asleep(comm: MPI.Comm) -> None:
         time.sleep(NAP)
 
 
-def measure(world: MPI.Comm) -> dict[str, np.ndarray]:
-    """Return processor and least wall seconds of each work, ``(rounds, 2)``; of the single rank's on rank 0 only."""
+def measure(world: MPI.Comm) -> dict[str, float]:
+    """Return the least wall seconds of each work; of the single rank's on rank 0 only."""
     both = motion_on(world, [])
     works = {"step_2": (world, step(both)), "force_2": (world, force(both))}
     if world.rank == 0:
@@ -95,32 +94,29 @@ def measure(world: MPI.Comm) -> dict[str, np.ndarray]:
         works = {name: (MPI.COMM_SELF, work) for name, work in single.items()} | works
     for _, work in works.values():
         work()
-    rows: dict[str, list[tuple[float, float]]] = {name: [] for name in works}
+    least = dict.fromkeys(works, np.inf)
     for _ in range(ROUNDS):
         for name, (comm, work) in works.items():
             if name == "step_2":
                 asleep(world)
-            rows[name].append(seconds_of(comm, work))
-    return {name: np.array(values) for name, values in rows.items()}
+            least[name] = min(least[name], least_wall(comm, work))
+    return least
 
 
-def report(measured: dict[str, np.ndarray]) -> dict:
+def report(least: dict[str, float]) -> dict:
     """Return rates, ratios and bars."""
-    processor = {name: values[:, 0] for name, values in measured.items() if name.endswith("_1")}
-    least = {name: values[:, 1].min(keepdims=True) for name, values in measured.items()}
     count = len(cube().cells)
-    bars = {
-        "step / force": turns.bar(turns.ratio(processor, "step_1", "force_1"), 0.8),
-        "step under a body force / force": turns.bar(turns.ratio(processor, "drop_1", "force_1"), 0.8),
-        "step / force on 2 ranks": turns.bar(turns.ratio(least, "step_2", "force_2"), 0.8),
-        "2 ranks / 1": turns.bar(turns.ratio(least, "step_2", "step_1"), 1.7),
+    pairs = {
+        "step / force": ("force_1", "step_1", 0.8),
+        "step under a body force / force": ("force_1", "drop_1", 0.8),
+        "step / force on 2 ranks": ("force_2", "step_2", 0.8),
+        "2 ranks / 1": ("step_1", "step_2", 1.7),
     }
     return {
         "elements": count,
-        "updates_per_second": turns.rates(processor, dict.fromkeys(processor, count)),
-        "updates_per_second_at_best": turns.rates(least, dict.fromkeys(least, count)),
+        "updates_per_second": {name: count / seconds for name, seconds in least.items()},
         "load_average": os.getloadavg()[0],
-        "bars": bars,
+        "bars": {name: turns.bar(least[other] / least[ours], bar) for name, (other, ours, bar) in pairs.items()},
     }
 
 
