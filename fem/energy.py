@@ -16,7 +16,8 @@ class Energy:
     Attributes:
         strain: Elastic strain energy, recoverable.
         plastic: Work dissipated by plastic flow so far.
-        hourglass: Energy of the hourglass stiffness of elements with one integration point.
+        hourglass: Energy of the hourglass stiffness of elements with one integration point; in fully integrated ones
+            that yield the work of incompatible modes that are not yet in equilibrium.
     """
 
     strain: float = 0.0

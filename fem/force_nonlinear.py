@@ -60,13 +60,13 @@ class NonlinearElements:
         lanes, finite = arrange(elements), path.finite
         if elements.kind.name == HEXAHEDRON.name:
             full = hexahedron_blocks(elements, lanes, plastic, finite)
-            history = {"state": full.state, "work": full.plastic_work, "modes": full.modes}
+            history = {"state": full.state, "work": full.plastic_work, "hourglass": full.hourglass_energy}
+            history |= {"modes": full.modes, "residual": full.residual}
             kernel = partial(add_hexahedron_force, full, path)
             return cls(elements, chosen, finite, lanes, full, kernel, history)
         blocks = gradient_blocks(elements, lanes, plastic, finite)
-        history = {"state": blocks.state, "work": blocks.plastic_work}
-        if elements.kind.hourglass:
-            history |= {"hourglass": blocks.hourglass_energy, "slip": blocks.slip}
+        history = {"state": blocks.state, "work": blocks.plastic_work, "hourglass": blocks.hourglass_energy}
+        history |= {"slip": blocks.slip}
         kernel = partial(add_gradient_force, blocks, tuple(range(elements.kind.nodes)), path)
         return cls(elements, chosen, finite, lanes, blocks, kernel, history)
 
@@ -83,11 +83,10 @@ class NonlinearElements:
     def energy(self, displacement: NDArray[np.float64]) -> Energy:
         """Return the energies at the latest ``add``."""
         blocks, valid = self.blocks, self.lanes.valid
-        hourglass = self.history.get("hourglass")
         return Energy(
             strain=float(elastic_energy(blocks, self.elements.elasticity)[valid].sum()),
             plastic=float(blocks.plastic_work[valid].sum()),
-            hourglass=0.0 if hourglass is None else float(hourglass[valid].sum()),
+            hourglass=float(blocks.hourglass_energy[valid].sum()),
         )
 
     def means(self, places: NDArray[np.integer]) -> "Means":

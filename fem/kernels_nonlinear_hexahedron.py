@@ -12,9 +12,9 @@ s = dev s + p 1 the Kirchhoff stress and c = (J' / det F)^(1/3): on the modes, w
     P = c R (dev s + p / c^3 1) U'^-1,  P_c = P + (Pr(p / J') - p / J') cof F_c.
 
 Modes follow each step by one Newton correction with the elastic operator: exact while elastic; what plastic flow leaves
-over is corrected in the next step. Elastic strains must stay well below one, as those of metals do: above about one
-half the modes grow without load, known of all enhanced strains (Wriggers & Reese, CMAME 135, 1996); take the one-point
-element there.
+over is corrected in the next step, and its work on the modes told as hourglass energy. Elastic strains must stay well
+below one, as those of metals do: above about one half the modes grow without load, known of all enhanced strains
+(Wriggers & Reese, CMAME 135, 1996); take the one-point element there.
 """
 
 from typing import NamedTuple
@@ -48,7 +48,15 @@ from fem.kernels_nonlinear_dilatation import (
     write_dilatation,
 )
 from fem.kernels_nonlinear_gradient import FINE
-from fem.kernels_nonlinear_modes import add_modes, add_residual, correct_modes, push_normals, write_operator
+from fem.kernels_nonlinear_modes import (
+    add_modes,
+    add_remainder,
+    add_residual,
+    correct_modes,
+    push_normals,
+    write_inverse,
+    write_operator,
+)
 from fem.kernels_nonlinear_parent import add_point_monomials, fit, gather_monomials, point_gradient, scatter_monomials
 
 
@@ -60,12 +68,13 @@ class HexahedronBlocks(NamedTuple):
         inverse: ``(np, 8, 16 * 9)`` [1/m] inverse Jacobian at the Gauss points.
         weight: ``(np, 16 * 8)`` [m^3].
         basis: ``(np, 16 * 32)`` linear functions at the Gauss points, orthonormal under the weights.
-        centre: ``(np, 16 * 9)`` [1/m] inverse Jacobian at the centre.
-        normal: ``(np, 16 * 9)`` [m^2] N_k, -2 det J_0 times the rows of ``centre``.
+        normal: ``(np, 16 * 9)`` [m^2] N_k: -2 det J_0 times the inverse of the Jacobian at the centre, J_0.
         coupling: ``(np, 16 * 6)`` [1/m^3] sums of xi_k xi_l / w, order of a symmetric matrix.
         state: ``(nb, 8, 16 * 13)``, see ``kernels_nonlinear``.
         modes: ``(nb, 16 * 9)`` [1/m^2] a_k.
         plastic_work: ``(nb, 16)`` [J].
+        residual: ``(nb, 16 * 9)`` [N m] forces on the modes.
+        hourglass_energy: ``(nb, 16)`` [J] their work.
     """
 
     cells: NDArray[np.int32]
@@ -77,12 +86,13 @@ class HexahedronBlocks(NamedTuple):
     inverse: NDArray[np.float64]
     weight: NDArray[np.float64]
     basis: NDArray[np.float64]
-    centre: NDArray[np.float64]
     normal: NDArray[np.float64]
     coupling: NDArray[np.float64]
     state: NDArray[np.float64]
     modes: NDArray[np.float64]
     plastic_work: NDArray[np.float64]
+    residual: NDArray[np.float64]
+    hourglass_energy: NDArray[np.float64]
 
 
 class Bench(NamedTuple):
@@ -125,7 +135,7 @@ def new_bench(finite):
         np.empty(9 * LANES),
         np.empty(54 * LANES),
         np.empty(8 * LANES),
-        np.empty(8 * LANES),
+        np.empty(9 * LANES),
     )
 
 
@@ -169,7 +179,8 @@ def write_frame(w, frame):
 @njit(cache=True)
 def write_centre(blocks, b, bench):
     """Write the frame of the element's centre; return whether it is upright."""
-    point_gradient(bench.monomials, (0.0, 0.0, 0.0), blocks.centre[blocks.pattern[b]], bench.point)
+    write_inverse(blocks.normal[blocks.pattern[b]], bench.frame)
+    point_gradient(bench.monomials, (0.0, 0.0, 0.0), bench.frame, bench.point)
     add_identity(bench.point)
     upright = rotate(bench.point)
     write_frame(bench.point, bench.frame)
@@ -218,15 +229,16 @@ def relax_modes(blocks, b, bench):
     if bench.finite:
         push_normals(bench.frame, bench.turned)
     write_operator(bench.turned, blocks.coupling[pattern], elastic, bench.operator)
-    correct_modes(bench.operator, bench.residual, blocks.modes[b])
+    correct_modes(bench.operator, bench.residual, blocks.modes[b], bench.change)
     write_turned(blocks, b, bench)
     return True
 
 
 @njit(cache=True)
 def move_points(blocks, b, bench, step):
-    """Move all Gauss points on by a step and write their P; return whether they are upright."""
-    weight, law = blocks.weight[blocks.pattern[b]], (blocks.plastic[blocks.material[b]], step)
+    """Move all Gauss points on by a step, write P and the forces on the modes; return whether they are upright."""
+    pattern = blocks.pattern[b]
+    weight, law = blocks.weight[pattern], (blocks.plastic[blocks.material[b]], step)
     for g in range(8):
         state, at = blocks.state[b, g], slice(LANES * g, LANES * (g + 1))
         if not strain_at(blocks, b, g, bench, state):
@@ -234,6 +246,8 @@ def move_points(blocks, b, bench, step):
         plastic_flow(bench.point, state, law, weight[at], blocks.plastic_work[b])
         write_nominal(bench, state, bench.pressure[at])
         bench.nominal[g] = bench.point[NOMINAL : NOMINAL + 9 * LANES]
+        xi = (GAUSS[g, 0], GAUSS[g, 1], GAUSS[g, 2])
+        add_residual(bench.point, blocks.normal[pattern], xi, bench.residual)
     return True
 
 
@@ -258,15 +272,21 @@ def add_hexahedron_force(blocks, path, displacement, force):
         if path.finite and not write_centre(blocks, b, bench):
             return b
         write_compatible(blocks, b, bench)
-        if not (relax_modes(blocks, b, bench) and move_points(blocks, b, bench, path.step)):
+        if not relax_modes(blocks, b, bench):
             return b
-        fit(blocks.basis[pattern], blocks.weight[pattern], bench.pressure, bench.change)
-        bench.change[:] -= bench.pressure
+        bench.residual[:] = 0.0
+        if not move_points(blocks, b, bench, path.step):
+            return b
+        if path.finite:
+            turn_back(bench.frame, bench.residual)
+        add_remainder(bench.residual, bench.change, blocks.residual[b], blocks.hourglass_energy[b])
+        fit(blocks.basis[pattern], blocks.weight[pattern], bench.pressure, bench.fitted)
+        bench.fitted[:] -= bench.pressure
         bench.monomials[:] = 0.0
         for g in range(8):
             at = slice(LANES * g, LANES * (g + 1))
             finish_nominal(
-                bench.nominal[g], bench.compatible[g], blocks.weight[pattern, at], bench.change[at], path.finite
+                bench.nominal[g], bench.compatible[g], blocks.weight[pattern, at], bench.fitted[at], path.finite
             )
             xi = (GAUSS[g, 0], GAUSS[g, 1], GAUSS[g, 2])
             add_point_monomials(bench.nominal[g], xi, blocks.inverse[pattern, g], bench.monomials)

@@ -1,5 +1,6 @@
 """Numba kernels of the incompatible modes of sixteen hexahedra: gradients, forces, elastic operator."""
 
+import numpy as np
 from numba import njit
 
 from fem.kernels_lanes import (
@@ -21,7 +22,6 @@ from fem.kernels_lanes import (
 )
 from fem.kernels_nonlinear import DEFORMATION, NOMINAL
 
-UNIT = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 PAIRS = ((0, 0, 0), (1, 1, 1), (2, 2, 2), (0, 1, 3), (1, 2, 4), (0, 2, 5))  # k, l, place in a symmetric matrix
 
 
@@ -127,8 +127,8 @@ def less(v, m, u):
 
 
 @njit(**LANE_OPTIONS)
-def correct_modes(operator, residual, modes):
-    """Subtract the operator's inverse times the residual ``(16 * 9,)`` from the modes: elimination by blocks."""
+def correct_modes(operator, residual, modes, change):
+    """Subtract the operator's inverse times the residual ``(16 * 9,)``, the change, from the modes, by blocks."""
     for lane in range(LANES):
         a12, a23 = nine(operator, 27 * LANES + lane), nine(operator, 36 * LANES + lane)
         a13 = nine(operator, 45 * LANES + lane)
@@ -144,6 +144,28 @@ def correct_modes(operator, residual, modes):
         x3 = applied(i3, r3)
         x2 = applied(i2, less(r2, a23, x3))
         x1 = applied(i1, less(less(r1, a12, x2), a13, x3))
-        put_three(modes, lane, less(three(modes, lane), UNIT, x1))
-        put_three(modes, 3 * LANES + lane, less(three(modes, 3 * LANES + lane), UNIT, x2))
-        put_three(modes, 6 * LANES + lane, less(three(modes, 6 * LANES + lane), UNIT, x3))
+        put_three(change, lane, x1)
+        put_three(change, 3 * LANES + lane, x2)
+        put_three(change, 6 * LANES + lane, x3)
+    for k in range(0, 9 * LANES, LANES):
+        for lane in range(LANES):
+            modes[k + lane] -= change[k + lane]
+
+
+@njit(**LANE_OPTIONS)
+def add_remainder(residual, change, before, energy):
+    """Add the work of the mean residual of a step on minus the change of the modes; keep the residual."""
+    for lane in range(LANES):
+        total = 0.0
+        for k in range(0, 9 * LANES, LANES):
+            total += (residual[k + lane] + before[k + lane]) * change[k + lane]
+        energy[lane] += 0.5 * total
+    before[:] = residual
+
+
+@njit(**LANE_OPTIONS)
+def write_inverse(normal, result):
+    """Write the inverse of the Jacobian at the centre J_0 from N = -2 det(J_0) J_0^-1: det N = -8 det(J_0)^2."""
+    for lane in range(LANES):
+        n = nine(normal, lane)
+        put_nine(result, lane, scaled(-1.0 / np.sqrt(-0.5 * determinant(n, cofactor(n))), n))

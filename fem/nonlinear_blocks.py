@@ -101,20 +101,20 @@ def hexahedron_blocks(elements: Elements, lanes: Lanes, plastic: NDArray[np.floa
     jacobian = np.einsum("eai,gad->egid", corners, GAUSS_DERIVATIVES, optimize=True)
     weight = np.linalg.det(jacobian)
     centre = np.einsum("eai,ad->eid", corners, CENTRE_DERIVATIVES, optimize=True)
-    inverse = np.linalg.inv(centre)
-    normal = -2.0 * np.linalg.det(centre)[:, None, None] * inverse
+    factor = -2.0 * np.linalg.det(centre)[:, None, None]
     coupling = np.einsum("gk,gl,eg->ekl", GAUSS, GAUSS, 1.0 / weight)[:, SYMMETRIC[0], SYMMETRIC[1]]
     return HexahedronBlocks(
         **common_arrays(elements, lanes, plastic),
         inverse=lanes.spread(np.linalg.inv(jacobian).reshape(count, 8, 9)),
         weight=lanes.spread(weight[:, None])[:, 0],
         basis=lanes.spread(orthonormal_basis(weight).reshape(count, 1, -1))[:, 0],
-        centre=lanes.spread(inverse.reshape(count, 1, -1))[:, 0],
-        normal=lanes.spread(normal.reshape(count, 1, -1))[:, 0],
+        normal=lanes.spread((factor * np.linalg.inv(centre)).reshape(count, 1, -1))[:, 0],
         coupling=lanes.spread(coupling[:, None])[:, 0],
         state=initial_state(len(lanes.filled), 8, finite),
         modes=np.zeros((len(lanes.filled), 9 * LANES)),
         plastic_work=np.zeros(lanes.element.shape),
+        residual=np.zeros((len(lanes.filled), 9 * LANES)),
+        hourglass_energy=np.zeros(lanes.element.shape),
     )
 
 
