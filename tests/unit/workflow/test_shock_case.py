@@ -1,0 +1,52 @@
+"""The shock of a package in a case file: every way to give its pulse, and what is said about impossible ones."""
+
+from pathlib import Path
+
+import pytest
+
+from tests.support.workflow_command import SMALL_CASE
+from workflow.case import read_case
+from workflow.problems import CaseError
+
+PULSE = 'peak_acceleration = "1500 G"\npulse_duration = "0.02 ms"\n'
+
+
+def case_with(directory: Path, pulse: str) -> Path:
+    path = directory / "case.toml"
+    text = SMALL_CASE.read_text()
+    assert PULSE in text
+    path.write_text(text.replace(PULSE, pulse))
+    return path
+
+
+def test_service_condition_damping_and_method(tmp_path):
+    pulse = 'service_condition = "G"\nmethod = "large_mass"\ngravity = "on"\n'
+    pulse += 'damping = { stiffness_ratio = 0.01, frequency = "1 kHz" }\n'
+    shock = read_case(case_with(tmp_path, pulse)).shock
+    assert (shock.service_condition, shock.method, shock.gravity) == ("G", "large_mass", "on")
+    assert shock.damping.coefficients[1] == pytest.approx(0.01 / (3.14159265 * 1e3))
+
+
+def test_table_lies_beside_the_case(tmp_path):
+    case = read_case(case_with(tmp_path, 'table = "drop.csv"\n'))
+    assert case.shock.table == str((tmp_path / "drop.csv").resolve())
+    assert case.files == {"shock.table": (tmp_path / "drop.csv").resolve()}
+
+
+FAULTS = {
+    'service_condition = "J"\n': ["shock.service_condition", "one of A, B, C, D, E, F, G, H"],
+    PULSE + 'service_condition = "B"\n': ["shock.peak_acceleration", "does not go with shock.service_condition"],
+    'peak_acceleration = "1500 G"\n': ["shock.pulse_duration", "is missing"],
+    "": ["shock.peak_acceleration", "is missing", "service_condition"],
+    PULSE + "damping = { mass_ratio = 0.01 }\n": ["shock.damping.frequency", "is missing"],
+    PULSE + 'method = "large_mas"\n': ["shock.method", "did you mean large_mass?"],
+    PULSE + 'gravity = "yes"\n': ["shock.gravity", "one of auto, on, off"],
+}
+
+
+@pytest.mark.parametrize("pulse", FAULTS)
+def test_impossible_shock_is_said(tmp_path, pulse):
+    with pytest.raises(CaseError) as error:
+        read_case(case_with(tmp_path, pulse))
+    text = "\n".join(str(problem) for problem in error.value.problems)
+    assert [word for word in FAULTS[pulse] if word not in text] == [], text
