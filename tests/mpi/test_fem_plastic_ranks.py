@@ -1,0 +1,42 @@
+"""Solder that yields flows alike on any number of ranks."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+
+from tests.support.fem_models import write_small_assembly
+from tests.support.fem_program import run_program
+
+SHOCK = {
+    "peak_acceleration": 2e7,
+    "pulse_duration": 2e-5,
+    "duration": 1e-5,
+    "numerics": {"mass_scaled": ["copper"], "history_samples": 20, "field_samples": 2},
+    "failure": {"peel_stress": 1e8, "plastic_work_density": 1e6},
+}
+
+
+def run(meshes: list[Path], mode: str, macro: int, meso: int) -> tuple[dict[str, np.ndarray], dict]:
+    """Return history and result of a run on some ranks."""
+    output = meshes[0].parent / f"{mode}_{macro}_{meso}"
+    shock = SHOCK | {"ranks": {"macro": macro, "meso": meso}}
+    request = {"mode": mode, "meshes": [str(path) for path in meshes], "shock": shock, "output": str(output)}
+    path = meshes[0].parent / "input.json"
+    path.write_text(json.dumps(request | {"materials": {"solder": "SAC405"}}))
+    done = run_program(path, macro + meso)
+    assert done.returncode == 0, done.stderr
+    with np.load(output / "history.npz") as arrays:
+        return dict(arrays), json.loads((output / "result.json").read_text())
+
+
+def test_flow_is_the_same_on_more_ranks(tmp_path):
+    meshes = write_small_assembly(tmp_path)
+    expected, result = run(meshes, "two_scale", 1, 1)
+    found, other = run(meshes, "two_scale", 1, 2)
+    for name in ("plastic_work_board", "plastic_work_package", "plastic_strain_max", "von_mises_max", "plastic"):
+        scale = np.abs(expected[name]).max()
+        assert scale > 0.0
+        assert np.abs(found[name] - expected[name]).max() <= 1e-8 * scale, name
+    assert other["failure"].keys() == result["failure"].keys() == {"peel_stress", "plastic_work_density"}
+    assert all(check["ok"] for name, check in result["health"].items() if name not in result["failure"])
