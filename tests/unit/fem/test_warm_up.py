@@ -1,0 +1,27 @@
+"""A force evaluated at rest leaves no trace in elements that have a path."""
+
+import numpy as np
+import pytest
+
+from fem.body import warm_up
+from fem.element import Elements
+from fem.force import force_terms
+from fem.material_library import SAC305
+from fem.materials import elasticity_matrix
+from tests.support.fem_models import grid
+
+
+@pytest.mark.parametrize(("kinematics", "rounding"), [("small", 0.0), ("finite", 1e-4)])
+def test_rest_leaves_no_path(kinematics, rounding):
+    """But round-off: 1e-4 Pa is 2e-15 of Young's modulus."""
+    points, cells = grid(*[np.linspace(0.0, 1.0, 3)] * 3)
+    elements = Elements(
+        points, cells, np.zeros(len(cells), np.int32), elasticity_matrix(SAC305)[None], np.full(len(cells), 7380.0)
+    )
+    terms = force_terms(elements, [SAC305], kinematics, 1e-8)
+    before = [{name: array.copy() for name, array in term.history.items()} for term in terms]
+    assert any(before)
+    warm_up(terms, len(points))
+    for term, history in zip(terms, before, strict=True):
+        for name, array in term.history.items():
+            assert array == pytest.approx(history[name], abs=rounding), name
