@@ -67,7 +67,7 @@ def reference_problems(references: dict[str, AnyReference], scene: StructureScen
         if isinstance(reference, BarWave):
             yield from _bar(key, reference, scene)
         elif isinstance(reference, Cantilever):
-            yield from _pressure(f"{key}.load", reference.load, scene)
+            yield from _pressure(f"{key}.load", reference.load, scene, "constant")
             yield from _known(f"{key}.tip", reference.tip, scene.watch, "watch point")
             yield from _layers(key, 1, scene)
         elif isinstance(reference, FrequencyRange) and reference.mode > scene.dynamics.modes:
@@ -76,7 +76,7 @@ def reference_problems(references: dict[str, AnyReference], scene: StructureScen
 
 
 def _bar(key: str, reference: BarWave, scene: StructureScene) -> Iterator[Problem]:
-    yield from _pressure(f"{key}.load", reference.load, scene)
+    yield from _pressure(f"{key}.load", reference.load, scene, "half_sine")
     yield from _layers(key, 2, scene)
     points = [*(("incident", name) for name in reference.incident), ("transmitted", reference.transmitted)]
     for item, name in points:
@@ -90,11 +90,13 @@ def _bar(key: str, reference: BarWave, scene: StructureScene) -> Iterator[Proble
         yield Problem(key, "the watch points are not in their layers", None, allowed)
 
 
-def _pressure(key: str, name: str, scene: StructureScene) -> Iterator[Problem]:
+def _pressure(key: str, name: str, scene: StructureScene, pulse: str) -> Iterator[Problem]:
     yield from _known(key, name, scene.loads, "load")
     load = scene.loads.get(name)
-    if load is not None and not (isinstance(load, Pressure) and load.peak is not None):
-        yield Problem(key, "is no pressure that is given by its peak", name, 'kind = "pressure" with a peak')
+    if load is not None and not (isinstance(load, Pressure) and load.peak is not None and load.pulse == pulse):
+        yield Problem(
+            key, f"is no {pulse} pressure that is given by its peak", name, f'a pressure with pulse = "{pulse}"'
+        )
 
 
 def _known(key: str, name: str, names: dict, what: str) -> Iterator[Problem]:

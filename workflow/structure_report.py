@@ -21,6 +21,7 @@ HEADLINE = (
     "tip_deflection_error", "swing_frequency_error", "energy_balance_error",
 )  # fmt: skip
 FRACTIONS = ("_error", "_difference", "_fraction")
+SHORTEST_IN_MM = 1e-5  # m
 MODEL_ROWS = (
     ("elements", lambda model: f"{number(model['elements'])} ({model['element']} {model['formulation']})"),
     ("nodes", lambda model: number(model["nodes"])),
@@ -77,7 +78,10 @@ def text(name: str, metric: dict) -> str:
     what = name.partition("@")[0]
     if what.endswith(FRACTIONS):
         return percent(metric["value"])
-    return f"{1e6 * metric['value']:.0f} µm/m" if what.endswith("strain") else quantity(metric)
+    if what.endswith("strain"):
+        return f"{1e6 * metric['value']:.0f} µm/m"
+    is_short = metric["unit"] == "m" and 0.0 < metric["value"] < SHORTEST_IN_MM
+    return f"{number(1e6 * metric['value'])} µm" if is_short else quantity(metric)
 
 
 def metric_table(metrics: dict) -> dict:

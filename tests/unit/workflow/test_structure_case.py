@@ -61,7 +61,16 @@ BAD_REFERENCES = {
         'references.wave.incident=["second","first"]',
         ["references.wave", "below 60 mm, upwards"],
     ),
-    "no pressure": ("jedec_board", "references.x={kind='cantilever',load='drop',tip='centre'}", ["is no pressure"]),
+    "no pressure": (
+        "jedec_board",
+        "references.x={kind='cantilever',load='drop',tip='centre'}",
+        ["references.x.load", "is no constant pressure"],
+    ),
+    "not sudden": (
+        "cantilever",
+        "loads.wind={kind='pressure',on='z_max',peak='1 Pa',duration='1 s'}",
+        ["no constant pr"],
+    ),
     "no such load": ("cantilever", "references.tip.load=wnd", ["references.tip.load", "did you mean wind?"]),
     "too many layers": (
         "cantilever",
