@@ -1,6 +1,5 @@
 """Rayleigh damping C = alpha M + beta K: a force at the nodes, and the energy that it takes."""
 
-import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, ClassVar, Literal
 
@@ -20,7 +19,7 @@ class RayleighDamping(Load):
     """Damping of the velocity: -alpha M v at the middle of the step, -beta K v half a step late.
 
     The mass term is implicit, -alpha M (v(t - dt/2) + v(t + dt/2)) / 2, which needs no smaller step. The stiffness term
-    takes v(t - dt/2), since K v(t) would need a solve; it lowers the critical step, see ``damped_critical_step``.
+    takes v(t - dt/2), since K v(t) would need a solve, and lowers the critical step (``estimate.damped_critical_step``).
 
     Attributes:
         force: ``(n, 3)`` [N] at the motion's time, summed over ranks.
@@ -88,14 +87,3 @@ class RayleighDamping(Load):
         """Add half a step's work."""
         owned = motion.body.shared.owned
         self.work += 0.5 * motion.step * float(np.sum((self.force * motion.velocity)[owned]))
-
-
-def damped_critical_step(critical: float, stiffness: float) -> float:
-    """Return the critical step [s] with stiffness-proportional damping: dt (sqrt(1 + xi^2) - xi).
-
-    Args:
-        critical: 2 / omega_max without damping [s].
-        stiffness: beta [s]; the highest mode has xi = beta omega_max / 2.
-    """
-    ratio = stiffness / critical
-    return critical * (math.sqrt(1.0 + ratio**2) - ratio)

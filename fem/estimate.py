@@ -55,6 +55,17 @@ def box_critical_step(material: Material, size: NDArray[np.float64]) -> float:
     return 1.0 / math.sqrt(max(float(normal), float(shear)) / material.density)
 
 
+def damped_critical_step(critical: float, stiffness: float) -> float:
+    """Return the critical step [s] with stiffness-proportional damping: dt (sqrt(1 + xi^2) - xi).
+
+    Args:
+        critical: 2 / omega_max without damping [s].
+        stiffness: beta [s]; the highest mode has xi = beta omega_max / 2.
+    """
+    ratio = stiffness / critical
+    return critical * (math.sqrt(1.0 + ratio**2) - ratio)
+
+
 def window_plan(macro_step: float, meso_step: float, fraction: float, duration: float, samples: int) -> WindowPlan:
     """Choose window and substeps from critical steps.
 

@@ -9,9 +9,8 @@ from numpy.typing import NDArray
 
 from fem.body import Pieces, make_body
 from fem.communicators import Role
-from fem.damping import damped_critical_step
 from fem.errors import AgreedError
-from fem.estimate import WindowPlan, window_plan
+from fem.estimate import WindowPlan, damped_critical_step, window_plan
 from fem.material_roles import Materials
 from fem.parameters import Shock
 from fem.power_iteration import highest_frequency

@@ -9,9 +9,8 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from fem.body import Pieces
-from fem.damping import damped_critical_step
 from fem.errors import StepError
-from fem.estimate import WindowPlan
+from fem.estimate import WindowPlan, damped_critical_step
 from fem.solver_cost import implicit_step
 from fem.steps import Steps, agreed_minimum, critical_by_role, mass_factor
 from fem.structure_parameters import Dynamics

@@ -115,12 +115,13 @@ def forecast_shock(case: BoardDropCase, parts: dict[str, PartForecast]) -> Shock
     Scaled masses follow the smallest step of the others, so they do not limit it. The board's patch touches the cut: it
     limits the window, as the board does.
     """
-    from fem.estimate import UPDATES_PER_SECOND, predict_seconds, window_plan
+    from fem.estimate import UPDATES_PER_SECOND, damped_critical_step, predict_seconds, window_plan
 
     shock, numerics = case.shock, case.shock.numerics
     macro = min(part.critical_step for name, part in parts.items() if role_of(name) == MACRO)
     limiting = [part.critical_step for part in parts.values() if not part.mass_scaled]
     meso_step = min(limiting, default=macro)
+    macro, meso_step = (damped_critical_step(step, shock.damping.coefficients[1]) for step in (macro, meso_step))
     plan = window_plan(macro, meso_step, numerics.step_fraction, shock.duration, numerics.history_samples)
     meso = sum(part.elements for name, part in parts.items() if name != MACRO)
     two_scale, dns = predict_seconds(parts[MACRO].elements, meso, plan, (shock.ranks.macro, shock.ranks.meso))

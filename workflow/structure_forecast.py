@@ -44,14 +44,16 @@ class StructureForecast:
 
 def forecast_structure(case: StructureCase) -> StructureForecast:
     """Predict sizes, steps and cost."""
+    from fem.estimate import damped_critical_step
     from fem.solver_cost import forecast_solvers, implicit_step
     from fem.structure_effects import effects
     from fem.structure_pulses import pulse_durations, pulses_of
 
     layers, dynamics = forecast_layers(case), case.dynamics
-    critical = min(layer.critical_step for layer in layers.values() if not layer.mass_scaled)
+    undamped = min(layer.critical_step for layer in layers.values() if not layer.mass_scaled)
+    critical = damped_critical_step(undamped, dynamics.damping.coefficients[1])
     steps = {
-        "explicit": dynamics.numerics.step_fraction * critical,
+        "explicit": dynamics.numerics.explicit_step or dynamics.numerics.step_fraction * critical,
         "implicit": implicit_step(dynamics, pulse_durations(pulses_of(case.loads))),
     }
     counts = {solver: ceil(dynamics.duration / step) for solver, step in steps.items()}

@@ -28,7 +28,8 @@ def solvers(case: StructureCase, outlook: StructureForecast) -> Table:
     """Steps, cost and memory of both solvers, and which to take."""
     table = new_table("\nSolvers, on one core", "solver", "step", "steps", "cost", "memory", "remark")
     numerics, found = case.dynamics.numerics, outlook.solvers
-    fraction = f"{numerics.step_fraction:g} of the smallest critical step"
+    given = numerics.explicit_step is not None
+    fraction = "as given" if given else f"{numerics.step_fraction:g} of the smallest critical step"
     factor = f"of it {duration(found.implicit.setup)} for the factor"
     for name, cost, remark in (("explicit", found.explicit, fraction), ("implicit", found.implicit, factor)):
         unused = "" if name in case.dynamics.solvers else "; not in dynamics.solver"

@@ -5,9 +5,9 @@ import pytest
 from mpi4py import MPI
 
 from fem.body import Body
-from fem.damping import RayleighDamping, damped_critical_step
+from fem.damping import RayleighDamping
 from fem.errors import EnergyError
-from fem.estimate import WindowPlan
+from fem.estimate import WindowPlan, damped_critical_step
 from fem.ledger import Ledger, ledger_sums
 from fem.loads import BodyAcceleration, Load
 from fem.material_parameters import Isotropic

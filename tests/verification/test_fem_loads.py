@@ -5,7 +5,8 @@ import pytest
 from mpi4py import MPI
 
 from fem.body import Body
-from fem.damping import RayleighDamping, damped_critical_step
+from fem.damping import RayleighDamping
+from fem.estimate import damped_critical_step
 from fem.facet_areas import outward_areas
 from fem.loads import BodyAcceleration, LargeMass, Load, NodalForces, PrescribedMotion
 from fem.material_parameters import Isotropic
