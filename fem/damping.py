@@ -19,7 +19,7 @@ class RayleighDamping(Load):
     """Damping of the velocity: -alpha M v at the middle of the step, -beta K v half a step late.
 
     The mass term is implicit, -alpha M (v(t - dt/2) + v(t + dt/2)) / 2, which needs no smaller step. The stiffness term
-    takes v(t - dt/2), since K v(t) would need a solve, and lowers the critical step (``estimate.damped_critical_step``).
+    takes v(t - dt/2), as K v(t) would need a solve, and lowers the critical step (``estimate.damped_critical_step``).
 
     Attributes:
         force: ``(n, 3)`` [N] at the motion's time, summed over ranks.
