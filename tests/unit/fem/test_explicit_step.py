@@ -1,9 +1,13 @@
 """A step that the user gives: taken as it is below the critical one, refused above it with both numbers."""
 
+import numpy as np
 import pytest
 from mpi4py import MPI
 
 from fem.errors import StepError
+from fem.ledger import Ledger
+from fem.march import GUARD
+from fem.structure import run_structure
 from fem.structure_model import build_structure
 from tests.support.fem_structures import structure_input
 
@@ -24,3 +28,16 @@ def test_given_step_is_taken_or_refused(tmp_path):
     steps_of(tmp_path, critical_step="power_iteration", explicit_step=1.003 * critical)
     with pytest.raises(StepError, match=r"explicit_step = .* \(power_iteration\)"):
         steps_of(tmp_path, critical_step="power_iteration", explicit_step=1.01 * larger.smallest)
+
+
+def test_energies_are_looked_at_between_samples_that_are_far_apart(tmp_path, monkeypatch):
+    numerics = {"history_samples": 2, "field_samples": 2}
+    request = structure_input(tmp_path, dynamics={"duration": 8e-5, "numerics": numerics})
+    steps, looked = build_structure(MPI.COMM_SELF, request, []).steps.plan, []
+    judge = Ledger.judge
+    monkeypatch.setattr(Ledger, "judge", lambda self, sums, time: (looked.append(time), judge(self, sums, time))[1])
+    run_structure(MPI.COMM_SELF, request)
+    with np.load(request.output / "history.npz") as arrays:
+        assert len(arrays["time"]) == 3
+    assert steps.windows * steps.substeps > 1000
+    assert max(np.diff(looked)) / steps.step <= GUARD + 0.5
