@@ -29,6 +29,7 @@ SOLVE_RATE = 6.0e8  # entries of the factor per second of a solution
 ASSEMBLY_SECONDS = 2.0e-5  # [s] an equation
 EXPLICIT_OVERHEAD, IMPLICIT_OVERHEAD = 2.5e-5, 4.0e-4  # [s] a step, interpreter
 IMPLICIT_UPDATE = 3.0e-7  # [s] a step and node: forces, vectors, ledger
+PLATE_LAYERS = 4  # of the plate that stands for a package on its board: those of the board
 ENTRY_MEMORY, EQUATION_MEMORY = 11.0, 3.0e3  # [B] factor; matrix while it is assembled
 ELEMENT_MEMORY, NODE_MEMORY = 300.0, 500.0  # [B] explicit
 
@@ -105,6 +106,12 @@ def implicit_cost(nodes: tuple[int, int, int], steps: int) -> SolverCost:
     step = factor.entries / SOLVE_RATE + IMPLICIT_UPDATE * math.prod(nodes) + IMPLICIT_OVERHEAD
     seconds = setup + steps * step
     return SolverCost(steps, seconds, setup, ENTRY_MEMORY * factor.entries + EQUATION_MEMORY * equations)
+
+
+def plate_nodes(elements: int) -> tuple[int, int, int]:
+    """Return the nodes of a square plate of so many hexahedra, as board and package with their joints make one."""
+    side = max(1, round(math.sqrt(elements / PLATE_LAYERS)))
+    return side + 1, side + 1, PLATE_LAYERS + 1
 
 
 def node_counts(scene: StructureScene) -> tuple[int, int, int]:

@@ -29,7 +29,8 @@ class ShockForecast:
         substeps: m, meso steps a window.
         windows: number of windows.
         two_scale: predicted wall time of the two-scale run [s].
-        dns: predicted wall time of the DNS [s].
+        dns: predicted wall time of the DNS [s] in explicit steps.
+        implicit: the same in implicit steps on one rank, where everything is elastic.
         updates_per_second: element updates per second and rank that the prediction assumes.
     """
 
@@ -38,6 +39,7 @@ class ShockForecast:
     windows: int
     two_scale: float
     dns: float
+    implicit: float
     updates_per_second: float
 
 
@@ -78,8 +80,9 @@ def forecast(case: BoardDropCase) -> Forecast:
     reflow = sum(reflow_seconds(case.solder, geometry) for geometry in distinct) / workers
     parts = forecast_parts(case)
     shock = forecast_shock(case, parts)
-    modes = case.shock.numerics.modes
-    wall = sum(seconds for mode, seconds in (("two_scale", shock.two_scale), ("dns", shock.dns)) if mode in modes)
+    numerics = case.shock.numerics
+    dns = shock.implicit if numerics.dns_solver == "implicit" else shock.dns
+    wall = sum(seconds for mode, seconds in (("two_scale", shock.two_scale), ("dns", dns)) if mode in numerics.modes)
     return Forecast(
         effects=decide_effects(max(distinct, key=lambda geometry: geometry.gap), case.solder)
         | material_effects(case.materials.by_role)
@@ -115,7 +118,15 @@ def forecast_shock(case: BoardDropCase, parts: dict[str, PartForecast]) -> Shock
     Scaled masses follow the smallest step of the others, so they do not limit it. The board's patch touches the cut: it
     limits the window, as the board does.
     """
-    from fem.estimate import UPDATES_PER_SECOND, damped_critical_step, predict_seconds, window_plan
+    from fem.estimate import (
+        UPDATES_PER_SECOND,
+        damped_critical_step,
+        implicit_plan,
+        largest_implicit_step,
+        predict_seconds,
+        window_plan,
+    )
+    from fem.solver_cost import implicit_cost, plate_nodes
 
     shock, numerics = case.shock, case.shock.numerics
     macro = min(part.critical_step for name, part in parts.items() if role_of(name) == MACRO)
@@ -125,7 +136,10 @@ def forecast_shock(case: BoardDropCase, parts: dict[str, PartForecast]) -> Shock
     plan = window_plan(macro, meso_step, numerics.step_fraction, shock.duration, numerics.history_samples)
     meso = sum(part.elements for name, part in parts.items() if name != MACRO)
     two_scale, dns = predict_seconds(parts[MACRO].elements, meso, plan, (shock.ranks.macro, shock.ranks.meso))
-    return ShockForecast(plan.window, plan.substeps, plan.windows, two_scale, dns, UPDATES_PER_SECOND)
+    pulses = [shock.pulse_duration] if shock.pulse_duration else []
+    slow = implicit_plan(plan, largest_implicit_step(shock.duration, pulses))
+    implicit = implicit_cost(plate_nodes(parts[MACRO].elements + meso), slow.windows * slow.substeps).seconds
+    return ShockForecast(plan.window, plan.substeps, plan.windows, two_scale, dns, implicit, UPDATES_PER_SECOND)
 
 
 def with_critical_step(quality: dict, materials: Materials) -> dict:

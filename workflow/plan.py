@@ -138,6 +138,9 @@ def _shock(case: BoardDropCase, outlook: Forecast) -> Table:
     table.add_row("step ratio m", f"{shock.substeps}", f"meso step {short(shock.window / shock.substeps)}")
     table.add_row("two-scale", f"about {duration(shock.two_scale)}", _placement(case) + _absent("two_scale", case))
     table.add_row("DNS", f"about {duration(shock.dns)}", f"all {every} ranks on one model" + _absent("dns", case))
+    table.add_row(
+        "DNS, implicit steps", f"about {duration(shock.implicit)}", "one rank; elastic only (shock.numerics.dns_solver)"
+    )
     table.add_row("two-scale / DNS", f"{shock.two_scale / shock.dns:.2f}", "predicted ratio of wall times")
     return table
 

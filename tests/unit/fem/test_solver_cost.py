@@ -3,7 +3,7 @@ import math
 import pytest
 
 from fem.factor_cost import box_factor
-from fem.solver_cost import forecast_solvers
+from fem.solver_cost import forecast_solvers, plate_nodes
 from fem.structure_parameters import StructureScene
 from tests.support.fem_structures import structure_tables_of
 
@@ -53,3 +53,8 @@ def test_what_only_explicit_steps_can_do():
     layers = {"joint": {"material": "SAC305", "thickness": 1e-3, "cells": 2}}
     forecast = forecast_solvers(scene(structure=structure_tables_of()["structure"] | {"layers": layers}), 48, 10, 1000)
     assert forecast.only_explicit == ("plasticity (layers joint)",)
+
+
+def test_plate_that_stands_for_a_package_has_its_elements():
+    x, y, z = plate_nodes(12_558)
+    assert (x - 1) * (y - 1) * (z - 1) == pytest.approx(12_558, rel=0.02)
