@@ -59,17 +59,21 @@ class BoardDropCase(Case):
         ]
         geometries = joint_geometries(pad_table(self.package, self.board, self.warpage))
         found = impossible + of_particles(particles_checks.problems(self.solder, geometries, self.package.pitch))
-        return found + self._failure_problems()
+        return found + self._flow_problems()
 
-    def _failure_problems(self) -> list[Problem]:
-        """Find a limit of plastic work where nothing yields."""
-        failure = self.shock.failure
-        if failure.plastic_work_density is None or self.materials.solder.plasticity is not None:
-            return []
-        message = "limits the plastic work of solder that does not yield"
-        allowed = 'materials.solder of the library, such as "SAC405", or with a table plasticity'
-        limit = fields.shown(failure.plastic_work_density, type(failure).model_fields["plastic_work_density"])
-        return [Problem("shock.failure.plastic_work_density", message, limit, allowed)]
+    def _flow_problems(self) -> list[Problem]:
+        """Find a limit of plastic work where nothing yields, and linear steps where something does."""
+        failure, numerics, found = self.shock.failure, self.shock.numerics, []
+        yielding = [role for role, material in self.materials.by_role.items() if material.plasticity is not None]
+        if failure.plastic_work_density is not None and "solder" not in yielding:
+            message = "limits the plastic work of solder that does not yield"
+            allowed = 'materials.solder of the library, such as "SAC405", or with a table plasticity'
+            limit = fields.shown(failure.plastic_work_density, type(failure).model_fields["plastic_work_density"])
+            found.append(Problem("shock.failure.plastic_work_density", message, limit, allowed))
+        if numerics.dns_solver == "implicit" and yielding:
+            message = f"is linear, {' and '.join(yielding)} yields"
+            found.append(Problem("shock.numerics.dns_solver", message, "implicit", "explicit, or elastic materials"))
+        return found
 
     @property
     def ranks(self) -> int:

@@ -134,12 +134,23 @@ def forecast_shock(case: BoardDropCase, parts: dict[str, PartForecast]) -> Shock
     meso_step = min(limiting, default=macro)
     macro, meso_step = (damped_critical_step(step, shock.damping.coefficients[1]) for step in (macro, meso_step))
     plan = window_plan(macro, meso_step, numerics.step_fraction, shock.duration, numerics.history_samples)
-    meso = sum(part.elements for name, part in parts.items() if name != MACRO)
-    two_scale, dns = predict_seconds(parts[MACRO].elements, meso, plan, (shock.ranks.macro, shock.ranks.meso))
+    board, meso = parts[MACRO].elements, sum(part.elements for name, part in parts.items() if name != MACRO)
+    work = round(sum(part.elements * relative_cost(case, name) for name, part in parts.items() if name != MACRO))
+    two_scale, dns = predict_seconds(board, work, plan, (shock.ranks.macro, shock.ranks.meso))
     pulses = [shock.pulse_duration] if shock.pulse_duration else []
     slow = implicit_plan(plan, largest_implicit_step(shock.duration, pulses))
-    implicit = implicit_cost(plate_nodes(parts[MACRO].elements + meso), slow.windows * slow.substeps).seconds
+    implicit = implicit_cost(plate_nodes(board + meso), slow.windows * slow.substeps).seconds
     return ShockForecast(plan.window, plan.substeps, plan.windows, two_scale, dns, implicit, UPDATES_PER_SECOND)
+
+
+def relative_cost(case: BoardDropCase, part: str) -> float:
+    """Return the cost of an element of a part over that of an elastic one: what yields or turns has a path."""
+    from fem.estimate import UPDATES_PER_SECOND
+    from fem.solver_cost import NONLINEAR_RATE
+
+    numerics = case.shock.numerics
+    has_path = material_of(case, part).plasticity is not None or numerics.kinematics == "finite"
+    return UPDATES_PER_SECOND / NONLINEAR_RATE[numerics.formulation] if has_path else 1.0
 
 
 def with_critical_step(quality: dict, materials: Materials) -> dict:
