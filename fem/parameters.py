@@ -6,7 +6,8 @@ All values are SI floats; see ``meshing.parameters`` for what the unit strings m
 import math
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator
+from pydantic_core import PydanticCustomError
 
 ServiceCondition = Literal["A", "B", "C", "D", "E", "F", "G", "H"]
 
@@ -64,6 +65,16 @@ class ShockNumerics(Parameters):
     field_samples: int = Field(12, ge=2)
     energy_balance_limit: float = Field(0.02, gt=0)
     checkpoint_seconds: Annotated[float, "s"] = Field(60.0, gt=0)
+
+    @field_validator("kinematics")
+    @classmethod
+    def _fit_the_solver(cls, value: str, info: ValidationInfo) -> str:
+        if value == "finite" and info.data.get("dns_solver") == "implicit":
+            allowed = "small, or dns_solver = explicit"
+            raise PydanticCustomError(
+                "inadmissible", "is not for implicit steps, which are linear", {"allowed": allowed}
+            )
+        return value
 
 
 class Failure(Parameters):
