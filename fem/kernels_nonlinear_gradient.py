@@ -158,6 +158,12 @@ def write_hourglass_energy(w, slip):
 
 
 @njit(cache=True, error_model="numpy")
+def carried(strength, mises):
+    """Return the hourglass stress that a section of some yield stress carries beside the stress of its centre."""
+    return BENDING_STRENGTH * strength * max(LEAST_STRENGTH, 1.0 - (mises / strength) ** 2)
+
+
+@njit(cache=True, error_model="numpy")
 def hourglass_flow(blocks, b, w):
     """Reduce hourglass forces to what a section can carry.
 
@@ -169,12 +175,10 @@ def hourglass_flow(blocks, b, w):
     for lane in range(LANES):
         before, trial = energy[lane], w[TRIAL + lane]
         energy[lane] = trial
-        stress = np.sqrt(2.0 * young * trial / weight[lane])
-        if stress <= BENDING_STRENGTH * LEAST_STRENGTH * law[FIRST_YIELD]:
+        stress, mises = np.sqrt(2.0 * young * max(trial, 0.0) / weight[lane]), w[MISES + lane]
+        if stress <= carried(law[FIRST_YIELD], mises):  # the yield stress is at least this
             continue
-        strength = max(yield_stress(state[PLASTIC + lane], 0.0, law), w[MISES + lane])
-        left = max(LEAST_STRENGTH, 1.0 - (w[MISES + lane] / strength) ** 2)
-        factor = BENDING_STRENGTH * left * strength / stress
+        factor = carried(max(yield_stress(state[PLASTIC + lane], 0.0, law), mises), mises) / stress
         if factor < 1.0:
             energy[lane] = factor * factor * trial
             blocks.plastic_work[b, lane] += (1.0 - factor) * (np.sqrt(before * trial) + factor * trial)

@@ -89,7 +89,7 @@ def gradient_blocks(elements: Elements, lanes: Lanes, plastic: NDArray[np.float6
         state=initial_state(len(lanes.filled), points, finite),
         plastic_work=np.zeros(lanes.element.shape),
         hourglass_energy=np.zeros(lanes.element.shape),
-        slip=np.zeros((len(lanes.filled), 12 * LANES if kind.hourglass else 0)),
+        slip=written_zeros(len(lanes.filled), 12 * LANES if kind.hourglass else 0),
         modulus=1.0 / np.linalg.inv(elements.elasticity)[:, 0, 0],
     )
 
@@ -111,9 +111,9 @@ def hexahedron_blocks(elements: Elements, lanes: Lanes, plastic: NDArray[np.floa
         normal=lanes.spread((factor * np.linalg.inv(centre)).reshape(count, 1, -1))[:, 0],
         coupling=lanes.spread(coupling[:, None])[:, 0],
         state=initial_state(len(lanes.filled), 8, finite),
-        modes=np.zeros((len(lanes.filled), 9 * LANES)),
+        modes=written_zeros(len(lanes.filled), 9 * LANES),
         plastic_work=np.zeros(lanes.element.shape),
-        residual=np.zeros((len(lanes.filled), 9 * LANES)),
+        residual=written_zeros(len(lanes.filled), 9 * LANES),
         hourglass_energy=np.zeros(lanes.element.shape),
     )
 
@@ -128,6 +128,11 @@ def common_arrays(elements: Elements, lanes: Lanes, plastic: NDArray[np.float64]
         "elastic": elastic_constants(elements.elasticity),
         "plastic": plastic,
     }
+
+
+def written_zeros(*shape: int) -> NDArray[np.float64]:
+    """Return zeros in memory of their own; pages never written are all one, which some processors read slowly."""
+    return np.full(shape, 0.0)
 
 
 def orthonormal_basis(weight: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -152,6 +157,6 @@ def elastic_constants(elasticity: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def initial_state(blocks: int, points: int, finite: bool) -> NDArray[np.float64]:
     """Return the state without stress ``(nb, m, 16 * 13)``: no strain, or the unit stretch."""
-    state = np.zeros((blocks, points, STATE_SLOTS))
+    state = written_zeros(blocks, points, STATE_SLOTS)
     state[:, :, STRETCH : STRETCH + 3 * LANES] = float(finite)
     return state
