@@ -16,7 +16,7 @@ from fem.material_parameters import Isotropic, Material
 FIRST_YIELD = 1  # column of the yield stress at no plastic strain, infinite where a material never yields
 ITERATIONS = 100  # far more than any admissible constants need; typical are 2
 CONVERGED = 1e-7  # relative correction after which the error, at most half its square, is below 1e-14
-LARGEST_EXPONENT = 700.0  # of exp, that is finite
+LARGEST_EXPONENT = 600.0  # of exp, that is finite
 SERIES = 1e-3  # below it four terms of exp are exact to 5e-14
 
 
@@ -65,10 +65,9 @@ def plastic_increment(trial_mises, plastic_strain, constants, step):
     sensitivity, slow = constants[4], step * constants[5]
     largest = (trial_mises - static) / stiffness
     x = largest
-    if sensitivity > 0.0 and x > slow:
-        x = max(
-            slow, first_guess(x, slow * math.exp(min((trial_mises / static - 1.0) / sensitivity, LARGEST_EXPONENT)))
-        )
+    if sensitivity > 0.0 and x > slow:  # start below both: the increments that only stiffness or only the rate limits
+        relaxed = slow * math.exp(min((trial_mises / static - 1.0) / sensitivity, LARGEST_EXPONENT))
+        x = max(slow, x * (relaxed / (x + relaxed)))
     for _ in range(ITERATIONS):
         strain = plastic_strain + x
         hardened = hardening * strain**exponent
@@ -86,9 +85,3 @@ def plastic_increment(trial_mises, plastic_strain, constants, step):
         if x == 0.0 or (abs(change) < CONVERGED and is_fast == (sensitivity > 0.0 and x >= slow)):
             break
     return min(x, largest)
-
-
-@njit(cache=True)
-def first_guess(without_rate, without_stiffness):
-    """Return half the harmonic mean of the increments that only the elastic stiffness or only the rate would limit."""
-    return without_rate * (without_stiffness / (without_rate + without_stiffness))
