@@ -51,6 +51,7 @@ def difference(first: dict[str, np.ndarray], second: dict[str, np.ndarray]) -> f
 
 
 def test_large_mass_at_the_holes_is_direct_acceleration(assembly):
+    """They differ by what a window's held velocity does to a moving frame: a DT^2 / 8, little once the board bends."""
     result, direct = run(assembly, "two_scale")
     assert result["effects"]["input_g"]["why"].startswith("JEDEC service condition H, direct acceleration")
     assert not result["effects"]["gravity"]["on"]
