@@ -5,7 +5,16 @@ import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
-from fem.structure_parameters import Gravity, InputG, PrescribedMotion, Pressure, StructureLoad, StructureScene, Support
+from fem.structure_parameters import (
+    AXES,
+    Gravity,
+    InputG,
+    PrescribedMotion,
+    Pressure,
+    StructureLoad,
+    StructureScene,
+    Support,
+)
 
 ROUNDING = 1e-9  # of the box: a watch point on its surface is inside
 
@@ -42,6 +51,8 @@ def problems(scene: StructureScene) -> list[Problem]:
         *_structure(scene),
         *_supports(scene),
         *(found for name, load in scene.loads.items() for found in _load(f"loads.{name}", load, scene)),
+        *_large_mass(scene),
+        *_symmetry(scene),
         *_watch(scene),
         *_dynamics(scene),
     ]
@@ -91,9 +102,54 @@ def _load(key: str, load: StructureLoad, scene: StructureScene) -> Iterator[Prob
         yield Problem(f"{key}.direction", list(load.direction), "has no length", "any vector but zero")
     if isinstance(load, PrescribedMotion):
         yield from _conflicts(key, load, scene.supports)
-    if isinstance(load, InputG) and load.method == "large_mass" and not scene.supports:
-        yield Problem(f"{key}.method", "large_mass", "needs a support that it can shake, there is none", "direct")
     yield from _pulse(key, load)
+
+
+def _large_mass(scene: StructureScene) -> Iterator[Problem]:
+    """A large mass moves the supports that hold all components; nothing else may refer to a place in space."""
+    shaking = [name for name, load in scene.loads.items() if isinstance(load, InputG) and load.method == "large_mass"]
+    if not shaking:
+        return
+    key = f"loads.{shaking[0]}.method"
+    if not any(set(support.hold) == set(AXES) for support in scene.supports.values()):
+        yield Problem(key, "large_mass", "needs a support that it can shake: one that holds x, y, z", "direct")
+    moved = {"initial_velocity": any(scene.dynamics.initial_velocity)}
+    moved |= {"mass-proportional damping": bool(scene.dynamics.damping.coefficients[0])}
+    moved |= {f"loads.{name}": isinstance(load, PrescribedMotion) for name, load in scene.loads.items()}
+    for what in [name for name, is_there in moved.items() if is_there]:
+        message = f"does not go with {what}, whose velocities would be those in space, not those seen from the supports"
+        yield Problem(key, "large_mass", message, "direct")
+    for name in shaking[1:]:
+        yield Problem(f"loads.{name}.method", "large_mass", f"is already that of loads.{shaking[0]}", "direct")
+    for name in shaking:
+        yield from _left_behind(name, scene)
+
+
+def _left_behind(shaking: str, scene: StructureScene) -> Iterator[Problem]:
+    """Yield the supports that would stay in place along the direction of a large mass."""
+    load = scene.loads[shaking]
+    for name, support in scene.supports.items():
+        along = [axis for axis in support.hold if isinstance(load, InputG) and load.direction[AXES.index(axis)]]
+        if along and set(support.hold) != set(AXES):
+            message = f"would stay in place along {' and '.join(along)} while the large mass of loads.{shaking} moves"
+            yield Problem(f"supports.{name}.hold", list(support.hold), message, "x, y, z, or method = direct")
+
+
+def _symmetry(scene: StructureScene) -> Iterator[Problem]:
+    """What both halves of a body do must be mirror images."""
+    pushes = {f"loads.{name}.direction": load for name, load in scene.loads.items()}
+    vectors = {key: load.direction for key, load in pushes.items() if isinstance(load, InputG | Gravity)}
+    vectors["dynamics.initial_velocity"] = scene.dynamics.initial_velocity
+    for axis in scene.structure.symmetry:
+        for key, vector in vectors.items():
+            if vector[AXES.index(axis)]:
+                message = (
+                    f"crosses the plane of symmetry {axis} = 0, on both sides of which it would have to be mirrored"
+                )
+                yield Problem(key, list(vector), message, f"0 along {axis}, or no symmetry in {axis}")
+        for name, load in scene.loads.items():
+            if isinstance(load, Pressure) and load.on == f"{axis}_min":
+                yield Problem(f"loads.{name}.on", load.on, "is a plane of symmetry inside the body", f"{axis}_max")
 
 
 def _conflicts(key: str, load: PrescribedMotion, supports: dict[str, Support]) -> Iterator[Problem]:

@@ -11,8 +11,8 @@ from fem.damping import RayleighDamping
 from fem.loads import BodyAcceleration, LargeMass, Load, NodalForces, PrescribedMotion
 from fem.parameters import Damping
 from fem.pulse import Pulse
-from fem.structure_parameters import Gravity, InputG, Pressure, StructureScene
-from fem.structure_tables import AXES, StructureTables, shaken_supports
+from fem.structure_parameters import AXES, Gravity, InputG, Pressure, StructureScene
+from fem.structure_tables import StructureTables, shaken_supports
 
 
 def structure_loads(

@@ -15,8 +15,8 @@ from fem.global_matrix import Equations
 from fem.inputs import StructureInput
 from fem.modal import Modes, natural_modes
 from fem.structure_model import StructureModel
-from fem.structure_parameters import PrescribedMotion
-from fem.structure_tables import AXES, shaken_supports
+from fem.structure_parameters import AXES, PrescribedMotion
+from fem.structure_tables import shaken_supports
 
 SHOWN = 0.05  # largest displacement of a shape in a field file, in lengths of the structure
 

@@ -12,6 +12,7 @@ from fem.material_library import LIBRARY
 from fem.material_parameters import Material
 from fem.parameters import Damping, Parameters, ServiceCondition
 
+AXES = "xyz"
 Axis = Literal["x", "y", "z"]
 Direction = tuple[float, float, float]
 Cells = Annotated[int, Field(ge=1, le=2000)]

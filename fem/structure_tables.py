@@ -10,11 +10,10 @@ from fem.facet_areas import facet_set, outward_areas
 from fem.material_effects import plastic_laws
 from fem.mesh import MeshData
 from fem.scene import Tables
-from fem.structure_parameters import InputG, PrescribedMotion, Pressure, StructureScene
+from fem.structure_parameters import AXES, InputG, PrescribedMotion, Pressure, StructureScene
 from fem.tie import Tie
 from fem.watch_points import PointTable, point_table
 
-AXES = "xyz"
 NODES = {"hexahedron": 8, "tetrahedron": 4, "tetrahedron_quadratic": 10}
 
 

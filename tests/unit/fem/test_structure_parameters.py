@@ -6,6 +6,8 @@ from fem.structure_checks import check, problems
 from fem.structure_parameters import StructureScene
 
 TIN = {"kind": "isotropic", "density": 7400.0, "young_modulus": 50e9, "poisson_ratio": 0.36}
+HELD = {"on": "mounting_holes", "hold": ["x", "y", "z"]}
+SHAKEN = {"kind": "input_g", "service_condition": "B", "method": "large_mass"}
 YIELDING = TIN | {"plasticity": {"A": 40e6}}
 
 
@@ -75,8 +77,41 @@ def test_own_materials_go_before_those_of_the_library():
             "loads.fall.direction = [0.0, 0.0, 0.0]: has no length",
         ),
         (
-            {"supports": {}, "loads": {"drop": {"kind": "input_g", "service_condition": "B", "method": "large_mass"}}},
+            {"supports": {}, "loads": {"drop": SHAKEN}},
             "loads.drop.method = large_mass: needs a support",
+        ),
+        (
+            {"supports": {"foot": {"on": "z_min", "hold": ["z"]}}, "loads": {"drop": SHAKEN}},
+            "loads.drop.method = large_mass: needs a support that it can shake: one that holds x, y, z",
+        ),
+        (
+            {"supports": {"holes": HELD, "foot": {"on": "z_min", "hold": ["z"]}}, "loads": {"drop": SHAKEN}},
+            "supports.foot.hold = ['z']: would stay in place along z while the large mass of loads.drop moves",
+        ),
+        ({"loads": {"drop": SHAKEN, "again": SHAKEN}}, "loads.again.method = large_mass: is already that of loads."),
+        (
+            {"loads": {"drop": SHAKEN}, "dynamics": {"duration": 1e-3, "damping": {"mass_coefficient": 10.0}}},
+            "loads.drop.method = large_mass: does not go with mass-proportional damping",
+        ),
+        (
+            {"loads": {"drop": SHAKEN}, "dynamics": {"duration": 1e-3, "initial_velocity": [0.0, 0.0, 1.0]}},
+            "loads.drop.method = large_mass: does not go with initial_velocity",
+        ),
+        (
+            {"loads": {"drop": SHAKEN, "pull": {"kind": "motion", "on": "x_max", "component": "z", "table": "v.csv"}}},
+            "loads.drop.method = large_mass: does not go with loads.pull",
+        ),
+        (
+            {"loads": {"drop": {"kind": "input_g", "service_condition": "B", "direction": [1.0, 0.0, 1.0]}}},
+            "loads.drop.direction = [1.0, 0.0, 1.0]: crosses the plane of symmetry x = 0",
+        ),
+        (
+            {"dynamics": {"duration": 1e-3, "initial_velocity": [1.0, 0.0, 0.0]}},
+            "dynamics.initial_velocity = [1.0, 0.0, 0.0]: crosses the plane of symmetry x = 0",
+        ),
+        (
+            {"loads": {"push": {"kind": "pressure", "on": "x_min", "table": "p.csv"}}},
+            "loads.push.on = x_min: is a plane of symmetry inside the body; allowed: x_max",
         ),
         (
             {"loads": {"pull": {"kind": "motion", "on": "mounting_holes", "component": "z", "table": "v.csv"}}},
@@ -108,6 +143,11 @@ def test_what_does_not_fit_is_said(changes, message):
     with pytest.raises(ValueError) as error:
         check(scene(**changes))
     assert message in str(error.value)
+
+
+def test_large_mass_with_supports_across_its_direction():
+    supports = {"holes": HELD, "rail": {"on": "y_min", "hold": ["y"]}}
+    assert not problems(scene(supports=supports, loads={"drop": SHAKEN, "weight": {"kind": "gravity"}}))
 
 
 def test_gravity_needs_neither_peak_nor_duration():
