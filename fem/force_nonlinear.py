@@ -98,7 +98,7 @@ class NonlinearElements:
         blocks = self.blocks
         points = blocks.state.shape[1]
         state = blocks.state.reshape(len(blocks.state), points, -1, LANES)[block, :, :, lane]
-        weight = blocks.weight[blocks.pattern].reshape(-1, points, LANES)[block, :, lane]
+        weight = blocks.weight[blocks.pattern[block]].reshape(-1, points, LANES)[np.arange(len(block)), :, lane]
         mean = np.einsum("km,kmc->kc", weight, state) / weight.sum(axis=1)[:, None]
         return Means(mean[:, :6], mean[:, 12], blocks.plastic_work[block, lane] / weight.sum(axis=1))
 
