@@ -1,10 +1,13 @@
 """Implicit time integration: order, amplification, energy, and the explicit solver in the limit."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from mpi4py import MPI
 
 from fem.body import Body
+from fem.errors import AgreedError
 from fem.implicit import ImplicitMotion
 from fem.loads import half_sine_drop
 from fem.material_roles import Materials
@@ -121,3 +124,8 @@ def test_energy_of_a_board_balances_at_any_step():
 def test_numbers_out_of_range(spring, step, alpha, message):
     with pytest.raises(ValueError, match=message):
         implicit(spring[0], step, alpha)
+
+
+def test_elements_that_are_not_linear_are_refused(spring):
+    with pytest.raises(AgreedError, match="the implicit solver is linear and cannot take object"):
+        implicit(replace(spring[0], terms=[object()]), 1e-6)
