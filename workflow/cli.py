@@ -14,6 +14,7 @@ from workflow import __version__
 from workflow.case import available_cores, read_case
 from workflow.case_kind import Case
 from workflow.inputs import CASE, examine, read_case_of_run, write_inputs
+from workflow.kernel_cache import keep_kernels_by_source
 from workflow.pipeline import RunFolderBusy, drive, failed_checks, locked
 from workflow.problems import CaseError
 from workflow.terminal import console, print_error
@@ -149,6 +150,7 @@ def stage(
 def main() -> None:
     """Run the command line; exit codes: 0 done and healthy, 1 failed, 2 bad input."""
     signal.signal(signal.SIGTERM, _interrupt)
+    keep_kernels_by_source()
     if "DISPLAY" not in os.environ:
         # VTK would look for an X server first, and complain.
         os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")

@@ -1,0 +1,45 @@
+"""Compiled kernels belong to the sources that they were made from."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+from workflow import kernel_cache
+
+
+def test_folder_changes_with_a_kernel(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    package = tmp_path / "laws"
+    package.mkdir()
+    (package / "__init__.py").write_text("")
+    (package / "kernels.py").write_text("from numba import njit\n")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.setattr(kernel_cache, "PACKAGES", ("laws",))
+    before = kernel_cache.digest()
+    (package / "no_kernel.py").write_text("x = 1\n")
+    assert kernel_cache.digest() == before
+    (package / "kernels.py").write_text("from numba import njit  # changed\n")
+    assert kernel_cache.digest() != before
+
+
+def test_folder_of_the_user_stays(tmp_path: Path) -> None:
+    environment = {"XDG_CACHE_HOME": str(tmp_path), "NUMBA_CACHE_DIR": "mine"}
+    kernel_cache.keep_kernels_by_source(environment)
+    assert environment["NUMBA_CACHE_DIR"] == "mine"
+
+
+def test_folder_is_made(tmp_path: Path) -> None:
+    environment = {"XDG_CACHE_HOME": str(tmp_path)}
+    kernel_cache.keep_kernels_by_source(environment)
+    assert Path(environment["NUMBA_CACHE_DIR"]).parent == tmp_path / "reflowshock"
+
+
+def test_a_place_that_cannot_be_made_is_left_to_numba(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    environment = {"XDG_CACHE_HOME": str(tmp_path / "file")}
+    kernel_cache.keep_kernels_by_source(environment)
+    assert "NUMBA_CACHE_DIR" not in environment
+
+
+def test_tests_use_it() -> None:
+    assert kernel_cache.VARIABLE in os.environ
