@@ -46,6 +46,7 @@ def structure_tables(mesh: MeshData, scene: StructureScene) -> StructureTables:
     pressed = {load.on for load in scene.loads.values() if isinstance(load, Pressure)}
     held = held_by_supports(mesh, scene)
     check_motions(scene, nodes_of, held)
+    check_shaken(scene, nodes_of, held)
     points = {name: point.at for name, point in scene.watch.items()}
     held_nodes = np.flatnonzero(held.any(axis=1))
     supports = {name: nodes_of[support.on] for name, support in scene.supports.items()}
@@ -93,6 +94,18 @@ def check_motions(scene: StructureScene, nodes_of: dict[str, NDArray[np.int32]],
             raise LoadError(
                 f"loads.{name} moves {load.on} along {load.component}, where a support or a plane of symmetry holds"
                 f" {count} of its {len(nodes)} nodes"
+            )
+
+
+def check_shaken(scene: StructureScene, nodes_of: dict[str, NDArray[np.int32]], held: NDArray[np.bool_]) -> None:
+    """Refuse a large mass on components ``(n, 3)`` that are held in space; errors as ``structure_tables``."""
+    for name in shaken_supports(scene):
+        nodes = nodes_of[scene.supports[name].on]
+        count = int(held[nodes].any(axis=1).sum())
+        if count:
+            raise LoadError(
+                f"a large mass cannot move supports.{name}: another support or a plane of symmetry holds {count} of its"
+                f" {len(nodes)} nodes; method = direct can"
             )
 
 

@@ -226,6 +226,15 @@ def test_motion_of_what_is_held(tmp_path):
         run_structure(MPI.COMM_SELF, structure_input(tmp_path, loads={"pull": pull}))
 
 
+def test_large_mass_on_what_is_held(tmp_path):
+    clamp = {"on": "x_min", "hold": ["x", "y", "z"]}
+    supports = {"clamp": clamp, "rail": {"on": "y_min", "hold": ["y"]}}
+    drop = structure_tables_of()["loads"]["drop"] | {"method": "large_mass"}
+    request = structure_input(tmp_path, supports=supports, loads={"drop": drop})
+    with pytest.raises(AgreedError, match=r"cannot move supports\.clamp: another support .* holds 3 of its 12 nodes"):
+        run_structure(MPI.COMM_SELF, request)
+
+
 def test_run_ends_where_energies_do_not_balance(tmp_path):
     numerics = {"history_samples": 40, "field_samples": 2, "energy_balance_limit": 1e-20}
     request = structure_input(tmp_path, dynamics={"duration": 8e-5, "numerics": numerics})
