@@ -88,8 +88,14 @@ class Motion:
         self.mobility[nodes] = 1.0 / (1.0 / self.mobility[nodes] + mass[:, None])
 
     def launch(self, velocity: NDArray[np.float64]) -> None:
-        """Give all free components an initial velocity ``(3,)`` [m/s]; before the first step."""
+        """Give all free components an initial velocity ``(3,)`` [m/s], which damping feels; before the first step."""
+        before = self.acceleration()
         self.velocity += np.where(self.mobility > 0.0, velocity, 0.0)
+        for load in self._loads:
+            if load.account == "damping":
+                load.remove(self.force)
+                load.add(self)
+        self.velocity -= 0.5 * self.step * (self.acceleration() - before)
 
     def advance(self) -> None:
         """Move from ``time`` to ``time + dt``, slaves with their masters; the force is then out of date."""

@@ -103,6 +103,25 @@ def test_second_order_in_time(kind):
     assert order([field(steps) for steps in (100, 200, 400)]) == pytest.approx(2.0, abs=0.2)
 
 
+def test_second_order_of_a_body_that_starts_with_a_velocity_and_drag():
+    """A free body slows down as v exp(-alpha t), and has moved by v (1 - exp(-alpha t)) / alpha."""
+    drag = 2e5
+    body, critical = dns_body(box(held=False), STEEL)
+    duration = 40 * critical
+    exact = (1.0 - np.exp(-drag * duration)) / drag
+
+    def error(steps: int) -> float:
+        motion = motion_of(body, duration / steps, [RayleighDamping(drag, 0.0, body.terms)])
+        motion.launch(ALONG)
+        for _ in range(steps):
+            motion.advance()
+            motion.update_force()
+        return abs(float(motion.displacement[0, 0]) - exact) / exact
+
+    assert error(100) < 1e-3
+    assert np.log2(error(100) / error(200)) == pytest.approx(2.0, abs=0.1)
+
+
 def test_stiffness_damping_half_a_step_late_is_of_first_order():
     """Its error is the ratio of critical damping times the step, small against the damping itself."""
     mesh = box(held=True)
