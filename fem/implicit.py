@@ -258,6 +258,10 @@ class ImplicitMotion:
         """Return the displacement ``(3,)`` [m] of the frame in which results are told; zero but with a large mass."""
         return sum((load.base_displacement() for load in self._loads), np.zeros(3))
 
+    def base_velocity(self) -> NDArray[np.float64]:
+        """Return the velocity ``(3,)`` [m/s] of that frame."""
+        return sum((load.base_velocity() for load in self._loads), np.zeros(3))
+
     def present_velocity(self) -> NDArray[np.float64]:
         """Return the velocity ``(n, 3)`` [m/s] at ``time``."""
         return self.velocity

@@ -46,6 +46,10 @@ class Load:
         """Return the displacement ``(3,)`` [m] of the frame in which results are told."""
         return np.zeros(3)
 
+    def base_velocity(self) -> NDArray[np.float64]:
+        """Return the velocity ``(3,)`` [m/s] of the frame in which results are told."""
+        return np.zeros(3)
+
     def begin(self, motion: "Motion") -> None:
         """Take part in the masses and free components of a motion at rest."""
 
@@ -213,7 +217,7 @@ class LargeMass(Load):
     kept: ClassVar[tuple[str, ...]] = ("work", "_force", "_base")
     work: float = 0.0
     _force: NDArray[np.float64] = field(init=False)
-    _base: NDArray[np.float64] = field(init=False)  # displacement at the motion's time, velocity half a step later
+    _base: NDArray[np.float64] = field(init=False)  # displacement and velocity at the motion's time, half a kick
 
     @classmethod
     def build(
@@ -246,17 +250,22 @@ class LargeMass(Load):
         """Return the displacement ``(3,)`` [m] of the base, integrated in the motion's own steps."""
         return -self.direction * self._base[0]
 
+    def base_velocity(self) -> NDArray[np.float64]:
+        """Return the velocity ``(3,)`` [m/s] of the base, integrated in the motion's own steps."""
+        return -self.direction * self._base[1]
+
     def begin(self, motion: "Motion") -> None:
         """Add the masses."""
         motion.add_mass(self.nodes, self.mass)
         kick = 0.5 * motion.step * self.pulse.value(0.0)
-        self._base = np.array([motion.step * kick, -kick])
+        self._base = np.array([motion.step * kick, -2.0 * kick, kick])
 
     def add(self, motion: "Motion") -> None:
         """Add the force that gives the masses the base's acceleration against all body forces."""
         value = self.pulse.value(motion.time)
-        self._base[0] += motion.step * self._base[1]
-        self._base[1] += motion.step * value
+        kick = 0.5 * motion.step * value
+        between = self._base[1] + self._base[2]
+        self._base = np.array([self._base[0] + motion.step * between, between + kick, kick])
         self._force = np.outer(self.mass, -self.direction * value - motion.gravity)
         motion.force[self.nodes] += self._force
 

@@ -79,6 +79,10 @@ class Motion:
         """Return the displacement ``(3,)`` [m] of the frame in which results are told; zero but with a large mass."""
         return sum((load.base_displacement() for load in self._loads), np.zeros(3))
 
+    def base_velocity(self) -> NDArray[np.float64]:
+        """Return the velocity ``(3,)`` [m/s] of that frame."""
+        return sum((load.base_velocity() for load in self._loads), np.zeros(3))
+
     def hold(self, nodes: NDArray[np.integer], component: int) -> None:
         """Let a velocity component of local nodes no longer follow from forces."""
         self.mobility[nodes, component] = 0.0

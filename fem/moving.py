@@ -53,6 +53,9 @@ class Moving(Protocol):
     def base_displacement(self) -> NDArray[np.float64]:
         """Return the displacement ``(3,)`` [m] of the frame in which results are told."""
 
+    def base_velocity(self) -> NDArray[np.float64]:
+        """Return the velocity ``(3,)`` [m/s] of that frame."""
+
     def reaction(self) -> NDArray[np.float64]:
         """Return the forces ``(n, 3)`` [N] of supports and prescribed motion on the nodes that this rank counts."""
 

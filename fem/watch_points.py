@@ -141,7 +141,7 @@ class PointWatch:
         if quantity == "displacement":
             result[self._slots] = motion.displacement[self._nodes] - motion.base_displacement()
         elif quantity == "velocity":
-            result[self._slots] = motion.present_velocity()[self._nodes]
+            result[self._slots] = motion.present_velocity()[self._nodes] - motion.base_velocity()
         else:
             np.add.at(result, self._owner, self._weight[:, None] * self._mean(quantity, motion.displacement))
         return result

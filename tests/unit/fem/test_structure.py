@@ -124,6 +124,8 @@ def test_large_mass_gives_what_direct_input_gives(tmp_path):
     found = solver_differences(large, direct)
     assert found["displacement_difference"] < 5e-3
     assert found["strain_difference"] < 5e-3
+    speed = np.abs(direct["velocity@tip"]).max()
+    assert np.abs(large["velocity@tip"] - direct["velocity@tip"]).max() < 5e-3 * speed
     peak = np.abs(direct["reaction@clamp"]).max()
     assert np.abs(large["reaction@clamp"] - direct["reaction@clamp"]).max() < 5e-3 * peak
 
