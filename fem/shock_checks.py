@@ -8,7 +8,7 @@ from fem.structure_checks import Problem
 
 def problems(shock: Shock) -> list[Problem]:
     """Find what cannot work before anything is meshed or computed."""
-    return [*_pulse(shock), *_damping(shock.damping), *_large_mass(shock)]
+    return [*_pulse(shock), *_damping(shock.damping), *_large_mass(shock), *_finite(shock)]
 
 
 def _pulse(shock: Shock) -> Iterator[Problem]:
@@ -46,4 +46,15 @@ def _large_mass(shock: Shock) -> Iterator[Problem]:
             shock.method,
             "does not go with mass-proportional damping, which would brake the moving table",
             "direct, or stiffness-proportional damping",
+        )
+
+
+def _finite(shock: Shock) -> Iterator[Problem]:
+    """Stiffness-proportional damping takes the elastic stiffness as it lies, and would brake what turns."""
+    if shock.numerics.kinematics == "finite" and shock.damping.coefficients[1]:
+        yield Problem(
+            "shock.numerics.kinematics",
+            "finite",
+            "does not go with stiffness-proportional damping, whose stiffness does not turn",
+            "small, or mass-proportional damping",
         )

@@ -55,6 +55,10 @@ PROBLEMS = {
     "shock.pulse_duration": {"pulse_duration": None},
     "shock.table": {"peak_acceleration": None, "pulse_duration": None, "service_condition": "B", "table": "a.csv"},
     "shock.damping.frequency": {"damping": Damping(mass_ratio=0.01)},
+    "shock.numerics.kinematics": {
+        "damping": Damping(stiffness_coefficient=1e-9),
+        "numerics": {"kinematics": "finite"},
+    },
     "shock.method": {"method": "large_mass", "damping": Damping(mass_coefficient=10.0)},
 }
 
