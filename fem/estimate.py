@@ -56,14 +56,14 @@ def box_critical_step(material: Material, size: NDArray[np.float64]) -> float:
 
 
 def damped_critical_step(critical: float, stiffness: float) -> float:
-    """Return the critical step [s] with stiffness-proportional damping: dt (sqrt(1 + xi^2) - xi).
+    """Return the critical step [s] with stiffness-proportional damping: dt (sqrt(1 + xi^2) - xi), cancelling nothing.
 
     Args:
         critical: 2 / omega_max without damping [s].
         stiffness: beta [s]; the highest mode has xi = beta omega_max / 2.
     """
     ratio = stiffness / critical
-    return critical * (math.sqrt(1.0 + ratio**2) - ratio)
+    return critical / (math.hypot(1.0, ratio) + ratio)
 
 
 def window_plan(macro_step: float, meso_step: float, fraction: float, duration: float, samples: int) -> WindowPlan:

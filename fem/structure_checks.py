@@ -1,10 +1,10 @@
 """Parameters of a structure that are each allowed but do not fit together. Loads neither numba nor DOLFINx."""
 
-import difflib
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
+from fem.names import nearest
 from fem.structure_parameters import (
     AXES,
     Gravity,
@@ -13,7 +13,6 @@ from fem.structure_parameters import (
     Pressure,
     StructureLoad,
     StructureScene,
-    Support,
 )
 
 ROUNDING = 1e-9  # of the box: a watch point on its surface is inside
@@ -73,8 +72,7 @@ def unknown_name(key: str, name: str, valid: Iterable[str], what: str) -> Iterat
     """Yield a problem where a name is not among the valid ones."""
     names = list(valid)
     if name not in names:
-        near = difflib.get_close_matches(name, names, n=1, cutoff=0.6)
-        yield Problem(key, name, f"no such {what}", "one of " + ", ".join(names), near[0] if near else "")
+        yield Problem(key, name, f"no such {what}", "one of " + ", ".join(names), nearest(name, names))
 
 
 def _structure(scene: StructureScene) -> Iterator[Problem]:
@@ -100,8 +98,12 @@ def _load(key: str, load: StructureLoad, scene: StructureScene) -> Iterator[Prob
         yield from unknown_name(f"{key}.on", load.on, scene.structure.facet_sets, "facet set")
     if isinstance(load, InputG | Gravity) and not math.hypot(*load.direction) > 0.0:
         yield Problem(f"{key}.direction", list(load.direction), "has no length", "any vector but zero")
+    if isinstance(load, InputG) and load.method == "direct" and not _is_held(scene):
+        yield Problem(
+            f"{key}.method", "direct", "needs a support that the table shakes, there is none", "a [supports.NAME]"
+        )
     if isinstance(load, PrescribedMotion):
-        yield from _conflicts(key, load, scene.supports)
+        yield from _conflicts(key, load, scene)
     yield from _pulse(key, load)
 
 
@@ -152,10 +154,21 @@ def _symmetry(scene: StructureScene) -> Iterator[Problem]:
                 yield Problem(f"loads.{name}.on", load.on, "is a plane of symmetry inside the body", f"{axis}_max")
 
 
-def _conflicts(key: str, load: PrescribedMotion, supports: dict[str, Support]) -> Iterator[Problem]:
-    for name, support in supports.items():
+def _is_held(scene: StructureScene) -> bool:
+    """Return whether something of the body keeps its place."""
+    return bool(scene.supports) or any(isinstance(load, PrescribedMotion) for load in scene.loads.values())
+
+
+def _conflicts(key: str, load: PrescribedMotion, scene: StructureScene) -> Iterator[Problem]:
+    """Yield what else decides on the component that a load moves."""
+    for name, support in scene.supports.items():
         if support.on == load.on and load.component in support.hold:
             yield Problem(f"{key}.component", load.component, f"is held by supports.{name} on the same facet set")
+    for name, other in scene.loads.items():
+        if f"loads.{name}" == key:  # of two that clash, the later one is named
+            return
+        if isinstance(other, PrescribedMotion) and (other.on, other.component) == (load.on, load.component):
+            yield Problem(f"{key}.component", load.component, f"is moved by loads.{name} on the same facet set")
 
 
 def _pulse(key: str, load: StructureLoad) -> Iterator[Problem]:

@@ -7,10 +7,11 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
+from fem.names import nearest
 from workflow import fields
 from workflow.board_drop_case import BoardDropCase
 from workflow.case_kind import Case
-from workflow.problems import CaseError, Problem, nearest
+from workflow.problems import CaseError, Problem
 from workflow.scene_cases import DropCase, DropsCase, JointCase, OscillationCase
 from workflow.structure_case import StructureCase
 from workflow.validation import translate

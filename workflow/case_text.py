@@ -8,10 +8,11 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
+from fem.names import nearest
 from workflow.case import read_case
 from workflow.case_kind import NAME, Case, Title
 from workflow.fields import allowed, display, holds_named_tables, literal_names, models_of, unit_of
-from workflow.problems import CaseError, Problem, as_toml, nearest
+from workflow.problems import CaseError, Problem, as_toml
 from workflow.validation import NAMES
 
 CASES = Path(__file__).resolve().parent.parent / "cases"

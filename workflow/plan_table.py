@@ -13,8 +13,10 @@ def new_table(title: str, *columns: str) -> Table:
 
 
 def duration(seconds: float) -> str:
-    """Write a wall time with two digits."""
-    return f"{seconds:.2g} s" if seconds < 100 else f"{seconds / 60:.2g} min"
+    """Write a wall time with two digits, in the unit that makes its figure readable."""
+    units = ((1.0, "s"), (60.0, "min"), (3600.0, "h"))
+    size, unit = next(((s, u) for s, u in units if seconds < 100.0 * s), (86400.0, "days"))
+    return f"{seconds / size:.2g} {unit}" if seconds < 100.0 * size else f"{seconds / size:.0f} {unit}"
 
 
 def short(seconds: float) -> str:

@@ -1,6 +1,5 @@
 """What is wrong with a case: records that name the key, the value and what is allowed."""
 
-import difflib
 import json
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -50,12 +49,6 @@ class CaseError(ValueError):
     def _place(self, problem: Problem) -> str:
         given = any(f"{key}.".startswith(f"{problem.key}.") for key in self.overridden)
         return "--set" if given else self.source
-
-
-def nearest(name: str, names: Iterable[str]) -> str:
-    """Return the valid name most like a wrong one, or an empty string."""
-    matches = difflib.get_close_matches(name, list(names), n=1, cutoff=0.6)
-    return matches[0] if matches else ""
 
 
 def as_toml(value: object) -> str:

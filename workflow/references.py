@@ -5,8 +5,9 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from fem.names import nearest
 from fem.structure_parameters import Pressure, StructureScene
-from workflow.problems import Problem, nearest
+from workflow.problems import Problem
 
 
 class Reference(BaseModel):

@@ -67,7 +67,13 @@ class StructureCase(Case):
             Problem(found.key, found.message, found.value, found.allowed, found.hint)
             for found in structure_checks.problems(self.scene)
         ]
-        return [*boxes, *scenes, *self._unreadable_tables(), *reference_problems(self.references, self.scene)]
+        found = [*boxes, *scenes, *self._unreadable_tables(), *reference_problems(self.references, self.scene)]
+        return found or self._impossible_steps()
+
+    def _impossible_steps(self) -> list[Problem]:
+        from workflow.structure_forecast import step_problems
+
+        return list(step_problems(self))
 
     def _unreadable_tables(self) -> Iterator[Problem]:
         from fem.errors import PulseError

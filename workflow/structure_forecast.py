@@ -1,15 +1,18 @@
 """Size, time steps and cost of a structure's motion, from its parameters alone."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from math import ceil
 from typing import TYPE_CHECKING, Any
 
+from workflow.plan_table import short
+from workflow.problems import Problem
 from workflow.structure_case import StructureCase
 
 if TYPE_CHECKING:
     from fem.solver_cost import SolverForecast
 
+STEPS_MOST = 1e10  # of a run: those of the smallest meshes take hours
 SECONDS_TO_START = 4.0  # until the ranks of a solver have loaded their libraries and kernels
 
 
@@ -44,24 +47,64 @@ class StructureForecast:
 
 def forecast_structure(case: StructureCase) -> StructureForecast:
     """Predict sizes, steps and cost."""
-    from fem.estimate import damped_critical_step
-    from fem.solver_cost import forecast_solvers, implicit_step
+    from fem.solver_cost import forecast_solvers
     from fem.structure_effects import effects
-    from fem.structure_pulses import pulse_durations, pulses_of
 
     layers, dynamics = forecast_layers(case), case.dynamics
-    undamped = min(layer.critical_step for layer in layers.values() if not layer.mass_scaled)
-    critical = damped_critical_step(undamped, dynamics.damping.coefficients[1])
-    steps = {
-        "explicit": dynamics.numerics.explicit_step or dynamics.numerics.step_fraction * critical,
-        "implicit": implicit_step(dynamics, pulse_durations(pulses_of(case.loads))),
-    }
+    steps = forecast_steps(case, layers)
     counts = {solver: ceil(dynamics.duration / step) for solver, step in steps.items()}
     elements = sum(layer.elements for layer in layers.values())
     solvers = forecast_solvers(case.scene, elements, counts["explicit"], counts["implicit"])
     cost = {"explicit": solvers.explicit.seconds / case.ranks, "implicit": solvers.implicit.seconds}
     shock = sum(SECONDS_TO_START + cost[solver] for solver in dynamics.solvers)
     return StructureForecast(effects(case.scene, added_mass(case, layers)), layers, steps, solvers, {"shock": shock})
+
+
+def critical_step(case: StructureCase, layers: Mapping[str, LayerForecast]) -> float:
+    """Predict the critical step [s] of all elements, with damping."""
+    from fem.estimate import damped_critical_step
+
+    undamped = min(layer.critical_step for layer in layers.values() if not layer.mass_scaled)
+    return damped_critical_step(undamped, case.dynamics.damping.coefficients[1])
+
+
+def forecast_steps(case: StructureCase, layers: Mapping[str, LayerForecast]) -> dict[str, float]:
+    """Predict the time step [s] of each solver."""
+    from fem.solver_cost import implicit_step
+    from fem.structure_pulses import pulse_durations, pulses_of
+
+    numerics = case.dynamics.numerics
+    return {
+        "explicit": numerics.explicit_step or numerics.step_fraction * critical_step(case, layers),
+        "implicit": implicit_step(case.dynamics, pulse_durations(pulses_of(case.loads))),
+    }
+
+
+def step_problems(case: StructureCase) -> Iterator[Problem]:
+    """Find steps that cannot be taken: none at all, too many, or one that is known to be above the critical step."""
+    import numpy as np
+
+    try:
+        with np.errstate(all="ignore"):
+            layers = forecast_layers(case)
+    except np.linalg.LinAlgError:
+        yield Problem(
+            "structure", "has elements without a time step: sizes, densities or moduli are beyond all numbers"
+        )
+        return
+    numerics, critical = case.dynamics.numerics, critical_step(case, layers)
+    exact = numerics.critical_step == "element" and case.structure.holes is None
+    if numerics.explicit_step and exact and numerics.explicit_step > critical and "explicit" in case.dynamics.solvers:
+        message = "is above the critical step, beyond which every motion grows"
+        allowed = f"<= {short(critical)}; critical_step = power_iteration may allow more"
+        yield Problem("dynamics.numerics.explicit_step", message, short(numerics.explicit_step), allowed)
+    steps = forecast_steps(case, layers)
+    for solver in case.dynamics.solvers:
+        if not case.dynamics.duration <= STEPS_MOST * steps[solver]:
+            message = f"takes more than {STEPS_MOST:g} {solver} steps of {steps[solver]:.3g} s"
+            yield Problem(
+                "dynamics.duration", message, short(case.dynamics.duration), f"<= {STEPS_MOST * steps[solver]:.3g} s"
+            )
 
 
 def forecast_layers(case: StructureCase) -> dict[str, LayerForecast]:

@@ -43,4 +43,6 @@ def _about(cost: "SolverCost") -> str:
 
 
 def _memory(cost: "SolverCost") -> str:
-    return f"{cost.memory / MEGA:.2g} MB" if cost.memory < 100.0 * MEGA else f"{cost.memory / (1000.0 * MEGA):.2g} GB"
+    size, unit = (MEGA, "MB") if cost.memory < 100.0 * MEGA else (1000.0 * MEGA, "GB")
+    figure = cost.memory / size
+    return f"{figure:.2g} {unit}" if figure < 100.0 else f"{figure:.0f} {unit}"

@@ -7,8 +7,9 @@ from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
+from fem.names import nearest
 from workflow import fields
-from workflow.problems import Problem, nearest
+from workflow.problems import Problem
 
 NAMES = "letters, digits, _ . -, the first one a letter or digit"
 RANGES = ("greater_than", "greater_than_equal", "less_than", "less_than_equal", "finite_number")

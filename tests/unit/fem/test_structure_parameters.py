@@ -117,6 +117,10 @@ def test_own_materials_go_before_those_of_the_library():
             {"loads": {"pull": {"kind": "motion", "on": "mounting_holes", "component": "z", "table": "v.csv"}}},
             "loads.pull.component = z: is held by supports.holes",
         ),
+        (
+            {"loads": {name: {"kind": "motion", "on": "z_max", "component": "z", "table": "v.csv"} for name in "ab"}},
+            "loads.b.component = z: is moved by loads.a",
+        ),
         ({"loads": {}}, "loads: nothing moves the structure"),
         (
             {"watch": {"centre": {"at": [0.0, 0.0, 4e-3]}}},

@@ -38,6 +38,14 @@ BAD_VALUES = {
     "holes outside": ('structure.holes.spacing=["29 mm","14 mm"]', ["holes.spacing", '"29 mm"', "4 mm to 27 mm"]),
     "unknown solver": ("dynamics.solver=implict", ["dynamics.solver", "did you mean implicit?"]),
     "too many ranks": ("dynamics.ranks=4096", ["dynamics.ranks", "4096 MPI ranks", "--oversubscribe"]),
+    "other case": ("structure.layers.cover.material=fr4", ["did you mean FR4?"]),
+    "no support": ("supports={}", ["loads.drop.method", "needs a support that the table shakes"]),
+    "too many steps": ("dynamics.duration=1e300 s", ["dynamics.duration", "takes more than 1e+10 explicit steps"]),
+    "damped too much": (
+        "dynamics.damping={stiffness_ratio=0.9,frequency='1e-6 Hz'}",
+        ["dynamics.duration", "takes more than 1e+10 explicit steps of"],
+    ),
+    "beyond all numbers": ("structure.layers.board.thickness=1e-200 mm", ["structure", "beyond all numbers"]),
     "value in a material": ("materials.cover.density=3 mm", ["materials.cover.density", "is a length"]),
     "layer named as a face": (
         "structure.layers.z_max={material='FR4',thickness='1 mm'}",
@@ -52,6 +60,15 @@ def test_bad_values_are_named(setting, words):
         read_case(BOARD, [setting])
     text = "\n".join(caught.value.lines())
     assert [word for word in words if word not in text] == []
+
+
+def test_a_step_above_the_critical_one_is_refused_where_it_is_known():
+    case = BOARD.parents[2] / "cases" / "cantilever" / "case.toml"
+    given = "dynamics.numerics.explicit_step=1 ms"
+    with pytest.raises(CaseError, match=r"explicit_step = \"1 ms\": is above the critical step.*allowed: <= .* ns"):
+        read_case(case, [given])
+    for other in ("dynamics.solver=implicit", "dynamics.numerics.critical_step=power_iteration"):
+        read_case(case, [given, other])
 
 
 BAD_REFERENCES = {
