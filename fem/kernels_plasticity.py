@@ -18,6 +18,8 @@ ITERATIONS = 100  # far more than any admissible constants need; typical are 2
 CONVERGED = 1e-7  # relative correction after which the error, at most half its square, is below 1e-14
 LARGEST_EXPONENT = 600.0  # of exp, that is finite
 SERIES = 1e-3  # below it four terms of exp are exact to 5e-14
+THIRD = 1.0 / 3.0
+SMALL_GROWTH = 0.01  # of plastic strain in a step, see ``small_power``
 
 
 def plastic_constants(material: Material) -> NDArray[np.float64]:
@@ -59,29 +61,45 @@ def plastic_increment(trial_mises, plastic_strain, constants, step):
         step: dt [s].
     """
     stiffness, first, hardening, exponent = constants[0], constants[1], constants[2], constants[3]
-    static = first + hardening * plastic_strain**exponent
+    before = hardening * plastic_strain**exponent
+    static = first + before
     if not trial_mises > static:  # an elastic step; no increment either from a trial that is not a number
         return 0.0
     sensitivity, slow = constants[4], step * constants[5]
-    largest = (trial_mises - static) / stiffness
-    x = largest
+    inverse = 1.0 / plastic_strain if plastic_strain > 0.0 else 0.0
+    x = largest = (trial_mises - static) / stiffness
     if sensitivity > 0.0 and x > slow:  # start below both: the increments that only stiffness or only the rate limits
         relaxed = slow * math.exp(min((trial_mises / static - 1.0) / sensitivity, LARGEST_EXPONENT))
         x = max(slow, x * (relaxed / (x + relaxed)))
+    is_fast = sensitivity > 0.0 and x >= slow
+    excess = math.log(x / slow) if is_fast else 0.0
     for _ in range(ITERATIONS):
         strain = plastic_strain + x
-        hardened = hardening * strain**exponent
+        if x < SMALL_GROWTH * plastic_strain:
+            hardened = before * small_power(x * inverse, exponent)
+        else:
+            hardened = hardening * strain**exponent
         factor, slope = 1.0, 0.0
-        is_fast = sensitivity > 0.0 and x >= slow
         if is_fast:
-            factor += sensitivity * math.log(x / slow)
-            slope = (first + hardened) * sensitivity
-        slope += x * (stiffness + factor * exponent * hardened / strain)
-        change = (stiffness * x + (first + hardened) * factor - trial_mises) / slope
+            factor += sensitivity * excess
+            slope = (first + hardened) * sensitivity * strain
+        slope += x * (stiffness * strain + factor * exponent * hardened)
+        change = (stiffness * x + (first + hardened) * factor - trial_mises) * strain / slope
         if abs(change) < SERIES:
             x *= 1.0 - change * (1.0 - change * (0.5 - change / 6.0))
         else:
             x = min(largest, x * math.exp(min(-change, LARGEST_EXPONENT)))
-        if x == 0.0 or (abs(change) < CONVERGED and is_fast == (sensitivity > 0.0 and x >= slow)):
+        was_fast, is_fast = is_fast, sensitivity > 0.0 and x >= slow
+        if x == 0.0 or (abs(change) < CONVERGED and is_fast == was_fast):
             break
+        if is_fast:  # ln x moves by the change itself, unless it was cut
+            excess = excess - change if was_fast and x < largest else math.log(x / slow)
     return min(x, largest)
+
+
+@njit(cache=True)
+def small_power(growth, exponent):
+    """Return (1 + growth)^exponent of a growth below ``SMALL_GROWTH``: five terms of its series, to 1e-13."""
+    n, e = exponent, growth
+    higher = 1.0 + e * (n - 2.0) * THIRD * (1.0 + 0.25 * e * (n - 3.0) * (1.0 + 0.2 * e * (n - 4.0)))
+    return 1.0 + e * n * (1.0 + 0.5 * e * (n - 1.0) * higher)

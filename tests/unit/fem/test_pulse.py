@@ -30,9 +30,21 @@ def test_integrals_are_those_of_the_values(name):
         assert pulse.double_integral(times[k]) == pytest.approx(twice[k], abs=2e-4)
 
 
-def test_service_condition_b_is_a_drop_from_112_cm():
+def test_service_conditions_are_the_drops_of_their_table():
     assert service_condition("B").integral(1.0) ** 2 / (2 * 9.80665) == pytest.approx(1.12, abs=0.005)
     assert sorted(SERVICE_CONDITIONS) == list("ABCDEFGH")
+    heights = {
+        "H": 1.5,
+        "G": 1.3,
+        "B": 1.12,
+        "F": 0.762,
+        "A": 0.508,
+        "E": 0.33,
+        "D": 0.178,
+        "C": 0.0762,
+    }  # [m], same table
+    for name, height in heights.items():
+        assert service_condition(name).integral(1.0) ** 2 / (2 * 9.80665) == pytest.approx(height, rel=0.07)
     harshness = [service_condition(name).integral(1.0) for name in "CDEAFBGH"]
     assert harshness == sorted(harshness)
 
