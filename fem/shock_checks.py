@@ -34,9 +34,7 @@ def _damping(damping: Damping) -> Iterator[Problem]:
     ratios = {"mass_ratio": damping.mass_ratio, "stiffness_ratio": damping.stiffness_ratio}
     used = [name for name, value in ratios.items() if value]
     if used and damping.frequency is None:
-        yield Problem(
-            "shock.damping.frequency", None, f"is missing: {' and '.join(used)} hold at a frequency", "> 0 Hz"
-        )
+        yield Problem("shock.damping.frequency", None, f"is missing: at which {' and '.join(used)} is meant", "> 0 Hz")
 
 
 def _large_mass(shock: Shock) -> Iterator[Problem]:

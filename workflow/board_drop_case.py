@@ -48,18 +48,21 @@ class BoardDropCase(Case):
         from workflow.reflow_pool import joint_geometries
 
         contradictions = meshing_checks.problems(self.package, self.board, self.warpage)
-        if contradictions:
-            known = {key: field for key, _, field in fields.leaves(self)}
-            return [
-                Problem(found.key, found.message, fields.shown(found.value, known.get(found.key)), found.allowed)
-                for found in contradictions
-            ]
+        known = {key: field for key, _, field in fields.leaves(self)}
         impossible = [
-            Problem(found.key, found.message, found.value, found.allowed) for found in shock_checks.problems(self.shock)
+            Problem(found.key, found.message, fields.shown(found.value, known.get(found.key)), found.allowed)
+            for found in contradictions or shock_checks.problems(self.shock)
         ]
+        if contradictions:
+            return impossible
         geometries = joint_geometries(pad_table(self.package, self.board, self.warpage))
         found = impossible + of_particles(particles_checks.problems(self.solder, geometries, self.package.pitch))
-        return found + self._flow_problems()
+        return (found + self._flow_problems()) or self._impossible_steps()
+
+    def _impossible_steps(self) -> list[Problem]:
+        from workflow.forecast import step_problems
+
+        return list(step_problems(self))
 
     def _flow_problems(self) -> list[Problem]:
         """Find a limit of plastic work where nothing yields, and linear steps where something does."""

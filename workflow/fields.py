@@ -163,8 +163,8 @@ def display(value: object, field: FieldInfo) -> str:
 
 
 def shown(value: object, field: FieldInfo | None) -> object:
-    """Write an SI value as its field is shown to users; other values stay as they are."""
-    return display(value, field) if field is not None and unit_of(field) else value
+    """Write an SI value as its field is shown to users; other values, and none, stay as they are."""
+    return display(value, field) if value is not None and field is not None and unit_of(field) else value
 
 
 def _choice(field: FieldInfo) -> str:

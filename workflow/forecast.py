@@ -1,12 +1,16 @@
 """Sizes, time steps and cost of a run, from its parameters alone."""
 
+import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 from fem.material_parameters import Material
 from fem.material_roles import Materials
 from workflow.board_drop_case import BoardDropCase
 from workflow.case import available_cores
+from workflow.problems import Problem
 from workflow.reflow_pool import distinct_geometries, joint_geometries
+from workflow.step_limit import too_many_steps
 
 MACRO = "board"  # the part of the macro model; all others belong to the meso model
 
@@ -110,6 +114,18 @@ def forecast_parts(case: BoardDropCase) -> dict[str, PartForecast]:
         )
         for name, part in count_elements(case.package, case.board, case.warpage).items()
     }
+
+
+def step_problems(case: BoardDropCase) -> Iterator[Problem]:
+    """Find more steps than any run takes."""
+    import numpy as np
+
+    from fem.estimate import damped_critical_step
+
+    with np.errstate(all="ignore"):
+        steps = [part.critical_step for part in forecast_parts(case).values() if not part.mass_scaled]
+        step = damped_critical_step(min(steps), case.shock.damping.coefficients[1]) if steps else math.inf
+    yield from too_many_steps("shock.duration", case.shock.duration, step, "explicit")
 
 
 def forecast_shock(case: BoardDropCase, parts: dict[str, PartForecast]) -> ShockForecast:

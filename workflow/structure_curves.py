@@ -15,7 +15,7 @@ SOLVER_STYLE: dict[str, dict[str, Any]] = {
     "implicit": {"color": "#d1495b", "linestyle": "--", "linewidth": 1.3, "label": "implicit"},
 }
 COMPONENTS = {3: ("x", "y", "z"), 6: ("xx", "yy", "zz", "xy", "yz", "xz")}
-UNITS = {"displacement": "m", "velocity": "m/s", "strain": "", "stress": "Pa", "reaction": "N"}
+UNITS = {"displacement": "m", "velocity": "m/s", "strain": "m/m", "stress": "Pa", "reaction": "N"}
 PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
 
 Histories = Mapping[str, Mapping[str, NDArray]]
@@ -75,8 +75,7 @@ def _draw(axis: Axes, histories: Histories, quantity: str, place: str) -> None:
     factor, prefix = _prefix(float(np.abs(first[:, component]).max()))
     for solver, history in histories.items():
         axis.plot(history["time"] / MILLI, history[name][:, component] / factor, **SOLVER_STYLE[solver])
-    unit = f"{prefix}{UNITS[quantity]}" if UNITS[quantity] else f"{factor:.0e}".replace("1e+00", "1")
-    axis.set_ylabel(f"{quantity} {COMPONENTS[first.shape[1]][component]} [{unit}]")
+    axis.set_ylabel(f"{quantity} {COMPONENTS[first.shape[1]][component]} [{prefix}{UNITS[quantity]}]")
 
 
 def _prefix(largest: float) -> tuple[float, str]:

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 from workflow.plan_table import short
 from workflow.problems import Problem
+from workflow.step_limit import too_many_steps
 from workflow.structure_case import StructureCase
 
 if TYPE_CHECKING:
     from fem.solver_cost import SolverForecast
 
-STEPS_MOST = 1e10  # of a run: those of the smallest meshes take hours
 SECONDS_TO_START = 4.0  # until the ranks of a solver have loaded their libraries and kernels
 
 
@@ -100,11 +100,7 @@ def step_problems(case: StructureCase) -> Iterator[Problem]:
         yield Problem("dynamics.numerics.explicit_step", message, short(numerics.explicit_step), allowed)
     steps = forecast_steps(case, layers)
     for solver in case.dynamics.solvers:
-        if not case.dynamics.duration <= STEPS_MOST * steps[solver]:
-            message = f"takes more than {STEPS_MOST:g} {solver} steps of {steps[solver]:.3g} s"
-            yield Problem(
-                "dynamics.duration", message, short(case.dynamics.duration), f"<= {STEPS_MOST * steps[solver]:.3g} s"
-            )
+        yield from too_many_steps("dynamics.duration", case.dynamics.duration, steps[solver], solver)
 
 
 def forecast_layers(case: StructureCase) -> dict[str, LayerForecast]:

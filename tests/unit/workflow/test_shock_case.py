@@ -35,10 +35,16 @@ def test_table_lies_beside_the_case(tmp_path):
 
 FAULTS = {
     'service_condition = "J"\n': ["shock.service_condition", "one of A, B, C, D, E, F, G, H"],
-    PULSE + 'service_condition = "B"\n': ["shock.peak_acceleration", "does not go with shock.service_condition"],
+    PULSE + 'service_condition = "B"\n': [
+        "shock.peak_acceleration",
+        '"1500 G"',
+        "does not go with shock.service_condition",
+    ],
     'peak_acceleration = "1500 G"\n': ["shock.pulse_duration", "is missing"],
     "": ["shock.peak_acceleration", "is missing", "service_condition"],
-    PULSE + "damping = { mass_ratio = 0.01 }\n": ["shock.damping.frequency", "is missing"],
+    PULSE + "damping = { mass_ratio = 0.01 }\n": ["shock.damping.frequency: is missing"],
+    PULSE + 'damping = { stiffness_ratio = 0.9, frequency = "1e-6 Hz" }\n': ["shock.duration", "more than 1e+10"],
+    PULSE + 'damping = { stiffness_coefficient = "1e308 s" }\n': ["shock.duration", "has no explicit step"],
     PULSE + 'method = "large_mas"\n': ["shock.method", "did you mean large_mass?"],
     PULSE + 'gravity = "yes"\n': ["shock.gravity", "one of auto, on, off"],
 }
