@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from fem.body import Body
 from fem.damping import RayleighDamping
+from fem.follower_pressure import FollowerPressure
 from fem.loads import BodyAcceleration, LargeMass, Load, NodalForces, PrescribedMotion
 from fem.parameters import Damping
 from fem.pulse import Pulse
@@ -22,7 +23,9 @@ def structure_loads(
     made: list[Load] = []
     for name, load in scene.loads.items():
         pulse = pulses[name]
-        if isinstance(load, Pressure):
+        if isinstance(load, Pressure) and scene.dynamics.kinematics == "finite":
+            made.append(FollowerPressure.build(body, tables.pressed[load.on], pulse))
+        elif isinstance(load, Pressure):
             nodes, areas = tables.areas[load.on]
             made.append(NodalForces.build(body, nodes, -areas, pulse))
         elif isinstance(load, InputG) and load.method == "large_mass":

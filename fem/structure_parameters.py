@@ -101,7 +101,7 @@ class InputG(Pulsed):
 
 
 class Pressure(Pulsed):
-    """Pressure on a facet set, positive where it pushes into the body."""
+    """Pressure on a facet set, positive where it pushes into the body; it follows the surface in finite kinematics."""
 
     kind: Literal["pressure"] = "pressure"
     on: str

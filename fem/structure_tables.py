@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem.errors import LoadError, MeshError
-from fem.facet_areas import facet_set, outward_areas
+from fem.facet_areas import OutwardFacets, facet_set, outward_areas, outward_facets
 from fem.material_effects import plastic_laws
 from fem.mesh import MeshData
 from fem.scene import Tables
@@ -24,11 +24,13 @@ class StructureTables(Tables):
     Attributes:
         nodes_of: Name -> nodes of a facet set that supports or motions act on.
         areas: Name -> nodes and outward areas of a facet set under pressure, see ``facet_areas.outward_areas``.
+        pressed: Name -> the same facet set, for a pressure that follows it.
         watch: Watch points and supports.
     """
 
     nodes_of: dict[str, NDArray[np.int32]]
     areas: dict[str, tuple[NDArray[np.int64], NDArray[np.float64]]]
+    pressed: dict[str, OutwardFacets]
     watch: PointTable
 
 
@@ -62,6 +64,7 @@ def structure_tables(mesh: MeshData, scene: StructureScene) -> StructureTables:
         nodes=len(mesh.points),
         nodes_of=nodes_of,
         areas={name: outward_areas(mesh, name) for name in sorted(pressed)},
+        pressed={name: outward_facets(mesh, name) for name in sorted(pressed)},
         watch=point_table(mesh, points, supports, yields=bool(plastic_laws(scene.layer_materials))),
     )
 

@@ -9,8 +9,13 @@ from mpi4py import MPI
 
 from fem.compare_structures import solver_differences
 from fem.errors import AgreedError, EnergyError
+from fem.follower_pressure import FollowerPressure
+from fem.loads import NodalForces
 from fem.program import main
 from fem.structure import run_structure
+from fem.structure_loads import structure_loads
+from fem.structure_model import build_structure
+from fem.structure_pulses import pulses_of
 from tests.support.fem_structures import (
     LENGTH,
     STEEL,
@@ -150,6 +155,15 @@ def test_both_solvers_agree_under_all_loads(tmp_path):
     assert found["strain_difference"] < 5e-3
     reactions = explicit["reaction@clamp"], implicit["reaction@clamp"]
     assert np.linalg.norm(reactions[0] - reactions[1]) < 5e-3 * np.linalg.norm(reactions[1])
+
+
+@pytest.mark.parametrize(("kinematics", "kind"), [("small", NodalForces), ("finite", FollowerPressure)])
+def test_pressure_follows_the_surface_where_it_may_turn(tmp_path, kinematics, kind):
+    loads = {"push": {"kind": "pressure", "on": "z_max", "peak": 1e5, "pulse": "constant"}}
+    request = structure_input(tmp_path, loads=loads, dynamics={"duration": 1e-5, "kinematics": kinematics})
+    model = build_structure(MPI.COMM_SELF, request, [])
+    (load,) = structure_loads(MPI.COMM_SELF, model.body, model.tables, request, pulses_of(request.loads))
+    assert isinstance(load, kind)
 
 
 def test_implicit_solver_with_nothing_to_solve(tmp_path):

@@ -1,0 +1,67 @@
+"""A pressure that follows its surface: normal to it, in balance on a closed one, its work exact in the ledger."""
+
+import numpy as np
+import pytest
+
+from fem.facet_areas import outward_areas, outward_facets
+from fem.follower_pressure import FollowerPressure
+from fem.loads import NodalForces
+from fem.mesh import MeshData
+from fem.motion import Motion
+from fem.pulse import Constant
+from tests.support.fem_bodies import STEEL, dns_body, motion_of
+from tests.support.fem_models import grid, mesh_of, on
+
+PRESSURE = 1e6
+SIDES = {f"{'xyz'[axis]}_{end}": on(axis, place) for axis in range(3) for end, place in (("min", 0.0), ("max", 1e-3))}
+
+
+def cube() -> MeshData:
+    ticks = np.linspace(0.0, 1e-3, 3)
+    points, cells = grid(ticks, ticks, ticks)
+    return mesh_of(points, cells, "board", SIDES)
+
+
+def pressed(names) -> tuple[MeshData, Motion, list[FollowerPressure]]:
+    mesh = cube()
+    body, critical = dns_body(mesh, STEEL)
+    loads = [FollowerPressure.build(body, outward_facets(mesh, name), Constant(PRESSURE)) for name in names]
+    return mesh, motion_of(body, 0.5 * critical, loads), loads
+
+
+def force_of(load, motion: Motion) -> np.ndarray:
+    before = motion.force.copy()
+    load.add(motion)
+    return motion.force - before
+
+
+def test_it_turns_with_the_body():
+    mesh, motion, (load,) = pressed(["x_max"])
+    nodes, areas = outward_areas(mesh, "x_max")
+    dead = force_of(NodalForces.build(motion.body, nodes, -areas, Constant(PRESSURE)), motion)
+    angle = 1.1
+    turn = np.array([[np.cos(angle), -np.sin(angle), 0.0], [np.sin(angle), np.cos(angle), 0.0], [0.0, 0.0, 1.0]])
+    points = motion.body.local.points
+    motion.displacement[:] = points @ turn.T - points
+    assert np.abs(force_of(load, motion) - dead @ turn.T).max() < 1e-12 * np.abs(dead).max()
+
+
+def test_closed_surface_of_any_shape_is_in_balance():
+    _, motion, loads = pressed(SIDES)
+    motion.displacement[:] = np.random.default_rng(4).uniform(-1e-4, 1e-4, motion.displacement.shape)
+    force = sum(force_of(load, motion) for load in loads)
+    place = motion.body.local.points + motion.displacement
+    scale = PRESSURE * 1e-6
+    assert np.abs(force.sum(axis=0)).max() < 1e-12 * scale
+    assert np.abs(np.cross(place, force).sum(axis=0)).max() < 1e-12 * scale * 1e-3
+
+
+def test_its_work_is_that_of_the_motion():
+    _, motion, _ = pressed(["x_max"])
+    motion.velocity += np.cross([0.0, 0.0, 1e4], motion.body.local.points)
+    start = motion.kinetic_energy() + motion.internal_energy().total
+    for _ in range(200):
+        motion.advance()
+        motion.update_force()
+    total = motion.kinetic_energy() + motion.internal_energy().total
+    assert motion.external_work == pytest.approx(total - start, rel=1e-9)
