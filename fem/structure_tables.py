@@ -51,7 +51,9 @@ def structure_tables(mesh: MeshData, scene: StructureScene) -> StructureTables:
     check_shaken(scene, nodes_of, held)
     points = {name: point.at for name, point in scene.watch.items()}
     held_nodes = np.flatnonzero(held.any(axis=1))
-    supports = {name: nodes_of[support.on] for name, support in scene.supports.items()}
+    supports = {
+        name: (nodes_of[support.on], np.isin(list(AXES), support.hold)) for name, support in scene.supports.items()
+    }
     return StructureTables(
         part=mesh.part,
         part_names=mesh.part_names,

@@ -14,6 +14,7 @@ from fem.recovery import fit, patch
 from fem.stress_recovery import StressRecovery
 
 ROUNDING = 1e-9  # of the mesh: closer than that is the same place
+Support = tuple[NDArray[np.int32], NDArray[np.bool_]]
 COMPONENTS = {"displacement": 3, "velocity": 3, "strain": 6, "stress": 6, "plastic_strain": 1}
 
 
@@ -29,7 +30,7 @@ class PointTable:
         cells: ``(k,)`` elements whose means give strain and stress.
         owner: ``(k,)`` the point that each belongs to.
         weight: ``(k,)`` of each in its point's value.
-        supports: Name -> nodes of a support.
+        supports: Name -> nodes of a support, and ``(3,)`` which components it holds.
         quantities: What is watched, of ``COMPONENTS``.
         extent: Of the mesh [m].
     """
@@ -41,7 +42,7 @@ class PointTable:
     cells: NDArray[np.int64]
     owner: NDArray[np.int64]
     weight: NDArray[np.float64]
-    supports: dict[str, NDArray[np.int32]]
+    supports: dict[str, Support]
     quantities: tuple[str, ...]
     extent: float
 
@@ -56,7 +57,7 @@ class PointTable:
 def point_table(
     mesh: MeshData,
     wanted: Mapping[str, tuple[float, float, float]],
-    supports: dict[str, NDArray[np.int32]],
+    supports: dict[str, Support],
     yields: bool = False,
 ) -> PointTable:
     """Find the nodes and the elements of watch points.
@@ -64,7 +65,7 @@ def point_table(
     Args:
         mesh: The whole mesh.
         wanted: Name -> place [m].
-        supports: Name -> nodes.
+        supports: Name -> nodes and held components.
         yields: Whether plastic strain is watched, too.
 
     Raises:
@@ -126,14 +127,15 @@ class PointWatch:
         self._owner, self._weight = table.owner[cells >= 0], table.weight[cells >= 0]
         cells = cells[cells >= 0]
         self._recovery = StressRecovery(body, cells)
-        supports = [body.local.locate(nodes) for nodes in table.supports.values()]
-        self._supports = [nodes[(nodes >= 0) & body.shared.owned[nodes]] for nodes in supports]
+        supports = [(body.local.locate(nodes), held) for nodes, held in table.supports.values()]
+        self._supports = [(nodes[(nodes >= 0) & body.shared.owned[nodes]], held) for nodes, held in supports]
 
     def sample(self, motion: Moving) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return this rank's parts of the sums: the values of all points by quantity, then the reactions [N]."""
         parts = [self._value(quantity, motion).ravel() for quantity in self._table.quantities]
-        reaction = motion.reaction()
-        return np.concatenate([*parts, *(reaction[nodes].sum(axis=0) for nodes in self._supports)]), np.empty(0)
+        reaction = motion.reaction()  # of all supports: their nodes are shared where facet sets meet
+        sums = (held * reaction[nodes].sum(axis=0) for nodes, held in self._supports)
+        return np.concatenate([*parts, *sums]), np.empty(0)
 
     def _value(self, quantity: str, motion: Moving) -> NDArray[np.float64]:
         """Return this rank's part of a quantity at all points."""

@@ -81,6 +81,14 @@ def test_hanging_rod_at_rest(tmp_path):
     assert history["reaction@clamp"][-1, 0] == pytest.approx(-force * LENGTH * WIDTH * THICKNESS, rel=1e-7)
 
 
+def test_reaction_of_a_support_has_the_components_that_it_holds(tmp_path):
+    """The clamp carries the strip along z also at the nodes that it shares with the side, which holds y alone."""
+    supports = {"clamp": {"on": "x_min", "hold": ["x", "y", "z"]}, "side": {"on": "y_min", "hold": ["y"]}}
+    _, history = run(tmp_path, supports=supports)
+    assert np.abs(history["reaction@clamp"][:, 2]).max() > 0.0
+    assert np.abs(history["reaction@side"][:, [0, 2]]).max() == 0.0
+
+
 def test_rigid_flight_has_no_strain(tmp_path):
     result, history = run(
         tmp_path,
