@@ -8,7 +8,7 @@ Seconds are those of one core, to follow one period of the first mode: explicit 
 critical step at the measured speed of a whole step; implicit steps (trapezoidal rule) of a fortieth of the period,
 whose error in the period is 0.2 %, with the measured factorisation. Errors are relative to the finest hexahedra, whose
 plate is compared with Mindlin's. The linear one-point hexahedron has the stiffness of the incompatible-modes one
-(`fem/element_one_point.py`), so one row stands for both; what it saves in finite strains is in the second table.
+(`fem/elements/one_point.py`), so one row stands for both; what it saves in finite strains is in the second table.
 """
 
 import argparse
@@ -26,14 +26,14 @@ import numpy as np
 from mpi4py import MPI
 
 from fem.body import Body, Response, make_body, make_pieces
-from fem.element import critical_steps
+from fem.elements.element import critical_steps
 from fem.facet import area_vectors
 from fem.factorisation import Factorisation
 from fem.force import Kinematics
 from fem.global_matrix import Equations
 from fem.implicit import ImplicitMotion
 from fem.local_mesh import distribute
-from fem.material_parameters import Isotropic
+from fem.materials.parameters import Isotropic
 from fem.mesh import MeshData, boundary_facets
 from fem.modal import natural_modes
 from fem.motion import Motion

@@ -32,7 +32,7 @@ from petsc4py import PETSc
 from benchmarks.support import turns
 from benchmarks.support.cube import SOLDER, STEEL, cube, elements_of, random_displacement
 from fem import dolfinx_api
-from fem.element import CHUNK, Elements, element_stiffness
+from fem.elements.element import CHUNK, Elements, element_stiffness
 from fem.force import ForceTerm, Kinematics, force_terms
 from fem.mesh import MeshData
 from tests.support.fem_bodies import dns_body, motion_of

@@ -30,11 +30,11 @@ from fem.factorisation import Factorisation
 from fem.global_matrix import Equations
 from fem.implicit import ImplicitMotion
 from fem.inputs import INPUT, StructureInput
-from fem.material_library import FR4
+from fem.materials.library import FR4
 from fem.solver_cost import forecast_solvers
-from fem.structure import make_history, make_participant
-from fem.structure_model import build_structure
-from fem.structure_pulses import pulse_durations, pulses_of
+from fem.structure.model import build_structure
+from fem.structure.pulses import pulse_durations, pulses_of
+from fem.structure.run import make_history, make_participant
 from meshing.box import write_box
 from meshing.box_plan import Box, BoxHoles, BoxLayer
 from tests.support.fem_bodies import dns_body

@@ -27,7 +27,7 @@ from benchmarks.support.cube import STEEL, cube
 from fem.body import make_body, make_pieces
 from fem.loads import Load, half_sine_drop
 from fem.local_mesh import distribute
-from fem.material_roles import Materials
+from fem.materials.roles import Materials
 from fem.motion import Motion
 from fem.scene import prepare
 from tests.support.fem_bodies import motion_of

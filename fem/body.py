@@ -7,16 +7,16 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from fem.element import Elements, critical_steps, element_geometry, element_kind, lumped_mass
-from fem.element_hexahedron import HEXAHEDRON
-from fem.element_kind import Geometry
+from fem.elements.element import Elements, critical_steps, element_geometry, element_kind, lumped_mass
+from fem.elements.hexahedron import HEXAHEDRON
+from fem.elements.kind import Geometry
 from fem.errors import MassError
 from fem.exchange import SharedNodes
 from fem.force import ForceTerm, Kinematics, force_terms, linear_terms
 from fem.local_mesh import LocalMesh
-from fem.material_parameters import Material
-from fem.material_roles import Materials
-from fem.materials import elasticity_matrix, materials_of_parts
+from fem.materials.elasticity import elasticity_matrix, materials_of_parts
+from fem.materials.parameters import Material
+from fem.materials.roles import Materials
 from fem.scene import Tables
 from fem.tie import Tie
 

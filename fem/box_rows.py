@@ -5,14 +5,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.kernels_box_rows import LONGEST
+from fem.kernels.box_rows import LONGEST
 
 SAME_PLANE = 1e-9  # of the model's extent
 
 
 @dataclass(frozen=True, slots=True)
 class BoxRows:
-    """Lines of nodes and the rows of boxes between them; see ``kernels_box_rows.add_row_forces``.
+    """Lines of nodes and the rows of boxes between them; see ``kernels.box_rows.add_row_forces``.
 
     Attributes:
         nodes: ``(p,)`` int32, node at each position; those of a line follow each other.

@@ -122,6 +122,6 @@ def write_at_once(path: Path, content: bytes) -> None:
 def _code() -> bytes:
     """Return a digest of this package's source and of the libraries: other code may continue a state differently."""
     digest = hashlib.sha256(" ".join(version(name) for name in LIBRARIES).encode())
-    for path in sorted(Path(__file__).parent.glob("*.py")):
+    for path in sorted(Path(__file__).parent.rglob("*.py")):
         digest.update(path.read_bytes())
     return digest.digest()

@@ -6,7 +6,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.mean_strain import MeanStrain
+from fem.elements.mean_strain import MeanStrain
 
 
 @dataclass(frozen=True, slots=True)

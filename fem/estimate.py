@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.material_parameters import Material
-from fem.materials import elasticity_matrix
+from fem.materials.elasticity import elasticity_matrix
+from fem.materials.parameters import Material
 
 # Element updates per second and core of a whole substep (force, update, tie) of elements whose matrix is assembled, as
 # those of joints, on one core of an AMD EPYC (AVX-512); boards are boxes in rows, which share their matrices.

@@ -6,7 +6,7 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from fem.kernels_motion import pack, sum_in_rank_order, unpack
+from fem.kernels.motion import pack, sum_in_rank_order, unpack
 
 SHARED_TAG, CHANNEL_TAG = 11, 12
 
@@ -93,7 +93,7 @@ def rank_order(
         own: This rank.
 
     Returns:
-        Nodes ``(m,)``, pointer ``(m + 1,)`` and sources of ``kernels_motion.sum_in_rank_order``.
+        Nodes ``(m,)``, pointer ``(m + 1,)`` and sources of ``kernels.motion.sum_in_rank_order``.
     """
     nodes = np.unique(rows)
     node = np.concatenate([rows, nodes])

@@ -6,14 +6,14 @@ from typing import Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.element import Elements
+from fem.elements.element import Elements
 from fem.energy import Energy
 from fem.force_assembled import AssembledElements
 from fem.force_congruent import CongruentElements, is_box
 from fem.force_nonlinear import NonlinearElements
-from fem.kernels_nonlinear import Path
-from fem.kernels_plasticity import FIRST_YIELD, plastic_constants
-from fem.material_parameters import Material
+from fem.kernels.nonlinear import Path
+from fem.kernels.plasticity import FIRST_YIELD, plastic_constants
+from fem.materials.parameters import Material
 
 Kinematics = Literal["small", "finite"]
 

@@ -6,15 +6,15 @@ import numpy as np
 import scipy.sparse
 from numpy.typing import NDArray
 
-from fem.element import CHUNK, Elements, element_stiffness
+from fem.elements.element import CHUNK, Elements, element_stiffness
+from fem.elements.mean_strain import MeanStrain
 from fem.energy import Energy, linear_energy
-from fem.kernels_force import add_block_force, assemble_upper_blocks
-from fem.mean_strain import MeanStrain
+from fem.kernels.force import add_block_force, assemble_upper_blocks
 
 
 @dataclass(frozen=True, slots=True)
 class AssembledElements:
-    """Upper triangle of a stiffness in block rows; see ``kernels_force.add_block_force`` for the arrays."""
+    """Upper triangle of a stiffness in block rows; see ``kernels.force.add_block_force`` for the arrays."""
 
     pointer: NDArray[np.int32]
     columns: NDArray[np.int32]

@@ -3,7 +3,7 @@
 A box of a material whose axes it shares has three mirror planes. In the Walsh-Hadamard basis of its eight nodes
 the 24 x 24 stiffness falls into eight blocks of 3 x 3, one per parity: the modes of component c with parity p have
 the index p XOR 2^c. A product costs 216 multiplications and additions instead of 1152, with one small table per shape,
-and half of them are shared by the neighbours in a row of boxes (``box_rows``, ``kernels_box_rows``).
+and half of them are shared by the neighbours in a row of boxes (``box_rows``, ``kernels.box_rows``).
 """
 
 from dataclasses import dataclass, field, replace
@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem.box_rows import BoxRows
-from fem.element import Elements, classes, element_stiffness
+from fem.elements.element import Elements, classes, element_stiffness
+from fem.elements.mean_strain import MeanStrain
 from fem.energy import Energy, linear_energy
-from fem.kernels_box_rows import PAD, add_row_forces, read_lines, subtract_lines
-from fem.mean_strain import MeanStrain
+from fem.kernels.box_rows import PAD, add_row_forces, read_lines, subtract_lines
 
 SIGNS = np.array([[(-1.0) ** bin(p & a).count("1") for a in range(8)] for p in range(8)])
 UPPER = np.triu_indices(3)
@@ -31,7 +31,7 @@ class CongruentElements:
     Attributes:
         axes: ``(3,)`` coordinate directions in the order of the rows' frame.
         nodes: ``(p,)`` int32, node at each position of the lines.
-        rows: ``(nr, 6)`` int32, see ``kernels_box_rows.add_row_forces``.
+        rows: ``(nr, 6)`` int32, see ``kernels.box_rows.add_row_forces``.
         blocks: ``(ns, 8, 6)`` [N/m], in the rows' frame.
         lines: ``(2, 3, p + PAD)`` displacements [m] and forces [N] at the positions, between calls of no meaning.
         mean: Mean strains of elements with hourglass control.

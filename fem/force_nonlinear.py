@@ -11,14 +11,14 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.element import Elements
-from fem.element_hexahedron import HEXAHEDRON
+from fem.elements.element import Elements
+from fem.elements.hexahedron import HEXAHEDRON
 from fem.energy import Energy
 from fem.errors import InvertedElementError
-from fem.kernels_lanes import LANES
-from fem.kernels_nonlinear import Path
-from fem.kernels_nonlinear_gradient import FINE, Blocks, add_gradient_force
-from fem.kernels_nonlinear_hexahedron import HexahedronBlocks, add_hexahedron_force
+from fem.kernels.lanes import LANES
+from fem.kernels.nonlinear import Path
+from fem.kernels.nonlinear_gradient import FINE, Blocks, add_gradient_force
+from fem.kernels.nonlinear_hexahedron import HexahedronBlocks, add_hexahedron_force
 from fem.nonlinear_blocks import Lanes, arrange, gradient_blocks, hexahedron_blocks
 
 
@@ -53,7 +53,7 @@ class NonlinearElements:
         Args:
             everything: The elements of a rank.
             chosen: ``(ne,)`` which of them.
-            plastic: ``(nm, 6)`` rows of ``kernels_plasticity.plastic_constants``.
+            plastic: ``(nm, 6)`` rows of ``kernels.plasticity.plastic_constants``.
             path: Kinematics and step.
         """
         elements = everything.subset(chosen)

@@ -5,9 +5,9 @@ from typing import Annotated, Literal
 
 from pydantic import Field, TypeAdapter
 
-from fem.material_roles import Materials
+from fem.materials.roles import Materials
 from fem.parameters import Parameters, Shock
-from fem.structure_parameters import StructureScene
+from fem.structure.parameters import StructureScene
 
 
 class RunInput(Parameters):

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.cell_shape import CellShape, shape_of
+from fem.elements.cell_shape import CellShape, shape_of
 from fem.errors import MeshError
 
 
@@ -16,7 +16,7 @@ class MeshData:
 
     Attributes:
         points: ``(n, 3)`` [m].
-        cells: ``(ne, k)`` int32, node order of DOLFINx (``cell_shape``).
+        cells: ``(ne, k)`` int32, node order of DOLFINx (``elements.cell_shape``).
         part: ``(ne,)`` int32, index into ``part_names``.
         part_names: Names of the parts.
         facets: Name -> ``(nf, m)`` int32: quadrilaterals in cyclic order, or triangles with their edges' nodes.

@@ -7,7 +7,7 @@ import meshio
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.cell_shape import SHAPES, CellShape
+from fem.elements.cell_shape import SHAPES, CellShape
 from fem.errors import MeshError
 from fem.mesh import MeshData, append, without_unused_nodes
 from fem.mesh_quality import check_quality

@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.cell_shape import HEXAHEDRON
-from fem.element_tetrahedron import EDGES
+from fem.elements.cell_shape import HEXAHEDRON
+from fem.elements.tetrahedron import EDGES
 from fem.errors import MeshError
 from fem.mesh import MeshData
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from fem.body import Body
 from fem.energy import Energy
-from fem.kernels_motion import advance
+from fem.kernels.motion import advance
 from fem.loads import Load
 
 

@@ -5,14 +5,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.element import Elements, classes
-from fem.element_one_point import hourglass_control
-from fem.element_tetrahedron import QUADRATIC_SHARE, TETRAHEDRON, Tetrahedron, quadratic_derivatives
-from fem.kernels_hexahedron import CENTRE_DERIVATIVES, GAUSS, GAUSS_DERIVATIVES
-from fem.kernels_lanes import LANES
-from fem.kernels_nonlinear import STATE_SLOTS, STRETCH
-from fem.kernels_nonlinear_gradient import Blocks
-from fem.kernels_nonlinear_hexahedron import HexahedronBlocks
+from fem.elements.element import Elements, classes
+from fem.elements.one_point import hourglass_control
+from fem.elements.tetrahedron import QUADRATIC_SHARE, TETRAHEDRON, Tetrahedron, quadratic_derivatives
+from fem.kernels.hexahedron import CENTRE_DERIVATIVES, GAUSS, GAUSS_DERIVATIVES
+from fem.kernels.lanes import LANES
+from fem.kernels.nonlinear import STATE_SLOTS, STRETCH
+from fem.kernels.nonlinear_gradient import Blocks
+from fem.kernels.nonlinear_hexahedron import HexahedronBlocks
 
 # Degree 2 (Hammer, Marlowe & Stroud 1956): exact for the stiffness of straight-edged 10-node tetrahedra.
 FOUR_POINTS = np.full((4, 4), (5.0 - np.sqrt(5.0)) / 20.0) + np.eye(4) / np.sqrt(5.0)
@@ -68,7 +68,7 @@ def arrange(elements: Elements) -> Lanes:
 
 
 def gradient_blocks(elements: Elements, lanes: Lanes, plastic: NDArray[np.float64], finite: bool) -> Blocks:
-    """Return one-point hexahedra or tetrahedra without stress; ``plastic (nm, 6)`` as in ``kernels_plasticity``."""
+    """Return one-point hexahedra or tetrahedra without stress; ``plastic (nm, 6)`` as in ``kernels.plasticity``."""
     corners, kind = elements.points[elements.cells[lanes.shape]], elements.kind
     hourglass = np.empty((len(corners), 1, 0))
     if kind.hourglass:
@@ -95,7 +95,7 @@ def gradient_blocks(elements: Elements, lanes: Lanes, plastic: NDArray[np.float6
 
 
 def hexahedron_blocks(elements: Elements, lanes: Lanes, plastic: NDArray[np.float64], finite: bool) -> HexahedronBlocks:
-    """Return fully integrated hexahedra without stress; ``plastic (nm, 6)`` as in ``kernels_plasticity``."""
+    """Return fully integrated hexahedra without stress; ``plastic (nm, 6)`` as in ``kernels.plasticity``."""
     corners = elements.points[elements.cells[lanes.shape]]
     count = len(corners)
     jacobian = np.einsum("eai,gad->egid", corners, GAUSS_DERIVATIVES, optimize=True)
@@ -143,7 +143,7 @@ def orthonormal_basis(weight: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def elastic_constants(elasticity: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the nine constants of orthotropic materials ``(nm, 9)`` [Pa]; see ``kernels_nonlinear.elastic_stress``.
+    """Return the nine constants of orthotropic materials ``(nm, 9)`` [Pa]; see ``kernels.nonlinear.elastic_stress``.
 
     Raises:
         ValueError: A material couples normal strain and shear.

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from fem.body import Body
 from fem.estimate import WindowPlan
 from fem.exchange import CutChannels
-from fem.kernels_motion import add_impulse
+from fem.kernels.motion import add_impulse
 from fem.loads import Load
 from fem.motion import Motion
 from fem.moving import Moving

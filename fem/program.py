@@ -11,8 +11,8 @@ from fem.agreement import agreed
 from fem.errors import AgreedError, EnergyError, InvertedElementError, RankError
 from fem.inputs import INPUT, RunInput, StructureInput
 from fem.run import run
-from fem.structure import run_structure
-from fem.structure_checks import check
+from fem.structure.checks import check
+from fem.structure.run import run_structure
 
 
 def main(world: MPI.Comm, arguments: list[str]) -> int:

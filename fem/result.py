@@ -10,10 +10,10 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from fem.communicators import Communicators, Role
-from fem.failure import Verdicts, failed_joints, failure_criteria, judge, worst
 from fem.history import History
 from fem.inputs import RunInput
-from fem.material_effects import failure_effect, material_effects
+from fem.materials.effects import failure_effect, material_effects
+from fem.materials.failure import Verdicts, failed_joints, failure_criteria, judge, worst
 from fem.model import Model
 from fem.shock_loads import shock_pulse
 from fem.steps import Steps

@@ -18,7 +18,7 @@ from fem.implicit import ImplicitMotion
 from fem.inputs import RunInput
 from fem.ledger import Ledger
 from fem.march import Outputs, march
-from fem.materials import materials_of_parts
+from fem.materials.elasticity import materials_of_parts
 from fem.model import Model, build_models
 from fem.parameters import Shock
 from fem.participant import Alone, Macro, Meso, Participant, uncut_motion
@@ -26,7 +26,7 @@ from fem.pulse import Pulse
 from fem.result import Timings, write_result
 from fem.shock_loads import shock_loads, shock_pulse
 from fem.steps import Steps
-from fem.structure_pulses import pulse_durations
+from fem.structure.pulses import pulse_durations
 from fem.watch_joints import JointWatch
 
 SPEEDS = 201  # times at which the largest velocity of the table is looked for

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from fem.parameters import Damping, Shock
-from fem.structure_checks import Problem
+from fem.structure.checks import Problem
 
 
 def problems(shock: Shock) -> list[Problem]:

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 from fem.estimate import largest_implicit_step
 from fem.factor_cost import box_factor
-from fem.material_effects import plastic_laws
-from fem.structure_parameters import Dynamics, StructureScene
+from fem.materials.effects import plastic_laws
+from fem.structure.parameters import Dynamics, StructureScene
 
 # Measured by benchmarks/jedec_oracle.py on one core of an AMD EPYC (AVX-512), Debian 12: element updates per second of
 # whole explicit steps, linear and with plasticity or finite rotations; MUMPS 5.5 on the BLAS that Debian installs (an

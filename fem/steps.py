@@ -11,7 +11,7 @@ from fem.body import Pieces, make_body
 from fem.communicators import Role
 from fem.errors import AgreedError
 from fem.estimate import WindowPlan, damped_critical_step, window_plan
-from fem.material_roles import Materials
+from fem.materials.roles import Materials
 from fem.parameters import Shock
 from fem.power_iteration import highest_frequency
 from fem.scene import Tables

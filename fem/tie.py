@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from fem.cell_shape import HEXAHEDRON
+from fem.elements.cell_shape import HEXAHEDRON
 from fem.errors import TieError
-from fem.kernels_motion import gather_from_slaves, spread_to_slaves
+from fem.kernels.motion import gather_from_slaves, spread_to_slaves
 from fem.mesh import MeshData
 
 CORNERS = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.element import element_geometry
+from fem.elements.element import element_geometry
 from fem.errors import MeshError
 from fem.mesh import MeshData, cells_of_facets
 

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from fem.material_roles import Materials
+from fem.materials.roles import Materials
 from fem.parameters import Shock
 from meshing.parameters import Board, Package, Warpage
 from particles.parameters import Solder

@@ -13,7 +13,7 @@ from workflow.board_drop_case import BoardDropCase
 from workflow.case_kind import Case
 from workflow.problems import CaseError, Problem
 from workflow.scene_cases import DropCase, DropsCase, JointCase, OscillationCase
-from workflow.structure_case import StructureCase
+from workflow.structure.case import StructureCase
 from workflow.validation import translate
 
 KINDS: dict[str, type[Case]] = {

@@ -4,8 +4,8 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from fem.material_parameters import Material
-from fem.material_roles import Materials
+from fem.materials.parameters import Material
+from fem.materials.roles import Materials
 from workflow.board_drop_case import BoardDropCase
 from workflow.case import available_cores
 from workflow.problems import Problem
@@ -72,7 +72,7 @@ class Forecast:
 
 def forecast(case: BoardDropCase) -> Forecast:
     """Predict sizes, time steps and cost of a run."""
-    from fem.material_effects import failure_effect, material_effects
+    from fem.materials.effects import failure_effect, material_effects
     from meshing.pads import pad_table
     from particles.effects import decide_effects
     from particles.estimate import particle_count, reflow_seconds

@@ -7,7 +7,6 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from workflow import structure_plan
 from workflow.board_drop_case import BoardDropCase
 from workflow.case import available_cores
 from workflow.case_kind import Case
@@ -16,8 +15,9 @@ from workflow.forecast import MACRO, Forecast, forecast
 from workflow.inputs import Change, Verdict, examine
 from workflow.plan_table import duration, new_table, short
 from workflow.scene_forecast import SceneForecast, forecast_scene
-from workflow.structure_case import StructureCase
-from workflow.structure_forecast import StructureForecast, forecast_structure
+from workflow.structure import plan as structure_plan
+from workflow.structure.case import StructureCase
+from workflow.structure.forecast import StructureForecast, forecast_structure
 
 LONGEST_LIST = 4
 SCHEMES = {

@@ -9,7 +9,7 @@ import jinja2
 import numpy as np
 
 from workflow import report_tables as tables
-from workflow.structure_case import StructureCase
+from workflow.structure.case import StructureCase
 from workflow.summary import collect_summary, write_summary
 
 TEMPLATES = Path(__file__).parent / "templates"
@@ -147,7 +147,7 @@ def _add_body(run_folder: Path, kind: str, context: dict, summary: dict) -> None
 
 
 def _add_structure(run_folder: Path, case: StructureCase, context: dict, summary: dict) -> None:
-    from workflow.structure_report import add_structure
+    from workflow.structure.report import add_structure
 
     context["preview_caption"] = "Mesh, coloured by layer."
     add_structure(run_folder, case, context, summary["metrics"])

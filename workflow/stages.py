@@ -1,7 +1,7 @@
 """The pipelines, one function a stage; which kind of case has which stages stands at the end.
 
 Board drop: geometry -> reflow -> surface -> solder_mesh -> shock -> report. Scenes of solder alone (their reflow is in
-`scene_stages.py`): reflow -> report. Structures (`structure_stages.py`): geometry -> shock ->
+`scene_stages.py`): reflow -> report. Structures (`structure/stages.py`): geometry -> shock ->
 comparison -> report.
 
 Each reads products of earlier stages from ``run.folder``, writes its own into ``folder``, and returns what it found.
@@ -17,8 +17,8 @@ from workflow.products import read_json, write_json
 from workflow.progress import progress_bar
 from workflow.scene_stages import REFLOW_SCENES
 from workflow.stage_runner import Findings, Run, StageFunction
-from workflow.structure_case import StructureCase
-from workflow.structure_stages import STRUCTURE_STAGES
+from workflow.structure.case import StructureCase
+from workflow.structure.stages import STRUCTURE_STAGES
 
 
 def geometry(run: Run[BoardDropCase], folder: Path) -> Findings:

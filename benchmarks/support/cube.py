@@ -3,8 +3,8 @@
 import numpy as np
 
 from fem.box_step import diagonal_tetrahedra
-from fem.element import Elements
-from fem.material_parameters import Isotropic, JohnsonCook, Material
+from fem.elements.element import Elements
+from fem.materials.parameters import Isotropic, JohnsonCook, Material
 from fem.mesh import MeshData
 from tests.support.fem_elements import KINDS, with_middles
 from tests.support.fem_elements import elements_of as material_elements

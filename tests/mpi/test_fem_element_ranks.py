@@ -16,7 +16,7 @@ from fem.energy import Energy
 from fem.fields import Fields
 from fem.loads import half_sine_drop
 from fem.local_mesh import distribute
-from fem.material_roles import Materials
+from fem.materials.roles import Materials
 from fem.mesh import MeshData
 from fem.motion import Motion
 from fem.scene import prepare

@@ -15,7 +15,7 @@ from fem.loads import half_sine_drop
 from fem.local_mesh import distribute
 from fem.mesh import append
 from fem.modal import natural_modes
-from fem.material_roles import Materials
+from fem.materials.roles import Materials
 from fem.scene import prepare
 from tests.support.fem_models import small_assembly
 

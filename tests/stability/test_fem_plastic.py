@@ -5,8 +5,8 @@ import pytest
 
 from fem.body import Body, Response
 from fem.errors import InvertedElementError
-from fem.material_library import FR4
-from fem.material_parameters import Isotropic, JohnsonCook
+from fem.materials.library import FR4
+from fem.materials.parameters import Isotropic, JohnsonCook
 from fem.mesh import MeshData
 from fem.motion import Motion
 from tests.support.fem_bodies import motion_of

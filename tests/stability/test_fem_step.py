@@ -10,8 +10,8 @@ from fem.errors import EnergyError
 from fem.estimate import WindowPlan, damped_critical_step
 from fem.ledger import Ledger, ledger_sums
 from fem.loads import BodyAcceleration, Load
-from fem.material_parameters import Isotropic
-from fem.material_roles import Materials
+from fem.materials.parameters import Isotropic
+from fem.materials.roles import Materials
 from fem.mesh import MeshData
 from fem.motion import Motion
 from fem.participant import Alone, uncut_motion

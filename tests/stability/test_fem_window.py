@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from fem.errors import CutError
-from fem.material_library import SAC405, SILICON
-from fem.material_parameters import Isotropic
-from fem.material_roles import Materials
+from fem.materials.library import SAC405, SILICON
+from fem.materials.parameters import Isotropic
+from fem.materials.roles import Materials
 from fem.mesh import MeshData, append, merge_nodes
 from fem.scene import prepare
 from tests.support.fem_models import grid, joint_mesh, mesh_of, on

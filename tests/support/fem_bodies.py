@@ -5,9 +5,9 @@ from mpi4py import MPI
 
 from fem.body import Body, Pieces, make_body, make_pieces
 from fem.local_mesh import distribute
-from fem.material_library import FR4
-from fem.material_parameters import Isotropic
-from fem.material_roles import Materials
+from fem.materials.library import FR4
+from fem.materials.parameters import Isotropic
+from fem.materials.roles import Materials
 from fem.mesh import MeshData
 from fem.motion import Motion
 from fem.scene import Tables, prepare

@@ -7,11 +7,11 @@ import scipy.sparse
 from scipy.sparse.linalg import eigsh, splu
 
 from fem.box_step import diagonal_tetrahedra
-from fem.element import Elements, element_geometry, element_kind, element_stiffness, lumped_mass
-from fem.element_kind import ElementKind
-from fem.element_tetrahedron import EDGES
-from fem.material_parameters import Material
-from fem.materials import elasticity_matrix
+from fem.elements.element import Elements, element_geometry, element_kind, element_stiffness, lumped_mass
+from fem.elements.kind import ElementKind
+from fem.elements.tetrahedron import EDGES
+from fem.materials.elasticity import elasticity_matrix
+from fem.materials.parameters import Material
 from tests.support.fem_models import grid
 
 KINDS = {

@@ -6,7 +6,7 @@ from pathlib import Path
 import gmsh
 import numpy as np
 
-from fem.cell_shape import TENSOR_ORDER
+from fem.elements.cell_shape import TENSOR_ORDER
 from fem.mesh import MeshData, append, boundary_facets, without_unused_nodes
 
 CYCLIC = [0, 1, 3, 2]

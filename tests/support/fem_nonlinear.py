@@ -5,13 +5,13 @@ from mpi4py import MPI
 from scipy.linalg import polar
 
 from fem.body import Body, Response, make_body, make_pieces
-from fem.element import Elements
+from fem.elements.element import Elements
 from fem.force_nonlinear import NonlinearElements
-from fem.kernels_hexahedron import GAUSS, shape_derivatives
-from fem.kernels_nonlinear import Path
-from fem.kernels_plasticity import plastic_constants, plastic_increment
+from fem.kernels.hexahedron import GAUSS, shape_derivatives
+from fem.kernels.nonlinear import Path
+from fem.kernels.plasticity import plastic_constants, plastic_increment
 from fem.local_mesh import distribute
-from fem.material_parameters import Isotropic, JohnsonCook, Material
+from fem.materials.parameters import Isotropic, JohnsonCook, Material
 from fem.mesh import MeshData
 from fem.scene import prepare
 from fem.strain import strain_matrix

@@ -10,7 +10,7 @@ from fem.estimate import WindowPlan, window_plan
 from fem.exchange import CutChannels
 from fem.loads import Load
 from fem.local_mesh import distribute
-from fem.material_roles import Materials
+from fem.materials.roles import Materials
 from fem.mesh import MeshData
 from fem.participant import Macro, Meso
 from fem.scene import Tables, prepare

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from fem.element import Elements, element_geometry
+from fem.elements.element import Elements, element_geometry
 from fem.force import force_terms
-from fem.material_library import FR4, SAC405
-from fem.material_parameters import Isotropic
-from fem.materials import elasticity_matrix
+from fem.materials.elasticity import elasticity_matrix
+from fem.materials.library import FR4, SAC405
+from fem.materials.parameters import Isotropic
 from fem.stress import element_stress
 from tests.support.fem_bodies import dense_stiffness, dns_body
 from tests.support.fem_models import bar, grid, mesh_of, on

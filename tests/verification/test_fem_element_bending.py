@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from fem.element_kind import ElementKind
+from fem.elements.kind import ElementKind
 from fem.facet import area_vectors
-from fem.material_library import FR4
-from fem.material_parameters import Isotropic, Material
+from fem.materials.library import FR4
+from fem.materials.parameters import Isotropic, Material
 from fem.mesh import boundary_facets
 from fem.mesh_quality import scaled_jacobians
 from tests.support.fem_elements import KINDS, box, elements_of, frequencies, solve

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from fem.element import Elements, element_kind
-from fem.element_one_point import ONE_POINT, hourglass_control
+from fem.elements.element import Elements, element_kind
+from fem.elements.one_point import ONE_POINT, hourglass_control
 from fem.force import force_terms
-from fem.material_library import FR4
-from fem.materials import elasticity_matrix
+from fem.materials.elasticity import elasticity_matrix
+from fem.materials.library import FR4
 from tests.support.fem_models import grid
 
 RANDOM = np.random.default_rng(5)

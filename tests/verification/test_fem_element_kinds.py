@@ -5,11 +5,11 @@ import pytest
 import scipy.sparse
 from scipy.sparse.linalg import eigsh
 
-from fem.element import Elements, critical_steps, element_geometry
+from fem.elements.element import Elements, critical_steps, element_geometry
 from fem.facet import area_vectors
 from fem.force import linear_terms
-from fem.material_library import FR4, SAC405
-from fem.material_parameters import Isotropic
+from fem.materials.library import FR4, SAC405
+from fem.materials.parameters import Isotropic
 from fem.mesh import boundary_facets
 from fem.mesh_quality import scaled_jacobians
 from fem.stress import element_stress, mean_strain

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fem.structure import run_structure
+from fem.structure.run import run_structure
 from tests.support.fem_elements import KINDS, box
 from tests.support.fem_models import mesh_of, on
 from tests.support.fem_structures import LENGTH, THICKNESS, WIDTH, structure_input, structure_tables_of

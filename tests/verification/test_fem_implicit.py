@@ -10,7 +10,7 @@ from fem.body import Body
 from fem.errors import AgreedError
 from fem.implicit import ImplicitMotion
 from fem.loads import half_sine_drop
-from fem.material_roles import Materials
+from fem.materials.roles import Materials
 from fem.mesh import append
 from tests.support.fem_bodies import STEEL, dns_body, motion_of
 from tests.support.fem_models import board_mesh, grid, mesh_of, small_assembly

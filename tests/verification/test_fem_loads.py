@@ -9,7 +9,7 @@ from fem.damping import RayleighDamping
 from fem.estimate import damped_critical_step
 from fem.facet_areas import outward_areas
 from fem.loads import BodyAcceleration, LargeMass, Load, NodalForces, PrescribedMotion
-from fem.material_parameters import Isotropic
+from fem.materials.parameters import Isotropic
 from fem.mesh import MeshData
 from fem.motion import Motion
 from fem.parameters import Damping

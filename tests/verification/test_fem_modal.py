@@ -7,7 +7,7 @@ from mpi4py import MPI
 from fem import modal
 from fem.body import Body
 from fem.global_matrix import Equations
-from fem.material_library import FR4
+from fem.materials.library import FR4
 from fem.modal import natural_modes
 from tests.support.fem_bodies import STEEL, dns_body
 from tests.support.fem_models import bar, grid, mesh_of

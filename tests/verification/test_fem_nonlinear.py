@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from fem.element import critical_steps, element_geometry
+from fem.elements.element import critical_steps, element_geometry
 from fem.force_nonlinear import NonlinearElements
-from fem.material_library import FR4
-from fem.material_parameters import Isotropic, JohnsonCook, Material
+from fem.materials.library import FR4
+from fem.materials.parameters import Isotropic, JohnsonCook, Material
 from fem.stress import symmetric
 from tests.support.fem_elements import KINDS, box, elements_of, mass_of
 from tests.support.fem_nonlinear import LINEAR_HARDENING, SOLDER, force_of, nonlinear

@@ -9,7 +9,7 @@ from mpi4py import MPI
 
 from fem.compare_structures import solver_differences
 from fem.mesh import MeshData
-from fem.structure import run_structure
+from fem.structure.run import run_structure
 from tests.support.fem_models import grid, mesh_of, on
 from tests.support.fem_structures import structure_input
 

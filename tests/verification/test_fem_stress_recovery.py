@@ -5,9 +5,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from fem.body import Response
-from fem.material_library import FR4
-from fem.material_parameters import Isotropic
-from fem.materials import elasticity_matrix
+from fem.materials.elasticity import elasticity_matrix
+from fem.materials.library import FR4
+from fem.materials.parameters import Isotropic
 from fem.stress import symmetric
 from fem.stress_recovery import StressRecovery
 from tests.support.fem_bodies import motion_of

@@ -9,8 +9,8 @@ from mpi4py import MPI
 from fem.damping import RayleighDamping
 from fem.facet_areas import outward_areas
 from fem.loads import BodyAcceleration, LargeMass, Load, NodalForces, PrescribedMotion
-from fem.material_parameters import Isotropic
-from fem.material_roles import Materials
+from fem.materials.parameters import Isotropic
+from fem.materials.roles import Materials
 from fem.mesh import MeshData
 from fem.pulse import HalfSine, Tabulated
 from tests.support.fem_bodies import STEEL, dns_body, motion_of

@@ -5,8 +5,8 @@ import pytest
 
 from fem.ledger import Ledger, ledger_sums
 from fem.loads import half_sine_drop
-from fem.material_library import SAC405
-from fem.material_roles import Materials
+from fem.materials.library import SAC405
+from fem.materials.roles import Materials
 from fem.mesh import MeshData, append
 from tests.support.fem_bodies import dns_body, motion_of
 from tests.support.fem_models import board_mesh, small_assembly

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from fem.material_parameters import Isotropic
-from fem.materials import elasticity_matrix
-from workflow import exact_bar, exact_cantilever
+from fem.materials.elasticity import elasticity_matrix
+from fem.materials.parameters import Isotropic
+from workflow.structure import exact_bar, exact_cantilever
 
 BARS = exact_bar.Bars((0.1, 0.1), (70e9, 200e9), (2700.0, 8000.0), 8e-6)
 HEIGHTS = [0.03, 0.05, 0.15]

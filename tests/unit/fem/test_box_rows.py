@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from fem.box_rows import BoxRows
-from fem.element import Elements, element_kind, element_stiffness
+from fem.elements.element import Elements, element_kind, element_stiffness
 from fem.force_congruent import CongruentElements
-from fem.kernels_box_rows import LONGEST
-from fem.material_library import FR4, SAC405
-from fem.materials import elasticity_matrix
+from fem.kernels.box_rows import LONGEST
+from fem.materials.elasticity import elasticity_matrix
+from fem.materials.library import FR4, SAC405
 from tests.support.fem_models import grid
 
 MATERIALS = np.array([elasticity_matrix(FR4), elasticity_matrix(SAC405)])

@@ -6,15 +6,15 @@ import pytest
 from mpi4py import MPI
 
 from fem.body import make_body, make_pieces
-from fem.cell_shape import HEXAHEDRON, TETRAHEDRON, TETRAHEDRON_QUADRATIC
-from fem.element_tetrahedron import EDGES
+from fem.elements.cell_shape import HEXAHEDRON, TETRAHEDRON, TETRAHEDRON_QUADRATIC
+from fem.elements.tetrahedron import EDGES
 from fem.errors import MeshError
 from fem.facet import area_vectors
 from fem.facet_areas import outward_areas
 from fem.fields import Fields
-from fem.kernels_hexahedron import SIDES
+from fem.kernels.hexahedron import SIDES
 from fem.local_mesh import distribute
-from fem.material_roles import Materials
+from fem.materials.roles import Materials
 from fem.mesh import append, boundary_facets, cells_of_facets
 from fem.mesh_file import read_mesh
 from fem.mesh_quality import scaled_jacobians

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from fem.element import Elements, critical_steps, element_geometry, element_kind, element_stiffness
-from fem.element_hexahedron import HEXAHEDRON
-from fem.element_one_point import ONE_POINT, OnePoint, hourglass_control
-from fem.element_tetrahedron import EDGES, TETRAHEDRON, TETRAHEDRON_QUADRATIC
+from fem.elements.element import Elements, critical_steps, element_geometry, element_kind, element_stiffness
+from fem.elements.hexahedron import HEXAHEDRON
+from fem.elements.one_point import ONE_POINT, OnePoint, hourglass_control
+from fem.elements.tetrahedron import EDGES, TETRAHEDRON, TETRAHEDRON_QUADRATIC
 from fem.errors import MeshError
-from fem.kernels_hexahedron import SIDES
-from fem.material_library import FR4, SAC405
-from fem.materials import elasticity_matrix
+from fem.kernels.hexahedron import SIDES
+from fem.materials.elasticity import elasticity_matrix
+from fem.materials.library import FR4, SAC405
 
 RANDOM = np.random.default_rng(11)
 KINDS = [HEXAHEDRON, ONE_POINT, TETRAHEDRON, TETRAHEDRON_QUADRATIC]

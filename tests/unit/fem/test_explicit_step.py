@@ -7,8 +7,8 @@ from mpi4py import MPI
 from fem.errors import StepError
 from fem.ledger import Ledger
 from fem.march import GUARD
-from fem.structure import run_structure
-from fem.structure_model import build_structure
+from fem.structure.model import build_structure
+from fem.structure.run import run_structure
 from tests.support.fem_structures import structure_input
 
 

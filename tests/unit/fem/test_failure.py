@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from fem.failure import failed_joints, failure_criteria, judge, worst
-from fem.material_effects import failure_effect, material_effects
-from fem.material_library import SAC305, SILICON, SNPB
-from fem.material_roles import Materials
+from fem.materials.effects import failure_effect, material_effects
+from fem.materials.failure import failed_joints, failure_criteria, judge, worst
+from fem.materials.library import SAC305, SILICON, SNPB
+from fem.materials.roles import Materials
 from fem.parameters import Failure
 
 HISTORY = {

@@ -7,7 +7,7 @@ from fem.body import Body
 from fem.errors import AgreedError
 from fem.factorisation import Factorisation
 from fem.global_matrix import Equations
-from fem.material_roles import Materials
+from fem.materials.roles import Materials
 from fem.mesh import append
 from tests.support.fem_bodies import STEEL, dense_stiffness, dns_body
 from tests.support.fem_models import bar, small_assembly

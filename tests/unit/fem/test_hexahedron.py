@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from fem.element import Elements, critical_steps, element_geometry, element_stiffness, lumped_mass
+from fem.elements.element import Elements, critical_steps, element_geometry, element_stiffness, lumped_mass
 from fem.errors import MeshError
 from fem.estimate import box_critical_step
 from fem.force_assembled import AssembledElements
 from fem.force_congruent import CongruentElements, is_box, parity_blocks
-from fem.kernels_hexahedron import GAUSS, SIDES, shape_derivatives
-from fem.material_library import COPPER, FR4, SAC405, SILICON
-from fem.materials import elasticity_matrix
+from fem.kernels.hexahedron import GAUSS, SIDES, shape_derivatives
+from fem.materials.elasticity import elasticity_matrix
+from fem.materials.library import COPPER, FR4, SAC405, SILICON
 from tests.support.fem_models import grid
 
 RANDOM = np.random.default_rng(7)

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from fem.material_library import FR4, SAC405
-from fem.material_parameters import GeneralOrthotropic, JohnsonCook
-from fem.materials import elasticity_matrix
+from fem.materials.elasticity import elasticity_matrix
+from fem.materials.library import FR4, SAC405
+from fem.materials.parameters import GeneralOrthotropic, JohnsonCook
 
 RANDOM = np.random.default_rng(5)
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fem.exchange import rank_order
-from fem.kernels_motion import STRIP, advance, sum_in_rank_order
+from fem.kernels.motion import STRIP, advance, sum_in_rank_order
 
 
 @pytest.mark.parametrize("count", [1, 2, STRIP // 3, STRIP // 3 + 1, STRIP + 5])

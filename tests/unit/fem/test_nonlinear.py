@@ -6,13 +6,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fem.element_one_point import hourglass_control
+from fem.elements.one_point import hourglass_control
 from fem.errors import InvertedElementError
 from fem.force import force_terms, linear_terms
 from fem.force_nonlinear import NonlinearElements
-from fem.kernels_nonlinear import Path
-from fem.kernels_plasticity import yield_stress
-from fem.material_library import FR4
+from fem.kernels.nonlinear import Path
+from fem.kernels.plasticity import yield_stress
+from fem.materials.library import FR4
 from fem.nonlinear_blocks import TEN_NODES, elastic_constants
 from fem.stress import von_mises
 from tests.support.fem_elements import KINDS, box, elements_of

@@ -10,10 +10,10 @@ from fem.errors import EnergyError
 from fem.estimate import BOARD_ADVANTAGE, implicit_plan, largest_implicit_step, predict_seconds, window_plan
 from fem.ledger import SUMS, Ledger
 from fem.loads import half_sine_drop
-from fem.material_library import COPPER, FR4, SILICON
-from fem.material_parameters import Isotropic, Orthotropic
-from fem.material_roles import Materials
-from fem.materials import elasticity_matrix, material_of_part, role_of_part, wave_speeds
+from fem.materials.elasticity import elasticity_matrix, material_of_part, role_of_part, wave_speeds
+from fem.materials.library import COPPER, FR4, SILICON
+from fem.materials.parameters import Isotropic, Orthotropic
+from fem.materials.roles import Materials
 from fem.mesh import append
 from fem.stress import principal_strain, von_mises
 from fem.watch_table import centre_nodes, footprint, joint_names, watch_table

@@ -4,7 +4,7 @@ import pytest
 
 from fem.factor_cost import box_factor
 from fem.solver_cost import forecast_solvers, plate_nodes
-from fem.structure_parameters import StructureScene
+from fem.structure.parameters import StructureScene
 from tests.support.fem_structures import structure_tables_of
 
 # Unknowns of three MUMPS factorisations by benchmarks/jedec_oracle.py: operations, entries.

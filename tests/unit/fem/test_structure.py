@@ -12,10 +12,10 @@ from fem.errors import AgreedError, EnergyError
 from fem.follower_pressure import FollowerPressure
 from fem.loads import NodalForces
 from fem.program import main
-from fem.structure import run_structure
-from fem.structure_loads import structure_loads
-from fem.structure_model import build_structure
-from fem.structure_pulses import pulses_of
+from fem.structure.loads import structure_loads
+from fem.structure.model import build_structure
+from fem.structure.pulses import pulses_of
+from fem.structure.run import run_structure
 from tests.support.fem_structures import (
     LENGTH,
     STEEL,

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from fem.body import warm_up
-from fem.element import Elements
+from fem.elements.element import Elements
 from fem.force import force_terms
-from fem.material_library import SAC305
-from fem.materials import elasticity_matrix
+from fem.materials.elasticity import elasticity_matrix
+from fem.materials.library import SAC305
 from tests.support.fem_models import grid
 
 

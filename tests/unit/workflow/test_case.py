@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from fem.material_library import SAC305
+from fem.materials.library import SAC305
 from tests.support.workflow_command import SMALL_CASE
 from workflow.case import available_cores, display_values, read_case
 from workflow.problems import CaseError

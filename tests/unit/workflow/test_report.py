@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from fem.failure import failure_criteria, judge
+from fem.materials.failure import failure_criteria, judge
 from fem.parameters import Failure
 from workflow import report_body
 from workflow import report_tables as tables

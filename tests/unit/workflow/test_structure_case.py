@@ -11,7 +11,7 @@ from workflow.case_text import case_text, templates
 from workflow.inputs import compare, stage_inputs
 from workflow.problems import CaseError
 from workflow.schema import case_schema
-from workflow.structure_forecast import forecast_structure
+from workflow.structure.forecast import forecast_structure
 
 BOARD = Path(__file__).resolve().parents[2] / "pipeline" / "structure.toml"
 FINITE = ["dynamics.solver=explicit", "dynamics.kinematics=finite"]

@@ -1,0 +1,87 @@
+"""The 8-node hexahedron with one-point strain and stiffness hourglass control.
+
+A nodal field is its affine part with the mean gradient plus the rest, the hourglass part P u. The mean strain gives
+V B^T C B; the hourglass part is resisted by the incompatible-modes stiffness restricted to it, K_h = P^T K P. Because K
+passes the patch test, its affine and hourglass parts do not couple, so that coefficient 1 gives K back exactly, on any
+shape: linear bodies lose nothing, and non-linear ones need the material law at one point only.
+Modes as in Flanagan & Belytschko, IJNME 17 (1981), with mean gradients; their amplitudes are q = gamma^T u.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem.elements.hexahedron import HEXAHEDRON
+from fem.elements.kind import Geometry
+from fem.kernels.hexahedron import SIDES
+from fem.strain import strain_matrix
+
+HOURGLASS = np.column_stack([SIDES[:, 1] * SIDES[:, 2], SIDES[:, 2] * SIDES[:, 0], SIDES[:, 0] * SIDES[:, 1]])
+HOURGLASS = np.column_stack([HOURGLASS, SIDES.prod(axis=1)]) / np.sqrt(8.0)
+
+
+@dataclass(frozen=True, slots=True)
+class OnePoint:
+    """One-point hexahedron.
+
+    Attributes:
+        coefficient: Factor on the hourglass stiffness; 1 gives the incompatible-modes element in linear problems.
+    """
+
+    coefficient: float = 1.0
+    name: str = "one_point"
+    nodes: int = 8
+    hourglass: bool = True
+
+    def geometry(self, corners: NDArray[np.float64]) -> Geometry:
+        """Integrate as ``IncompatibleModes`` does: the mean gradients are exact volume averages."""
+        return HEXAHEDRON.geometry(corners)
+
+    def stiffness(
+        self, corners: NDArray[np.float64], elasticity: NDArray[np.float64], material: NDArray[np.int32]
+    ) -> NDArray[np.float64]:
+        """Return mean plus hourglass stiffness ``(ne, 24, 24)`` [N/m]."""
+        geometry = HEXAHEDRON.geometry(corners)
+        mean = strain_matrix(geometry.gradient)
+        weighted = geometry.volume[:, None, None] * elasticity[material]
+        gamma, resistance = hourglass_control(corners, elasticity, material)
+        return mean.transpose(0, 2, 1) @ weighted @ mean + self.coefficient * transformed(gamma, resistance)
+
+
+def hourglass_control(
+    corners: NDArray[np.float64], elasticity: NDArray[np.float64], material: NDArray[np.int32]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the hourglass modes of hexahedra and their stiffness.
+
+    Args:
+        corners: ``(ne, 8, 3)`` [m].
+        elasticity: ``(nm, 6, 6)`` [Pa].
+        material: ``(ne,)`` index into ``elasticity``.
+
+    Returns:
+        gamma ``(ne, 8, 4)``, orthogonal to affine fields: amplitudes ``q_ki = sum_a gamma_ak u_ai``; and the symmetric
+        stiffness ``(ne, 12, 12)`` [N/m] on them, index 3k + i. Force of a node: ``f_ai = sum_k gamma_ak (H q)_ki``.
+    """
+    gradient = HEXAHEDRON.geometry(corners).gradient
+    gamma = HOURGLASS - gradient @ (corners.transpose(0, 2, 1) @ HOURGLASS)
+    centred = corners - corners.mean(axis=1, keepdims=True)
+    shape = HOURGLASS - centred @ (gradient.transpose(0, 2, 1) @ HOURGLASS)
+    dual = shape @ np.linalg.inv(gamma.transpose(0, 2, 1) @ shape)
+    stiffness = HEXAHEDRON.stiffness(corners, elasticity, material)
+    return gamma, transformed(dual.transpose(0, 2, 1), stiffness)
+
+
+def transformed(left: NDArray[np.float64], matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return (left x 1) matrix (left x 1)^T for vectors of three components per row: ``(ne, 3m, 3m)``.
+
+    Args:
+        left: ``(ne, m, n)``.
+        matrix: ``(ne, 3n, 3n)``.
+    """
+    count, rows, columns = left.shape
+    wide = np.einsum("emn,ij->eminj", left, np.eye(3)).reshape(count, 3 * rows, 3 * columns)
+    return wide @ matrix @ wide.transpose(0, 2, 1)
+
+
+ONE_POINT = OnePoint()

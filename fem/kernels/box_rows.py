@@ -1,0 +1,129 @@
+"""Numba kernels of the internal force of rows of equal boxes, vectorised along the row; see ``force_congruent``.
+
+A row is a run of boxes between four lines of nodes. Lines are stored component by component, so that the lanes of a
+vector are consecutive nodes of a line. With k the parity across the row (bit 0: second direction, bit 1: third), the
+Walsh-Hadamard transform over the four lines gives face values t_k at each node, and the boxes of a row couple only
+neighbours: with s = t_left + t_right, d = t_left - t_right and t itself, even and odd blocks E and O of parity k along
+the row give, at an inner node (components 0, 1, 2 have face parity k, k XOR 1, k XOR 2),
+
+    f_0 = (O_00 - E_00) s_0 + 2 (O_00 + E_00) t_0 + (O_01 - E_01) d_1 + (O_02 - E_02) d_2
+    f_i = sum over j = 1, 2 of (E_ij - O_ij) s_j + 2 (E_ij + O_ij) t_j  -  (O_0i - E_0i) d_0
+
+The two ends have one box only. The parts of the kernel are inlined before compilation: views of arrays passed to a
+compiled function would be counted as references at each call.
+"""
+
+import numpy as np
+from numba import njit
+
+from fem.kernels.hexahedron import FINITE
+
+LONGEST = 128  # boxes of a row: what a row works with stays in the fastest cache
+LANES = 8  # of a vector; loops run over whole vectors, and past the end of a line
+PAD = 2 * LANES  # positions that may be read after the last line
+FIRST = LANES - 1  # column of lane 0: lane 1, where inner nodes begin, is aligned
+COLUMNS = LONGEST + 3 * LANES
+
+
+@njit(cache=True)
+def read_lines(nodes, axes, values, lines):
+    """Copy ``values (n, 3)`` at ``nodes (p,)`` into ``lines (3, >= p)``, components in the order of ``axes``."""
+    x, y, z = axes[0], axes[1], axes[2]
+    for p in range(len(nodes)):
+        node = nodes[p]
+        lines[0, p] = values[node, x]
+        lines[1, p] = values[node, y]
+        lines[2, p] = values[node, z]
+
+
+@njit(cache=True)
+def subtract_lines(nodes, axes, lines, values):
+    """Subtract lines from the rows of ``values (n, 3)`` at ``nodes (p,)``, and zero them."""
+    x, y, z = axes[0], axes[1], axes[2]
+    for p in range(len(nodes)):
+        node = nodes[p]
+        values[node, x] -= lines[0, p]
+        values[node, y] -= lines[1, p]
+        values[node, z] -= lines[2, p]
+        lines[0, p] = lines[1, p] = lines[2, p] = 0.0
+
+
+@njit(inline="always")
+def transform_lines(line, starts, count, faces):
+    """Write the transform of one component ``line (p,)`` over the four lines of a row: ``faces (4, .)``."""
+    a, b = line[starts[0] : starts[0] + count], line[starts[1] : starts[1] + count]
+    c, d = line[starts[2] : starts[2] + count], line[starts[3] : starts[3] + count]
+    t0, t1, t2, t3 = faces[0, FIRST:], faces[1, FIRST:], faces[2, FIRST:], faces[3, FIRST:]
+    for i in range(count):
+        p, q, r, s = a[i] + b[i], a[i] - b[i], c[i] + d[i], c[i] - d[i]
+        t0[i], t1[i], t2[i], t3[i] = p + r, q + s, p - r, q - s
+
+
+@njit(inline="always")
+def add_transform(faces, starts, count, line):
+    """Add the transform of ``faces (4, .)`` to one component of the four lines of a row."""
+    a, b = line[starts[0] : starts[0] + count], line[starts[1] : starts[1] + count]
+    c, d = line[starts[2] : starts[2] + count], line[starts[3] : starts[3] + count]
+    t0, t1, t2, t3 = faces[0, FIRST:], faces[1, FIRST:], faces[2, FIRST:], faces[3, FIRST:]
+    for i in range(count):
+        p, q, r, s = t0[i] + t1[i], t0[i] - t1[i], t2[i] + t3[i], t2[i] - t3[i]
+        a[i] += p + r
+        b[i] += q + s
+        c[i] += p - r
+        d[i] += q - s
+
+
+@njit(inline="always")
+def couple_inner(pair, k, count, faces, forces):
+    """Write the face forces of parity k at the inner nodes of a row: lanes 1 to at least ``count - 1``."""
+    e, o = pair[0], pair[1]
+    x, y, z = faces[0, k, FIRST:], faces[1, k ^ 1, FIRST:], faces[2, k ^ 2, FIRST:]
+    fx, fy, fz = forces[0, k, LANES:], forces[1, k ^ 1, LANES:], forces[2, k ^ 2, LANES:]
+    xx, xy, xz, yy, yz, zz = o[0] - e[0], o[1] - e[1], o[2] - e[2], e[3] - o[3], e[4] - o[4], e[5] - o[5]
+    own_x, own_y, own_yz, own_z = 2 * (o[0] + e[0]), 2 * (e[3] + o[3]), 2 * (e[4] + o[4]), 2 * (e[5] + o[5])
+    for i in range((count - 2 + LANES) // LANES * LANES):
+        sx, dx, tx = x[i] + x[i + 2], x[i] - x[i + 2], x[i + 1]
+        sy, dy, ty = y[i] + y[i + 2], y[i] - y[i + 2], y[i + 1]
+        sz, dz, tz = z[i] + z[i + 2], z[i] - z[i + 2], z[i + 1]
+        fx[i] = xx * sx + own_x * tx + xy * dy + xz * dz
+        fy[i] = yy * sy + own_y * ty + yz * sz + own_yz * tz - xy * dx
+        fz[i] = yz * sy + own_yz * ty + zz * sz + own_z * tz - xz * dx
+
+
+@njit(inline="always")
+def couple_ends(pair, k, count, faces, forces):
+    """Write the face forces of parity k at the two end nodes of a row, which only the first or last box has."""
+    e, o = pair[0], pair[1]
+    x, y, z = faces[0, k], faces[1, k ^ 1], faces[2, k ^ 2]
+    for end in range(2):
+        left = FIRST + end * (count - 1)
+        node, sign = FIRST + end * count, 1.0 - 2.0 * end
+        sx, sy, sz = x[left] + x[left + 1], y[left] + y[left + 1], z[left] + z[left + 1]
+        dx, dy, dz = x[left] - x[left + 1], y[left] - y[left + 1], z[left] - z[left + 1]
+        forces[0, k, node] = o[0] * sx + o[1] * dy + o[2] * dz + sign * (e[0] * dx + e[1] * sy + e[2] * sz)
+        forces[1, k ^ 1, node] = e[1] * dx + e[3] * sy + e[4] * sz + sign * (o[1] * sx + o[3] * dy + o[4] * dz)
+        forces[2, k ^ 2, node] = e[2] * dx + e[4] * sy + e[5] * sz + sign * (o[2] * sx + o[4] * dy + o[5] * dz)
+
+
+@njit(cache=True, fastmath=FINITE)
+def add_row_forces(rows, blocks, displacement, force):
+    """Add K u of rows of boxes.
+
+    Args:
+        rows: ``(nr, 6)`` int32: positions at which the four lines of a row begin (second direction first), number of
+            boxes, index into ``blocks``.
+        blocks: ``(ns, 8, 6)`` [N/m] per shape and parity, symmetric storage, divided by 8.
+        displacement: ``(3, >= p + PAD)`` [m] at the positions; finite in the padding.
+        force: The same [N], added to.
+    """
+    faces, forces = np.zeros((3, 4, COLUMNS)), np.zeros((3, 4, COLUMNS))
+    for r in range(len(rows)):
+        starts, count = rows[r, :4], rows[r, 4]
+        block = blocks[rows[r, 5]]
+        for c in range(3):
+            transform_lines(displacement[c], starts, (count + LANES) // LANES * LANES, faces[c])
+        for k in range(4):
+            couple_inner(block[2 * k : 2 * k + 2], k, count, faces, forces)
+            couple_ends(block[2 * k : 2 * k + 2], k, count, faces, forces)
+        for c in range(3):
+            add_transform(forces[c], starts, count + 1, force[c])

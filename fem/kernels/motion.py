@@ -1,0 +1,105 @@
+"""Numba kernels of a substep apart from the internal force: update, tie, packing of messages."""
+
+import numpy as np
+from numba import njit
+
+from fem.kernels.hexahedron import FINITE
+
+STRIP = 384  # degrees of freedom: whole nodes and whole vectors
+
+
+@njit(cache=True, fastmath=FINITE)
+def advance(state, mobility, acceleration, step):
+    """Take one step of central differences: v += dt (f / m + g), u += dt v, at free degrees of freedom.
+
+    The loop runs over strips of all components together, which fill vectors; g comes from a strip of its own.
+
+    Args:
+        state: ``(3, n, 3)``: displacement [m], velocity half a step back [m/s], force [N].
+        mobility: ``(n, 3)`` inverse mass [1/kg], zero where the velocity is prescribed.
+        acceleration: ``(3,)`` [m/s^2], of the body force.
+        step: dt [s].
+    """
+    flat, inverse = state.reshape(3, -1), mobility.reshape(-1)
+    kick = np.empty(STRIP)
+    for i in range(STRIP):
+        kick[i] = step * acceleration[i % 3]
+    for begin in range(0, len(inverse), STRIP):
+        end = min(begin + STRIP, len(inverse))
+        displacement, velocity, force = flat[0, begin:end], flat[1, begin:end], flat[2, begin:end]
+        factor = inverse[begin:end]
+        for i in range(end - begin):
+            new = velocity[i] + (step * factor[i] * force[i] + (kick[i] if factor[i] > 0.0 else 0.0))
+            velocity[i] = new
+            displacement[i] += step * new
+
+
+@njit(cache=True)
+def spread_to_slaves(slave, master, weight, values):
+    """Overwrite the slaves' rows with the weighted sum of their masters' rows."""
+    for i in range(len(slave)):
+        for c in range(3):
+            total = 0.0
+            for k in range(4):
+                total += weight[i, k] * values[master[i, k], c]
+            values[slave[i], c] = total
+
+
+@njit(cache=True)
+def gather_from_slaves(slave, master, weight, values):
+    """Add the slaves' rows to their masters' rows by the transposed weights, then zero them."""
+    for i in range(len(slave)):
+        row = slave[i]
+        for c in range(3):
+            for k in range(4):
+                values[master[i, k], c] += weight[i, k] * values[row, c]
+            values[row, c] = 0.0
+
+
+@njit(cache=True)
+def pack(values, rows, buffer):
+    """Copy rows of ``values (n, 3)`` into a message ``(m, 3)``."""
+    for i in range(len(rows)):
+        for c in range(3):
+            buffer[i, c] = values[rows[i], c]
+
+
+@njit(cache=True)
+def unpack(buffer, rows, values):
+    """Copy a message ``(m, 3)`` into rows of ``values (n, 3)``."""
+    for i in range(len(rows)):
+        for c in range(3):
+            values[rows[i], c] = buffer[i, c]
+
+
+@njit(cache=True)
+def sum_in_rank_order(rows, pointer, source, buffer, values):
+    """Replace each shared row by the sum over all its holders, in the order of their ranks.
+
+    The order makes the sums, and with them all copies of a node, equal to the last bit on all ranks.
+
+    Args:
+        rows: ``(m,)`` shared nodes.
+        pointer: ``(m + 1,)`` first entry of each row in ``source``.
+        source: Row of ``buffer`` to add, -1 for this rank's own part.
+        buffer: ``(k, 3)`` received parts.
+        values: ``(n, 3)``.
+    """
+    for i in range(len(rows)):
+        row = rows[i]
+        x = y = z = 0.0
+        for k in range(pointer[i], pointer[i + 1]):
+            part = source[k]
+            if part < 0:
+                x, y, z = x + values[row, 0], y + values[row, 1], z + values[row, 2]
+            else:
+                x, y, z = x + buffer[part, 0], y + buffer[part, 1], z + buffer[part, 2]
+        values[row, 0], values[row, 1], values[row, 2] = x, y, z
+
+
+@njit(cache=True)
+def add_impulse(rows, force, scale, impulse):
+    """Add scale times the force at some nodes to an impulse ``(len(rows), 3)``."""
+    for i in range(len(rows)):
+        for c in range(3):
+            impulse[i, c] += scale * force[rows[i], c]

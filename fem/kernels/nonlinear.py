@@ -1,0 +1,257 @@
+"""Numba kernels of one integration point of sixteen elements: strain increment, stress, nominal stress.
+
+Finite kinematics refer to the initial configuration. With F = R U (polar decomposition) the stress is kept in the frame
+that turns with R, as Flanagan & Taylor (CMAME 62, 1987) do; its rate is then the Green-Naghdi rate,
+s' = C : sym(U' U^-1), and axes of an orthotropic material turn with the body. R and U come from the whole deformation
+F, not from a sum of increments: U does not see a rotation, so that a rigid rotation of any size, in one step or many,
+gives no strain but round-off, and errors of rotation do not pile up. The increment over a step is taken at its middle
+(as Hughes & Winget, IJNME 15, 1980): sym((U_1 - U_0) ((U_0 + U_1) / 2)^-1). s is the Kirchhoff stress, whose work s : D
+per initial volume is that of the elastic energy s : C^-1 : s / 2; the nominal stress conjugate to F is P = R s U^-1.
+
+Slots of the workspace ``w`` and of the state, in units of lanes:
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from fem.kernels.lanes import (
+    LANE_OPTIONS,
+    LANES,
+    cofactor,
+    cofactor_symmetric,
+    determinant,
+    full,
+    nine,
+    put_nine,
+    put_six,
+    six,
+    times,
+)
+from fem.kernels.plasticity import plastic_increment
+
+DEFORMATION, ROTATION, INCREMENT, MISES, NOMINAL, WORK_SLOTS = (LANES * k for k in (0, 9, 18, 24, 25, 34))
+STRESS, STRETCH, PLASTIC, STATE_SLOTS = (LANES * k for k in (0, 6, 12, 13))
+POLAR_ITERATIONS = 40  # stretches of 1e6 need 25
+POLAR_CONVERGED = 1e-18  # squared change after which the next one is below rounding (quadratic convergence)
+
+
+class Path(NamedTuple):
+    """How a path is followed.
+
+    Attributes:
+        finite: Whether rotations and strains are finite.
+        step: dt [s], of laws that depend on the rate; infinity stands for slow.
+    """
+
+    finite: bool
+    step: float
+
+
+@njit(**LANE_OPTIONS)
+def small_increment(w, state):
+    """Take the strain increment from the displacement gradient; store the strain. Engineering shear."""
+    for lane in range(LANES):
+        h = nine(w, DEFORMATION + lane)
+        new = h[0], h[4], h[8], h[1] + h[3], h[5] + h[7], h[2] + h[6]
+        old = six(state, STRETCH + lane)
+        put_six(
+            w,
+            INCREMENT + lane,
+            (
+                new[0] - old[0],
+                new[1] - old[1],
+                new[2] - old[2],
+                new[3] - old[3],
+                new[4] - old[4],
+                new[5] - old[5],
+            ),
+        )
+        put_six(state, STRETCH + lane, new)
+
+
+@njit(**LANE_OPTIONS)
+def add_identity(w):
+    """Turn a displacement gradient into a deformation gradient."""
+    for lane in range(LANES):
+        w[DEFORMATION + lane] += 1.0
+        w[DEFORMATION + 4 * LANES + lane] += 1.0
+        w[DEFORMATION + 8 * LANES + lane] += 1.0
+
+
+@njit(**LANE_OPTIONS)
+def start_rotation(w):
+    """Let the iteration for R start from F; return how many lanes are turned inside out."""
+    inverted = 0.0
+    for lane in range(LANES):
+        f = nine(w, DEFORMATION + lane)
+        put_nine(w, ROTATION + lane, f)
+        inverted += 0.0 if determinant(f, cofactor(f)) > 0.0 else 1.0
+    return inverted
+
+
+@njit(**LANE_OPTIONS)
+def improve_rotation(w):
+    """Take one Newton step X -> (X + X^-T) / 2 towards the rotation (Higham 1986); return its squared size."""
+    change = 0.0
+    for lane in range(LANES):
+        x = nine(w, ROTATION + lane)
+        c = cofactor(x)
+        scale = 0.5 / determinant(x, c)
+        for k in range(9):
+            step = scale * c[k] - 0.5 * x[k]
+            change += step * step
+            w[ROTATION + LANES * k + lane] = x[k] + step
+    return change
+
+
+@njit(cache=True)
+def rotate(w):
+    """Write the rotation of the polar decomposition; return whether no lane is turned inside out."""
+    if start_rotation(w) > 0.0:
+        return False
+    for _ in range(POLAR_ITERATIONS):
+        if improve_rotation(w) < POLAR_CONVERGED:
+            break
+    return True
+
+
+@njit(**LANE_OPTIONS)
+def stretch_increment(w, state):
+    """Take the strain increment from the stretch before and now; store the stretch. Engineering shear."""
+    for lane in range(LANES):
+        u = stretch(nine(w, ROTATION + lane), nine(w, DEFORMATION + lane))
+        o = six(state, STRETCH + lane)
+        d = u[0] - o[0], u[1] - o[1], u[2] - o[2], u[3] - o[3], u[4] - o[4], u[5] - o[5]
+        m = (
+            0.5 * (u[0] + o[0]),
+            0.5 * (u[1] + o[1]),
+            0.5 * (u[2] + o[2]),
+            0.5 * (u[3] + o[3]),
+            0.5 * (u[4] + o[4]),
+            0.5 * (u[5] + o[5]),
+        )
+        c = cofactor_symmetric(m)
+        scale = 1.0 / (m[0] * c[0] + m[3] * c[3] + m[5] * c[5])
+        a = times(full(d), full(c))
+        put_six(
+            w,
+            INCREMENT + lane,
+            (
+                scale * a[0],
+                scale * a[4],
+                scale * a[8],
+                scale * (a[1] + a[3]),
+                scale * (a[5] + a[7]),
+                scale * (a[2] + a[6]),
+            ),
+        )
+        put_six(state, STRETCH + lane, u)
+
+
+@njit(**LANE_OPTIONS)
+def stretch(r, f):
+    """Return U = R^T F, made symmetric."""
+    return (
+        r[0] * f[0] + r[3] * f[3] + r[6] * f[6],
+        r[1] * f[1] + r[4] * f[4] + r[7] * f[7],
+        r[2] * f[2] + r[5] * f[5] + r[8] * f[8],
+        0.5 * (r[0] * f[1] + r[3] * f[4] + r[6] * f[7] + r[1] * f[0] + r[4] * f[3] + r[7] * f[6]),
+        0.5 * (r[1] * f[2] + r[4] * f[5] + r[7] * f[8] + r[2] * f[1] + r[5] * f[4] + r[8] * f[7]),
+        0.5 * (r[0] * f[2] + r[3] * f[5] + r[6] * f[8] + r[2] * f[0] + r[5] * f[3] + r[8] * f[6]),
+    )
+
+
+@njit(**LANE_OPTIONS)
+def elastic_stress(w, state, elastic):
+    """Add C times the strain increment to the stress; write its von Mises stress.
+
+    Args:
+        w: Workspace.
+        state: Of the point.
+        elastic: ``(9,)`` [Pa]: C_xx, C_yy, C_zz, C_xy, C_yz, C_xz (normal), G_xy, G_yz, G_xz.
+    """
+    for lane in range(LANES):
+        d = six(w, INCREMENT + lane)
+        s = six(state, STRESS + lane)
+        s = (
+            s[0] + elastic[0] * d[0] + elastic[3] * d[1] + elastic[5] * d[2],
+            s[1] + elastic[3] * d[0] + elastic[1] * d[1] + elastic[4] * d[2],
+            s[2] + elastic[5] * d[0] + elastic[4] * d[1] + elastic[2] * d[2],
+            s[3] + elastic[6] * d[3],
+            s[4] + elastic[7] * d[4],
+            s[5] + elastic[8] * d[5],
+        )
+        put_six(state, STRESS + lane, s)
+        x, y, z = s[0] - s[1], s[1] - s[2], s[2] - s[0]
+        square = 0.5 * (x * x + y * y + z * z) + 3.0 * (s[3] * s[3] + s[4] * s[4] + s[5] * s[5])
+        w[MISES + lane] = np.sqrt(square)
+
+
+@njit(cache=True, error_model="numpy")
+def plastic_flow(w, state, law, weight, work):
+    """Return the stress to the yield surface where the elastic trial state lies outside (radial return).
+
+    Its von Mises stress is then that after the step.
+
+    Plastic work is the mean of the stress before and after the step times the plastic strain increment, as the elastic
+    energy s : C^-1 : s / 2 is integrated by the mean stress exactly: the sum of both is the work of the internal force.
+
+    Args:
+        w: Workspace.
+        state: Of the point, with the elastic trial stress.
+        law: Row of ``kernels.plasticity.plastic_constants``, whose first entry is 3 G, and the step dt [s].
+        weight: ``(16,)`` [m^3] volume of the point.
+        work: ``(16,)`` [J] plastic work, added to.
+    """
+    plastic, step = law
+    for lane in range(LANES):
+        trial = w[MISES + lane]
+        if trial <= plastic[1]:
+            continue
+        flow = plastic_increment(trial, state[PLASTIC + lane], plastic, step)
+        if flow == 0.0:
+            continue
+        mises = trial - plastic[0] * flow
+        mean_stress = trial - 0.5 * (plastic[0] * flow + mises_change(w, state, lane, plastic[0]))
+        work[lane] += weight[lane] * flow * mean_stress
+        pressure = (state[lane] + state[LANES + lane] + state[2 * LANES + lane]) / 3.0
+        for k in range(6):
+            mean = pressure if k < 3 else 0.0
+            at = STRESS + LANES * k + lane
+            state[at] = mean + (state[at] - mean) * mises / trial
+        state[PLASTIC + lane] += flow
+        w[MISES + lane] = mises
+
+
+@njit(cache=True, error_model="numpy")
+def mises_change(w, state, lane, stiffness):
+    """Return by how much the strain increment de raised the stress along the trial deviator s: 3 G s : de / |s|."""
+    x, y, z = state[lane], state[LANES + lane], state[2 * LANES + lane]
+    mean, total = (x + y + z) / 3.0, 0.0
+    for k in range(3):
+        total += (state[LANES * k + lane] - mean) * w[INCREMENT + LANES * k + lane]
+        total += state[LANES * (k + 3) + lane] * w[INCREMENT + LANES * (k + 3) + lane]
+    return stiffness * total / w[MISES + lane]
+
+
+@njit(**LANE_OPTIONS)
+def nominal_stress_small(w, state, weight):
+    """Write the stress times the weight of the point."""
+    for lane in range(LANES):
+        s = full(six(state, STRESS + lane))
+        for k in range(9):
+            w[NOMINAL + LANES * k + lane] = weight[lane] * s[k]
+
+
+@njit(**LANE_OPTIONS)
+def nominal_stress_finite(w, state, weight):
+    """Write the nominal stress P = R s U^-1 times the weight of the point."""
+    for lane in range(LANES):
+        u = six(state, STRETCH + lane)
+        c = cofactor_symmetric(u)
+        scale = weight[lane] / (u[0] * c[0] + u[3] * c[3] + u[5] * c[5])
+        p = times(nine(w, ROTATION + lane), times(full(six(state, STRESS + lane)), full(c)))
+        for k in range(9):
+            w[NOMINAL + LANES * k + lane] = scale * p[k]

@@ -1,0 +1,1 @@
+"""Materials: parameters, library, laws, failure."""

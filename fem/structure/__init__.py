@@ -1,0 +1,1 @@
+"""One structure: a box of layers under supports and loads."""

@@ -1,0 +1,1 @@
+"""Structures as a kind of case: stages, forecast, what their motion is compared with, report."""

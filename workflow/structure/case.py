@@ -1,0 +1,91 @@
+"""The case of a structure: a box of layers, held and loaded, whose motion is computed."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from pydantic import Field
+
+from fem.materials.parameters import Material
+from fem.structure.parameters import Dynamics, Structure, StructureLoad, StructureScene, Support, WatchPoint
+from meshing.box_plan import Box, BoxHoles, BoxLayer
+from workflow.case_kind import Case
+from workflow.problems import Problem
+from workflow.stage_table import STRUCTURE
+from workflow.structure.references import AnyReference, reference_problems
+
+
+class StructureCase(Case):
+    """A box of layers under supports and loads."""
+
+    kind = "structure"
+    pipeline = STRUCTURE
+    ranks_key = "dynamics.ranks"
+
+    structure: Structure
+    materials: dict[str, Material] = Field(default_factory=dict)
+    supports: dict[str, Support] = Field(default_factory=dict)
+    loads: dict[str, StructureLoad] = Field(default_factory=dict)
+    watch: dict[str, WatchPoint] = Field(default_factory=dict)
+    dynamics: Dynamics
+    references: dict[str, AnyReference] = Field(default_factory=dict)
+
+    @classmethod
+    def located(cls, table: dict, folder: Path) -> dict:
+        """Take the tables of loads as relative to the folder of the case file."""
+        loads = table.get("loads")
+        for load in loads.values() if isinstance(loads, dict) else ():
+            if isinstance(load, dict) and isinstance(load.get("table"), str):
+                load["table"] = str((folder / load["table"]).resolve())
+        return table
+
+    @property
+    def files(self) -> dict[str, Path]:
+        """Tables of loads."""
+        tables = {f"loads.{name}.table": load.table for name, load in self.loads.items()}
+        return {key: Path(table) for key, table in tables.items() if table is not None}
+
+    @property
+    def scene(self) -> StructureScene:
+        """All of it as the solver takes it."""
+        return StructureScene(**{name: getattr(self, name) for name in StructureScene.model_fields})
+
+    @property
+    def box(self) -> Box:
+        """The body as the mesher takes it."""
+        body = self.structure
+        layers = tuple(BoxLayer(name, layer.thickness, layer.cells) for name, layer in body.layers.items())
+        holes = BoxHoles(body.holes.spacing, body.holes.diameter) if body.holes else None
+        return Box((body.length, body.width), body.cells, layers, body.symmetry, body.element, holes)
+
+    def problems(self) -> list[Problem]:
+        """Find what does not fit together: materials, places, facet sets, loads, references."""
+        from fem.structure import checks as structure_checks
+        from meshing.box_checks import box_problems
+
+        boxes = [Problem(found.key, found.message, found.value, found.allowed) for found in box_problems(self.box)]
+        scenes = [
+            Problem(found.key, found.message, found.value, found.allowed, found.hint)
+            for found in structure_checks.problems(self.scene)
+        ]
+        found = [*boxes, *scenes, *self._unreadable_tables(), *reference_problems(self.references, self.scene)]
+        return found or self._impossible_steps()
+
+    def _impossible_steps(self) -> list[Problem]:
+        from workflow.structure.forecast import step_problems
+
+        return list(step_problems(self))
+
+    def _unreadable_tables(self) -> Iterator[Problem]:
+        from fem.errors import PulseError
+        from fem.structure.pulses import pulse_of
+
+        for key, path in self.files.items():
+            try:
+                pulse_of(self.loads[key.split(".")[1]])
+            except PulseError as error:
+                yield Problem(key, str(error), str(path))
+
+    @property
+    def ranks(self) -> int:
+        """MPI ranks of each solver."""
+        return self.dynamics.ranks

@@ -1,0 +1,127 @@
+"""What the stages of a structure found: its mesh, its motion against references, one solver against the other."""
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workflow.findings import at_least, at_most, in_words_continued, metric
+from workflow.stage_runner import Findings
+from workflow.structure import exact_bar, exact_cantilever
+from workflow.structure.case import StructureCase
+from workflow.structure.references import BarWave, Cantilever, FrequencyRange
+
+SOLVER_DIFFERENCE = 0.01  # of the histories of watch points, explicit against implicit, relative L2
+JUDGED = ("displacement_difference", "strain_difference")
+UNITS = {"wave_speed": "m/s", "tip_deflection": "m", "swing_frequency": "Hz"}
+
+Arrays = Mapping[str, NDArray]
+
+
+def of_mesh(elements: Mapping[str, int]) -> Findings:
+    """Say how many elements each layer has."""
+    counts = {f"elements_{layer}": metric(count) for layer, count in elements.items()}
+    return Findings(metrics=counts | {"elements": metric(sum(elements.values()))})
+
+
+def of_motion(results: Mapping[str, dict]) -> Findings:
+    """Judge the motion by what each solver says of itself in ``result.json``; the figures of the first one count."""
+    metrics: dict = {}
+    health: dict = {}
+    for solver, result in results.items():
+        prefix = "" if solver == next(iter(results)) else f"{solver}_"
+        metrics |= {prefix + name: value for name, value in result["metrics"].items()}
+        health |= {prefix + name: value for name, value in result["health"].items()}
+    effects = dict(next(iter(results.values()))["effects"])
+    return Findings(metrics, health, effects, in_words_continued(results))
+
+
+def of_comparison(case: StructureCase, folders: Mapping[str, Path]) -> Findings:
+    """Judge the motion by the references of the case, and two solvers by each other.
+
+    Args:
+        case: the case.
+        folders: folder of each solver's products, the one whose figures count first.
+    """
+    from fem.compare_structures import solver_differences
+
+    histories = {solver: read_history(folder) for solver, folder in folders.items()}
+    metrics: dict = {}
+    health: dict = {}
+    for solver, folder in folders.items():
+        prefix = "" if solver == next(iter(folders)) else f"{solver}_"
+        found, checks = compared_with_references(case, read_modes(folder), histories[solver])
+        metrics |= {prefix + name: value for name, value in found.items()}
+        health |= {prefix + name: value for name, value in checks.items()}
+    if len(folders) == 2:
+        differences = solver_differences(*histories.values())
+        metrics |= {name: metric(value) for name, value in differences.items()}
+        health |= {name: at_most(differences[name], SOLVER_DIFFERENCE) for name in JUDGED if name in differences}
+    return Findings(metrics, health)
+
+
+def read_history(folder: Path) -> dict[str, NDArray]:
+    """Read the history that a solver left."""
+    with np.load(folder / "history.npz") as arrays:
+        return dict(arrays)
+
+
+def read_modes(folder: Path) -> list[dict]:
+    """Read the natural modes that a solver left, lowest first; none where another solver has found them."""
+    path = folder / "modes.json"
+    return json.loads(path.read_text()) if path.exists() else []
+
+
+def compared_with_references(case: StructureCase, modes: list[dict], history: Arrays) -> tuple[dict, dict]:
+    """Return metrics and health checks of all references of a case, for one solver."""
+    metrics: dict = {}
+    health: dict = {}
+    for reference in case.references.values():
+        if isinstance(reference, BarWave):
+            found = exact_bar.measure(*_bar_wave(case, reference, history))
+            limits = {"wave_speed_error": reference.speed_limit} | dict.fromkeys(
+                ("transmitted_velocity_error", "reflected_velocity_error"), reference.amplitude_limit
+            )
+        elif isinstance(reference, Cantilever):
+            tip = history[f"displacement@{reference.tip}"][:, 2]
+            found = exact_cantilever.measure(strip_of(case, reference), history["time"], tip)
+            limits = dict.fromkeys(("tip_deflection_error", "swing_frequency_error"), reference.limit)
+        else:
+            health |= _in_range(reference, modes) if isinstance(reference, FrequencyRange) and modes else {}
+            continue
+        metrics |= {name: metric(value, UNITS.get(name.removesuffix("_exact"), "")) for name, value in found.items()}
+        health |= {name: at_most(abs(found[name]), limit) for name, limit in limits.items()}
+    return metrics, health
+
+
+def bars_of(case: StructureCase, reference: BarWave) -> exact_bar.Bars:
+    """Return the two layers as bars."""
+    from fem.materials.elasticity import elasticity_matrix
+
+    layers, materials = case.structure.layers.values(), case.scene.layer_materials.values()
+    lower, upper = (float(elasticity_matrix(material)[2, 2]) for material in materials)
+    below, above = (material.density for material in materials)
+    first, second = (layer.thickness for layer in layers)
+    return exact_bar.Bars((first, second), (lower, upper), (below, above), case.loads[reference.load].duration or 0.0)
+
+
+def strip_of(case: StructureCase, reference: Cantilever) -> exact_cantilever.Strip:
+    """Return the only layer as a strip."""
+    from fem.materials.elasticity import elasticity_matrix
+
+    (material,) = case.scene.layer_materials.values()
+    pressure, body = case.loads[reference.load].peak or 0.0, case.structure
+    return exact_cantilever.Strip(body.length, body.thickness, elasticity_matrix(material), material.density, pressure)
+
+
+def _bar_wave(case: StructureCase, reference: BarWave, history: Arrays) -> tuple:
+    points = [*reference.incident, reference.transmitted]
+    velocities = [history[f"velocity@{name}"][:, 2] for name in points]
+    return bars_of(case, reference), history["time"], velocities, [case.watch[name].at[2] for name in points]
+
+
+def _in_range(reference: FrequencyRange, modes: list[dict]) -> dict:
+    name, value = f"frequency_{reference.mode}", modes[reference.mode - 1]["frequency"]
+    return {f"{name}_low": at_least(value, reference.at_least), f"{name}_high": at_most(value, reference.at_most)}

@@ -1,0 +1,134 @@
+"""Size, time steps and cost of a structure's motion, from its parameters alone."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from math import ceil
+from typing import TYPE_CHECKING, Any
+
+from workflow.plan_table import short
+from workflow.problems import Problem
+from workflow.step_limit import too_many_steps
+from workflow.structure.case import StructureCase
+
+if TYPE_CHECKING:
+    from fem.solver_cost import SolverForecast
+
+SECONDS_TO_START = 4.0  # until the ranks of a solver have loaded their libraries and kernels
+
+
+@dataclass(frozen=True, slots=True)
+class LayerForecast:
+    """A layer of the mesh: its material, number of elements, critical time step of the smallest one [s]."""
+
+    material: str
+    elements: int
+    critical_step: float
+    mass_scaled: bool
+
+
+@dataclass(frozen=True, slots=True)
+class StructureForecast:
+    """What a run will be like.
+
+    Attributes:
+        effects: effect -> {"on", "why"}.
+        layers: layer -> size and step.
+        steps: time step [s] of each solver.
+        solvers: their cost on one core, and which is cheaper.
+        seconds: stage -> predicted wall time [s].
+    """
+
+    effects: Mapping[str, Any]
+    layers: dict[str, LayerForecast]
+    steps: dict[str, float]
+    solvers: "SolverForecast"
+    seconds: dict[str, float]
+
+
+def forecast_structure(case: StructureCase) -> StructureForecast:
+    """Predict sizes, steps and cost."""
+    from fem.solver_cost import forecast_solvers
+    from fem.structure.effects import effects
+
+    layers, dynamics = forecast_layers(case), case.dynamics
+    steps = forecast_steps(case, layers)
+    counts = {solver: ceil(dynamics.duration / step) for solver, step in steps.items()}
+    elements = sum(layer.elements for layer in layers.values())
+    solvers = forecast_solvers(case.scene, elements, counts["explicit"], counts["implicit"])
+    cost = {"explicit": solvers.explicit.seconds / case.ranks, "implicit": solvers.implicit.seconds}
+    shock = sum(SECONDS_TO_START + cost[solver] for solver in dynamics.solvers)
+    return StructureForecast(effects(case.scene, added_mass(case, layers)), layers, steps, solvers, {"shock": shock})
+
+
+def critical_step(case: StructureCase, layers: Mapping[str, LayerForecast]) -> float:
+    """Predict the critical step [s] of all elements, with damping."""
+    from fem.estimate import damped_critical_step
+
+    undamped = min(layer.critical_step for layer in layers.values() if not layer.mass_scaled)
+    return damped_critical_step(undamped, case.dynamics.damping.coefficients[1])
+
+
+def forecast_steps(case: StructureCase, layers: Mapping[str, LayerForecast]) -> dict[str, float]:
+    """Predict the time step [s] of each solver."""
+    from fem.solver_cost import implicit_step
+    from fem.structure.pulses import pulse_durations, pulses_of
+
+    numerics = case.dynamics.numerics
+    return {
+        "explicit": numerics.explicit_step or numerics.step_fraction * critical_step(case, layers),
+        "implicit": implicit_step(case.dynamics, pulse_durations(pulses_of(case.loads))),
+    }
+
+
+def step_problems(case: StructureCase) -> Iterator[Problem]:
+    """Find steps that cannot be taken: none at all, too many, or one that is known to be above the critical step."""
+    import numpy as np
+
+    try:
+        with np.errstate(all="ignore"):
+            layers = forecast_layers(case)
+    except np.linalg.LinAlgError:
+        yield Problem(
+            "structure", "has elements without a time step: sizes, densities or moduli are beyond all numbers"
+        )
+        return
+    numerics, critical = case.dynamics.numerics, critical_step(case, layers)
+    exact = numerics.critical_step == "element" and case.structure.holes is None
+    if numerics.explicit_step and exact and numerics.explicit_step > critical and "explicit" in case.dynamics.solvers:
+        message = "is above the critical step, beyond which every motion grows"
+        allowed = f"<= {short(critical)}; critical_step = power_iteration may allow more"
+        yield Problem("dynamics.numerics.explicit_step", message, short(numerics.explicit_step), allowed)
+    steps = forecast_steps(case, layers)
+    for solver in case.dynamics.solvers:
+        yield from too_many_steps("dynamics.duration", case.dynamics.duration, steps[solver], solver)
+
+
+def forecast_layers(case: StructureCase) -> dict[str, LayerForecast]:
+    """Predict size and critical time step of every layer."""
+    import numpy as np
+
+    from fem.box_step import box_element_step
+    from meshing.box_plan import count_box
+
+    body, materials = case.structure, case.scene.layer_materials
+    layers = {}
+    for name, part in count_box(case.box).items():
+        step = box_element_step(body.element, body.formulation, materials[name], np.array(part.smallest))
+        scaled = name in case.dynamics.numerics.mass_scaled
+        layers[name] = LayerForecast(body.layers[name].material, part.elements, step, scaled)
+    return layers
+
+
+def added_mass(case: StructureCase, layers: Mapping[str, LayerForecast]) -> float:
+    """Predict the mass [kg] that scaling adds: it raises the steps of some layers to the smallest of the others."""
+    body, materials = case.structure, case.scene.layer_materials
+    target = min(layer.critical_step for layer in layers.values() if not layer.mass_scaled)
+    area = case.box.extent(0) * case.box.extent(1)
+    return sum(
+        (max(1.0, (target / layer.critical_step) ** 2) - 1.0)
+        * materials[name].density
+        * area
+        * body.layers[name].thickness
+        for name, layer in layers.items()
+        if layer.mass_scaled
+    )

@@ -1,0 +1,48 @@
+"""Tables of the plan of a structure: its layers, and what either solver would cost."""
+
+from typing import TYPE_CHECKING
+
+from rich.table import Table
+
+from workflow.plan_table import duration, new_table, short
+from workflow.structure.case import StructureCase
+from workflow.structure.forecast import StructureForecast
+
+if TYPE_CHECKING:
+    from fem.solver_cost import SolverCost
+
+MEGA = 1.0e6
+
+
+def layers(outlook: StructureForecast) -> Table:
+    """Elements and critical steps of the layers, top first."""
+    table = new_table("\nLayers, top first", "layer", "elements", "critical step", "material")
+    for name, layer in reversed(outlook.layers.items()):
+        remark = "; mass scaled to the smallest step of the others" if layer.mass_scaled else ""
+        table.add_row(name, f"{layer.elements}", short(layer.critical_step), layer.material + remark)
+    table.add_row("all", f"{sum(layer.elements for layer in outlook.layers.values())}", "", "", style="bold")
+    return table
+
+
+def solvers(case: StructureCase, outlook: StructureForecast) -> Table:
+    """Steps, cost and memory of both solvers, and which to take."""
+    table = new_table("\nSolvers, on one core", "solver", "step", "steps", "cost", "memory", "remark")
+    numerics, found = case.dynamics.numerics, outlook.solvers
+    given = numerics.explicit_step is not None
+    fraction = "as given" if given else f"{numerics.step_fraction:g} of the smallest critical step"
+    factor = f"of it {duration(found.implicit.setup)} for the factor"
+    for name, cost, remark in (("explicit", found.explicit, fraction), ("implicit", found.implicit, factor)):
+        unused = "" if name in case.dynamics.solvers else "; not in dynamics.solver"
+        table.add_row(name, short(outlook.steps[name]), f"{cost.steps}", _about(cost), _memory(cost), remark + unused)
+    table.caption, table.caption_justify = found.sentence, "left"
+    return table
+
+
+def _about(cost: "SolverCost") -> str:
+    return f"about {duration(cost.seconds)}"
+
+
+def _memory(cost: "SolverCost") -> str:
+    size, unit = (MEGA, "MB") if cost.memory < 100.0 * MEGA else (1000.0 * MEGA, "GB")
+    figure = cost.memory / size
+    return f"{figure:.2g} {unit}" if figure < 100.0 else f"{figure:.0f} {unit}"

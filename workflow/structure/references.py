@@ -1,0 +1,111 @@
+"""What a structure's motion is compared with: exact solutions, bounds, published values; each a table of the case."""
+
+from collections.abc import Iterator
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from fem.names import nearest
+from fem.structure.parameters import Pressure, StructureScene
+from workflow.problems import Problem
+
+
+class Reference(BaseModel):
+    """Base of all references: immutable, unknown keys are errors."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class BarWave(Reference):
+    """Waves along z in two layers whose sides are held, after a half-sine pressure on ``z_min``: speed and amplitudes.
+
+    ``incident`` are two watch points in the lower layer, the one nearer to the load first; ``transmitted`` is one in
+    the upper layer.
+    """
+
+    kind: Literal["bar_wave"] = "bar_wave"
+    load: str
+    incident: tuple[str, str]
+    transmitted: str
+    speed_limit: float = Field(0.005, gt=0)
+    amplitude_limit: float = Field(0.01, gt=0)
+
+
+class Cantilever(Reference):
+    """A strip of one layer, clamped at ``x_min``, its sides held, under a sudden constant pressure: beam theory."""
+
+    kind: Literal["cantilever"] = "cantilever"
+    load: str
+    tip: str
+    limit: float = Field(0.02, gt=0)
+
+
+class FrequencyRange(Reference):
+    """Bounds of a natural frequency; ``mode`` 1 is the lowest."""
+
+    kind: Literal["frequency"] = "frequency"
+    mode: int = Field(1, ge=1)
+    at_least: Annotated[float, "Hz"] = Field(gt=0)
+    at_most: Annotated[float, "Hz"] = Field(gt=0)
+
+
+class Published(Reference):
+    """A published value, shown beside a metric."""
+
+    kind: Literal["published"] = "published"
+    metric: str
+    value: str
+    source: str
+
+
+AnyReference = Annotated[BarWave | Cantilever | FrequencyRange | Published, Field(discriminator="kind")]
+
+
+def reference_problems(references: dict[str, AnyReference], scene: StructureScene) -> Iterator[Problem]:
+    """Find references to loads, points or modes that are not there, or to what has no exact solution."""
+    for name, reference in references.items():
+        key = f"references.{name}"
+        if isinstance(reference, BarWave):
+            yield from _bar(key, reference, scene)
+        elif isinstance(reference, Cantilever):
+            yield from _pressure(f"{key}.load", reference.load, scene, "constant")
+            yield from _known(f"{key}.tip", reference.tip, scene.watch, "watch point")
+            yield from _layers(key, 1, scene)
+        elif isinstance(reference, FrequencyRange) and reference.mode > scene.dynamics.modes:
+            allowed = f"<= {scene.dynamics.modes}, or more dynamics.modes"
+            yield Problem(f"{key}.mode", "is not computed", reference.mode, allowed)
+
+
+def _bar(key: str, reference: BarWave, scene: StructureScene) -> Iterator[Problem]:
+    yield from _pressure(f"{key}.load", reference.load, scene, "half_sine")
+    yield from _layers(key, 2, scene)
+    points = [*(("incident", name) for name in reference.incident), ("transmitted", reference.transmitted)]
+    for item, name in points:
+        yield from _known(f"{key}.{item}", name, scene.watch, "watch point")
+    if len(scene.structure.layers) != 2 or any(name not in scene.watch for _, name in points):
+        return
+    interface = next(iter(scene.structure.layers.values())).thickness
+    heights = [scene.watch[name].at[2] for _, name in points]
+    if not 0.0 <= heights[0] < heights[1] < interface < heights[2]:
+        allowed = f"two heights below {1e3 * interface:g} mm, upwards, then one above"
+        yield Problem(key, "the watch points are not in their layers", None, allowed)
+
+
+def _pressure(key: str, name: str, scene: StructureScene, pulse: str) -> Iterator[Problem]:
+    yield from _known(key, name, scene.loads, "load")
+    load = scene.loads.get(name)
+    if load is not None and not (isinstance(load, Pressure) and load.peak is not None and load.pulse == pulse):
+        yield Problem(
+            key, f"is no {pulse} pressure that is given by its peak", name, f'a pressure with pulse = "{pulse}"'
+        )
+
+
+def _known(key: str, name: str, names: dict, what: str) -> Iterator[Problem]:
+    if name not in names:
+        yield Problem(key, f"no such {what}", name, "one of " + ", ".join(names), nearest(name, names))
+
+
+def _layers(key: str, count: int, scene: StructureScene) -> Iterator[Problem]:
+    found = len(scene.structure.layers)
+    if found != count:
+        yield Problem(f"{key}.kind", f"has no exact solution for {found} layers", None, f"{count} in structure.layers")

@@ -1,0 +1,155 @@
+"""Report of a structure: what moved how, against what, at what cost."""
+
+import base64
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from workflow.plan_table import short
+from workflow.report_tables import costs, number, percent, quantity
+from workflow.structure import curves as structure_curves
+from workflow.structure.case import StructureCase
+from workflow.structure.findings import read_history, read_modes
+from workflow.structure.launch import read_results
+from workflow.structure.references import Published
+
+HEADLINE = (
+    "first_frequency", "peak_displacement", "displacement_range", "peak_strain", "displacement_difference",
+    "strain_difference", "wave_speed_error", "transmitted_velocity_error", "reflected_velocity_error",
+    "tip_deflection_error", "swing_frequency_error", "energy_balance_error",
+)  # fmt: skip
+FRACTIONS = ("_error", "_difference", "_fraction")
+SHORTEST_IN_MM = 1e-5  # m
+MODEL_ROWS = (
+    ("elements", lambda model: f"{number(model['elements'])} ({model['element']} {model['formulation']})"),
+    ("nodes", lambda model: number(model["nodes"])),
+    ("MPI ranks", lambda model: number(model["ranks"])),
+    ("critical time step", lambda model: short(model["critical_step"])),
+    ("time step", lambda model: short(model["step"])),
+    ("steps", lambda model: number(model["steps"])),
+    ("mass", lambda model: f"{number(1e3 * model['model_mass'])} g"),
+    ("mass added by mass scaling", lambda model: f"{number(1e3 * model['added_mass'])} g"),
+)
+
+
+def add_structure(run_folder: Path, case: StructureCase, context: dict, metrics: dict) -> None:
+    """Add what is told of a structure that has moved."""
+    folder = run_folder / "shock"
+    if not folder.is_dir():
+        return
+    results = read_results(folder)
+    histories = {solver: read_history(folder / solver) for solver in results}
+    context["headline"] = headline(metrics)
+    context["points"] = [{"name": name, "curve": structure_curves.point_curves(histories, name)} for name in case.watch]
+    context["curves"]["energies"] = structure_curves.energy_curves(histories)
+    if case.supports:
+        context["curves"]["reactions"] = structure_curves.reaction_curves(histories, list(case.supports))
+    context["tables"] |= {
+        "structure": models(results),
+        "metrics": metric_table(metrics),
+        "references": references(metrics),
+        "published": published(case, metrics),
+        "cost": costs(results),
+    }
+    first = next(iter(results))
+    _add_pictures(folder / first, case, histories[first], context)
+
+
+def headline(metrics: dict) -> list[dict]:
+    """The figures at the top of the page: of every kind the first one that the run has."""
+    shown = []
+    for wanted in HEADLINE:
+        name = next((name for name in metrics if name.split("@")[0] == wanted), None)
+        if name is not None:
+            shown.append({"label": label(name), "value": text(name, metrics[name])})
+    return shown
+
+
+def label(name: str) -> str:
+    """Write the name of a metric in words."""
+    what, _, where = name.partition("@")
+    return what.replace("_", " ") + (f" at {where}" if where else "")
+
+
+def text(name: str, metric: dict) -> str:
+    """Write the value of a metric: differences as per cent, strains in microstrain."""
+    what = name.partition("@")[0]
+    if what.endswith(FRACTIONS):
+        return percent(metric["value"])
+    if what.endswith("strain"):
+        return f"{1e6 * metric['value']:.0f} µm/m"
+    is_short = metric["unit"] == "m" and 0.0 < metric["value"] < SHORTEST_IN_MM
+    return f"{number(1e6 * metric['value'])} µm" if is_short else quantity(metric)
+
+
+def metric_table(metrics: dict) -> dict:
+    """All metrics."""
+    return {"head": ["metric", "value"], "rows": [[label(name), text(name, found)] for name, found in metrics.items()]}
+
+
+def references(metrics: dict) -> dict | None:
+    """What was measured beside its exact value."""
+    rows = []
+    for name, metric in metrics.items():
+        if f"{name}_exact" in metrics:
+            exact, error = metrics[f"{name}_exact"], metrics[f"{name}_error"]
+            rows.append([label(name), text(name, metric), text(name, exact), percent(error["value"])])
+    return {"head": ["quantity", "computed", "exact", "error"], "rows": rows} if rows else None
+
+
+def published(case: StructureCase, metrics: dict) -> dict | None:
+    """What was computed beside what others published."""
+    rows = [
+        [
+            label(one.metric),
+            text(one.metric, metrics[one.metric]) if one.metric in metrics else "–",
+            one.value,
+            one.source,
+        ]
+        for one in case.references.values()
+        if isinstance(one, Published)
+    ]
+    return {"head": ["quantity", "computed", "published", "source"], "rows": rows} if rows else None
+
+
+def models(results: Mapping[str, dict]) -> dict:
+    """What was computed, each solver a column."""
+    records = [result["model"] for result in results.values()]
+    return {
+        "head": ["model", *results],
+        "rows": [[name, *(row(record) for record in records)] for name, row in MODEL_ROWS],
+    }
+
+
+def mode_table(modes: list[dict]) -> dict:
+    """Natural frequencies, and how much of the mass moves with each mode when the supports are shaken."""
+    rows = [
+        [
+            f"{mode['mode']}",
+            f"{mode['frequency']:.2f}",
+            *(f"{100 * mode['mass_fraction'][axis]:.1f} %" for axis in "xyz"),
+        ]
+        for mode in modes
+    ]
+    return {"head": ["mode", "frequency [Hz]", "mass along x", "along y", "along z"], "rows": rows}
+
+
+def _add_pictures(folder: Path, case: StructureCase, history: Mapping[str, np.ndarray], context: dict) -> None:
+    from workflow.structure.pictures import render_deformation, render_modes
+
+    modes = read_modes(folder)
+    with tempfile.TemporaryDirectory() as temporary:
+        bent, shapes = Path(temporary) / "bent.png", Path(temporary) / "modes.png"
+        context["bent_caption"] = render_deformation(folder / "structure.pvd", _peak_time(case, history), bent)
+        context["pictures"]["bent"] = base64.b64encode(bent.read_bytes()).decode()
+        if modes:
+            context["tables"]["modes"] = mode_table(modes)
+            render_modes(folder / "modes.pvd", modes[:6], shapes)
+            context["pictures"]["modes"] = base64.b64encode(shapes.read_bytes()).decode()
+
+
+def _peak_time(case: StructureCase, history: Mapping[str, np.ndarray]) -> float:
+    """Time [s] at which the strain energy is largest."""
+    return float(history["time"][np.argmax(history["internal"])])
