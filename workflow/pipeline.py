@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
+from workflow.check_text import against_limit
 from workflow.inputs import read_record
 from workflow.launch import DIE_WITH_PARENT, end_group
 from workflow.problems import CaseError, Problem
@@ -86,6 +87,6 @@ def failed_checks(run_folder: Path, stages: Sequence[Stage]) -> list[str]:
         record = read_record(run_folder, stage) or {"health": {}}
         for check, result in record["health"].items():
             if not result["ok"]:
-                value, limit = result["value"], result["limit"]
-                failures.append(f"{stage.name}: {check.replace('_', ' ')} {value:.3g}, limit {limit:.3g}")
+                value, limit = against_limit(check, result)
+                failures.append(f"{stage.name}: {check.replace('_', ' ')} {value}, limit {limit}")
     return failures

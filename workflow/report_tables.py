@@ -7,6 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
+from workflow.check_text import against_limit
+
 HEADLINE = (
     ("critical_joint", "critical joint"),
     ("peak_von_mises", "peak von Mises at its pads"),
@@ -60,14 +62,10 @@ def headline(metrics: dict) -> list[dict]:
 
 def health_rows(health: dict) -> list[dict]:
     """One record a check: name, value, limit (texts) and ok."""
+    texts = {name: against_limit(name, check) for name, check in health.items()}
     return [
-        {
-            "name": name.replace("_", " "),
-            "value": number(check["value"]),
-            "limit": number(check["limit"]),
-            "ok": check["ok"],
-        }
-        for name, check in health.items()
+        {"name": name.replace("_", " "), "value": value, "limit": limit, "ok": health[name]["ok"]}
+        for name, (value, limit) in texts.items()
     ]
 
 

@@ -5,6 +5,8 @@ import os
 from rich.console import Console
 from rich.markup import escape
 
+from workflow.check_text import against_limit
+
 # A terminal has its own width; a file or a pipe gets lines that a report or a log can hold.
 WIDTH = None if os.isatty(1) else 100
 console = Console(width=WIDTH, highlight=False)
@@ -44,7 +46,8 @@ def health_line(stage: str, seconds: float, health: dict, continued: str = "") -
 
 
 def _against_limit(name: str, result: dict) -> str:
-    return f"{name.replace('_', ' ')} {result['value']:.2g} (limit {result['limit']:.2g})"
+    value, limit = against_limit(name, result)
+    return f"{name.replace('_', ' ')} {value} (limit {limit})"
 
 
 def _closeness(result: dict) -> float:

@@ -7,6 +7,7 @@ import pytest
 
 from tests.support.workflow_command import SMALL_CASE
 from workflow.case import read_case
+from workflow.check_text import against_limit
 from workflow.pipeline import RunFolderBusy, failed_checks, locked
 from workflow.problems import CaseError
 from workflow.stage_runner import Findings, Run, execute, run_stage
@@ -78,3 +79,9 @@ def test_a_file_is_no_run_folder(tmp_path):
     (tmp_path / "file").touch()
     with pytest.raises(CaseError, match="cannot be a run folder"), locked(tmp_path / "file"):
         pass
+
+
+def test_checks_of_quantities_have_their_unit():
+    assert against_limit("dns_peel_stress", {"value": 5.2e6, "limit": 1e6}) == ("5.2 MPa", "1 MPa")
+    assert against_limit("frequency_1_high", {"value": 273.47, "limit": 350.0}) == ("273.5 Hz", "350 Hz")
+    assert against_limit("swing_frequency_error", {"value": 0.004, "limit": 0.02}) == ("0.004", "0.02")

@@ -1,0 +1,14 @@
+"""Health checks in words: value and limit with the unit of what is checked."""
+
+import re
+
+UNITS = {r".*peel_stress": "Pa", r".*plastic_work_density": "J/m^3", r"(\w+_)?frequency_\d+_(low|high)": "Hz"}
+
+
+def against_limit(name: str, check: dict) -> tuple[str, str]:
+    """Return value and limit of a check."""
+    from workflow.report_tables import quantity
+
+    unit = next((unit for pattern, unit in UNITS.items() if re.fullmatch(pattern, name)), "")
+    value, limit = (quantity({"value": check[key], "unit": unit}) for key in ("value", "limit"))
+    return value, limit
