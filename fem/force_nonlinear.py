@@ -109,9 +109,10 @@ class NonlinearElements:
         lowest = elements.kind.geometry((elements.points + displacement)[cells]).lowest
         worst = int(np.argmin(lowest))
         place = ", ".join(f"{value:.6g}" for value in elements.points[cells[worst]].mean(axis=0))
+        modes = "; its corners are not, so its incompatible modes have grown: formulation = one_point has none"
         return InvertedElementError(
             f"element {self.numbers[places[worst]]}, at first near ({place}) m, is turned inside out (lowest Jacobian"
-            f" determinant {lowest[worst]:.3e} m^3)"
+            f" determinant {lowest[worst]:.3e} m^3{modes if lowest[worst] > 0.0 else ''})"
         )
 
 

@@ -10,6 +10,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from fem.communicators import Communicators, Role
+from fem.elements.hexahedron import HEXAHEDRON
 from fem.history import History
 from fem.inputs import RunInput
 from fem.materials.effects import failure_effect, material_effects
@@ -21,6 +22,9 @@ from fem.watch_joints import FLOW_LAYERS
 
 FORCE_RESIDUAL_LIMIT = 1e-10
 ADDED_MASS_LIMIT = 0.05
+# Above it hourglass stiffness carries a part of the load, or incompatible modes are out of balance; 10 % is the usual
+# bound (Belytschko, Liu, Moran & Elkhodary, Nonlinear Finite Elements, 2nd ed., 8.7).
+HOURGLASS_LIMIT = 0.1
 METHODS = {"direct": "direct acceleration input", "large_mass": "large mass at the mounting holes"}
 
 
@@ -160,7 +164,15 @@ def health(history: History, summary: dict[str, Any], request: RunInput) -> dict
         "interface_force_residual": (history.ledger.force_residual, FORCE_RESIDUAL_LIMIT),
         "added_mass_fraction": (summary["added_mass"] / summary["model_mass"], ADDED_MASS_LIMIT),
     }
+    if request.shock.numerics.formulation == HEXAHEDRON.name:  # of one point it is the bending of the board, too
+        checks |= hourglass_check(history)
     return checked(checks)
+
+
+def hourglass_check(history: History) -> dict[str, tuple[float, float]]:
+    """Return the largest hourglass energy over the largest energy, and its limit; nothing where there is none."""
+    hourglass = float(np.abs(history.arrays()["hourglass"]).max())
+    return {"hourglass_energy_fraction": (hourglass / history.ledger.largest, HOURGLASS_LIMIT)} if hourglass else {}
 
 
 def checked(checks: Mapping[str, tuple[float, float]]) -> dict[str, Any]:

@@ -9,21 +9,18 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from fem.elements.one_point import ONE_POINT
 from fem.factorisation import FactorCost
 from fem.fields import Fields
 from fem.history import History
 from fem.inputs import StructureInput
 from fem.materials.effects import plastic_laws
-from fem.result import ADDED_MASS_LIMIT, Timings, checked, quantity
+from fem.result import ADDED_MASS_LIMIT, Timings, checked, hourglass_check, quantity
 from fem.stress import principal_strains, von_mises
 from fem.structure.effects import effects
 from fem.structure.model import StructureModel
 from fem.structure.modes import ModeTable
 from fem.watch_points import PointTable
-
-# Above it the hourglass stiffness carries a part of the load; 10 % is the usual bound (Belytschko, Liu, Moran &
-# Elkhodary, Nonlinear Finite Elements, 2nd ed., 8.7).
-HOURGLASS_LIMIT = 0.1
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +64,7 @@ def write_result(
             | point_metrics(arrays)
             | layer_metrics(found.peaks)
             | mode_metrics(found.modes),
-            "health": health(history, arrays, summary, request),
+            "health": health(history, summary, request),
             "effects": effects(request, summary["added_mass"]) | strain_effect(model.tables.watch),
             "timings": timings.seconds,
             "continued_from": timings.first,
@@ -177,15 +174,13 @@ def mode_metrics(modes: ModeTable | None) -> dict[str, Any]:
     return {} if modes is None else {"first_frequency": quantity(float(modes.frequency[0]), "Hz")}
 
 
-def health(
-    history: History, arrays: dict[str, NDArray], summary: dict[str, Any], request: StructureInput
-) -> dict[str, Any]:
+def health(history: History, summary: dict[str, Any], request: StructureInput) -> dict[str, Any]:
     """Return the checks of a finished run."""
     checks = {
         "energy_balance_error": (history.ledger.balance_error, request.dynamics.numerics.energy_balance_limit),
         "added_mass_fraction": (summary["added_mass"] / summary["model_mass"], ADDED_MASS_LIMIT),
     }
-    hourglass = float(np.abs(arrays["hourglass"]).max())
-    if hourglass > 0.0 and plastic_laws(request.layer_materials):  # of elastic elements it is their bending, no error
-        checks["hourglass_energy_fraction"] = (hourglass / history.ledger.largest, HOURGLASS_LIMIT)
+    one_point = request.structure.formulation == ONE_POINT.name  # of elastic ones it is their bending, no error
+    if not one_point or plastic_laws(request.layer_materials):
+        checks |= hourglass_check(history)
     return checked(checks)

@@ -1,0 +1,54 @@
+"""Large elastic compression: one-point elements bear it; incompatible modes grow, which a run must not hide."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from fem.errors import InvertedElementError
+from fem.structure.run import run_structure
+from tests.support.fem_structures import LENGTH, STEEL, structure_input, structure_tables_of
+
+DURATION = 4e-4
+SIDES = {side: {"on": side, "hold": [side[0]]} for side in ("x_min", "y_min", "y_max", "z_min", "z_max")}
+
+
+def compressed(directory: Path, stretch: float, formulation: str) -> dict:
+    """Press a soft bar in a rigid channel to a fraction of its length; return the result."""
+    speed = 0.5 * np.pi * LENGTH * (1.0 - stretch) / DURATION
+    request = structure_input(
+        directory,
+        supports=SIDES,
+        materials={"steel": STEEL | {"young_modulus": 2e9}},
+        structure=structure_tables_of()["structure"] | {"formulation": formulation},
+        loads={"push": {"kind": "motion", "on": "x_max", "component": "x", "peak": -speed, "duration": DURATION}},
+        dynamics={
+            "duration": 1.5 * DURATION,
+            "kinematics": "finite",
+            "numerics": {"history_samples": 100, "field_samples": 2, "energy_balance_limit": 10.0},
+        },
+    )
+    run_structure(MPI.COMM_SELF, request)
+    return json.loads((request.output / "result.json").read_text())
+
+
+def test_one_point_elements_bear_half_the_length(tmp_path):
+    health = compressed(tmp_path, 0.5, "one_point")["health"]
+    assert health["energy_balance_error"]["value"] < 1e-4
+
+
+def test_incompatible_modes_bear_five_per_cent(tmp_path):
+    health = compressed(tmp_path, 0.95, "incompatible_modes")["health"]
+    assert health["hourglass_energy_fraction"]["value"] < 1e-5
+
+
+def test_growth_of_incompatible_modes_is_told(tmp_path):
+    health = compressed(tmp_path, 0.85, "incompatible_modes")["health"]
+    assert not health["hourglass_energy_fraction"]["ok"]
+
+
+def test_element_inverted_by_its_modes_says_so(tmp_path):
+    with pytest.raises(InvertedElementError, match="incompatible modes have grown: formulation = one_point"):
+        compressed(tmp_path, 0.6, "incompatible_modes")
