@@ -51,7 +51,7 @@ class ShockNumerics(Parameters):
     """How the shock is computed; implicit steps are for elastic materials, at most from sample to sample.
 
     ``kinematics`` and ``formulation`` of hexahedra as for a structure. Elastic hexahedra are the same in both
-    formulations; those that yield are seven to eight times cheaper with one point, and a few per cent stronger in bending.
+    formulations; those that yield are seven to eight times cheaper with one point, a few per cent stronger in bending.
     """
 
     modes: tuple[Literal["two_scale", "dns"], ...] = ("two_scale", "dns")
