@@ -17,6 +17,7 @@ from fem.history import History
 from fem.participant import Participant
 
 PROGRESS_INTERVAL = 0.5  # [s] between two progress lines
+FLATTENED = "the step is that of the undeformed body: where elements are pressed flat, step_fraction must be smaller"
 GUARD = 500  # steps between two looks at the energies, whatever the samples
 
 Crew = Mapping[Role, Participant]
@@ -85,7 +86,7 @@ def run_window(crew: Crew) -> None:
         for participant in crew.values():
             participant.finish_window()
     except InvertedElementError as error:
-        raise InvertedElementError(f"time {time_of(crew):.6e} s: {error}") from error
+        raise InvertedElementError(f"time {time_of(crew):.6e} s: {error}; {FLATTENED}") from error
 
 
 def time_of(crew: Crew) -> float:

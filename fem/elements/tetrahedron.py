@@ -9,7 +9,6 @@ from fem.elements.kind import Geometry
 from fem.strain import strain_matrix
 
 EDGES = np.array([[2, 3], [1, 3], [1, 2], [0, 3], [0, 2], [0, 1]])  # of the middle nodes 4 to 9
-CENTROID = np.full((1, 4), 0.25)
 # Vertices and face centroids in barycentric coordinates, weights of volume 1/6: exact for cubics (Stroud 1971, T3:3-3),
 # so that curved elements pass the patch test; the vertices show where an element is turned inside out.
 CUBIC_POINTS = np.concatenate([np.eye(4), (1.0 - np.eye(4)) / 3.0])
