@@ -125,6 +125,18 @@ def _large_mass(scene: StructureScene) -> Iterator[Problem]:
         yield Problem(f"loads.{name}.method", "large_mass", f"is already that of loads.{shaking[0]}", "direct")
     for name in shaking:
         yield from _left_behind(name, scene)
+    yield from _not_shaken(key, scene)
+
+
+def _not_shaken(key: str, scene: StructureScene) -> Iterator[Problem]:
+    """Yield what holds in space some nodes of a support that a large mass moves."""
+    shaken = [name for name, support in scene.supports.items() if set(support.hold) == set(AXES)]
+    for name in shaken:
+        support = scene.supports[name]
+        for what, on, _ in _held_sets(scene):
+            if what.removeprefix("supports.") not in shaken and _meet(on, support.on):
+                message = f"cannot move supports.{name}: {what} holds nodes of it in space {_where(on, support.on)}"
+                yield Problem(key, "large_mass", message, "direct")
 
 
 def _left_behind(shaking: str, scene: StructureScene) -> Iterator[Problem]:
@@ -161,14 +173,33 @@ def _is_held(scene: StructureScene) -> bool:
 
 def _conflicts(key: str, load: PrescribedMotion, scene: StructureScene) -> Iterator[Problem]:
     """Yield what else decides on the component that a load moves."""
-    for name, support in scene.supports.items():
-        if support.on == load.on and load.component in support.hold:
-            yield Problem(f"{key}.component", load.component, f"is held by supports.{name} on the same facet set")
+    for what, on, components in _held_sets(scene):
+        if _meet(on, load.on) and load.component in components:
+            yield Problem(f"{key}.component", load.component, f"is held by {what} {_where(on, load.on)}")
     for name, other in scene.loads.items():
         if f"loads.{name}" == key:  # of two that clash, the later one is named
             return
-        if isinstance(other, PrescribedMotion) and (other.on, other.component) == (load.on, load.component):
-            yield Problem(f"{key}.component", load.component, f"is moved by loads.{name} on the same facet set")
+        if isinstance(other, PrescribedMotion) and _meet(other.on, load.on) and other.component == load.component:
+            yield Problem(f"{key}.component", load.component, f"is moved by loads.{name} {_where(other.on, load.on)}")
+
+
+def _held_sets(scene: StructureScene) -> Iterator[tuple[str, str, tuple[str, ...]]]:
+    """Yield supports and planes of symmetry: what holds, on which facet set, which components."""
+    for name, support in scene.supports.items():
+        yield f"supports.{name}", support.on, support.hold
+    for axis in scene.structure.symmetry:
+        yield "a plane of symmetry", f"{axis}_min", (axis,)
+
+
+def _meet(first: str, second: str) -> bool:
+    """Return whether two facet sets have nodes in common: all but opposite faces, and side faces and holes."""
+    if first != second and "mounting_holes" in (first, second):
+        return any(name.startswith("z") for name in (first, second))
+    return first == second or first[0] != second[0]
+
+
+def _where(first: str, second: str) -> str:
+    return "on the same facet set" if first == second else f"where {first} and {second} meet"
 
 
 def _pulse(key: str, load: StructureLoad) -> Iterator[Problem]:

@@ -119,7 +119,20 @@ def test_own_materials_go_before_those_of_the_library():
         ),
         (
             {"loads": {name: {"kind": "motion", "on": "z_max", "component": "z", "table": "v.csv"} for name in "ab"}},
-            "loads.b.component = z: is moved by loads.a",
+            "loads.b.component = z: is moved by loads.a on the same facet set",
+        ),
+        (
+            {"loads": {"pull": {"kind": "motion", "on": "z_max", "component": "z", "table": "v.csv"}}},
+            "loads.pull.component = z: is held by supports.holes where mounting_holes and z_max meet",
+        ),
+        (
+            {"loads": {"pull": {"kind": "motion", "on": "y_max", "component": "x", "table": "v.csv"}}},
+            "loads.pull.component = x: is held by a plane of symmetry where x_min and y_max meet",
+        ),
+        (
+            {"supports": {"end": {"on": "y_max", "hold": ["x", "y", "z"]}}}
+            | {"loads": {"drop": {"kind": "input_g", "service_condition": "B", "method": "large_mass"}}},
+            "cannot move supports.end: a plane of symmetry holds nodes of it in space where x_min and y_max meet",
         ),
         ({"loads": {}}, "loads: nothing moves the structure"),
         (
