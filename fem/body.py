@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from fem.elements.element import Elements, critical_steps, element_geometry, element_kind, lumped_mass
 from fem.elements.hexahedron import HEXAHEDRON
 from fem.elements.kind import Geometry
-from fem.errors import MassError
+from fem.errors import MassError, RankError
 from fem.exchange import SharedNodes
 from fem.force import ForceTerm, Kinematics, force_terms, linear_terms
 from fem.local_mesh import LocalMesh
@@ -99,7 +99,13 @@ def make_pieces(
         tables: The model's tables.
         materials: Material of each role, or of each part.
         formulation: Of hexahedra, see ``element.element_kind``.
+
+    Raises:
+        RankError: There is no element on this rank.
+        MeshError: An element is turned inside out.
     """
+    if not len(local.cells):
+        raise RankError("a rank has no element of the mesh: take fewer ranks")
     local = local.with_nodes(*masters_of(local, tables))
     number = tables.part[local.cell_numbers]
     names, assigned = materials_of_parts(tables.part_names, materials)

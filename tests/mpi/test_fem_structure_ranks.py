@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from tests.support.fem_program import run_program
-from tests.support.fem_structures import LENGTH, WIDTH, write_structure
+from tests.support.fem_structures import LENGTH, WIDTH, strip_mesh, write_structure
 
 LOADS = {
     "drop": {"kind": "input_g", "peak": 1e4, "duration": 4e-5, "direction": [0.0, 0.0, 1.0]},
@@ -65,3 +65,9 @@ def test_error_ends_both_ranks(tmp_path, changes, message):
     done = run_program(write_structure(tmp_path, **changes), 2)
     assert done.returncode == 1
     assert message in done.stderr
+
+
+def test_more_ranks_than_elements(tmp_path):
+    done = run_program(write_structure(tmp_path, strip_mesh((2, 1, 1)), watch={}), 4)
+    assert done.returncode == 1
+    assert "a rank has no element of the mesh: take fewer ranks" in done.stderr
