@@ -42,6 +42,7 @@ def add_structure(run_folder: Path, case: StructureCase, context: dict, metrics:
     results = read_results(folder)
     histories = {solver: read_history(folder / solver) for solver in results}
     context["headline"] = headline(metrics)
+    context["meshed"] = meshed_part(case)
     context["points"] = [{"name": name, "curve": structure_curves.point_curves(histories, name)} for name in case.watch]
     context["curves"]["energies"] = structure_curves.energy_curves(histories)
     if case.supports:
@@ -55,6 +56,11 @@ def add_structure(run_folder: Path, case: StructureCase, context: dict, metrics:
     }
     first = next(iter(results))
     _add_pictures(folder / first, case, histories[first], context)
+
+
+def meshed_part(case: StructureCase) -> str:
+    """Return what planes of symmetry leave to be meshed, in words; empty where all of the body is."""
+    return ("", "half", "quarter")[len(set(case.structure.symmetry))]
 
 
 def headline(metrics: dict) -> list[dict]:

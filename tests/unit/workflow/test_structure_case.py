@@ -12,6 +12,7 @@ from workflow.inputs import compare, stage_inputs
 from workflow.problems import CaseError
 from workflow.schema import case_schema
 from workflow.structure.forecast import forecast_structure
+from workflow.structure.report import meshed_part
 
 BOARD = Path(__file__).resolve().parents[2] / "pipeline" / "structure.toml"
 FINITE = ["dynamics.solver=explicit", "dynamics.kinematics=finite"]
@@ -69,6 +70,12 @@ def test_a_step_above_the_critical_one_is_refused_where_it_is_known():
         read_case(case, [given])
     for other in ("dynamics.solver=implicit", "dynamics.numerics.critical_step=power_iteration"):
         read_case(case, [given, other])
+
+
+def test_report_says_what_part_is_meshed():
+    wholes = {"[]": "", '["y"]': "half", '["x", "y"]': "quarter", '["y", "y"]': "half"}
+    for symmetry, part in wholes.items():
+        assert meshed_part(read_case(BOARD, [f"structure.symmetry={symmetry}"])) == part
 
 
 BAD_REFERENCES = {
