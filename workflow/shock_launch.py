@@ -50,7 +50,7 @@ def run_fem(run: Run, folder: Path, request: dict, title: str) -> None:
     path.write_text(json.dumps(request | {"output": str(folder.resolve())}, indent=1) + "\n")
     ranks = run.case.ranks
     command = mpi_command(ranks, [sys.executable, "-m", "fem", str(path)], run.oversubscribe)
-    with progress_bar(f"{title} on {ranks} rank{"s" if ranks > 1 else ""}") as progress:
+    with progress_bar(f"{title} on {ranks} rank{'s' if ranks > 1 else ''}") as progress:
         launch(command, lambda line: _pass_on(line, progress), folder / "log.txt")
 
 
