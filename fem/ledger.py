@@ -109,9 +109,9 @@ class Ledger:
             self.balance_error = max(self.balance_error, abs(balance) / self.largest)
         if self.balance_error > self.limit:
             raise EnergyError(
-                f"energy balance {balance:.3e} J {self._when(time)} is {self.balance_error:.2%} of the largest energy"
-                f" {self.largest:.3e} J, allowed are {self.limit:.2%} (numerics.energy_balance_limit):"
-                f" {self._cause(found)}"
+                f"energy balance {balance:.3e} J {self._when(time)} is {100.0 * self.balance_error:.3g} % of the"
+                f" largest energy {self.largest:.3e} J, allowed are {100.0 * self.limit:.3g} %"
+                f" (numerics.energy_balance_limit): {self._cause(found)}"
             )
         self._judge_forces(sums[len(ENERGIES) + 1 :])
         self.latest = found

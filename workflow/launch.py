@@ -9,6 +9,7 @@ from contextlib import suppress
 from pathlib import Path
 
 GRACE = 5.0  # seconds that a program has to end by itself after SIGTERM
+TOLD = "error: "  # begins what a program says of an error that it knows
 LAST_LINES = 15
 
 # In front of a command: the system sends the signal when the process that starts it ends, however that happens.
@@ -77,7 +78,8 @@ def launch(command: Sequence[str], on_line: Callable[[str], None], log: Path) ->
             raise
     if code != 0:
         words = "\n".join(log.read_text(errors="replace").strip().splitlines()[-LAST_LINES:])
-        raise LaunchError(f"{program} ended with exit code {code}: {words}")
+        told = words.removeprefix(TOLD)
+        raise LaunchError(told if told != words else f"{program} ended with exit code {code}: {words}")
 
 
 def own_environment(environment: Mapping[str, str]) -> dict[str, str]:

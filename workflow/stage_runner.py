@@ -11,6 +11,7 @@ from typing import Any, Generic, TypeVar
 
 from workflow.case_kind import Case
 from workflow.inputs import stage_inputs
+from workflow.launch import LaunchError
 from workflow.terminal import health_line, print_error
 
 AnyCase = TypeVar("AnyCase", bound=Case)
@@ -101,7 +102,8 @@ def execute(name: str, function: StageFunction, run: Run) -> bool:
             raise KeyboardInterrupt from error
         log = run.folder / f".{name}.partial" / "error.txt"
         log.write_text(traceback.format_exc())
-        print_error(f"stage {name} failed: {type(error).__name__}: {error}\ntraceback: {log}")
+        told = str(error) if isinstance(error, LaunchError) else f"{type(error).__name__}: {error}"
+        print_error(f"stage {name} failed: {told}\ntraceback: {log}")
         return False
     health_line(name, record["seconds"], record["health"], record["continued"])
     return True

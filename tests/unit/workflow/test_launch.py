@@ -43,6 +43,12 @@ def test_the_last_words_of_a_failure_are_kept(tmp_path):
         )
 
 
+def test_a_failure_that_the_program_tells_is_told_alone(tmp_path):
+    program = "import sys; sys.exit('error: no equilibrium at step 7')"
+    with pytest.raises(LaunchError, match=r"^no equilibrium at step 7$"):
+        launch([sys.executable, "-c", program], print, tmp_path / "log.txt")
+
+
 def test_a_program_that_is_not_there(tmp_path):
     with pytest.raises(LaunchError, match="no-such-program is not installed"):
         launch(["no-such-program"], print, tmp_path / "log.txt")
