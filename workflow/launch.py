@@ -79,7 +79,15 @@ def launch(command: Sequence[str], on_line: Callable[[str], None], log: Path) ->
     if code != 0:
         words = "\n".join(log.read_text(errors="replace").strip().splitlines()[-LAST_LINES:])
         told = words.removeprefix(TOLD)
-        raise LaunchError(told if told != words else f"{program} ended with exit code {code}: {words}")
+        raise LaunchError(told if told != words else f"{program} {ending(code)}: {words or 'it said nothing'}")
+
+
+def ending(code: int) -> str:
+    """Say how a program ended, from its exit code: below 0 or above 128 by a signal."""
+    number = -code if code < 0 else code - 128
+    if number == signal.SIGKILL:
+        return "was killed, as the system does when memory is short"
+    return f"ended with exit code {code}"
 
 
 def own_environment(environment: Mapping[str, str]) -> dict[str, str]:

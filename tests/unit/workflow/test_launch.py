@@ -49,6 +49,12 @@ def test_a_failure_that_the_program_tells_is_told_alone(tmp_path):
         launch([sys.executable, "-c", program], print, tmp_path / "log.txt")
 
 
+def test_a_program_that_is_killed(tmp_path):
+    program = "import os, signal; os.kill(os.getpid(), signal.SIGKILL)"
+    with pytest.raises(LaunchError, match="was killed, as the system does when memory is short: it said nothing"):
+        launch([sys.executable, "-c", program], print, tmp_path / "log.txt")
+
+
 def test_a_program_that_is_not_there(tmp_path):
     with pytest.raises(LaunchError, match="no-such-program is not installed"):
         launch(["no-such-program"], print, tmp_path / "log.txt")
