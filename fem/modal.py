@@ -8,6 +8,7 @@ import scipy.sparse.linalg
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
+from fem.errors import AgreedError
 from fem.factorisation import make_direct
 from fem.global_matrix import Equations
 
@@ -46,7 +47,7 @@ def natural_modes(equations: Equations, count: int) -> Modes:
 
     Raises:
         ValueError: ``count`` is out of range, or there are several ranks and no SLEPc.
-        RuntimeError: Fewer modes converged than are wanted.
+        AgreedError: Fewer modes converged than are wanted; on every rank.
     """
     if not 0 < count < equations.total:
         raise ValueError(f"{count} modes are wanted, allowed are 1 to {equations.total - 1}")
@@ -88,7 +89,7 @@ def slepc_modes(
     make_direct(transform.getKSP())
     solver.solve()
     if solver.getConverged() < count:
-        raise RuntimeError(
+        raise AgreedError(
             f"{solver.getConverged()} of {count} modes converged, SLEPc says {solver.getConvergedReason()}"
         )
     vectors = [stiffness.createVecRight() for _ in range(count)]

@@ -55,7 +55,28 @@ class Participant(Protocol):
         """Continue from what ``state`` returned."""
 
 
-class Alone:
+class Continued:
+    """What a participant keeps for a restart.
+
+    Attributes:
+        motion: Its state.
+        interface_work: See ``Participant``.
+    """
+
+    motion: Moving
+    interface_work: float
+
+    def state(self) -> dict[str, Any]:
+        """Return the motion's state and the work across the cut."""
+        return {"motion": self.motion.state(), "interface_work": self.interface_work}
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Continue from what ``state`` returned."""
+        self.motion.restore(state["motion"])
+        self.interface_work = state["interface_work"]
+
+
+class Alone(Continued):
     """One model without a cut: a DNS, all steps small, or a structure."""
 
     def __init__(self, motion: Moving, plan: WindowPlan) -> None:
@@ -82,17 +103,8 @@ class Alone:
         """Return zero: all forces are this model's."""
         return self._zero
 
-    def state(self) -> dict[str, Any]:
-        """Return the motion's state and the work across the cut."""
-        return {"motion": self.motion.state(), "interface_work": self.interface_work}
 
-    def restore(self, state: dict[str, Any]) -> None:
-        """Continue from what ``state`` returned."""
-        self.motion.restore(state["motion"])
-        self.interface_work = state["interface_work"]
-
-
-class Macro:
+class Macro(Continued):
     """The board: one step a window."""
 
     def __init__(self, body: Body, loads: list[Load], plan: WindowPlan, channels: CutChannels) -> None:
@@ -130,17 +142,16 @@ class Macro:
         return self._received
 
     def state(self) -> dict[str, Any]:
-        """Return the motion's state, the work across the cut and the received force."""
-        return {"motion": self.motion.state(), "interface_work": self.interface_work, "received": self._received}
+        """Return also the received force."""
+        return super().state() | {"received": self._received}
 
     def restore(self, state: dict[str, Any]) -> None:
         """Continue from what ``state`` returned."""
-        self.motion.restore(state["motion"])
-        self.interface_work = state["interface_work"]
+        super().restore(state)
         self._received[:] = state["received"]
 
 
-class Meso:
+class Meso(Continued):
     """Joints, package and the uppermost board layers: m substeps a window."""
 
     def __init__(self, body: Body, loads: list[Load], plan: WindowPlan, channels: CutChannels) -> None:
@@ -180,15 +191,6 @@ class Meso:
     def foreign_force(self) -> NDArray[np.float64]:
         """Return zero: all forces are this model's."""
         return self._zero
-
-    def state(self) -> dict[str, Any]:
-        """Return the motion's state and the work across the cut."""
-        return {"motion": self.motion.state(), "interface_work": self.interface_work}
-
-    def restore(self, state: dict[str, Any]) -> None:
-        """Continue from what ``state`` returned."""
-        self.motion.restore(state["motion"])
-        self.interface_work = state["interface_work"]
 
 
 def uncut_motion(body: Body, loads: list[Load], step: float) -> Motion:

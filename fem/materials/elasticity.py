@@ -33,11 +33,6 @@ def compliance_matrix(constants: EngineeringConstants) -> NDArray[np.float64]:
     return compliance
 
 
-def wave_speeds(material: Material) -> NDArray[np.float64]:
-    """Return the speeds of pressure waves along x, y, z: ``(3,)`` [m/s], sqrt(C_ii / density)."""
-    return np.sqrt(np.diag(elasticity_matrix(material))[:3] / material.density)
-
-
 def role_of_part(part: str) -> str:
     """Return the material role of a part: its name up to ``@``, then up to ``_``."""
     return part.split("@")[0].split("_")[0]

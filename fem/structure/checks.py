@@ -266,6 +266,9 @@ def _dynamics(scene: StructureScene) -> Iterator[Problem]:
         yield from _nonlinear_damping(scene)
     for name in dynamics.numerics.mass_scaled:
         yield from unknown_name("dynamics.numerics.mass_scaled", name, scene.structure.layers, "layer")
+    if dynamics.numerics.mass_scaled and dynamics.solver != "explicit":
+        message = f"serves explicit steps, the solver is {dynamics.solver}"
+        yield Problem("dynamics.numerics.mass_scaled", list(dynamics.numerics.mass_scaled), message, "none")
     if scene.structure.layers and set(dynamics.numerics.mass_scaled) >= set(scene.structure.layers):
         message = "leaves no layer to take the step from"
         yield Problem("dynamics.numerics.mass_scaled", list(dynamics.numerics.mass_scaled), message)

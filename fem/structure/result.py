@@ -9,12 +9,11 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from fem.elements.one_point import ONE_POINT
+from fem.elements.hexahedron import HEXAHEDRON
 from fem.factorisation import FactorCost
 from fem.fields import Fields
 from fem.history import History
 from fem.inputs import StructureInput
-from fem.materials.effects import plastic_laws
 from fem.result import ADDED_MASS_LIMIT, Timings, checked, hourglass_check, quantity
 from fem.stress import principal_strains, von_mises
 from fem.structure.effects import effects
@@ -180,7 +179,6 @@ def health(history: History, summary: dict[str, Any], request: StructureInput) -
         "energy_balance_error": (history.ledger.balance_error, request.dynamics.numerics.energy_balance_limit),
         "added_mass_fraction": (summary["added_mass"] / summary["model_mass"], ADDED_MASS_LIMIT),
     }
-    one_point = request.structure.formulation == ONE_POINT.name  # of elastic ones it is their bending, no error
-    if not one_point or plastic_laws(request.layer_materials):
+    if request.structure.formulation == HEXAHEDRON.name:  # of one point it is the bending of the layers, too
         checks |= hourglass_check(history)
     return checked(checks)

@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from fem.kernels.plasticity import plastic_constants, yield_stress
-from fem.materials.elasticity import elasticity_matrix, wave_speeds
+from fem.materials.elasticity import elasticity_matrix
 from fem.materials.library import LIBRARY, SAC305, SNPB
 from fem.materials.parameters import Isotropic
 
@@ -14,8 +14,10 @@ RATES = (1e-3, 1e-1, 10.0, 100.0)
 
 @pytest.mark.parametrize("name", LIBRARY)
 def test_material_is_stable_and_its_waves_are_those_of_a_solid(name):
-    assert np.linalg.eigvalsh(elasticity_matrix(LIBRARY[name]))[0] > 0.0
-    assert 1800.0 < wave_speeds(LIBRARY[name]).min() < 9000.0
+    elasticity = elasticity_matrix(LIBRARY[name])
+    assert np.linalg.eigvalsh(elasticity)[0] > 0.0
+    speeds = np.sqrt(np.diag(elasticity)[:3] / LIBRARY[name].density)
+    assert 1800.0 < speeds.min() < 9000.0
 
 
 def law(material: Isotropic, celsius: float, strain: float, rate: float) -> float:

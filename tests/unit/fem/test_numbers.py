@@ -10,7 +10,7 @@ from fem.errors import EnergyError
 from fem.estimate import BOARD_ADVANTAGE, implicit_plan, largest_implicit_step, predict_seconds, window_plan
 from fem.ledger import SUMS, Ledger
 from fem.loads import half_sine_drop
-from fem.materials.elasticity import elasticity_matrix, material_of_part, role_of_part, wave_speeds
+from fem.materials.elasticity import elasticity_matrix, material_of_part, role_of_part
 from fem.materials.library import COPPER, FR4, SILICON
 from fem.materials.parameters import Isotropic, Orthotropic
 from fem.materials.roles import Materials
@@ -54,7 +54,7 @@ def test_impossible_laminate_is_refused():
 
 def test_silicon_wave_speed():
     # sqrt(E (1 - nu) / ((1 + nu)(1 - 2 nu) rho)), by hand
-    assert wave_speeds(SILICON) == pytest.approx(8525.0, rel=1e-3)
+    assert np.sqrt(elasticity_matrix(SILICON)[0, 0] / SILICON.density) == pytest.approx(8525.0, rel=1e-3)
 
 
 @pytest.mark.parametrize(("part", "role"), [("solder@A10", "solder"), ("copper_board@A1", "copper"), ("die", "die")])

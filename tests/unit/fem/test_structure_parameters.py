@@ -154,6 +154,7 @@ def test_own_materials_go_before_those_of_the_library():
         ),
         ({"dynamics": {"duration": 1e-3, "numerics": {"mass_scaled": ["copper"]}}}, "mass_scaled = copper: no such"),
         ({"dynamics": {"duration": 1e-3, "numerics": {"mass_scaled": ["board"]}}}, "leaves no layer to take the step"),
+        ({"dynamics": {"duration": 1e-3, "solver": "both", "numerics": {"mass_scaled": ["board"]}}}, "serves explicit"),
     ],
 )  # fmt: skip
 def test_what_does_not_fit_is_said(changes, message):
