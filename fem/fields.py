@@ -1,4 +1,4 @@
-"""Fields for ParaView: displacement, and per cell von Mises stress [Pa], plastic strain where it may be, and part."""
+"""Fields for ParaView: displacement, and per cell von Mises stress [Pa], neglected and plastic strain, and part."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -48,7 +48,7 @@ class Fields:
         """
         mesh = body.local.mesh
         space, cells = dolfinx_api.vector_space(mesh), dolfinx_api.cell_space(mesh)
-        names = ("von_mises", "plastic_strain") if yields else ("von_mises",)
+        names = ("von_mises", "neglected_strain", *(("plastic_strain",) if yields else ()))
         self._displacement = dolfinx.fem.Function(space, name="displacement")
         self._cell_functions = {name: dolfinx.fem.Function(cells, name=name) for name in names}
         self._part = dolfinx.fem.Function(cells, name="part")
@@ -64,7 +64,10 @@ class Fields:
 
     def sample(self, displacement: NDArray[np.float64], time: float) -> FieldSample:
         """Return the fields at a displacement ``(n, 3)`` [m] and a time [s]."""
-        cells = {"von_mises": von_mises(self._recovery.stress(displacement))}
+        cells = {
+            "von_mises": von_mises(self._recovery.stress(displacement)),
+            "neglected_strain": self._recovery.neglected_strain(displacement),
+        }
         if "plastic_strain" in self._cell_functions:
             cells["plastic_strain"] = self._recovery.plastic_strain()
         return FieldSample(time, displacement.copy(), cells)

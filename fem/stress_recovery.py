@@ -55,6 +55,16 @@ class StressRecovery:
             result[finite] = voigt(stretch - np.eye(3)) * [1.0, 1.0, 1.0, 2.0, 2.0, 2.0]
         return result
 
+    def neglected_strain(self, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the largest strain ``(k,)`` that small kinematics leaves out, zero where kinematics are finite.
+
+        It is the greatest eigenvalue of h^T h / 2, the part of Green's strain that is quadratic in the displacement
+        gradient h: what a rotation would stretch a body whose ends are held.
+        """
+        gradient = np.einsum("kai,kaj->kij", displacement[self._cells], self._gradient)
+        largest = 0.5 * np.linalg.eigvalsh(gradient.transpose(0, 2, 1) @ gradient)[:, -1]
+        return np.where(self._finite, 0.0, largest)
+
     def plastic_strain(self) -> NDArray[np.float64]:
         """Return the equivalent plastic strains ``(k,)``, zero where a material does not yield."""
         result = np.zeros(len(self._cells))

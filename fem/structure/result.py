@@ -21,6 +21,8 @@ from fem.structure.model import StructureModel
 from fem.structure.modes import ModeTable
 from fem.watch_points import PointTable
 
+NEGLIGIBLE_STRAIN = 1e-4  # a tenth or less of the strains for which boards are tested
+
 
 @dataclass(frozen=True, slots=True)
 class Found:
@@ -64,7 +66,9 @@ def write_result(
             | layer_metrics(found.peaks)
             | mode_metrics(found.modes),
             "health": health(history, summary, request),
-            "effects": effects(request, summary["added_mass"]) | strain_effect(model.tables.watch),
+            "effects": effects(request, summary["added_mass"])
+            | strain_effect(model.tables.watch)
+            | rotation_effect(request, found.peaks["neglected_strain"]),
             "timings": timings.seconds,
             "continued_from": timings.first,
             "model": summary,
@@ -132,6 +136,17 @@ def strain_effect(watch: PointTable) -> dict[str, Any]:
     return {"strain_at_surface": {"on": not away, "why": why if away else "a linear fit to the means of elements"}}
 
 
+def rotation_effect(request: StructureInput, neglected: dict[str, float]) -> dict[str, Any]:
+    """Return whether rotations are finite, and what small kinematics has left out."""
+    kinematics, strain = request.dynamics.kinematics, max(neglected.values())
+    why = f"dynamics.kinematics = {kinematics}"
+    if kinematics == "small":
+        why += f"; it leaves out strains of up to {1e6 * strain:.3g} um/m (half the squared displacement gradient)"
+        if strain > NEGLIGIBLE_STRAIN:
+            why += ": not negligible, compare with a run of kinematics = finite"
+    return {"finite_rotation": {"on": kinematics == "finite", "why": why}}
+
+
 def energy_metrics(arrays: dict[str, NDArray]) -> dict[str, Any]:
     """Return the largest value of each energy that the ledger keeps and that is not zero throughout."""
     names = ("kinetic", "internal", "plastic", "hourglass", "damping", "external")
@@ -160,7 +175,11 @@ def point_metrics(arrays: dict[str, NDArray]) -> dict[str, Any]:
 
 def layer_metrics(peaks: dict[str, dict[str, float]]) -> dict[str, Any]:
     """Return the largest element values of each layer at the times of the fields."""
-    names = {"von_mises": ("peak_element_stress", "Pa"), "plastic_strain": ("peak_element_plastic_strain", "")}
+    names = {
+        "von_mises": ("peak_element_stress", "Pa"),
+        "neglected_strain": ("peak_neglected_strain", ""),
+        "plastic_strain": ("peak_element_plastic_strain", ""),
+    }
     return {
         f"{names[field][0]}@{layer}": quantity(peak, names[field][1])
         for field, layers in peaks.items()

@@ -74,3 +74,15 @@ def test_small_kinematics_of_an_elastic_body_follow_the_linear_law():
     strain = np.array([*np.diag(gradient), *(gradient + gradient.T)[[0, 1, 0], [1, 2, 2]]])
     assert np.allclose(recovery.stress(displacement), elasticity_matrix(FR4) @ strain, rtol=1e-10)
     assert not recovery.plastic_strain().any()
+
+
+@pytest.mark.parametrize(("kinematics", "left_out"), [("small", True), ("finite", False)])
+def test_strain_that_small_kinematics_leaves_out_of_a_rotation(kinematics, left_out):
+    angle = 0.02
+
+    def turn(s: float) -> np.ndarray:
+        return Rotation.from_rotvec([s * angle, 0.0, 0.0]).as_matrix()
+
+    recovery, displacement = recovered(LINEAR_HARDENING, turn, kinematics, "one_point", steps=1)
+    exact = 1.0 - np.cos(angle)  # h = R - 1: h^T h = 2 (1 - cos) across the axis
+    assert recovery.neglected_strain(displacement) == pytest.approx(exact * left_out, rel=1e-9, abs=1e-15)
