@@ -266,13 +266,23 @@ def _dynamics(scene: StructureScene) -> Iterator[Problem]:
         yield from _nonlinear_damping(scene)
     for name in dynamics.numerics.mass_scaled:
         yield from unknown_name("dynamics.numerics.mass_scaled", name, scene.structure.layers, "layer")
-    if dynamics.numerics.mass_scaled and dynamics.solver != "explicit":
-        message = f"serves explicit steps, the solver is {dynamics.solver}"
-        yield Problem("dynamics.numerics.mass_scaled", list(dynamics.numerics.mass_scaled), message, "none")
-    if scene.structure.layers and set(dynamics.numerics.mass_scaled) >= set(scene.structure.layers):
-        message = "leaves no layer to take the step from"
-        yield Problem("dynamics.numerics.mass_scaled", list(dynamics.numerics.mass_scaled), message)
+    yield from _numerics(scene)
     if not scene.loads and not any(dynamics.initial_velocity):
         yield Problem(
             "loads", None, "nothing moves the structure", "a table such as loads.drop, or an initial_velocity"
         )
+
+
+def _numerics(scene: StructureScene) -> Iterator[Problem]:
+    dynamics, numerics = scene.dynamics, scene.dynamics.numerics
+    longest = min([dynamics.duration, *(load.duration / 2 for load in scene.loads.values() if load.duration)])
+    step = numerics.implicit_step
+    if step is not None and step > longest:
+        message = "is too long to see the motion: above the duration, or half a pulse"
+        yield Problem("dynamics.numerics.implicit_step", f"{step:g} s", message, f"<= {longest:g} s")
+    if numerics.mass_scaled and dynamics.solver != "explicit":
+        message = f"serves explicit steps, the solver is {dynamics.solver}"
+        yield Problem("dynamics.numerics.mass_scaled", list(numerics.mass_scaled), message, "none")
+    if scene.structure.layers and set(numerics.mass_scaled) >= set(scene.structure.layers):
+        message = "leaves no layer to take the step from"
+        yield Problem("dynamics.numerics.mass_scaled", list(numerics.mass_scaled), message)

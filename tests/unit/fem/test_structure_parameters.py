@@ -155,6 +155,7 @@ def test_own_materials_go_before_those_of_the_library():
         ({"dynamics": {"duration": 1e-3, "numerics": {"mass_scaled": ["copper"]}}}, "mass_scaled = copper: no such"),
         ({"dynamics": {"duration": 1e-3, "numerics": {"mass_scaled": ["board"]}}}, "leaves no layer to take the step"),
         ({"dynamics": {"duration": 1e-3, "solver": "both", "numerics": {"mass_scaled": ["board"]}}}, "serves explicit"),
+        ({"dynamics": {"duration": 1e-5, "numerics": {"implicit_step": 1e-3}}}, "implicit_step = 0.001 s: is too long"),
     ],
 )  # fmt: skip
 def test_what_does_not_fit_is_said(changes, message):
