@@ -118,8 +118,9 @@ def _widened(indices: set[int]) -> range:
 
 
 def _package_axis(die: float, substrate: float, size: float) -> tuple[Interval, ...]:
-    under_die = uniform(0.0, die, size)
-    return (under_die, uniform(die, substrate, size)) if substrate > die else (under_die,)
+    if math.isclose(die, substrate, rel_tol=1.0e-9):  # what rounding leaves between their edges is no block
+        return (uniform(0.0, substrate, size),)
+    return uniform(0.0, die, size), uniform(die, substrate, size)
 
 
 def _board_axis(footprint: float, end: float, hole: float, square: float, numerics: BoardNumerics) -> list[Interval]:

@@ -30,6 +30,12 @@ def test_die_edges_lie_on_grid_lines():
     assert plan.y[0].end == pytest.approx(1.45 * MM)
 
 
+def test_a_die_that_rounding_makes_smaller_covers_its_substrate():
+    die = {"length": 4.999999999999999 * MM, "width": 5.0 * MM, "thickness": 0.4 * MM}
+    plan = package_plan(package(die=die), board())
+    assert len(plan.x) == len(plan.y) == 1
+
+
 def test_patch_is_the_footprint_and_its_margin():
     plan = board_plan(package(), board())
     assert footprint(plan, package()) == {(0, 0)}

@@ -192,7 +192,9 @@ def test_either_solver_has_a_cost():
 
 
 def test_effects_have_reasons():
-    effects = forecast_structure(read_case(BOARD, ['dynamics.numerics.mass_scaled=["cover"]'])).effects
+    effects = forecast_structure(
+        read_case(BOARD, ["dynamics.solver=explicit", 'dynamics.numerics.mass_scaled=["cover"]'])
+    ).effects
     assert effects["input_g"] == {"on": True, "why": "loads.drop"}
     assert not effects["finite_rotation"]["on"]
     assert effects["mass_scaling"]["why"].startswith("dynamics.numerics.mass_scaled = ['cover']")
