@@ -19,13 +19,15 @@ def keep_kernels_by_source(environment: MutableMapping[str, str] = os.environ) -
 
     A folder that the user has named stays. Where none can be made, Numba keeps its own place.
     """
+    if VARIABLE in environment:
+        return
     cache = Path(environment.get("XDG_CACHE_HOME") or Path.home() / ".cache")
     folder = cache / "reflowshock" / f"kernels-{digest()}"
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError:
         return
-    environment.setdefault(VARIABLE, str(folder))
+    environment[VARIABLE] = str(folder)
 
 
 def digest() -> str:
