@@ -20,12 +20,11 @@ from numpy.typing import NDArray
 from fem.agreement import agreed
 from fem.body import Body
 from fem.damping import RayleighDamping
-from fem.energy import Energy
 from fem.factorisation import Factorisation
 from fem.force_assembled import AssembledElements
 from fem.force_congruent import CongruentElements
 from fem.global_matrix import Equations
-from fem.loads import Load
+from fem.loads import Load, Loaded
 from fem.motion import Motion
 
 
@@ -54,7 +53,7 @@ class Scheme:
         return 0.5 - self.alpha
 
 
-class ImplicitMotion:
+class ImplicitMotion(Loaded):
     """The state of one model on one rank, and its step; the surface of ``motion.Motion``.
 
     Attributes:
@@ -250,18 +249,6 @@ class ImplicitMotion:
         self.body.shared.add(force)
         return at_slaves
 
-    def body_acceleration(self, time: float) -> NDArray[np.float64]:
-        """Return the sum of all loads' accelerations ``(3,)`` [m/s^2] at a time [s]."""
-        return sum((load.acceleration(time) for load in self._loads), np.zeros(3))
-
-    def base_displacement(self) -> NDArray[np.float64]:
-        """Return the displacement ``(3,)`` [m] of the frame in which results are told; zero but with a large mass."""
-        return sum((load.base_displacement() for load in self._loads), np.zeros(3))
-
-    def base_velocity(self) -> NDArray[np.float64]:
-        """Return the velocity ``(3,)`` [m/s] of that frame."""
-        return sum((load.base_velocity() for load in self._loads), np.zeros(3))
-
     def present_velocity(self) -> NDArray[np.float64]:
         """Return the velocity ``(n, 3)`` [m/s] at ``time``."""
         return self.velocity
@@ -286,10 +273,6 @@ class ImplicitMotion:
     def kinetic_energy(self) -> float:
         """Return the kinetic energy [J] of this rank's share."""
         return 0.5 * float(self.ledger_mass @ np.sum(self.velocity**2, axis=1))
-
-    def internal_energy(self) -> Energy:
-        """Return the energies [J] of this rank's elements."""
-        return sum((term.energy(self.displacement) for term in self.body.terms), Energy())
 
     def step_energy(self, foreign: NDArray[np.float64]) -> float:
         """Return zero: no step is too large for stability."""

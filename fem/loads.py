@@ -5,6 +5,7 @@ step's work. The work of a force over a step is the mean of its values at both e
 them, so that with ``Motion.kinetic_energy`` the ledger of a linear model is exact at any step.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
@@ -13,6 +14,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from fem.body import Body
+from fem.energy import Energy
 from fem.errors import LoadError
 from fem.pulse import HalfSine, Pulse
 
@@ -76,6 +78,35 @@ class Load:
         """Continue from what ``state`` returned."""
         for name, value in state.items():
             setattr(self, name, value)
+
+
+class Loaded:
+    """A motion under loads: what follows from their list and from the force terms, explicit or implicit.
+
+    Attributes:
+        body: The model.
+        displacement: ``(n, 3)`` [m].
+    """
+
+    body: Body
+    displacement: NDArray[np.float64]
+    _loads: Sequence[Load]
+
+    def body_acceleration(self, time: float) -> NDArray[np.float64]:
+        """Return the sum of all loads' accelerations ``(3,)`` [m/s^2] at a time [s]."""
+        return sum((load.acceleration(time) for load in self._loads), np.zeros(3))
+
+    def base_displacement(self) -> NDArray[np.float64]:
+        """Return the displacement ``(3,)`` [m] of the frame in which results are told; zero but with a large mass."""
+        return sum((load.base_displacement() for load in self._loads), np.zeros(3))
+
+    def base_velocity(self) -> NDArray[np.float64]:
+        """Return the velocity ``(3,)`` [m/s] of that frame."""
+        return sum((load.base_velocity() for load in self._loads), np.zeros(3))
+
+    def internal_energy(self) -> Energy:
+        """Return the energies [J] of this rank's elements."""
+        return sum((term.energy(self.displacement) for term in self.body.terms), Energy())
 
 
 @dataclass(frozen=True)

@@ -7,12 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem.body import Body
-from fem.energy import Energy
 from fem.kernels.motion import advance
-from fem.loads import Load
+from fem.loads import Load, Loaded
 
 
-class Motion:
+class Motion(Loaded):
     """The state of one model on one rank, and its step.
 
     Half-kick, drift, force, half-kick, written with the velocity half a step back: v += dt (f / m + g), u += dt v.
@@ -70,18 +69,6 @@ class Motion:
     def damping_energy(self) -> float:
         """Return the energy that damping has taken from this rank's share [J]."""
         return -sum(load.work for load in self._loads if load.account == "damping")
-
-    def body_acceleration(self, time: float) -> NDArray[np.float64]:
-        """Return the sum of all loads' accelerations ``(3,)`` [m/s^2] at a time [s]."""
-        return sum((load.acceleration(time) for load in self._loads), np.zeros(3))
-
-    def base_displacement(self) -> NDArray[np.float64]:
-        """Return the displacement ``(3,)`` [m] of the frame in which results are told; zero but with a large mass."""
-        return sum((load.base_displacement() for load in self._loads), np.zeros(3))
-
-    def base_velocity(self) -> NDArray[np.float64]:
-        """Return the velocity ``(3,)`` [m/s] of that frame."""
-        return sum((load.base_velocity() for load in self._loads), np.zeros(3))
 
     def hold(self, nodes: NDArray[np.integer], component: int) -> None:
         """Let a velocity component of local nodes no longer follow from forces."""
@@ -161,10 +148,6 @@ class Motion:
             load.release(force)
         acceleration = (self._following_velocity() - self.velocity) / self.step - self.gravity
         return self.ledger_mass[:, None] * acceleration - force
-
-    def internal_energy(self) -> Energy:
-        """Return the energies [J] of this rank's elements."""
-        return sum((term.energy(self.displacement) for term in self.body.terms), Energy())
 
     def step_energy(self, foreign: NDArray[np.float64]) -> float:
         """Return dt^2 f . M^-1 f / 8 [J] of this rank's share, f the internal force.

@@ -38,7 +38,7 @@ class StressRecovery:
             result[rows] = term.means(places).stress
         finite = self._finite
         if finite.any():
-            deformation = np.eye(3) + np.einsum("kai,kaj->kij", local[finite], self._gradient[finite])
+            deformation = np.eye(3) + self._displacement_gradient(displacement, finite)
             rotation, _ = polar(deformation)
             turned = rotation @ symmetric(result[finite]) @ rotation.transpose(0, 2, 1)
             result[finite] = voigt(turned / np.linalg.det(deformation)[:, None, None])
@@ -50,7 +50,7 @@ class StressRecovery:
         result = mean_strain(self._gradient, local)
         finite = self._finite
         if finite.any():
-            deformation = np.eye(3) + np.einsum("kai,kaj->kij", local[finite], self._gradient[finite])
+            deformation = np.eye(3) + self._displacement_gradient(displacement, finite)
             _, stretch = polar(deformation)
             result[finite] = voigt(stretch - np.eye(3)) * [1.0, 1.0, 1.0, 2.0, 2.0, 2.0]
         return result
@@ -61,9 +61,16 @@ class StressRecovery:
         It is the greatest eigenvalue of h^T h / 2, the part of Green's strain that is quadratic in the displacement
         gradient h: what a rotation would stretch a body whose ends are held.
         """
-        gradient = np.einsum("kai,kaj->kij", displacement[self._cells], self._gradient)
-        largest = 0.5 * np.linalg.eigvalsh(gradient.transpose(0, 2, 1) @ gradient)[:, -1]
-        return np.where(self._finite, 0.0, largest)
+        result = np.zeros(len(self._cells))
+        small = ~self._finite
+        if small.any():
+            gradient = self._displacement_gradient(displacement, small)
+            result[small] = 0.5 * np.linalg.eigvalsh(gradient.transpose(0, 2, 1) @ gradient)[:, -1]
+        return result
+
+    def _displacement_gradient(self, displacement: NDArray[np.float64], rows: NDArray[np.bool_]) -> NDArray[np.float64]:
+        """Return the mean displacement gradients ``(r, 3, 3)`` of some elements."""
+        return np.einsum("kai,kaj->kij", displacement[self._cells[rows]], self._gradient[rows])
 
     def plastic_strain(self) -> NDArray[np.float64]:
         """Return the equivalent plastic strains ``(k,)``, zero where a material does not yield."""

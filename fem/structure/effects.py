@@ -6,17 +6,19 @@ from typing import Any
 from fem.materials.effects import material_effects
 from fem.structure.parameters import StructureScene
 
+NEGLIGIBLE_STRAIN = 1e-4  # a tenth or less of the strains for which boards are tested
 
-def effects(scene: StructureScene, added_mass: float) -> dict[str, Any]:
+
+def effects(scene: StructureScene, added_mass: float, neglected_strain: float | None = None) -> dict[str, Any]:
     """Return name -> whether it is on, and why.
 
     Args:
         scene: The structure.
         added_mass: Mass that scaling has added [kg].
+        neglected_strain: Largest strain that a run of small kinematics has left out; None before a run.
     """
-    return material_effects(scene.layer_materials) | {
-        name: {"on": on, "why": why} for name, on, why in [*_loads(scene), *_scheme(scene, added_mass)]
-    }
+    others = [*_loads(scene), _kinematics(scene, neglected_strain), *_scheme(scene, added_mass)]
+    return material_effects(scene.layer_materials) | {name: {"on": on, "why": why} for name, on, why in others}
 
 
 def _loads(scene: StructureScene) -> Iterator[tuple[str, bool, str]]:
@@ -28,9 +30,18 @@ def _loads(scene: StructureScene) -> Iterator[tuple[str, bool, str]]:
     yield "initial_velocity", any(velocity), f"dynamics.initial_velocity = {list(velocity)} m/s"
 
 
-def _scheme(scene: StructureScene, added_mass: float) -> Iterator[tuple[str, bool, str]]:
+def _kinematics(scene: StructureScene, neglected_strain: float | None) -> tuple[str, bool, str]:
     finite = scene.dynamics.kinematics == "finite"
-    yield "finite_rotation", finite, f"dynamics.kinematics = {scene.dynamics.kinematics}"
+    why = f"dynamics.kinematics = {scene.dynamics.kinematics}"
+    if not finite and neglected_strain is not None:
+        strain = f"{1e6 * neglected_strain:.3g} um/m"
+        why += f"; it leaves out strains of up to {strain} (half the squared displacement gradient)"
+        if neglected_strain > NEGLIGIBLE_STRAIN:
+            why += ": not negligible, compare with a run of kinematics = finite"
+    return "finite_rotation", finite, why
+
+
+def _scheme(scene: StructureScene, added_mass: float) -> Iterator[tuple[str, bool, str]]:
     damping, numerics = scene.dynamics.damping, scene.dynamics.numerics
     given = {name: value for name, value in damping.model_dump().items() if value and name != "frequency"}
     yield "damping", bool(given), ", ".join(f"{name} = {value:g}" for name, value in given.items()) or "none is given"

@@ -9,7 +9,6 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from fem.elements.hexahedron import HEXAHEDRON
 from fem.factorisation import FactorCost
 from fem.fields import Fields
 from fem.history import History
@@ -20,8 +19,6 @@ from fem.structure.effects import effects
 from fem.structure.model import StructureModel
 from fem.structure.modes import ModeTable
 from fem.watch_points import PointTable
-
-NEGLIGIBLE_STRAIN = 1e-4  # a tenth or less of the strains for which boards are tested
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,9 +63,8 @@ def write_result(
             | layer_metrics(found.peaks)
             | mode_metrics(found.modes),
             "health": health(history, summary, request),
-            "effects": effects(request, summary["added_mass"])
-            | strain_effect(model.tables.watch)
-            | rotation_effect(request, found.peaks["neglected_strain"]),
+            "effects": effects(request, summary["added_mass"], max(found.peaks["neglected_strain"].values()))
+            | strain_effect(model.tables.watch),
             "timings": timings.seconds,
             "continued_from": timings.first,
             "model": summary,
@@ -136,17 +132,6 @@ def strain_effect(watch: PointTable) -> dict[str, Any]:
     return {"strain_at_surface": {"on": not away, "why": why if away else "a linear fit to the means of elements"}}
 
 
-def rotation_effect(request: StructureInput, neglected: dict[str, float]) -> dict[str, Any]:
-    """Return whether rotations are finite, and what small kinematics has left out."""
-    kinematics, strain = request.dynamics.kinematics, max(neglected.values())
-    why = f"dynamics.kinematics = {kinematics}"
-    if kinematics == "small":
-        why += f"; it leaves out strains of up to {1e6 * strain:.3g} um/m (half the squared displacement gradient)"
-        if strain > NEGLIGIBLE_STRAIN:
-            why += ": not negligible, compare with a run of kinematics = finite"
-    return {"finite_rotation": {"on": kinematics == "finite", "why": why}}
-
-
 def energy_metrics(arrays: dict[str, NDArray]) -> dict[str, Any]:
     """Return the largest value of each energy that the ledger keeps and that is not zero throughout."""
     names = ("kinetic", "internal", "plastic", "hourglass", "damping", "external")
@@ -198,6 +183,4 @@ def health(history: History, summary: dict[str, Any], request: StructureInput) -
         "energy_balance_error": (history.ledger.balance_error, request.dynamics.numerics.energy_balance_limit),
         "added_mass_fraction": (summary["added_mass"] / summary["model_mass"], ADDED_MASS_LIMIT),
     }
-    if request.structure.formulation == HEXAHEDRON.name:  # of one point it is the bending of the layers, too
-        checks |= hourglass_check(history)
-    return checked(checks)
+    return checked(checks | hourglass_check(history, request.structure.formulation))

@@ -5,8 +5,7 @@ from pathlib import Path
 
 from pydantic import Field
 
-from fem.materials.parameters import Material
-from fem.structure.parameters import Dynamics, Structure, StructureLoad, StructureScene, Support, WatchPoint
+from fem.structure.parameters import StructureScene
 from meshing.box_plan import Box, BoxHoles, BoxLayer
 from workflow.case_kind import Case
 from workflow.problems import Problem
@@ -14,19 +13,13 @@ from workflow.stage_table import STRUCTURE
 from workflow.structure.references import AnyReference, reference_problems
 
 
-class StructureCase(Case):
+class StructureCase(StructureScene, Case):
     """A box of layers under supports and loads."""
 
     kind = "structure"
     pipeline = STRUCTURE
     ranks_key = "dynamics.ranks"
 
-    structure: Structure
-    materials: dict[str, Material] = Field(default_factory=dict)
-    supports: dict[str, Support] = Field(default_factory=dict)
-    loads: dict[str, StructureLoad] = Field(default_factory=dict)
-    watch: dict[str, WatchPoint] = Field(default_factory=dict)
-    dynamics: Dynamics
     references: dict[str, AnyReference] = Field(default_factory=dict)
 
     @classmethod
