@@ -47,6 +47,8 @@ class Tie:
 def tie_joints(mesh: MeshData) -> tuple[MeshData, Tie, float]:
     """Tie the ends of all joints: ``foot@..`` to ``board_side``, ``head@..`` to ``package_side``.
 
+    Layers that differ are tied alike: ``slave@..`` to ``master@..`` of the same name.
+
     Returns:
         The mesh with its slaves moved onto their facets, the tie, and the largest such move [m].
 
@@ -56,7 +58,8 @@ def tie_joints(mesh: MeshData) -> tuple[MeshData, Tie, float]:
     """
     if mesh.shape is not HEXAHEDRON and any("@" in name for name in mesh.facets):
         raise TieError(f"joints are tied to quadrilateral facets only: the mesh needs hexahedra, not {mesh.shape.name}")
-    ends = [(name, "board_side") for name in mesh.facets if name.startswith("foot@")]
+    ends = [(name, name.replace("slave@", "master@", 1)) for name in mesh.facets if name.startswith("slave@")]
+    ends += [(name, "board_side") for name in mesh.facets if name.startswith("foot@")]
     ends += [(name, "package_side") for name in mesh.facets if name.startswith("head@")]
     ties = [tie_end(mesh, end, side) for end, side in ends if len(mesh.facets[end])]
     if not ties:

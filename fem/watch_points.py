@@ -113,7 +113,7 @@ class PointWatch:
 
     def __init__(self, table: PointTable, body: Body) -> None:
         """Find this rank's share of the table."""
-        self._table = table
+        self._table, self._tie = table, body.tie
         self.labels: dict[str, NDArray] = {
             "watch": np.array(table.names, dtype=str),
             "watch_points": table.points,
@@ -143,7 +143,9 @@ class PointWatch:
         if quantity == "displacement":
             result[self._slots] = motion.displacement[self._nodes] - motion.base_displacement()
         elif quantity == "velocity":
-            result[self._slots] = motion.present_velocity()[self._nodes] - motion.base_velocity()
+            velocity = motion.present_velocity()
+            self._tie.spread(velocity)
+            result[self._slots] = velocity[self._nodes] - motion.base_velocity()
         else:
             np.add.at(result, self._owner, self._weight[:, None] * self._mean(quantity, motion.displacement))
         return result

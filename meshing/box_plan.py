@@ -1,7 +1,7 @@
 """A box of layers as data: its intervals, its elements counted without a mesh. Pure Python."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from meshing.estimate import PartEstimate
@@ -15,11 +15,12 @@ ROOM = 1.6  # the same side, over the distance from the hole's axis to the neare
 
 @dataclass(frozen=True, slots=True)
 class BoxLayer:
-    """A layer [m], ``cells`` elements thick."""
+    """A layer [m], ``cells`` elements thick, and ``in_plane`` along x and y if it differs from the box."""
 
     name: str
     thickness: float
     cells: int
+    in_plane: tuple[int, int] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,6 +67,18 @@ class Box:
         meshed = min(self.extent(axis) / self.cells[axis] for axis in (0, 1))
         return max(1, round(0.5 * (self.square - self.holes.diameter) / meshed))
 
+    @property
+    def stacks(self) -> tuple["Box", ...]:
+        """Neighbouring layers whose elements match, bottom to top: each stack a box that shares no node with others."""
+        stacks: list[Box] = []
+        for layer in self.layers:
+            cells = layer.in_plane or self.cells
+            if stacks and stacks[-1].cells == cells:
+                stacks[-1] = replace(stacks[-1], layers=(*stacks[-1].layers, layer))
+            else:
+                stacks.append(replace(self, cells=cells, layers=(layer,)))
+        return tuple(stacks)
+
     def is_halved(self, axis: int) -> bool:
         """Whether a plane normal to an axis is one of symmetry."""
         return "xy"[axis] in self.symmetry
@@ -85,6 +98,10 @@ def box_plan(box: Box) -> Plan:
 
 def count_box(box: Box) -> dict[str, PartEstimate]:
     """Count the elements of every layer, exactly; lengths are those of the smallest box of cells."""
+    return {name: part for stack in box.stacks for name, part in _count_stack(stack).items()}
+
+
+def _count_stack(box: Box) -> dict[str, PartEstimate]:
     plan = box_plan(box)
     cells = sum(part.cells for part in plan.x) * sum(part.cells for part in plan.y)
     for i in plan.hole_x:

@@ -67,8 +67,7 @@ def read_structure(comm: MPI.Comm, request: StructureInput) -> tuple[MeshData | 
     def read() -> tuple[MeshData, StructureTables] | None:
         if comm.rank:
             return None
-        mesh = read_mesh(request.mesh)
-        return mesh, structure_tables(mesh, request)
+        return structure_tables(read_mesh(request.mesh), request)
 
     found = agreed(comm, read)
     return (found[0] if found else None), comm.bcast(found[1] if found else None)

@@ -19,11 +19,16 @@ Cells = Annotated[int, Field(ge=1, le=2000)]
 
 
 class Layer(Parameters):
-    """One layer: its material by name, and how many elements lie one above the other in it."""
+    """One layer: its material by name, and how many elements lie one above the other in it.
+
+    ``in_plane`` are its elements along x and y where they are not the ``cells`` of the structure; layers that differ
+    are tied.
+    """
 
     material: str
     thickness: Annotated[float, "mm"] = Field(gt=0)
     cells: int = Field(1, ge=1, le=1000)
+    in_plane: tuple[Cells, Cells] | None = None
 
 
 class Holes(Parameters):

@@ -11,7 +11,7 @@ from fem.materials.effects import plastic_laws
 from fem.mesh import MeshData
 from fem.scene import Tables
 from fem.structure.parameters import AXES, InputG, PrescribedMotion, Pressure, StructureScene
-from fem.tie import Tie
+from fem.tie import tie_joints
 from fem.watch_points import PointTable, point_table
 
 NODES = {"hexahedron": 8, "tetrahedron": 4, "tetrahedron_quadratic": 10}
@@ -34,17 +34,22 @@ class StructureTables(Tables):
     watch: PointTable
 
 
-def structure_tables(mesh: MeshData, scene: StructureScene) -> StructureTables:
-    """Build the tables of a structure.
+def structure_tables(mesh: MeshData, scene: StructureScene) -> tuple[MeshData, StructureTables]:
+    """Tie the layers of a structure whose elements differ, and build its tables.
+
+    Returns:
+        The mesh with the slaves of the tie on their facets, and the tables.
 
     Raises:
         MeshError: Cells of another shape, layers without elements or elements without layers, watch points outside.
         LoadError: A facet set without facets, or a prescribed motion of what is held.
+        TieError: Layers whose elements differ do not touch.
     """
     check_layers(mesh, scene)
+    mesh, tie, moved_slaves = tie_joints(mesh)
     moved = [load.on for load in scene.loads.values() if isinstance(load, PrescribedMotion)]
     sets = [*(support.on for support in scene.supports.values()), *moved]
-    nodes_of = {name: np.unique(facet_set(mesh, name)) for name in sets}
+    nodes_of = {name: np.setdiff1d(facet_set(mesh, name), tie.slave) for name in sets}  # slaves follow their masters
     pressed = {load.on for load in scene.loads.values() if isinstance(load, Pressure)}
     held = held_by_supports(mesh, scene)
     check_motions(scene, nodes_of, held)
@@ -54,12 +59,12 @@ def structure_tables(mesh: MeshData, scene: StructureScene) -> StructureTables:
     supports = {
         name: (nodes_of[support.on], np.isin(list(AXES), support.hold)) for name, support in scene.supports.items()
     }
-    return StructureTables(
+    tables = StructureTables(
         part=mesh.part,
         part_names=mesh.part_names,
-        tie=Tie.none(),
-        master_points=np.empty((0, 4, 3)),
-        moved=0.0,
+        tie=tie,
+        master_points=mesh.points[tie.master],
+        moved=moved_slaves,
         held_nodes=held_nodes,
         held=held[held_nodes],
         cut=np.empty(0, np.int32),
@@ -69,6 +74,7 @@ def structure_tables(mesh: MeshData, scene: StructureScene) -> StructureTables:
         pressed={name: outward_facets(mesh, name) for name in sorted(pressed)},
         watch=point_table(mesh, points, supports, yields=bool(plastic_laws(scene.layer_materials))),
     )
+    return mesh, tables
 
 
 def check_layers(mesh: MeshData, scene: StructureScene) -> None:

@@ -46,7 +46,9 @@ class StructureCase(StructureScene, Case):
     def box(self) -> Box:
         """The body as the mesher takes it."""
         body = self.structure
-        layers = tuple(BoxLayer(name, layer.thickness, layer.cells) for name, layer in body.layers.items())
+        layers = tuple(
+            BoxLayer(name, layer.thickness, layer.cells, layer.in_plane) for name, layer in body.layers.items()
+        )
         holes = BoxHoles(body.holes.spacing, body.holes.diameter) if body.holes else None
         return Box((body.length, body.width), body.cells, layers, body.symmetry, body.element, holes)
 

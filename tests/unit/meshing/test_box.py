@@ -1,12 +1,14 @@
 """Boxes of layers: elements counted before they are made, layers and faces named, volumes exact, halves at symmetry."""
 
 import math
+from dataclasses import replace
 
 import meshio
 import numpy as np
 import pytest
 
 from meshing.box import write_box
+from meshing.box_checks import box_problems
 from meshing.box_plan import Box, BoxHoles, BoxLayer, box_plan, count_box
 
 SIZE, THICKNESS = (40e-3, 20e-3), (1e-3, 0.5e-3)
@@ -62,6 +64,35 @@ def test_named_facets_lie_where_their_name_says(tmp_path):
     radius = np.hypot(np.abs(holes[:, 0]) - 15e-3, np.abs(holes[:, 1]) - 7e-3)
     assert radius == pytest.approx(1e-3, rel=1e-9)
     assert sorted({round(z, 9) for z in holes[:, 2]}) == [0.0, 0.5e-3, 1e-3, 1.5e-3]
+
+
+def test_layers_whose_elements_differ_share_no_node_and_name_both_faces(tmp_path):
+    fine = BoxLayer("solder", 0.3e-3, 3, (24, 10))
+    box = Box(SIZE, (16, 8), (LAYERS[0], fine, BoxLayer("top", 1e-3, 1, (24, 10)), LAYERS[1]), ("y",))
+    assert [len(stack.layers) for stack in box.stacks] == [1, 2, 1]
+    counts = write_box(box, tmp_path / "structure.msh")
+    assert counts == {"board": 256, "solder": 720, "top": 240, "cover": 128}
+    assert counts == {name: part.elements for name, part in count_box(box).items()}
+    mesh = meshio.read(tmp_path / "structure.msh", file_format="gmsh")
+    assert volume(mesh) == pytest.approx(0.5 * SIZE[0] * SIZE[1] * 2.8e-3, rel=1e-12)
+    faces = {"slave@board-solder": 25 * 11, "master@board-solder": 17 * 9}
+    faces |= {"slave@top-cover": 25 * 11, "master@top-cover": 17 * 9, "z_min": 17 * 9, "z_max": 17 * 9}
+    found = {name: nodes_of(mesh, name) for name in faces}
+    assert {name: len(nodes) for name, nodes in found.items()} == faces
+    assert not np.intersect1d(found["slave@board-solder"], found["master@board-solder"]).size
+    for name, height in {"board-solder": 1e-3, "top-cover": 2.3e-3}.items():
+        for side in ("slave", "master"):
+            assert mesh.points[found[f"{side}@{name}"], 2] == pytest.approx(height, abs=1e-12)
+    assert len(nodes_of(mesh, "y_min")) == 17 * 3 + 25 * 5 + 17 * 2
+
+
+@pytest.mark.parametrize(("changes", "words"), [({"element": "tetrahedron"}, "hexahedra"), ({"holes": HOLES}, "holes")])
+def test_layers_whose_elements_differ_need_hexahedra_without_holes(changes, words):
+    box = replace(Box(SIZE, (16, 8), (LAYERS[0], replace(LAYERS[1], in_plane=(8, 8)))), **changes)
+    (problem,) = box_problems(box)
+    assert problem.key == "structure.layers.cover.in_plane"
+    assert words in problem.message
+    assert box_problems(replace(box, layers=LAYERS)) == []
 
 
 def nodes_of(mesh: meshio.Mesh, name: str) -> np.ndarray:
