@@ -30,6 +30,29 @@ class Ranks(Parameters):
     placement: Literal["split", "shared"] = "split"
 
 
+class Coupling(Parameters):
+    """How two models are coupled; ``auto`` takes local steps where all that is fine is linear, else held velocity.
+
+    ``one_way`` drives the meso model by the macro model, which takes nothing back. ``levels`` are those of the meso
+    model's steps below the window. ``buffer_layers`` of board elements lie between joints and a cut of held velocity.
+    """
+
+    scheme: Literal["auto", "held_velocity", "local_steps", "gravouil_combescure"] = "auto"
+    direction: Literal["two_way", "one_way"] = "two_way"
+    levels: Literal["auto"] | Annotated[int, Field(ge=1)] = "auto"
+    buffer_layers: int = Field(2, ge=2, le=20)
+
+
+class JointCoupling(Coupling):
+    """The coupling of a package on a board; joints that are not fine have the coarse mesh.
+
+    ``fine_joints`` are all, those named, or as many as ``critical_joints`` of the most stressed ones of a coarse run.
+    """
+
+    fine_joints: Literal["all", "critical"] | tuple[str, ...] = "all"
+    critical_joints: int = Field(3, ge=1)
+
+
 class Damping(Parameters):
     """Rayleigh damping C = alpha M + beta K, given as coefficients or as ratios of critical damping at a frequency."""
 
@@ -105,4 +128,5 @@ class Shock(Parameters):
     damping: Damping = Damping()
     failure: Failure = Failure()
     ranks: Ranks = Ranks()
+    coupling: JointCoupling = JointCoupling()
     numerics: ShockNumerics = ShockNumerics()

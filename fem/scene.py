@@ -29,6 +29,8 @@ class Tables:
         held: ``(k, 3)`` which components.
         cut: ``(nc,)`` nodes of the cut, in the same order on both sides.
         nodes: Number of nodes of the model.
+        level: ``(ne,)`` int32 level of the step of each cell, 0 for the model's own step.
+        ratios: Steps of level k + 1 in one of level k.
     """
 
     part: NDArray[np.int32]
@@ -40,6 +42,8 @@ class Tables:
     held: NDArray[np.bool_]
     cut: NDArray[np.int32]
     nodes: int
+    level: NDArray[np.int32]
+    ratios: tuple[int, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,5 +126,7 @@ def model_input(
         watch=watch_table(mesh, *scene, centres),
         shaken=mesh.facet_nodes("mounting_holes"),
         nodes=len(mesh.points),
+        level=np.zeros(len(mesh.cells), np.int32),
+        ratios=(),
     )
     return ModelInput(mesh, tables)

@@ -2,13 +2,19 @@
 
 from collections.abc import Iterator
 
-from fem.parameters import Damping, Shock
+from fem.parameters import Damping, JointCoupling, Shock
 from fem.structure.checks import Problem
 
 
 def problems(shock: Shock) -> list[Problem]:
     """Find what cannot work before anything is meshed or computed."""
-    return [*_pulse(shock), *_damping(shock.damping), *_large_mass(shock), *_finite(shock)]
+    return [
+        *_pulse(shock),
+        *_damping(shock.damping),
+        *_large_mass(shock),
+        *_finite(shock),
+        *_coupling(shock.coupling),
+    ]
 
 
 def _pulse(shock: Shock) -> Iterator[Problem]:
@@ -56,3 +62,17 @@ def _finite(shock: Shock) -> Iterator[Problem]:
             "does not go with stiffness-proportional damping, whose stiffness does not turn",
             "small, or mass-proportional damping",
         )
+
+
+def _coupling(coupling: JointCoupling) -> Iterator[Problem]:
+    """Refuse what is not computed yet."""
+    served = {
+        "scheme": ("auto", "held_velocity"),
+        "direction": ("two_way",),
+        "levels": ("auto", 1),
+        "fine_joints": ("all",),
+    }
+    for name, choices in served.items():
+        value = getattr(coupling, name)
+        if value not in choices:
+            yield Problem(f"shock.coupling.{name}", value, "is not computed yet", ", ".join(map(str, choices)))

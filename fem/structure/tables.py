@@ -69,6 +69,8 @@ def structure_tables(mesh: MeshData, scene: StructureScene) -> tuple[MeshData, S
         held=held[held_nodes],
         cut=np.empty(0, np.int32),
         nodes=len(mesh.points),
+        level=np.zeros(len(mesh.cells), np.int32),
+        ratios=(),
         nodes_of=nodes_of,
         areas={name: outward_areas(mesh, name) for name in sorted(pressed)},
         pressed={name: outward_facets(mesh, name) for name in sorted(pressed)},

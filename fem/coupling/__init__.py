@@ -1,0 +1,1 @@
+"""Two models of one run: how they are divided, placed and coupled."""

@@ -1,0 +1,37 @@
+"""How the cells of a whole mesh are divided: which model has them, at which level of step they are."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem.estimate import WindowPlan
+
+SchemeName = Literal["held_velocity", "local_steps", "gravouil_combescure"]
+
+
+@dataclass(frozen=True, slots=True)
+class Division:
+    """The cells of each model, and the steps that they take.
+
+    Attributes:
+        scheme: How the models are coupled.
+        macro: ``(ne,)`` cells of the macro model; all of them where there is one model only.
+        meso: ``(ne,)`` cells of the meso model: the others, unless the macro model takes nothing back from it.
+        level: ``(ne,)`` int32 level of the step of each cell, 0 for the window.
+        ratios: Steps of level k + 1 in one of level k.
+        plan: Window and substeps.
+    """
+
+    scheme: SchemeName
+    macro: NDArray[np.bool_]
+    meso: NDArray[np.bool_]
+    level: NDArray[np.int32]
+    ratios: tuple[int, ...]
+    plan: WindowPlan
+
+    @property
+    def meso_step(self) -> float:
+        """Return the step of the meso model's motion [s]: with local steps these are inside its force."""
+        return self.plan.window if self.scheme == "local_steps" else self.plan.step
