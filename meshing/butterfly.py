@@ -19,9 +19,11 @@ class Butterfly:
 
 
 def butterfly(core: int, rings: int) -> Butterfly:
-    """Build the section with core x core quads inside ``rings`` rings of 4 core quads each."""
+    """Build the section with core x core quads inside ``rings`` rings of 4 core quads each; without, the core fills it."""
     outline = _core_outline(core)
-    inner = _core_points(core)
+    inner = _core_points(core, CORE_DIAGONAL, CORE_SIDE) if rings else _core_points(core, 1.0, 1.0)
+    if not rings:
+        inner[outline] /= np.linalg.norm(inner[outline], axis=1, keepdims=True)
     angles = -0.75 * np.pi + 0.5 * np.pi * np.arange(4 * core) / core
     circle = np.column_stack([np.cos(angles), np.sin(angles)])
     layers = [inner[outline] + share * (circle - inner[outline]) for share in np.arange(1, rings + 1) / rings]
@@ -32,12 +34,12 @@ def butterfly(core: int, rings: int) -> Butterfly:
     return Butterfly(np.vstack([inner, *layers]), np.vstack(quads), ids[-1])
 
 
-def _core_points(core: int) -> np.ndarray:
-    """Square grid, its sides bent outwards so that they bulge towards the circle."""
+def _core_points(core: int, diagonal: float, side: float) -> np.ndarray:
+    """Square grid of given half-diagonal and half-side: its sides are bent outwards towards the circle."""
     steps = np.linspace(-1.0, 1.0, core + 1)
     x, y = np.meshgrid(steps, steps)
-    corner = CORE_DIAGONAL / np.sqrt(2.0)
-    bend = CORE_SIDE - corner
+    corner = diagonal / np.sqrt(2.0)
+    bend = side - corner
     return np.column_stack([(x * (corner + bend * (1.0 - y**2))).ravel(), (y * (corner + bend * (1.0 - x**2))).ravel()])
 
 

@@ -23,14 +23,20 @@ class Levels:
     Attributes:
         points: (layers + 1, n, 3) [m].
         scale: factor by which the inner outlines were scaled to keep the volume.
+        volume: the volume that they keep [m^3].
     """
 
     points: np.ndarray
     scale: float
+    volume: float
 
 
 def solder_levels(
-    surface: ClosedSurface, section: Butterfly, layers: int, place: Callable[[np.ndarray], np.ndarray]
+    surface: ClosedSurface,
+    section: Butterfly,
+    layers: int,
+    place: Callable[[np.ndarray], np.ndarray],
+    overhang: float = 0.0,
 ) -> Levels:
     """Cut a body into sections of equal distance and lay the butterfly into each.
 
@@ -43,12 +49,13 @@ def solder_levels(
         layers: number of layers.
         place: moves points (n, 3) [m] to where the joint will be, where its volume is kept: a tilted or curved package
             makes a joint higher here, lower there, and its mean gap another than that on its axis.
+        overhang: height [m] by which each end face is drawn out as a prism, which belongs to the body.
 
     Raises:
         ValueError: a section is not star-shaped, or the layers are too few to keep the volume.
     """
     bottom, top = float(surface.points[:, 2].min()), float(surface.points[:, 2].max())
-    heights = np.linspace(bottom, top, layers + 1)
+    heights = np.linspace(bottom - overhang, top + overhang, layers + 1)
     cuts = np.clip(heights, bottom + END * (top - bottom), top - END * (top - bottom))
     points = np.empty((layers + 1, len(section.points), 3))
     for level, cut in enumerate(cuts):
@@ -59,8 +66,10 @@ def solder_levels(
     def swept_volume(scale: float) -> float:
         return float(volumes(place(_scaled(points, section, scale).reshape(-1, 3)), cells).sum())
 
-    scale = _volume_keeping_scale(swept_volume, enclosed_volume(surface))
-    return Levels(_scaled(points, section, scale), scale)
+    ends = sum(section_area(cut_segments(surface.points, surface.triangles, cut)) for cut in cuts[[0, -1]])
+    volume = enclosed_volume(surface) + overhang * ends
+    scale = _volume_keeping_scale(swept_volume, volume)
+    return Levels(_scaled(points, section, scale), scale, volume)
 
 
 def layer_cells(quads: np.ndarray, nodes: int, layers: int) -> np.ndarray:

@@ -60,12 +60,15 @@ class JointNumerics(Parameters):
     """How a joint is meshed: butterfly cross-section swept from pad to pad."""
 
     core: int = Field(2, ge=1, le=16)
-    rings: int = Field(1, ge=1, le=16)
+    rings: int = Field(1, ge=0, le=16)
     layers: int = Field(6, ge=2, le=64)
 
 
 class Package(Parameters):
-    """A ball grid array package: the array of joints, substrate and die."""
+    """A ball grid array package: the array of joints, substrate and die.
+
+    ``coarse_joint_numerics`` is for joints of a shock that are not fine: solder alone, also in place of their copper.
+    """
 
     rows: int = Field(ge=1, le=100)
     columns: int = Field(ge=1, le=100)
@@ -79,6 +82,7 @@ class Package(Parameters):
     die: Layer
     numerics: PackageNumerics = PackageNumerics()
     joint_numerics: JointNumerics = JointNumerics()
+    coarse_joint_numerics: JointNumerics = JointNumerics(core=2, rings=0, layers=2)
 
 
 class Holes(Parameters):

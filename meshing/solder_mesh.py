@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 
@@ -12,7 +11,7 @@ from meshing.levels import Levels, layer_cells, solder_levels
 from meshing.package_side import side_lift
 from meshing.pads import PadSite, has_rim, lift
 from meshing.parameters import Package, Warpage
-from meshing.surface import ClosedSurface, enclosed_volume
+from meshing.surface import ClosedSurface
 
 MINIMUM_SCALED_JACOBIAN = 0.2
 GAP_TOLERANCE = 1.0e-3
@@ -31,7 +30,7 @@ class JointMesh:
         points: (n, 3) [m].
         cells: part name -> (c, 8) int32.
         facets: facet set name -> (f, 4) int32, seen from outside counter-clockwise.
-        volume_error: of the solder in its place against the closed surface, relative.
+        volume_error: of the solder in its place against the body that it fills, relative.
         section_scale: factor by which the inner sections were scaled to keep the volume.
         head_mismatch: largest distance of a head node from the bilinear facets of the meshed package [m].
     """
@@ -58,23 +57,63 @@ def mesh_joint(surface: ClosedSurface, site: PadSite, package: Package, warpage:
         JointMeshError: the surface spans another gap, has sections that are not star-shaped, needs more layers to keep
             its volume, or the scaled Jacobian is too small.
     """
+    copper = package.copper.thickness if package.copper.layout == "pads" else None
+    return _mesh(surface, site, _Place(site, package, warpage), copper)
+
+
+def mesh_coarse_joint(surface: ClosedSurface, site: PadSite, package: Package, warpage: Warpage) -> JointMesh:
+    """Mesh a joint by few hexahedra of solder alone, which also fill the place of the copper on its wetted discs.
+
+    Args and errors as ``mesh_joint``.
+    """
+    coarse = package.model_copy(update={"joint_numerics": package.coarse_joint_numerics})
+    overhang = package.copper.thickness if package.copper.layout == "pads" else 0.0
+    return _mesh(surface, site, _Place(site, coarse, warpage), None, overhang)
+
+
+@dataclass(frozen=True, slots=True)
+class _Place:
+    """Where a joint goes: its site under a package that is warped."""
+
+    site: PadSite
+    package: Package
+    warpage: Warpage
+
+    def __call__(self, points: np.ndarray) -> np.ndarray:
+        """Move the joint to its site and shear its solder in z so that its head lies on the warped package."""
+        site, package = self.site, self.package
+        x, y = points[:, 0] + site.x, points[:, 1] + site.y
+        rise = package.standoff - site.gap + lift(package, self.warpage, x, y)
+        share = np.clip(points[:, 2] / site.gap, 0.0, 1.0)
+        return np.column_stack([x, y, site.z_board + points[:, 2] + share * rise])
+
+    def head_mismatch(self, head: np.ndarray) -> float:
+        """Return the largest distance of nodes (n, 3) from the bilinear facets of the meshed package [m]."""
+        x, y = head[:, 0], head[:, 1]
+        flat, curved = (side(self.package, self.warpage, x, y) for side in (side_lift, lift))
+        return float(np.abs(flat - curved).max())
+
+
+def _mesh(
+    surface: ClosedSurface, site: PadSite, place: _Place, copper: float | None, overhang: float = 0.0
+) -> JointMesh:
+    """Mesh a joint with copper pads of a thickness [m], or without, its ends drawn out by ``overhang`` [m]."""
     _check_gap(surface, site)
-    numerics, copper = package.joint_numerics, package.copper
+    numerics = place.package.joint_numerics
     section = butterfly(numerics.core, numerics.rings)
-    place = partial(_placed, site=site, package=package, warpage=warpage)
     try:
-        levels = solder_levels(surface, section, numerics.layers, place)
+        levels = solder_levels(surface, section, numerics.layers, place, overhang)
     except ValueError as error:
         raise JointMeshError(f"joint {site.name}: {error}") from error
-    stack = _stack(levels, section, site, copper.thickness if copper.layout == "pads" else None)
+    stack = _stack(levels, section, site, copper)
     points = place(stack.points)
     _check_quality(points, stack.cells)
     head = points[np.unique(stack.facets[f"head@{site.name}"])]
-    x, y = head[:, 0], head[:, 1]
-    mismatch = np.abs(side_lift(package, warpage, x, y) - lift(package, warpage, x, y)).max()
     volume = volumes(points, stack.cells[f"solder@{site.name}"]).sum()
-    volume_error = float(abs(volume / enclosed_volume(surface) - 1.0))
-    return JointMesh(site.name, points, stack.cells, stack.facets, volume_error, levels.scale, float(mismatch))
+    volume_error = float(abs(volume / levels.volume - 1.0))
+    return JointMesh(
+        site.name, points, stack.cells, stack.facets, volume_error, levels.scale, place.head_mismatch(head)
+    )
 
 
 def joint_quality(mesh: JointMesh) -> dict:
@@ -145,14 +184,6 @@ def _add_pad(
     beyond = len(stack.points) + np.arange(len(ids))
     stack.points = np.vstack([stack.points, stack.points[ids] + [0.0, 0.0, rise]])
     return ids[quads], beyond[quads]
-
-
-def _placed(points: np.ndarray, site: PadSite, package: Package, warpage: Warpage) -> np.ndarray:
-    """Move the joint to its site and shear its solder in z so that its head lies on the warped package."""
-    x, y = points[:, 0] + site.x, points[:, 1] + site.y
-    rise = package.standoff - site.gap + lift(package, warpage, x, y)
-    share = np.clip(points[:, 2] / site.gap, 0.0, 1.0)
-    return np.column_stack([x, y, site.z_board + points[:, 2] + share * rise])
 
 
 def _check_gap(surface: ClosedSurface, site: PadSite) -> None:

@@ -24,7 +24,7 @@ def nodes_of(mesh, facets):
     return mesh.points[np.unique(mesh.facets[facets])]
 
 
-@pytest.mark.parametrize("numerics", [(1, 1, 4), (2, 1, 6), (3, 2, 5), (6, 3, 16)])
+@pytest.mark.parametrize("numerics", [(1, 1, 4), (2, 0, 4), (3, 0, 5), (2, 1, 6), (3, 2, 5), (6, 3, 16)])
 def test_any_resolution_keeps_the_volume(numerics):
     core, rings, layers = numerics
     mesh, _ = mesh_corner(warpage=Warpage(), joint_numerics={"core": core, "rings": rings, "layers": layers})
