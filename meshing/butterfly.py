@@ -19,7 +19,7 @@ class Butterfly:
 
 
 def butterfly(core: int, rings: int) -> Butterfly:
-    """Build the section with core x core quads inside ``rings`` rings of 4 core quads each; without, the core fills it."""
+    """Build the section with core x core quads inside ``rings`` rings of 4 core quads each; without, it fills all."""
     outline = _core_outline(core)
     inner = _core_points(core, CORE_DIAGONAL, CORE_SIDE) if rings else _core_points(core, 1.0, 1.0)
     if not rings:
