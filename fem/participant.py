@@ -1,10 +1,8 @@
-"""The participants of a run: macro and meso model of the two-scale scheme, or one model alone.
+"""The participants of a run: what all of them do in a window, and one model alone.
 
-A window of the held-velocity scheme (held cut velocity; the cut lies two layers of elements inside the board):
-macro: a_n = (F_ext + F_c - F_int) / (M + M_interface) -> v^{n+1/2}, U^{n+1}; the cut's v^{n+1/2} goes to the meso
-model, which takes m substeps with it WHILE the macro model computes F_int(U^{n+1}); F_c = -(K u)_cut comes back at the
-end. Messages go through two channels and nothing else; ``Macro.begin_window`` and ``finish_window`` are apart, so that
-one rank can also carry both models and take turns.
+``begin_window`` and ``finish_window`` are apart, so that one rank can also carry several models and take turns: what
+others wait for is sent in the first, what needs their answer is done in the second. Messages between models go through
+two channels and nothing else. The participants of each scheme are in ``fem/coupling``.
 """
 
 from typing import Any, Protocol
@@ -14,8 +12,6 @@ from numpy.typing import NDArray
 
 from fem.body import Body
 from fem.estimate import WindowPlan
-from fem.exchange import CutChannels
-from fem.kernels.motion import add_impulse
 from fem.loads import Load
 from fem.motion import Motion
 from fem.moving import Moving
@@ -104,101 +100,6 @@ class Alone(Continued):
         return self._zero
 
 
-class Macro(Continued):
-    """The board: one step a window."""
-
-    def __init__(self, body: Body, loads: list[Load], plan: WindowPlan, channels: CutChannels) -> None:
-        """Receive the interface mass and start at rest; a ``Meso`` must have sent it."""
-        self._channels = channels
-        self._received = np.zeros((len(body.mass), 3))
-        channels.forces.receive(self._received)
-        self.motion = Motion(body, loads, plan.window, np.empty(0, np.int32), self._received[:, 0].copy())
-        self._received[:] = 0.0
-        self.plan = plan
-        self._counted = counted_cut(body)
-        self.interface_work = 0.0
-
-    def begin_window(self) -> None:
-        """Move, and send the cut's velocity."""
-        self.motion.advance()
-        self._channels.velocities.send(self.motion.velocity)
-
-    def finish_window(self) -> None:
-        """Compute the force, and receive the meso model's."""
-        motion = self.motion
-        motion.update_force()
-        before = self._received[self._counted]
-        self._channels.forces.receive(self._received)
-        motion.force += self._received
-        impulse = 0.5 * motion.step * (before + self._received[self._counted])
-        self.interface_work -= float(np.sum(impulse * motion.velocity[self._counted]))
-
-    def cut_force(self) -> NDArray[np.float64]:
-        """Return the received force at the cut."""
-        return self._received
-
-    def foreign_force(self) -> NDArray[np.float64]:
-        """Return the received force: it is in ``motion.force``."""
-        return self._received
-
-    def state(self) -> dict[str, Any]:
-        """Return also the received force."""
-        return super().state() | {"received": self._received}
-
-    def restore(self, state: dict[str, Any]) -> None:
-        """Continue from what ``state`` returned."""
-        super().restore(state)
-        self._received[:] = state["received"]
-
-
-class Meso(Continued):
-    """Joints, package and the uppermost board layers: m substeps a window."""
-
-    def __init__(self, body: Body, loads: list[Load], plan: WindowPlan, channels: CutChannels) -> None:
-        """Send the interface mass and start at rest."""
-        self._channels = channels
-        channels.forces.send(np.repeat(body.mass[:, None], 3, axis=1))
-        held = body.cut[body.cut >= 0]
-        self.motion = Motion(body, loads, plan.step, held, np.zeros(len(body.mass)))
-        self.plan = plan
-        self._counted = counted_cut(body)
-        self._cut_force = np.zeros((len(body.mass), 3))
-        self._zero = np.zeros_like(self._cut_force)
-        self.interface_work = 0.0
-
-    def begin_window(self) -> None:
-        """Take m substeps at the received velocity of the cut, then send its force."""
-        motion = self.motion
-        self._channels.velocities.receive(motion.velocity)
-        impulse = np.zeros((len(self._counted), 3))
-        add_impulse(self._counted, motion.force, 0.5 * motion.step, impulse)
-        for _ in range(self.plan.substeps):
-            motion.advance()
-            motion.update_force()
-            add_impulse(self._counted, motion.force, motion.step, impulse)
-        add_impulse(self._counted, motion.force, -0.5 * motion.step, impulse)
-        self._channels.forces.send(motion.force)
-        self.interface_work -= float(np.sum(impulse * motion.velocity[self._counted]))
-
-    def finish_window(self) -> None:
-        """Do nothing: the window is done."""
-
-    def cut_force(self) -> NDArray[np.float64]:
-        """Return the force that was sent."""
-        self._cut_force[self._counted] = self.motion.force[self._counted]
-        return self._cut_force
-
-    def foreign_force(self) -> NDArray[np.float64]:
-        """Return zero: all forces are this model's."""
-        return self._zero
-
-
 def uncut_motion(body: Body, loads: list[Load], step: float) -> Motion:
     """Return the motion from rest of a model without a cut."""
     return Motion(body, loads, step, np.empty(0, np.int32), np.zeros(len(body.mass)))
-
-
-def counted_cut(body: Body) -> NDArray[np.int32]:
-    """Return the local cut nodes that count on this rank: those that it owns."""
-    here = body.cut[body.cut >= 0]
-    return here[body.shared.owned[here]]

@@ -10,6 +10,7 @@ from mpi4py import MPI
 from fem.agreement import agreed
 from fem.checkpoint import Checkpoints, digest_of_files
 from fem.communicators import Communicators, Role
+from fem.coupling.scheme import scheme_of
 from fem.estimate import WindowPlan, implicit_plan, largest_implicit_step
 from fem.exchange import CutChannels
 from fem.fields import Fields
@@ -21,7 +22,7 @@ from fem.march import Outputs, march
 from fem.materials.elasticity import materials_of_parts
 from fem.model import Model, build_models
 from fem.parameters import Shock
-from fem.participant import Alone, Macro, Meso, Participant, uncut_motion
+from fem.participant import Alone, Participant, uncut_motion
 from fem.pulse import Pulse
 from fem.result import Timings, write_result
 from fem.shock_loads import shock_loads, shock_pulse
@@ -77,11 +78,9 @@ def make_crew(
     absent = np.full_like(next(iter(bodies.values())).cut, -1)
     macro, meso = (bodies[role].cut if role in bodies else absent for role in ("macro", "meso"))
     channels = CutChannels.open(comms.world, macro, meso, receiver_waits=len(comms.models) == 1)
-    made: dict[Role, Participant] = {}
-    if "meso" in bodies:  # first: it sends the interface mass that the macro model waits for
-        made["meso"] = Meso(bodies["meso"], loads["meso"], plan, channels)
-    if "macro" in bodies:
-        made["macro"] = Macro(bodies["macro"], loads["macro"], plan, channels)
+    scheme = scheme_of("held_velocity")
+    make = {"macro": scheme.macro, "meso": scheme.meso}
+    made = {role: make[role](bodies[role], loads[role], plan, channels) for role in scheme.order if role in bodies}
     return {role: made[role] for role in comms.models}
 
 

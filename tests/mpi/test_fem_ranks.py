@@ -141,9 +141,9 @@ def test_crash_of_one_rank_ends_all(assembly, tmp_path):
     script.write_text(
         "import sys\n"
         "from mpi4py import MPI\n"
-        "import fem.participant, fem.program as program\n"
+        "import fem.coupling.held_velocity, fem.program as program\n"
         "def broken(self): raise ZeroDivisionError('broken rank')\n"
-        "fem.participant.Meso.begin_window = broken\n"
+        "fem.coupling.held_velocity.Meso.begin_window = broken\n"
         "sys.exit(program.main(MPI.COMM_WORLD, sys.argv[1:]))\n"
     )
     path = tmp_path / "input.json"

@@ -6,13 +6,13 @@ import numpy as np
 from mpi4py import MPI
 
 from fem.body import Pieces, make_body, make_pieces
+from fem.coupling.held_velocity import Macro, Meso
 from fem.estimate import WindowPlan, window_plan
 from fem.exchange import CutChannels
 from fem.loads import Load
 from fem.local_mesh import distribute
 from fem.materials.roles import Materials
 from fem.mesh import MeshData
-from fem.participant import Macro, Meso
 from fem.scene import Tables, prepare
 from fem.steps import is_macro
 

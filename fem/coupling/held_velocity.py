@@ -1,0 +1,146 @@
+"""Held velocity: the cut moves at the macro model's velocity over a window, the meso model's force comes back.
+
+A window (the cut lies two layers of elements inside the board):
+macro: a_n = (F_ext + F_c - F_int) / (M + M_interface) -> v^{n+1/2}, U^{n+1}; the cut's v^{n+1/2} goes to the meso
+model, which takes m substeps with it WHILE the macro model computes F_int(U^{n+1}); F_c = -(K u)_cut comes back at the
+end.
+"""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem.body import Body
+from fem.communicators import Role
+from fem.estimate import WindowPlan
+from fem.exchange import CutChannels
+from fem.kernels.motion import add_impulse
+from fem.loads import Load
+from fem.motion import Motion
+from fem.participant import Continued
+
+
+class HeldVelocity:
+    """The scheme: the macro model waits for the interface mass, so the meso model is made first."""
+
+    order: tuple[Role, Role] = ("meso", "macro")
+
+    def macro(self, body: Body, loads: list[Load], plan: WindowPlan, channels: CutChannels) -> "Macro":
+        """Return the macro model's participant."""
+        return Macro(body, loads, plan, channels)
+
+    def meso(self, body: Body, loads: list[Load], plan: WindowPlan, channels: CutChannels) -> "Meso":
+        """Return the meso model's participant."""
+        return Meso(body, loads, plan, channels)
+
+
+class Macro(Continued):
+    """The board: one step a window."""
+
+    def __init__(self, body: Body, loads: list[Load], plan: WindowPlan, channels: CutChannels) -> None:
+        """Receive the interface mass and start at rest; a ``Meso`` must have sent it."""
+        self._channels = channels
+        self._received = np.zeros((len(body.mass), 3))
+        channels.forces.receive(self._received)
+        self.motion = Motion(body, loads, plan.window, np.empty(0, np.int32), self._received[:, 0].copy())
+        self._received[:] = 0.0
+        self.plan = plan
+        self._counted = counted_cut(body)
+        self.interface_work = 0.0
+
+    def begin_window(self) -> None:
+        """Move, and send the cut's velocity."""
+        self.motion.advance()
+        self._channels.velocities.send(self.motion.velocity)
+
+    def finish_window(self) -> None:
+        """Compute the force, and receive the meso model's."""
+        motion = self.motion
+        motion.update_force()
+        before = self._received[self._counted]
+        self._channels.forces.receive(self._received)
+        motion.force += self._received
+        impulse = 0.5 * motion.step * (before + self._received[self._counted])
+        self.interface_work -= float(np.sum(impulse * motion.velocity[self._counted]))
+
+    def cut_force(self) -> NDArray[np.float64]:
+        """Return the received force at the cut."""
+        return self._received
+
+    def foreign_force(self) -> NDArray[np.float64]:
+        """Return the received force: it is in ``motion.force``."""
+        return self._received
+
+    def state(self) -> dict[str, Any]:
+        """Return also the received force."""
+        return super().state() | {"received": self._received}
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Continue from what ``state`` returned."""
+        super().restore(state)
+        self._received[:] = state["received"]
+
+
+class Driven(Continued):
+    """A meso model whose cut moves at the macro model's velocity."""
+
+    def __init__(self, body: Body, loads: list[Load], plan: WindowPlan, channels: CutChannels) -> None:
+        """Start at rest."""
+        self._channels = channels
+        self.motion = Motion(body, loads, plan.step, local_cut(body), np.zeros(len(body.mass)))
+        self.plan = plan
+        self.interface_work = 0.0
+        self._counted = counted_cut(body)
+        self._zero = np.zeros((len(body.mass), 3))
+
+    def follow(self) -> float:
+        """Take m substeps at the received velocity of the cut; return the work that came in across it [J]."""
+        motion = self.motion
+        self._channels.velocities.receive(motion.velocity)
+        impulse = np.zeros((len(self._counted), 3))
+        add_impulse(self._counted, motion.force, 0.5 * motion.step, impulse)
+        for _ in range(self.plan.substeps):
+            motion.advance()
+            motion.update_force()
+            add_impulse(self._counted, motion.force, motion.step, impulse)
+        add_impulse(self._counted, motion.force, -0.5 * motion.step, impulse)
+        return -float(np.sum(impulse * motion.velocity[self._counted]))
+
+    def finish_window(self) -> None:
+        """Do nothing: the window is done."""
+
+    def foreign_force(self) -> NDArray[np.float64]:
+        """Return zero: all forces are this model's."""
+        return self._zero
+
+
+class Meso(Driven):
+    """Joints, package and the uppermost board layers: m substeps a window."""
+
+    def __init__(self, body: Body, loads: list[Load], plan: WindowPlan, channels: CutChannels) -> None:
+        """Send the interface mass and start at rest."""
+        channels.forces.send(np.repeat(body.mass[:, None], 3, axis=1))
+        super().__init__(body, loads, plan, channels)
+        self._cut_force = np.zeros((len(body.mass), 3))
+
+    def begin_window(self) -> None:
+        """Take m substeps, then send the force of the cut."""
+        self.interface_work += self.follow()
+        self._channels.forces.send(self.motion.force)
+
+    def cut_force(self) -> NDArray[np.float64]:
+        """Return the force that was sent."""
+        self._cut_force[self._counted] = self.motion.force[self._counted]
+        return self._cut_force
+
+
+def local_cut(body: Body) -> NDArray[np.int32]:
+    """Return the cut nodes that this rank has, local numbers."""
+    return body.cut[body.cut >= 0]
+
+
+def counted_cut(body: Body) -> NDArray[np.int32]:
+    """Return the local cut nodes that count on this rank: those that it owns."""
+    here = local_cut(body)
+    return here[body.shared.owned[here]]

@@ -1,0 +1,54 @@
+"""Coupling schemes: the contract, and the scheme of a name."""
+
+from dataclasses import replace
+from typing import Literal, Protocol
+
+from fem.body import Body
+from fem.communicators import Role
+from fem.coupling.division import SchemeName
+from fem.coupling.held_velocity import HeldVelocity
+from fem.coupling.one_way import OneWay
+from fem.estimate import WindowPlan
+from fem.exchange import CutChannels
+from fem.loads import Load
+from fem.participant import Participant
+
+Direction = Literal["two_way", "one_way"]
+
+
+class Scheme(Protocol):
+    """How two models go through a window together.
+
+    Attributes:
+        order: In which order a rank makes its participants: the second waits for what the first sends.
+    """
+
+    order: tuple[Role, Role]
+
+    def macro(self, body: Body, loads: list[Load], plan: WindowPlan, channels: CutChannels) -> Participant:
+        """Return the macro model's participant; collective over its ranks."""
+
+    def meso(self, body: Body, loads: list[Load], plan: WindowPlan, channels: CutChannels) -> Participant:
+        """Return the meso model's participant; collective over its ranks."""
+
+
+class LocalSteps:
+    """Another scheme whose meso model takes whole windows: its smaller steps are inside its force."""
+
+    def __init__(self, scheme: Scheme) -> None:
+        """Take the scheme that couples at whole windows."""
+        self._scheme, self.order = scheme, scheme.order
+
+    def macro(self, body: Body, loads: list[Load], plan: WindowPlan, channels: CutChannels) -> Participant:
+        """Return the macro model's participant."""
+        return self._scheme.macro(body, loads, plan, channels)
+
+    def meso(self, body: Body, loads: list[Load], plan: WindowPlan, channels: CutChannels) -> Participant:
+        """Return the meso model's participant."""
+        return self._scheme.meso(body, loads, replace(plan, substeps=1), channels)
+
+
+def scheme_of(name: SchemeName, direction: Direction = "two_way") -> Scheme:
+    """Return the scheme of a name and direction."""
+    scheme = OneWay() if direction == "one_way" else HeldVelocity()
+    return LocalSteps(scheme) if name == "local_steps" else scheme
