@@ -1,48 +1,32 @@
 """Communicators of the models: one class that splits, owns and frees them."""
 
 from types import TracebackType
-from typing import Literal, Self
+from typing import Self
 
 from mpi4py import MPI
 
-from fem.errors import RankError
-from fem.parameters import Ranks
-
-Role = Literal["macro", "meso", "dns", "structure"]
+from fem.coupling.placement import Placement, Role
 
 
 class Communicators:
     """The communicators of the models on this rank, and the one that joins all models.
 
-    Placement ``split``: the first ``ranks.macro`` ranks carry the macro model, the others the meso model. Placement
-    ``shared``: every rank carries both.
-
     Attributes:
         world: All ranks of the run.
+        placement: Which ranks carry which model.
         models: The ranks of each model that this rank carries, in the order of the window.
         first: Lowest rank of ``world`` that carries each model.
     """
 
-    def __init__(self, world: MPI.Comm, mode: Literal["two_scale", "dns", "structure"], ranks: Ranks) -> None:
-        """Split ``world``.
-
-        Raises:
-            RankError: ``world`` has not the number of ranks that the input asks for.
-        """
-        expected = ranks.macro + ranks.meso
-        if mode == "two_scale" and world.size != expected:
-            raise RankError(
-                f"the input asks for {ranks.macro} macro + {ranks.meso} meso ranks, mpirun started {world.size}"
-            )
-        self.world = world.Dup()
-        roles: tuple[Role, ...] = ("macro", "meso") if mode == "two_scale" else (mode,)
-        split = mode == "two_scale" and ranks.placement == "split"
-        self.first = {role: ranks.macro if split and role == "meso" else 0 for role in roles}
-        if split:
-            role = roles[world.rank >= ranks.macro]
-            self.models = {role: self.world.Split(roles.index(role), self.world.rank)}
-        else:
-            self.models = {role: self.world.Dup() for role in roles}
+    def __init__(self, world: MPI.Comm, placement: Placement) -> None:
+        """Split ``world``; collective."""
+        self.world, self.placement = world.Dup(), placement
+        self.first = {role: ranks[0] for role, ranks in placement.ranks.items()}
+        split = {
+            role: self.world.Split(0 if world.rank in ranks else MPI.UNDEFINED, world.rank)
+            for role, ranks in placement.ranks.items()
+        }
+        self.models: dict[Role, MPI.Comm] = {role: comm for role, comm in split.items() if comm != MPI.COMM_NULL}
 
     def __enter__(self) -> Self:
         """Return self."""

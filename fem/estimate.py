@@ -1,20 +1,23 @@
 """Steps and cost before anything is meshed: plain NumPy, for ``plan`` and for the run itself."""
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fem.coupling.placement import WindowCost, alternatives
 from fem.materials.elasticity import elasticity_matrix
 from fem.materials.parameters import Material
+from fem.parameters import Ranks
 
 # Element updates per second and core of a whole substep (force, update, tie) of elements whose matrix is assembled, as
 # those of joints, on one core of an AMD EPYC (AVX-512); boards are boxes in rows, which share their matrices.
 UPDATES_PER_SECOND = 1.2e7
 BOARD_ADVANTAGE = 4.3
 WINDOW_OVERHEAD = 3.0e-5  # [s] messages and interpreter per window, same source
+LATENCY = 1.5e-5  # [s] a message between two ranks of one machine, same source
 PULSE_STEPS = 200  # implicit steps in the shortest pulse: 3e-4 of the period of what swings twice in it
 RUN_STEPS = 1000  # implicit steps in a run, at least
 
@@ -105,24 +108,24 @@ def largest_implicit_step(duration: float, pulses: Iterable[float]) -> float:
 
 
 def predict_seconds(
-    macro_elements: int, meso_elements: int, plan: WindowPlan, ranks: tuple[int, int], rate: float = UPDATES_PER_SECOND
+    macro_elements: float, meso: Sequence[tuple[float, int]], plan: WindowPlan, ranks: Ranks
 ) -> tuple[float, float]:
-    """Predict the wall time of a two-scale and of a DNS run.
+    """Predict the wall time of a two-scale and of a DNS run on equal cores.
 
     Args:
-        macro_elements: Elements of the macro model.
-        meso_elements: Elements of the meso model.
-        plan: Time steps.
-        ranks: Macro and meso ranks; DNS uses their sum.
-        rate: Element updates per second and rank of assembled elements.
+        macro_elements: Elements of the macro model, all boxes of a board.
+        meso: Elements of each step level of the meso model, in the cost of assembled ones, and its steps a window.
+        plan: Time steps; its substeps are those of a DNS.
+        ranks: Their number, and which placements are allowed.
 
     Returns:
         Seconds of ``two_scale`` and of ``dns``.
     """
-    board = macro_elements / BOARD_ADVANTAGE
-    macro, meso = board / ranks[0], plan.substeps * meso_elements / ranks[1]
-    everything = plan.substeps * (board + meso_elements) / sum(ranks)
-    return (
-        plan.windows * (max(macro, meso) / rate + WINDOW_OVERHEAD),
-        plan.windows * (everything / rate + WINDOW_OVERHEAD),
-    )
+    board = macro_elements / BOARD_ADVANTAGE / UPDATES_PER_SECOND
+    work = sum(elements * steps for elements, steps in meso) / UPDATES_PER_SECOND
+    sums = sum(steps for _, steps in meso)
+    cost = WindowCost(board, work, sums, LATENCY)
+    two_scale = alternatives(ranks, [1.0] * ranks.total, cost)[0].seconds
+    everything = board + sum(elements for elements, _ in meso) / UPDATES_PER_SECOND
+    dns = plan.substeps * (everything / ranks.total + (ranks.total > 1) * LATENCY)
+    return plan.windows * (two_scale + WINDOW_OVERHEAD), plan.windows * (dns + WINDOW_OVERHEAD)

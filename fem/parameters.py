@@ -19,15 +19,33 @@ class Parameters(BaseModel):
 
 
 class Ranks(Parameters):
-    """MPI ranks of each model; a DNS run uses the sum of both.
+    """MPI ranks of a run, and which of them work on which model.
 
-    ``split`` gives each model ranks of its own, which work at the same time; ``shared`` gives both models to all ranks,
-    which take turns: better where the models' costs differ from their ranks.
+    ``disjoint`` gives each model ranks of its own, which work at the same time: the macro model ``macro`` of them.
+    ``shared`` gives both models to all ranks, which take turns. ``auto`` takes what is predicted to be fastest, from
+    speeds that are measured when the run begins.
     """
 
-    macro: int = Field(1, ge=1)
-    meso: int = Field(1, ge=1)
-    placement: Literal["split", "shared"] = "split"
+    total: int = Field(2, ge=1)
+    placement: Literal["auto", "disjoint", "shared"] = "auto"
+    macro: int | None = Field(None, ge=1)
+
+    @field_validator("placement")
+    @classmethod
+    def _ranks_for_each(cls, value: str, info: ValidationInfo) -> str:
+        if value == "disjoint" and info.data.get("total", 2) < 2:
+            raise PydanticCustomError("inadmissible", "needs a rank for each model", {"allowed": "auto, shared"})
+        return value
+
+    @field_validator("macro")
+    @classmethod
+    def _rank_for_meso(cls, value: int | None, info: ValidationInfo) -> int | None:
+        if value is not None and info.data.get("placement", "disjoint") != "disjoint":
+            raise PydanticCustomError("inadmissible", "is for placement = disjoint", {"allowed": "none"})
+        if value is not None and value >= info.data.get("total", math.inf):
+            allowed = f"< {info.data['total']}, shock.ranks.total"
+            raise PydanticCustomError("inadmissible", "leaves no rank for the meso model", {"allowed": allowed})
+        return value
 
 
 class Coupling(Parameters):

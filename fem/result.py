@@ -83,7 +83,7 @@ def model_summary(comms: Communicators, request: RunInput, models: dict[Role, Mo
     return {
         "mode": request.mode,
         "ranks": comms.world.size,
-        "placement": request.shock.ranks.placement if request.mode == "two_scale" else "shared",
+        "placement": comms.placement.name,
         "elements": {role: sum(rank[role][0] for rank in everyone if role in rank) for role in comms.first},
         "nodes": {role: next(rank[role][1] for rank in everyone if role in rank) for role in comms.first},
         "tied_nodes": comms.world.allreduce(max(len(item.tie.slave) for item in tables), MPI.MAX),

@@ -10,6 +10,7 @@ from mpi4py import MPI
 from fem.agreement import agreed
 from fem.checkpoint import Checkpoints, digest_of_files
 from fem.communicators import Communicators, Role
+from fem.coupling.placement import Placement, admissible, check_size, shared
 from fem.coupling.scheme import scheme_of
 from fem.estimate import WindowPlan, implicit_plan, largest_implicit_step
 from fem.exchange import CutChannels
@@ -43,7 +44,7 @@ def run(world: MPI.Comm, request: RunInput) -> None:
         EnergyError: Energies that do not balance; on every rank.
     """
     start = time.perf_counter()
-    with Communicators(world, request.mode, request.shock.ranks) as comms:
+    with Communicators(world, place(world, request)) as comms:
         models, steps = build_models(comms, request)
         pulse = agreed(comms.world, lambda: shock_pulse(request.shock)).pulse
         if request.implicit:
@@ -61,6 +62,18 @@ def run(world: MPI.Comm, request: RunInput) -> None:
         timings = Timings(ready - start, seconds, output_seconds, checkpoints.continued or 0)
         write_result(comms, request, (models, steps), history, timings)
         agreed(comms.world, lambda: None)
+
+
+def place(world: MPI.Comm, request: RunInput) -> Placement:
+    """Return which ranks carry which model.
+
+    Raises:
+        RankError: Too few or too many ranks; on every rank.
+    """
+    if request.mode == "dns":
+        return shared(("dns",), world.size)
+    check_size(request.shock.ranks, world.size)
+    return next(admissible(request.shock.ranks, np.ones(world.size).tolist()))
 
 
 def make_crew(

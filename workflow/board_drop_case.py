@@ -81,4 +81,4 @@ class BoardDropCase(Case):
     @property
     def ranks(self) -> int:
         """MPI ranks of the shock."""
-        return self.shock.ranks.macro + self.shock.ranks.meso
+        return self.shock.ranks.total

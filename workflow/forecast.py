@@ -152,7 +152,7 @@ def forecast_shock(case: BoardDropCase, parts: dict[str, PartForecast]) -> Shock
     plan = window_plan(macro, meso_step, numerics.step_fraction, shock.duration, numerics.history_samples)
     board, meso = parts[MACRO].elements, sum(part.elements for name, part in parts.items() if name != MACRO)
     work = round(sum(part.elements * relative_cost(case, name) for name, part in parts.items() if name != MACRO))
-    two_scale, dns = predict_seconds(board, work, plan, (shock.ranks.macro, shock.ranks.meso))
+    two_scale, dns = predict_seconds(board, [(work, plan.substeps)], plan, shock.ranks)
     pulses = [shock.pulse_duration] if shock.pulse_duration else []
     slow = implicit_plan(plan, largest_implicit_step(shock.duration, pulses))
     implicit = implicit_cost(plate_nodes(board + meso), slow.windows * slow.substeps).seconds

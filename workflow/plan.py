@@ -132,7 +132,7 @@ def _sizes(outlook: Forecast) -> Table:
 
 
 def _shock(case: BoardDropCase, outlook: Forecast) -> Table:
-    shock, every = outlook.shock, case.shock.ranks.macro + case.shock.ranks.meso
+    shock, every = outlook.shock, case.shock.ranks.total
     table = new_table("\nShock", "what", "value", "remark")
     table.add_row("window", short(shock.window), f"step of the macro model, {shock.windows} windows")
     table.add_row("step ratio m", f"{shock.substeps}", f"meso step {short(shock.window / shock.substeps)}")
@@ -148,14 +148,15 @@ def _shock(case: BoardDropCase, outlook: Forecast) -> Table:
 def _placement(case: BoardDropCase) -> str:
     """Say which MPI rank works on which model."""
     ranks, cores = case.shock.ranks, f"on {available_cores()} cores"
+    if ranks.total == 1:
+        return f"one rank, {cores}"
     if ranks.placement == "shared":
-        return f"all {ranks.macro + ranks.meso} ranks on both models in turn, {cores}"
-    macro, meso = _span(0, ranks.macro), _span(ranks.macro, ranks.meso)
-    return f"{macro} macro, {meso} meso, at the same time, {cores}"
-
-
-def _span(first: int, count: int) -> str:
-    return f"rank {first}" if count == 1 else f"ranks {first}-{first + count - 1}"
+        return f"all {ranks.total} ranks on both models in turn, {cores}"
+    macro = f"{ranks.macro} of {ranks.total}" if ranks.macro else f"some of {ranks.total}"
+    own = f"{macro} ranks on the macro model, the others on the meso model, at the same time"
+    if ranks.placement == "disjoint":
+        return f"{own}, {cores}"
+    return f"all {ranks.total} ranks on both models in turn, or each on one, as speeds measured by the run say, {cores}"
 
 
 def _absent(mode: str, case: BoardDropCase) -> str:

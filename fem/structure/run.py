@@ -9,6 +9,7 @@ from mpi4py import MPI
 from fem.agreement import agreed
 from fem.checkpoint import Checkpoints, digest_of_files
 from fem.communicators import Communicators
+from fem.coupling.placement import shared
 from fem.errors import AgreedError
 from fem.fields import Fields
 from fem.history import History
@@ -19,7 +20,6 @@ from fem.loads import Load
 from fem.march import Outputs, march
 from fem.materials.effects import plastic_laws
 from fem.moving import Moving
-from fem.parameters import Ranks
 from fem.participant import Alone, uncut_motion
 from fem.pulse import Pulse
 from fem.result import Timings
@@ -40,7 +40,7 @@ def run_structure(world: MPI.Comm, request: StructureInput) -> None:
     """
     start = time.perf_counter()
     pulses = agreed(world, lambda: pulses_of(request.loads))
-    with Communicators(world, "structure", Ranks()) as comms:
+    with Communicators(world, shared(("structure",), world.size)) as comms:
         comm = comms.models["structure"]
         model = build_structure(comm, request, pulse_durations(pulses))
         modes = find_modes(comm, model, request)

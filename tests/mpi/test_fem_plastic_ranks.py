@@ -20,7 +20,7 @@ SHOCK = {
 def run(meshes: list[Path], mode: str, macro: int, meso: int) -> tuple[dict[str, np.ndarray], dict]:
     """Return history and result of a run on some ranks."""
     output = meshes[0].parent / f"{mode}_{macro}_{meso}"
-    shock = SHOCK | {"ranks": {"macro": macro, "meso": meso}}
+    shock = SHOCK | {"ranks": {"total": macro + meso, "placement": "disjoint", "macro": macro}}
     request = {"mode": mode, "meshes": [str(path) for path in meshes], "shock": shock, "output": str(output)}
     path = meshes[0].parent / "input.json"
     path.write_text(json.dumps(request | {"materials": {"solder": "SAC405"}}))

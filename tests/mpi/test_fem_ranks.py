@@ -32,9 +32,10 @@ def start(directory: Path, ranks: int, **changes) -> subprocess.CompletedProcess
     return run_program(path, ranks)
 
 
-def history(directory: Path, ranks: tuple[int, int], mode: str, placement: str = "split") -> dict[str, np.ndarray]:
+def history(directory: Path, ranks: tuple[int, int], mode: str, placement: str = "disjoint") -> dict[str, np.ndarray]:
     output = directory / f"{mode}_{ranks[0]}_{ranks[1]}_{placement}"
-    shock = SHOCK | {"ranks": {"macro": ranks[0], "meso": ranks[1], "placement": placement}}
+    macro = {"macro": ranks[0]} if placement == "disjoint" else {}
+    shock = SHOCK | {"ranks": {"total": sum(ranks), "placement": placement} | macro}
     done = start(directory, sum(ranks), mode=mode, shock=shock, output=str(output))
     assert done.returncode == 0, done.stderr
     result = json.loads((output / "result.json").read_text())
@@ -115,7 +116,7 @@ def fails(directory: Path, ranks: int, message: str, **changes) -> None:
 
 
 def test_wrong_number_of_ranks_ends_the_run(assembly):
-    fails(assembly, 3, "asks for 1 macro + 1 meso ranks, mpirun started 3", mode="two_scale")
+    fails(assembly, 3, "asks for 2 ranks (ranks.total), mpirun started 3", mode="two_scale")
 
 
 def test_missing_mesh_ends_all_ranks(assembly):

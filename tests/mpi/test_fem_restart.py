@@ -21,7 +21,7 @@ SHOCK = {
     "duration": 2e-5,
     "gravity": "on",
     "damping": {"stiffness_coefficient": 1e-10, "mass_coefficient": 10.0},
-    "ranks": {"macro": 1, "meso": 1},
+    "ranks": {"placement": "disjoint"},
     "numerics": {"mass_scaled": ["copper"], "history_samples": 100, "field_samples": 4, "checkpoint_seconds": 1e-9},
 }
 

@@ -67,7 +67,7 @@ BAD_VALUES = {
     "unknown constant of plasticity": ("materials.solder.plasticity.D=1", ["unknown key", "one of A, B, n, C"]),
     "table below a value": ("package.rows.all=1", ["package.rows.all", "lies below a value"]),
     "no setting": ("package.rows", ["package.rows", "is no setting", "dotted.key=value"]),
-    "more ranks than cores": ("shock.ranks.meso=4096", ["shock.ranks", "4097 MPI ranks", "--oversubscribe"]),
+    "more ranks than cores": ("shock.ranks.total=4096", ["shock.ranks", "4096 MPI ranks", "--oversubscribe"]),
     "pads overlapping": (
         "package.pitch=0.5 mm",
         ["package.board_pad.mask_opening", '"0.58 mm"', "0.5 mm, the pitch"],
@@ -158,7 +158,7 @@ def test_another_kind_of_material_needs_all_its_properties():
 
 def test_more_ranks_are_welcome_with_oversubscribe():
     ranks = available_cores() + 1
-    assert read_case(SMALL_CASE, [f"shock.ranks.meso={ranks}"], oversubscribe=True).shock.ranks.meso == ranks
+    assert read_case(SMALL_CASE, [f"shock.ranks.total={ranks}"], oversubscribe=True).shock.ranks.total == ranks
 
 
 def test_values_are_shown_in_the_units_of_users():

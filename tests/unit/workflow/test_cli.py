@@ -70,7 +70,7 @@ def test_a_new_case_overwrites_nothing(call):
         (("run", str(CASE), "--until", "shok"), "is no stage"),
         (("run", str(CASE), "--set", "shock.duration=1"), 'such as "1 ms"'),
         (("run", "absent.toml"), "no such case file"),
-        (("plan", str(CASE), "--set", "shock.ranks.meso=1000"), "--oversubscribe"),
+        (("plan", str(CASE), "--set", "shock.ranks.total=1000"), "--oversubscribe"),
         (("fly",), "No such command"),
     ],
 )
