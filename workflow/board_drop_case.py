@@ -45,6 +45,7 @@ class BoardDropCase(Case):
         from meshing import checks as meshing_checks
         from meshing.pads import pad_table
         from particles import checks as particles_checks
+        from workflow import fine_joints
         from workflow.reflow_pool import joint_geometries
 
         contradictions = meshing_checks.problems(self.package, self.board, self.warpage)
@@ -56,6 +57,7 @@ class BoardDropCase(Case):
         if contradictions:
             return impossible
         geometries = joint_geometries(pad_table(self.package, self.board, self.warpage))
+        impossible += fine_joints.problems(self)
         found = impossible + of_particles(particles_checks.problems(self.solder, geometries, self.package.pitch))
         return (found + self._flow_problems()) or self._impossible_steps()
 

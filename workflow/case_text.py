@@ -11,7 +11,7 @@ from pydantic_core import PydanticUndefined
 from fem.names import nearest
 from workflow.case import read_case
 from workflow.case_kind import NAME, Case, Title
-from workflow.fields import allowed, display, holds_named_tables, literal_names, models_of, unit_of
+from workflow.fields import allowed, alternatives, display, holds_named_tables, literal_names, models_of, unit_of
 from workflow.problems import CaseError, Problem, as_toml
 from workflow.validation import NAMES
 
@@ -100,7 +100,8 @@ def _line(name: str, value: object, field: FieldInfo) -> str:
     if value is None:
         return f"# {name} = ...".ljust(COMMENT_COLUMN) + f" # {'; '.join(filter(None, ('not given', allowed(field))))}"
     text = _value(value, field)
-    remarks = [allowed(field)] if len(literal_names(field)) != 1 else []
+    is_fixed = len(literal_names(field)) == len(alternatives(field)) == 1
+    remarks = [] if is_fixed else [allowed(field)]
     if field.default not in (PydanticUndefined, "", None):
         remarks.append(f"default {_default(field)}")
     comment = "; ".join(remark for remark in remarks if remark)

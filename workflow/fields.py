@@ -52,8 +52,18 @@ def tag_of(model: type[BaseModel]) -> str:
     return str(typing.get_args(model.model_fields["kind"].annotation)[0])
 
 
+def alternatives(field: FieldInfo) -> tuple[FieldInfo, ...]:
+    """Return the kinds of value that a field takes, such as a name or a number; the field itself where it is one."""
+    members = typing.get_args(field.annotation) if _is_union(field.annotation) and not models_of(field) else ()
+    values = [member for member in members if member is not types.NoneType]
+    return tuple(map(FieldInfo.from_annotation, values)) if len(values) > 1 else (field,)
+
+
 def allowed(field: FieldInfo) -> str:
     """Describe what a field takes: names, or a range in the user's unit."""
+    kinds = alternatives(field)
+    if len(kinds) > 1:
+        return ", or ".join(", ".join(literal_names(kind)) or allowed(kind) or "a list of names" for kind in kinds)
     names = literal_names(field)
     if names:
         return _choice(field) + ", ".join(names)

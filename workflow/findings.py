@@ -157,22 +157,24 @@ def of_surface(surfaces: Records) -> Findings:
     )
 
 
-def of_solder_mesh(quality: Records) -> Findings:
-    """Judge the joints' hexahedra."""
-    volume_error = worst(joint["volume_error"] for joint in quality.values())
-    jacobian = min(joint["minimum_scaled_jacobian"] for joint in quality.values())
-    step = min(joint["critical_time_step"] for joint in quality.values())
-    return Findings(
-        metrics={
-            "joint_volume_error_max": metric(volume_error),
-            "joint_scaled_jacobian_min": metric(jacobian),
-            "joint_critical_time_step": metric(step, "s"),
-        },
-        health={
-            "joint_volume_error_max": at_most(volume_error, VOLUME_ERROR),
-            "joint_scaled_jacobian_min": at_least(jacobian, SCALED_JACOBIAN),
-        },
-    )
+def of_solder_mesh(qualities: Mapping[str, Records], effects: Mapping[str, Any]) -> Findings:
+    """Judge the joints' hexahedra; ``qualities`` by kind of joint mesh: prefix of its metrics -> joint -> quality."""
+    metrics: dict[str, dict] = {}
+    health: dict[str, dict] = {}
+    for kind, quality in qualities.items():
+        volume_error = worst(joint["volume_error"] for joint in quality.values())
+        jacobian = min(joint["minimum_scaled_jacobian"] for joint in quality.values())
+        step = min(joint["critical_time_step"] for joint in quality.values())
+        metrics |= {
+            f"{kind}joint_volume_error_max": metric(volume_error),
+            f"{kind}joint_scaled_jacobian_min": metric(jacobian),
+            f"{kind}joint_critical_time_step": metric(step, "s"),
+        }
+        health |= {
+            f"{kind}joint_volume_error_max": at_most(volume_error, VOLUME_ERROR),
+            f"{kind}joint_scaled_jacobian_min": at_least(jacobian, SCALED_JACOBIAN),
+        }
+    return Findings(metrics, health, dict(effects))
 
 
 def of_shock(results: Mapping[str, dict], folder: Path) -> Findings:

@@ -5,32 +5,64 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
+from fem.parameters import JointCoupling
+from workflow.board_drop_case import BoardDropCase
+from workflow.fine_joints import FineJoints, most_stressed, named_joints, needs_coarse_joints, write_fine_joints
 from workflow.launch import launch, mpi_command
 from workflow.progress import progress_bar
 from workflow.stage_runner import Run
 
 MODES = {"two_scale": "two-scale", "dns": "DNS"}
+ASSEMBLY, JOINTS, COARSE_JOINTS = "geometry/assembly.msh", "solder_mesh/joints.msh", "solder_mesh/coarse_joints.msh"
 
 
-def run_mode(run: Run, folder: Path, mode: str) -> None:
+def find_fine_joints(run: Run[BoardDropCase], folder: Path) -> FineJoints:
+    """Return which joints the two-scale run has fine; where they are the critical ones, by a run with coarse joints.
+
+    That run is a two-scale run, too, in ``coarse``: of all runs the cheapest, since the board keeps its large step.
+    """
+    coupling, modes = run.case.shock.coupling, run.case.shock.numerics.modes
+    if coupling.fine_joints != "critical" or "two_scale" not in modes:
+        return named_joints(coupling)
+    all_coarse = coupling.model_copy(update={"fine_joints": "all", "direction": "two_way"})
+    request = _request(run, "two_scale", (ASSEMBLY, COARSE_JOINTS), all_coarse)
+    request["checkpoints"] = str(run.checkpoints("shock").resolve() / "coarse")
+    run_fem(run, folder / "coarse", request, "shock, coarse joints")
+    fine = most_stressed(folder / "coarse/history.npz", coupling.critical_joints)
+    write_fine_joints(folder, fine)
+    return fine
+
+
+def run_mode(run: Run[BoardDropCase], folder: Path, mode: str, fine: FineJoints) -> None:
     """Run one mode of the shock on its MPI ranks, showing its progress.
 
     Args:
         run: run folder with assembly and joints, case, cores.
         folder: where the mode's products go.
-        mode: "two_scale" or "dns".
+        mode: "two_scale" or "dns", which has all joints fine.
+        fine: the fine joints of a two-scale run.
 
     Raises:
         LaunchError: the run failed; the message has its last words.
     """
-    request = {
-        "mode": mode,
-        "meshes": [str(run.folder.resolve() / name) for name in ("geometry/assembly.msh", "solder_mesh/joints.msh")],
-        "shock": run.case.shock.model_dump(mode="json"),
-        "materials": run.case.materials.model_dump(mode="json"),
-        "checkpoints": str(run.checkpoints("shock").resolve() / mode),
-    }
+    chosen = fine.names if mode == "two_scale" else "all"
+    coupling = run.case.shock.coupling.model_copy(update={"fine_joints": chosen})
+    request = _request(run, mode, (ASSEMBLY, JOINTS), coupling)
+    if mode == "two_scale" and needs_coarse_joints(coupling):
+        request["coarse_joints"] = str(run.folder.resolve() / COARSE_JOINTS)
+    request["checkpoints"] = str(run.checkpoints("shock").resolve() / mode)
     run_fem(run, folder, request, f"shock, {MODES[mode]}")
+
+
+def _request(run: Run[BoardDropCase], mode: str, meshes: tuple[str, ...], coupling: JointCoupling) -> dict:
+    """Return what the package fem reads as input of a run, but for its folders."""
+    shock = run.case.shock.model_copy(update={"coupling": coupling})
+    return {
+        "mode": mode,
+        "meshes": [str(run.folder.resolve() / name) for name in meshes],
+        "shock": shock.model_dump(mode="json"),
+        "materials": run.case.materials.model_dump(mode="json"),
+    }
 
 
 def run_fem(run: Run, folder: Path, request: dict, title: str) -> None:

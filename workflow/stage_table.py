@@ -13,6 +13,12 @@ ARRAY = (
     "board.symmetry",
     "warpage",
 )
+JOINT_MESHES = (
+    "package.joint_numerics",
+    "package.coarse_joint_numerics",
+    "shock.coupling.fine_joints",
+    "shock.coupling.direction",
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +82,7 @@ BOARD_DROP = Pipeline(
         Stage("surface", (), ("reflow",), ("surface/surfaces.json",)),
         Stage(
             "solder_mesh",
-            (*ARRAY, "package.copper", "package.joint_numerics", "materials.copper", "materials.solder"),
+            (*ARRAY, "package.copper", *JOINT_MESHES, "materials.copper", "materials.solder"),
             ("surface",),
             ("solder_mesh/joints.msh", "solder_mesh/quality.json"),
             pads=True,

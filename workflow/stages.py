@@ -74,32 +74,36 @@ def surface(run: Run[BoardDropCase], folder: Path) -> Findings:
 
 
 def solder_mesh(run: Run[BoardDropCase], folder: Path) -> Findings:
-    """Mesh every joint in its place with hexahedra."""
+    """Mesh every joint in its place with hexahedra, with few of them also where the shock needs coarse joints."""
     from meshing.joints_file import write_joints
     from meshing.pads import read_pads
-    from meshing.solder_mesh import joint_quality, mesh_joint
+    from meshing.solder_mesh import joint_quality, mesh_coarse_joint, mesh_joint
     from meshing.surface import read_surface
+    from workflow.fine_joints import coarse_joints_effect, needs_coarse_joints
     from workflow.forecast import with_critical_step
 
     case, shape_of = run.case, read_json(run.folder / "reflow/joints.json")
-    meshes = [
-        mesh_joint(
-            read_surface(run.folder / f"surface/{shape_of[site.name]['shape']}.vtu"), site, case.package, case.warpage
-        )
+    kinds = {"": mesh_joint} | ({"coarse_": mesh_coarse_joint} if needs_coarse_joints(case.shock.coupling) else {})
+    bodies = [
+        (read_surface(run.folder / f"surface/{shape_of[site.name]['shape']}.vtu"), site)
         for site in read_pads(run.folder / "geometry/pads.json")
     ]
-    write_joints(meshes, folder / "joints.msh")
-    quality = {mesh.name: with_critical_step(joint_quality(mesh), case.materials) for mesh in meshes}
-    write_json(folder / "quality.json", quality)
-    return findings.of_solder_mesh(quality)
+    qualities = {}
+    for kind, mesh_of in kinds.items():
+        meshes = [mesh_of(surface, site, case.package, case.warpage) for surface, site in bodies]
+        write_joints(meshes, folder / f"{kind}joints.msh")
+        qualities[kind] = {mesh.name: with_critical_step(joint_quality(mesh), case.materials) for mesh in meshes}
+        write_json(folder / f"{kind}quality.json", qualities[kind])
+    return findings.of_solder_mesh(qualities, coarse_joints_effect(case.shock.coupling))
 
 
 def shock(run: Run[BoardDropCase], folder: Path) -> Findings:
     """Drop the board: each mode is one MPI run of the package fem; two modes are compared."""
-    from workflow.shock_launch import read_results, run_mode
+    from workflow.shock_launch import find_fine_joints, read_results, run_mode
 
+    fine = find_fine_joints(run, folder)
     for mode in run.case.shock.numerics.modes:
-        run_mode(run, folder / mode, mode)
+        run_mode(run, folder / mode, mode, fine)
     return findings.of_shock(read_results(folder), folder)
 
 

@@ -57,7 +57,8 @@ def _problem(root: type[BaseModel], names: list[str], record: ErrorDetails, tabl
     if fields.models_of(field):
         return Problem(key, "must be a table", value)
     if kind == "literal_error":
-        return Problem(key, "unknown name", value, fields.allowed(field), _nearest_name(value, field))
+        message = "unknown name" if len(fields.alternatives(field)) == 1 else "is not among what is allowed"
+        return Problem(key, message, value, fields.allowed(field), _nearest_name(value, field))
     if kind in RANGES:
         return Problem(key, "is out of range", value, fields.allowed(field))
     if kind == "string_pattern_mismatch":
@@ -93,7 +94,7 @@ def _nearest_name(value: Any, field: FieldInfo) -> str:
 
 
 def _names(model: type[BaseModel], location: Sequence[int | str]) -> list[str]:
-    """Drop from a pydantic location what is no key: tags of unions and positions in lists."""
+    """Drop from a pydantic location what is no key: tags and members of unions, positions in lists."""
     names: list[str] = []
     candidates: tuple[type[BaseModel], ...] = (model,)
     is_own_name = False
@@ -105,6 +106,8 @@ def _names(model: type[BaseModel], location: Sequence[int | str]) -> list[str]:
             is_own_name = False
             continue
         field = next((c.model_fields[part] for c in candidates if part in c.model_fields), None)
+        if field is not None and len(fields.alternatives(field)) > 1:
+            return names
         candidates = fields.models_of(field) if field else ()
         is_own_name = field is not None and fields.holds_named_tables(field)
     return names

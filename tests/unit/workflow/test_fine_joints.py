@@ -1,0 +1,80 @@
+"""Which joints are fine: the keys of a case, what is said about wrong ones, and the critical ones of a history."""
+
+import numpy as np
+import pytest
+
+from tests.support.workflow_command import SMALL_CASE
+from workflow.case import read_case
+from workflow.case_text import case_text
+from workflow.fine_joints import (
+    FineJoints,
+    coarse_joints_effect,
+    most_stressed,
+    needs_coarse_joints,
+    read_fine_joints,
+    write_fine_joints,
+)
+from workflow.problems import CaseError
+
+FAULTS = {
+    "shock.coupling.fine_joints=['A9']": ("no such joint", "A3 to B4"),
+    "shock.coupling.fine_joints=['a3']": ("no such joint", "did you mean A3?"),
+    "shock.coupling.fine_joints=['D1']": ("another quarter", "did you mean A4?"),
+    "shock.coupling.fine_joints=[]": ("leaves nothing", "at least one name"),
+    "shock.coupling.fine_joints='criticl'": ("all, critical, or a list of names", "did you mean critical?"),
+    "shock.coupling.fine_joints=[3]": ("shock.coupling.fine_joints = [3]", "a list of names"),
+    "shock.coupling.levels=0": ("shock.coupling.levels = 0", "auto, or >= 1"),
+    "shock.coupling.critical_joints=0": ("out of range", ">= 1"),
+}
+
+
+@pytest.mark.parametrize("setting", FAULTS)
+def test_wrong_choices_are_said(setting):
+    with pytest.raises(CaseError) as error:
+        read_case(SMALL_CASE, [setting])
+    text = str(error.value)
+    assert [word for word in FAULTS[setting] if word not in text] == [], text
+
+
+def test_more_critical_joints_than_joints_are_refused():
+    with pytest.raises(CaseError, match=r"critical_joints = 5: is more than the model has joints; allowed: 1 to 4"):
+        read_case(SMALL_CASE, ["shock.coupling.fine_joints=critical", "shock.coupling.critical_joints=5"])
+
+
+def test_a_new_case_shows_what_the_keys_take():
+    text = case_text(read_case(SMALL_CASE), "small")
+    lines = {line.split(" = ")[0]: line for line in text.splitlines()}
+    assert "all, critical, or a list of names" in lines["fine_joints"]
+    assert "auto, or >= 1" in lines["levels"]
+
+
+@pytest.mark.parametrize(
+    ("chosen", "direction", "needed"),
+    [("all", "two_way", False), ("critical", "two_way", True), (("A3",), "two_way", True), ("all", "one_way", True)],
+)
+def test_coarse_joints_are_an_effect_of_what_is_not_fine(chosen, direction, needed):
+    given = {"fine_joints": chosen, "direction": direction}
+    coupling = read_case(SMALL_CASE).shock.coupling.model_copy(update=given)
+    assert needs_coarse_joints(coupling) is needed
+    effect = coarse_joints_effect(coupling)["coarse_joints"]
+    assert effect["on"] is needed
+    assert effect["why"]
+
+
+def test_the_most_stressed_joints_are_those_of_the_highest_peak_at_either_pad(tmp_path):
+    board = np.array([[1.0, 9.0, 3.0], [2.0, 1.0, 3.0]]) * 1e6
+    package = np.array([[1.0, 1.0, 3.0], [10.0, 1.0, 4.0]]) * 1e6
+    path = tmp_path / "history.npz"
+    np.savez(path, joints=np.array(["A1", "A2", "A3"]), von_mises_board=board, von_mises_package=package)
+    fine = most_stressed(path, 2)
+    assert fine.names == ("A1", "A2")
+    assert "most stressed of 3" in fine.why
+    assert "A1 10.0 MPa, A2 9.0 MPa; the next is A3 4.0 MPa" in fine.why
+    assert most_stressed(path, 3).why.endswith("A3 4.0 MPa")
+
+
+@pytest.mark.parametrize("names", ["all", ("A3", "B4")])
+def test_what_was_chosen_can_be_read_again(tmp_path, names):
+    assert read_fine_joints(tmp_path) is None
+    write_fine_joints(tmp_path, FineJoints(names, "so"))
+    assert read_fine_joints(tmp_path) == FineJoints(names, "so")
