@@ -16,25 +16,35 @@ from fem.elements.cell_shape import shape_of
 OLD = tuple(int(part) for part in dolfinx.__version__.split(".")[:2]) < (0, 8)
 
 
-def make_mesh(comm: MPI.Comm, points: NDArray[np.float64], cells: NDArray[np.integer]) -> dolfinx.mesh.Mesh:
+def make_mesh(
+    comm: MPI.Comm,
+    points: NDArray[np.float64],
+    cells: NDArray[np.integer],
+    ranks: NDArray[np.int32] | None = None,
+) -> dolfinx.mesh.Mesh:
     """Create a distributed mesh without ghost cells; the arrays of all ranks together are the input.
 
     Args:
         comm: Communicator of the model.
         points: ``(n, 3)`` [m], this rank's share of the nodes in input order.
         cells: ``(ne, k)`` input node numbers; k is the same on all ranks and says which shape the cells have.
+        ranks: ``(ne,)`` rank that gets each of these cells; None on all ranks for DOLFINx's own partition.
     """
     cells, shape = np.ascontiguousarray(cells, np.int64), shape_of(cells)
+    ghosts = dolfinx.mesh.GhostMode.none
+
+    def partitioner(*_: object) -> dolfinx.cpp.graph.AdjacencyList_int32:
+        return dolfinx.cpp.graph.AdjacencyList_int32(ranks, np.arange(len(cells) + 1, dtype=np.int32))
+
     if OLD:
         domain = ufl.Mesh(ufl.VectorElement("Lagrange", shape.cell, shape.degree))
-        partitioner = dolfinx.cpp.mesh.create_cell_partitioner()
-        ghosts = dolfinx.mesh.GhostMode.none
-        return dolfinx.mesh.create_mesh(comm, cells, points, domain, ghost_mode=ghosts, partitioner=partitioner)
+        chosen = dolfinx.cpp.mesh.create_cell_partitioner() if ranks is None else partitioner
+        return dolfinx.mesh.create_mesh(comm, cells, points, domain, ghost_mode=ghosts, partitioner=chosen)
     import basix.ufl
 
     domain = ufl.Mesh(basix.ufl.element("Lagrange", shape.cell, shape.degree, shape=(3,)))
-    partitioner = dolfinx.mesh.create_cell_partitioner(dolfinx.mesh.GhostMode.none)
-    return dolfinx.mesh.create_mesh(comm, cells, points, domain, partitioner=partitioner)
+    chosen = dolfinx.mesh.create_cell_partitioner(ghosts) if ranks is None else partitioner
+    return dolfinx.mesh.create_mesh(comm, cells, points, domain, partitioner=chosen)
 
 
 def cell_nodes(mesh: dolfinx.mesh.Mesh) -> NDArray[np.int32]:

@@ -59,12 +59,18 @@ def positions(haystack: NDArray[np.int64], needles: NDArray[np.integer]) -> NDAr
     return np.where(haystack[found] == needles, found, -1).astype(np.int32)
 
 
-def distribute(comm: MPI.Comm, data: MeshData | None) -> LocalMesh:
-    """Partition a mesh that rank 0 of ``comm`` holds; collective."""
+def distribute(comm: MPI.Comm, data: MeshData | None, ranks: NDArray[np.int32] | None = None) -> LocalMesh:
+    """Partition a mesh that rank 0 of ``comm`` holds; collective.
+
+    Args:
+        comm: Communicator of the model.
+        data: The mesh on rank 0.
+        ranks: ``(ne,)`` rank of each cell, on rank 0; without it DOLFINx chooses.
+    """
     nodes = comm.bcast(data.shape.nodes if data else None)
     points = data.points if data else np.empty((0, 3))
     cells = data.cells if data else np.empty((0, nodes), np.int64)
-    mesh = dolfinx_api.make_mesh(comm, points, cells)
+    mesh = dolfinx_api.make_mesh(comm, points, cells, destinations(comm, data, ranks))
     return LocalMesh(
         mesh,
         dolfinx_api.input_nodes(mesh),
@@ -72,3 +78,9 @@ def distribute(comm: MPI.Comm, data: MeshData | None) -> LocalMesh:
         dolfinx_api.cell_nodes(mesh),
         dolfinx_api.input_cells(mesh),
     )
+
+
+def destinations(comm: MPI.Comm, data: MeshData | None, ranks: NDArray[np.int32] | None) -> NDArray[np.int32] | None:
+    """Return the rank of each cell that this rank holds before the mesh is distributed; None if none has a say."""
+    chosen = comm.bcast(ranks is not None)
+    return (ranks if data else np.empty(0, np.int32)) if chosen else None

@@ -1,0 +1,47 @@
+"""Partition of cells among ranks: work in proportion to speeds, at every step level, by cuts with few nodes."""
+
+import numpy as np
+import pytest
+
+from fem.partition import partition
+from tests.support.fem_models import grid, mesh_of
+
+
+def plate(count: int = 24):
+    return mesh_of(
+        *grid(np.linspace(0, 3, 3 * count // 2 + 1), np.linspace(0, 2, count + 1), [0, 0.05, 0.1]), "board", {}
+    )
+
+
+def shares(rank: np.ndarray, work: np.ndarray, ranks: int) -> np.ndarray:
+    return np.array([work[rank == k].sum(axis=0) for k in range(ranks)]) / work.sum(axis=0)
+
+
+@pytest.mark.parametrize("speeds", [(1.0, 1.0), (1.0, 3.0), (1.0, 1.0, 1.0), (2.0, 1.0, 1.0, 0.5)])
+def test_work_is_shared_as_the_speeds(speeds):
+    mesh, speeds = plate(), np.array(speeds)
+    work = np.random.default_rng(1).uniform(1.0, 4.0, (len(mesh.cells), 1))
+    found = shares(partition(mesh, work, speeds), work, len(speeds))[:, 0]
+    assert found == pytest.approx(speeds / speeds.sum(), abs=5e-3)
+
+
+def test_every_level_is_shared_by_one_cut():
+    """Fine cells in a corner: half of all cells on each side would leave them all on one rank."""
+    mesh = plate()
+    centre = mesh.points[mesh.cells].mean(axis=1)
+    fine = (centre[:, 0] < 0.75) & (centre[:, 1] < 0.75)
+    work = np.column_stack([~fine * 1.0, fine * 8.0])
+    found = shares(partition(mesh, work, np.ones(2)), work, 2)
+    assert np.abs(found - 0.5).max() < 0.1
+
+
+def test_equal_cells_are_cut_along_a_short_line():
+    mesh = plate()
+    rank = partition(mesh, np.ones((len(mesh.cells), 1)), np.ones(2))
+    shared = np.intersect1d(mesh.cells[rank == 0], mesh.cells[rank == 1])
+    assert len(shared) == 25 * 3
+
+
+def test_more_ranks_than_cells_leave_some_without():
+    mesh = mesh_of(*grid([0, 1, 2], [0, 1], [0, 1]), "board", {})
+    assert sorted(partition(mesh, np.ones((2, 1)), np.ones(4))) == [0, 1]
