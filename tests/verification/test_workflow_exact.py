@@ -5,7 +5,8 @@ import pytest
 
 from fem.materials.elasticity import elasticity_matrix
 from fem.materials.parameters import Isotropic
-from workflow.structure import exact_bar, exact_cantilever
+from fem.pulse import HalfSine
+from workflow.structure import exact_bar, exact_cantilever, exact_layers
 
 BARS = exact_bar.Bars((0.1, 0.1), (70e9, 200e9), (2700.0, 8000.0), 8e-6)
 HEIGHTS = [0.03, 0.05, 0.15]
@@ -37,6 +38,46 @@ def test_a_run_that_ends_before_the_wave_is_back_has_no_reflection():
     time = np.linspace(0.0, 20e-6, 501)
     found = exact_bar.measure(BARS, time, [pulse(time, BARS.arrival(z)) for z in HEIGHTS], HEIGHTS)
     assert np.isnan(found["reflected_velocity_error"])
+
+
+def test_rays_through_layers_are_those_of_two_bars_and_keep_energy():
+    layers = exact_layers.Layers(BARS.lengths, (70e9, 200e9), (2700.0, 8000.0))
+    time = np.linspace(0.0, 55e-6, 1376)
+    low = pulse(time, BARS.arrival(0.05)) + BARS.reflected * pulse(time, BARS.return_time(0.05))
+    low += BARS.reflected * pulse(time, BARS.return_time(0.0) + 0.05 / BARS.speeds[0])
+    shape = HalfSine(BARS.impedances[0], BARS.pulse).value
+    assert np.abs(layers.velocity(0.05, time, shape) - low).max() < 1e-6
+
+
+def test_a_thin_section_sends_back_what_its_transfer_matrix_says():
+    """Transmission of a plane wave through a section of other impedance (Brekhovskikh 1980, 2.5), per frequency."""
+    layers = exact_layers.Layers((0.5, 2e-3, 1.0), (20e9, 60e9, 20e9), (2000.0, 8000.0, 2000.0))
+    duration, count = 300e-6, 6000
+    time = np.arange(count) * duration / count
+
+    def shape(t: float) -> float:
+        return float(np.sin(np.pi * t / 20e-6) ** 2) if 0.0 < t < 20e-6 else 0.0
+
+    found = layers.velocity(0.6, time, shape) * layers.impedances[0]
+    z1, z2 = layers.impedances[:2]
+    omega = 2.0 * np.pi * np.fft.rfftfreq(count, duration / count)
+    across = omega * 2e-3 / layers.speeds[1]
+    passed = 1.0 / (np.cos(across) + 0.5j * (z1 / z2 + z2 / z1) * np.sin(across))
+    delay = np.exp(-1j * omega * (0.6 - 2e-3) / layers.speeds[0])
+    exact = np.fft.irfft(np.fft.rfft([shape(t) for t in time]) * passed * delay, count)
+    early = time < 0.5 / layers.speeds[0] + 0.5 * 20e-6 + 60e-6
+    assert np.abs(found - exact)[early].max() < 2e-4 * exact.max()
+
+
+def test_exact_waves_through_layers_have_no_error():
+    layers = exact_layers.Layers((0.1, 4e-3, 0.1), (70e9, 200e9, 70e9), (2700.0, 8000.0, 2700.0))
+    heights = {"near": 0.03, "far": 0.05, "beyond": 0.15}
+    time, shape = np.linspace(0.0, 55e-6, 1376), exact_layers.Pulse(HalfSine(1e6, 8e-6).value, 8e-6)
+    history = {name: layers.velocity(height, time, shape.value) for name, height in heights.items()}
+    found = exact_layers.measure(layers, shape, heights, history | {"time": time})
+    assert found["wave_speed_error"] == pytest.approx(0.0, abs=5e-4)
+    assert found["transmitted_velocity_error"] == found["reflected_velocity_error"] == found["wave_error"] == 0.0
+    assert 0.6 < found["reflected_velocity"] < 0.7 and 0.8 < found["transmitted_velocity"] < 1.0
 
 
 def modal_tip(strip: exact_cantilever.Strip, time: np.ndarray, modes: int = 12) -> np.ndarray:

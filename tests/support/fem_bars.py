@@ -1,0 +1,58 @@
+"""A bar of layers with held sides, whose strain is uniaxial, under a smooth pressure pulse: mesh, run, exact waves."""
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from mpi4py import MPI
+
+from fem.inputs import INPUT, StructureInput
+from fem.materials.library import LIBRARY
+from fem.structure.run import run_structure
+from meshing.box import write_box
+from meshing.box_plan import Box, BoxLayer
+
+HELD = {f"{axis}_{end}": {"on": f"{axis}_{end}", "hold": [axis]} for axis in "xy" for end in ("min", "max")}
+PEAK = 1e6  # [Pa]
+
+
+def speed_of(material: str) -> float:
+    """Return the speed [m/s] of plane waves along z in a material of the library."""
+    from fem.materials.elasticity import elasticity_matrix
+
+    return float(np.sqrt(elasticity_matrix(LIBRARY[material])[2, 2] / LIBRARY[material].density))
+
+
+def write_bar(
+    directory: Path, width: float, cells: tuple[int, int], layers: Mapping[str, dict], pulse: float, **changes
+) -> StructureInput:
+    """Write mesh, pulse and input of a bar; ``changes`` replace or add whole tables."""
+    directory.mkdir(parents=True, exist_ok=True)
+    (directory / "out").mkdir(exist_ok=True)
+    box = Box((width, width), cells, tuple(BoxLayer(name, **_shape(layer)) for name, layer in layers.items()))
+    write_box(box, directory / "bar.msh")
+    time = np.linspace(0.0, pulse, 101)
+    rows = np.column_stack([time, PEAK * np.sin(np.pi * time / pulse) ** 2])
+    np.savetxt(directory / "pulse.csv", rows, delimiter=",", header="time [s], pressure [Pa]", comments="")
+    tables = {
+        "mode": "structure",
+        "solver": "explicit",
+        "structure": {"length": width, "width": width, "cells": cells, "layers": dict(layers)},
+        "supports": HELD,
+        "loads": {"push": {"kind": "pressure", "on": "z_min", "table": str(directory / "pulse.csv")}},
+        "mesh": str(directory / "bar.msh"),
+        "output": str(directory / "out"),
+    }
+    return INPUT.validate_json(json.dumps(tables | changes))
+
+
+def _shape(layer: dict) -> dict:
+    return {name: value for name, value in layer.items() if name != "material"}
+
+
+def run_bar(request: StructureInput, comm: MPI.Comm = MPI.COMM_SELF) -> tuple[dict, dict[str, np.ndarray]]:
+    """Run a bar; return its result and its history."""
+    run_structure(comm, request)
+    with np.load(request.output / "history.npz") as arrays:
+        return json.loads((request.output / "result.json").read_text()), dict(arrays)
