@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from workflow.findings import at_least, at_most, in_words_continued, metric
 from workflow.stage_runner import Findings
-from workflow.structure import exact_bar, exact_cantilever
+from workflow.structure import exact_bar, exact_cantilever, exact_layers
 from workflow.structure.case import StructureCase
-from workflow.structure.references import BarWave, Cantilever, FrequencyRange
+from workflow.structure.references import BarWave, Cantilever, FrequencyRange, LayeredBar
 
 SOLVER_DIFFERENCE = 0.01  # of the histories of watch points, explicit against implicit, relative L2
 JUDGED = ("displacement_difference", "strain_difference")
@@ -79,8 +79,8 @@ def compared_with_references(case: StructureCase, modes: list[dict], history: Ar
     metrics: dict = {}
     health: dict = {}
     for reference in case.references.values():
-        if isinstance(reference, BarWave):
-            found = exact_bar.measure(*_bar_wave(case, reference, history))
+        if isinstance(reference, BarWave | LayeredBar):
+            found = _waves(case, reference, history)
             limits = {"wave_speed_error": reference.speed_limit} | dict.fromkeys(
                 ("transmitted_velocity_error", "reflected_velocity_error"), reference.amplitude_limit
             )
@@ -107,6 +107,18 @@ def bars_of(case: StructureCase, reference: BarWave) -> exact_bar.Bars:
     return exact_bar.Bars((first, second), (lower, upper), (below, above), case.loads[reference.load].duration or 0.0)
 
 
+def layers_of(case: StructureCase) -> exact_layers.Layers:
+    """Return all layers as bars."""
+    from fem.materials.elasticity import elasticity_matrix
+
+    materials = case.scene.layer_materials.values()
+    return exact_layers.Layers(
+        tuple(layer.thickness for layer in case.structure.layers.values()),
+        tuple(float(elasticity_matrix(material)[2, 2]) for material in materials),
+        tuple(material.density for material in materials),
+    )
+
+
 def strip_of(case: StructureCase, reference: Cantilever) -> exact_cantilever.Strip:
     """Return the only layer as a strip."""
     from fem.materials.elasticity import elasticity_matrix
@@ -116,10 +128,24 @@ def strip_of(case: StructureCase, reference: Cantilever) -> exact_cantilever.Str
     return exact_cantilever.Strip(body.length, body.thickness, elasticity_matrix(material), material.density, pressure)
 
 
-def _bar_wave(case: StructureCase, reference: BarWave, history: Arrays) -> tuple:
+def _waves(case: StructureCase, reference: BarWave | LayeredBar, history: Arrays) -> dict[str, float]:
     points = [*reference.incident, reference.transmitted]
     velocities = [history[f"velocity@{name}"][:, 2] for name in points]
-    return bars_of(case, reference), history["time"], velocities, [case.watch[name].at[2] for name in points]
+    heights = [case.watch[name].at[2] for name in points]
+    if isinstance(reference, BarWave):
+        return exact_bar.measure(bars_of(case, reference), history["time"], velocities, heights)
+    roles = ("near", "far", "beyond")
+    found = dict(zip(roles, velocities, strict=True)) | {"time": history["time"]}
+    pulse = _pulse_of(case, reference.load)
+    return exact_layers.measure(layers_of(case), pulse, dict(zip(roles, heights, strict=True)), found)
+
+
+def _pulse_of(case: StructureCase, name: str) -> exact_layers.Pulse:
+    from fem.structure.pulses import pulse_durations, pulse_of
+
+    load = case.loads[name]
+    pulse = pulse_of(load)
+    return exact_layers.Pulse(pulse.value, load.duration or max(pulse_durations({name: pulse})))
 
 
 def _in_range(reference: FrequencyRange, modes: list[dict]) -> dict:

@@ -31,6 +31,21 @@ class BarWave(Reference):
     amplitude_limit: float = Field(0.01, gt=0)
 
 
+class LayeredBar(Reference):
+    """Waves along z in any layers whose sides are held, after a pulse of pressure on ``z_min``: every ray through them.
+
+    ``incident`` are two watch points in the lowest layer, the one nearer to the load first; ``transmitted`` is one in
+    the uppermost layer.
+    """
+
+    kind: Literal["layered_bar"] = "layered_bar"
+    load: str
+    incident: tuple[str, str]
+    transmitted: str
+    speed_limit: float = Field(0.005, gt=0)
+    amplitude_limit: float = Field(0.005, gt=0)
+
+
 class Cantilever(Reference):
     """A strip of one layer, clamped at ``x_min``, its sides held, under a sudden constant pressure: beam theory."""
 
@@ -58,7 +73,7 @@ class Published(Reference):
     source: str
 
 
-AnyReference = Annotated[BarWave | Cantilever | FrequencyRange | Published, Field(discriminator="kind")]
+AnyReference = Annotated[BarWave | LayeredBar | Cantilever | FrequencyRange | Published, Field(discriminator="kind")]
 
 
 def reference_problems(references: dict[str, AnyReference], scene: StructureScene) -> Iterator[Problem]:
@@ -66,7 +81,12 @@ def reference_problems(references: dict[str, AnyReference], scene: StructureScen
     for name, reference in references.items():
         key = f"references.{name}"
         if isinstance(reference, BarWave):
-            yield from _bar(key, reference, scene)
+            yield from _pressure(f"{key}.load", reference.load, scene, "half_sine")
+            yield from _layers(key, 2, scene)
+            yield from _heights(key, reference, scene)
+        elif isinstance(reference, LayeredBar):
+            yield from _pulse(f"{key}.load", reference.load, scene)
+            yield from _heights(key, reference, scene)
         elif isinstance(reference, Cantilever):
             yield from _pressure(f"{key}.load", reference.load, scene, "constant")
             yield from _known(f"{key}.tip", reference.tip, scene.watch, "watch point")
@@ -76,18 +96,17 @@ def reference_problems(references: dict[str, AnyReference], scene: StructureScen
             yield Problem(f"{key}.mode", "is not computed", reference.mode, allowed)
 
 
-def _bar(key: str, reference: BarWave, scene: StructureScene) -> Iterator[Problem]:
-    yield from _pressure(f"{key}.load", reference.load, scene, "half_sine")
-    yield from _layers(key, 2, scene)
+def _heights(key: str, reference: BarWave | LayeredBar, scene: StructureScene) -> Iterator[Problem]:
     points = [*(("incident", name) for name in reference.incident), ("transmitted", reference.transmitted)]
     for item, name in points:
         yield from _known(f"{key}.{item}", name, scene.watch, "watch point")
-    if len(scene.structure.layers) != 2 or any(name not in scene.watch for _, name in points):
+    thickness = [layer.thickness for layer in scene.structure.layers.values()]
+    if len(thickness) < 2 or any(name not in scene.watch for _, name in points):
         return
-    interface = next(iter(scene.structure.layers.values())).thickness
+    lower, upper = thickness[0], sum(thickness[:-1])
     heights = [scene.watch[name].at[2] for _, name in points]
-    if not 0.0 <= heights[0] < heights[1] < interface < heights[2]:
-        allowed = f"two heights below {1e3 * interface:g} mm, upwards, then one above"
+    if not 0.0 <= heights[0] < heights[1] < lower <= upper < heights[2]:
+        allowed = f"two heights below {1e3 * lower:g} mm, upwards, then one above {1e3 * upper:g} mm"
         yield Problem(key, "the watch points are not in their layers", None, allowed)
 
 
@@ -98,6 +117,17 @@ def _pressure(key: str, name: str, scene: StructureScene, pulse: str) -> Iterato
         yield Problem(
             key, f"is no {pulse} pressure that is given by its peak", name, f'a pressure with pulse = "{pulse}"'
         )
+
+
+def _pulse(key: str, name: str, scene: StructureScene) -> Iterator[Problem]:
+    yield from _known(key, name, scene.loads, "load")
+    load = scene.loads.get(name)
+    if load is not None and not (isinstance(load, Pressure) and load.on == "z_min" and _ends(load)):
+        yield Problem(key, "is no pulse of pressure on z_min", name, "a pressure on z_min with a duration or a table")
+
+
+def _ends(load: Pressure) -> bool:
+    return load.table is not None or load.duration is not None
 
 
 def _known(key: str, name: str, names: dict, what: str) -> Iterator[Problem]:

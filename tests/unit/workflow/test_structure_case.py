@@ -101,6 +101,11 @@ BAD_REFERENCES = {
         "structure.layers.top={material='FR4',thickness='1 mm'}",
         ["references.tip.kind", "2 layers", "1 in structure.layers"],
     ),
+    "no pulse": (
+        "bar_wave",
+        "references.x={kind='layered_bar',load='pull',incident=['first','second'],transmitted='beyond'}",
+        ["references.x.load", "no such load"],
+    ),
     "no such mode": ("jedec_board", "references.first_mode.mode=9", ["references.first_mode.mode = 9", "<= 6"]),
 }
 
