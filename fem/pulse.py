@@ -65,6 +65,34 @@ class HalfSine:
 
 
 @dataclass(frozen=True, slots=True)
+class Haversine:
+    """A sin^2(pi t / tau) up to the time tau, then nothing: it starts and ends without a kink.
+
+    Attributes:
+        peak: A, in the unit of the load.
+        duration: tau [s].
+    """
+
+    peak: float
+    duration: float
+
+    def value(self, time: float) -> float:
+        """Return the value at a time [s]."""
+        return float(self.peak * np.sin(np.pi * time / self.duration) ** 2) if 0.0 < time < self.duration else 0.0
+
+    def integral(self, time: float) -> float:
+        """Return the integral up to a time [s]; A tau / 2 for all of it."""
+        inside, rate = min(max(time, 0.0), self.duration), 2.0 * np.pi / self.duration
+        return float(0.5 * self.peak * (inside - np.sin(rate * inside) / rate))
+
+    def double_integral(self, time: float) -> float:
+        """Return the second integral up to a time [s]."""
+        inside, rate = min(max(time, 0.0), self.duration), 2.0 * np.pi / self.duration
+        within = 0.5 * self.peak * (0.5 * inside**2 - (1.0 - np.cos(rate * inside)) / rate**2)
+        return float(within + self.integral(time) * max(time - self.duration, 0.0))
+
+
+@dataclass(frozen=True, slots=True)
 class Constant:
     """A constant value from time zero on, up to a duration [s]."""
 

@@ -213,9 +213,9 @@ def _pulse(key: str, load: StructureLoad) -> Iterator[Problem]:
     ways = "service_condition, or peak and duration, or table" if isinstance(load, InputG) else "peak, or table"
     if len(given) != 1 and not (isinstance(load, Gravity) and not given):
         yield Problem(key, None, f"is given by {' and '.join(given) or 'nothing'}", f"exactly one of {ways}")
-    elif (own_peak is not None or isinstance(load, Gravity)) and load.pulse == "half_sine" and load.duration is None:
+    elif (own_peak is not None or isinstance(load, Gravity)) and load.pulse != "constant" and load.duration is None:
         if load.table is None:
-            yield Problem(f"{key}.duration", None, "is missing, a half sine needs it", "> 0")
+            yield Problem(f"{key}.duration", None, f"is missing, a {load.pulse.replace('_', ' ')} needs it", "> 0")
     elif load.duration is not None and (condition or load.table):
         yield Problem(f"{key}.duration", f"{load.duration:g} s", f"is already given by {given[0]}")
 

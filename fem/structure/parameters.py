@@ -83,11 +83,11 @@ class Support(Parameters):
 class Pulsed(Parameters):
     """A load whose value is its peak times a pulse of unit height, or the values of a table.
 
-    ``half_sine`` acts for ``duration``; ``constant`` from the start, for ``duration`` or to the end. ``table`` is a CSV
-    file of times and values and stands instead of peak and pulse.
+    ``half_sine`` and ``haversine``, its square, act for ``duration``; ``constant`` from the start, for ``duration`` or
+    to the end. ``table`` is a CSV file of times and values and stands instead of peak and pulse.
     """
 
-    pulse: Literal["half_sine", "constant"] = "half_sine"
+    pulse: Literal["half_sine", "haversine", "constant"] = "half_sine"
     duration: Annotated[float | None, "ms"] = Field(None, gt=0)
     table: str | None = None
 
@@ -126,7 +126,7 @@ class Gravity(Pulsed):
     """Weight, constant unless a pulse or a table says otherwise."""
 
     kind: Literal["gravity"] = "gravity"
-    pulse: Literal["half_sine", "constant"] = "constant"
+    pulse: Literal["half_sine", "haversine", "constant"] = "constant"
     peak: Annotated[float, "m/s^2"] = Field(9.80665, gt=0)
     direction: Direction = (0.0, 0.0, -1.0)
 

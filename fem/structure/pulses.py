@@ -5,10 +5,11 @@ from pathlib import Path
 
 import numpy as np
 
-from fem.pulse import Constant, HalfSine, Pulse, Tabulated, service_condition
+from fem.pulse import Constant, HalfSine, Haversine, Pulse, Tabulated, service_condition
 from fem.pulse_table import read_pulse
 from fem.structure.parameters import InputG, StructureLoad
 
+SHAPES: dict[str, type[HalfSine] | type[Haversine]] = {"half_sine": HalfSine, "haversine": Haversine}
 QUANTITY = {"input_g": "acceleration", "gravity": "acceleration", "pressure": "pressure", "motion": "velocity"}
 
 
@@ -29,12 +30,12 @@ def pulse_of(load: StructureLoad) -> Pulse:
         return service_condition(load.service_condition)
     if load.peak is None:
         raise ValueError(f"a load of kind {load.kind} has neither peak nor table")
-    if load.pulse == "half_sine" and load.duration is not None:
-        return HalfSine(load.peak, load.duration)
+    if load.pulse != "constant" and load.duration is not None:
+        return SHAPES[load.pulse](load.peak, load.duration)
     return Constant(load.peak, load.duration or np.inf)
 
 
 def pulse_durations(pulses: Mapping[str, Pulse]) -> list[float]:
     """Return the durations [s] of those pulses that have a course of their own."""
-    sines = [pulse.duration for pulse in pulses.values() if isinstance(pulse, HalfSine)]
+    sines = [pulse.duration for pulse in pulses.values() if isinstance(pulse, HalfSine | Haversine)]
     return sines + [float(np.ptp(pulse.times)) for pulse in pulses.values() if isinstance(pulse, Tabulated)]

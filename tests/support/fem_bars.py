@@ -27,20 +27,17 @@ def speed_of(material: str) -> float:
 def write_bar(
     directory: Path, width: float, cells: tuple[int, int], layers: Mapping[str, dict], pulse: float, **changes
 ) -> StructureInput:
-    """Write mesh, pulse and input of a bar; ``changes`` replace or add whole tables."""
+    """Write mesh and input of a bar under a pulse [s]; ``changes`` replace or add whole tables."""
     directory.mkdir(parents=True, exist_ok=True)
     (directory / "out").mkdir(exist_ok=True)
     box = Box((width, width), cells, tuple(BoxLayer(name, **_shape(layer)) for name, layer in layers.items()))
     write_box(box, directory / "bar.msh")
-    time = np.linspace(0.0, pulse, 101)
-    rows = np.column_stack([time, PEAK * np.sin(np.pi * time / pulse) ** 2])
-    np.savetxt(directory / "pulse.csv", rows, delimiter=",", header="time [s], pressure [Pa]", comments="")
     tables = {
         "mode": "structure",
         "solver": "explicit",
         "structure": {"length": width, "width": width, "cells": cells, "layers": dict(layers)},
         "supports": HELD,
-        "loads": {"push": {"kind": "pressure", "on": "z_min", "table": str(directory / "pulse.csv")}},
+        "loads": {"push": {"kind": "pressure", "on": "z_min", "peak": PEAK, "pulse": "haversine", "duration": pulse}},
         "mesh": str(directory / "bar.msh"),
         "output": str(directory / "out"),
     }

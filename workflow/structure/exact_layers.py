@@ -116,8 +116,8 @@ def measure(
 ) -> dict[str, float]:
     """Measure speed and amplitudes in the velocities of two points of the lowest layer and one of the uppermost.
 
-    Amplitudes are largest minus smallest velocity while the pulse passes (a thin layer sends back two of opposite
-    signs), over the incident one, and so are their errors: what comes back may be nothing.
+    Amplitudes are magnitudes (a thin layer sends back two of opposite signs) over the incident one, and so are their
+    errors: what comes back may be nothing.
 
     Args:
         layers: the bar.
@@ -146,12 +146,12 @@ def measure(
     }
     for name, (point, start) in starts.items():
         here = (time >= start) & (time <= start + pulse.duration)
-        found, right = (_swing(values[point][here]) / incident for values in (history, exact))
+        found, right = (_largest(values[point][here]) / incident for values in (history, exact))
         result |= {name: found, f"{name}_exact": right, f"{name}_error": found - right}
     together = [np.concatenate([values[name] for name in heights]) for values in (history, exact)]
     return result | {"wave_error": float(np.linalg.norm(together[0] - together[1]) / np.linalg.norm(together[1]))}
 
 
-def _swing(values: NDArray[np.float64]) -> float:
-    """Return the largest value minus the smallest; nan where the run has ended before."""
-    return float(np.ptp(values)) if len(values) else float("nan")
+def _largest(values: NDArray[np.float64]) -> float:
+    """Return the largest magnitude; nan where the run has ended before."""
+    return float(np.abs(values).max()) if len(values) else float("nan")

@@ -6,12 +6,13 @@ import pytest
 from fem.errors import LoadError, PulseError
 from fem.facet import area_vectors
 from fem.facet_areas import outward_areas
-from fem.pulse import SERVICE_CONDITIONS, Constant, HalfSine, Tabulated, service_condition
+from fem.pulse import SERVICE_CONDITIONS, Constant, HalfSine, Haversine, Tabulated, service_condition
 from fem.pulse_table import read_pulse
 from tests.support.fem_models import bar
 
 PULSES = {
     "half_sine": HalfSine(3.0, 0.8),
+    "haversine": Haversine(3.0, 0.8),
     "constant": Constant(2.0),
     "step": Constant(2.0, 0.7),
     "table": Tabulated(np.array([0.1, 0.3, 0.9]), np.array([1.0, -2.0, 3.0])),
