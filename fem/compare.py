@@ -1,5 +1,6 @@
 """Compare the histories of a two-scale run with those of a DNS. Plain NumPy."""
 
+from collections.abc import Collection
 from pathlib import Path
 
 import numpy as np
@@ -14,13 +15,19 @@ def relative_error(values: NDArray[np.float64], reference: NDArray[np.float64]) 
     return float(np.linalg.norm(values - reference)) / scale if scale > 0.0 else float(np.linalg.norm(values))
 
 
-def compare_histories(two_scale: Path, dns: Path) -> dict[str, float | str]:
+def compare_histories(two_scale: Path, dns: Path, fine: Collection[str] | None = None) -> dict[str, float | str]:
     """Compare two ``history.npz``.
+
+    Args:
+        two_scale: Of the two-scale run.
+        dns: Of the reference.
+        fine: Joints that the two-scale run has fine; None if all.
 
     Returns:
         ``critical_joint`` (largest interface-averaged von Mises of the DNS); relative L2 errors:
-        ``critical_joint_stress_error`` (its board and package side), ``worst_joint_stress_error``,
-        ``die_displacement_error`` and ``board_displacement_error`` (their centres), ``board_strain_error``.
+        ``critical_joint_stress_error`` (its board and package side), ``worst_joint_stress_error`` (of the fine ones),
+        ``die_displacement_error`` and ``board_displacement_error`` (their centres), ``board_strain_error``; with
+        ``fine`` also ``critical_joint_coarse``: 1 if the critical joint is not among them.
 
     Raises:
         ValueError: The files have different sample times or joints.
@@ -34,19 +41,24 @@ def compare_histories(two_scale: Path, dns: Path) -> dict[str, float | str]:
         f"{name}_error": relative_error(ours[array], reference[array]) for name, array in COMPARED.items()
     }
     if len(reference["joints"]):
-        result |= joint_errors(ours, reference)
+        result |= joint_errors(ours, reference, fine)
     return result
 
 
-def joint_errors(ours: dict[str, NDArray], reference: dict[str, NDArray]) -> dict[str, float | str]:
+def joint_errors(
+    ours: dict[str, NDArray], reference: dict[str, NDArray], fine: Collection[str] | None
+) -> dict[str, float | str]:
     """Return the errors of the joints' interface-averaged von Mises histories."""
     layers = ("von_mises_board", "von_mises_package")
     values = np.stack([ours[name] for name in layers])
     exact = np.stack([reference[name] for name in layers])
     critical = int(np.argmax(exact.max(axis=(0, 1))))
     errors = [relative_error(values[:, :, j], exact[:, :, j]) for j in range(exact.shape[2])]
+    names = [str(name) for name in reference["joints"]]
+    compared = [error for name, error in zip(names, errors, strict=True) if fine is None or name in fine]
     return {
-        "critical_joint": str(reference["joints"][critical]),
+        "critical_joint": names[critical],
         "critical_joint_stress_error": errors[critical],
-        "worst_joint_stress_error": max(errors),
+        "worst_joint_stress_error": max(compared),
+        **({} if fine is None else {"critical_joint_coarse": float(names[critical] not in fine)}),
     }

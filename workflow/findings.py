@@ -186,13 +186,49 @@ def of_shock(results: Mapping[str, dict], folder: Path) -> Findings:
     """
     first = next(iter(results))
     metrics, health = dict(results[first]["metrics"]), dict(results[first]["health"])
+    metrics |= _coupling_metrics(results[first])
     for mode, result in results.items():
         if mode != first:
             health |= {f"{mode}_{name}": value for name, value in result["health"].items()}
     if len(results) == 2:
         metrics |= _comparison(results, folder)
         health["critical_joint_stress_error"] = at_most(metrics["critical_joint_stress_error"]["value"], STRESS_ERROR)
+        if "critical_joint_coarse" in metrics:
+            health["critical_joint_coarse"] = at_most(metrics["critical_joint_coarse"]["value"], 0)
     return Findings(metrics, health, dict(results[first]["effects"]), in_words_continued(results))
+
+
+def fine_joints_of(result: Mapping[str, Any]) -> list[str] | None:
+    """Return the fine joints of a run in which some are coarse, else None."""
+    fine = result.get("coupling", {}).get("fine_joints", "all")
+    return None if isinstance(fine, str) else list(fine)
+
+
+def _coupling_metrics(result: Mapping[str, Any]) -> dict:
+    """Return what a two-scale run says of its coupling: shares of elements, and of its ranks' time."""
+    coupling = result.get("coupling", {})
+    balance = coupling.get("balance", {})
+    found = {
+        "meso_share": coupling.get("meso_share"),
+        "two_scale_ideal_ratio": ideal_ratio(coupling, result.get("model", {})),
+        "coupling_overhead": balance.get("overhead"),
+        "busy_share": min(balance.get("busy_share", ()), default=None),
+    }
+    return {name: metric(value) for name, value in found.items() if value is not None}
+
+
+def ideal_ratio(coupling: Mapping[str, Any], model: Mapping[str, Any]) -> float | None:
+    """Return the time of a two-scale run over that of a DNS if each element update cost the same and all else nothing.
+
+    Of levels this is the sum of elements over their steps, in that of all elements at the smallest step: with one level
+    f + (1 - f) / m.
+    """
+    steps = [(record["elements"], record["step"]) for record in coupling.get("levels", ())]
+    if steps:
+        smallest = min(step for _, step in steps)
+        return sum(elements * smallest / step for elements, step in steps) / sum(elements for elements, _ in steps)
+    share = coupling.get("meso_share")
+    return None if share is None else share + (1.0 - share) / model["substeps"]
 
 
 def in_words_continued(results: Mapping[str, dict]) -> str:
@@ -205,7 +241,8 @@ def _comparison(results: Mapping[str, dict], folder: Path) -> dict:
     """Compare both modes: errors of histories, and the ratio of the wall times of their windows."""
     from fem.compare import compare_histories
 
-    errors = compare_histories(folder / "two_scale/history.npz", folder / "dns/history.npz")
+    files = [folder / mode / "history.npz" for mode in ("two_scale", "dns")]
+    errors = compare_histories(files[0], files[1], fine_joints_of(results["two_scale"]))
     seconds = {mode: result["metrics"]["window_seconds"]["value"] for mode, result in results.items()}
     ratio = {"two_scale_dns_time_ratio": metric(seconds["two_scale"] / seconds["dns"])}
     return {name: metric(value) for name, value in errors.items()} | ratio

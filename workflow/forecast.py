@@ -159,6 +159,13 @@ def forecast_shock(case: BoardDropCase, parts: dict[str, PartForecast]) -> Shock
     return ShockForecast(plan.window, plan.substeps, plan.windows, two_scale, dns, implicit, UPDATES_PER_SECOND)
 
 
+def implicit_seconds(case: BoardDropCase) -> float | None:
+    """Predict the wall time of a DNS in implicit steps on one rank; None where something is not linear."""
+    parts = forecast_parts(case)
+    is_linear = all(relative_cost(case, name) == 1.0 for name in parts)
+    return forecast_shock(case, parts).implicit if is_linear else None
+
+
 def relative_cost(case: BoardDropCase, part: str) -> float:
     """Return the cost of an element of a part over that of an elastic one: what yields or turns has a path."""
     from fem.estimate import UPDATES_PER_SECOND

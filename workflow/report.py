@@ -8,7 +8,9 @@ from pathlib import Path
 import jinja2
 import numpy as np
 
+from workflow import findings
 from workflow import report_tables as tables
+from workflow.board_drop_case import BoardDropCase
 from workflow.structure.case import StructureCase
 from workflow.summary import collect_summary, write_summary
 
@@ -70,7 +72,7 @@ def _context(run_folder: Path, case, summary: dict) -> dict:
     if isinstance(case, StructureCase):
         _add_structure(run_folder, case, context, summary)
     else:
-        _add_shock(run_folder, context, summary)
+        _add_shock(run_folder, case, context, summary)
     return context
 
 
@@ -153,7 +155,7 @@ def _add_structure(run_folder: Path, case: StructureCase, context: dict, summary
     add_structure(run_folder, case, context, summary["metrics"])
 
 
-def _add_shock(run_folder: Path, context: dict, summary: dict) -> None:
+def _add_shock(run_folder: Path, case, context: dict, summary: dict) -> None:
     histories, results = {}, {}
     for mode in ("two_scale", "dns"):
         folder = run_folder / "shock" / mode
@@ -174,23 +176,49 @@ def _add_shock(run_folder: Path, context: dict, summary: dict) -> None:
         model=tables.models(results),
         comparison=tables.comparison(summary["metrics"]),
         joints=tables.ranked_joints(
-            histories[main_mode], tables.joint_records(run_folder), results[main_mode]["failure"]
+            histories[main_mode],
+            tables.joint_records(run_folder),
+            results[main_mode]["failure"],
+            findings.fine_joints_of(results[main_mode]),
         ),
         energy=tables.energies(histories),
         cost=tables.costs(results),
     )
-    _add_shock_pictures(run_folder / "shock" / main_mode, histories[main_mode], results[main_mode]["parts"], context)
+    _add_two_scales(run_folder, case, context, results)
+    _add_shock_pictures(run_folder / "shock" / main_mode, histories[main_mode], results[main_mode], context)
 
 
-def _add_shock_pictures(folder: Path, history: dict, parts: list[str], context: dict) -> None:
+def _add_two_scales(run_folder: Path, case: BoardDropCase, context: dict, results: dict[str, dict]) -> None:
+    """Add how the models are coupled, where they are."""
+    from workflow import report_two_scales as scales
+    from workflow.fine_joints import read_fine_joints
+    from workflow.forecast import implicit_seconds
+
+    result = results.get("two_scale")
+    if result is None:
+        return
+    coupling = result.get("coupling", {})
+    context["tables"].update(
+        two_scales=scales.two_scales(coupling, result["model"], read_fine_joints(run_folder / "shock")),
+        levels=scales.levels(coupling),
+        placement=scales.placement(coupling, result["metrics"]),
+    )
+    seconds = implicit_seconds(case)
+    context["oracle"] = scales.oracle(seconds, result) if seconds is not None else ""
+
+
+def _add_shock_pictures(folder: Path, history: dict, result: dict, context: dict) -> None:
     from workflow.report_pictures import render_board, render_joints
 
+    names = ("dns", "macro", "meso")
+    whole = {name: folder / f"{name}.pvd" for name in names if (folder / f"{name}.pvd").exists()}
+    is_one_way = result.get("coupling", {}).get("direction") == "one_way"
+    joints, board = ([whole["meso"]], [whole["macro"]]) if is_one_way else 2 * (list(whole.values()),)
     with tempfile.TemporaryDirectory() as temporary:
-        joints, board = Path(temporary) / "joints.png", Path(temporary) / "board.png"
-        context["joints_caption"] = render_joints(folder, history, parts, joints)
-        context["board_caption"] = render_board(folder, history, board)
-        context["pictures"]["joints"] = _base64(joints)
-        context["pictures"]["board"] = _base64(board)
+        pictures = {name: Path(temporary) / f"{name}.png" for name in ("joints", "board")}
+        context["joints_caption"] = render_joints(joints, history, result["parts"], pictures["joints"])
+        context["board_caption"] = render_board(board, history, result["parts"], pictures["board"])
+        context["pictures"] |= {name: _base64(path) for name, path in pictures.items()}
 
 
 def _base64(path: Path) -> str:

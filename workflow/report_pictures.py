@@ -49,11 +49,11 @@ def render_shapes(surface_folder: Path, joints: list[dict], picture: Path) -> No
     save(plotter, picture)
 
 
-def render_joints(folder: Path, history: dict, parts: list[str], picture: Path) -> str:
+def render_joints(series: list[Path], history: dict, parts: list[str], picture: Path) -> str:
     """Render all joints under their package, coloured by von Mises stress, when the worst one is stressed most.
 
     Args:
-        folder: folder of the shock run with its PVD files.
+        series: PVD files of the models that have them, all of one run.
         history: arrays of ``history.npz``.
         parts: names of the parts, in the order of the field ``part``.
         picture: PNG file to write.
@@ -64,7 +64,7 @@ def render_joints(folder: Path, history: dict, parts: list[str], picture: Path) 
     stress = np.maximum(history["von_mises_board"], history["von_mises_package"])
     row, column = np.unravel_index(np.argmax(stress), stress.shape)
     critical = str(history["joints"][column])
-    grid, time = _fields_near(folder, ("meso", "dns"), float(history["time"][row]))
+    grid, time = _fields_near(series, float(history["time"][row]))
     grid.points = grid.points / MILLI
     grid["von Mises [MPa]"] = grid.cell_data["von_mises"] / MEGA
     plotter = new_plotter((1800, 1000))
@@ -74,14 +74,16 @@ def render_joints(folder: Path, history: dict, parts: list[str], picture: Path) 
         cmap="turbo",
         clim=(0.0, float(1.0e-6 * stress.max())),
         scalar_bar_args=SCALAR_BAR | {"fmt": "%.0f"},
+        show_edges=True,
+        edge_color="#3a4048",
+        line_width=0.3,
     )
-    plotter.add_mesh(_of_role(grid, parts, "copper"), color="#b87333")
-    plotter.add_mesh(
-        _of_role(grid, parts, "board_patch"), color="#9cc9a7", show_edges=True, edge_color="#5d8f6b", line_width=0.5
-    )
+    _add_part(plotter, _of_role(grid, parts, "copper"), color="#b87333")
+    board = {"color": "#9cc9a7", "show_edges": True, "edge_color": "#5d8f6b", "line_width": 0.5}
+    _add_part(plotter, _of_role(grid, parts, "board_patch"), **board)
     for role, colour in (("substrate", "#c9a227"), ("die", "#5b6770")):
         outline = _of_role(grid, parts, role).extract_surface(algorithm="dataset_surface").extract_feature_edges(60)
-        plotter.add_mesh(outline, color=colour, line_width=3)
+        _add_part(plotter, outline, color=colour, line_width=3)
     mark = _of_role(grid, parts, f"solder@{critical}")
     plotter.add_point_labels(
         [(mark.center[0], mark.center[1], mark.bounds[5] + 0.05)],
@@ -103,10 +105,11 @@ def render_joints(folder: Path, history: dict, parts: list[str], picture: Path) 
     )
 
 
-def render_board(folder: Path, history: dict, picture: Path) -> str:
-    """Render the board at its largest deflection, exaggerated, coloured by displacement; return a caption."""
+def render_board(series: list[Path], history: dict, parts: list[str], picture: Path) -> str:
+    """Render the board at its largest deflection, exaggerated, coloured by displacement; arguments as above."""
     deflection = np.abs(history["board_centre"][:, 2])
-    grid, time = _fields_near(folder, ("macro", "dns"), float(history["time"][np.argmax(deflection)]))
+    grid, time = _fields_near(series, float(history["time"][np.argmax(deflection)]))
+    grid = _of_role(grid, parts, "board")
     grid["deflection [mm]"] = grid.point_data["displacement"][:, 2] / MILLI
     length = max(grid.bounds[1] - grid.bounds[0], grid.bounds[3] - grid.bounds[2])
     factor = round_down(0.12 * length / float(np.abs(grid.point_data["displacement"][:, 2]).max()))
@@ -170,13 +173,21 @@ def _radius_limits(joints: list[dict]) -> tuple[float, float]:
     return 1.0e6 * narrow, 0.5e6 * max(joint["max_width"] for joint in joints)
 
 
-def _fields_near(folder: Path, names: tuple[str, ...], time: float) -> tuple[pyvista.UnstructuredGrid, float]:
-    """Read the first of the named series that exists at its stored time nearest to ``time`` [s]."""
-    path = next(folder / f"{name}.pvd" for name in names if (folder / f"{name}.pvd").exists())
-    reader = pyvista.get_reader(path)
-    stored = min(reader.time_values, key=lambda value: abs(value - time))
-    reader.set_active_time_value(stored)
-    return _linear(reader.read().combine(merge_points=True)), stored
+def _add_part(plotter: pyvista.Plotter, part: pyvista.DataSet, **style) -> None:
+    """Add a part, unless the models that are drawn have nothing of it."""
+    if part.n_cells:
+        plotter.add_mesh(part, **style)
+
+
+def _fields_near(series: list[Path], time: float) -> tuple[pyvista.UnstructuredGrid, float]:
+    """Read series of the models of a run at their stored time nearest to ``time`` [s], as one grid."""
+    grids, stored = pyvista.MultiBlock(), time
+    for path in series:
+        reader = pyvista.get_reader(path)
+        stored = min(reader.time_values, key=lambda value: abs(value - time))
+        reader.set_active_time_value(stored)
+        grids.append(_linear(reader.read().combine(merge_points=True)))
+    return grids.combine(merge_points=True), stored
 
 
 def _linear(grid: pyvista.UnstructuredGrid) -> pyvista.UnstructuredGrid:

@@ -1,0 +1,106 @@
+"""Section "Two scales" of the report, and the metrics of the coupling."""
+
+import json
+
+import numpy as np
+import pytest
+
+from workflow import report_two_scales as section
+from workflow.findings import fine_joints_of, ideal_ratio, of_shock
+from workflow.fine_joints import FineJoints
+
+MODEL = {"window": 80e-9, "substeps": 8, "ranks": 2}
+COUPLING = {
+    "scheme": "local_steps",
+    "why": "all is linear",
+    "direction": "two_way",
+    "fine_joints": ["A4", "B4"],
+    "levels": [
+        {"step": 80e-9, "elements": 600, "cost_share": 0.2},
+        {"step": 20e-9, "elements": 300, "cost_share": 0.3},
+        {"step": 10e-9, "elements": 100, "cost_share": 0.5},
+    ],
+    "meso_share": 0.4,
+    "self_check": {"rigid_motion": 2e-16},
+    "mass": {"macro": 1e-3},
+    "placement": {"name": "shared", "alternatives": {"shared": 3e-4, "disjoint, 1 macro rank": 4e-4}},
+    "balance": {"busy_share": [0.95, 0.92], "overhead": 0.02},
+}
+
+
+def rows_of(table: dict) -> dict[str, str]:
+    return {row[0]: row[1] for row in table["rows"]}
+
+
+def test_the_section_tells_scheme_joints_and_checks():
+    rows = rows_of(section.two_scales(COUPLING, MODEL, FineJoints(("A4", "B4"), "the most stressed")))
+    assert rows["scheme"].startswith("local time steps")
+    assert rows["why"] == "all is linear"
+    assert rows["fine joints"] == "A4 B4"
+    assert rows["how they were found"] == "the most stressed"
+    assert rows["meso share f of the elements"] == "40 %"
+    assert rows["self-check, rigid motion"] == "2.0e-16"
+    assert rows["mass of the macro model"] == "1000 mg"
+
+
+def test_what_a_run_does_not_tell_is_left_out():
+    rows = rows_of(section.two_scales({}, MODEL, None))
+    assert set(rows) == {"window", "step ratio m"}
+    assert section.levels({}) is None
+    assert section.placement({}, {}) is None
+
+
+def test_levels_begin_with_the_window():
+    assert section.levels(COUPLING)["rows"] == [
+        ["0", "80 ns", "600", "20 %"],
+        ["1", "20 ns", "300", "30 %"],
+        ["2", "10 ns", "100", "50 %"],
+    ]
+
+
+def test_predictions_stand_beside_what_was_measured():
+    rows = rows_of(section.placement(COUPLING, {"window_seconds": {"value": 3.3e-4, "unit": "s"}}))
+    assert rows["window, predicted, shared (chosen)"] == "300.0 µs"
+    assert rows["window, predicted, disjoint, 1 macro rank"] == "400.0 µs"
+    assert rows["window, measured"] == "330.0 µs"
+    assert rows["rank 1 computes"] == "92 %"
+    assert rows["coupling, share of a window"] == "2 %"
+
+
+@pytest.mark.parametrize(("seconds", "winner"), [(10.0, "implicit steps win"), (100.0, "two scales win")])
+def test_the_cheaper_of_two_scales_and_implicit_steps_is_named(seconds, winner):
+    assert winner in section.oracle(seconds, {"timings": {"windows": 20.0}, "model": MODEL})
+
+
+def test_the_ideal_ratio_counts_element_updates():
+    assert ideal_ratio({}, {}) is None
+    assert ideal_ratio({"meso_share": 0.25}, {"substeps": 15}) == pytest.approx(0.25 + 0.75 / 15)
+    assert ideal_ratio(COUPLING, MODEL) == pytest.approx((600 / 8 + 300 / 2 + 100) / 1000)
+
+
+def test_coupling_and_comparison_become_metrics(tmp_path):
+    window = {"window_seconds": {"value": 1.0, "unit": "s"}}
+    result = {"metrics": window, "health": {}, "effects": {}, "model": MODEL}
+    for mode, factor in (("two_scale", 0.9), ("dns", 1.0)):
+        (tmp_path / mode).mkdir()
+        wave = factor * np.sin(np.linspace(0.0, 1.0, 5))
+        stress = wave[:, None] * [1.0, 2.0, 3.0]
+        np.savez(
+            tmp_path / mode / "history.npz", time=np.arange(5.0), joints=np.array(["A3", "A4", "B3"]), die_centre=wave,
+            board_centre=wave, board_strain=wave, von_mises_board=stress, von_mises_package=stress,
+        )  # fmt: skip
+    found = of_shock({"two_scale": result | {"coupling": COUPLING}, "dns": result}, tmp_path)
+    metrics = {name: metric["value"] for name, metric in found.metrics.items()}
+    assert metrics["meso_share"] == 0.4
+    assert metrics["busy_share"] == 0.92
+    assert metrics["coupling_overhead"] == 0.02
+    assert metrics["two_scale_dns_time_ratio"] == 1.0
+    assert metrics["critical_joint"] == "B3"
+    assert metrics["worst_joint_stress_error"] == pytest.approx(0.1)
+    assert not found.health["critical_joint_coarse"]["ok"]
+    json.dumps(found.metrics)
+
+
+def test_a_run_with_all_joints_fine_has_no_coarse_ones():
+    assert fine_joints_of({"coupling": {"fine_joints": "all"}}) is None
+    assert fine_joints_of({"coupling": {"fine_joints": ["A3"]}}) == ["A3"]

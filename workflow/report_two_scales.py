@@ -1,0 +1,110 @@
+"""Section "Two scales" of the report: how the models are coupled, what that costs, and what else would cost."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from workflow.fine_joints import FineJoints
+from workflow.report_tables import nano, number, percent, quantity
+
+Record = Mapping[str, Any]
+
+SCHEMES = {
+    "held_velocity": "held velocity, its cut inside the board",
+    "local_steps": "local time steps (LTS-leapfrog)",
+    "gravouil_combescure": "Gravouil-Combescure, at the joints' own facets",
+}
+DIRECTIONS = {"two_way": "two-way", "one_way": "one-way: the macro model takes nothing back"}
+MASSES = {
+    "macro": "mass of the macro model",
+    "interface": "mass at the cut that both share",
+    "meso": "mass of the meso model",
+    "expected": "density times volume, all",
+}
+
+
+def two_scales(coupling: Record, model: Record, fine: FineJoints | None) -> dict:
+    """Return how the models are coupled: what of it the run has told.
+
+    Args:
+        coupling: ``coupling`` of the result of a two-scale run.
+        model: its ``model``.
+        fine: its fine joints, where they were found by a coarse run.
+    """
+    scheme, joints = coupling.get("scheme"), coupling.get("fine_joints")
+    rows = [
+        ("scheme", scheme and SCHEMES.get(scheme, scheme)),
+        ("why", coupling.get("why")),
+        ("direction", DIRECTIONS.get(coupling.get("direction", ""))),
+        ("fine joints", " ".join(joints) if joints is not None and not isinstance(joints, str) else joints),
+        ("how they were found", fine and fine.why),
+        ("window", nano(model["window"])),
+        ("step ratio m", number(model["substeps"])),
+        ("meso share f of the elements", _share(coupling.get("meso_share"))),
+        ("nodes of the cut", _number(coupling.get("cut_nodes"))),
+        *(
+            (f"self-check, {name.replace('_', ' ')}", f"{value:.1e}")
+            for name, value in _numbers(coupling, "self_check")
+        ),
+        *((MASSES.get(name, name), _mass(value)) for name, value in _numbers(coupling, "mass")),
+    ]
+    return {"head": ["two scales", ""], "rows": [[name, text] for name, text in rows if text]}
+
+
+def levels(coupling: Record) -> dict | None:
+    """Return the levels of time steps: level 0 is the window."""
+    rows = [
+        [str(level), nano(record["step"]), number(record["elements"]), _share(record.get("cost_share")) or "–"]
+        for level, record in enumerate(coupling.get("levels", ()))
+    ]
+    return {"head": ["level", "time step", "hexahedra", "share of the cost"], "rows": rows} if rows else None
+
+
+def placement(coupling: Record, summary: Record) -> dict | None:
+    """Return the predicted window of every placement, what was measured, and how busy the ranks were.
+
+    Args:
+        coupling: as ``two_scales``.
+        summary: ``metrics`` of the run, as ``summary.json`` has them.
+    """
+    chosen, balance = coupling.get("placement", {}), coupling.get("balance", {})
+    rows = [
+        (f"window, predicted, {name}{' (chosen)' if name == chosen.get('name') else ''}", f"{1e6 * seconds:.1f} µs")
+        for name, seconds in _numbers(chosen, "alternatives")
+    ]
+    measured = summary.get("window_seconds")
+    rows += [("window, measured", f"{1e6 * measured['value']:.1f} µs")] if measured else []
+    rows += [(f"rank {rank} computes", _share(share)) for rank, share in enumerate(balance.get("busy_share", ()))]
+    rows += [("coupling, share of a window", _share(balance["overhead"]))] if "overhead" in balance else []
+    return {"head": ["placement", ""], "rows": [list(row) for row in rows]} if rows else None
+
+
+def oracle(seconds: float, result: Record) -> str:
+    """Say what one model in implicit steps would cost beside the two-scale run, and which of both wins.
+
+    Args:
+        seconds: predicted for the implicit run on one rank.
+        result: of the two-scale run.
+    """
+    core_seconds = result["timings"]["windows"] * result["model"]["ranks"]
+    winner = "implicit steps win" if seconds < core_seconds else "two scales win"
+    return (
+        f"All is linear elastic here, so {winner}: one model in implicit steps (MUMPS, factored once) is predicted to"
+        f" take {seconds:.0f} core seconds, the two-scale run took {core_seconds:.0f}. Solder that yields, finite"
+        " rotations and failure need explicit steps."
+    )
+
+
+def _numbers(record: Record, name: str) -> list[tuple[str, float]]:
+    return [(key, value) for key, value in record.get(name, {}).items() if isinstance(value, int | float)]
+
+
+def _share(value: float | None) -> str:
+    return "" if value is None else percent(value)
+
+
+def _number(value: int | None) -> str:
+    return "" if value is None else number(value)
+
+
+def _mass(value: float) -> str:
+    return quantity({"value": value, "unit": "kg"})
