@@ -7,7 +7,14 @@ import pytest
 
 from fem.compare import compare_histories
 from fem.errors import EnergyError
-from fem.estimate import BOARD_ADVANTAGE, implicit_plan, largest_implicit_step, predict_seconds, window_plan
+from fem.estimate import (
+    BOARD_ADVANTAGE,
+    UPDATES_PER_SECOND,
+    implicit_plan,
+    largest_implicit_step,
+    predict_seconds,
+    window_plan,
+)
 from fem.ledger import SUMS, Ledger
 from fem.loads import half_sine_drop
 from fem.materials.elasticity import elasticity_matrix, material_of_part, role_of_part
@@ -15,6 +22,7 @@ from fem.materials.library import COPPER, FR4, SILICON
 from fem.materials.parameters import Isotropic, Orthotropic
 from fem.materials.roles import Materials
 from fem.mesh import append
+from fem.parameters import Ranks
 from fem.stress import principal_strain, von_mises
 from fem.watch_table import centre_nodes, footprint, joint_names, watch_table
 from tests.support.fem_models import BOARD_Z, small_assembly
@@ -91,7 +99,9 @@ def test_implicit_step_follows_the_shortest_pulse():
 
 def test_prediction_of_equal_ranks():
     plan = window_plan(1.0, 0.1, 1.0, 100.0, 10)
-    two_scale, dns = predict_seconds(round(10000 * BOARD_ADVANTAGE), 1000, plan, (1, 1), rate=1e6)
+    board, joints = 0.01 * UPDATES_PER_SECOND, 0.001 * UPDATES_PER_SECOND  # updates in that many seconds
+    ranks = Ranks(total=2, placement="disjoint", macro=1)
+    two_scale, dns = predict_seconds(board * BOARD_ADVANTAGE, [(joints, 10)], plan, ranks)
     assert two_scale == pytest.approx(100 * 0.01, rel=0.01)
     assert dns == pytest.approx(100 * 0.055, rel=0.01)
 
