@@ -13,6 +13,7 @@ from fem.elements.kind import Geometry
 from fem.errors import MassError, RankError
 from fem.exchange import SharedNodes
 from fem.force import ForceTerm, Kinematics, force_terms, linear_terms
+from fem.levels.force import Levels, LocalSteps, check_elastic
 from fem.local_mesh import LocalMesh
 from fem.materials.elasticity import elasticity_matrix, materials_of_parts
 from fem.materials.parameters import Material
@@ -163,15 +164,27 @@ def make_body(
     held = local.locate(tables.held_nodes)
     free[held[held >= 0]] = ~tables.held[held >= 0]
     free[tie.slave] = False
-    terms = (
-        force_terms(elements, pieces.materials, response.kinematics, response.step)
-        if response
-        else linear_terms(elements)
-    )
+    cut = local.locate(tables.cut).astype(np.int32)
+    body = Body(local, elements, pieces.geometry, [], tie, shared, cut, mass, free)
+    terms = response_terms(comm, body, pieces.materials, tables, response) if response else linear_terms(elements)
     warm_up(terms, len(mass))
-    return Body(
-        local, elements, pieces.geometry, terms, tie, shared, local.locate(tables.cut).astype(np.int32), mass, free
-    )
+    return replace(body, terms=terms)
+
+
+def response_terms(
+    comm: MPI.Comm, body: Body, materials: Sequence[Material], tables: Tables, response: Response
+) -> list[ForceTerm]:
+    """Return the force terms of a body, one of them with all elements that take smaller steps; collective.
+
+    Raises:
+        LevelError: Not all elements of a body with levels are linear elastic; on every rank.
+    """
+    if not tables.level.any():
+        return force_terms(body.elements, materials, response.kinematics, response.step)
+    check_elastic(materials, response.kinematics, tables.ratios)
+    level = tables.level[body.local.cell_numbers]
+    levels = LocalSteps.build(comm, body, Levels(level, tables.ratios, response.step))
+    return [*linear_terms(body.elements.subset(level == 0)), levels]
 
 
 def warm_up(terms: Sequence[ForceTerm], count: int) -> None:

@@ -13,6 +13,10 @@ class CutError(ValueError):
     """A cut between macro and meso model that does not fit or is not stable."""
 
 
+class LevelError(ValueError):
+    """Step levels that do not go with the model."""
+
+
 class RankError(ValueError):
     """A number of MPI ranks that does not fit the input."""
 

@@ -1,0 +1,69 @@
+"""Coefficients of stabilised leapfrog steps inside one step: Chebyshev polynomials shifted a little.
+
+With z = DT^2 M^-1 K, p small steps from rest make q_p = T_p(delta - z / omega) / T_p(delta) q_0 of q_0,
+delta = 1 + nu / p^2, omega = 2 T_p'(delta) / T_p(delta) (Carle, Hochbruck & Sturm, SIAM J. Numer. Anal. 58, 2020;
+nu = 0 is the leapfrog of Diaz & Grote, SIAM J. Sci. Comput. 31, 2009). Leapfrog with 2 (q_0 - q_p) for z q_0 is stable
+up to z = omega (1 + delta), and |q_p| <= 1 / T_p(delta) from z = omega (delta - 1) on.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+FIRST, GROWTH = 0.15, 2.5  # nu of the outermost level; each inner one must stay below what the level around it bears
+
+
+@dataclass(frozen=True, slots=True)
+class Substeps:
+    """The p small steps of one level inside a step DT of the level around it.
+
+    Substep k changes the displacement by d_k = memory_k d_{k-1} + rate_k DT^2 f(q_k) / m. The mean force of the step,
+    by which q_p = q_0 + DT^2 f / (2 m), is the sum of weight_k f(q_k): weights are positive and add up to one.
+
+    Attributes:
+        memory: ``(p,)``, the first is zero.
+        rate: ``(p,)``.
+        weight: ``(p,)``.
+        reach: Largest z over that of p leapfrog steps, 4 p^2, as a ratio of steps: its square root.
+    """
+
+    memory: NDArray[np.float64]
+    rate: NDArray[np.float64]
+    weight: NDArray[np.float64]
+    reach: float
+
+    @classmethod
+    def of(cls, count: int, level: int) -> "Substeps":
+        """Return the ``count`` substeps of a level; 1 is the outermost."""
+        delta = 1.0 + stabilisation(level) / count**2
+        value, slope = chebyshev(count, delta)
+        omega = 2.0 * slope[count] / value[count]
+        rate = np.concatenate([[1.0 / delta], 2.0 * value[1:count] / value[2:]]) / omega
+        memory = np.concatenate([[0.0], value[: count - 1] / value[2:]])
+        weight = np.empty(count)
+        following = 0.0
+        for k in range(count - 1, -1, -1):  # what a unit of d_k adds to q_p: itself, and its memory in all later ones
+            following = 1.0 + (memory[k + 1] * following if k + 1 < count else 0.0)
+            weight[k] = 2.0 * rate[k] * following
+        return cls(memory, rate, weight, float(np.sqrt(omega * (1.0 + delta))) / (2.0 * count))
+
+
+def stabilisation(level: int) -> float:
+    """Return nu of a level, 1 the outermost.
+
+    A step of an inner level is itself a leapfrog whose highest frequencies reach 4 / (1 + nu) or so, whatever the
+    elements: nu must grow inwards for that to stay below the reach of the level around it. Both numbers were found on
+    chains of random elements, levels and impedances (tests/stability/test_fem_levels.py).
+    """
+    return FIRST * GROWTH ** (level - 1)
+
+
+def chebyshev(degree: int, x: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return T_k(x) and T_k'(x) for k = 0 ... degree: ``(degree + 1,)`` each."""
+    value, slope = np.ones(degree + 1), np.zeros(degree + 1)
+    value[1], slope[1] = x, 1.0
+    for k in range(1, degree):
+        value[k + 1] = 2.0 * x * value[k] - value[k - 1]
+        slope[k + 1] = 2.0 * value[k] + 2.0 * x * slope[k] - slope[k - 1]
+    return value, slope

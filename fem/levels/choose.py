@@ -1,0 +1,126 @@
+"""Which level each element takes its steps at, and how many steps: least predicted cost of a window."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem.errors import LevelError
+from fem.levels.chebyshev import Substeps
+from fem.tie import Tie
+
+SUBSTEP_COST = 1500.0  # updates of boxes in the time of one substep without elements (kernel calls)
+LARGEST_RATIO = 64
+ROUNDING = 1e-12
+
+
+@dataclass(frozen=True, slots=True)
+class Pace:
+    """What the steps of a window follow.
+
+    Attributes:
+        steps: ``(ne,)`` critical step of each element [s].
+        cost: ``(ne,)`` cost of an update of each element, in those of a box.
+        window: Step of level 0 [s].
+        fraction: Largest step over critical step.
+    """
+
+    steps: NDArray[np.float64]
+    cost: NDArray[np.float64]
+    window: float
+    fraction: float
+
+
+def choose_levels(
+    cells: NDArray[np.int32], tie: Tie, pace: Pace, most: int
+) -> tuple[NDArray[np.int32], tuple[int, ...]]:
+    """Choose the levels of all elements of a mesh.
+
+    A level has all nodes of the elements that need its step, masters of slaves among them, and all elements of these
+    nodes: so it grows by one layer of elements that could take larger steps.
+
+    Args:
+        cells: ``(ne, k)``.
+        tie: Its slaves and masters.
+        pace: Steps and cost of the elements.
+        most: Largest number of levels below the window, at least 1.
+
+    Returns:
+        Level of each element ``(ne,)`` int32, 0 for the window; steps of level k + 1 in one of level k, empty where
+        all elements take the window.
+
+    Raises:
+        LevelError: The elements need more than ``LARGEST_RATIO`` steps of a level.
+    """
+    needed = governing_steps(cells, tie, pace.fraction * pace.steps)
+    if needed.min() >= pace.window * (1.0 - ROUNDING):
+        return np.zeros(len(cells), np.int32), ()
+    order = np.argsort(needed)
+    cost = np.concatenate([[0.0], np.cumsum(pace.cost[order])])
+    candidates = list(all_ratios(pace.window / needed.min(), (), most))
+    if not candidates:
+        raise LevelError(
+            f"the window {pace.window:.3e} s is {pace.window / needed.min():.3g} times the smallest step of an element,"
+            f" {needed.min():.3e} s: allowed are {LARGEST_RATIO} steps a level, and {most} levels"
+        )
+    finer = [np.searchsorted(needed[order], bounds(ratios, pace.window)) for ratios in candidates]
+    totals = [window_cost(cost[below], ratios) for below, ratios in zip(finer, candidates, strict=True)]
+    ratios = candidates[int(np.argmin(totals))]
+    limits = bounds(ratios, pace.window)
+    return np.sum(needed[:, None] < limits, axis=1, dtype=np.int32), ratios
+
+
+def governing_steps(cells: NDArray[np.int32], tie: Tie, steps: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return for each element the smallest of the steps ``(ne,)`` of all elements that share a node with it.
+
+    Slaves stand for their masters. The level of an element is that of the largest at one of its nodes, which is that
+    of the smallest step at this node.
+    """
+    node = np.full(int(max(cells.max(), tie.master.max(initial=0), tie.slave.max(initial=0))) + 1, np.inf)
+    np.minimum.at(node, cells.ravel(), np.repeat(steps, cells.shape[1]))
+    np.minimum.at(node, tie.master.ravel(), np.repeat(node[tie.slave], tie.master.shape[1]))
+    node[tie.slave] = node[tie.master].min(axis=1)
+    return node[cells].min(axis=1)
+
+
+def bounds(ratios: tuple[int, ...], window: float) -> NDArray[np.float64]:
+    """Return the allowed steps ``(levels,)`` [s] below which elements need level 1, 2, ...: those of level 0, 1, ..."""
+    count, limits = 1, [1.0]
+    for level, ratio in enumerate(ratios[:-1], 1):
+        count *= ratio
+        limits.append(1.0 / (count * Substeps.of(ratio, level).reach))
+    return window * np.array(limits) * (1.0 - ROUNDING)
+
+
+def all_ratios(needed: float, inner: tuple[int, ...], most: int) -> Iterator[tuple[int, ...]]:
+    """Yield ratios of one to ``most`` levels that make ``needed`` steps of a window.
+
+    Args:
+        needed: Step of level 0 over the smallest one.
+        inner: Ratios of the levels around.
+        most: Levels that may follow.
+    """
+    level = len(inner) + 1
+    for ratio in range(2, LARGEST_RATIO + 1):
+        reached = ratio * Substeps.of(ratio, level).reach
+        if reached >= needed * (1.0 - ROUNDING):
+            yield (*inner, ratio)
+            return
+        if most > 1:
+            yield from all_ratios(needed / ratio, (*inner, ratio), most - 1)
+
+
+def window_cost(finer: NDArray[np.float64], ratios: tuple[int, ...]) -> float:
+    """Return the cost of a window: elements of each level times their steps, and of each substep.
+
+    Args:
+        finer: ``(levels,)`` cost of one update of all elements of level 1 and above, 2 and above, ...
+        ratios: Ratios of the levels.
+    """
+    total, count = 0.0, 1
+    for ratio, (here, beyond) in zip(ratios, pairwise([*finer, 0.0]), strict=True):
+        count *= ratio
+        total += count * (here - beyond + SUBSTEP_COST)
+    return total - finer[0]

@@ -1,0 +1,183 @@
+"""The internal force of elements that take several small steps within the step of their model.
+
+Leapfrog with local time steps (Diaz & Grote, SIAM J. Sci. Comput. 31, 2009, and 37, 2015 for several levels;
+stabilised, see ``levels.chebyshev``) is leapfrog of the large step DT with another symmetric stiffness. At a
+displacement u the nodes inside a level take p substeps from rest at q_0 = u, all other nodes held at u; the force of
+the step is the mean of the forces f(q_k) on the way, on the nodes inside as on those around (the ring). So it is a
+force term like any other:
+
+    f(u) = sum over k of weight_k f(q_k),        K_eff = -df/du = K_eff^T,        K_eff -> K for DT -> 0.
+
+Being a mean of internal forces it has no resultant; rigid motion gives none at all. Forces of loads are not in it: they
+act once a step. The elements of the next level are a term inside f with the substep for DT, and so on.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from fem.elements.element import Elements
+from fem.energy import Energy, InternalForce, linear_energy
+from fem.errors import LevelError
+from fem.exchange import SharedNodes
+from fem.force import Kinematics, linear_terms
+from fem.kernels.levels import begin_substeps, collect_force, end_substeps, take_substep
+from fem.levels.chebyshev import Substeps
+from fem.local_mesh import positions
+from fem.materials.parameters import Material
+from fem.tie import Tie
+
+if TYPE_CHECKING:
+    from fem.body import Body
+
+
+@dataclass(frozen=True, slots=True)
+class Levels:
+    """Who takes which steps.
+
+    Attributes:
+        level: ``(ne,)`` level of each element of the rank, 0 for those that take the step of the model.
+        ratios: Steps of level k + 1 in one of level k.
+        step: Step of the model DT [s].
+    """
+
+    level: NDArray[np.int32]
+    ratios: tuple[int, ...]
+    step: float
+
+
+@dataclass(frozen=True, slots=True)
+class LocalSteps:
+    """One level and all inside it.
+
+    Its nodes are numbered anew: first those that move (free), then its slaves and the ring.
+
+    Attributes:
+        rows: ``(n,)`` int32, its nodes among those of the level around it.
+        terms: Forces at its nodes: of its own elements, and of the next level.
+        substeps: Their coefficients.
+        tie: Its slaves and masters.
+        shared: Its free nodes that several ranks hold.
+        inverse: ``(nf, 3)`` DT^2 / m of its free nodes [s^2/kg], zero for held components.
+        change: ``(nf, 3)`` [m] of the latest substep.
+        state: ``(3, n, 3)``: displacement [m], force [N] there, weighted sum of forces [N]; only ``add`` reads it.
+        history: Empty: the force follows from the displacement.
+    """
+
+    rows: NDArray[np.int32]
+    terms: Sequence[InternalForce]
+    substeps: Substeps
+    tie: Tie
+    shared: SharedNodes
+    inverse: NDArray[np.float64]
+    change: NDArray[np.float64]
+    state: NDArray[np.float64]
+    history: dict[str, NDArray] = field(default_factory=dict)
+
+    @classmethod
+    def build(cls, comm: MPI.Comm, body: "Body", levels: Levels) -> "LocalSteps":
+        """Build the levels below the step of a model, whose elements of level 0 are not in them; collective.
+
+        Args:
+            comm: Communicator of the model.
+            body: The model, whatever its terms. The nodes of its cut are held.
+            levels: Levels of its elements, which must be linear elastic.
+        """
+        return build_level(comm, body, levels, 1, np.arange(len(body.mass), dtype=np.int32))
+
+    def add(self, displacement: NDArray[np.float64], force: NDArray[np.float64]) -> None:
+        """Subtract K_eff u from the force, of the slaves too; collective."""
+        steps, tie = self.substeps, (self.tie.slave, self.tie.master, self.tie.weight)
+        place, pull = self.state[0], self.state[1]
+        begin_substeps(self.rows, displacement, self.state)
+        for k, weight in enumerate(steps.weight):
+            if k:
+                self.shared.add(pull)
+                take_substep((steps.memory[k - 1], steps.rate[k - 1]), tie, self.inverse, self.change, self.state)
+            for term in self.terms:
+                term.add(place, pull)
+            collect_force(weight, tie, self.state)
+        end_substeps(self.rows, self.state, force)
+
+    def energy(self, displacement: NDArray[np.float64]) -> Energy:
+        """Return u . K_eff u / 2 as strain energy; collective."""
+        return linear_energy(self, displacement, None)
+
+
+def check_elastic(materials: Sequence[Material], kinematics: Kinematics, ratios: tuple[int, ...]) -> None:
+    """Refuse levels where forces depend on the path: a mean over substeps from rest is no path.
+
+    Raises:
+        LevelError: With what is not linear elastic.
+    """
+    yielding = [material for material in materials if material.plasticity is not None]
+    if yielding or kinematics == "finite":
+        cause = f"{len(yielding)} of the materials yield" if yielding else "kinematics = finite"
+        raise LevelError(
+            f"local steps (ratios {', '.join(map(str, ratios))}) need linear elastic elements at small strains, but"
+            f" {cause}; scheme = held_velocity or gravouil_combescure is for them"
+        )
+
+
+def build_level(comm: MPI.Comm, body: "Body", levels: Levels, number: int, around: NDArray[np.int32]) -> LocalSteps:
+    """Build a level and those inside it; collective.
+
+    Args:
+        comm: Communicator of the model.
+        body: The model.
+        levels: Levels of its elements; ``step`` is that of the level around.
+        number: Which level.
+        around: ``(m,)`` nodes of the level around it.
+    """
+    nodes, free = level_nodes(body, levels.level, number)
+    elements = renumbered(body.elements, nodes)
+    slave = positions(nodes, body.tie.slave)
+    here = slave >= 0
+    tie = Tie(slave[here], positions(nodes, body.tie.master[here]), body.tie.weight[here])
+    substeps = Substeps.of(levels.ratios[number - 1], number)
+    terms: list[InternalForce] = list(linear_terms(elements.subset(levels.level == number)))
+    if number < len(levels.ratios):
+        inner = replace(levels, step=levels.step / levels.ratios[number - 1])
+        terms.append(build_level(comm, body, inner, number + 1, nodes))
+    mass = np.where(body.mass > 0.0, body.mass, np.inf)[nodes[:free], None]
+    return LocalSteps(
+        rows=positions(around, nodes),
+        terms=terms,
+        substeps=substeps,
+        tie=tie,
+        shared=SharedNodes(comm, body.local.nodes[nodes[:free]]),
+        inverse=np.where(body.free[nodes[:free]], levels.step**2 / mass, 0.0),
+        change=np.zeros((free, 3)),
+        state=np.zeros((3, len(nodes), 3)),
+    )
+
+
+def level_nodes(body: "Body", level: NDArray[np.int32], number: int) -> tuple[NDArray[np.int32], int]:
+    """Return the local nodes of the elements of a level and of those inside it, and how many of them move; collective.
+
+    Those that move come first: no element of an outer level has them, on any rank, not even by a slave.
+    """
+    used = np.zeros(len(body.mass), dtype=bool)
+    used[body.elements.cells[level >= number]] = True
+    used[body.tie.master[used[body.tie.slave]]] = True
+    outer = np.zeros((len(body.mass), 3))
+    outer[body.elements.cells[level < number]] = 1.0
+    outer[body.cut[body.cut >= 0]] = 1.0
+    slaves = np.zeros(len(body.mass), dtype=bool)
+    slaves[body.tie.slave] = True
+    body.tie.gather(outer)
+    body.shared.add(outer)
+    moves = (outer[:, 0] == 0.0) & ~slaves
+    nodes = np.concatenate([np.flatnonzero(used & moves), np.flatnonzero(used & ~moves)])
+    return nodes.astype(np.int32), int(np.sum(used & moves))
+
+
+def renumbered(elements: Elements, nodes: NDArray[np.int32]) -> Elements:
+    """Return elements on some of their points; of cells with other nodes the connectivity has no meaning."""
+    number = np.full(len(elements.points), -1, np.int32)
+    number[nodes] = np.arange(len(nodes), dtype=np.int32)
+    return replace(elements, points=elements.points[nodes], cells=number[elements.cells])

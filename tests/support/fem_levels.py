@@ -1,0 +1,124 @@
+"""Bodies with step levels, and their effective stiffness by dense matrix functions."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from mpi4py import MPI
+
+from fem.body import Body, Response, make_body, make_pieces
+from fem.elements.element import element_stiffness
+from fem.global_matrix import tie_matrix
+from fem.levels.chebyshev import Substeps, stabilisation
+from fem.levels.choose import bounds, governing_steps
+from fem.local_mesh import distribute
+from fem.materials.roles import Materials
+from fem.mesh import MeshData, append
+from fem.scene import prepare
+from tests.support.fem_models import grid, joint_mesh, mesh_of, on
+
+EDGE = 1.5e-3
+
+
+def joint_on_board(solder: int = 7) -> MeshData:
+    """A joint with copper pads, free at its upper end, tied to a small block of board that is held on two sides."""
+    ticks = np.linspace(0, EDGE, 4)
+    points, cells = grid(ticks, ticks, [-1.3e-3, -0.8e-3, -0.3e-3, -0.15e-3, 0.0])
+    facets = {
+        "mounting_holes": on(0, EDGE),
+        "symmetry_y": on(1, 0.0),
+        "board_side": on(2, 0.0),
+    }
+    joint = joint_mesh("A1", 0.5e-3, 0.5e-3, layers=solder)
+    ends = {name: quads for name, quads in joint.facets.items() if not name.startswith("head@")}
+    return append([mesh_of(points, cells, "board", facets), replace(joint, facets=ends)])
+
+
+@dataclass(frozen=True)
+class Levelled:
+    """A body with levels, the same without, and what the levels are."""
+
+    body: Body
+    plain: Body
+    level: np.ndarray
+    ratios: tuple[int, ...]
+    window: float
+
+
+def levelled(mesh: MeshData, materials: Materials, ratios: tuple[int, ...], fraction: float = 0.9) -> Levelled:
+    """Return a body whose smallest elements go to ``fraction`` of the largest step that the innermost level allows."""
+    item = prepare(mesh, "dns")["dns"]
+    pieces = make_pieces(distribute(MPI.COMM_SELF, item.mesh), item.tables, materials)
+    steps = np.empty(len(pieces.steps))
+    steps[pieces.local.cell_numbers] = pieces.steps
+    reach = Substeps.of(ratios[-1], len(ratios)).reach
+    window = fraction * min(steps.max(), steps.min() * np.prod(ratios) * reach)
+    needed = governing_steps(item.mesh.cells, item.tables.tie, fraction * steps)
+    level = np.sum(needed[:, None] < bounds(ratios, window), axis=1, dtype=np.int32)
+    tables, factor = replace(item.tables, level=level, ratios=ratios), np.ones(len(steps))
+    body = make_body(MPI.COMM_SELF, pieces, tables, factor, Response("small", window))
+    plain = make_body(MPI.COMM_SELF, pieces, item.tables, factor)
+    return Levelled(body, plain, level[pieces.local.cell_numbers], ratios, window)
+
+
+def dense_level_stiffness(model: Levelled, number: int) -> np.ndarray:
+    """Return T^T K T of the elements of a level, (3n, 3n), from their element stiffnesses."""
+    elements = model.body.elements.subset(model.level == number)
+    size = 3 * len(model.body.mass)
+    matrix = np.zeros((size, size))
+    for cell, stiffness in zip(elements.cells, element_stiffness(elements), strict=True):
+        dofs = (3 * cell[:, None] + np.arange(3)).ravel()
+        matrix[np.ix_(dofs, dofs)] += stiffness
+    tie = tie_matrix(model.body)
+    return matrix if tie is None else tie.T @ (tie.T @ matrix).T
+
+
+def dense_effective_stiffness(model: Levelled, number: int = 0, step: float | None = None) -> np.ndarray:
+    """Return K_eff of the elements of a level and inside, in block form by eigenvectors of the nodes that move.
+
+    With A and B the blocks of the stiffness inside and beside (scaled by masses), K_eff has A phi(A), B phi(A) and
+    B ((phi - 1) / z)(A) B^T more than the block of the ring, phi(z) = (2 - 2 T_p(delta - z / omega) / T_p(delta)) / z.
+    """
+    step = step or model.window
+    inner = step if number == 0 else step / model.ratios[number - 1]
+    matrix = dense_level_stiffness(model, number)
+    if number < len(model.ratios):
+        matrix = matrix + dense_effective_stiffness(model, number + 1, inner)
+    if number == 0:
+        return matrix
+    moves = moving_components(model, number)
+    scale = step / np.sqrt(np.repeat(model.body.mass, 3)[moves])
+    values, vectors = np.linalg.eigh(scale[:, None] * matrix[np.ix_(moves, moves)] * scale)
+    beside = matrix[np.ix_(~moves, moves)] * scale @ vectors
+    phi, slope = filter_of(model.ratios[number - 1], stabilisation(number), values)
+    back = vectors.T / scale
+    result = matrix.copy()
+    result[np.ix_(moves, moves)] = back.T * (values * phi) @ back
+    result[np.ix_(~moves, moves)] = beside * phi @ back
+    result[np.ix_(moves, ~moves)] = result[np.ix_(~moves, moves)].T
+    result[np.ix_(~moves, ~moves)] += beside * slope @ beside.T
+    return result
+
+
+def filter_of(count: int, nu: float, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return phi(z) and (phi(z) - 1) / z, the latter zero where z is: Chebyshev polynomials by NumPy's class."""
+    polynomial = np.polynomial.Chebyshev.basis(count)
+    delta = 1.0 + nu / count**2
+    omega = 2.0 * polynomial.deriv()(delta) / polynomial(delta)
+    some = np.abs(z) > 1e-9
+    safe = np.where(some, z, 1.0)
+    phi = np.where(some, (2.0 - 2.0 * polynomial(delta - safe / omega) / polynomial(delta)) / safe, 1.0)
+    return phi, np.where(some, (phi - 1.0) / safe, 0.0)
+
+
+def moving_components(model: Levelled, number: int) -> np.ndarray:
+    """Return (3n,): free components that no element of an outer level has, not even by a slave."""
+    body = model.body
+    outer = np.zeros(len(body.mass), dtype=bool)
+    for cell in body.elements.cells[model.level < number]:
+        for node in cell:
+            outer[node] = True
+            outer[body.tie.master[body.tie.slave == node].ravel()] = True
+    used = np.zeros(len(body.mass), dtype=bool)
+    used[body.elements.cells[model.level >= number]] = True
+    used[body.tie.master[used[body.tie.slave]].ravel()] = True
+    return (body.free & (used & ~outer)[:, None]).ravel()

@@ -1,0 +1,131 @@
+"""Step levels against dense matrix functions; what follows from the equations exactly."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from fem.energy import Energy
+from fem.errors import LevelError
+from fem.levels.chebyshev import Substeps
+from fem.levels.choose import Pace, choose_levels, governing_steps
+from fem.levels.force import Levels, LocalSteps, check_elastic
+from fem.materials.library import FR4, SAC405
+from fem.materials.roles import Materials
+from fem.tie import Tie, net_load
+from tests.support.fem_bodies import dense_stiffness
+from tests.support.fem_levels import Levelled, dense_effective_stiffness, joint_on_board, levelled
+
+
+@pytest.fixture(scope="module", params=[(12,), (7, 3), (4, 3, 3)], ids=str)
+def model(request) -> Levelled:
+    made = levelled(joint_on_board(), Materials(), request.param)
+    assert np.bincount(made.level).min() > 0
+    return made
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 8, 40])
+@pytest.mark.parametrize("level", [1, 2, 3])
+def test_weights_are_positive_and_add_up_to_one(count, level):
+    steps = Substeps.of(count, level)
+    assert steps.weight.sum() == pytest.approx(1.0, abs=1e-13)
+    assert steps.weight.min() > 0.0
+    assert 0.6 < steps.reach <= 1.0
+
+
+def test_force_is_that_of_the_dense_matrix_function(model):
+    expected = dense_effective_stiffness(model)
+    assert np.abs(dense_stiffness(model.body) - expected).max() <= 1e-12 * np.abs(expected).max()
+
+
+def test_effective_stiffness_is_symmetric(model):
+    matrix = dense_stiffness(model.body)
+    assert np.abs(matrix - matrix.T).max() <= 1e-13 * np.abs(matrix).max()
+
+
+def total_force(model: Levelled, displacement: np.ndarray) -> np.ndarray:
+    """Return the force (n, 3) of all terms, slaves' moved to their masters."""
+    moved, force = displacement.copy(), np.zeros_like(displacement)
+    model.body.tie.spread(moved)
+    for term in model.body.terms:
+        term.add(moved, force)
+    model.body.tie.gather(force)
+    return force
+
+
+def test_rigid_motion_gives_no_force_and_any_motion_no_resultant(model):
+    points = model.body.local.points
+    rigid = np.array([3e-6, -2e-6, 1e-6]) + np.cross([1e-3, 2e-3, -1e-3], points)
+    some = 1e-6 * np.sin(np.arange(points.size)).reshape(-1, 3)
+    force, scale = total_force(model, some), np.abs(total_force(model, some)).sum()
+    assert np.abs(total_force(model, rigid)).max() <= 1e-10 * scale
+    assert np.abs(net_load(points, force)[:3]).max() <= 1e-12 * scale
+    assert np.abs(net_load(points, force)[3:]).max() <= 1e-12 * scale * np.abs(points).max()
+
+
+def test_one_substep_is_the_plain_force():
+    model = levelled(joint_on_board(), Materials(), (12,))
+    once = LocalSteps.build(MPI.COMM_SELF, model.body, Levels(model.level, (1,), model.window))
+    body = replace(model.body, terms=[*model.body.terms[:-1], once])
+    plain = dense_stiffness(model.plain)
+    assert np.abs(dense_stiffness(body) - plain).max() <= 1e-13 * np.abs(plain).max()
+
+
+def test_energy_is_that_of_the_effective_stiffness(model):
+    displacement = 1e-6 * np.sin(np.arange(3 * len(model.body.mass))).reshape(-1, 3)
+    model.body.tie.spread(displacement)
+    held = sum((term.energy(displacement) for term in model.body.terms), Energy())
+    work = -0.5 * np.vdot(displacement, total_force(model, displacement))
+    assert held.strain == pytest.approx(work, rel=1e-12)
+
+
+def test_levels_need_linear_elastic_elements():
+    with pytest.raises(LevelError, match="1 of the materials yield"):
+        check_elastic([SAC405, FR4], "small", (3,))
+    with pytest.raises(LevelError, match="kinematics = finite"):
+        check_elastic([FR4], "finite", (3,))
+    check_elastic([FR4], "small", (3,))
+
+
+CHAIN = np.column_stack([np.arange(12), np.arange(1, 13)]).astype(np.int32)
+
+
+def test_levels_grow_by_the_elements_of_their_nodes():
+    steps = np.array([1, 1, 1, 1, 0.2, 1, 1, 1, 1, 1, 1, 1.0])
+    level, ratios = choose_levels(CHAIN, Tie.none(), Pace(steps, np.full(12, 1e6), 0.9, 0.9), 1)
+    assert level.tolist() == [0, 0, 0, 1, 1, 1, 0, 0, 0, 0, 0, 0]
+    assert ratios == (6,)  # 5, and one for the reach of stabilised substeps
+
+
+def test_masters_of_a_slave_share_its_level():
+    cells = CHAIN.copy()
+    cells[6:] += 1  # a second chain from node 7, tied to nodes 5 and 6 of the first
+    tie = Tie(np.array([7], np.int32), np.array([[5, 6, 6, 6]], np.int32), np.full((1, 4), 0.25))
+    steps = np.ones(12)
+    steps[6] = 0.4
+    assert governing_steps(cells, tie, steps).tolist() == [1, 1, 1, 1, 0.4, 0.4, 0.4, 0.4, 1, 1, 1, 1]
+    steps[6], steps[4] = 1.0, 0.3
+    assert governing_steps(cells, tie, steps).tolist() == [1, 1, 1, 0.3, 0.3, 0.3, 0.3, 1, 1, 1, 1, 1]
+
+
+def test_more_levels_are_taken_where_they_pay():
+    steps = np.concatenate([np.full(2, 0.05), np.full(20, 0.4), np.ones(40)])
+    cells = np.column_stack([np.arange(62), np.arange(1, 63)]).astype(np.int32)
+    dear, cheap = (Pace(steps, np.full(62, cost), 1.0, 1.0) for cost in (1e6, 1.0))
+    assert choose_levels(cells, Tie.none(), dear, 1)[1] == (21,)
+    level, ratios = choose_levels(cells, Tie.none(), dear, 3)
+    assert ratios == (3, 8)
+    assert np.bincount(level).tolist() == [39, 20, 3]
+    assert choose_levels(cells, Tie.none(), cheap, 3)[1] == (21,)  # calls cost more than elements
+
+
+def test_no_level_where_all_elements_take_the_window():
+    level, ratios = choose_levels(CHAIN, Tie.none(), Pace(np.ones(12), np.ones(12), 0.9, 0.9), 3)
+    assert not level.any()
+    assert ratios == ()
+
+
+def test_too_many_steps_are_refused():
+    with pytest.raises(LevelError, match="allowed are 64 steps a level, and 1 levels"):
+        choose_levels(CHAIN, Tie.none(), Pace(np.geomspace(1e-3, 1.0, 12), np.ones(12), 0.9, 0.9), 1)
