@@ -50,7 +50,7 @@ class LocalMesh:
         )
 
 
-def positions(haystack: NDArray[np.int64], needles: NDArray[np.integer]) -> NDArray[np.int32]:
+def positions(haystack: NDArray[np.integer], needles: NDArray[np.integer]) -> NDArray[np.int32]:
     """Return the position of each needle in the haystack (unique numbers), -1 where it is not there."""
     if not len(haystack):
         return np.full(np.shape(needles), -1, np.int32)
