@@ -1,5 +1,6 @@
 """Messages between ranks: sums over nodes that several ranks hold, and the channel across the cut."""
 
+import time
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +10,23 @@ from numpy.typing import NDArray
 from fem.kernels.motion import pack, sum_in_rank_order, unpack
 
 SHARED_TAG, CHANNEL_TAG = 11, 12
+
+
+@dataclass(slots=True)
+class MessageClock:
+    """Seconds that a rank spent on messages: ``packing`` and unpacking, ``waiting`` for them."""
+
+    packing: float = 0.0
+    waiting: float = 0.0
+
+    def count(self, begin: float, packed: float, arrived: float) -> None:
+        """Count a message that was begun, packed and complete at given times, and unpacked now [s]."""
+        self.packing += packed - begin + time.perf_counter() - arrived
+        self.waiting += arrived - packed
+
+    def reset(self) -> None:
+        """Go back to zero."""
+        self.packing, self.waiting = 0.0, 0.0
 
 
 def holders(comm: MPI.Comm, nodes: NDArray[np.integer]) -> list[NDArray[np.int64]]:
@@ -44,10 +62,12 @@ class SharedNodes:
 
     Attributes:
         owned: ``(n,)``: whether this rank is the lowest that holds the node.
+        clock: Time spent on its messages.
     """
 
-    def __init__(self, comm: MPI.Comm, nodes: NDArray[np.integer]) -> None:
-        """Find the copies of the nodes ``(n,)`` of this rank, and prepare the messages."""
+    def __init__(self, comm: MPI.Comm, nodes: NDArray[np.integer], clock: MessageClock | None = None) -> None:
+        """Find the copies of the nodes ``(n,)`` of this rank, and prepare the messages; a clock may serve several."""
+        self.clock = clock or MessageClock()
         shared = holders(comm, nodes)
         order = np.argsort(nodes)
         local = [order[np.searchsorted(nodes, numbers, sorter=order)].astype(np.int32) for numbers in shared]
@@ -70,10 +90,14 @@ class SharedNodes:
     def add(self, values: NDArray[np.float64]) -> None:
         """Replace shared rows of ``values (n, 3)`` by the sum over all ranks that hold them."""
         if self._requests:
+            begin = time.perf_counter()
             pack(values, self._rows, self._sent)
+            packed = time.perf_counter()
             MPI.Prequest.Startall(self._requests)
             MPI.Prequest.Waitall(self._requests)
+            arrived = time.perf_counter()
             sum_in_rank_order(self._nodes, self._pointer, self._source, self._received, values)
+            self.clock.count(begin, packed, arrived)
 
     def free(self) -> None:
         """Free the persistent requests."""
@@ -109,6 +133,9 @@ class Channel:
 
     A rank may carry one model or both; what it can copy from itself is no message. Else the lowest rank that holds a
     cut node of the source sends it to every rank that holds it of the target.
+
+    Attributes:
+        clock: Time spent on its messages.
     """
 
     def __init__(
@@ -122,6 +149,7 @@ class Channel:
             target: The same in the receiving model.
             receiver_waits: Whether receivers are already waiting when this rank sends: it carries one model only.
         """
+        self.clock = MessageClock()
         self._receiver_waits = receiver_waits
         sources = np.array(comm.allgather(source >= 0)).reshape(comm.size, -1)
         targets = np.array(comm.allgather(target >= 0)).reshape(comm.size, -1)
@@ -142,18 +170,25 @@ class Channel:
         A large message makes no progress while its sender computes, so this waits until it is taken, where receivers
         are waiting for it. Ranks that carry both models receive at a later turn: waiting for them would never end.
         """
+        begin = time.perf_counter()
         pack(values, self._out_rows, self._sent)
+        packed = time.perf_counter()
         MPI.Prequest.Startall(self._sends)
         if self._receiver_waits:
             MPI.Prequest.Waitall(self._sends)
+        self.clock.count(begin, packed, time.perf_counter())
 
     def receive(self, values: NDArray[np.float64]) -> None:
         """Receive the cut rows of ``values (n, 3)``."""
+        begin = time.perf_counter()
         MPI.Prequest.Startall(self._receives)
         self._own[1][:] = self._own[0]
+        packed = time.perf_counter()
         MPI.Prequest.Waitall(self._receives)
         MPI.Prequest.Waitall(self._sends)
+        arrived = time.perf_counter()
         unpack(self._received, self._in_rows, values)
+        self.clock.count(begin, packed, arrived)
 
     def free(self) -> None:
         """Free the persistent requests."""
@@ -188,6 +223,11 @@ class CutChannels:
             receiver_waits: See ``Channel``.
         """
         return cls(Channel(comm, macro, meso, receiver_waits), Channel(comm, meso, macro, receiver_waits))
+
+    @property
+    def clocks(self) -> list[MessageClock]:
+        """Return the clocks of both."""
+        return [self.velocities.clock, self.forces.clock]
 
     def free(self) -> None:
         """Free both."""

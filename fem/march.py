@@ -11,6 +11,7 @@ from mpi4py import MPI
 
 from fem.checkpoint import Checkpoints
 from fem.communicators import Role
+from fem.coupling.stopwatch import Stopwatch
 from fem.errors import InvertedElementError
 from fem.fields import Fields
 from fem.history import History
@@ -40,7 +41,7 @@ class Outputs:
     checkpoints: Checkpoints
 
 
-def march(world: MPI.Comm, crew: Crew, outputs: Outputs) -> float:
+def march(world: MPI.Comm, crew: Crew, outputs: Outputs, stopwatch: Stopwatch) -> float:
     """Run all windows, from the latest checkpoint where there is one; return the seconds spent on fields. Collective.
 
     Raises:
@@ -56,7 +57,7 @@ def march(world: MPI.Comm, crew: Crew, outputs: Outputs) -> float:
         output_seconds += resume(crew, outputs, state, [window for window in sorted(field_windows) if window < first])
     for window in range(first, plan.windows + 1):
         if window:
-            run_window(crew)
+            run_window(crew, stopwatch)
         sampled = window % plan.stride == 0 or window == plan.windows
         if sampled:
             history.sample(crew)
@@ -74,17 +75,20 @@ def march(world: MPI.Comm, crew: Crew, outputs: Outputs) -> float:
     return output_seconds
 
 
-def run_window(crew: Crew) -> None:
+def run_window(crew: Crew, stopwatch: Stopwatch) -> None:
     """Advance all models of this rank by one window, each at its turn.
 
     Raises:
         InvertedElementError: On the rank that has the element, with the time.
     """
+    stopwatch.start()
     try:
-        for participant in crew.values():
+        for role, participant in crew.items():
             participant.begin_window()
-        for participant in crew.values():
+            stopwatch.lap(role)
+        for role, participant in crew.items():
             participant.finish_window()
+            stopwatch.lap(role)
     except InvertedElementError as error:
         raise InvertedElementError(f"time {time_of(crew):.6e} s: {error}; {FLATTENED}") from error
 

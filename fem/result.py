@@ -30,11 +30,20 @@ METHODS = {"direct": "direct acceleration input", "large_mass": "large mass at t
 
 @dataclass(frozen=True, slots=True)
 class Timings:
-    """Wall seconds of the parts of a run on rank 0; ``first`` is the window from which it continued, or zero."""
+    """Wall seconds of the parts of a run on rank 0.
+
+    Attributes:
+        setup: Until the first window.
+        windows: Windows and samples.
+        fields: Field files.
+        balance: Where the time of windows went, see ``Stopwatch.summary``.
+        first: Window from which the run continued, or zero.
+    """
 
     setup: float
     windows: float
     fields: float
+    balance: dict[str, Any]
     first: int = 0
 
     @property
@@ -62,6 +71,7 @@ def write_result(
             "effects": effects(request, summary),
             "failure": verdicts,
             "timings": timings.seconds,
+            "coupling": {"placement": {"chosen": comms.placement.words, **timings.balance}},
             "continued_from": timings.first,
             "model": summary,
             "parts": list(next(iter(models.values())).tables.part_names),

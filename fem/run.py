@@ -12,8 +12,9 @@ from fem.checkpoint import Checkpoints, digest_of_files
 from fem.communicators import Communicators, Role
 from fem.coupling.placement import Placement, admissible, check_size, shared
 from fem.coupling.scheme import scheme_of
+from fem.coupling.stopwatch import Stopwatch
 from fem.estimate import WindowPlan, implicit_plan, largest_implicit_step
-from fem.exchange import CutChannels
+from fem.exchange import CutChannels, MessageClock
 from fem.fields import Fields
 from fem.history import History
 from fem.implicit import ImplicitMotion
@@ -50,16 +51,20 @@ def run(world: MPI.Comm, request: RunInput) -> None:
         if request.implicit:
             largest = largest_implicit_step(request.shock.duration, pulse_durations({"drop": pulse}))
             steps = replace(steps, plan=implicit_plan(steps.plan, largest))
-        crew = make_crew(comms, models, steps.plan, request.shock)
+        crew, channels = make_crew(comms, models, steps.plan, request.shock)
+        stopwatch = Stopwatch({role: model.body.shared.clock for role, model in models.items()}, channels)
         history = make_history(comms, models, steps, pulse, request)
         numerics, fields = request.shock.numerics, make_fields(comms, models, request)
         tables = [Path(request.shock.table)] if request.shock.table else []
         inputs = request.model_dump_json(exclude={"output"}), digest_of_files(*request.meshes, *tables)
         checkpoints = Checkpoints(comms.world, request.checkpoints, inputs, numerics.checkpoint_seconds)
+        outputs = Outputs(history, fields, numerics.field_samples, checkpoints)
         ready = time.perf_counter()
-        output_seconds = march(comms.world, crew, Outputs(history, fields, numerics.field_samples, checkpoints))
+        output_seconds = march(comms.world, crew, outputs, stopwatch)
         seconds = time.perf_counter() - ready - output_seconds
-        timings = Timings(ready - start, seconds, output_seconds, checkpoints.continued or 0)
+        first = checkpoints.continued or 0
+        balance = stopwatch.summary(comms.world, steps.plan.windows - first)
+        timings = Timings(ready - start, seconds, output_seconds, balance, first)
         write_result(comms, request, (models, steps), history, timings)
         agreed(comms.world, lambda: None)
 
@@ -78,8 +83,8 @@ def place(world: MPI.Comm, request: RunInput) -> Placement:
 
 def make_crew(
     comms: Communicators, models: dict[Role, Model], plan: WindowPlan, shock: Shock
-) -> dict[Role, Participant]:
-    """Return the participants of this rank, in the order of their turns; collective."""
+) -> tuple[dict[Role, Participant], list[MessageClock]]:
+    """Return the participants of this rank in the order of their turns, and the clocks of channels; collective."""
     bodies = {role: model.body for role, model in models.items()}
     loads = {
         role: shock_loads(comms.models[role], role, model.body, model.tables, shock) for role, model in models.items()
@@ -87,14 +92,15 @@ def make_crew(
     if "dns" in bodies:
         model = bodies["dns"], loads["dns"], plan.step
         implicit = shock.numerics.dns_solver == "implicit"
-        return {"dns": Alone(ImplicitMotion(comms.models["dns"], *model) if implicit else uncut_motion(*model), plan)}
+        motion = ImplicitMotion(comms.models["dns"], *model) if implicit else uncut_motion(*model)
+        return {"dns": Alone(motion, plan)}, []
     absent = np.full_like(next(iter(bodies.values())).cut, -1)
     macro, meso = (bodies[role].cut if role in bodies else absent for role in ("macro", "meso"))
     channels = CutChannels.open(comms.world, macro, meso, receiver_waits=len(comms.models) == 1)
     scheme = scheme_of("held_velocity")
     make = {"macro": scheme.macro, "meso": scheme.meso}
     made = {role: make[role](bodies[role], loads[role], plan, channels) for role in scheme.order if role in bodies}
-    return {role: made[role] for role in comms.models}
+    return {role: made[role] for role in comms.models}, channels.clocks
 
 
 def make_history(

@@ -66,6 +66,7 @@ def write_result(
             "effects": effects(request, summary["added_mass"], max(found.peaks["neglected_strain"].values()))
             | strain_effect(model.tables.watch),
             "timings": timings.seconds,
+            "balance": timings.balance,
             "continued_from": timings.first,
             "model": summary,
             "parts": list(model.tables.part_names),

@@ -10,6 +10,7 @@ from fem.agreement import agreed
 from fem.checkpoint import Checkpoints, digest_of_files
 from fem.communicators import Communicators
 from fem.coupling.placement import shared
+from fem.coupling.stopwatch import Stopwatch
 from fem.errors import AgreedError
 from fem.fields import Fields
 from fem.history import History
@@ -46,10 +47,13 @@ def run_structure(world: MPI.Comm, request: StructureInput) -> None:
         modes = find_modes(comm, model, request)
         structure = make_participant(comm, model, request, pulses)
         outputs = make_outputs(comm, model, request, pulses)
+        stopwatch = Stopwatch({"structure": model.body.shared.clock})
         ready = time.perf_counter()
-        output_seconds = march(comm, {"structure": structure}, outputs)
+        output_seconds = march(comm, {"structure": structure}, outputs, stopwatch)
         seconds = time.perf_counter() - ready - output_seconds
-        timings = Timings(ready - start, seconds, output_seconds, outputs.checkpoints.continued or 0)
+        first = outputs.checkpoints.continued or 0
+        balance = stopwatch.summary(comm, model.steps.plan.windows - first)
+        timings = Timings(ready - start, seconds, output_seconds, balance, first)
         peaks = element_peaks(comm, outputs.fields["structure"], model.tables.part_names)
         cost = structure.motion.factor.cost if isinstance(structure.motion, ImplicitMotion) else None
         write_result(comm, request, model, Found(outputs.history, modes, peaks, cost), timings)

@@ -62,9 +62,9 @@ def run_some_windows(count: int):
     left = iter(range(count))
     real = fem.march.run_window
 
-    def run_window(crew) -> None:
+    def run_window(crew, stopwatch) -> None:
         if next(left, None) is None:
             raise Killed
-        real(crew)
+        real(crew, stopwatch)
 
     return run_window

@@ -1,0 +1,72 @@
+"""Where the time of windows goes: each model's turns on each rank, and what of them is packing and waiting."""
+
+import time
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+
+from fem.coupling.placement import Role
+from fem.exchange import MessageClock
+
+
+class Stopwatch:
+    """Takes the time of turns, read a few times a window.
+
+    Attributes:
+        turns: Seconds that each model of this rank has had.
+    """
+
+    def __init__(self, sums: Mapping[Role, MessageClock], coupling: Sequence[MessageClock] = ()) -> None:
+        """Start at zero.
+
+        Args:
+            sums: Of each model of this rank, the clock of sums over nodes that ranks share.
+            coupling: Clocks of the channels between the models.
+        """
+        self.turns: dict[Role, float] = dict.fromkeys(sums, 0.0)
+        self._sums, self._coupling = sums, coupling
+        self._begin = 0.0
+        for clock in [*sums.values(), *coupling]:
+            clock.reset()
+
+    def start(self) -> None:
+        """Begin a window."""
+        self._begin = time.perf_counter()
+
+    def lap(self, role: Role) -> None:
+        """Count the time since the start or the last lap for a model."""
+        end = time.perf_counter()
+        self.turns[role] += end - self._begin
+        self._begin = end
+
+    def summary(self, world: MPI.Comm, windows: int) -> dict[str, Any]:
+        """Return shares of the time of all windows, on each rank and in all; collective.
+
+        ``coupling_overhead`` is what the rank that others wait for spends on the coupling, packing and messages: its
+        share is that of the rank with the least. Waiting for the other model is in ``busy_share``, as is waiting
+        within a model.
+        """
+        ranks = world.allgather(self._record())
+        total = np.array([sum(item["turns"].values()) for item in ranks])
+        waiting = np.array([sum(item["sum_waiting"].values()) + item["coupling_waiting"] for item in ranks])
+        coupling = np.array([item["coupling_packing"] + item["coupling_waiting"] for item in ranks])
+        total = np.maximum(total, np.finfo(float).tiny)  # a run that had no window to do
+        return {
+            "window_seconds": float(total.max()) / max(windows, 1),
+            "busy_share": float(1.0 - waiting.sum() / total.sum()),
+            "busy_shares": (1.0 - waiting / total).tolist(),
+            "coupling_overhead": float((coupling / total).min()),
+            "ranks": ranks,
+        }
+
+    def _record(self) -> dict[str, Any]:
+        """Return the seconds of this rank."""
+        return {
+            "turns": self.turns,
+            "sum_packing": {role: clock.packing for role, clock in self._sums.items()},
+            "sum_waiting": {role: clock.waiting for role, clock in self._sums.items()},
+            "coupling_packing": sum(clock.packing for clock in self._coupling),
+            "coupling_waiting": sum(clock.waiting for clock in self._coupling),
+        }

@@ -1,0 +1,46 @@
+"""Where the time of windows goes, by a clock that the test sets."""
+
+import time
+
+import pytest
+
+from fem.coupling.stopwatch import Stopwatch
+from fem.exchange import MessageClock
+
+
+class TwoRanks:
+    """Stands for two ranks: the one that asks, and another whose record is known."""
+
+    def __init__(self, other: dict) -> None:
+        self.other = other
+
+    def allgather(self, record: dict) -> list[dict]:
+        return [record, self.other]
+
+
+def at(monkeypatch, second: float) -> None:
+    monkeypatch.setattr(time, "perf_counter", lambda: second)
+
+
+def test_waiting_is_told_from_work(monkeypatch):
+    sums, coupling = MessageClock(1.0, 1.0), MessageClock(1.0, 1.0)
+    stopwatch = Stopwatch({"macro": MessageClock(), "meso": sums}, [coupling])
+    assert (sums.packing, sums.waiting) == (0.0, 0.0)
+    for begin in (0.0, 100.0):
+        at(monkeypatch, begin)
+        stopwatch.start()
+        at(monkeypatch, begin + 4.0)
+        coupling.count(begin + 1.0, begin + 1.5, begin + 3.5)
+        stopwatch.lap("macro")
+        at(monkeypatch, begin + 10.0)
+        sums.count(begin + 8.0, begin + 8.0, begin + 9.0)
+        stopwatch.lap("meso")
+    assert stopwatch.turns == {"macro": 8.0, "meso": 12.0}
+    other = {"turns": {"macro": 20.0}, "sum_waiting": {"macro": 0.0}, "coupling_packing": 0.5, "coupling_waiting": 0.5}
+    found = stopwatch.summary(TwoRanks(other), 2)
+    assert found["ranks"][0]["coupling_packing"] == pytest.approx(2.0)
+    assert found["ranks"][0]["sum_packing"]["meso"] == pytest.approx(2.0)
+    assert found["window_seconds"] == pytest.approx(10.0)
+    assert found["busy_shares"] == pytest.approx([0.7, 0.975])
+    assert found["busy_share"] == pytest.approx(1.0 - 6.5 / 40.0)
+    assert found["coupling_overhead"] == pytest.approx(0.05)
