@@ -1,13 +1,13 @@
 """Checkpoints of a run on all its ranks: two generations, each written at once or not at all.
 
-Every rank has files of its own. A run continues from the latest window of which all ranks have a whole file of the same
-inputs, ranks and code; the other generation is there for a kill between two ranks' files. As in every pickle, a file
-from a stranger must not be read.
+Every rank has files of its own, in a folder for the inputs and the division into ranks that the run has. A run
+continues from the latest window of which all files are whole: to the same bits where the division is its own, else with
+what the files of all ranks together say (``portable``); its first own checkpoint then replaces those. The other
+generation is there for a kill between two ranks' files. As in every pickle, a file from a stranger must not be read.
 """
 
 import hashlib
-import os
-import pickle
+import shutil
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
@@ -16,15 +16,33 @@ from typing import Any
 
 from mpi4py import MPI
 
+from fem import portable
+from fem.checkpoint_files import (
+    FOLDER_NAME,
+    STATE,
+    Checkpoint,
+    Header,
+    digest_of,
+    find_checkpoints,
+    is_whole,
+    read_state,
+    write_state,
+)
+from fem.errors import CheckpointError
+from fem.portable import State
+
 LIBRARIES = ("numpy", "scipy", "numba")
 GENERATIONS = 2
+KEPT = "{name}-{rank:04d}"
 
 
 class Checkpoints:
     """The checkpoint files of one run.
 
     Attributes:
+        latest: The latest checkpoint, of this run or from which it continued; None where there is none.
         continued: Window from which the run continued, None where it began anew.
+        moved: Whether the run continued from another division into ranks.
     """
 
     def __init__(self, comm: MPI.Comm, folder: Path | None, inputs: object, interval: float) -> None:
@@ -32,27 +50,42 @@ class Checkpoints:
 
         Args:
             comm: All ranks of the run.
-            folder: Where the files are; None for a run without checkpoints.
-            inputs: All that the run depends on; plain data whose ``repr`` tells all of it, equal on all ranks.
+            folder: Where the files are, for all ranks; None for a run without checkpoints.
+            inputs: All that the run depends on but its ranks; plain data whose ``repr`` tells all of it, equal on all.
             interval: Wall time between two checkpoints [s].
         """
         self._comm, self._folder, self._interval = comm, folder, interval
+        self.latest: Checkpoint | None = None
         self.continued: int | None = None
-        self._owner = hashlib.sha256(repr((inputs, comm.rank, comm.size)).encode() + _code()).digest()
+        self.moved = False
+        self._owner = digest_of(repr(inputs).encode() + _code())
+        self._own, self._first = Path(), set[str]()
         self._written, self._generation = monotonic(), 0
-        if folder is not None:
-            folder.mkdir(parents=True, exist_ok=True)
 
-    def read(self) -> Any | None:
-        """Return this rank's state at the latest window that all ranks have, None where there is none; collective."""
-        mine = {} if self._folder is None else self._whole_files(self._folder)
-        common = set.intersection(*(set(windows) for windows in self._comm.allgather(list(mine))))
-        if not common:
+    def read(self, like: State) -> dict[str, Any] | None:
+        """Return this rank's values at the latest window of which all files are whole, None where there is none.
+
+        Collective.
+
+        Args:
+            like: The state with which this rank would begin anew: its models, and what else there is, by name.
+
+        Raises:
+            CheckpointError: The files lack what this rank has; on that rank.
+        """
+        if self._folder is None:
             return None
-        self.continued = max(common)
-        generation, state = mine[self.continued]
-        self._generation = (generation + 1) % GENERATIONS
-        return pickle.loads(state)
+        self._own = self._folder / f"{self._owner[:12]}-{self._division(like)[:12]}"
+        if self._comm.rank == 0:
+            self._own.mkdir(parents=True, exist_ok=True)
+        found = find_checkpoints(self._folder, self._owner, self._own) if self._comm.rank == 0 else []
+        for checkpoint in self._comm.bcast(found):
+            mine = checkpoint.paths[self._comm.rank :: self._comm.size]
+            if self._comm.allreduce(all(is_whole(path) for path in mine), MPI.LAND):
+                self.latest, self.continued, self.moved = checkpoint, checkpoint.window, not checkpoint.preferred
+                self._generation = (checkpoint.generation + 1) % GENERATIONS
+                return portable.values(self._part(checkpoint.paths, like))
+        return None
 
     def is_due(self) -> bool:
         """Return whether the interval has passed on rank 0; collective."""
@@ -60,62 +93,68 @@ class Checkpoints:
             return False
         return bool(self._comm.bcast(monotonic() - self._written >= self._interval))
 
-    def write(self, window: int, state: object) -> None:
-        """Write this rank's state at a window over the older generation; collective."""
+    def write(self, window: int, time: float, state: State) -> None:
+        """Write this rank's state at a window and a time [s] over the older generation; after ``read``; collective."""
         if self._folder is None:
             return
-        content = pickle.dumps((window, pickle.dumps(state, pickle.HIGHEST_PROTOCOL)))
-        write_at_once(self._path(self._folder, self._generation), self._owner + digest_of(content) + content)
-        self._generation = (self._generation + 1) % GENERATIONS
+        header = Header(self._owner, self._comm.size, window, time)
+        write_state(self._own / STATE.format(rank=self._comm.rank, generation=self._generation), header, state)
         self._comm.Barrier()  # no rank may overwrite its older file before all have the newer one
+        self.latest = Checkpoint(window, True, self._own, self._generation, self._comm.size, time)
+        if self._comm.rank == 0:
+            remove_others(self._own)
+        self._generation = (self._generation + 1) % GENERATIONS
         self._written = monotonic()
 
-    def keep(self, name: str, value: object) -> None:
-        """Keep something for the rest of the run, beside the state; of this rank."""
+    def keep(self, name: str, state: State) -> None:
+        """Keep something for the rest of the run, beside the state; of this rank; after ``read``."""
         if self._folder is not None:
-            content = pickle.dumps(value, pickle.HIGHEST_PROTOCOL)
-            write_at_once(self._folder / f"{name}-{self._comm.rank:04d}", content)
+            path = self._own / KEPT.format(name=name, rank=self._comm.rank)
+            write_state(path, Header(self._owner, self._comm.size), state)
 
-    def kept(self, name: str) -> Any:
-        """Return what ``keep`` kept before the window from which this run continues."""
-        assert self._folder is not None
-        return pickle.loads((self._folder / f"{name}-{self._comm.rank:04d}").read_bytes())
+    def kept(self, name: str, like: State) -> dict[str, Any]:
+        """Return the values of what was kept before the window from which the run continues; before the next ``write``.
 
-    def _path(self, folder: Path, generation: int) -> Path:
-        return folder / f"state-{self._comm.rank:04d}-{generation}"
+        Args:
+            name: Of what was kept.
+            like: A state of the same nodes and cells.
+        """
+        assert self.latest is not None
+        paths = [self.latest.folder / KEPT.format(name=name, rank=rank) for rank in range(self.latest.ranks)]
+        state = self._part(paths, like)
+        if self.moved:
+            self.keep(name, state)
+        return portable.values(state)
 
-    def _whole_files(self, folder: Path) -> dict[int, tuple[int, bytes]]:
-        """Return window -> generation and pickled state of this rank's files that are whole and of this run."""
-        found = {}
-        size = len(self._owner)
-        for generation in range(GENERATIONS):
-            path = self._path(folder, generation)
-            data = path.read_bytes() if path.exists() else b""
-            owner, digest, content = data[:size], data[size : 2 * size], data[2 * size :]
-            if owner == self._owner and digest == digest_of(content):
-                window, state = pickle.loads(content)
-                found[window] = (generation, state)
-        return found
+    def _part(self, paths: list[Path], like: State) -> State:
+        """Return this rank's part of the states in the files of all ranks: its own file's in its own division.
+
+        Raises:
+            CheckpointError: The files lack what this rank has.
+        """
+        if not self.moved:
+            return read_state(paths[self._comm.rank])
+        state = portable.blank(like)
+        for path in paths:
+            if path.exists():  # of a rank that did not carry this model there is none
+                portable.take(state, read_state(path), self._first)
+        if not portable.is_complete(state):
+            raise CheckpointError(f"the files of {paths[0].parent} lack nodes or cells of this run")
+        return state
+
+    def _division(self, like: State) -> str:
+        """Return a digest of who has which nodes and cells; find what this rank is the first to carry; collective."""
+        everyone = self._comm.allgather((portable.place(like), list(like)))
+        before = {name for _, names in everyone[: self._comm.rank] for name in names}
+        self._first = like.keys() - before
+        return digest_of(repr(everyone).encode())
 
 
-def digest_of(content: bytes) -> bytes:
-    """Return the SHA-256 digest of some bytes."""
-    return hashlib.sha256(content).digest()
-
-
-def digest_of_files(*paths: Path) -> tuple[str, ...]:
-    """Return the SHA-256 digest of each file."""
-    return tuple(hashlib.sha256(path.read_bytes()).hexdigest() for path in paths)
-
-
-def write_at_once(path: Path, content: bytes) -> None:
-    """Replace a file; a kill at any moment leaves the old one or the new one."""
-    partial = path.with_name(f".{path.name}.partial")
-    with partial.open("wb") as file:
-        file.write(content)
-        file.flush()
-        os.fsync(file.fileno())
-    partial.replace(path)
+def remove_others(own: Path) -> None:
+    """Remove the folders of other inputs and divisions beside a run's own."""
+    for folder in own.parent.iterdir():
+        if folder != own and FOLDER_NAME.fullmatch(folder.name):
+            shutil.rmtree(folder)
 
 
 @cache

@@ -1,6 +1,6 @@
 """Rayleigh damping C = alpha M + beta K: a force at the nodes, and the energy that it takes."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from fem.body import Body
 from fem.energy import InternalForce
 from fem.force import linear_terms
-from fem.loads import Load
+from fem.loads import Kept, Load
 
 if TYPE_CHECKING:
     from fem.motion import Motion
@@ -26,7 +26,7 @@ class RayleighDamping(Load):
     """
 
     account: ClassVar[Literal["external", "damping"]] = "damping"
-    kept: ClassVar[tuple[str, ...]] = ("work", "force")
+    kept: ClassVar[Mapping[str, Kept]] = {"work": "sum", "force": "nodes"}
 
     def __init__(self, mass: float, stiffness: float, terms: Sequence[InternalForce]) -> None:
         """Make damping from coefficients.

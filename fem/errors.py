@@ -45,5 +45,9 @@ class StepError(AgreedError):
     """A time step above the critical one, which all ranks know."""
 
 
+class CheckpointError(RuntimeError):
+    """Checkpoint files that lack a part of the model."""
+
+
 class InvertedElementError(RuntimeError):
     """An element that the motion has turned inside out."""

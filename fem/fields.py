@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from fem import dolfinx_api
 from fem.body import Body
+from fem.portable import Rows, Same, State
 from fem.stress import von_mises
 from fem.stress_recovery import StressRecovery
 
@@ -59,7 +60,7 @@ class Fields:
         self._nodes = body.local.cells.ravel()[first]
         self._recovery = StressRecovery(body, np.arange(len(body.elements.cells)))
         self._file = dolfinx_api.FieldFile(comm, path)
-        self._local_part = part
+        self._local, self._local_part = body.local, part
         self.peaks = {name: dict.fromkeys(np.unique(part).tolist(), 0.0) for name in names}
 
     def sample(self, displacement: NDArray[np.float64], time: float) -> FieldSample:
@@ -71,6 +72,11 @@ class Fields:
         if "plastic_strain" in self._cell_functions:
             cells["plastic_strain"] = self._recovery.plastic_strain()
         return FieldSample(time, displacement.copy(), cells)
+
+    def state(self, sample: FieldSample) -> State:
+        """Return a sample for a checkpoint."""
+        cells = {name: Rows(self._local.cell_numbers, value) for name, value in sample.cells.items()}
+        return {"time": Same(sample.time), "displacement": Rows(self._local.nodes, sample.displacement), "cells": cells}
 
     def write(self, sample: FieldSample) -> None:
         """Append a sample; collective over the model."""

@@ -1,5 +1,6 @@
 """Pressure on a surface that moves: normal to it, and on the area that it has, wherever it goes."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, ClassVar
 
@@ -9,7 +10,7 @@ from numpy.typing import NDArray
 from fem.body import Body
 from fem.facet import area_vectors
 from fem.facet_areas import OutwardFacets
-from fem.loads import Load
+from fem.loads import Kept, Load
 from fem.pulse import Pulse
 
 if TYPE_CHECKING:
@@ -29,7 +30,7 @@ class FollowerPressure(Load):
     facets: NDArray[np.int32]
     sign: NDArray[np.float64]
     pulse: Pulse
-    kept: ClassVar[tuple[str, ...]] = ("work", "_force")
+    kept: ClassVar[Mapping[str, Kept]] = {"work": "sum", "_force": "nodes"}
     work: float = 0.0
     _force: NDArray[np.float64] = field(init=False)
 

@@ -4,7 +4,7 @@ A 4-node tetrahedron has one constant strain: where it flows at constant volume 
 (locking); use the 10-node one (four points, straight edges) or hexahedra for parts that yield.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 
@@ -20,6 +20,7 @@ from fem.kernels.nonlinear import Path
 from fem.kernels.nonlinear_gradient import FINE, Blocks, add_gradient_force
 from fem.kernels.nonlinear_hexahedron import HexahedronBlocks, add_hexahedron_force
 from fem.nonlinear_blocks import Lanes, arrange, gradient_blocks, hexahedron_blocks
+from fem.portable import Rows
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,6 +90,20 @@ class NonlinearElements:
             hourglass=float(blocks.hourglass_energy[valid].sum()),
         )
 
+    def state(self, cells: NDArray[np.int64]) -> dict[str, Rows]:
+        """Return the history by element, for a checkpoint; ``cells`` are the input numbers of the rank's elements."""
+        block, lane = np.nonzero(self.lanes.valid)
+        numbers = cells[self.numbers[self.lanes.element[block, lane]]]
+        return {name: Rows(numbers, by_lane(values)[block, lane]) for name, values in self.history.items()}
+
+    def restore(self, state: Mapping[str, NDArray[np.float64]]) -> None:
+        """Continue from the values of what ``state`` returned; lanes that repeat an element get its history, too."""
+        block, lane = np.nonzero(self.lanes.valid)
+        row = np.empty(len(self.numbers), np.int64)
+        row[self.lanes.element[block, lane]] = np.arange(len(block))
+        for name, values in self.history.items():
+            by_lane(values)[...] = state[name][row[self.lanes.element]]
+
     def means(self, places: NDArray[np.integer]) -> "Means":
         """Return mean values over some elements; ``places (k,)`` are positions among this term's elements."""
         block, lane = np.nonzero(self.lanes.valid)
@@ -129,6 +144,12 @@ class Means:
     stress: NDArray[np.float64]
     plastic_strain: NDArray[np.float64]
     plastic_work: NDArray[np.float64]
+
+
+def by_lane(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return a view ``(nb, 16, m)`` or ``(nb, 16, p, m)`` of an array of blocks whose lanes are innermost."""
+    split = values.reshape(*values.shape[:-1], -1, LANES)
+    return np.moveaxis(split, -1, 1)
 
 
 def elastic_energy(blocks: Blocks | HexahedronBlocks, elasticity: NDArray[np.float64]) -> NDArray[np.float64]:

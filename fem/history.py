@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from fem.communicators import Role
 from fem.ledger import Ledger, ledger_sums
 from fem.participant import Participant
+from fem.portable import Log, Same, State
 from fem.watch import Watch
 
 SIDE: dict[Role, float] = {"macro": 1.0, "meso": -1.0, "dns": 0.0, "structure": 0.0}
@@ -56,12 +57,12 @@ class History:
         time = next(iter(crew.values())).motion.time
         return self.ledger.judge(self._combine(np.sum(ledgers, axis=0)), time)
 
-    def state(self) -> dict[str, Any]:
+    def state(self) -> State:
         """Return ledger and samples, for a checkpoint."""
-        return {"ledger": self.ledger, "rows": self._rows}
+        return {"ledger": Same(self.ledger), "rows": Log(self._rows)}
 
-    def restore(self, state: dict[str, Any]) -> None:
-        """Continue from what ``state`` returned."""
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Continue from the values of what ``state`` returned."""
         self.ledger, self._rows = state["ledger"], state["rows"]
 
     def _combine(self, part: NDArray[np.float64], operation: MPI.Op = MPI.SUM) -> NDArray[np.float64]:

@@ -9,7 +9,7 @@ a linear model to the last digits whatever the step: the default, because an ora
 Negative alpha damps what the step does not resolve, for loads that start with a jump.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, cast
 
@@ -26,6 +26,7 @@ from fem.force_congruent import CongruentElements
 from fem.global_matrix import Equations
 from fem.loads import Load, Loaded
 from fem.motion import Motion
+from fem.portable import Rows, Same, Shares, State, Sum
 
 
 @dataclass(frozen=True, slots=True)
@@ -278,20 +279,24 @@ class ImplicitMotion(Loaded):
         """Return zero: no step is too large for stability."""
         return 0.0
 
-    def state(self) -> dict[str, Any]:
+    def state(self) -> State:
         """Return all that changes with time, for a checkpoint."""
-        loads = [load.state() for load in self._loads]
-        arrays = {"state": self._state, "slave_force": self.slave_force, "before": self._before}
-        return arrays | {"loads": loads, "time": self.time, "works": self._works, "older": self._older}
+        nodes, tie = self.body.local.nodes, self.body.tie
+        nodal = {"state": self._state.transpose(1, 0, 2), "before": self._before.transpose(1, 0, 2)}
+        rows = {name: Rows(nodes, value) for name, value in (nodal | {"older": self._older}).items()}
+        at_slaves = Shares(nodes[tie.slave], self.slave_force, self.body.shared.owned[tie.slave])
+        loads = {str(k): load.state(self.body) for k, load in enumerate(self._loads)}
+        told: State = {"time": Same(self.time), "works": Sum(self._works)}
+        return {**rows, **told, "slave_force": at_slaves, "loads": loads}
 
-    def restore(self, state: dict[str, Any]) -> None:
-        """Continue from what ``state`` returned, in a motion that was built alike."""
-        self._state[:], self._works[:] = state["state"], state["works"]
-        self.slave_force, self._before, self.time = state["slave_force"], state["before"], state["time"]
-        self._older = state["older"]
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Continue from the values of what ``state`` returned, in a motion that was built alike."""
+        self._state[:], self._works[:] = state["state"].transpose(1, 0, 2), state["works"]
+        self._before = state["before"].transpose(1, 0, 2)
+        self.slave_force, self._older, self.time = state["slave_force"], state["older"], state["time"]
         self.gravity = self.body_acceleration(self.time)
-        for load, kept in zip(self._loads, state["loads"], strict=True):
-            load.restore(kept)
+        for k, load in enumerate(self._loads):
+            load.restore(state["loads"][str(k)])
 
 
 def check_linear(body: Body) -> None:

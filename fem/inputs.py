@@ -1,13 +1,15 @@
 """The input file of a run: which models, meshes, materials and loads, and where the results go."""
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, TypeAdapter
 
 from fem.materials.roles import Materials
 from fem.parameters import Parameters, Shock
 from fem.structure.parameters import StructureScene
+
+UNRELATED = {"checkpoint_seconds"}  # numerics that results do not depend on
 
 
 class RunInput(Parameters):
@@ -19,6 +21,12 @@ class RunInput(Parameters):
     materials: Materials = Materials()
     output: Path
     checkpoints: Path | None = None
+
+    @property
+    def computed(self) -> str:
+        """Return all that results depend on: not where they go, nor which ranks compute them."""
+        shock: Any = {"ranks": True, "numerics": UNRELATED}
+        return self.model_dump_json(exclude={"output": True, "checkpoints": True, "shock": shock})
 
     @property
     def implicit(self) -> bool:
@@ -34,6 +42,12 @@ class StructureInput(StructureScene):
     solver: Literal["explicit", "implicit"]
     output: Path
     checkpoints: Path | None = None
+
+    @property
+    def computed(self) -> str:
+        """Return all that results depend on: not where they go, nor which ranks compute them."""
+        dynamics: Any = {"ranks": True, "numerics": UNRELATED}
+        return self.model_dump_json(exclude={"output": True, "checkpoints": True, "dynamics": dynamics})
 
     @property
     def finds_modes(self) -> bool:

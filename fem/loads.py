@@ -5,8 +5,9 @@ step's work. The work of a force over a step is the mean of its values at both e
 them, so that with ``Motion.kinetic_energy`` the ledger of a linear model is exact at any step.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 from fem.body import Body
 from fem.energy import Energy
 from fem.errors import LoadError
+from fem.portable import Entry, Rows, Same, State, Sum
 from fem.pulse import HalfSine, Pulse
 
 if TYPE_CHECKING:
@@ -24,6 +26,7 @@ if TYPE_CHECKING:
 # A package that is dropped looks towards the ground, so the table's upward acceleration points along -z and the board,
 # seen from the table, is pushed along +z; so does its weight.
 DOWN = np.array([0.0, 0.0, 1.0])
+Kept = Literal["sum", "same", "nodes"]
 MASS_RATIO = 1e6  # large mass over the model's: the base deviates from its pulse by about one part in this
 
 
@@ -32,12 +35,12 @@ class Load:
 
     Attributes:
         account: Where the ledger puts the work.
-        kept: What changes with time, by name.
+        kept: What changes with time, and what it is: a ``sum`` over ranks, the ``same`` on all, or of all ``nodes``.
         work: Work done on this rank's share of the model so far [J].
     """
 
     account: ClassVar[Literal["external", "damping"]] = "external"
-    kept: ClassVar[tuple[str, ...]] = ()
+    kept: ClassVar[Mapping[str, Kept]] = {}
     work: float = 0.0
 
     def acceleration(self, time: float) -> NDArray[np.float64]:
@@ -70,12 +73,13 @@ class Load:
     def collect(self, motion: "Motion") -> None:
         """Add half a step's work of the force at the motion's time at its velocity; all forces are complete."""
 
-    def state(self) -> dict[str, Any]:
+    def state(self, body: Body) -> State:
         """Return all that changes with time, for a checkpoint."""
-        return {name: getattr(self, name) for name in self.kept}
+        kinds: dict[Kept, Callable[[Any], Entry]] = {"sum": Sum, "same": Same, "nodes": partial(Rows, body.local.nodes)}
+        return {name: kinds[kind](getattr(self, name)) for name, kind in self.kept.items()}
 
-    def restore(self, state: dict[str, Any]) -> None:
-        """Continue from what ``state`` returned."""
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Continue from the values of what ``state`` returned."""
         for name, value in state.items():
             setattr(self, name, value)
 
@@ -146,7 +150,7 @@ class NodalForces(Load):
     pattern: NDArray[np.float64]
     pulse: Pulse
     owned: NDArray[np.bool_]
-    kept: ClassVar[tuple[str, ...]] = ("work", "_factor")
+    kept: ClassVar[Mapping[str, Kept]] = {"work": "sum", "_factor": "same"}
     work: float = 0.0
     _factor: float = 0.0
 
@@ -191,7 +195,7 @@ class PrescribedMotion(Load):
     nodes: NDArray[np.int32]
     component: int
     pulse: Pulse
-    kept: ClassVar[tuple[str, ...]] = ("work",)
+    kept: ClassVar[Mapping[str, Kept]] = {"work": "sum"}
     step: float = field(default=0.0, init=False)
     work: float = field(default=0.0, init=False)
 
@@ -245,7 +249,7 @@ class LargeMass(Load):
     mass: NDArray[np.float64]
     direction: NDArray[np.float64]
     pulse: Pulse
-    kept: ClassVar[tuple[str, ...]] = ("work", "_force", "_base")
+    kept: ClassVar[Mapping[str, Kept]] = {"work": "sum", "_base": "same"}
     work: float = 0.0
     _force: NDArray[np.float64] = field(init=False)
     _base: NDArray[np.float64] = field(init=False)  # displacement and velocity at the motion's time, half a kick
@@ -276,6 +280,10 @@ class LargeMass(Load):
             found = f"{int(wrong)} of their components are held or tied" if count else "there are none"
             raise LoadError(f"a large mass needs support nodes that are free to move: {found}")
         return cls(local, body.mass[local] * (MASS_RATIO * total / support), direction, pulse)
+
+    def state(self, body: Body) -> State:
+        """Return also the force at its nodes."""
+        return {**super().state(body), "_force": Rows(body.local.nodes[self.nodes], self._force)}
 
     def base_displacement(self) -> NDArray[np.float64]:
         """Return the displacement ``(3,)`` [m] of the base, integrated in the motion's own steps."""

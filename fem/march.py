@@ -13,9 +13,10 @@ from fem.checkpoint import Checkpoints
 from fem.communicators import Role
 from fem.coupling.stopwatch import Stopwatch
 from fem.errors import InvertedElementError
-from fem.fields import Fields
+from fem.fields import Fields, FieldSample
 from fem.history import History
 from fem.participant import Participant
+from fem.portable import State
 
 PROGRESS_INTERVAL = 0.5  # [s] between two progress lines
 FLATTENED = "the step is that of the undeformed body: where elements are pressed flat, step_fraction must be smaller"
@@ -51,9 +52,9 @@ def march(world: MPI.Comm, crew: Crew, outputs: Outputs, stopwatch: Stopwatch) -
     field_windows = set(np.linspace(0, plan.windows, outputs.field_samples).round().astype(int).tolist())
     guard = max(1, GUARD // plan.substeps)
     told, output_seconds, first = time.perf_counter(), 0.0, 0
-    state = outputs.checkpoints.read()
-    if state is not None:
-        first = state["window"] + 1
+    state = outputs.checkpoints.read(state_of(crew, outputs))
+    if state is not None and outputs.checkpoints.continued is not None:
+        first = outputs.checkpoints.continued + 1
         output_seconds += resume(crew, outputs, state, [window for window in sorted(field_windows) if window < first])
     for window in range(first, plan.windows + 1):
         if window:
@@ -102,26 +103,41 @@ def write_fields(crew: Crew, outputs: Outputs, window: int) -> float:
     """Write the fields of all models of this rank, and keep them for a restart; return the seconds it took."""
     begin = time.perf_counter()
     for role, participant in crew.items():
-        motion, fields = participant.motion, outputs.fields[role]
-        sample = fields.sample(motion.displacement - motion.base_displacement(), motion.time)
+        fields = outputs.fields[role]
+        sample = sample_fields(participant, fields)
         fields.write(sample)
-        outputs.checkpoints.keep(f"{role}-{window}", sample)
+        outputs.checkpoints.keep(f"{role}-{window}", {role: fields.state(sample)})
     return time.perf_counter() - begin
+
+
+def sample_fields(participant: Participant, fields: Fields) -> FieldSample:
+    """Return the fields of a model as they are now."""
+    motion = participant.motion
+    return fields.sample(motion.displacement - motion.base_displacement(), motion.time)
+
+
+def state_of(crew: Crew, outputs: Outputs) -> State:
+    """Return all that changes with time on this rank."""
+    return {role: participant.state() for role, participant in crew.items()} | {"history": outputs.history.state()}
 
 
 def save(crew: Crew, outputs: Outputs, window: int) -> None:
     """Write a checkpoint at the end of a window."""
-    states = {role: participant.state() for role, participant in crew.items()}
-    outputs.checkpoints.write(window, {"window": window, "crew": states, "history": outputs.history.state()})
+    outputs.checkpoints.write(window, time_of(crew), state_of(crew, outputs))
 
 
 def resume(crew: Crew, outputs: Outputs, state: dict[str, Any], field_windows: list[int]) -> float:
     """Continue from a checkpoint, and write its earlier fields anew; return the seconds that these took."""
+    checkpoints = outputs.checkpoints
     for role, participant in crew.items():
-        participant.restore(state["crew"][role])
+        participant.restore(state[role])
     outputs.history.restore(state["history"])
     begin = time.perf_counter()
+    like = {role: outputs.fields[role].state(sample_fields(crew[role], outputs.fields[role])) for role in crew}
     for window in field_windows:
         for role in crew:
-            outputs.fields[role].write(outputs.checkpoints.kept(f"{role}-{window}"))
+            kept = checkpoints.kept(f"{role}-{window}", {role: like[role]})
+            outputs.fields[role].write(FieldSample(**kept[role]))
+    if checkpoints.moved and checkpoints.continued is not None:
+        save(crew, outputs, checkpoints.continued)
     return time.perf_counter() - begin

@@ -1,14 +1,16 @@
 """Central differences on one rank: velocities live half a step behind displacements."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fem.body import Body
+from fem.force_nonlinear import NonlinearElements
 from fem.kernels.motion import advance
 from fem.loads import Load, Loaded
+from fem.portable import Rows, Same, Shares, State, Sum
 
 
 class Motion(Loaded):
@@ -164,19 +166,27 @@ class Motion(Loaded):
         owned = self.body.shared.owned
         return 0.125 * self.step**2 * float(np.sum((force**2 * self.mobility)[owned]))
 
-    def state(self) -> dict[str, Any]:
+    def state(self) -> State:
         """Return all that changes with time, for a checkpoint."""
-        terms = [term.history for term in self.body.terms]
-        arrays = {"state": self._state, "slave_force": self.slave_force, "gravity": self.gravity, "terms": terms}
-        loads = [load.state() for load in self._loads]
-        return arrays | {"loads": loads, "time": self.time, "body_work": self._body_work}
+        local, tie = self.body.local, self.body.tie
+        nodal = {"displacement": self.displacement, "velocity": self.velocity, "force": self.force}
+        rows = {name: Rows(local.nodes, value) for name, value in nodal.items()}
+        at_slaves = Shares(local.nodes[tie.slave], self.slave_force, self.body.shared.owned[tie.slave])
+        loads = {str(k): load.state(self.body) for k, load in enumerate(self._loads)}
+        paths = {str(k): term.state(local.cell_numbers) for k, term in enumerate(self._terms_with_path())}
+        told: State = {"gravity": Same(self.gravity), "time": Same(self.time), "body_work": Sum(self._body_work)}
+        return {**rows, **told, "slave_force": at_slaves, "paths": paths, "loads": loads}
 
-    def restore(self, state: dict[str, Any]) -> None:
-        """Continue from what ``state`` returned, in a motion that was built alike."""
-        self._state[:], self.slave_force[:] = state["state"], state["slave_force"]
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Continue from the values of what ``state`` returned, in a motion that was built alike."""
+        for name in ("displacement", "velocity", "force", "slave_force"):
+            getattr(self, name)[:] = state[name]
         self.gravity, self.time, self._body_work = state["gravity"], state["time"], state["body_work"]
-        for term, history in zip(self.body.terms, state["terms"], strict=True):
-            for name, values in history.items():
-                term.history[name][...] = values
-        for load, kept in zip(self._loads, state["loads"], strict=True):
-            load.restore(kept)
+        for k, term in enumerate(self._terms_with_path()):
+            term.restore(state["paths"][str(k)])
+        for k, load in enumerate(self._loads):
+            load.restore(state["loads"][str(k)])
+
+    def _terms_with_path(self) -> list[NonlinearElements]:
+        """Return the force terms whose history must be kept; the same ones in the same order on all ranks with any."""
+        return [term for term in self.body.terms if isinstance(term, NonlinearElements)]

@@ -1,5 +1,6 @@
 """What a run asks of a motion, be it explicit or implicit."""
 
+from collections.abc import Mapping
 from typing import Any, Protocol
 
 import numpy as np
@@ -7,6 +8,7 @@ from numpy.typing import NDArray
 
 from fem.body import Body
 from fem.energy import Energy
+from fem.portable import State
 
 
 class Moving(Protocol):
@@ -65,11 +67,11 @@ class Moving(Protocol):
     def internal_energy(self) -> Energy:
         """Return the energies of the elements."""
 
-    def state(self) -> dict[str, Any]:
+    def state(self) -> State:
         """Return all that changes with time, for a checkpoint."""
 
-    def restore(self, state: dict[str, Any]) -> None:
-        """Continue from what ``state`` returned."""
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Continue from the values of what ``state`` returned."""
 
     def step_energy(self, foreign: NDArray[np.float64]) -> float:
         """Return what exceeds the strain energy where the step is too large for stability, see ``motion.Motion``."""

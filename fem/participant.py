@@ -5,6 +5,7 @@ others wait for is sent in the first, what needs their answer is done in the sec
 two channels and nothing else. The participants of each scheme are in ``fem/coupling``.
 """
 
+from collections.abc import Mapping
 from typing import Any, Protocol
 
 import numpy as np
@@ -15,6 +16,7 @@ from fem.estimate import WindowPlan
 from fem.loads import Load
 from fem.motion import Motion
 from fem.moving import Moving
+from fem.portable import State, Sum
 
 
 class Participant(Protocol):
@@ -44,11 +46,11 @@ class Participant(Protocol):
     def foreign_force(self) -> NDArray[np.float64]:
         """Return the part ``(n, 3)`` [N] of ``motion.force`` that belongs to the other model."""
 
-    def state(self) -> dict[str, Any]:
+    def state(self) -> State:
         """Return all that changes from window to window, for a checkpoint."""
 
-    def restore(self, state: dict[str, Any]) -> None:
-        """Continue from what ``state`` returned."""
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Continue from the values of what ``state`` returned."""
 
 
 class Continued:
@@ -62,12 +64,12 @@ class Continued:
     motion: Moving
     interface_work: float
 
-    def state(self) -> dict[str, Any]:
+    def state(self) -> State:
         """Return the motion's state and the work across the cut."""
-        return {"motion": self.motion.state(), "interface_work": self.interface_work}
+        return {"motion": self.motion.state(), "interface_work": Sum(self.interface_work)}
 
-    def restore(self, state: dict[str, Any]) -> None:
-        """Continue from what ``state`` returned."""
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Continue from the values of what ``state`` returned."""
         self.motion.restore(state["motion"])
         self.interface_work = state["interface_work"]
 

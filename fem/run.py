@@ -8,7 +8,8 @@ import numpy as np
 from mpi4py import MPI
 
 from fem.agreement import agreed
-from fem.checkpoint import Checkpoints, digest_of_files
+from fem.checkpoint import Checkpoints
+from fem.checkpoint_files import digest_of_files
 from fem.communicators import Communicators, Role
 from fem.coupling.placement import Placement, admissible, check_size, shared
 from fem.coupling.scheme import scheme_of
@@ -56,7 +57,7 @@ def run(world: MPI.Comm, request: RunInput) -> None:
         history = make_history(comms, models, steps, pulse, request)
         numerics, fields = request.shock.numerics, make_fields(comms, models, request)
         tables = [Path(request.shock.table)] if request.shock.table else []
-        inputs = request.model_dump_json(exclude={"output"}), digest_of_files(*request.meshes, *tables)
+        inputs = request.computed, steps.plan, digest_of_files(*request.meshes, *tables)
         checkpoints = Checkpoints(comms.world, request.checkpoints, inputs, numerics.checkpoint_seconds)
         outputs = Outputs(history, fields, numerics.field_samples, checkpoints)
         ready = time.perf_counter()

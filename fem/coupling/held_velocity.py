@@ -6,6 +6,7 @@ model, which takes m substeps with it WHILE the macro model computes F_int(U^{n+
 end.
 """
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,7 @@ from fem.kernels.motion import add_impulse
 from fem.loads import Load
 from fem.motion import Motion
 from fem.participant import Continued
+from fem.portable import Rows, State
 
 
 class HeldVelocity:
@@ -72,12 +74,12 @@ class Macro(Continued):
         """Return the received force: it is in ``motion.force``."""
         return self._received
 
-    def state(self) -> dict[str, Any]:
+    def state(self) -> State:
         """Return also the received force."""
-        return super().state() | {"received": self._received}
+        return {**super().state(), "received": Rows(self.motion.body.local.nodes, self._received)}
 
-    def restore(self, state: dict[str, Any]) -> None:
-        """Continue from what ``state`` returned."""
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Continue from the values of what ``state`` returned."""
         super().restore(state)
         self._received[:] = state["received"]
 

@@ -4,6 +4,7 @@ The macro model is a whole structure of its own, the fine region coarsely includ
 alone. The meso model's ledger balances with the work across its cut, which to it is external.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -15,7 +16,7 @@ from fem.communicators import Role
 from fem.coupling.held_velocity import Driven
 from fem.estimate import WindowPlan
 from fem.exchange import CutChannels
-from fem.loads import Load
+from fem.loads import Kept, Load
 from fem.participant import Alone, uncut_motion
 
 
@@ -55,7 +56,7 @@ class Driver(Alone):
 class CutWork(Load):
     """The work that moves the cut of a submodel [J]."""
 
-    kept: ClassVar[tuple[str, ...]] = ("work",)
+    kept: ClassVar[Mapping[str, Kept]] = {"work": "sum"}
     work: float = 0.0
 
 

@@ -7,7 +7,8 @@ import numpy as np
 from mpi4py import MPI
 
 from fem.agreement import agreed
-from fem.checkpoint import Checkpoints, digest_of_files
+from fem.checkpoint import Checkpoints
+from fem.checkpoint_files import digest_of_files
 from fem.communicators import Communicators
 from fem.coupling.placement import shared
 from fem.coupling.stopwatch import Stopwatch
@@ -91,7 +92,7 @@ def make_outputs(comm: MPI.Comm, model: StructureModel, request: StructureInput,
     yields = bool(plastic_laws(request.layer_materials))
     fields = Fields(comm, model.body, part, request.output / "structure.pvd", yields)
     tables = [Path(load.table) for load in request.loads.values() if load.table is not None]
-    inputs = request.model_dump_json(exclude={"output"}), digest_of_files(request.mesh, *tables)
+    inputs = request.computed, model.steps.plan, digest_of_files(request.mesh, *tables)
     numerics = request.dynamics.numerics
     checkpoints = Checkpoints(comm, request.checkpoints, inputs, numerics.checkpoint_seconds)
     history = make_history(comm, model, request, pulses)

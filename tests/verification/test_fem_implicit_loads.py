@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from fem import portable
 from fem.body import Body
 from fem.damping import RayleighDamping
 from fem.global_matrix import Equations
@@ -84,7 +85,7 @@ def test_state_continues_to_the_same_bits():
         ImplicitMotion(MPI.COMM_SELF, body, loads_of("motion", body, mesh, 0.0), 2 * critical) for _ in range(2)
     )
     run(first, 20 * critical)
-    second.restore(first.state())
+    second.restore(portable.values(first.state()))
     run(first, 40 * critical)
     run(second, 40 * critical)
     assert np.array_equal(first.displacement, second.displacement)

@@ -1,0 +1,149 @@
+"""A run that is broken off continues on other numbers of ranks, and with another placement, as if nothing had been."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from tests.support.fem_models import write_small_assembly
+from tests.support.fem_program import run_python
+from tests.support.fem_structures import STEEL, write_structure
+
+# Runs the first of some inputs whole and broken off, and continues it as the others say, broken off once more on their
+# ranks. Tells of each: the largest relative difference of a history from the whole run's, the window from which it
+# continued, whose folders of checkpoints are left, and the files of its fields.
+SCRIPT = """
+import json, shutil, sys
+from pathlib import Path
+import numpy as np
+from mpi4py import MPI
+import fem.march
+from fem.inputs import INPUT, RunInput
+from fem.run import run
+from fem.structure.run import run_structure
+
+ENERGIES = {"kinetic", "internal", "plastic", "hourglass", "damping", "external", "interface", "balance"}
+world, run_window = MPI.COMM_WORLD, fem.march.run_window
+
+class Killed(Exception):
+    pass
+
+def go(changes, name, checkpoints=None, windows=10**9):
+    comm = world.Split(0 if world.rank < changes["ranks"] else MPI.UNDEFINED)
+    if comm == MPI.COMM_NULL:
+        return folder / name
+    left = iter(range(windows))
+    def some_windows(crew):
+        if next(left, None) is None:
+            raise Killed
+        run_window(crew)
+    fem.march.run_window = some_windows
+    (folder / name).mkdir(exist_ok=True)
+    request = json.loads((folder / "input.json").read_text()) | changes["input"]
+    request = INPUT.validate_python(request | {"output": folder / name, "checkpoints": checkpoints})
+    try:
+        (run if isinstance(request, RunInput) else run_structure)(comm, request)
+    except Killed:
+        pass
+    return folder / name
+
+def histories(path):
+    with np.load(path / "history.npz") as arrays:
+        return {name: arrays[name] for name in arrays if arrays[name].dtype.kind == "f"}
+
+def difference(found, expected):
+    assert found.keys() == expected.keys()
+    scale = {name: np.abs(values).max() or 1.0 for name, values in expected.items()}
+    energy = max(scale[name] for name in ENERGIES)
+    scale |= dict.fromkeys(ENERGIES, energy)
+    return max(np.abs(found[name] - expected[name]).max() / scale[name] for name in expected)
+
+def continue_otherwise():
+    whole = go(inputs[0], "whole")
+    go(inputs[0], "broken", folder / "checkpoints", 11)
+    world.Barrier()
+    told = []
+    for k, changes in enumerate(inputs[1:]):
+        copy = folder / f"checkpoints{k}"
+        if world.rank == 0:
+            shutil.copytree(folder / "checkpoints", copy)
+        world.Barrier()
+        go(changes, f"again{k}", copy, 4)
+        world.Barrier()
+        found = go(changes, f"again{k}", copy)
+        world.Barrier()
+        if world.rank == 0:
+            window = json.loads((found / "result.json").read_text())["continued_from"]
+            fields = len(list(found.glob("*.pvtu")) + list(found.glob("*.vtu")))
+            told.append([difference(histories(found), histories(whole)), window, len(list(copy.iterdir())), fields])
+    if world.rank == 0:
+        energies = {name: float(values[-1]) for name, values in histories(whole).items() if name in ENERGIES}
+        (folder / "told.json").write_text(json.dumps([told, energies]))
+
+for folder in sorted(Path(sys.argv[1]).glob("*/")):
+    inputs = json.loads((folder / "inputs.json").read_text())
+    continue_otherwise()
+"""
+NUMERICS = {"history_samples": 20, "field_samples": 4, "checkpoint_seconds": 1e-9}
+WEAK = STEEL | {"plasticity": {"A": 4e7, "B": 1e9, "n": 0.5, "C": 0.05, "reference_rate": 1.0}}
+
+
+def write_package(directory: Path) -> None:
+    """Write a package with solder that yields, and damping: two ranks, three, one, two taking turns."""
+    directory.mkdir()
+    shock = {
+        "peak_acceleration": 2e9,
+        "pulse_duration": 2e-5,
+        "duration": 2e-6,
+        "gravity": "on",
+        "damping": {"stiffness_coefficient": 1e-10, "mass_coefficient": 10.0},
+        "numerics": NUMERICS | {"mass_scaled": ["copper"]},
+    }
+    meshes = [str(path) for path in write_small_assembly(directory, 1, size=1e-3)]
+    scene = {"mode": "two_scale", "meshes": meshes, "materials": {"solder": "SAC405"}}
+    (directory / "input.json").write_text(json.dumps(scene))
+    placements = [(2, "disjoint"), (3, "disjoint"), (1, "shared"), (2, "shared")]
+    inputs = [
+        {"ranks": total, "input": {"shock": shock | {"ranks": {"total": total, "placement": placement}}}}
+        for total, placement in placements
+    ]
+    (directory / "inputs.json").write_text(json.dumps(inputs))
+
+
+def write_strip(directory: Path, solver: str, ranks: tuple[int, ...], **changes) -> None:
+    """Write a structure under pressure and prescribed motion, shaken by a large mass, damped."""
+    directory.mkdir()
+    loads = {
+        "push": {"kind": "pressure", "on": "z_max", "peak": 1e5, "pulse": "constant"},
+        "drop": {"kind": "input_g", "peak": 1e4, "duration": 4e-5, "method": "large_mass"},
+        "shake": {"kind": "motion", "on": "x_max", "component": "z", "peak": 5.0, "duration": 4e-5},
+    }
+    damping = {"stiffness_coefficient": 1e-8}
+    kinematics = "finite" if solver == "explicit" else "small"
+    dynamics = {"duration": 4e-5, "solver": solver, "numerics": NUMERICS, "damping": damping, "kinematics": kinematics}
+    write_structure(directory, solver=solver, dynamics=dynamics, loads=loads, **changes)
+    (directory / "inputs.json").write_text(json.dumps([{"ranks": count, "input": {}} for count in ranks]))
+
+
+@pytest.fixture(scope="module")
+def scenes(tmp_path_factory) -> Path:
+    directory = tmp_path_factory.mktemp("ranks")
+    write_package(directory / "package")
+    write_strip(directory / "yielding", "explicit", (2, 3, 1), materials={"steel": WEAK})
+    write_strip(directory / "implicit", "implicit", (2, 1))
+    (directory / "script.py").write_text(SCRIPT)
+    done = run_python([str(directory / "script.py"), str(directory)], 3)
+    assert done.returncode == 0, done.stderr
+    return directory
+
+
+@pytest.mark.parametrize("name, ways", [("package", 3), ("yielding", 2), ("implicit", 1)])
+def test_run_continues_on_other_ranks(scenes, name, ways):
+    told, energies = json.loads((scenes / name / "told.json").read_text())
+    assert len(told) == ways
+    assert (energies["plastic"] > 0.0) == (name != "implicit")
+    for difference, window, folders, fields in told:
+        assert difference <= 1e-10
+        assert window == 11 + 4
+        assert folders == 1
+        assert fields >= 4
