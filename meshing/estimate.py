@@ -3,8 +3,8 @@
 from collections.abc import Collection
 from dataclasses import dataclass
 
-from meshing.pads import PadSite, has_rim, pad_table
-from meshing.parameters import Board, Package, Warpage
+from meshing.pads import has_rim, pad_table
+from meshing.parameters import Board, JointNumerics, Package, Warpage
 from meshing.plan import Interval, Plan, blocks_within, board_plan, footprint, hole_rings, package_plan, patch
 
 FLAT = Warpage()
@@ -18,14 +18,21 @@ class PartEstimate:
     smallest: tuple[float, float, float]
 
 
-def count_elements(package: Package, board: Board, warpage: Warpage = FLAT) -> dict[str, PartEstimate]:
+def count_elements(
+    package: Package, board: Board, warpage: Warpage = FLAT, fine: int | None = None
+) -> dict[str, PartEstimate]:
     """Count the hexahedra of every part; the joints' ``solder`` and ``copper`` are summed over the array.
+
+    Of all joints but ``fine``, where this is given, ``solder_coarse`` has the coarse mesh.
 
     The counts are exact as long as solder reaches the edge of its pad or mask; lengths of joint elements are those of a
     cylinder of the smallest wetted radius and gap.
     """
     joints = pad_table(package, board, warpage)
-    parts = _board_estimates(package, board) | _package_estimates(package, board) | _joint_estimates(package, joints)
+    count = len(joints) if fine is None else fine
+    gap = min((site.gap for site in joints), default=package.standoff)
+    of_joints = _joint_estimates(package, count, gap) | _coarse_estimates(package, len(joints) - count, gap)
+    parts = _board_estimates(package, board) | _package_estimates(package, board) | of_joints
     return {name: part for name, part in parts.items() if part.elements}
 
 
@@ -59,18 +66,34 @@ def _package_estimates(package: Package, board: Board) -> dict[str, PartEstimate
     }
 
 
-def _joint_estimates(package: Package, joints: list[PadSite]) -> dict[str, PartEstimate]:
+def _joint_estimates(package: Package, joints: int, gap: float) -> dict[str, PartEstimate]:
     numerics = package.joint_numerics
-    section = numerics.core**2 + 4 * numerics.core * numerics.rings
-    pads = (package.board_pad, package.package_pad)
-    edge = min(pad.wetted_radius for pad in pads) / (0.5 * numerics.core + numerics.rings)
-    height = min((site.gap for site in joints), default=package.standoff) / numerics.layers
-    parts = {"solder": PartEstimate(len(joints) * section * numerics.layers, (edge, edge, height))}
+    pads, edge = (package.board_pad, package.package_pad), _edge(package, numerics)
+    cells = joints * _section(numerics) * numerics.layers
+    parts = {"solder": PartEstimate(cells, (edge, edge, gap / numerics.layers))}
     if package.copper.layout == "pads":
         rims = sum(has_rim(0.5 * pad.diameter, pad.wetted_radius) for pad in pads)
-        cells = len(joints) * (2 * section + rims * 4 * numerics.core)
+        cells = joints * (2 * _section(numerics) + rims * 4 * numerics.core)
         parts["copper"] = PartEstimate(cells, (edge, edge, package.copper.thickness))
     return parts
+
+
+def _coarse_estimates(package: Package, joints: int, gap: float) -> dict[str, PartEstimate]:
+    numerics, edge = package.coarse_joint_numerics, _edge(package, package.coarse_joint_numerics)
+    height = gap + 2.0 * package.copper.thickness if package.copper.layout == "pads" else gap
+    cells = joints * _section(numerics) * numerics.layers
+    return {"solder_coarse": PartEstimate(cells, (edge, edge, height / numerics.layers))}
+
+
+def _section(numerics: JointNumerics) -> int:
+    """Number of quadrilaterals in the cross-section of a joint."""
+    return numerics.core**2 + 4 * numerics.core * numerics.rings
+
+
+def _edge(package: Package, numerics: JointNumerics) -> float:
+    """Edge length in the cross-section of a joint [m]."""
+    wetted = min(pad.wetted_radius for pad in (package.board_pad, package.package_pad))
+    return wetted / (0.5 * numerics.core + numerics.rings)
 
 
 def _plate(package: Package, plan: Plan, blocks: Collection[tuple[int, int]]) -> PartEstimate:

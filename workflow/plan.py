@@ -11,10 +11,11 @@ from workflow.board_drop_case import BoardDropCase
 from workflow.case import available_cores
 from workflow.case_kind import Case
 from workflow.fields import display, leaves
-from workflow.forecast import MACRO, Forecast, forecast
+from workflow.forecast import Forecast, forecast
 from workflow.inputs import Change, Verdict, examine
 from workflow.plan_table import duration, new_table, short
 from workflow.scene_forecast import SceneForecast, forecast_scene
+from workflow.shock_forecast import ShockForecast
 from workflow.structure import plan as structure_plan
 from workflow.structure.case import StructureCase
 from workflow.structure.forecast import StructureForecast, forecast_structure
@@ -118,9 +119,10 @@ def _effects(effects: Mapping[str, Any], of_what: str) -> Table:
 def _sizes(outlook: Forecast) -> Table:
     smallest, largest = outlook.particles
     particles = f"{smallest}" if smallest == largest else f"{smallest} to {largest}"
-    table = new_table("\nSizes and critical time steps", "part", "hexahedra", "critical step", "belongs to")
+    table = new_table("\nSizes and critical time steps", "part", "hexahedra", "critical step", "time step")
+    step = {name: level for level in outlook.shock.levels for name in level.parts}
     for name, part in outlook.parts.items():
-        remark = "macro model" if name == MACRO else "meso model"
+        remark = f"{short(step[name].step)}, {step[name].count} in a window" if name in step else ""
         if part.mass_scaled:
             remark += "; mass scaled to the smallest step of the others"
         table.add_row(name, f"{part.elements}", short(part.critical_step), remark)
@@ -134,8 +136,12 @@ def _sizes(outlook: Forecast) -> Table:
 def _shock(case: BoardDropCase, outlook: Forecast) -> Table:
     shock, every = outlook.shock, case.shock.ranks.total
     table = new_table("\nShock", "what", "value", "remark")
+    scheme, why = shock.scheme
+    table.add_row("scheme", scheme.replace("_", " "), why)
+    table.add_row("fine joints", *_fine_joints(case))
     table.add_row("window", short(shock.window), f"step of the macro model, {shock.windows} windows")
-    table.add_row("step ratio m", f"{shock.substeps}", f"meso step {short(shock.window / shock.substeps)}")
+    table.add_row("steps in a window", *_levels(shock))
+    table.add_row("step ratio m", f"{shock.substeps}", f"step of the DNS {short(shock.window / shock.substeps)}")
     table.add_row("two-scale", f"about {duration(shock.two_scale)}", _placement(case) + _absent("two_scale", case))
     table.add_row("DNS", f"about {duration(shock.dns)}", f"all {every} ranks on one model" + _absent("dns", case))
     table.add_row(
@@ -143,6 +149,27 @@ def _shock(case: BoardDropCase, outlook: Forecast) -> Table:
     )
     table.add_row("two-scale / DNS", f"{shock.two_scale / shock.dns:.2f}", "predicted ratio of wall times")
     return table
+
+
+def _levels(shock: ShockForecast) -> tuple[str, str]:
+    """Say how many steps the levels take in a window, and what share of the elements is not at the window's."""
+    elements = [level.elements for level in shock.levels]
+    counts = ", ".join(str(level.count) for level in shock.levels)
+    share = 1.0 - elements[0] / sum(elements)
+    return (
+        counts,
+        f"of {' + '.join(map(str, elements))} hexahedra; meso share f = {share:.2f}, elements beside them left out",
+    )
+
+
+def _fine_joints(case: BoardDropCase) -> tuple[str, str]:
+    """Say how many joints are fine, and which."""
+    coupling = case.shock.coupling
+    if coupling.fine_joints == "critical":
+        return f"{coupling.critical_joints}", "the most stressed ones of a run with coarse joints before"
+    if coupling.fine_joints == "all":
+        return "all", "one-way: coarse in the macro model" if coupling.direction == "one_way" else ""
+    return f"{len(set(coupling.fine_joints))}", ", ".join(coupling.fine_joints)
 
 
 def _placement(case: BoardDropCase) -> str:

@@ -192,7 +192,7 @@ def _add_two_scales(run_folder: Path, case: BoardDropCase, context: dict, result
     """Add how the models are coupled, where they are."""
     from workflow import report_two_scales as scales
     from workflow.fine_joints import read_fine_joints
-    from workflow.forecast import implicit_seconds
+    from workflow.shock_forecast import implicit_seconds
 
     result = results.get("two_scale")
     if result is None:

@@ -1,0 +1,249 @@
+"""Scheme, levels, time steps and cost of a shock, from the parameters of its case alone."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from fem.materials.parameters import Material
+from workflow.fine_joints import needs_coarse_joints
+
+if TYPE_CHECKING:
+    from meshing.estimate import PartEstimate
+    from workflow.board_drop_case import BoardDropCase
+
+MACRO = "board"  # role of the parts whose elements the window follows
+MOST_LEVELS = 3  # that are tried where the case leaves the number open
+
+
+@dataclass(frozen=True, slots=True)
+class PartForecast:
+    """A part of the mesh.
+
+    Attributes:
+        elements: its hexahedra.
+        critical_step: of the smallest one [s].
+        mass_scaled: whether it follows the step of the others.
+        cost: of an update over that of an assembled elastic element.
+    """
+
+    elements: int
+    critical_step: float
+    mass_scaled: bool
+    cost: float
+
+
+@dataclass(frozen=True, slots=True)
+class LevelForecast:
+    """Parts that take one step: their names, the step [s], steps a window, elements, cost of an update of all."""
+
+    parts: tuple[str, ...]
+    step: float
+    count: int
+    elements: int
+    cost: float
+
+
+@dataclass(frozen=True, slots=True)
+class ShockForecast:
+    """Scheme, time steps and wall time of the shock.
+
+    Attributes:
+        scheme: how the models of the two-scale run are coupled, and why.
+        levels: elements by the steps that they take, the window first.
+        window: step of the macro model [s].
+        substeps: m, steps of a DNS in a window.
+        windows: number of windows.
+        two_scale: predicted wall time of the two-scale run [s], with that of a coarse run before it.
+        dns: predicted wall time of the DNS [s] in explicit steps.
+        implicit: the same in implicit steps on one rank, where everything is elastic.
+        updates_per_second: element updates per second and rank that the prediction assumes.
+    """
+
+    scheme: tuple[str, str]
+    levels: tuple[LevelForecast, ...]
+    window: float
+    substeps: int
+    windows: int
+    two_scale: float
+    dns: float
+    implicit: float
+    updates_per_second: float
+
+
+Parts = Mapping[str, PartForecast]
+
+
+def forecast_parts(case: "BoardDropCase") -> dict[str, PartForecast]:
+    """Predict size and critical time step of every part of the mesh with all joints fine."""
+    from meshing.estimate import count_elements
+
+    return _forecasts(case, count_elements(case.package, case.board, case.warpage))
+
+
+def two_scale_parts(case: "BoardDropCase") -> dict[str, PartForecast]:
+    """Predict the same of a two-scale run, in which joints may be coarse."""
+    from meshing.estimate import count_elements
+
+    return _forecasts(case, count_elements(case.package, case.board, case.warpage, fine_joint_count(case)))
+
+
+def coarse_parts(case: "BoardDropCase") -> dict[str, PartForecast]:
+    """Predict the same of the run that finds the critical joints."""
+    from meshing.estimate import count_elements
+
+    return _forecasts(case, count_elements(case.package, case.board, case.warpage, 0))
+
+
+def fine_joint_count(case: "BoardDropCase") -> int | None:
+    """Return how many joints of a two-scale run are fine, None if all."""
+    coupling = case.shock.coupling
+    if coupling.fine_joints == "all":
+        return None
+    return coupling.critical_joints if coupling.fine_joints == "critical" else len(set(coupling.fine_joints))
+
+
+def _forecasts(case: "BoardDropCase", estimates: "Mapping[str, PartEstimate]") -> dict[str, PartForecast]:
+    import numpy as np
+
+    from fem.estimate import box_critical_step
+
+    scaled = case.shock.numerics.mass_scaled
+    return {
+        name: PartForecast(
+            part.elements,
+            box_critical_step(material_of(case, name), np.array(part.smallest)),
+            role_of(name) in scaled,
+            relative_cost(case, name),
+        )
+        for name, part in estimates.items()
+    }
+
+
+def forecast_shock(case: "BoardDropCase", parts: Parts) -> ShockForecast:
+    """Predict the scheme, the time steps and the wall time of the shock.
+
+    Args:
+        case: the case.
+        parts: of the mesh with all joints fine.
+    """
+    from fem.estimate import UPDATES_PER_SECOND, implicit_plan, largest_implicit_step
+    from fem.solver_cost import implicit_cost, plate_nodes
+
+    shock = case.shock
+    two_scale = two_scale_parts(case)
+    scheme, levels, seconds = _coupled(case, two_scale)
+    if shock.coupling.fine_joints == "critical":
+        seconds += _coupled(case, coarse_parts(case))[2]
+    plan, dns = _direct(case, parts)
+    pulses = [shock.pulse_duration] if shock.pulse_duration else []
+    slow = implicit_plan(plan, largest_implicit_step(shock.duration, pulses))
+    elements = sum(part.elements for part in parts.values())
+    implicit = implicit_cost(plate_nodes(elements), slow.windows * slow.substeps).seconds
+    return ShockForecast(
+        scheme, levels, plan.window, plan.substeps, plan.windows, seconds, dns, implicit, UPDATES_PER_SECOND
+    )
+
+
+def implicit_seconds(case: "BoardDropCase") -> float | None:
+    """Predict the wall time of a DNS in implicit steps on one rank; None where something is not linear."""
+    parts = forecast_parts(case)
+    return forecast_shock(case, parts).implicit if is_linear(parts) else None
+
+
+def is_linear(parts: Parts) -> bool:
+    """Whether no element has a path."""
+    return all(part.cost == 1.0 for part in parts.values())
+
+
+def _plan(case: "BoardDropCase", parts: Parts):
+    """Return the windows of a mesh; scaled masses follow the smallest step of the others, so they do not limit it."""
+    from fem.estimate import damped_critical_step, window_plan
+
+    shock, numerics = case.shock, case.shock.numerics
+    macro = min(part.critical_step for name, part in parts.items() if role_of(name) == MACRO)
+    limiting = [part.critical_step for part in parts.values() if not part.mass_scaled]
+    meso = min(limiting, default=macro)
+    macro, meso = (damped_critical_step(step, shock.damping.coefficients[1]) for step in (macro, meso))
+    return window_plan(macro, meso, numerics.step_fraction, shock.duration, numerics.history_samples)
+
+
+def _direct(case: "BoardDropCase", parts: Parts):
+    """Return windows and seconds of a DNS."""
+    from fem.estimate import predict_seconds
+
+    plan, board = _plan(case, parts), parts[MACRO].elements
+    work = sum(part.elements * part.cost for name, part in parts.items() if name != MACRO)
+    return plan, predict_seconds(board, [(work, plan.substeps)], plan, case.shock.ranks)[1]
+
+
+def _coupled(case: "BoardDropCase", parts: Parts) -> tuple[tuple[str, str], tuple[LevelForecast, ...], float]:
+    """Return scheme, levels and seconds of a two-scale run."""
+    from fem.estimate import predict_seconds
+
+    plan, scheme = _plan(case, parts), forecast_scheme(case, parts)
+    ratios, level_of = (
+        _levels(case, parts, plan.window) if scheme[0] == "local_steps" else _models(parts, plan.substeps)
+    )
+    levels, count = [], 1
+    for level in range(len(ratios) + 1):
+        count *= ratios[level - 1] if level else 1
+        here = {name: parts[name] for name in parts if level_of[name] == level}
+        elements = sum(part.elements for part in here.values())
+        cost = sum(part.elements * part.cost for part in here.values())
+        levels.append(LevelForecast(tuple(here), plan.window / count, count, elements, cost))
+    work = [(level.cost, level.count) for level in levels[1:]]
+    return scheme, tuple(levels), predict_seconds(levels[0].elements, work, plan, case.shock.ranks)[0]
+
+
+def forecast_scheme(case: "BoardDropCase", parts: Parts) -> tuple[str, str]:
+    """Return the scheme of the coupling, and why."""
+    chosen = case.shock.coupling.scheme
+    if chosen != "auto":
+        return chosen, f"shock.coupling.scheme = {chosen}"
+    if is_linear(parts):
+        return "local_steps", "all elements are linear elastic"
+    return "held_velocity", "solder that yields, or turns, has a path, which local steps would not follow"
+
+
+def _models(parts: Parts, substeps: int) -> tuple[tuple[int, ...], dict[str, int]]:
+    """Return one ratio and which parts take it: all but the macro model."""
+    return (substeps,), {name: int(name != MACRO) for name in parts}
+
+
+def _levels(case: "BoardDropCase", parts: Parts, window: float) -> tuple[tuple[int, ...], dict[str, int]]:
+    """Return the ratios of step levels and the level of each part, as if parts did not touch."""
+    import numpy as np
+
+    from fem.estimate import BOARD_ADVANTAGE
+    from fem.levels.choose import Pace, choose_levels
+    from fem.tie import Tie
+
+    scaled_to = min(part.critical_step for part in parts.values() if not part.mass_scaled)
+    steps = np.array([scaled_to if part.mass_scaled else part.critical_step for part in parts.values()])
+    box = np.array([role_of(name) == MACRO for name in parts])
+    cost = np.array([part.elements * part.cost for part in parts.values()]) * np.where(box, 1.0, BOARD_ADVANTAGE)
+    wanted = case.shock.coupling.levels
+    most = MOST_LEVELS if wanted == "auto" else wanted
+    pace = Pace(steps, cost, window, case.shock.numerics.step_fraction)
+    level, ratios = choose_levels(np.arange(len(steps), dtype=np.int32)[:, None], Tie.none(), pace, most)
+    return ratios, dict(zip(parts, level.tolist(), strict=True))
+
+
+def relative_cost(case: "BoardDropCase", part: str) -> float:
+    """Return the cost of an element of a part over that of an elastic one: what yields or turns has a path."""
+    from fem.estimate import UPDATES_PER_SECOND
+    from fem.solver_cost import NONLINEAR_RATE
+
+    numerics = case.shock.numerics
+    has_path = material_of(case, part).plasticity is not None or numerics.kinematics == "finite"
+    return UPDATES_PER_SECOND / NONLINEAR_RATE[numerics.formulation] if has_path else 1.0
+
+
+def role_of(part: str) -> str:
+    """Return the material role of a part: its name up to "@", then up to "_"."""
+    return part.split("@")[0].split("_")[0]
+
+
+def material_of(case: "BoardDropCase", part: str) -> Material:
+    """Return the material of a part."""
+    return getattr(case.materials, role_of(part))
