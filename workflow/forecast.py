@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from fem.materials.roles import Materials
 from workflow.board_drop_case import BoardDropCase
 from workflow.case import available_cores
-from workflow.problems import Problem
 from workflow.fine_joints import coarse_joints_effect
+from workflow.problems import Problem
 from workflow.reflow_pool import distinct_geometries, joint_geometries
 from workflow.shock_forecast import PartForecast, ShockForecast, forecast_parts, forecast_shock, two_scale_parts
 from workflow.step_limit import too_many_steps

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from fem.materials.parameters import Material
-from workflow.fine_joints import needs_coarse_joints
 
 if TYPE_CHECKING:
     from meshing.estimate import PartEstimate

@@ -1,0 +1,62 @@
+"""What plan says of two scales: scheme, levels of time steps, fine and coarse joints, cost."""
+
+from itertools import pairwise
+
+import pytest
+
+from meshing.estimate import count_elements
+from tests.support.workflow_command import SMALL_CASE
+from workflow.case import read_case
+from workflow.shock_forecast import forecast_parts, forecast_shock, implicit_seconds, two_scale_parts
+
+
+def foreseen(*settings: str):
+    case = read_case(SMALL_CASE, settings, oversubscribe=True)
+    return forecast_shock(case, forecast_parts(case))
+
+
+def test_joints_that_are_not_fine_have_the_coarse_mesh():
+    case = read_case(SMALL_CASE)
+    every, one = (count_elements(case.package, case.board, case.warpage, fine) for fine in (None, 1))
+    assert "solder_coarse" not in every
+    assert one["solder"].elements * 4 == every["solder"].elements
+    assert one["copper"].elements * 4 == every["copper"].elements
+    assert one["solder_coarse"].elements == 3 * 8
+    assert one["solder_coarse"].smallest[2] > every["solder"].smallest[2]
+
+
+def test_linear_elements_take_local_steps_from_the_window_down():
+    levels = foreseen().levels
+    assert levels[0].count == 1
+    assert levels[0].parts == ("board", "board_patch")
+    assert all(finer.count % coarser.count == 0 for coarser, finer in pairwise(levels))
+    assert sum(level.elements for level in levels) == sum(
+        p.elements for p in two_scale_parts(read_case(SMALL_CASE)).values()
+    )
+
+
+def test_copper_at_its_true_mass_takes_a_level_of_its_own():
+    shock = foreseen("shock.numerics.mass_scaled=[]")
+    assert shock.scheme[0] == "local_steps"
+    assert shock.levels[-1].parts == ("copper",)
+    assert shock.levels[-1].step <= 0.9 * forecast_parts(read_case(SMALL_CASE))["copper"].critical_step
+
+
+def test_one_level_is_one_ratio():
+    assert len(foreseen("shock.numerics.mass_scaled=[]", "shock.coupling.levels=1").levels) == 2
+
+
+@pytest.mark.parametrize("setting", ["materials.solder=SAC405", "shock.numerics.kinematics=finite"])
+def test_what_has_a_path_is_driven_by_held_velocity(setting):
+    shock = foreseen(setting)
+    assert shock.scheme[0] == "held_velocity"
+    assert [level.count for level in shock.levels] == [1, shock.substeps]
+    assert implicit_seconds(read_case(SMALL_CASE, [setting])) is None
+
+
+def test_the_wanted_scheme_is_taken():
+    assert foreseen("shock.coupling.scheme=held_velocity").scheme[0] == "held_velocity"
+
+
+def test_an_elastic_drop_has_an_implicit_cost_to_compare_with():
+    assert implicit_seconds(read_case(SMALL_CASE)) > 0.0
