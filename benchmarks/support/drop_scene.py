@@ -1,58 +1,87 @@
 """Packages on boards as mesh files, without a reflow: joints are barrels of the case's volume between its pads."""
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from scipy.optimize import brentq
 
+from fem.inputs import RunInput
+from fem.mesh_file import read_mesh
+from fem.parameters import Ranks
 from meshing.assembly import write_assembly
 from meshing.joints_file import write_joints
 from meshing.pads import PadSite, pad_table
-from meshing.parameters import Board, JointNumerics, Package, Warpage
-from meshing.solder_mesh import mesh_joint
+from meshing.solder_mesh import JointMesh, mesh_coarse_joint, mesh_joint
 from meshing.surface import ClosedSurface
+from tests.support.fem_models import write_msh
 from tests.support.joint_surfaces import barrel
+from workflow.board_drop_case import BoardDropCase
 from workflow.case import read_case
 
 CASE = Path(__file__).parents[2] / "cases" / "bga_drop" / "case.toml"
 HEIGHTS = np.linspace(0.0, 1.0, 25)  # of the sections between which a barrel is a cone
+SHIFT = 1e-6  # of an element's edge: enough that no element is a box, too little to matter otherwise
+Mesher = Callable[..., JointMesh]
 
 
 @dataclass(frozen=True, slots=True)
 class DropScene:
-    """The package on its board of ``cases/bga_drop``, in other sizes.
+    """The meshes of a case, and the inputs of runs on them.
 
     Attributes:
-        package: Array, pads, layers, joints and how they are meshed.
-        board: The board.
-        warpage: Of the package.
-        volume: Of the solder of a joint [m^3].
+        case: The case, with its copper at its true mass.
+        folder: Where the meshes are.
     """
 
-    package: Package
-    board: Board
-    warpage: Warpage
-    volume: float
+    case: BoardDropCase
+    folder: Path
 
     @classmethod
-    def of_case(cls, path: Path = CASE) -> "DropScene":
-        """Return the scene of a case file."""
-        case = read_case(path)
-        return cls(case.package, case.board, case.warpage, case.solder.volume)
+    def write(cls, folder: Path, overrides: tuple[str, ...] = ()) -> "DropScene":
+        """Mesh the case ``bga_drop`` with other values, ``key=value`` each."""
+        case = read_case(CASE, ("shock.numerics.mass_scaled=[]", *overrides))
+        assert isinstance(case, BoardDropCase)
+        write_assembly(case.package, case.board, case.warpage, folder / "assembly.msh")
+        for name, mesher in (("joints.msh", mesh_joint), ("coarse_joints.msh", mesh_coarse_joint)):
+            write_joints([joint(case, site, mesher) for site in sites(case)], folder / name)
+        return cls(case, folder)
 
-    def write(self, folder: Path) -> tuple[Path, Path]:
-        """Write ``assembly.msh`` and ``joints.msh``; return their paths."""
-        paths = folder / "assembly.msh", folder / "joints.msh"
-        write_assembly(self.package, self.board, self.warpage, paths[0])
-        self.write_joints(paths[1], self.package.joint_numerics)
-        return paths
+    def without_boxes(self, folder: Path) -> "DropScene":
+        """Write the meshes again, all elements a little distorted: each then has a matrix of its own."""
+        for path in self.folder.glob("*.msh"):
+            mesh = read_mesh(path)
+            length, phase = np.ptp(mesh.points[:, 0]), 1e4 * mesh.points[:, 1] + 3e4 * mesh.points[:, 2]
+            shift = SHIFT * self.case.board.numerics.element_size * np.cos(phase)
+            moved = mesh.points + np.outer(shift * np.sin(np.pi * mesh.points[:, 0] / length), [1.0, 0.0, 0.0])
+            write_msh(replace(mesh, points=moved), folder / path.name)
+        return replace(self, folder=folder)
 
-    def write_joints(self, path: Path, numerics: JointNumerics) -> None:
-        """Write the joints, meshed as ``numerics`` say."""
-        package = self.package.model_copy(update={"joint_numerics": numerics})
-        sites = pad_table(package, self.board, self.warpage)
-        write_joints([mesh_joint(barrel_of(site, self.volume), site, package, self.warpage) for site in sites], path)
+    def request(self, mode: str, coupling: dict, shock: dict) -> RunInput:
+        """Return the input of a run on one rank; ``shock`` are values of its numerics or of the shock itself."""
+        numerics = {key: shock[key] for key in shock if key in type(self.case.shock.numerics).model_fields}
+        tables = self.case.shock.model_dump() | {key: value for key, value in shock.items() if key not in numerics}
+        tables["numerics"] |= numerics
+        tables["coupling"] |= coupling
+        tables["ranks"] = Ranks(total=1, placement="shared").model_dump()
+        return RunInput(
+            mode=mode,
+            meshes=(self.folder / "assembly.msh", self.folder / "joints.msh"),
+            shock=tables,
+            materials=self.case.materials,
+            output=self.folder,
+        )
+
+
+def sites(case: BoardDropCase) -> list[PadSite]:
+    """Return the joints of a case."""
+    return pad_table(case.package, case.board, case.warpage)
+
+
+def joint(case: BoardDropCase, site: PadSite, mesher: Mesher) -> JointMesh:
+    """Return a joint's mesh."""
+    return mesher(barrel_of(site, case.solder.volume), site, case.package, case.warpage)
 
 
 def barrel_of(site: PadSite, volume: float) -> ClosedSurface:

@@ -1,0 +1,56 @@
+"""A run of the program on one rank, window by window, so that several can be measured in turns."""
+
+from time import process_time
+
+import numpy as np
+from mpi4py import MPI
+
+from fem.communicators import Communicators
+from fem.inputs import RunInput
+from fem.march import run_window
+from fem.model import build_models
+from fem.run import make_crew, make_history, place
+from fem.shock_loads import shock_pulse
+
+
+class ProgramRun:
+    """Models, participants and history of an input, at rest.
+
+    Attributes:
+        crew: The participants.
+        plan: Window and substeps.
+        elements: Elements of each model.
+        setup: Processor seconds until it could start.
+        history: Its samples.
+    """
+
+    def __init__(self, request: RunInput) -> None:
+        """Build the models."""
+        begin = process_time()
+        comms = Communicators(MPI.COMM_SELF, place(MPI.COMM_SELF, request))
+        models, steps = build_models(comms, request)
+        self.plan = steps.plan
+        self.crew = make_crew(comms, models, steps.plan, request.shock)
+        self.elements = {role: len(model.body.local.cells) for role, model in models.items()}
+        self.setup = process_time() - begin
+        self.history = make_history(comms, models, steps, shock_pulse(request.shock).pulse, request)
+
+    def step(self, seconds: float) -> float:
+        """Go on for some simulated time; return the processor seconds of a simulated one."""
+        windows = max(1, round(seconds / self.plan.window))
+        begin = process_time()
+        for _ in range(windows):
+            run_window(self.crew)
+        return (process_time() - begin) / (windows * self.plan.window)
+
+    def to_end(self) -> tuple[dict[str, np.ndarray], float]:
+        """Go to the end with samples; return them and the processor seconds of all windows."""
+        self.history.sample(self.crew)
+        seconds = 0.0
+        for window in range(1, self.plan.windows + 1):
+            begin = process_time()
+            run_window(self.crew)
+            seconds += process_time() - begin
+            if window % self.plan.stride == 0 or window == self.plan.windows:
+                self.history.sample(self.crew)
+        return self.history.arrays(), seconds

@@ -1,0 +1,116 @@
+"""Two scales against DNS on the composition of H 4.4: time ratio, error of the critical joint and of the die.
+
+    python benchmarks/two_scale.py [--full] [--only NAME ...]        (some minutes, one core; writes two_scale.json)
+
+A quarter of a 10 x 10 array on its board, copper of 0.02 mm at its true mass, a quarter of all elements in the meso
+model. Costs are processor seconds of a simulated second, both modes in turns in one run, once with the kernels that the
+program chooses (``shipped``: boxes share a matrix and cost a half to a fifth of an element of a joint) and once with all
+elements on the assembled matrix (``same``: no element is a box). Errors are relative L2 against the DNS over
+``DURATION`` of a half sine of ``PULSE``, ``--full`` over that of the case, on meshes as large as those of H.
+"""
+
+import argparse
+import os
+import tempfile
+from pathlib import Path
+
+os.environ["OMP_NUM_THREADS"] = os.environ["NUMBA_NUM_THREADS"] = "1"
+
+import numpy as np
+
+from benchmarks.support import turns
+from benchmarks.support.drop_scene import DropScene
+from benchmarks.support.program_run import ProgramRun
+from fem.compare import compare_histories
+
+CRITICAL = ("A10", "A9", "B10")
+SETTINGS: dict[str, dict] = {
+    "held_velocity": {"scheme": "held_velocity"},
+    "local_steps_one_level": {"scheme": "local_steps", "levels": 1},
+    "local_steps": {"scheme": "local_steps"},
+    "three_joints_fine": {"scheme": "local_steps", "fine_joints": CRITICAL},
+    "one_joint_fine": {"scheme": "local_steps", "fine_joints": CRITICAL[:1]},
+}
+# Time ratio, critical_joint_stress_error, die_displacement_error: at most.
+ALL_FINE, CRITICAL_FINE = (0.25, 0.02, 0.01), (0.077, 0.03, np.inf)
+BARS = {"local_steps": ALL_FINE, "one_joint_fine": CRITICAL_FINE}
+REDUCED = ("package.joint_numerics.core=2", "package.joint_numerics.rings=1", "package.joint_numerics.layers=6")
+FULL = (
+    "package.joint_numerics.core=6",
+    "package.joint_numerics.rings=2",
+    "package.joint_numerics.layers=14",
+    "board.numerics.coarse_size='0.5 mm'",
+)
+PULSE, DURATION = 5e-5, 1e-4  # [s]
+STRETCH = 2e-6  # [s] simulated by one side before it is the other's turn
+ROUNDS = 7
+
+
+def cost_table(scene: DropScene, names: list[str]) -> dict:
+    """Return what each setting costs against DNS: processor seconds of both, in turns."""
+    runs = {name: ProgramRun(scene.request("two_scale", SETTINGS[name], {"duration": DURATION})) for name in names}
+    runs["dns"] = ProgramRun(scene.request("dns", {}, {"duration": DURATION}))
+    for run in runs.values():
+        run.step(STRETCH)
+    seconds = turns.in_turns({name: lambda run=run: run.step(STRETCH) for name, run in runs.items()}, ROUNDS)
+    return {
+        name: {
+            "time_ratio": turns.ratio(seconds, "dns", name),
+            "seconds_per_simulated_us": 1e-6 * float(np.median(seconds[name])),
+            "elements": run.elements,
+            "meso_share": run.elements.get("meso", 0) / sum(runs["dns"].elements.values()),
+            "window_ns": 1e9 * run.plan.window,
+            "substeps": run.plan.substeps,
+            "setup_seconds": run.setup,
+        }
+        for name, run in runs.items()
+    }
+
+
+def error_table(scene: DropScene, names: list[str], shock: dict, folder: Path) -> dict:
+    """Return the errors of each setting against DNS, and the processor seconds of the runs."""
+    rows, files = {}, {}
+    for name in ["dns", *names]:
+        mode, coupling = ("dns", {}) if name == "dns" else ("two_scale", SETTINGS[name])
+        arrays, seconds = ProgramRun(scene.request(mode, coupling, shock)).to_end()
+        files[name] = folder / f"{name}.npz"
+        np.savez(files[name], **arrays)
+        rows[name] = compare_histories(files[name], files["dns"]) | {"seconds": seconds}
+        print(name, rows[name], flush=True)
+    return rows
+
+
+def bars_of(costs: dict[str, dict], errors: dict) -> dict:
+    """Return the issue's bars with what was measured."""
+    found = {}
+    for name in set(BARS) & set(errors):
+        limits = BARS[name]
+        for kernels, table in costs.items():
+            found[f"{name}: time ratio, {kernels} kernels"] = turns.bar(table[name]["time_ratio"], limits[0], False)
+        for metric, limit in zip(("critical_joint_stress_error", "die_displacement_error"), limits[1:], strict=True):
+            if np.isfinite(limit):
+                found[f"{name}: {metric}"] = turns.bar(errors[name][metric], limit, False)
+    return found
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--full", action="store_true", help="meshes as large as those of H, the whole pulse; hours")
+    parser.add_argument("--only", nargs="+", choices=SETTINGS, default=list(SETTINGS), help="of the settings")
+    options = parser.parse_args()
+    names = [name for name in SETTINGS if name in options.only]
+    shock = {} if options.full else {"pulse_duration": PULSE, "duration": DURATION}
+    with tempfile.TemporaryDirectory() as directory:
+        folders = {name: Path(directory) / name for name in ("shipped", "same", "histories")}
+        for folder in folders.values():
+            folder.mkdir()
+        scene = DropScene.write(folders["shipped"], FULL if options.full else REDUCED)
+        scenes = {"shipped": scene, "same": scene.without_boxes(folders["same"])}
+        costs = {kernels: cost_table(item, names) for kernels, item in scenes.items()}
+        errors = error_table(scene, names, shock, folders["histories"])
+    result = {"size": "full" if options.full else "reduced", "costs": costs, "errors": errors}
+    turns.write("two_scale_full" if options.full else "two_scale", result | {"bars": bars_of(costs, errors)})
+
+
+if __name__ == "__main__":
+    main()
