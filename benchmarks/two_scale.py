@@ -4,8 +4,8 @@
 
 A quarter of a 10 x 10 array on its board, copper of 0.02 mm at its true mass, a quarter of all elements in the meso
 model. Costs are processor seconds of a simulated second, both modes in turns in one run, once with the kernels that the
-program chooses (``shipped``: boxes share a matrix and cost a half to a fifth of an element of a joint) and once with all
-elements on the assembled matrix (``same``: no element is a box). Errors are relative L2 against the DNS over
+program chooses (``shipped``: boxes share a matrix and cost a half to a fifth of an element of a joint) and once with
+all elements on the assembled matrix (``same``: no element is a box). Errors are relative L2 against the DNS over
 ``DURATION`` of a half sine of ``PULSE``, ``--full`` over that of the case, on meshes as large as those of H.
 """
 

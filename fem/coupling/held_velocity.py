@@ -88,8 +88,8 @@ class WindowMotion(Motion):
     """The motion of a driven model: a body acceleration pushes it once a window, as it does the model that drives it.
 
     Acting in every substep, it would let the model run ahead of a cut that is held over the window and come back: it
-    is the same at the window's end, but the force that pulled it back acted on one model only, by some DT^2 a / 12 times
-    the stiffness at the cut, and in free fall the models parted.
+    ends where it began, but what pulled it back (DT^2 a / 12 times the stiffness at the cut, or so) acts on one model
+    only, and in free fall the two would part.
     """
 
     def __init__(self, body: Body, loads: list[Load], plan: WindowPlan) -> None:
