@@ -207,12 +207,12 @@ def fine_joints_of(result: Mapping[str, Any]) -> list[str] | None:
 def _coupling_metrics(result: Mapping[str, Any]) -> dict:
     """Return what a two-scale run says of its coupling: shares of elements, and of its ranks' time."""
     coupling = result.get("coupling", {})
-    balance = coupling.get("balance", {})
+    balance = coupling.get("placement", {})
     found = {
         "meso_share": coupling.get("meso_share"),
         "two_scale_ideal_ratio": ideal_ratio(coupling, result.get("model", {})),
-        "coupling_overhead": balance.get("overhead"),
-        "busy_share": min(balance.get("busy_share", ()), default=None),
+        "coupling_overhead": balance.get("coupling_overhead"),
+        "busy_share": balance.get("busy_share"),
     }
     return {name: metric(value) for name, value in found.items() if value is not None}
 

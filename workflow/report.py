@@ -201,7 +201,7 @@ def _add_two_scales(run_folder: Path, case: BoardDropCase, context: dict, result
     context["tables"].update(
         two_scales=scales.two_scales(coupling, result["model"], read_fine_joints(run_folder / "shock")),
         levels=scales.levels(coupling),
-        placement=scales.placement(coupling, result["metrics"]),
+        placement=scales.placement(coupling),
     )
     seconds = implicit_seconds(case)
     context["oracle"] = scales.oracle(seconds, result) if seconds is not None else ""

@@ -59,22 +59,18 @@ def levels(coupling: Record) -> dict | None:
     return {"head": ["level", "time step", "hexahedra", "share of the cost"], "rows": rows} if rows else None
 
 
-def placement(coupling: Record, summary: Record) -> dict | None:
-    """Return the predicted window of every placement, what was measured, and how busy the ranks were.
-
-    Args:
-        coupling: as ``two_scales``.
-        summary: ``metrics`` of the run, as ``summary.json`` has them.
-    """
-    chosen, balance = coupling.get("placement", {}), coupling.get("balance", {})
+def placement(coupling: Record) -> dict | None:
+    """Return the predicted window of every placement, what was measured, and how busy the ranks were."""
+    record = coupling.get("placement", {})
     rows = [
-        (f"window, predicted, {name}{' (chosen)' if name == chosen.get('name') else ''}", f"{1e6 * seconds:.1f} µs")
-        for name, seconds in _numbers(chosen, "alternatives")
+        (f"window, predicted, {name}{' (chosen)' if name == record.get('chosen') else ''}", _micro(seconds))
+        for name, seconds in _numbers(record, "alternatives")
     ]
-    measured = summary.get("window_seconds")
-    rows += [("window, measured", f"{1e6 * measured['value']:.1f} µs")] if measured else []
-    rows += [(f"rank {rank} computes", _share(share)) for rank, share in enumerate(balance.get("busy_share", ()))]
-    rows += [("coupling, share of a window", _share(balance["overhead"]))] if "overhead" in balance else []
+    rows += [("window, measured", _micro(record["window_seconds"]))] if "window_seconds" in record else []
+    rows += [(f"rank {rank} computes", _share(share)) for rank, share in enumerate(record.get("busy_shares", ()))]
+    rows += (
+        [("coupling, share of a window", _share(record["coupling_overhead"]))] if "coupling_overhead" in record else []
+    )
     return {"head": ["placement", ""], "rows": [list(row) for row in rows]} if rows else None
 
 
@@ -96,6 +92,10 @@ def oracle(seconds: float, result: Record) -> str:
 
 def _numbers(record: Record, name: str) -> list[tuple[str, float]]:
     return [(key, value) for key, value in record.get(name, {}).items() if isinstance(value, int | float)]
+
+
+def _micro(seconds: float) -> str:
+    return f"{1e6 * seconds:.1f} µs"
 
 
 def _share(value: float | None) -> str:

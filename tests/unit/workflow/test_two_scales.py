@@ -23,8 +23,14 @@ COUPLING = {
     "meso_share": 0.4,
     "self_check": {"rigid_motion": 2e-16},
     "mass": {"macro": 1e-3},
-    "placement": {"name": "shared", "alternatives": {"shared": 3e-4, "disjoint, 1 macro rank": 4e-4}},
-    "balance": {"busy_share": [0.95, 0.92], "overhead": 0.02},
+    "placement": {
+        "chosen": "shared by 2",
+        "alternatives": {"shared by 2": 3e-4, "macro 0, meso 1": 4e-4},
+        "window_seconds": 3.3e-4,
+        "busy_share": 0.93,
+        "busy_shares": [0.95, 0.92],
+        "coupling_overhead": 0.02,
+    },
 }
 
 
@@ -47,7 +53,7 @@ def test_what_a_run_does_not_tell_is_left_out():
     rows = rows_of(section.two_scales({}, MODEL, None))
     assert set(rows) == {"window", "step ratio m"}
     assert section.levels({}) is None
-    assert section.placement({}, {}) is None
+    assert section.placement({}) is None
 
 
 def test_levels_begin_with_the_window():
@@ -59,9 +65,9 @@ def test_levels_begin_with_the_window():
 
 
 def test_predictions_stand_beside_what_was_measured():
-    rows = rows_of(section.placement(COUPLING, {"window_seconds": {"value": 3.3e-4, "unit": "s"}}))
-    assert rows["window, predicted, shared (chosen)"] == "300.0 µs"
-    assert rows["window, predicted, disjoint, 1 macro rank"] == "400.0 µs"
+    rows = rows_of(section.placement(COUPLING))
+    assert rows["window, predicted, shared by 2 (chosen)"] == "300.0 µs"
+    assert rows["window, predicted, macro 0, meso 1"] == "400.0 µs"
     assert rows["window, measured"] == "330.0 µs"
     assert rows["rank 1 computes"] == "92 %"
     assert rows["coupling, share of a window"] == "2 %"
@@ -92,7 +98,7 @@ def test_coupling_and_comparison_become_metrics(tmp_path):
     found = of_shock({"two_scale": result | {"coupling": COUPLING}, "dns": result}, tmp_path)
     metrics = {name: metric["value"] for name, metric in found.metrics.items()}
     assert metrics["meso_share"] == 0.4
-    assert metrics["busy_share"] == 0.92
+    assert metrics["busy_share"] == 0.93
     assert metrics["coupling_overhead"] == 0.02
     assert metrics["two_scale_dns_time_ratio"] == 1.0
     assert metrics["critical_joint"] == "B3"
