@@ -37,29 +37,21 @@ class HeldVelocity:
         return Meso(body, loads, plan, channels)
 
 
-class Macro(Continued):
-    """The board: one step a window."""
+class Answered(Continued):
+    """A macro model that takes one step a window and gets a force at the cut back."""
 
-    def __init__(self, body: Body, loads: list[Load], plan: WindowPlan, channels: CutChannels) -> None:
-        """Receive the interface mass and start at rest; a ``Meso`` must have sent it."""
-        self._channels = channels
-        self._received = np.zeros((len(body.mass), 3))
-        channels.forces.receive(self._received)
-        self.motion = Motion(body, loads, plan.window, np.empty(0, np.int32), self._received[:, 0].copy())
-        self._received[:] = 0.0
-        self.plan = plan
-        self._counted = counted_cut(body)
+    motion: Motion
+
+    def __init__(self, motion: Motion, plan: WindowPlan, channels: CutChannels) -> None:
+        """Take a motion that is ready to advance by windows."""
+        self.motion, self.plan, self._channels = motion, plan, channels
+        self._received = np.zeros_like(motion.force)
+        self._counted = counted_cut(motion.body)
         self.interface_work = 0.0
 
-    def begin_window(self) -> None:
-        """Move, and send the cut's velocity."""
-        self.motion.advance()
-        self._channels.velocities.send(self.motion.velocity)
-
-    def finish_window(self) -> None:
-        """Compute the force, and receive the meso model's."""
+    def take_force(self) -> None:
+        """Receive the meso model's force, and count the work across the cut."""
         motion = self.motion
-        motion.update_force()
         before = self._received[self._counted]
         self._channels.forces.receive(self._received)
         motion.force += self._received
@@ -82,6 +74,26 @@ class Macro(Continued):
         """Continue from the values of what ``state`` returned."""
         super().restore(state)
         self._received[:] = state["received"]
+
+
+class Macro(Answered):
+    """The board: one step a window."""
+
+    def __init__(self, body: Body, loads: list[Load], plan: WindowPlan, channels: CutChannels) -> None:
+        """Receive the interface mass and start at rest; a ``Meso`` must have sent it."""
+        mass = np.zeros((len(body.mass), 3))
+        channels.forces.receive(mass)
+        super().__init__(Motion(body, loads, plan.window, np.empty(0, np.int32), mass[:, 0].copy()), plan, channels)
+
+    def begin_window(self) -> None:
+        """Move, and send the cut's velocity."""
+        self.motion.advance()
+        self._channels.velocities.send(self.motion.velocity)
+
+    def finish_window(self) -> None:
+        """Compute the force, and receive the meso model's."""
+        self.motion.update_force()
+        self.take_force()
 
 
 class WindowMotion(Motion):

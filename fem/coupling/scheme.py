@@ -6,6 +6,7 @@ from typing import Literal, Protocol
 from fem.body import Body
 from fem.communicators import Role
 from fem.coupling.division import SchemeName
+from fem.coupling.gravouil_combescure import GravouilCombescure
 from fem.coupling.held_velocity import HeldVelocity
 from fem.coupling.one_way import OneWay
 from fem.estimate import WindowPlan
@@ -49,6 +50,14 @@ class LocalSteps:
 
 
 def scheme_of(name: SchemeName, direction: Direction = "two_way") -> Scheme:
-    """Return the scheme of a name and direction."""
+    """Return the scheme of a name and direction.
+
+    Raises:
+        ValueError: The scheme needs an answer, which one way does not give.
+    """
+    if name == "gravouil_combescure":
+        if direction == "one_way":
+            raise ValueError("gravouil_combescure links two models; one_way needs held_velocity or local_steps")
+        return GravouilCombescure()
     scheme = OneWay() if direction == "one_way" else HeldVelocity()
     return LocalSteps(scheme) if name == "local_steps" else scheme

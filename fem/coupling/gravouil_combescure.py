@@ -1,0 +1,131 @@
+"""Gravouil and Combescure: equal velocities at the cut at every substep, by forces; for models without a buffer.
+
+The cut are the macro nodes that the joints are tied to; the meso model has copies of them, which weigh what the joints
+rest on them, rowsum(N^T M N). So both models have the cut's velocities as unknowns of their own, and the operator of
+the link is diagonal. A window: the macro model moves and computes its force, which gives the velocity that its cut
+would have without the link; the meso model's substep j solves
+
+    (dt / 2 m_meso + DT / 2 m_macro) link_j = (1 - j/m) v_free(t_n) + (j/m) v_free(t_{n+1}) - v_meso_free,j
+
+and the macro model gets -link_m. Any ratio of steps is stable as long as each model's own is: the interface takes
+(m sum |link_j - link_{j-1}|^2 - |link_m - link_0|^2) / 2 / m_macro of the energy of the accelerations, never less than
+zero (A. Gravouil, A. Combescure, Int. J. Numer. Meth. Engng 50, 2001, 199-225). That holds for v_free of t_n taken with
+the link of t_n added, and for path-dependent forces in that the link never looks back.
+
+Velocities are equal, displacements only to second order in DT: sum dt link_j is not DT times the mean of both ends, by
+2 m_macro / DT times the change of the gap (``test_fem_gravouil_combescure``).
+"""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem.body import Body
+from fem.communicators import Role
+from fem.coupling.held_velocity import Answered, local_cut
+from fem.estimate import WindowPlan
+from fem.exchange import CutChannels
+from fem.kernels.coupling import link_velocities
+from fem.loads import Load
+from fem.motion import Motion
+from fem.participant import Continued, uncut_motion
+
+
+class GravouilCombescure:
+    """The scheme: the meso model waits for the macro model's mobility at the cut, so the macro model is made first."""
+
+    order: tuple[Role, Role] = ("macro", "meso")
+
+    def macro(self, body: Body, loads: list[Load], plan: WindowPlan, channels: CutChannels) -> "Macro":
+        """Return the macro model's participant."""
+        return Macro(uncut_motion(body, loads, plan.window), plan, channels)
+
+    def meso(self, body: Body, loads: list[Load], plan: WindowPlan, channels: CutChannels) -> "Meso":
+        """Return the meso model's participant."""
+        return Meso(uncut_motion(body, loads, plan.step), plan, channels)
+
+
+class Macro(Answered):
+    """The board: one step a window, then as long as the meso model takes."""
+
+    def __init__(self, motion: Motion, plan: WindowPlan, channels: CutChannels) -> None:
+        """Send the mobility of the cut."""
+        super().__init__(motion, plan, channels)
+        self._cut = local_cut(motion.body)
+        self._free = np.zeros_like(motion.velocity)
+        channels.velocities.send(motion.mobility)
+
+    def begin_window(self) -> None:
+        """Move, compute the force, and send the velocity that the cut has without the link."""
+        motion = self.motion
+        motion.advance()
+        motion.update_force()
+        self._free[self._cut] = motion.velocity[self._cut] + 0.5 * motion.step * motion.acceleration(self._cut)
+        self._channels.velocities.send(self._free)
+
+    def finish_window(self) -> None:
+        """Receive the link's force."""
+        self.take_force()
+
+
+class Meso(Continued):
+    """Joints and package on copies of the macro nodes: m substeps a window, each with its link."""
+
+    motion: Motion
+
+    def __init__(self, motion: Motion, plan: WindowPlan, channels: CutChannels) -> None:
+        """Receive the mobility of the cut; a ``Macro`` must have sent it."""
+        self.motion, self.plan, self._channels = motion, plan, channels
+        self.interface_work = 0.0
+        self._link = np.zeros_like(motion.force)
+        self._arrived = np.zeros_like(motion.force)
+        channels.velocities.receive(self._arrived)
+        self._cut = local_cut(motion.body)
+        self._yield, self._terms, self._held = self._link_terms()
+        for component in range(3):
+            motion.hold(self._cut[self._held[:, component]], component)
+
+    def _link_terms(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
+        """Return the macro model's part of the compliance, ``link_velocities``' terms, and what it prescribes."""
+        motion, half = self.motion, 0.5 * self.plan.step
+        other, own = self._arrived[self._cut], motion.mobility[self._cut]
+        given = 0.5 * self.plan.window * other
+        linked = (other > 0.0) & (own > 0.0)
+        compliance = np.where(linked, given + half * own, np.inf)
+        weight = half * np.repeat(motion.body.shared.owned[self._cut, None], 3, axis=1)
+        return given, np.stack([half * own, compliance, np.zeros_like(own), weight]), other == 0.0
+
+    def begin_window(self) -> None:
+        """Take m substeps, linked to the macro model's velocity; then send the last link's force."""
+        motion, cut, count = self.motion, self._cut, self.plan.substeps
+        start = motion.velocity[cut] + 0.5 * motion.step * motion.acceleration(cut) + self._yield * self._link[cut]
+        self._channels.velocities.receive(self._arrived)
+        change = self._arrived[cut] - start
+        motion.velocity[cut] = np.where(self._held, self._arrived[cut], motion.velocity[cut])
+        for j in range(1, count + 1):
+            motion.advance()
+            motion.update_force()
+            self._terms[2] = start + (j / count) * change - 0.5 * motion.step * motion.gravity
+            self.interface_work += link_velocities(cut, motion.velocity, motion.force, self._terms, self._link)
+        self._channels.forces.send(-self._link)
+
+    def finish_window(self) -> None:
+        """Do nothing: the window is done."""
+
+    def cut_force(self) -> NDArray[np.float64]:
+        """Return the force that was sent."""
+        return -self._link
+
+    def foreign_force(self) -> NDArray[np.float64]:
+        """Return the link's force: it is in ``motion.force``."""
+        return self._link
+
+    def state(self) -> dict[str, Any]:
+        """Return also the link."""
+        return super().state() | {"link": self._link}
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Continue from what ``state`` returned."""
+        super().restore(state)
+        self._link[:] = state["link"]

@@ -1,0 +1,124 @@
+"""Pairs of a coarse board and a finer block on it, for which any scheme's window can be tried."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from fem.body import Body
+from fem.coupling.held_velocity import Answered, HeldVelocity, Macro
+from fem.coupling.scheme import Scheme, scheme_of
+from fem.estimate import WindowPlan
+from fem.exchange import CutChannels
+from fem.loads import Load
+from fem.materials.library import FR4
+from fem.materials.parameters import Isotropic
+from fem.materials.roles import Materials
+from fem.mesh import MeshData, append
+from fem.motion import Motion
+from tests.support.fem_coupled import Coupled, Models, bodies_of, split
+from tests.support.fem_models import grid, mesh_of, on
+
+SIZE, THICKNESS = 0.5e-3, 0.25e-3  # of a board element [m]
+FRACTION = 0.9  # of the critical step of elements, the program's default
+BOARD_IMPEDANCE = float(np.sqrt(FR4.density * FR4.young_modulus_out_of_plane))
+
+
+@dataclass(frozen=True)
+class Pair:
+    """A board of FR4, 3 x 3 elements in plane, and a block tied to its top off the grid.
+
+    Attributes:
+        substeps: m that the steps of both call for.
+        impedance: sqrt(density E) of the block over that of the board across.
+        ratio: Board elements over elements of the block, in size.
+        shape: Of board and block.
+        free: Whether nothing holds them.
+        layers: Of the board.
+    """
+
+    substeps: int = 4
+    impedance: float = 1.0
+    ratio: float = 2.0
+    shape: Literal["flat", "distorted", "curved"] = "flat"
+    free: bool = False
+    layers: int = 4
+
+    def mesh(self) -> MeshData:
+        ticks = np.arange(4) * SIZE
+        board = mesh_of(
+            *grid(ticks, ticks, -THICKNESS * np.arange(self.layers, -1.0, -1.0)),
+            "board",
+            {"board_side": on(2, 0.0)} | ({} if self.free else {"mounting_holes": on(0, 3 * SIZE)}),
+        )
+        cells = int(np.clip(round(self.ratio), 1, 4))
+        side = 0.13 * SIZE + np.arange(cells + 1) * SIZE / self.ratio
+        block = mesh_of(*grid(side, side, np.arange(3) * THICKNESS / self.ratio), "solder@A1", {"foot@A1": on(2, 0.0)})
+        return shaped(append([board, block]), self.shape)
+
+    def materials(self) -> Materials:
+        """Return materials with the impedance of the block whose critical step is a little above 1/m of the board's."""
+        trial = Materials(solder=Isotropic(density=1e3, young_modulus=1e9, poisson_ratio=0.35))
+        board, block = (pieces.steps.min() for pieces, _ in self.models(trial).values())
+        slowness = 1e-3 * board / block / (self.substeps - 0.02)
+        product = self.impedance * BOARD_IMPEDANCE
+        return Materials(
+            solder=Isotropic(density=product * slowness, young_modulus=product / slowness, poisson_ratio=0.35)
+        )
+
+    def models(self, materials: Materials, buffer: int = 0) -> Models:
+        """Return the models: the block is meso, and so many layers of board around it."""
+        mesh = self.mesh()
+        macro = board_cells(mesh)
+        near = np.zeros(len(mesh.points), bool)
+        if buffer:
+            _, tables = split(mesh, materials, macro, ~macro)["meso"]
+            masters = np.unique(tables.master_points.reshape(-1, 3), axis=0)
+            near = (np.linalg.norm(mesh.points[:, None] - masters, axis=2) < 1e-9).any(axis=1)
+        for _ in range(buffer):
+            layer = macro & near[mesh.cells].any(axis=1)
+            near[mesh.cells[layer]] = True
+            macro = macro & ~layer
+        return split(mesh, materials, macro, ~macro)
+
+    def coupled(self, scheme: Scheme, buffer: int = 0, fraction: float = FRACTION, loads=()) -> Coupled:
+        models = self.models(self.materials(), buffer)
+        board = min(pieces.steps[pieces.roles == "board"].min(initial=np.inf) for pieces, _ in models.values())
+        window = fraction * board
+        smallest = min(pieces.steps.min() for pieces, _ in models.values())
+        substeps = int(np.ceil(window / (fraction * smallest)))
+        return Coupled(bodies_of(models), WindowPlan(window, substeps, 1, 1), scheme, loads)
+
+
+def board_cells(mesh: MeshData) -> np.ndarray:
+    return mesh.in_parts("board".__eq__)
+
+
+def shaped(mesh: MeshData, shape: str) -> MeshData:
+    """Return a pair of another shape: inner nodes moved at random, or the interface a paraboloid of 5 mm radius."""
+    points = mesh.points.copy()
+    if shape == "distorted":
+        low, high = points.min(axis=0), points.max(axis=0)
+        inside = (points > low + 1e-9) & (points < high - 1e-9)
+        inside[:, 2] &= np.abs(points[:, 2]) > 1e-9
+        edge = np.where(np.isin(np.arange(len(points)), mesh.cells[board_cells(mesh)]), THICKNESS, 0.0)
+        block = np.flatnonzero(edge == 0.0)
+        edge[block] = 0.5 * np.ptp(points[mesh.cells[~board_cells(mesh)][0]], axis=0).min()
+        points += inside * edge[:, None] * np.random.default_rng(5).uniform(-0.25, 0.25, points.shape)
+    if shape == "curved":
+        points[:, 2] -= (points[:, 0] ** 2 + points[:, 1] ** 2) / (2 * 5e-3)
+    return MeshData(points, mesh.cells, mesh.part, mesh.part_names, mesh.facets)
+
+
+class Printed(HeldVelocity):
+    """The paper's scheme as printed: the block alone is meso, only its internal force goes to the board, no mass."""
+
+    def macro(self, body: Body, loads: list[Load], plan: WindowPlan, channels: CutChannels) -> Macro:
+        return PrintedMacro(body, loads, plan, channels)
+
+
+class PrintedMacro(Macro):
+    def __init__(self, body: Body, loads: list[Load], plan: WindowPlan, channels: CutChannels) -> None:
+        channels.forces.receive(np.zeros((len(body.mass), 3)))
+        motion = Motion(body, loads, plan.window, np.empty(0, np.int32), np.zeros(len(body.mass)))
+        Answered.__init__(self, motion, plan, channels)
