@@ -53,7 +53,9 @@ class Pair:
         )
         cells = int(np.clip(round(self.ratio), 1, 4))
         side = 0.13 * SIZE + np.arange(cells + 1) * SIZE / self.ratio
-        block = mesh_of(*grid(side, side, np.arange(3) * THICKNESS / self.ratio), "solder@A1", {"foot@A1": on(2, 0.0)})
+        height = 2 * THICKNESS / self.ratio
+        sets = {"foot@A1": on(2, 0.0), "pad_board@A1": on(2, 0.0), "pad_package@A1": on(2, height)}
+        block = mesh_of(*grid(side, side, np.linspace(0.0, height, 3)), "solder@A1", sets)
         return shaped(append([board, block]), self.shape)
 
     def materials(self) -> Materials:
