@@ -16,6 +16,7 @@ Velocities are equal, displacements only to second order in DT: sum dt link_j is
 2 m_macro / DT times the change of the gap (``test_fem_gravouil_combescure``).
 """
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -30,6 +31,7 @@ from fem.kernels.coupling import link_velocities
 from fem.loads import Load
 from fem.motion import Motion
 from fem.participant import Continued, uncut_motion
+from fem.portable import Rows, State
 
 
 class GravouilCombescure:
@@ -121,11 +123,11 @@ class Meso(Continued):
         """Return the link's force: it is in ``motion.force``."""
         return self._link
 
-    def state(self) -> dict[str, Any]:
+    def state(self) -> State:
         """Return also the link."""
-        return super().state() | {"link": self._link}
+        return {**super().state(), "link": Rows(self.motion.body.local.nodes, self._link)}
 
-    def restore(self, state: dict[str, Any]) -> None:
-        """Continue from what ``state`` returned."""
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Continue from the values of what ``state`` returned."""
         super().restore(state)
         self._link[:] = state["link"]

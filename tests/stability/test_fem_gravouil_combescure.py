@@ -8,6 +8,7 @@ from fem.coupling.scheme import scheme_of
 from fem.ledger import ENERGIES
 from fem.materials.library import SAC405
 from fem.materials.roles import Materials
+from fem.portable import values
 from fem.tie import net_load
 from tests.support.fem_bodies import dns_body, motion_of
 from tests.support.fem_coupled import Coupled, bodies_of
@@ -74,11 +75,11 @@ def test_interface_takes_exactly_what_is_missing(pair):
 
 def test_smooth_motion_is_damped_little():
     """Modes that the board resolves, twenty windows a period and slower: damping ratio up to 1e-2."""
-    values = np.linalg.eigvals(Pair(4, 3.0, 2).coupled(LINK).matrix())
-    values = values[(np.abs(values.imag) > 1e-6) & (np.abs(values) > 0.5)]
-    angle = np.abs(np.angle(values))
+    factor = np.linalg.eigvals(Pair(4, 3.0, 2).coupled(LINK).matrix())
+    factor = factor[(np.abs(factor.imag) > 1e-6) & (np.abs(factor) > 0.5)]
+    angle = np.abs(np.angle(factor))
     slow = angle < 0.3
-    ratio = -np.log(np.abs(values[slow])) / angle[slow]
+    ratio = -np.log(np.abs(factor[slow])) / angle[slow]
     assert slow.sum() >= 10
     assert 1e-6 < ratio.max() < 1e-2
 
@@ -111,8 +112,7 @@ def test_a_run_continues_from_its_state_to_the_same_bits():
     for _ in range(20):
         first.run()
     for ours, others in zip(second.parts, first.parts, strict=True):
-        state = others.state()
-        ours.restore({name: value.copy() if isinstance(value, np.ndarray) else value for name, value in state.items()})
+        ours.restore(values(others.state()))
     for _ in range(20):
         first.run()
         second.run()

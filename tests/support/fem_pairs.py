@@ -7,7 +7,7 @@ import numpy as np
 
 from fem.body import Body
 from fem.coupling.held_velocity import Answered, HeldVelocity, Macro
-from fem.coupling.scheme import Scheme, scheme_of
+from fem.coupling.scheme import Scheme
 from fem.estimate import WindowPlan
 from fem.exchange import CutChannels
 from fem.loads import Load
