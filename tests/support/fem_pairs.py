@@ -26,7 +26,7 @@ BOARD_IMPEDANCE = float(np.sqrt(FR4.density * FR4.young_modulus_out_of_plane))
 
 @dataclass(frozen=True)
 class Pair:
-    """A board of FR4, 3 x 3 elements in plane, and a block tied to its top off the grid.
+    """A board of FR4 and a block tied to its top off the grid, in a corner.
 
     Attributes:
         substeps: m that the steps of both call for.
@@ -35,6 +35,8 @@ class Pair:
         shape: Of board and block.
         free: Whether nothing holds them.
         layers: Of the board.
+        columns: Elements of the board in plane, each way.
+        height: Layers of the block.
     """
 
     substeps: int = 4
@@ -43,19 +45,21 @@ class Pair:
     shape: Literal["flat", "distorted", "curved"] = "flat"
     free: bool = False
     layers: int = 4
+    columns: int = 3
+    height: int = 2
 
     def mesh(self) -> MeshData:
-        ticks = np.arange(4) * SIZE
+        ticks = np.arange(self.columns + 1) * SIZE
         board = mesh_of(
             *grid(ticks, ticks, -THICKNESS * np.arange(self.layers, -1.0, -1.0)),
             "board",
-            {"board_side": on(2, 0.0)} | ({} if self.free else {"mounting_holes": on(0, 3 * SIZE)}),
+            {"board_side": on(2, 0.0)} | ({} if self.free else {"mounting_holes": on(0, ticks[-1])}),
         )
         cells = int(np.clip(round(self.ratio), 1, 4))
         side = 0.13 * SIZE + np.arange(cells + 1) * SIZE / self.ratio
-        height = 2 * THICKNESS / self.ratio
-        sets = {"foot@A1": on(2, 0.0), "pad_board@A1": on(2, 0.0), "pad_package@A1": on(2, height)}
-        block = mesh_of(*grid(side, side, np.linspace(0.0, height, 3)), "solder@A1", sets)
+        levels = np.arange(self.height + 1) * THICKNESS / self.ratio
+        sets = {"foot@A1": on(2, 0.0), "pad_board@A1": on(2, 0.0), "pad_package@A1": on(2, levels[-1])}
+        block = mesh_of(*grid(side, side, levels), "solder@A1", sets)
         return shaped(append([board, block]), self.shape)
 
     def materials(self) -> Materials:

@@ -1,0 +1,28 @@
+"""The scheme that a scene calls for, with its reason."""
+
+import pytest
+
+from fem.coupling.choice import choose_scheme
+from fem.coupling.one_way import OneWay
+from fem.coupling.scheme import scheme_of
+
+
+@pytest.mark.parametrize(
+    "elastic, buffer_possible, scheme, reason",
+    [
+        (True, True, "local_steps", "linear elastic"),
+        (True, False, "local_steps", "linear elastic"),
+        (False, True, "held_velocity", "depends on its path; layers of board fit"),
+        (False, False, "gravouil_combescure", "no two layers of board fit"),
+    ],
+)
+def test_scheme_follows_the_scene(elastic, buffer_possible, scheme, reason):
+    choice = choose_scheme(elastic, buffer_possible)
+    assert choice.scheme == scheme
+    assert reason in choice.why
+
+
+def test_every_scheme_is_made_in_an_order_of_both_models():
+    for name in ("held_velocity", "local_steps", "gravouil_combescure"):
+        assert sorted(scheme_of(name).order) == ["macro", "meso"]
+    assert isinstance(scheme_of("held_velocity", "one_way"), OneWay)
