@@ -1,4 +1,4 @@
-"""One way: a fine block is driven by a board with a coarse one; it answers nothing, and each energy balance is closed."""
+"""One way: a fine block driven by a board with a coarse one; nothing comes back, and each energy balance is closed."""
 
 from dataclasses import replace
 
