@@ -6,7 +6,6 @@ of slaves, masters and weights.
 
 from numba import njit
 
-from fem.kernels.hexahedron import FINITE
 from fem.kernels.motion import gather_from_slaves, spread_to_slaves
 
 
@@ -20,50 +19,61 @@ def begin_substeps(rows, values, state):
 
 
 @njit(cache=True)
-def end_substeps(rows, state, values):
-    """Add the sum of a level's forces to rows of ``values``."""
-    for i in range(len(rows)):
+def gather_force(weight, tie, state):
+    """Add the weighted force of the slaves to their sum, then move the force to their masters."""
+    slave, force, total = tie[0], state[1], state[2]
+    for i in range(len(slave)):
         for c in range(3):
-            values[rows[i], c] += state[2, i, c]
+            total[slave[i], c] += weight * force[slave[i], c]
+    gather_from_slaves(slave, tie[1], tie[2], force)
 
 
-@njit(cache=True, fastmath=FINITE)
-def add_weighted(weight, force, total):
-    """Add ``weight`` times a force ``(n, 3)`` to a sum."""
-    part, whole = force.reshape(-1), total.reshape(-1)
-    for i in range(len(part)):
-        whole[i] += weight * part[i]
-
-
-@njit(cache=True)
-def collect_force(weight, tie, state):
-    """Add the weighted force to the sum as it is, then move the slaves' part of it to their masters."""
-    add_weighted(weight, state[1], state[2])
-    gather_from_slaves(tie[0], tie[1], tie[2], state[1])
-
-
-@njit(cache=True, fastmath=FINITE)
-def move_free(coefficients, inverse, change, state):
-    """Change the displacement of the free nodes, the first ones, by d = memory d + rate DT^2 f / m.
+@njit(cache=True)  # see kernels.motion.advance
+def take_substep(coefficients, tie, inverse, change, state):
+    """Add the weighted force to the sum and zero it; move the free nodes, the first ones, and the slaves with them.
 
     Args:
-        coefficients: memory and rate, see ``levels.chebyshev.Substeps``.
+        coefficients: memory, rate, weight, see ``levels.chebyshev.Substeps``.
+        tie: See above.
         inverse: ``(nf, 3)`` DT^2 / m [s^2/kg], zero where a component is held.
-        change: ``(nf, 3)`` [m], d.
+        change: ``(nf, 3)`` [m], of the displacement in the substep before, then in this one.
         state: See above.
     """
-    memory, rate = coefficients
+    memory, rate, weight = coefficients
     factor, step = inverse.reshape(-1), change.reshape(-1)
-    displacement, force = state[0].reshape(-1), state[1].reshape(-1)
+    displacement, force, total = state[0].reshape(-1), state[1].reshape(-1), state[2].reshape(-1)
+    for i in range(len(factor)):
+        total[i] += weight * force[i]
     for i in range(len(factor)):
         new = memory * step[i] + rate * factor[i] * force[i]
         step[i] = new
         displacement[i] += new
+        force[i] = 0.0
+    for i in range(len(factor), len(force)):
+        total[i] += weight * force[i]
+        force[i] = 0.0
+    spread_to_slaves(tie[0], tie[1], tie[2], state[0])
 
 
 @njit(cache=True)
-def take_substep(coefficients, tie, inverse, change, state):
-    """Move the free nodes, and the slaves with them; the force is then zero. Arguments as ``move_free``."""
-    move_free(coefficients, inverse, change, state)
-    spread_to_slaves(tie[0], tie[1], tie[2], state[0])
-    state[1] = 0.0
+def end_substeps(rows, foreign, tie, state, values):
+    """Add the sum of a level's forces to rows of ``values``, where each slave has its own part of it again.
+
+    Args:
+        rows: ``(n,)`` of ``values``.
+        foreign: Free nodes whose sum over ranks another rank adds.
+        tie: See above.
+        state: See above.
+        values: ``(>= n, 3)`` [N].
+    """
+    slave, master, share = tie
+    total = state[2]
+    for i in range(len(foreign)):
+        total[foreign[i]] = 0.0
+    for i in range(len(slave)):
+        for k in range(master.shape[1]):
+            for c in range(3):
+                total[master[i, k], c] -= share[i, k] * total[slave[i], c]
+    for i in range(len(rows)):
+        for c in range(3):
+            values[rows[i], c] += total[i, c]

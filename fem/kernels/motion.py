@@ -3,16 +3,16 @@
 import numpy as np
 from numba import njit
 
-from fem.kernels.hexahedron import FINITE
-
 STRIP = 384  # degrees of freedom: whole nodes and whole vectors
 
 
-@njit(cache=True, fastmath=FINITE)
+@njit(cache=True)
 def advance(state, mobility, acceleration, step):
     """Take one step of central differences: v += dt (f / m + g), u += dt v, at free degrees of freedom.
 
-    The loop runs over strips of all components together, which fill vectors; g comes from a strip of its own.
+    The loop runs over strips of all components together, which fill vectors; g comes from a strip of its own. No
+    operation may be reordered or fused: the rest of a strip would round otherwise than its vectors, and copies of a
+    node on several ranks drift apart.
 
     Args:
         state: ``(3, n, 3)``: displacement [m], velocity half a step back [m/s], force [N].

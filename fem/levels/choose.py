@@ -11,7 +11,7 @@ from fem.errors import LevelError
 from fem.levels.chebyshev import Substeps
 from fem.tie import Tie
 
-SUBSTEP_COST = 1500.0  # updates of boxes in the time of one substep without elements (kernel calls)
+SUBSTEP_COST = 500.0  # updates of boxes in the time of one substep without elements: kernel calls, messages
 LARGEST_RATIO = 64
 ROUNDING = 1e-12
 

@@ -25,7 +25,7 @@ from fem.energy import Energy, InternalForce, linear_energy
 from fem.errors import LevelError
 from fem.exchange import SharedNodes
 from fem.force import Kinematics, linear_terms
-from fem.kernels.levels import begin_substeps, collect_force, end_substeps, take_substep
+from fem.kernels.levels import begin_substeps, end_substeps, gather_force, take_substep
 from fem.levels.chebyshev import Substeps
 from fem.local_mesh import positions
 from fem.materials.parameters import Material
@@ -63,6 +63,7 @@ class LocalSteps:
         tie: Its slaves and masters.
         shared: Its free nodes that several ranks hold.
         inverse: ``(nf, 3)`` DT^2 / m of its free nodes [s^2/kg], zero for held components.
+        foreign: Those of its free nodes whose force another rank gives: the lowest that holds them.
         change: ``(nf, 3)`` [m] of the latest substep.
         state: ``(3, n, 3)``: displacement [m], force [N] there, weighted sum of forces [N]; only ``add`` reads it.
         history: Empty: the force follows from the displacement.
@@ -74,6 +75,7 @@ class LocalSteps:
     tie: Tie
     shared: SharedNodes
     inverse: NDArray[np.float64]
+    foreign: NDArray[np.int32]
     change: NDArray[np.float64]
     state: NDArray[np.float64]
     history: dict[str, NDArray] = field(default_factory=dict)
@@ -94,14 +96,13 @@ class LocalSteps:
         steps, tie = self.substeps, (self.tie.slave, self.tie.master, self.tie.weight)
         place, pull = self.state[0], self.state[1]
         begin_substeps(self.rows, displacement, self.state)
-        for k, weight in enumerate(steps.weight):
-            if k:
-                self.shared.add(pull)
-                take_substep((steps.memory[k - 1], steps.rate[k - 1]), tie, self.inverse, self.change, self.state)
+        for coefficients in zip(steps.memory, steps.rate, steps.weight, strict=True):
             for term in self.terms:
                 term.add(place, pull)
-            collect_force(weight, tie, self.state)
-        end_substeps(self.rows, self.state, force)
+            gather_force(coefficients[2], tie, self.state)
+            self.shared.add(pull)
+            take_substep(coefficients, tie, self.inverse, self.change, self.state)
+        end_substeps(self.rows, self.foreign, tie, self.state, force)
 
     def energy(self, displacement: NDArray[np.float64]) -> Energy:
         """Return u . K_eff u / 2 as strain energy; collective."""
@@ -143,14 +144,16 @@ def build_level(comm: MPI.Comm, body: "Body", levels: Levels, number: int, aroun
     if number < len(levels.ratios):
         inner = replace(levels, step=levels.step / levels.ratios[number - 1])
         terms.append(build_level(comm, body, inner, number + 1, nodes))
+    shared = SharedNodes(comm, body.local.nodes[nodes[:free]])
     mass = np.where(body.mass > 0.0, body.mass, np.inf)[nodes[:free], None]
     return LocalSteps(
         rows=positions(around, nodes),
         terms=terms,
         substeps=substeps,
         tie=tie,
-        shared=SharedNodes(comm, body.local.nodes[nodes[:free]]),
+        shared=shared,
         inverse=np.where(body.free[nodes[:free]], levels.step**2 / mass, 0.0),
+        foreign=np.flatnonzero(~shared.owned).astype(np.int32),
         change=np.zeros((free, 3)),
         state=np.zeros((3, len(nodes), 3)),
     )

@@ -19,7 +19,7 @@ from tests.support.fem_models import grid, joint_mesh, mesh_of, on
 EDGE = 1.5e-3
 
 
-def joint_on_board(solder: int = 7) -> MeshData:
+def joint_on_board(solder: int = 7, edges: int = 3) -> MeshData:
     """A joint with copper pads, free at its upper end, tied to a small block of board that is held on two sides."""
     ticks = np.linspace(0, EDGE, 4)
     points, cells = grid(ticks, ticks, [-1.3e-3, -0.8e-3, -0.3e-3, -0.15e-3, 0.0])
@@ -28,7 +28,7 @@ def joint_on_board(solder: int = 7) -> MeshData:
         "symmetry_y": on(1, 0.0),
         "board_side": on(2, 0.0),
     }
-    joint = joint_mesh("A1", 0.5e-3, 0.5e-3, layers=solder)
+    joint = joint_mesh("A1", 0.5e-3, 0.5e-3, layers=solder, edges=edges)
     ends = {name: quads for name, quads in joint.facets.items() if not name.startswith("head@")}
     return append([mesh_of(points, cells, "board", facets), replace(joint, facets=ends)])
 
@@ -44,19 +44,27 @@ class Levelled:
     window: float
 
 
-def levelled(mesh: MeshData, materials: Materials, ratios: tuple[int, ...], fraction: float = 0.9) -> Levelled:
+def levelled(
+    mesh: MeshData,
+    materials: Materials,
+    ratios: tuple[int, ...],
+    fraction: float = 0.9,
+    comm: MPI.Comm = MPI.COMM_SELF,
+) -> Levelled:
     """Return a body whose smallest elements go to ``fraction`` of the largest step that the innermost level allows."""
     item = prepare(mesh, "dns")["dns"]
-    pieces = make_pieces(distribute(MPI.COMM_SELF, item.mesh), item.tables, materials)
-    steps = np.empty(len(pieces.steps))
-    steps[pieces.local.cell_numbers] = pieces.steps
+    alone = make_pieces(distribute(MPI.COMM_SELF, item.mesh), item.tables, materials)
+    steps = np.empty(len(alone.steps))
+    steps[alone.local.cell_numbers] = alone.steps
     reach = Substeps.of(ratios[-1], len(ratios)).reach
     window = fraction * min(steps.max(), steps.min() * np.prod(ratios) * reach)
     needed = governing_steps(item.mesh.cells, item.tables.tie, fraction * steps)
     level = np.sum(needed[:, None] < bounds(ratios, window), axis=1, dtype=np.int32)
-    tables, factor = replace(item.tables, level=level, ratios=ratios), np.ones(len(steps))
-    body = make_body(MPI.COMM_SELF, pieces, tables, factor, Response("small", window))
-    plain = make_body(MPI.COMM_SELF, pieces, item.tables, factor)
+    tables = replace(item.tables, level=level, ratios=ratios)
+    pieces = make_pieces(distribute(comm, item.mesh if comm.rank == 0 else None), item.tables, materials)
+    factor = np.ones(len(pieces.steps))
+    body = make_body(comm, pieces, tables, factor, Response("small", window))
+    plain = make_body(comm, pieces, item.tables, factor)
     return Levelled(body, plain, level[pieces.local.cell_numbers], ratios, window)
 
 

@@ -81,12 +81,12 @@ def package_mesh(size: float = 0.5e-3) -> MeshData:
     return without_unused_nodes(mesh)[0]
 
 
-def joint_mesh(name: str, x: float, y: float, layers: int = 4) -> MeshData:
+def joint_mesh(name: str, x: float, y: float, layers: int = 4, edges: int = 3) -> MeshData:
     """Return a box joint of solder between two copper pads, centred on (x, y)."""
-    side = np.linspace(-0.2e-3, 0.2e-3, 4)
+    side = np.linspace(-0.2e-3, 0.2e-3, edges + 1)
     height = np.concatenate([[0.0], COPPER + np.linspace(0, GAP, layers + 1), [GAP + 2 * COPPER]])
     points, cells = grid(x + side, y + side, height)
-    level = np.repeat(np.arange(layers + 2), 9)
+    level = np.repeat(np.arange(layers + 2), edges**2)
     part = np.array(["solder"] * (layers + 2), dtype=object)
     part[0], part[-1] = "copper_board", "copper_package"
     ends = {f"foot@{name}": on(2, 0.0), f"head@{name}": on(2, height[-1])}

@@ -32,3 +32,15 @@ def test_sums_over_shared_nodes_are_taken_in_the_order_of_ranks():
     exact[5] = values[5] + received[3]
     sum_in_rank_order(*rank_order(rows, ranks, 1), received, values)
     assert np.array_equal(values, exact)
+
+
+def test_a_node_moves_alike_wherever_it_stands():
+    """Copies of a node have other places on other ranks: vectors and what is left of them must round alike."""
+    random = np.random.default_rng(0)
+    state, mobility = random.uniform(-1, 1, (3, 40, 3)), random.uniform(1, 2, (40, 3))
+    whole, gravity = state.copy(), np.array([0.3, -2.0, 9.81])
+    advance(whole, mobility, gravity, 0.1)
+    for first in range(40):
+        part = state[:, first:].copy()
+        advance(part, mobility[first:].copy(), gravity, 0.1)
+        assert np.array_equal(part, whole[:, first:])

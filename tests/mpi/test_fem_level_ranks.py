@@ -1,0 +1,63 @@
+"""Ranks must not change the force of step levels, nor may copies of a node differ in a bit."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from fem.materials.roles import Materials
+from fem.motion import Motion
+from tests.support.fem_levels import joint_on_board, levelled
+
+ROOT = Path(__file__).resolve().parents[2]
+RATIOS, WINDOWS = (4, 3, 3), 20
+
+
+def march(comm: MPI.Comm) -> tuple[np.ndarray, np.ndarray]:
+    """Return input numbers of this rank's nodes and their displacements after some windows of free vibration."""
+    model = levelled(joint_on_board(), Materials(), RATIOS, comm=comm)
+    body = model.body
+    motion = Motion(body, [], model.window, np.empty(0, np.int32), np.zeros(len(body.mass)))
+    motion.launch(np.array([1.0, 0.5, -0.3]))
+    for _ in range(WINDOWS):
+        motion.advance()
+        motion.update_force()
+    return body.local.nodes, motion.displacement
+
+
+def write_march(path: str) -> None:
+    """Compare the copies of all nodes bit by bit, and write one of each."""
+    comm = MPI.COMM_WORLD
+    nodes, displacement = (comm.gather(values) for values in march(comm))
+    if comm.rank == 0:
+        found: dict[int, np.ndarray] = {}
+        for number, value in zip(np.concatenate(nodes), np.concatenate(displacement), strict=True):
+            assert np.array_equal(found.setdefault(int(number), value), value), number
+        np.save(path, np.array([found[number] for number in sorted(found)]))
+
+
+@pytest.fixture(scope="module")
+def alone() -> np.ndarray:
+    nodes, displacement = march(MPI.COMM_SELF)
+    return displacement[np.argsort(nodes)]
+
+
+@pytest.mark.parametrize("ranks", [2, 4])
+def test_displacements_are_the_same_on_more_ranks(alone, tmp_path, ranks):
+    path = tmp_path / "march.npy"
+    code = f"from tests.mpi.test_fem_level_ranks import write_march; write_march({str(path)!r})"
+    done = subprocess.run(
+        ["mpirun", "--allow-run-as-root", "--oversubscribe", "-n", str(ranks), sys.executable, "-c", code],
+        cwd=ROOT,
+        env=os.environ | {"PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"},
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert np.abs(np.load(path) - alone).max() <= 1e-10 * np.abs(alone).max()

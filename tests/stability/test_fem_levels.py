@@ -1,0 +1,130 @@
+"""Step levels must not grow: the largest eigenvalue of DT^2 M^-1 K_eff is at most 4, the smallest at least 0.
+
+K_eff is symmetric, so this is the spectral radius 1 of a step of leapfrog. On chains of random elements, whose levels
+change every few elements and whose steps are just those of their level, the rule for nu is tried against others.
+"""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from fem.levels import chebyshev
+from fem.levels.chebyshev import Substeps
+from fem.levels.choose import bounds, governing_steps
+from fem.materials.library import SAC405
+from fem.materials.parameters import Isotropic
+from fem.materials.roles import Materials
+from fem.motion import Motion
+from fem.power_iteration import highest_frequency
+from fem.tie import Tie
+from tests.support.fem_levels import joint_on_board, levelled
+
+ELEMENTS, SAMPLES = 12, 60
+CELLS = np.column_stack([np.arange(ELEMENTS), np.arange(1, ELEMENTS + 1)]).astype(np.int32)
+RATIOS = [(2,), (3,), (7,), (40,), (2, 2), (3, 2), (10, 4), (2, 2, 2), (5, 2, 3), (3, 3, 3), (3, 2, 3, 2)]
+
+
+def chain_stiffness(levels: np.ndarray, stiffness: np.ndarray, chosen: int) -> np.ndarray:
+    """Return the stiffness of the elements of one level of a chain."""
+    matrix = np.zeros((ELEMENTS + 1, ELEMENTS + 1))
+    for e in np.flatnonzero(levels == chosen):
+        matrix[e : e + 2, e : e + 2] += stiffness[e] * np.array([[1.0, -1.0], [-1.0, 1.0]])
+    return matrix
+
+
+def chain_effective(
+    levels: np.ndarray, stiffness: np.ndarray, mass: np.ndarray, ratios: tuple[int, ...], step: float
+) -> np.ndarray:
+    """Return K_eff of a chain by the substeps themselves, all columns at a time."""
+
+    def effective(number: int, around: float) -> np.ndarray:
+        own = chain_stiffness(levels, stiffness, number)
+        inner = around / ratios[number - 1] if number else around
+        matrix = own + (effective(number + 1, inner) if number < len(ratios) else 0.0)
+        if number == 0:
+            return matrix
+        outer = np.zeros(ELEMENTS + 1, dtype=bool)
+        outer[CELLS[levels < number]] = True
+        steps, place = Substeps.of(ratios[number - 1], number), np.eye(ELEMENTS + 1)
+        change, total = np.zeros_like(place), np.zeros_like(place)
+        for memory, rate, weight in zip(steps.memory, steps.rate, steps.weight, strict=True):
+            force = matrix @ place
+            total += weight * force
+            change = memory * change - rate * around**2 * np.where(outer, 0.0, 1.0 / mass)[:, None] * force
+            place = place + change
+        return total
+
+    return effective(0, step)
+
+
+def extreme_eigenvalues(random: np.random.Generator, ratios: tuple[int, ...], fraction: float) -> tuple[float, float]:
+    """Return the smallest and the largest eigenvalue of DT^2 M^-1 K_eff of a random chain; DT is ``fraction``."""
+    limits = np.append(bounds(ratios, 1.0), 1.0 / (np.prod(ratios) * Substeps.of(ratios[-1], len(ratios)).reach))
+    runs = random.integers(1, 7, ELEMENTS)
+    level = np.repeat(random.integers(0, len(limits), ELEMENTS), runs)[:ELEMENTS]
+    steps = limits[level] * random.uniform(1.0, random.choice([1.0 + 1e-9, 1.3, 4.0]), ELEMENTS)
+    impedance = 10.0 ** np.repeat(random.uniform(-1.0, 1.0, ELEMENTS), runs)[:ELEMENTS]
+    stiffness, mass = impedance / steps, np.zeros(ELEMENTS + 1)
+    np.add.at(mass, CELLS, 0.5 * (impedance * steps)[:, None])
+    levels = np.sum(governing_steps(CELLS, Tie.none(), steps)[:, None] < bounds(ratios, 1.0), axis=1)
+    matrix = chain_effective(levels, stiffness, mass, ratios, fraction)
+    assert np.abs(matrix - matrix.T).max() <= 1e-9 * np.abs(matrix).max()
+    values = np.linalg.eigvalsh(fraction**2 * (matrix + matrix.T) / (2.0 * np.sqrt(np.outer(mass, mass))))
+    return values[0], values[-1]
+
+
+def grown(fraction: float, ratios: tuple[int, ...]) -> int:
+    """Return how many of some random chains grow."""
+    random = np.random.default_rng(sum(ratios))
+    found = [extreme_eigenvalues(random, ratios, fraction) for _ in range(SAMPLES)]
+    return sum(high > 4.0 or low < -1e-9 * 4.0 for low, high in found)
+
+
+@pytest.mark.parametrize("fraction", [0.5, 0.9, 0.95])
+@pytest.mark.parametrize("ratios", RATIOS, ids=str)
+def test_random_chains_do_not_grow(fraction, ratios):
+    assert grown(fraction, ratios) == 0
+
+
+def test_chains_without_stabilisation_or_with_the_same_on_all_levels_do_grow(monkeypatch):
+    monkeypatch.setattr(chebyshev, "FIRST", 0.0)
+    assert sum(grown(0.9, ratios) for ratios in RATIOS) > 0
+    monkeypatch.setattr(chebyshev, "FIRST", 0.15)
+    monkeypatch.setattr(chebyshev, "GROWTH", 1.0)
+    assert sum(grown(0.9, ratios) for ratios in RATIOS if len(ratios) > 1) > 0
+
+
+def of_impedance(ratio: float) -> Isotropic:
+    """Return solder as stiff and heavy as ``ratio`` times, with its wave speed."""
+    return Isotropic(
+        density=ratio * SAC405.density, young_modulus=ratio * SAC405.young_modulus, poisson_ratio=SAC405.poisson_ratio
+    )
+
+
+@pytest.mark.parametrize("impedance", [0.1, 1.0, 10.0])
+@pytest.mark.parametrize("ratios", [(2,), (12,), (40,), (7, 3), (4, 3, 3)], ids=str)
+def test_joint_tied_to_a_board_does_not_grow(impedance, ratios):
+    model = levelled(joint_on_board(), Materials(solder=of_impedance(impedance)), ratios)
+    body = model.body
+    assert highest_frequency(MPI.COMM_SELF, body, body.terms, body.mass).critical_step >= model.window
+
+
+@pytest.mark.parametrize("edges", [1, 3, 6], ids=["ratio 1.2", "ratio 3.8", "ratio 7.5"])
+def test_mesh_ratios_do_not_grow(edges):
+    model = levelled(joint_on_board(solder=5, edges=edges), Materials(), (6, 3))
+    body = model.body
+    assert highest_frequency(MPI.COMM_SELF, body, body.terms, body.mass).critical_step >= model.window
+
+
+def test_energy_stays_over_many_windows():
+    model = levelled(joint_on_board(solder=4), Materials(), (5, 3))
+    body = model.body
+    motion = Motion(body, [], model.window, np.empty(0, np.int32), np.zeros(len(body.mass)))
+    motion.launch(np.array([1.0, 0.5, -0.3]))
+    found = []
+    for _ in range(50):
+        found.append(motion.kinetic_energy() + motion.internal_energy().strain)
+        for _ in range(200):
+            motion.advance()
+            motion.update_force()
+    assert np.ptp(found) <= 1e-10 * found[0]
