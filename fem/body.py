@@ -7,7 +7,7 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from fem.elements.element import Elements, critical_steps, element_geometry, element_kind, lumped_mass
+from fem.elements.element import Elements, critical_steps, element_geometry, lumped_mass
 from fem.elements.hexahedron import HEXAHEDRON
 from fem.elements.kind import Geometry
 from fem.errors import MassError, RankError
@@ -15,9 +15,10 @@ from fem.exchange import SharedNodes
 from fem.force import ForceTerm, Kinematics, force_terms, linear_terms
 from fem.levels.force import Levels, LocalSteps, check_elastic
 from fem.local_mesh import LocalMesh
-from fem.materials.elasticity import elasticity_matrix, materials_of_parts
+from fem.materials.elasticity import materials_of_parts
 from fem.materials.parameters import Material
 from fem.materials.roles import Materials
+from fem.mesh_elements import elements_of
 from fem.scene import Tables
 from fem.tie import Tie
 
@@ -110,14 +111,7 @@ def make_pieces(
     local = local.with_nodes(*masters_of(local, tables))
     number = tables.part[local.cell_numbers]
     names, assigned = materials_of_parts(tables.part_names, materials)
-    elements = Elements(
-        points=local.points,
-        cells=local.cells,
-        material=number,
-        elasticity=np.array([elasticity_matrix(material) for material in assigned]),
-        density=np.array([material.density for material in assigned])[number],
-        kind=element_kind(local.cells.shape[1], formulation),
-    )
+    elements = elements_of(local.points, local.cells, number, assigned, formulation)
     geometry = element_geometry(elements.points, elements.cells)
     steps = critical_steps(elements, geometry.nodal_volume)
     roles = np.array(names)[number]

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from fem.errors import CutError
-from fem.mesh import MeshData, boundary_facets, cells_of_facets
+from fem.mesh import MeshData, boundary_facets
 
 MATCH = 1e-6  # of the shortest edge of the cut
 MACRO, PATCH = "board", "board_patch"
@@ -55,29 +55,3 @@ def inner_facets(points: NDArray[np.float64], board: NDArray[np.int32], patch: N
     if not len(inner):
         raise CutError(f"no face of {PATCH} lies inside the board: there is no cut")
     return inner
-
-
-def check_buffer(mesh: MeshData, cut: NDArray[np.int32], tied: NDArray[np.int32]) -> None:
-    """Check that two layers of board elements lie between the cut and whatever is tied to the patch.
-
-    A joint on an element that touches the cut makes the window unstable (tests/stability/test_fem_window.py).
-
-    Args:
-        mesh: The meso model.
-        cut: ``(nc,)`` nodes of the cut.
-        tied: ``(nf, 4)`` nodes of the facets that carry joints.
-
-    Raises:
-        CutError: An element at the cut is not of the patch, or carries a joint.
-    """
-    touching = np.isin(mesh.cells, cut).any(axis=1)
-    foreign = {mesh.part_names[part] for part in np.unique(mesh.part[touching])} - {PATCH}
-    if foreign:
-        raise CutError(f"elements that touch the cut must belong to {PATCH}, found {', '.join(sorted(foreign))}")
-    owner = np.unique(cells_of_facets(mesh.cells, tied))
-    close = int(np.sum(touching[owner[owner >= 0]]))
-    if close:
-        raise CutError(
-            f"{close} elements under the joints touch the cut: at least two layers of board elements must lie between"
-            " (board.numerics.patch_layers >= 2, patch_margin >= 2)"
-        )

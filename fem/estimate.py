@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,7 @@ WINDOW_OVERHEAD = 3.0e-5  # [s] messages and interpreter per window, same source
 LATENCY = 1.5e-5  # [s] a message between two ranks of one machine, same source
 PULSE_STEPS = 200  # implicit steps in the shortest pulse: 3e-4 of the period of what swings twice in it
 RUN_STEPS = 1000  # implicit steps in a run, at least
+Step = TypeVar("Step", float, NDArray[np.float64])
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,15 +60,15 @@ def box_critical_step(material: Material, size: NDArray[np.float64]) -> float:
     return 1.0 / math.sqrt(max(float(normal), float(shear)) / material.density)
 
 
-def damped_critical_step(critical: float, stiffness: float) -> float:
-    """Return the critical step [s] with stiffness-proportional damping: dt (sqrt(1 + xi^2) - xi), cancelling nothing.
+def damped_critical_step(critical: Step, stiffness: float) -> Step:
+    """Return critical steps [s] with stiffness-proportional damping: dt (sqrt(1 + xi^2) - xi), cancelling nothing.
 
     Args:
-        critical: 2 / omega_max without damping [s].
+        critical: 2 / omega_max without damping [s], one or many.
         stiffness: beta [s]; the highest mode has xi = beta omega_max / 2.
     """
     ratio = stiffness / critical
-    return critical / (math.hypot(1.0, ratio) + ratio)
+    return critical / (np.hypot(1.0, ratio) + ratio)
 
 
 def window_plan(macro_step: float, meso_step: float, fraction: float, duration: float, samples: int) -> WindowPlan:

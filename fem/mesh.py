@@ -91,12 +91,16 @@ def without_unused_nodes(data: MeshData) -> tuple[MeshData, NDArray[np.int32]]:
 
 
 def select(data: MeshData, accept: Callable[[str], bool]) -> tuple[MeshData, NDArray[np.int32]]:
-    """Make the parts whose names are accepted a mesh of their own; returns as ``without_unused_nodes``.
+    """Make the parts whose names are accepted a mesh of their own; returns and errors as ``selected_cells``."""
+    return selected_cells(data, data.in_parts(accept))
+
+
+def selected_cells(data: MeshData, chosen: NDArray[np.bool_]) -> tuple[MeshData, NDArray[np.int32]]:
+    """Make the chosen cells ``(ne,)`` a mesh of their own; returns as ``without_unused_nodes``.
 
     Raises:
         MeshError: No cell is left.
     """
-    chosen = data.in_parts(accept)
     if not chosen.any():
         raise MeshError(f"no cell belongs to the chosen parts; the mesh has {', '.join(data.part_names)}")
     return without_unused_nodes(

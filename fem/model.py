@@ -1,18 +1,30 @@
-"""From input files to one model on each rank: read, check, distribute, choose steps, assemble."""
+"""From input files to one model on each rank: read, divide, distribute, assemble."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
 
 from fem import dolfinx_api
 from fem.agreement import agreed
 from fem.body import Body, Pieces, Response, make_body, make_pieces
 from fem.communicators import Communicators, Role
+from fem.coupling.checks import check_division
+from fem.coupling.divide import Rules, divide
+from fem.coupling.division import SchemeName
+from fem.coupling.whole import Treatment, survey
 from fem.inputs import RunInput
 from fem.local_mesh import distribute
+from fem.materials.elasticity import role_of_part
 from fem.mesh import MeshData
 from fem.mesh_file import read_meshes
-from fem.scene import JointTables, prepare
-from fem.steps import Steps, choose_steps
+from fem.scene import JointTables, joined, model_inputs
+from fem.steps import Steps, agreed_minimum, assembled_step, steps_of_division, undivided
 from fem.supports import HELD, SYMMETRY
+
+COARSE = "board"  # role of what velocities are held in
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,46 +35,110 @@ class Model:
     body: Body
 
 
-def build_models(comms: Communicators, request: RunInput) -> tuple[dict[Role, Model], Steps]:
-    """Read, prepare and distribute the models of this rank, and choose their steps; collective."""
-    world = comms.world
-    inputs = read_models(comms, request)
-    mine = next((mesh for mesh, _ in inputs.values() if mesh), None) if world.rank == 0 else None
+@dataclass(frozen=True, slots=True)
+class Divided:
+    """The models of a run before they are distributed.
+
+    Attributes:
+        meshes: Mesh of each model, on rank 0.
+        tables: Their tables, on every rank.
+        mass_factors: Factor ``(ne,)`` on the density of the cells of each, on every rank.
+        steps: Their steps.
+        rules: What their division followed.
+        scheme: How they are coupled.
+    """
+
+    meshes: Mapping[Role, MeshData]
+    tables: Mapping[Role, JointTables]
+    mass_factors: Mapping[Role, NDArray[np.float64]]
+    steps: Steps
+    rules: Rules
+    scheme: SchemeName
+
+
+def divided_scene(world: MPI.Comm, request: RunInput) -> Divided:
+    """Read, check and divide all meshes on rank 0, and tell the other ranks; collective.
+
+    Raises:
+        AgreedError: Meshes that do not fit; on every rank.
+    """
+    found = agreed(world, lambda: divided_on_one_rank(request) if world.rank == 0 else None)
+    told: Divided = world.bcast(replace(found, meshes={}) if found else None)
+    return found or told
+
+
+def divided_on_one_rank(request: RunInput) -> Divided:
+    """Read, check and divide all meshes; errors as ``scene``, ``coupling.checks``, ``mesh_file``."""
+    shock, numerics = request.shock, request.shock.numerics
+    whole = joined(read_meshes(request.meshes))
+    found = survey(
+        whole.mesh, request.materials, Treatment(numerics.formulation, numerics.kinematics, numerics.mass_scaled)
+    )
+    rules = Rules(
+        coupling=shock.coupling,
+        coarse=whole.mesh.in_parts(lambda name: role_of_part(name) == COARSE),
+        fraction=numerics.step_fraction,
+        stiffness=shock.damping.coefficients[1],
+        duration=shock.duration,
+        samples=numerics.history_samples,
+    )
+    division = divide(whole, found, rules)
+    steps = steps_of_division(whole, found, division, rules)
+    held = HELD if shock.method == "direct" else SYMMETRY
+    if request.mode == "dns":
+        steps = undivided(steps, float(found.step.min()), rules)
+        inputs = model_inputs(whole, "dns", held)
+    else:
+        check_division(whole, found, division, rules)
+        inputs = model_inputs(whole, division, held)
+    return Divided(
+        meshes={role: item.mesh for role, item in inputs.items()},
+        tables={role: item.tables for role, item in inputs.items()},
+        mass_factors={role: found.factor[item.cells] for role, item in inputs.items()},
+        steps=steps,
+        rules=rules,
+        scheme=division.scheme,
+    )
+
+
+def build_models(comms: Communicators, divided: Divided, request: RunInput) -> tuple[dict[Role, Model], Steps]:
+    """Distribute and assemble the models of this rank; collective.
+
+    Returns:
+        The models, and the steps: those of a DNS may be larger than what its elements allow each on its own.
+    """
+    world, numerics, tables = comms.world, request.shock.numerics, divided.tables
+    given = hand_over(comms, divided)
+    mine = next(iter(divided.meshes.values()), None)
     dolfinx_api.compile_ahead(world, mine.points[mine.cells[0]] if mine else None)
-    meshes = {role: distribute(comms.models[role], mesh) for role, (mesh, _) in inputs.items()}
-    numerics = request.shock.numerics
+    meshes = {role: distribute(comms.models[role], mesh) for role, mesh in given.items()}
 
     def pieces_of(role: Role) -> Pieces:
-        return make_pieces(meshes[role], inputs[role][1], request.materials, numerics.formulation)
+        return make_pieces(meshes[role], tables[role], request.materials, numerics.formulation)
 
     pieces = agreed(world, lambda: {role: pieces_of(role) for role in meshes})
-    candidates = {role: (pieces[role], inputs[role][1]) for role in pieces}
-    steps = choose_steps(world, candidates, request.shock, comms.models)
+    factors = {role: divided.mass_factors[role][meshes[role].cell_numbers] for role in pieces}
+    steps = divided.steps
+    if "dns" in pieces and numerics.critical_step == "power_iteration":
+        found = assembled_step(comms.models["dns"], (pieces["dns"], tables["dns"]), factors["dns"])
+        alone = agreed_minimum(world, [pieces["dns"].steps * np.sqrt(factors["dns"])])
+        steps = undivided(steps, max(found, alone), divided.rules)
     models = {}
-    for role, factor in zip(pieces, steps.mass_factors, strict=True):
-        tables, response = inputs[role][1], Response(numerics.kinematics, steps.step_of(role))
-        models[role] = Model(tables, make_body(comms.models[role], pieces[role], tables, factor, response))
+    for role, own in pieces.items():
+        response = Response(numerics.kinematics, steps.step_of(role))
+        models[role] = Model(tables[role], make_body(comms.models[role], own, tables[role], factors[role], response))
     return models, steps
 
 
-def read_models(comms: Communicators, request: RunInput) -> dict[Role, tuple[MeshData | None, JointTables]]:
-    """Read and check all meshes on rank 0, and hand each model its part.
-
-    Returns:
-        Per model of this rank: its mesh on the first rank that carries it, None on the others; its tables.
-    """
+def hand_over(comms: Communicators, divided: Divided) -> dict[Role, MeshData | None]:
+    """Return the meshes of this rank's models: None on all but the first rank that carries a model; collective."""
     world = comms.world
-    rules = HELD if request.shock.method == "direct" else SYMMETRY
-    inputs = agreed(
-        world, lambda: prepare(read_meshes(request.meshes), request.mode, rules) if world.rank == 0 else None
-    )
-    tables = world.bcast({role: item.tables for role, item in inputs.items()} if inputs else None)
-    meshes: dict[Role, MeshData | None] = dict.fromkeys(comms.models)
+    given: dict[Role, MeshData | None] = dict.fromkeys(comms.models)
     for role, first in comms.first.items():
-        if inputs and first == 0:
-            meshes[role] = inputs[role].mesh
-        elif inputs:
-            world.send(inputs[role].mesh, first)
+        if world.rank == 0 and first == 0:
+            given[role] = divided.meshes[role]
+        elif world.rank == 0:
+            world.send(divided.meshes[role], first)
         elif world.rank == first:
-            meshes[role] = world.recv(source=0)
-    return {role: (meshes[role], tables[role]) for role in comms.models}
+            given[role] = world.recv(source=0)
+    return given

@@ -11,6 +11,7 @@ from fem.agreement import agreed
 from fem.checkpoint import Checkpoints
 from fem.checkpoint_files import digest_of_files
 from fem.communicators import Communicators, Role
+from fem.coupling.division import SchemeName
 from fem.coupling.placement import Placement, admissible, check_size, shared
 from fem.coupling.scheme import scheme_of
 from fem.coupling.stopwatch import Stopwatch
@@ -23,7 +24,7 @@ from fem.inputs import RunInput
 from fem.ledger import Ledger
 from fem.march import Outputs, march
 from fem.materials.elasticity import materials_of_parts
-from fem.model import Model, build_models
+from fem.model import Model, build_models, divided_scene
 from fem.parameters import Shock
 from fem.participant import Alone, Participant, uncut_motion
 from fem.pulse import Pulse
@@ -46,13 +47,14 @@ def run(world: MPI.Comm, request: RunInput) -> None:
         EnergyError: Energies that do not balance; on every rank.
     """
     start = time.perf_counter()
+    divided = divided_scene(world, request)
     with Communicators(world, place(world, request)) as comms:
-        models, steps = build_models(comms, request)
+        models, steps = build_models(comms, divided, request)
         pulse = agreed(comms.world, lambda: shock_pulse(request.shock)).pulse
         if request.implicit:
             largest = largest_implicit_step(request.shock.duration, pulse_durations({"drop": pulse}))
             steps = replace(steps, plan=implicit_plan(steps.plan, largest))
-        crew, channels = make_crew(comms, models, steps.plan, request.shock)
+        crew, channels = make_crew(comms, models, (steps.plan, divided.scheme), request.shock)
         stopwatch = Stopwatch({role: model.body.shared.clock for role, model in models.items()}, channels)
         history = make_history(comms, models, steps, pulse, request)
         numerics, fields = request.shock.numerics, make_fields(comms, models, request)
@@ -83,9 +85,13 @@ def place(world: MPI.Comm, request: RunInput) -> Placement:
 
 
 def make_crew(
-    comms: Communicators, models: dict[Role, Model], plan: WindowPlan, shock: Shock
+    comms: Communicators, models: dict[Role, Model], chosen: tuple[WindowPlan, SchemeName], shock: Shock
 ) -> tuple[dict[Role, Participant], list[MessageClock]]:
-    """Return the participants of this rank in the order of their turns, and the clocks of channels; collective."""
+    """Return the participants of this rank in the order of their turns, and the clocks of channels; collective.
+
+    ``chosen`` are the steps of the run and its scheme.
+    """
+    plan, name = chosen
     bodies = {role: model.body for role, model in models.items()}
     loads = {
         role: shock_loads(comms.models[role], role, model.body, model.tables, shock) for role, model in models.items()
@@ -98,7 +104,7 @@ def make_crew(
     absent = np.full_like(next(iter(bodies.values())).cut, -1)
     macro, meso = (bodies[role].cut if role in bodies else absent for role in ("macro", "meso"))
     channels = CutChannels.open(comms.world, macro, meso, receiver_waits=len(comms.models) == 1)
-    scheme = scheme_of("held_velocity")
+    scheme = scheme_of(name, shock.coupling.direction)
     make = {"macro": scheme.macro, "meso": scheme.meso}
     made = {role: make[role](bodies[role], loads[role], plan, channels) for role in scheme.order if role in bodies}
     return {role: made[role] for role in comms.models}, channels.clocks

@@ -1,18 +1,21 @@
-"""From mesh files to the tables of each model: the work of one rank before anything is distributed."""
+"""From a mesh to the tables of each model: the work of one rank before anything is distributed."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.cut import MACRO, check_buffer, find_cut
-from fem.errors import MeshError
-from fem.mesh import MeshData, merge_nodes, select
+from fem.coupling.division import Division
+from fem.coupling.placement import Role
+from fem.coupling.split import Part, cut_between, part_of
+from fem.coupling.whole import Whole
+from fem.cut import find_cut
+from fem.mesh import MeshData, merge_nodes
 from fem.supports import HELD, held_components
 from fem.tie import Tie, tie_joints
-from fem.watch_table import WatchTable, centre_nodes, footprint, joint_names, watch_table
+from fem.watch_table import WatchTable, whole_watch
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,72 +64,97 @@ class JointTables(Tables):
 
 @dataclass(frozen=True, slots=True)
 class ModelInput:
-    """One model before it is distributed: its mesh and its tables."""
+    """One model before it is distributed: its mesh, its tables, its cells ``(k,)`` in numbers of the whole mesh."""
 
     mesh: MeshData
     tables: JointTables
+    cells: NDArray[np.intp]
+
+
+def joined(data: MeshData) -> Whole:
+    """Let board and patch share their nodes, and tie the joints.
+
+    Raises:
+        CutError, TieError: They do not fit.
+    """
+    macro_nodes, meso_nodes = find_cut(data)
+    return Whole(*tie_joints(merge_nodes(data, meso_nodes, macro_nodes)[0]))
 
 
 def prepare(
-    data: MeshData, mode: Literal["two_scale", "dns"], rules: Mapping[str, Sequence[int]] = HELD
-) -> dict[str, ModelInput]:
-    """Split a mesh into the models of a mode; ``rules`` say what is held, as ``supports.HELD``.
+    data: MeshData, division: Division | Literal["dns"], rules: Mapping[str, Sequence[int]] = HELD
+) -> dict[Role, ModelInput]:
+    """Join a mesh and return its models, as ``model_inputs``."""
+    return model_inputs(joined(data), division, rules)
+
+
+def model_inputs(
+    whole: Whole, division: Division | Literal["dns"], rules: Mapping[str, Sequence[int]] = HELD
+) -> dict[Role, ModelInput]:
+    """Split a mesh into its models; ``rules`` say what is held, as ``supports.HELD``.
 
     Returns:
-        ``macro`` and ``meso``, or ``dns``.
+        ``macro`` and ``meso``, or ``dns``: all of it.
 
     Raises:
-        MeshError, TieError, CutError: The mesh does not fit.
+        MeshError: A pad has no solder.
     """
-    macro_nodes, meso_nodes = find_cut(data)
-    if mode == "dns":
-        merged, number = merge_nodes(data, meso_nodes, macro_nodes)
-        return {"dns": model_input(merged, number[macro_nodes], watch_scene(merged), centre_nodes(merged), rules)}
-    if not len(macro_nodes):
-        raise MeshError(f"two_scale needs the parts {MACRO} and board_patch; the mesh has {', '.join(data.part_names)}")
-    scene, centres = watch_scene(data), centre_nodes(data)
-    macro, macro_number = select(data, MACRO.__eq__)
-    meso, meso_number = select(data, MACRO.__ne__)
-    macro_centres = np.where(centres >= 0, macro_number[centres], -1)
-    meso_centres = np.where((centres >= 0) & (macro_centres < 0), meso_number[centres], -1)
-    result = {
-        "macro": model_input(macro, macro_number[macro_nodes], scene, macro_centres, rules),
-        "meso": model_input(meso, meso_number[meso_nodes], scene, meso_centres, rules),
+    scene = Scene.of(whole, rules)
+    if division == "dns":
+        part = part_of(whole, np.ones(len(whole.mesh.cells), dtype=bool))
+        return {"dns": scene.model_input(part, np.empty(0, np.int32), (part.number, part.cell_number))}
+    macro, meso = part_of(whole, division.macro), part_of(whole, division.meso)
+    cut = cut_between(whole, macro, meso)
+    rest = np.where(macro.number < 0, meso.number, -1), np.where(macro.cell_number < 0, meso.cell_number, -1)
+    inputs: dict[Role, ModelInput] = {
+        "macro": scene.model_input(macro, cut, (macro.number, macro.cell_number)),
+        "meso": scene.model_input(meso, cut, rest),
     }
-    tables = result["meso"].tables
-    check_buffer(meso, tables.cut, np.unique(tables.tie.master, axis=0))
-    return result
+    tables = replace(inputs["meso"].tables, level=division.level[division.meso], ratios=division.ratios)
+    return inputs | {"meso": replace(inputs["meso"], tables=tables)}
 
 
-def watch_scene(data: MeshData) -> tuple[tuple[str, ...], NDArray[np.float64]]:
-    """Return what all models watch alike: joint names, and the footprint ``(2, 2)`` [m]."""
-    return joint_names(data), footprint(data)
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """What is known of a package on a board before it is split: mesh and ties, held components ``(n, 3)``, watches."""
 
+    whole: Whole
+    held: NDArray[np.bool_]
+    watch: WatchTable
 
-def model_input(
-    mesh: MeshData,
-    cut: NDArray[np.int32],
-    scene: tuple[tuple[str, ...], NDArray[np.float64]],
-    centres: NDArray[np.integer],
-    rules: Mapping[str, Sequence[int]],
-) -> ModelInput:
-    """Build the tables of one model: tie, supports, watch points."""
-    mesh, tie, moved = tie_joints(mesh)
-    held = held_components(mesh, rules)
-    held_nodes = np.flatnonzero(held.any(axis=1))
-    tables = JointTables(
-        part=mesh.part,
-        part_names=mesh.part_names,
-        tie=tie,
-        master_points=mesh.points[tie.master],
-        moved=moved,
-        held_nodes=held_nodes,
-        held=held[held_nodes],
-        cut=cut,
-        watch=watch_table(mesh, *scene, centres),
-        shaken=mesh.facet_nodes("mounting_holes"),
-        nodes=len(mesh.points),
-        level=np.zeros(len(mesh.cells), np.int32),
-        ratios=(),
-    )
-    return ModelInput(mesh, tables)
+    @classmethod
+    def of(cls, whole: Whole, rules: Mapping[str, Sequence[int]]) -> "Scene":
+        """Find out what is held and watched."""
+        return cls(whole, held_components(whole.mesh, rules), whole_watch(whole.mesh))
+
+    def model_input(
+        self, part: Part, cut: NDArray[np.integer], counted: tuple[NDArray[np.int32], NDArray[np.int32]]
+    ) -> ModelInput:
+        """Return a model with its tables.
+
+        Args:
+            part: Its part of the mesh.
+            cut: ``(nc,)`` nodes of the whole mesh that couple.
+            counted: Own numbers of the nodes ``(n,)`` and cells ``(ne,)`` that are watched and shaken in this model, -1
+                for those of another one.
+        """
+        mine = np.flatnonzero(part.number >= 0)
+        order = mine[np.argsort(part.number[mine])]
+        held_nodes = np.flatnonzero(self.held[order].any(axis=1))
+        shaken = counted[0][self.whole.mesh.facet_nodes("mounting_holes")]
+        tables = JointTables(
+            part=part.mesh.part,
+            part_names=part.mesh.part_names,
+            tie=part.tie,
+            master_points=self.whole.mesh.points[order][part.tie.master],
+            moved=self.whole.moved,
+            held_nodes=held_nodes,
+            held=self.held[order][held_nodes],
+            cut=part.number[cut],
+            nodes=part.nodes,
+            level=np.zeros(len(part.mesh.cells), np.int32),
+            ratios=(),
+            watch=self.watch.within(*counted),
+            shaken=shaken[shaken >= 0],
+        )
+        return ModelInput(part.mesh, tables, np.flatnonzero(part.cell_number >= 0))

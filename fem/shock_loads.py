@@ -65,7 +65,7 @@ def shock_loads(comm: MPI.Comm, role: Role, body: Body, tables: JointTables, sho
 
     Args:
         comm: Communicator of the model.
-        role: The meso model has no holes for a large mass to act on, and only tells its results from that frame.
+        role: A meso model without holes for a large mass to act on only tells its results from that frame.
         body: The model.
         tables: Its support nodes.
         shock: Pulse, method, gravity, damping.
@@ -74,7 +74,7 @@ def shock_loads(comm: MPI.Comm, role: Role, body: Body, tables: JointTables, sho
     made: list[Load] = [BodyAcceleration(DOWN, Constant(STANDARD_GRAVITY))] if chosen.gravity else []
     if shock.method == "direct":
         made.append(BodyAcceleration(DOWN, chosen.pulse))
-    elif role == "meso":
+    elif role == "meso" and not len(tables.shaken):
         made.append(LargeMass(np.empty(0, np.int32), np.empty(0), DOWN, chosen.pulse))
     else:
         made.append(LargeMass.build(comm, body, tables.shaken, DOWN, chosen.pulse))

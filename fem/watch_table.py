@@ -12,7 +12,7 @@ from fem.mesh import MeshData, cells_of_facets
 
 @dataclass(frozen=True, slots=True)
 class WatchTable:
-    """Watch points in input numbers.
+    """Watch points in input numbers, of a whole mesh or of one model.
 
     Attributes:
         joints: Names of the joints, the same for all models of a run.
@@ -30,15 +30,33 @@ class WatchTable:
 
     joints: tuple[str, ...]
     centres: NDArray[np.integer]
-    layer_cells: NDArray[np.int64]
+    layer_cells: NDArray[np.integer]
     layer_end: NDArray[np.int64]
     layer_joint: NDArray[np.int64]
     layer_volume: NDArray[np.float64]
     layer_area: NDArray[np.float64]
-    solder_cells: NDArray[np.int64]
+    solder_cells: NDArray[np.integer]
     solder_joint: NDArray[np.int64]
     strain_facets: NDArray[np.int32]
-    strain_cells: NDArray[np.int64]
+    strain_cells: NDArray[np.integer]
+
+    def within(self, node_number: NDArray[np.int32], cell_number: NDArray[np.int32]) -> "WatchTable":
+        """Return the part of a model, in its numbers of nodes ``(n,)`` and cells ``(ne,)``: -1 for what it has not."""
+        layer, solder = cell_number[self.layer_cells], cell_number[self.solder_cells]
+        strain = cell_number[self.strain_cells]
+        return WatchTable(
+            joints=self.joints,
+            centres=np.where(self.centres >= 0, node_number[self.centres], -1),
+            layer_cells=layer[layer >= 0],
+            layer_end=self.layer_end[layer >= 0],
+            layer_joint=self.layer_joint[layer >= 0],
+            layer_volume=self.layer_volume[layer >= 0],
+            layer_area=self.layer_area[layer >= 0],
+            solder_cells=solder[solder >= 0],
+            solder_joint=self.solder_joint[solder >= 0],
+            strain_facets=node_number[self.strain_facets[strain >= 0]],
+            strain_cells=strain[strain >= 0],
+        )
 
 
 def joint_names(mesh: MeshData) -> tuple[str, ...]:
@@ -68,38 +86,30 @@ def nearest_to_axis(points: NDArray[np.float64], nodes: NDArray[np.integer]) -> 
     return int(nodes[np.argmin(np.sum(points[nodes, :2] ** 2, axis=1))]) if len(nodes) else -1
 
 
-def watch_table(
-    mesh: MeshData, joints: tuple[str, ...], corners: NDArray[np.float64], centres: NDArray[np.integer]
-) -> WatchTable:
-    """Build the table of one model, whose mesh may hold none of the joints.
-
-    Args:
-        mesh: The model's mesh.
-        joints: Names of the joints of all models.
-        corners: ``(2, 2)`` [m] footprint inside which the board's strain is watched.
-        centres: ``(2,)`` nodes of the board's and the die's centre.
+def whole_watch(mesh: MeshData) -> WatchTable:
+    """Return the table of all that is watched in a mesh, before it is divided.
 
     Raises:
         MeshError: A pad of a joint has no solder element.
     """
-    solder = [(j, mesh.in_parts(f"solder@{name}".__eq__).nonzero()[0]) for j, name in enumerate(joints)]
-    solder = [(j, cells) for j, cells in solder if len(cells)]
-    layers = [pad_layer(mesh, joints[j], cells, end) for j, cells in solder for end in (0, 1)]
+    joints = joint_names(mesh)
+    solder = [mesh.in_parts(f"solder@{name}".__eq__).nonzero()[0] for name in joints]
+    layers = [pad_layer(mesh, joint, cells, end) for joint, cells in zip(joints, solder, strict=True) for end in (0, 1)]
     facets = mesh.facets_of("board_bottom")
-    low, high = corners
-    inside = ((mesh.points[facets][:, :, :2] >= low) & (mesh.points[facets][:, :, :2] <= high)).all(axis=(1, 2))
-    facets = facets[inside]
+    low, high = footprint(mesh)
+    facets = facets[((mesh.points[facets][:, :, :2] >= low) & (mesh.points[facets][:, :, :2] <= high)).all(axis=(1, 2))]
     empty, lengths = np.empty(0, np.int64), [len(layer[0]) for layer in layers]
+    number = np.arange(len(joints))
     return WatchTable(
         joints=joints,
-        centres=centres,
+        centres=centre_nodes(mesh),
         layer_cells=np.concatenate([layer[0] for layer in layers] or [empty]),
-        layer_end=np.repeat(np.tile([0, 1], len(solder)), lengths),
-        layer_joint=np.repeat([j for j, _ in solder for _ in (0, 1)], lengths).astype(np.int64),
+        layer_end=np.repeat(np.tile([0, 1], len(joints)), lengths),
+        layer_joint=np.repeat(np.repeat(number, 2), lengths),
         layer_volume=np.concatenate([layer[1] for layer in layers] or [np.empty(0)]),
         layer_area=np.concatenate([layer[2] for layer in layers] or [np.empty(0)]),
-        solder_cells=np.concatenate([cells for _, cells in solder] or [empty]),
-        solder_joint=np.repeat([j for j, _ in solder], [len(cells) for _, cells in solder]).astype(np.int64),
+        solder_cells=np.concatenate([*solder, empty]),
+        solder_joint=np.repeat(number, [len(cells) for cells in solder]),
         strain_facets=facets,
         strain_cells=cells_of_facets(mesh.cells, facets),
     )

@@ -8,7 +8,7 @@ from mpi4py import MPI
 from fem.communicators import Communicators
 from fem.inputs import RunInput
 from fem.march import run_window
-from fem.model import build_models
+from fem.model import build_models, divided_scene
 from fem.run import make_crew, make_history, place
 from fem.shock_loads import shock_pulse
 
@@ -27,10 +27,11 @@ class ProgramRun:
     def __init__(self, request: RunInput) -> None:
         """Build the models."""
         begin = process_time()
+        divided = divided_scene(MPI.COMM_SELF, request)
         comms = Communicators(MPI.COMM_SELF, place(MPI.COMM_SELF, request))
-        models, steps = build_models(comms, request)
+        models, steps = build_models(comms, divided, request)
         self.plan = steps.plan
-        self.crew = make_crew(comms, models, steps.plan, request.shock)
+        self.crew, _ = make_crew(comms, models, (steps.plan, divided.scheme), request.shock)
         self.elements = {role: len(model.body.local.cells) for role, model in models.items()}
         self.setup = process_time() - begin
         self.history = make_history(comms, models, steps, shock_pulse(request.shock).pulse, request)

@@ -7,12 +7,13 @@ scheme, fine elements at the cut, must be seen to fail by the same measure.
 import numpy as np
 import pytest
 
+from fem.coupling.checks import check_division
 from fem.errors import CutError
 from fem.materials.library import SAC405, SILICON
 from fem.materials.parameters import Isotropic
 from fem.materials.roles import Materials
 from fem.mesh import MeshData, append, merge_nodes
-from fem.scene import prepare
+from tests.support.fem_division import by_patch, naive, surveyed
 from tests.support.fem_models import grid, joint_mesh, mesh_of, on
 from tests.support.fem_window import Window
 
@@ -51,16 +52,17 @@ def test_window_with_two_layers_of_board_does_not_grow(solder):
 
 def test_fine_elements_at_the_cut_do_grow_when_the_window_ignores_them():
     mesh = board(np.array([-0.6e-3, -0.35e-3, -0.1e-3, -0.05e-3, 0.0]), -0.1e-3, edge=EDGE)
-    naive = Window(mesh, Materials(), fraction=0.9, watch_cut=False)
-    assert naive.plan.substeps > 1
-    assert naive.spectral_radius() > 1 + 1e-3
-    chosen = Window(mesh, Materials(), fraction=0.9)
+    ignoring = Window(mesh, Materials(), 0.9, naive)
+    assert ignoring.plan.substeps > 1
+    assert ignoring.spectral_radius() > 1 + 1e-3
+    chosen = Window(mesh, Materials(), 0.9, by_patch)
     assert chosen.spectral_radius() <= 1 + 1e-8
 
 
 def test_joint_one_layer_above_the_cut_is_refused():
+    scene = surveyed(with_joint(board(np.linspace(-1e-3, 0, 5), -0.25e-3)))
     with pytest.raises(CutError, match="at least two layers"):
-        prepare(with_joint(board(np.linspace(-1e-3, 0, 5), -0.25e-3)), "two_scale")
+        check_division(*scene[:2], by_patch(*scene), scene[2])
 
 
 def test_elements_of_other_parts_at_the_cut_are_refused():
@@ -70,5 +72,6 @@ def test_elements_of_other_parts_at_the_cut_are_refused():
     mesh = append([base, lid])
     same, lower = np.nonzero((np.abs(lid.points[:, None] - base.points) < 1e-9).all(axis=2))
     mesh, _ = merge_nodes(mesh, (same + len(base.points)).astype(np.int32), lower.astype(np.int32))
-    with pytest.raises(CutError, match="must belong to board_patch"):
-        prepare(mesh, "two_scale")
+    scene = surveyed(mesh)
+    with pytest.raises(CutError, match=r"must belong to the board, found \d+ of die"):
+        check_division(*scene[:2], by_patch(*scene), scene[2])

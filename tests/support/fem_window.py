@@ -5,34 +5,36 @@ from collections.abc import Sequence
 import numpy as np
 from mpi4py import MPI
 
-from fem.body import Pieces, make_body, make_pieces
+from fem.body import make_body, make_pieces
 from fem.coupling.held_velocity import Macro, Meso
-from fem.estimate import WindowPlan, window_plan
 from fem.exchange import CutChannels
 from fem.loads import Load
 from fem.local_mesh import distribute
 from fem.materials.roles import Materials
 from fem.mesh import MeshData
-from fem.scene import Tables, prepare
-from fem.steps import is_macro
+from fem.scene import model_inputs
+from tests.support.fem_division import Divide, divide, surveyed
 
 
 class Window:
     """Macro and meso model on one rank, taking turns."""
 
     def __init__(
-        self, mesh: MeshData, materials: Materials, fraction: float, watch_cut: bool = True, loads: Sequence[Load] = ()
+        self,
+        mesh: MeshData,
+        materials: Materials,
+        fraction: float,
+        division: Divide = divide,
+        loads: Sequence[Load] = (),
     ) -> None:
-        """Build both; ``watch_cut`` False takes the window from the macro elements alone, as a naive scheme would."""
-        pieces, tables = {}, {}
-        for role, item in prepare(mesh, "two_scale").items():
-            tables[role] = item.tables
-            pieces[role] = make_pieces(distribute(MPI.COMM_SELF, item.mesh), item.tables, materials)
-        self.plan = choose_plan(pieces, tables, fraction, watch_cut)
-        bodies = {
-            role: make_body(MPI.COMM_SELF, pieces[role], tables[role], np.ones(len(pieces[role].steps)))
-            for role in pieces
-        }
+        """Build both, from the program's division of the mesh or another one."""
+        whole, found, rules = surveyed(mesh, materials, fraction)
+        divided = division(whole, found, rules)
+        self.plan = divided.plan
+        bodies = {}
+        for role, item in model_inputs(whole, divided).items():
+            pieces = make_pieces(distribute(MPI.COMM_SELF, item.mesh), item.tables, materials)
+            bodies[role] = make_body(MPI.COMM_SELF, pieces, item.tables, np.ones(len(pieces.steps)))
         channels = CutChannels.open(MPI.COMM_SELF, bodies["macro"].cut, bodies["meso"].cut, receiver_waits=False)
         self.meso = Meso(bodies["meso"], list(loads), self.plan, channels)
         self.macro = Macro(bodies["macro"], list(loads), self.plan, channels)
@@ -79,11 +81,3 @@ class Window:
         for k, unit in enumerate(np.eye(self.size)):
             columns[:, k] = self.apply(unit)
         return float(np.abs(np.linalg.eigvals(columns)).max())
-
-
-def choose_plan(pieces: dict[str, Pieces], tables: dict[str, Tables], fraction: float, watch_cut: bool) -> WindowPlan:
-    meso = is_macro(pieces["meso"], tables["meso"]) & watch_cut
-    macro_step = min(pieces["macro"].steps.min(), pieces["meso"].steps[meso].min(initial=np.inf))
-    smallest = min(macro_step, pieces["meso"].steps.min())
-    window = fraction * macro_step
-    return window_plan(macro_step, smallest, fraction, 10 * window, 1)

@@ -9,6 +9,7 @@ from fem.materials.library import SAC405
 from fem.materials.roles import Materials
 from fem.mesh import MeshData, append
 from tests.support.fem_bodies import dns_body, motion_of
+from tests.support.fem_division import by_patch
 from tests.support.fem_models import board_mesh, small_assembly
 from tests.support.fem_window import Window
 
@@ -23,7 +24,7 @@ def board_only() -> MeshData:
 
 def test_one_substep_a_window_is_the_dns():
     """The exchange is without lag: macro and meso model with m = 1 are one model, to round-off."""
-    window = Window(board_only(), Materials(), 0.9, loads=[PULSE])
+    window = Window(board_only(), Materials(), 0.9, by_patch, [PULSE])
     assert window.plan.substeps == 1
     body, _ = dns_body(board_only())
     dns = motion_of(body, window.plan.step, [PULSE])

@@ -3,11 +3,14 @@
 import numpy as np
 import pytest
 
+from fem.coupling.checks import check_division
+from fem.coupling.divide import divide
 from fem.cut import find_cut
 from fem.errors import CutError, MeshError
 from fem.mesh import MeshData, append, boundary_facets, cells_of_facets, merge_nodes, select
 from fem.mesh_file import read_mesh
 from fem.scene import prepare
+from tests.support.fem_division import surveyed
 from tests.support.fem_models import board_mesh, grid, mesh_of, small_assembly, write_msh
 
 
@@ -88,7 +91,8 @@ def test_patch_that_does_not_match_is_an_error_with_a_place():
         find_cut(mesh)
 
 
-def test_two_scale_without_a_patch_is_an_error():
+def test_two_scale_of_what_has_nothing_fine_is_an_error():
     points, cells = grid([0, 1], [0, 1], [0, 1])
-    with pytest.raises(MeshError, match="needs the parts board and board_patch"):
-        prepare(mesh_of(points, cells, "board", {}), "two_scale")
+    scene = surveyed(mesh_of(points, cells, "board", {}))
+    with pytest.raises(CutError, match="something finer than the rest: the mesh has the parts board and 0 tied nodes"):
+        check_division(*scene[:2], divide(*scene), scene[2])

@@ -24,7 +24,7 @@ from fem.materials.roles import Materials
 from fem.mesh import append
 from fem.parameters import Ranks
 from fem.stress import principal_strain, von_mises
-from fem.watch_table import centre_nodes, footprint, joint_names, watch_table
+from fem.watch_table import centre_nodes, whole_watch
 from tests.support.fem_models import BOARD_Z, small_assembly
 
 
@@ -183,7 +183,7 @@ def test_watch_table_of_the_small_assembly():
     centres = centre_nodes(mesh)
     assert mesh.points[centres[0]] == pytest.approx([0, 0, -BOARD_Z])
     assert mesh.points[centres[1], :2] == pytest.approx([0, 0])
-    table = watch_table(mesh, joint_names(mesh), footprint(mesh), centres)
+    table = whole_watch(mesh)
     assert set(table.joints) == {"A2", "A3", "B2", "B3"}
     assert len(table.layer_cells) == 4 * 2 * 9
     assert table.layer_volume.sum() == pytest.approx(8.0)

@@ -1,0 +1,103 @@
+"""What a division must keep so that the coupled models neither grow nor stand still."""
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem.coupling.buffer import grown, touching
+from fem.coupling.divide import Rules, cut_nodes, seeds_of
+from fem.coupling.division import Division
+from fem.coupling.whole import Survey, Whole
+from fem.errors import CutError
+from fem.estimate import damped_critical_step
+
+ROUNDING = 1e-9
+
+
+def check_division(whole: Whole, survey: Survey, division: Division, rules: Rules) -> None:
+    """Check models and steps of a division.
+
+    Raises:
+        CutError: A model without cells, a step above that of its cells, a buffer that is too thin or of foreign cells.
+    """
+    for role, cells in (("macro", division.macro), ("meso", division.meso)):
+        if not cells.any():
+            raise CutError(nothing_left(role, whole, rules))
+    if division.scheme == "held_velocity" and rules.coupling.direction == "two_way":
+        check_buffer(whole, survey, division, rules)
+    check_steps(whole, survey, division, rules)
+
+
+def nothing_left(role: str, whole: Whole, rules: Rules) -> str:
+    """Say why a model has no cell, and what to do."""
+    if role == "meso":
+        return (
+            "two_scale needs something finer than the rest: the mesh has the parts"
+            f" {', '.join(whole.mesh.part_names)} and {len(whole.tie.slave)} tied nodes; mode dns computes it"
+        )
+    return (
+        f"nothing is left for the macro model: all board elements are among the {rules.coupling.buffer_layers} layers"
+        " around the joints (coupling.buffer_layers); a larger board, smaller elements or scheme = gravouil_combescure,"
+        " which needs no buffer, leave some"
+    )
+
+
+def check_buffer(whole: Whole, survey: Survey, division: Division, rules: Rules) -> None:
+    """Check that layers of board elements lie between the cut and all that is finer; errors as ``check_division``.
+
+    A joint on an element that touches the cut makes the window unstable (tests/stability/test_fem_window.py), and so do
+    stiff elements that touch it (PHYSICS 4).
+    """
+    cells = whole.mesh.cells
+    at_cut = touching(cells, cut_nodes(cells, division.meso, len(whole.mesh.points)))
+    foreign = at_cut & ~rules.coarse
+    if foreign.any():
+        roles = ", ".join(np.unique(survey.role[foreign]).tolist())
+        raise CutError(
+            f"elements that touch the cut must belong to the board, found {np.sum(foreign)} of {roles}, the first"
+            f" {place_of(whole, foreign)}: scheme = local_steps may cut there"
+        )
+    layers = rules.coupling.buffer_layers
+    close = division.macro & grown(cells, seeds_of(whole, ~rules.coarse), rules.coarse, layers)
+    if close.any():
+        raise CutError(
+            f"{np.sum(close)} elements of the macro model are too close to the joints, the first"
+            f" {place_of(whole, close)}: at least two layers of board elements must lie between"
+            f" (coupling.buffer_layers = {layers})"
+        )
+
+
+def check_steps(whole: Whole, survey: Survey, division: Division, rules: Rules) -> None:
+    """Check every step against the critical step of each element that takes it; errors as ``check_division``."""
+    critical = damped_critical_step(survey.step, rules.stiffness)
+    for name, step, cells in steps_of(whole, division):
+        above = cells & (step > (1.0 + ROUNDING) * rules.fraction * critical)
+        if above.any():
+            lowest = float(critical[above].min())
+            raise CutError(
+                f"{name} of {step:.4g} s is above step_fraction = {rules.fraction:g} of the critical step of"
+                f" {np.sum(above)} elements ({', '.join(np.unique(survey.role[above]).tolist())}), the first"
+                f" {place_of(whole, above)}: at most {rules.fraction * lowest:.4g} s is stable"
+            )
+
+
+def steps_of(whole: Whole, division: Division) -> Iterator[tuple[str, float, NDArray[np.bool_]]]:
+    """Yield the name of each step, its size [s], and the cells ``(ne,)`` whose critical steps limit it."""
+    cells, plan = whole.mesh.cells, division.plan
+    if division.scheme == "local_steps":
+        steps = plan.window / np.cumprod([1, *division.ratios])
+        for level, step in enumerate(steps.tolist()):
+            yield f"the step of level {level}", step, division.level == level
+        return
+    slow = division.macro
+    if division.scheme == "held_velocity":
+        slow = slow | touching(cells, cut_nodes(cells, division.meso, len(whole.mesh.points)))
+    yield "the window", plan.window, slow
+    yield "the step", plan.step, division.meso
+
+
+def place_of(whole: Whole, cells: NDArray[np.bool_]) -> str:
+    """Return in words where the first of some cells is."""
+    centre = whole.mesh.points[whole.mesh.cells[np.argmax(cells)]].mean(axis=0)
+    return f"near ({', '.join(f'{value:.6g}' for value in centre)}) m"

@@ -1,0 +1,37 @@
+"""The elements of a mesh with the materials of its parts."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem.elements.element import Elements, element_kind
+from fem.elements.hexahedron import HEXAHEDRON
+from fem.materials.elasticity import elasticity_matrix
+from fem.materials.parameters import Material
+
+
+def elements_of(
+    points: NDArray[np.float64],
+    cells: NDArray[np.int32],
+    part: NDArray[np.int32],
+    materials: Sequence[Material],
+    formulation: str = HEXAHEDRON.name,
+) -> Elements:
+    """Give cells the elements and the materials of their parts.
+
+    Args:
+        points: ``(n, 3)`` [m].
+        cells: ``(ne, k)`` nodes.
+        part: ``(ne,)`` part of each cell.
+        materials: Material of each part.
+        formulation: Of hexahedra, see ``element.element_kind``.
+    """
+    return Elements(
+        points=points,
+        cells=cells,
+        material=part,
+        elasticity=np.array([elasticity_matrix(material) for material in materials]),
+        density=np.array([material.density for material in materials])[part],
+        kind=element_kind(cells.shape[1], formulation),
+    )

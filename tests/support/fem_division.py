@@ -1,0 +1,43 @@
+"""Divisions of meshes for tests: the program's own, by the parts of the mesh, or as a naive scheme would."""
+
+from collections.abc import Callable
+
+from fem.coupling.divide import Rules, divide, held, two_steps
+from fem.coupling.division import Division
+from fem.coupling.whole import Survey, Treatment, Whole, survey
+from fem.materials.elasticity import role_of_part
+from fem.materials.parameters import Material
+from fem.materials.roles import Materials
+from fem.mesh import MeshData
+from fem.parameters import Coupling
+from fem.scene import joined
+
+Divide = Callable[[Whole, Survey, Rules], Division]
+DEFAULTS, TWO_WAY = Materials(), Coupling()
+DURATION = 1e-2  # [s] so long that a whole number of windows shortens none
+
+
+def surveyed(
+    mesh: MeshData,
+    materials: Materials | dict[str, Material] = DEFAULTS,
+    fraction: float = 0.9,
+    coupling: Coupling = TWO_WAY,
+) -> tuple[Whole, Survey, Rules]:
+    """Return a mesh, its survey, and the rules of its division, in which boards are coarse."""
+    whole = joined(mesh)
+    coarse = whole.mesh.in_parts(lambda name: role_of_part(name) == "board")
+    return whole, survey(whole.mesh, materials, Treatment()), Rules(coupling, coarse, fraction, 0.0, DURATION, 1)
+
+
+def by_patch(whole: Whole, found: Survey, rules: Rules) -> Division:
+    """Give the meso model the board's patch and all that is no board."""
+    return held(whole, found, rules, whole.mesh.in_parts(lambda name: name != "board"))
+
+
+def naive(whole: Whole, found: Survey, rules: Rules) -> Division:
+    """Take the window from the macro elements alone, whatever touches the cut."""
+    macro = whole.mesh.in_parts("board".__eq__)
+    return two_steps("held_velocity", rules, (macro, ~macro), (macro, found.step))
+
+
+__all__ = ["Divide", "by_patch", "divide", "naive", "surveyed"]
