@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from tests.support.fem_models import CYCLIC, grid, mesh_of, on
 
 # Peers take isotropic materials in this comparison: a board of the in-plane stiffness of FR4.
 BOARD = Isotropic(density=1910.0, young_modulus=27.9e9, poisson_ratio=0.11)
-MATERIALS = Materials(board=BOARD, substrate=BOARD, die=SILICON, copper=COPPER, solder=SAC405)
+MATERIALS = Materials(board=BOARD, substrate=BOARD, die=SILICON, copper=COPPER, solder=SAC405.elastic)
 LENGTH, WIDTH, THICKNESS, PACKAGE = 8e-3, 6e-3, 1e-3, 2e-3  # [m], of a quarter
 JOINTS = {"B2": (0.5e-3, 0.5e-3), "B3": (1.5e-3, 0.5e-3), "A2": (0.5e-3, 1.5e-3), "A3": (1.5e-3, 1.5e-3)}
 RADIUS, COPPER_THICKNESS, GAP, LAYER = 0.2e-3, 2e-5, 0.3e-3, 0.4e-3
@@ -46,7 +47,8 @@ def in_plane(length: float, refinement: int) -> np.ndarray:
 
 def lines(breaks: Sequence[float], counts: Sequence[int]) -> np.ndarray:
     """Return grid lines with ``counts`` equal elements between breaks."""
-    pieces = [np.linspace(low, high, count + 1)[:-1] for low, high, count in zip(breaks, breaks[1:], counts)]
+    gaps = zip(pairwise(breaks), counts, strict=True)
+    pieces = [np.linspace(low, high, count + 1)[:-1] for (low, high), count in gaps]
     return np.append(np.concatenate(pieces), breaks[-1])
 
 
@@ -59,7 +61,9 @@ def parts(centre: np.ndarray, top: float) -> np.ndarray:
     part[above] = np.where(z[above] < top + LAYER, "substrate", "die")
     for name, (at_x, at_y) in JOINTS.items():
         inside = (np.abs(x - at_x) < RADIUS) & (np.abs(y - at_y) < RADIUS) & (z > 0.0) & (z < top)
-        kind = np.select([z < COPPER_THICKNESS, z > COPPER_THICKNESS + GAP], ["copper_board", "copper_package"], "solder")
+        kind = np.select(
+            [z < COPPER_THICKNESS, z > COPPER_THICKNESS + GAP], ["copper_board", "copper_package"], "solder"
+        )
         part[inside] = [f"{role}@{name}" for role in kind[inside]]
     return part.astype(str)
 
