@@ -102,19 +102,8 @@ def tied_stiffness(body: Body) -> scipy.sparse.csr_matrix:
     upper = AssembledElements.build(body.elements)
     size = 3 * len(body.mass)
     half = scipy.sparse.bsr_matrix((upper.blocks, upper.columns, upper.pointer), shape=(size, size))
-    tie = tie_matrix(body)
-    half = (tie.T @ half @ tie).tocsr() if tie is not None else half.tocsr()
+    if len(body.tie.slave):
+        tie = scipy.sparse.kron(body.tie.matrix(len(body.mass)), scipy.sparse.identity(3), format="csr")
+        half = tie.T @ half @ tie
+    half = half.tocsr()
     return (half + half.T).tocsr()
-
-
-def tie_matrix(body: Body) -> scipy.sparse.csr_matrix | None:
-    """Return T ``(3 n, 3 n)``: the displacement of all nodes from that of all but slaves; None without slaves."""
-    tie, count = body.tie, len(body.mass)
-    if not len(tie.slave):
-        return None
-    rest = np.setdiff1d(np.arange(count), tie.slave)
-    row = np.concatenate([rest, np.repeat(tie.slave, tie.master.shape[1])])
-    column = np.concatenate([rest, tie.master.ravel()])
-    weight = np.concatenate([np.ones(len(rest)), tie.weight.ravel()])
-    nodes = scipy.sparse.coo_matrix((weight, (row, column)), shape=(count, count))
-    return scipy.sparse.kron(nodes, scipy.sparse.identity(3), format="csr")

@@ -7,6 +7,7 @@ first (a joint's end is flat, a warped substrate is not), so that rigid rotation
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy.sparse
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
@@ -42,6 +43,14 @@ class Tie:
     def gather(self, values: NDArray[np.float64]) -> None:
         """Move the slaves' rows of ``values (n, 3)`` to the masters: add N^T of them, then zero them."""
         gather_from_slaves(self.slave, self.master, self.weight, values)
+
+    def matrix(self, count: int) -> scipy.sparse.csr_matrix:
+        """Return T ``(count, count)``: the values of all nodes from those of all but slaves."""
+        rest = np.setdiff1d(np.arange(count), self.slave)
+        row = np.concatenate([rest, np.repeat(self.slave, self.master.shape[1])])
+        column = np.concatenate([rest, self.master.ravel()])
+        weight = np.concatenate([np.ones(len(rest)), self.weight.ravel()])
+        return scipy.sparse.csr_matrix((weight, (row, column)), shape=(count, count))
 
 
 def tie_joints(mesh: MeshData) -> tuple[MeshData, Tie, float]:

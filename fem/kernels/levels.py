@@ -1,12 +1,9 @@
 """Numba kernels of substeps inside a step; see ``fem.levels.force``.
 
-A level has its state in ``(3, n, 3)``: displacement [m], force [N], weighted sum of forces [N]; and its tie as a tuple
-of slaves, masters and weights.
+A level has its state in ``(3, n, 3)``: displacement [m], force [N], weighted sum of forces [N].
 """
 
 from numba import njit
-
-from fem.kernels.motion import gather_from_slaves, spread_to_slaves
 
 
 @njit(cache=True)
@@ -18,23 +15,12 @@ def begin_substeps(rows, values, state):
             state[0, i, c] = values[rows[i], c]
 
 
-@njit(cache=True)
-def gather_force(weight, tie, state):
-    """Add the weighted force of the slaves to their sum, then move the force to their masters."""
-    slave, force, total = tie[0], state[1], state[2]
-    for i in range(len(slave)):
-        for c in range(3):
-            total[slave[i], c] += weight * force[slave[i], c]
-    gather_from_slaves(slave, tie[1], tie[2], force)
-
-
-@njit(cache=True)  # see kernels.motion.advance
-def take_substep(coefficients, tie, inverse, change, state):
-    """Add the weighted force to the sum and zero it; move the free nodes, the first ones, and the slaves with them.
+@njit(cache=True)  # rounds alike wherever a node stands, see kernels.motion.advance
+def take_substep(coefficients, inverse, change, state):
+    """Add the weighted force to the sum and zero it; move the free nodes, the first ones.
 
     Args:
         coefficients: memory, rate, weight, see ``levels.chebyshev.Substeps``.
-        tie: See above.
         inverse: ``(nf, 3)`` DT^2 / m [s^2/kg], zero where a component is held.
         change: ``(nf, 3)`` [m], of the displacement in the substep before, then in this one.
         state: See above.
@@ -52,28 +38,14 @@ def take_substep(coefficients, tie, inverse, change, state):
     for i in range(len(factor), len(force)):
         total[i] += weight * force[i]
         force[i] = 0.0
-    spread_to_slaves(tie[0], tie[1], tie[2], state[0])
 
 
 @njit(cache=True)
-def end_substeps(rows, foreign, tie, state, values):
-    """Add the sum of a level's forces to rows of ``values``, where each slave has its own part of it again.
-
-    Args:
-        rows: ``(n,)`` of ``values``.
-        foreign: Free nodes whose sum over ranks another rank adds.
-        tie: See above.
-        state: See above.
-        values: ``(>= n, 3)`` [N].
-    """
-    slave, master, share = tie
+def end_substeps(rows, foreign, state, values):
+    """Add the sum of a level's forces to rows of ``values``; ``foreign`` are free nodes whose sum another rank adds."""
     total = state[2]
     for i in range(len(foreign)):
         total[foreign[i]] = 0.0
-    for i in range(len(slave)):
-        for k in range(master.shape[1]):
-            for c in range(3):
-                total[master[i, k], c] -= share[i, k] * total[slave[i], c]
     for i in range(len(rows)):
         for c in range(3):
             values[rows[i], c] += total[i, c]

@@ -20,13 +20,13 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from fem.elements.element import Elements
 from fem.energy import Energy, InternalForce, linear_energy
 from fem.errors import LevelError
 from fem.exchange import SharedNodes
-from fem.force import Kinematics, linear_terms
-from fem.kernels.levels import begin_substeps, end_substeps, gather_force, take_substep
+from fem.force import Kinematics
+from fem.kernels.levels import begin_substeps, end_substeps, take_substep
 from fem.levels.chebyshev import Substeps
+from fem.levels.tied_elements import tied_terms
 from fem.local_mesh import positions
 from fem.materials.parameters import Material
 from fem.tie import Tie
@@ -54,13 +54,13 @@ class Levels:
 class LocalSteps:
     """One level and all inside it.
 
-    Its nodes are numbered anew: first those that move (free), then its slaves and the ring.
+    Its nodes are numbered anew: first those that move (free), then the ring. Slaves are eliminated: their masters are
+    the nodes of their elements, and get all force.
 
     Attributes:
         rows: ``(n,)`` int32, its nodes among those of the level around it.
         terms: Forces at its nodes: of its own elements, and of the next level.
         substeps: Their coefficients.
-        tie: Its slaves and masters.
         shared: Its free nodes that several ranks hold.
         inverse: ``(nf, 3)`` DT^2 / m of its free nodes [s^2/kg], zero for held components.
         foreign: Those of its free nodes whose force another rank gives: the lowest that holds them.
@@ -72,7 +72,6 @@ class LocalSteps:
     rows: NDArray[np.int32]
     terms: Sequence[InternalForce]
     substeps: Substeps
-    tie: Tie
     shared: SharedNodes
     inverse: NDArray[np.float64]
     foreign: NDArray[np.int32]
@@ -92,17 +91,15 @@ class LocalSteps:
         return build_level(comm, body, levels, 1, np.arange(len(body.mass), dtype=np.int32))
 
     def add(self, displacement: NDArray[np.float64], force: NDArray[np.float64]) -> None:
-        """Subtract K_eff u from the force, of the slaves too; collective."""
-        steps, tie = self.substeps, (self.tie.slave, self.tie.master, self.tie.weight)
-        place, pull = self.state[0], self.state[1]
+        """Subtract K_eff u from the force; collective."""
+        steps, place, pull = self.substeps, self.state[0], self.state[1]
         begin_substeps(self.rows, displacement, self.state)
         for coefficients in zip(steps.memory, steps.rate, steps.weight, strict=True):
             for term in self.terms:
                 term.add(place, pull)
-            gather_force(coefficients[2], tie, self.state)
             self.shared.add(pull)
-            take_substep(coefficients, tie, self.inverse, self.change, self.state)
-        end_substeps(self.rows, self.foreign, tie, self.state, force)
+            take_substep(coefficients, self.inverse, self.change, self.state)
+        end_substeps(self.rows, self.foreign, self.state, force)
 
     def energy(self, displacement: NDArray[np.float64]) -> Energy:
         """Return u . K_eff u / 2 as strain energy; collective."""
@@ -135,12 +132,8 @@ def build_level(comm: MPI.Comm, body: "Body", levels: Levels, number: int, aroun
         around: ``(m,)`` nodes of the level around it.
     """
     nodes, free = level_nodes(body, levels.level, number)
-    elements = renumbered(body.elements, nodes)
-    slave = positions(nodes, body.tie.slave)
-    here = slave >= 0
-    tie = Tie(slave[here], positions(nodes, body.tie.master[here]), body.tie.weight[here])
+    terms = own_terms(body, levels.level == number, nodes)
     substeps = Substeps.of(levels.ratios[number - 1], number)
-    terms: list[InternalForce] = list(linear_terms(elements.subset(levels.level == number)))
     if number < len(levels.ratios):
         inner = replace(levels, step=levels.step / levels.ratios[number - 1])
         terms.append(build_level(comm, body, inner, number + 1, nodes))
@@ -150,7 +143,6 @@ def build_level(comm: MPI.Comm, body: "Body", levels: Levels, number: int, aroun
         rows=positions(around, nodes),
         terms=terms,
         substeps=substeps,
-        tie=tie,
         shared=shared,
         inverse=np.where(body.free[nodes[:free]], levels.step**2 / mass, 0.0),
         foreign=np.flatnonzero(~shared.owned).astype(np.int32),
@@ -160,27 +152,30 @@ def build_level(comm: MPI.Comm, body: "Body", levels: Levels, number: int, aroun
 
 
 def level_nodes(body: "Body", level: NDArray[np.int32], number: int) -> tuple[NDArray[np.int32], int]:
-    """Return the local nodes of the elements of a level and of those inside it, and how many of them move; collective.
+    """Return the local nodes but slaves of a level and those inside it, and how many of them move; collective.
 
     Those that move come first: no element of an outer level has them, on any rank, not even by a slave.
     """
-    used = np.zeros(len(body.mass), dtype=bool)
+    used, slaves = np.zeros(len(body.mass), dtype=bool), np.zeros(len(body.mass), dtype=bool)
     used[body.elements.cells[level >= number]] = True
+    slaves[body.tie.slave] = True
     used[body.tie.master[used[body.tie.slave]]] = True
     outer = np.zeros((len(body.mass), 3))
     outer[body.elements.cells[level < number]] = 1.0
     outer[body.cut[body.cut >= 0]] = 1.0
-    slaves = np.zeros(len(body.mass), dtype=bool)
-    slaves[body.tie.slave] = True
     body.tie.gather(outer)
     body.shared.add(outer)
-    moves = (outer[:, 0] == 0.0) & ~slaves
+    moves = outer[:, 0] == 0.0
+    used &= ~slaves
     nodes = np.concatenate([np.flatnonzero(used & moves), np.flatnonzero(used & ~moves)])
     return nodes.astype(np.int32), int(np.sum(used & moves))
 
 
-def renumbered(elements: Elements, nodes: NDArray[np.int32]) -> Elements:
-    """Return elements on some of their points; of cells with other nodes the connectivity has no meaning."""
-    number = np.full(len(elements.points), -1, np.int32)
-    number[nodes] = np.arange(len(nodes), dtype=np.int32)
-    return replace(elements, points=elements.points[nodes], cells=number[elements.cells])
+def own_terms(body: "Body", chosen: NDArray[np.bool_], nodes: NDArray[np.int32]) -> list[InternalForce]:
+    """Return the forces of some elements of a body at some of its nodes, none of them a slave."""
+    here = np.isin(body.tie.slave, body.elements.cells[chosen])
+    tie = Tie(body.tie.slave[here], body.tie.master[here], body.tie.weight[here])
+    order = np.concatenate([nodes, tie.slave])
+    elements = body.elements.subset(chosen)
+    renumbered = replace(elements, points=elements.points[order], cells=positions(order, elements.cells))
+    return tied_terms(renumbered, Tie(positions(order, tie.slave), positions(order, tie.master), tie.weight))

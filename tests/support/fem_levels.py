@@ -7,7 +7,6 @@ from mpi4py import MPI
 
 from fem.body import Body, Response, make_body, make_pieces
 from fem.elements.element import element_stiffness
-from fem.global_matrix import tie_matrix
 from fem.levels.chebyshev import Substeps, stabilisation
 from fem.levels.choose import bounds, governing_steps
 from fem.local_mesh import distribute
@@ -72,8 +71,8 @@ def dense_level_stiffness(model: Levelled, number: int) -> np.ndarray:
     for cell, stiffness in zip(elements.cells, element_stiffness(elements), strict=True):
         dofs = (3 * cell[:, None] + np.arange(3)).ravel()
         matrix[np.ix_(dofs, dofs)] += stiffness
-    tie = tie_matrix(model.body)
-    return matrix if tie is None else tie.T @ (tie.T @ matrix).T
+    tie = np.kron(model.body.tie.matrix(len(model.body.mass)).toarray(), np.eye(3))
+    return tie.T @ matrix @ tie
 
 
 def dense_effective_stiffness(model: Levelled, number: int = 0, step: float | None = None) -> np.ndarray:
