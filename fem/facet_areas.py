@@ -42,7 +42,7 @@ class OutwardFacets:
     """
 
     facets: NDArray[np.int32]
-    cells: NDArray[np.int64]
+    cells: NDArray[np.integer]
     sign: NDArray[np.float64]
 
 

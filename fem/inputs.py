@@ -7,7 +7,7 @@ from pydantic import Field, TypeAdapter
 
 from fem.materials.roles import Materials
 from fem.parameters import Parameters, Shock
-from fem.structure.parameters import StructureScene
+from fem.structure.parameters import SolverName, StructureScene
 
 UNRELATED = {"checkpoint_seconds"}  # numerics that results do not depend on
 
@@ -35,24 +35,34 @@ class RunInput(Parameters):
 
 
 class StructureInput(StructureScene):
-    """A structure and one of its solvers; SI floats. ``checkpoints`` is a folder from which a run continues."""
+    """A structure and one of its solvers; SI floats. ``checkpoints`` is a folder from which a run continues.
+
+    The solver ``dns`` is the explicit one without coupling.
+    """
 
     mode: Literal["structure"]
     mesh: Path
-    solver: Literal["explicit", "implicit"]
+    solver: SolverName
     output: Path
     checkpoints: Path | None = None
 
     @property
     def computed(self) -> str:
         """Return all that results depend on: not where they go, nor which ranks compute them."""
-        dynamics: Any = {"ranks": True, "numerics": UNRELATED}
+        ranks = {"placement", "macro_ranks"}
+        dynamics: Any = {"ranks": True, "numerics": UNRELATED, "coupling": ranks}
         return self.model_dump_json(exclude={"output": True, "checkpoints": True, "dynamics": dynamics})
+
+    @property
+    def coupled(self) -> bool:
+        """Return whether the run has two models."""
+        return self.solver == "explicit" and self.dynamics.coupling is not None
 
     @property
     def finds_modes(self) -> bool:
         """Return whether this run is the one of the scene's solvers that finds the natural modes."""
-        return self.dynamics.modes > 0 and self.solver == self.dynamics.solvers[0]
+        alone = [solver for solver in self.dynamics.solvers if solver != "explicit" or not self.dynamics.coupling]
+        return self.dynamics.modes > 0 and self.solver in alone[:1]
 
 
 # What ``python -m fem INPUT.json`` reads.

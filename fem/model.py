@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Generic
 
 import numpy as np
 from mpi4py import MPI
@@ -20,7 +21,7 @@ from fem.local_mesh import distribute
 from fem.materials.elasticity import role_of_part
 from fem.mesh import MeshData
 from fem.mesh_file import read_meshes
-from fem.scene import JointTables, joined, model_inputs
+from fem.scene import JointTables, Tables, TablesT_co, joined, model_inputs
 from fem.steps import Steps, agreed_minimum, assembled_step, steps_of_division, undivided
 from fem.supports import HELD, SYMMETRY
 
@@ -36,7 +37,7 @@ class Model:
 
 
 @dataclass(frozen=True, slots=True)
-class Divided:
+class Divided(Generic[TablesT_co]):
     """The models of a run before they are distributed.
 
     Attributes:
@@ -49,25 +50,25 @@ class Divided:
     """
 
     meshes: Mapping[Role, MeshData]
-    tables: Mapping[Role, JointTables]
+    tables: Mapping[Role, TablesT_co]
     mass_factors: Mapping[Role, NDArray[np.float64]]
     steps: Steps
     rules: Rules
     scheme: SchemeName
 
 
-def divided_scene(world: MPI.Comm, request: RunInput) -> Divided:
+def divided_scene(world: MPI.Comm, request: RunInput) -> Divided[JointTables]:
     """Read, check and divide all meshes on rank 0, and tell the other ranks; collective.
 
     Raises:
         AgreedError: Meshes that do not fit; on every rank.
     """
     found = agreed(world, lambda: divided_on_one_rank(request) if world.rank == 0 else None)
-    told: Divided = world.bcast(replace(found, meshes={}) if found else None)
+    told: Divided[JointTables] = world.bcast(replace(found, meshes={}) if found else None)
     return found or told
 
 
-def divided_on_one_rank(request: RunInput) -> Divided:
+def divided_on_one_rank(request: RunInput) -> Divided[JointTables]:
     """Read, check and divide all meshes; errors as ``scene``, ``coupling.checks``, ``mesh_file``."""
     shock, numerics = request.shock, request.shock.numerics
     whole = joined(read_meshes(request.meshes))
@@ -101,7 +102,9 @@ def divided_on_one_rank(request: RunInput) -> Divided:
     )
 
 
-def build_models(comms: Communicators, divided: Divided, request: RunInput) -> tuple[dict[Role, Model], Steps]:
+def build_models(
+    comms: Communicators, divided: Divided[JointTables], request: RunInput
+) -> tuple[dict[Role, Model], Steps]:
     """Distribute and assemble the models of this rank; collective.
 
     Returns:
@@ -130,7 +133,7 @@ def build_models(comms: Communicators, divided: Divided, request: RunInput) -> t
     return models, steps
 
 
-def hand_over(comms: Communicators, divided: Divided) -> dict[Role, MeshData | None]:
+def hand_over(comms: Communicators, divided: Divided[Tables]) -> dict[Role, MeshData | None]:
     """Return the meshes of this rank's models: None on all but the first rank that carries a model; collective."""
     world = comms.world
     given: dict[Role, MeshData | None] = dict.fromkeys(comms.models)

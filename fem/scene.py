@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Generic, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,12 +62,15 @@ class JointTables(Tables):
     shaken: NDArray[np.int32]
 
 
+TablesT_co = TypeVar("TablesT_co", bound=Tables, covariant=True)
+
+
 @dataclass(frozen=True, slots=True)
-class ModelInput:
+class ModelInput(Generic[TablesT_co]):
     """One model before it is distributed: its mesh, its tables, its cells ``(k,)`` in numbers of the whole mesh."""
 
     mesh: MeshData
-    tables: JointTables
+    tables: TablesT_co
     cells: NDArray[np.intp]
 
 
@@ -83,14 +86,14 @@ def joined(data: MeshData) -> Whole:
 
 def prepare(
     data: MeshData, division: Division | Literal["dns"], rules: Mapping[str, Sequence[int]] = HELD
-) -> dict[Role, ModelInput]:
+) -> dict[Role, ModelInput[JointTables]]:
     """Join a mesh and return its models, as ``model_inputs``."""
     return model_inputs(joined(data), division, rules)
 
 
 def model_inputs(
     whole: Whole, division: Division | Literal["dns"], rules: Mapping[str, Sequence[int]] = HELD
-) -> dict[Role, ModelInput]:
+) -> dict[Role, ModelInput[JointTables]]:
     """Split a mesh into its models; ``rules`` say what is held, as ``supports.HELD``.
 
     Returns:
@@ -106,7 +109,7 @@ def model_inputs(
     macro, meso = part_of(whole, division.macro), part_of(whole, division.meso)
     cut = cut_between(whole, macro, meso)
     rest = np.where(macro.number < 0, meso.number, -1), np.where(macro.cell_number < 0, meso.cell_number, -1)
-    inputs: dict[Role, ModelInput] = {
+    inputs: dict[Role, ModelInput[JointTables]] = {
         "macro": scene.model_input(macro, cut, (macro.number, macro.cell_number)),
         "meso": scene.model_input(meso, cut, rest),
     }
@@ -129,7 +132,7 @@ class Scene:
 
     def model_input(
         self, part: Part, cut: NDArray[np.integer], counted: tuple[NDArray[np.int32], NDArray[np.int32]]
-    ) -> ModelInput:
+    ) -> ModelInput[JointTables]:
         """Return a model with its tables.
 
         Args:

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from fem.parameters import Damping, JointCoupling, Shock
-from fem.structure.checks import Problem
+from fem.structure.problem import Problem
 
 
 def problems(shock: Shock) -> list[Problem]:

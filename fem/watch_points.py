@@ -14,7 +14,7 @@ from fem.recovery import fit, patch
 from fem.stress_recovery import StressRecovery
 
 ROUNDING = 1e-9  # of the mesh: closer than that is the same place
-Support = tuple[NDArray[np.int32], NDArray[np.bool_]]
+Support = tuple[NDArray[np.integer], NDArray[np.bool_]]
 COMPONENTS = {"displacement": 3, "velocity": 3, "strain": 6, "stress": 6, "plastic_strain": 1}
 
 
@@ -36,10 +36,10 @@ class PointTable:
     """
 
     names: tuple[str, ...]
-    nodes: NDArray[np.int64]
+    nodes: NDArray[np.integer]
     points: NDArray[np.float64]
     strain_points: NDArray[np.float64]
-    cells: NDArray[np.int64]
+    cells: NDArray[np.integer]
     owner: NDArray[np.int64]
     weight: NDArray[np.float64]
     supports: dict[str, Support]

@@ -7,6 +7,7 @@ from mpi4py import MPI
 
 from fem.communicators import Communicators
 from fem.inputs import RunInput
+from fem.march import run_window
 from fem.model import build_models, divided_scene
 from fem.run import make_crew, make_history, place
 from fem.shock_loads import shock_pulse
@@ -35,19 +36,12 @@ class ProgramRun:
         self.setup = process_time() - begin
         self.history = make_history(comms, models, steps, shock_pulse(request.shock).pulse, request)
 
-    def window(self) -> None:
-        """Go on by one window."""
-        for participant in self.crew.values():
-            participant.begin_window()
-        for participant in self.crew.values():
-            participant.finish_window()
-
     def step(self, seconds: float) -> float:
         """Go on for some simulated time; return the processor seconds of a simulated one."""
         windows = max(1, round(seconds / self.plan.window))
         begin = process_time()
         for _ in range(windows):
-            self.window()
+            run_window(self.crew)
         return (process_time() - begin) / (windows * self.plan.window)
 
     def to_end(self) -> tuple[dict[str, np.ndarray], float]:
@@ -56,7 +50,7 @@ class ProgramRun:
         seconds = 0.0
         for window in range(1, self.plan.windows + 1):
             begin = process_time()
-            self.window()
+            run_window(self.crew)
             seconds += process_time() - begin
             if window % self.plan.stride == 0 or window == self.plan.windows:
                 self.history.sample(self.crew)

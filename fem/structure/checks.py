@@ -2,9 +2,8 @@
 
 import math
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 
-from fem.names import nearest
+from fem.structure.coupling_checks import coupling_problems
 from fem.structure.parameters import (
     AXES,
     Gravity,
@@ -14,34 +13,9 @@ from fem.structure.parameters import (
     StructureLoad,
     StructureScene,
 )
+from fem.structure.problem import Problem, unknown_name
 
 ROUNDING = 1e-9  # of the box: a watch point on its surface is inside
-
-
-@dataclass(frozen=True, slots=True)
-class Problem:
-    """One impossible value.
-
-    Attributes:
-        key: Dotted key as in the case file.
-        value: What was given; None where a value is missing.
-        message: What is wrong.
-        allowed: The allowed range or names, or empty.
-        hint: The nearest valid name, or empty.
-    """
-
-    key: str
-    value: object
-    message: str
-    allowed: str = ""
-    hint: str = ""
-
-    def __str__(self) -> str:
-        parts = [f"{self.key} = {self.value}" if self.value is not None else self.key]
-        parts[0] += f": {self.message}"
-        parts += [f"allowed: {self.allowed}"] if self.allowed else []
-        parts += [f"did you mean {self.hint}?"] if self.hint else []
-        return "; ".join(parts)
 
 
 def problems(scene: StructureScene) -> list[Problem]:
@@ -54,6 +28,7 @@ def problems(scene: StructureScene) -> list[Problem]:
         *_symmetry(scene),
         *_watch(scene),
         *_dynamics(scene),
+        *coupling_problems(scene),
     ]
 
 
@@ -66,13 +41,6 @@ def check(scene: StructureScene) -> None:
     found = problems(scene)
     if found:
         raise ValueError("\n".join(str(problem) for problem in found))
-
-
-def unknown_name(key: str, name: str, valid: Iterable[str], what: str) -> Iterator[Problem]:
-    """Yield a problem where a name is not among the valid ones."""
-    names = list(valid)
-    if name not in names:
-        yield Problem(key, name, f"no such {what}", "one of " + ", ".join(names), nearest(name, names))
 
 
 def _structure(scene: StructureScene) -> Iterator[Problem]:

@@ -4,17 +4,20 @@ from dataclasses import dataclass
 
 from mpi4py import MPI
 
+from fem import dolfinx_api
 from fem.agreement import agreed
 from fem.body import Body, Pieces, Response, make_body, make_pieces
+from fem.communicators import Communicators, Role
 from fem.force import Kinematics, linear_terms
 from fem.inputs import StructureInput
 from fem.local_mesh import distribute
 from fem.mesh import MeshData
 from fem.mesh_file import read_mesh
+from fem.model import Divided, hand_over
 from fem.power_iteration import highest_frequency
 from fem.steps import Steps
 from fem.structure.steps import check_step, explicit_steps, implicit_steps, with_critical
-from fem.structure.tables import StructureTables, structure_tables
+from fem.structure.tables import StructureTables, structure_tables, tied
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,11 +47,11 @@ def build_structure(comm: MPI.Comm, request: StructureInput, pulses: list[float]
     steps = choose_steps(comm, pieces, request, pulses)
     kinematics = request.dynamics.kinematics
     model = assemble(comm, pieces, tables, steps, kinematics)
-    if request.solver == "explicit" and request.dynamics.numerics.critical_step == "power_iteration":
+    if request.solver != "implicit" and request.dynamics.numerics.critical_step == "power_iteration":
         found = highest_frequency(comm, model.body, linear_terms(model.body.elements), model.body.mass)
         # Made anew, since a law that depends on the rate knows the step.
         model = assemble(comm, pieces, tables, with_critical(steps, found.critical_step, request.dynamics), kinematics)
-    if request.solver == "explicit":
+    if request.solver != "implicit":
         check_step(request.dynamics, model.steps.smallest)
     return model
 
@@ -67,7 +70,8 @@ def read_structure(comm: MPI.Comm, request: StructureInput) -> tuple[MeshData | 
     def read() -> tuple[MeshData, StructureTables] | None:
         if comm.rank:
             return None
-        return structure_tables(read_mesh(request.mesh), request)
+        whole = tied(read_mesh(request.mesh), request)
+        return whole.mesh, structure_tables(whole, request)
 
     found = agreed(comm, read)
     return (found[0] if found else None), comm.bcast(found[1] if found else None)
@@ -78,3 +82,25 @@ def choose_steps(comm: MPI.Comm, pieces: Pieces, request: StructureInput, pulses
     if request.solver == "implicit":
         return implicit_steps(comm, pieces, request.dynamics, pulses)
     return explicit_steps(comm, pieces, request.dynamics)
+
+
+def build_coupled(
+    comms: Communicators, divided: Divided[StructureTables], request: StructureInput
+) -> dict[Role, StructureModel]:
+    """Distribute and assemble the coupled models of this rank; collective."""
+    given, tables = hand_over(comms, divided), divided.tables
+    mine = next(iter(divided.meshes.values()), None)
+    dolfinx_api.compile_ahead(comms.world, mine.points[mine.cells[0]] if mine else None)
+    meshes = {role: distribute(comms.models[role], mesh) for role, mesh in given.items()}
+
+    def pieces_of(role: Role) -> Pieces:
+        return make_pieces(meshes[role], tables[role], request.layer_materials, request.structure.formulation)
+
+    pieces = agreed(comms.world, lambda: {role: pieces_of(role) for role in meshes})
+    models = {}
+    for role, own in pieces.items():
+        factor = divided.mass_factors[role][meshes[role].cell_numbers]
+        response = Response(request.dynamics.kinematics, divided.steps.step_of(role))
+        body = make_body(comms.models[role], own, tables[role], factor, response)
+        models[role] = StructureModel(tables[role], body, divided.steps)
+    return models

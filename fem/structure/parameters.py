@@ -4,17 +4,20 @@ All values are SI floats; see ``meshing.parameters`` for what the unit strings m
 each of its items. Tables of named members are dictionaries, so that one value of one member can be set.
 """
 
+from collections.abc import Mapping
 from typing import Annotated, Literal
 
 from pydantic import Field
 
 from fem.materials.library import LIBRARY
 from fem.materials.parameters import Material
-from fem.parameters import Damping, Parameters, ServiceCondition
+from fem.parameters import Coupling, Damping, Parameters, ServiceCondition
 
 AXES = "xyz"
+SMALLER = 0.5  # of the longest step of a layer: below it a layer is fine, unless the user names those that are
 Axis = Literal["x", "y", "z"]
 Direction = tuple[float, float, float]
+SolverName = Literal["explicit", "implicit", "dns"]
 Cells = Annotated[int, Field(ge=1, le=2000)]
 
 
@@ -140,6 +143,24 @@ class WatchPoint(Parameters):
     at: Annotated[tuple[float, float, float], "mm"]
 
 
+class LayerCoupling(Coupling):
+    """Two models of a structure: fine layers, each at its own steps, and the others at the window's.
+
+    ``fine`` are layers by name; without them those whose steps are less than half of the longest. ``compare`` also runs
+    one model at the smallest step (DNS). ``macro_ranks`` are those of the other layers with ``disjoint``.
+    """
+
+    fine: tuple[str, ...] = ()
+    compare: bool = False
+    placement: Literal["auto", "disjoint", "shared"] = "auto"
+    macro_ranks: int | None = Field(None, ge=1)
+
+
+def fine_layers(coupling: LayerCoupling, steps: Mapping[str, float]) -> tuple[str, ...]:
+    """Return the fine layers of a structure, from the critical steps [s] of all its layers."""
+    return coupling.fine or tuple(name for name, step in steps.items() if step < SMALLER * max(steps.values()))
+
+
 class DynamicsNumerics(Parameters):
     """How the motion is computed; ``mass_scaled`` names layers, ``explicit_step`` goes before ``step_fraction``."""
 
@@ -165,12 +186,14 @@ class Dynamics(Parameters):
     damping: Damping = Damping()
     modes: int = Field(0, ge=0, le=200)
     ranks: int = Field(1, ge=1)
+    coupling: LayerCoupling | None = None
     numerics: DynamicsNumerics = DynamicsNumerics()
 
     @property
-    def solvers(self) -> tuple[Literal["explicit", "implicit"], ...]:
-        """Return the solvers to run, each on its own."""
-        return ("explicit", "implicit") if self.solver == "both" else (self.solver,)
+    def solvers(self) -> tuple[SolverName, ...]:
+        """Return the solvers to run, each on its own; the explicit one is the coupled one where there is a coupling."""
+        chosen: tuple[SolverName, ...] = ("explicit", "implicit") if self.solver == "both" else (self.solver,)
+        return (*chosen, "dns") if self.coupling and self.coupling.compare else chosen
 
 
 class StructureScene(Parameters):

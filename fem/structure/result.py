@@ -1,7 +1,7 @@
 """``history.npz`` and ``result.json`` of a structure."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,6 +9,7 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from fem.communicators import Communicators, Role
 from fem.factorisation import FactorCost
 from fem.fields import Fields
 from fem.history import History
@@ -30,28 +31,39 @@ class Found:
         modes: Natural modes, if this run was asked for them.
         peaks: Cell field -> layer -> largest value of an element at the times of the fields.
         factor: What the factorisation of an implicit solver took.
+        coupling: How two models are coupled, if there are two.
     """
 
     history: History
     modes: ModeTable | None
     peaks: dict[str, dict[str, float]]
     factor: FactorCost | None
+    coupling: dict[str, Any] | None
 
 
-def element_peaks(comm: MPI.Comm, fields: Fields, parts: Sequence[str]) -> dict[str, dict[str, float]]:
-    """Return the largest value of each cell field in each part over all ranks and field samples; collective."""
+def element_peaks(world: MPI.Comm, files: Iterable[Fields], parts: Sequence[str]) -> dict[str, dict[str, float]]:
+    """Return the largest value of each cell field in each part over all models and field samples; collective."""
+    found = [file.peaks for file in files]
     return {
-        field: {name: comm.allreduce(peaks.get(part, 0.0), MPI.MAX) for part, name in enumerate(parts)}
-        for field, peaks in fields.peaks.items()
+        field: {
+            name: world.allreduce(max(peaks[field].get(part, 0.0) for peaks in found), MPI.MAX)
+            for part, name in enumerate(parts)
+        }
+        for field in found[0]
     }
 
 
 def write_result(
-    comm: MPI.Comm, request: StructureInput, model: StructureModel, found: Found, timings: Timings
+    comms: Communicators,
+    request: StructureInput,
+    models: Mapping[Role, StructureModel],
+    found: Found,
+    timings: Timings,
 ) -> None:
     """Write both files on rank 0; collective."""
-    summary, history = model_summary(comm, request, model), found.history
-    if comm.rank == 0:
+    summary, history = model_summary(comms, request, models), found.history
+    model = next(iter(models.values()))
+    if comms.world.rank == 0:
         history.write(request.output)
         arrays = history.arrays()
         result = {
@@ -65,6 +77,7 @@ def write_result(
             "health": health(history, summary, request),
             "effects": effects(request, summary["added_mass"], max(found.peaks["neglected_strain"].values()))
             | strain_effect(model.tables.watch),
+            **coupling_of(found, comms, timings),
             "timings": timings.seconds,
             "balance": timings.balance,
             "continued_from": timings.first,
@@ -74,19 +87,26 @@ def write_result(
         (request.output / "result.json").write_text(json.dumps(result, indent=1))
 
 
-def model_summary(comm: MPI.Comm, request: StructureInput, model: StructureModel) -> dict[str, Any]:
+def model_summary(
+    comms: Communicators, request: StructureInput, models: Mapping[Role, StructureModel]
+) -> dict[str, Any]:
     """Return sizes, steps, masses and where the watch points are; collective, complete on all ranks."""
-    steps, watch = model.steps, model.tables.watch
+    first = next(iter(models.values()))
+    steps, watch = first.steps, first.tables.watch
+    elements, nodes = sizes(comms, models)
     return {
         "mode": "structure",
         "solver": request.solver,
         "element": request.structure.element,
         "formulation": request.structure.formulation if request.structure.element == "hexahedron" else "",
-        "ranks": comm.size,
-        "elements": comm.allreduce(len(model.body.local.cells)),
-        "nodes": model.tables.nodes,
+        "ranks": comms.world.size,
+        "placement": comms.placement.name,
+        "elements": sum(elements.values()),
+        "nodes": sum(nodes.values()) - len(first.tables.cut),
         "critical_steps": steps.critical,
         "critical_step": steps.cut,
+        "window": steps.plan.window,
+        "substeps": steps.plan.substeps,
         "step": steps.plan.step,
         "steps": steps.plan.windows * steps.plan.substeps,
         "windows": steps.plan.windows,
@@ -97,7 +117,16 @@ def model_summary(comm: MPI.Comm, request: StructureInput, model: StructureModel
             name: {"node_at": watch.points[k].tolist(), "strain_at": watch.strain_points[k].tolist()}
             for k, name in enumerate(watch.names)
         },
+        "models": elements,
     }
+
+
+def sizes(comms: Communicators, models: Mapping[Role, StructureModel]) -> tuple[dict[Role, int], dict[Role, int]]:
+    """Return the numbers of elements and of nodes of every model; collective, complete on all ranks."""
+    mine = {role: (len(model.body.local.cells), model.tables.nodes) for role, model in models.items()}
+    everyone = comms.world.allgather(mine)
+    elements = {role: sum(rank[role][0] for rank in everyone if role in rank) for role in comms.first}
+    return elements, {role: next(rank[role][1] for rank in everyone if role in rank) for role in comms.first}
 
 
 def cost_metrics(summary: dict[str, Any], timings: Timings) -> dict[str, Any]:
@@ -116,6 +145,13 @@ def cost_metrics(summary: dict[str, Any], timings: Timings) -> dict[str, Any]:
         "critical_step": quantity(summary["critical_step"], "s"),
         "element_updates_per_second": quantity(rate * summary["elements"], "1/s"),
     }
+
+
+def coupling_of(found: Found, comms: Communicators, timings: Timings) -> dict[str, Any]:
+    """Return how two models are coupled and placed; nothing where there is one."""
+    if found.coupling is None:
+        return {}
+    return {"coupling": found.coupling | {"placement": {"chosen": comms.placement.words, **timings.balance}}}
 
 
 def factor_metrics(cost: FactorCost | None) -> dict[str, Any]:

@@ -1,7 +1,10 @@
 """One run of a structure, from its mesh to its results: what every rank does, in order."""
 
 import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
@@ -9,28 +12,49 @@ from mpi4py import MPI
 from fem.agreement import agreed
 from fem.checkpoint import Checkpoints
 from fem.checkpoint_files import digest_of_files
-from fem.communicators import Communicators
-from fem.coupling.placement import shared
+from fem.communicators import Communicators, Role
+from fem.coupling.placement import Placement, admissible, shared
 from fem.coupling.stopwatch import Stopwatch
-from fem.errors import AgreedError
+from fem.exchange import MessageClock
 from fem.fields import Fields
 from fem.history import History
 from fem.implicit import ImplicitMotion
 from fem.inputs import StructureInput
 from fem.ledger import Ledger
-from fem.loads import Load
 from fem.march import Outputs, march
 from fem.materials.effects import plastic_laws
-from fem.moving import Moving
-from fem.participant import Alone, uncut_motion
+from fem.parameters import Ranks
+from fem.participant import Participant
 from fem.pulse import Pulse
 from fem.result import Timings
-from fem.structure.loads import damping_loads, structure_loads
-from fem.structure.model import StructureModel, build_structure
-from fem.structure.modes import find_modes
+from fem.structure.crew import couple_models, make_participant
+from fem.structure.divided import divided_structure
+from fem.structure.model import StructureModel, build_coupled, build_structure
+from fem.structure.modes import ModeTable, find_modes
 from fem.structure.pulses import pulse_durations, pulses_of
 from fem.structure.result import Found, element_peaks, write_result
 from fem.watch_points import PointWatch
+
+Models = Mapping[Role, StructureModel]
+
+
+@dataclass(frozen=True, slots=True)
+class Started:
+    """A run before its first step.
+
+    Attributes:
+        models: The models of this rank.
+        crew: Their participants, in the order of their turns.
+        modes: Natural modes, if the run is asked for them.
+        channels: Clocks of the channels between two models.
+        coupling: How they are coupled, for the result.
+    """
+
+    models: Models
+    crew: dict[Role, Participant]
+    modes: ModeTable | None
+    channels: Sequence[MessageClock] = ()
+    coupling: dict[str, Any] | None = None
 
 
 def run_structure(world: MPI.Comm, request: StructureInput) -> None:
@@ -42,67 +66,70 @@ def run_structure(world: MPI.Comm, request: StructureInput) -> None:
     """
     start = time.perf_counter()
     pulses = agreed(world, lambda: pulses_of(request.loads))
-    with Communicators(world, shared(("structure",), world.size)) as comms:
-        comm = comms.models["structure"]
-        model = build_structure(comm, request, pulse_durations(pulses))
-        modes = find_modes(comm, model, request)
-        structure = make_participant(comm, model, request, pulses)
-        outputs = make_outputs(comm, model, request, pulses)
-        stopwatch = Stopwatch({"structure": model.body.shared.clock})
+    with Communicators(world, place(world, request)) as comms:
+        started = (start_two if request.coupled else start_one)(comms, request, pulses)
+        models, crew = started.models, started.crew
+        outputs = make_outputs(comms, models, request, pulses)
+        stopwatch = Stopwatch({role: model.body.shared.clock for role, model in models.items()}, started.channels)
         ready = time.perf_counter()
-        output_seconds = march(comm, {"structure": structure}, outputs, stopwatch)
+        output_seconds = march(comms.world, crew, outputs, stopwatch)
         seconds = time.perf_counter() - ready - output_seconds
         first = outputs.checkpoints.continued or 0
-        balance = stopwatch.summary(comm, model.steps.plan.windows - first)
+        balance = stopwatch.summary(comms.world, next(iter(crew.values())).plan.windows - first)
         timings = Timings(ready - start, seconds, output_seconds, balance, first)
-        peaks = element_peaks(comm, outputs.fields["structure"], model.tables.part_names)
-        cost = structure.motion.factor.cost if isinstance(structure.motion, ImplicitMotion) else None
-        write_result(comm, request, model, Found(outputs.history, modes, peaks, cost), timings)
-        agreed(comm, lambda: None)
+        peaks = element_peaks(comms.world, outputs.fields.values(), next(iter(models.values())).tables.part_names)
+        motion = next(iter(crew.values())).motion
+        cost = motion.factor.cost if isinstance(motion, ImplicitMotion) else None
+        found = Found(outputs.history, started.modes, peaks, cost, started.coupling)
+        write_result(comms, request, models, found, timings)
+        agreed(comms.world, lambda: None)
 
 
-def make_participant(comm: MPI.Comm, model: StructureModel, request: StructureInput, pulses: dict[str, Pulse]) -> Alone:
-    """Return the structure with its loads and initial velocity, ready to move; collective."""
-    loads = structure_loads(comm, model.body, model.tables, request, pulses)
-    loads += damping_loads(request.dynamics.damping, model.body)
-    plan, motion = model.steps.plan, make_motion(comm, model, request, loads)
-    if any(request.dynamics.initial_velocity):
-        motion.launch(np.array(request.dynamics.initial_velocity))
-    return Alone(motion, plan)
+def place(world: MPI.Comm, request: StructureInput) -> Placement:
+    """Return which ranks carry which model."""
+    coupling = request.dynamics.coupling
+    if not request.coupled or coupling is None:
+        return shared(("structure",), world.size)
+    ranks = Ranks(total=world.size, placement=coupling.placement, macro=coupling.macro_ranks)
+    return next(admissible(ranks, np.ones(world.size).tolist()))
 
 
-def make_motion(comm: MPI.Comm, model: StructureModel, request: StructureInput, loads: list[Load]) -> Moving:
-    """Return the motion from rest by the run's solver; collective.
-
-    Raises:
-        AgreedError: There is nothing to solve for; on every rank.
-    """
-    step = model.steps.plan.step
-    if request.solver == "explicit":
-        return uncut_motion(model.body, loads, step)
-    try:
-        return ImplicitMotion(comm, model.body, loads, step, request.dynamics.numerics.hht_alpha)
-    except ValueError as error:  # of what all ranks know alike
-        raise AgreedError(f"implicit solver: {error}") from error
+def start_one(comms: Communicators, request: StructureInput, pulses: dict[str, Pulse]) -> Started:
+    """Return the only model, and its natural modes if the run is asked for them; collective."""
+    comm = comms.models["structure"]
+    model = build_structure(comm, request, pulse_durations(pulses))
+    modes = find_modes(comm, model, request)
+    return Started({"structure": model}, {"structure": make_participant(comm, model, request, pulses)}, modes)
 
 
-def make_outputs(comm: MPI.Comm, model: StructureModel, request: StructureInput, pulses: dict[str, Pulse]) -> Outputs:
+def start_two(comms: Communicators, request: StructureInput, pulses: dict[str, Pulse]) -> Started:
+    """Return the coupled models of this rank; collective."""
+    divided = divided_structure(comms.world, request)
+    models = build_coupled(comms, divided, request)
+    crew, channels = couple_models(comms, models, request, pulses, divided.scheme)
+    return Started(models, crew, None, channels, divided.coupling)
+
+
+def make_outputs(comms: Communicators, models: Models, request: StructureInput, pulses: dict[str, Pulse]) -> Outputs:
     """Open the files of a run, and name what its checkpoints depend on; collective."""
-    part = model.tables.part[model.body.local.cell_numbers]
     yields = bool(plastic_laws(request.layer_materials))
-    fields = Fields(comm, model.body, part, request.output / "structure.pvd", yields)
+    fields = {}
+    for role, model in models.items():
+        part = model.tables.part[model.body.local.cell_numbers]
+        fields[role] = Fields(comms.models[role], model.body, part, request.output / f"{role}.pvd", yields)
     tables = [Path(load.table) for load in request.loads.values() if load.table is not None]
-    inputs = request.computed, model.steps.plan, digest_of_files(request.mesh, *tables)
+    inputs = request.computed, next(iter(models.values())).steps.plan, digest_of_files(request.mesh, *tables)
     numerics = request.dynamics.numerics
-    checkpoints = Checkpoints(comm, request.checkpoints, inputs, numerics.checkpoint_seconds)
-    history = make_history(comm, model, request, pulses)
-    return Outputs(history, {"structure": fields}, numerics.field_samples, checkpoints)
+    checkpoints = Checkpoints(comms.world, request.checkpoints, inputs, numerics.checkpoint_seconds)
+    history = make_history(comms.world, models, request, pulses)
+    return Outputs(history, fields, numerics.field_samples, checkpoints)
 
 
-def make_history(comm: MPI.Comm, model: StructureModel, request: StructureInput, pulses: dict[str, Pulse]) -> History:
+def make_history(world: MPI.Comm, models: Models, request: StructureInput, pulses: dict[str, Pulse]) -> History:
     """Return the empty history of this run, with the value of each load as ``load@<name>``."""
-    plan, steps = model.steps.plan, model.steps
+    steps = next(iter(models.values())).steps
     # The balance is exact at any step, so that there is no energy too small to be judged.
-    ledger = Ledger(request.dynamics.numerics.energy_balance_limit, 0.0, plan.step, steps.cut)
+    ledger = Ledger(request.dynamics.numerics.energy_balance_limit, 0.0, steps.plan.step, steps.smallest)
     signals = {f"load@{name}": pulse.value for name, pulse in pulses.items()}
-    return History(comm, {"structure": PointWatch(model.tables.watch, model.body)}, ledger, signals)
+    watches = {role: PointWatch(model.tables.watch, model.body) for role, model in models.items()}
+    return History(world, watches, ledger, signals)

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from fem.coupling.whole import Whole
 from fem.errors import LoadError, MeshError
 from fem.facet_areas import OutwardFacets, facet_set, outward_areas, outward_facets
 from fem.materials.effects import plastic_laws
@@ -28,28 +29,36 @@ class StructureTables(Tables):
         watch: Watch points and supports.
     """
 
-    nodes_of: dict[str, NDArray[np.int32]]
-    areas: dict[str, tuple[NDArray[np.int64], NDArray[np.float64]]]
+    nodes_of: dict[str, NDArray[np.integer]]
+    areas: dict[str, tuple[NDArray[np.integer], NDArray[np.float64]]]
     pressed: dict[str, OutwardFacets]
     watch: PointTable
 
 
-def structure_tables(mesh: MeshData, scene: StructureScene) -> tuple[MeshData, StructureTables]:
-    """Tie the layers of a structure whose elements differ, and build its tables.
-
-    Returns:
-        The mesh with the slaves of the tie on their facets, and the tables.
+def tied(mesh: MeshData, scene: StructureScene) -> Whole:
+    """Tie the layers of a structure whose elements differ.
 
     Raises:
-        MeshError: Cells of another shape, layers without elements or elements without layers, watch points outside.
-        LoadError: A facet set without facets, or a prescribed motion of what is held.
+        MeshError: Cells of another shape, layers without elements or elements without layers.
         TieError: Layers whose elements differ do not touch.
     """
     check_layers(mesh, scene)
-    mesh, tie, moved_slaves = tie_joints(mesh)
+    return Whole(*tie_joints(mesh))
+
+
+def structure_tables(whole: Whole, scene: StructureScene) -> StructureTables:
+    """Build the tables of a structure.
+
+    Raises:
+        MeshError: Watch points outside.
+        LoadError: A facet set without facets, or a prescribed motion of what is held.
+    """
+    mesh, tie = whole.mesh, whole.tie
     moved = [load.on for load in scene.loads.values() if isinstance(load, PrescribedMotion)]
     sets = [*(support.on for support in scene.supports.values()), *moved]
-    nodes_of = {name: np.setdiff1d(facet_set(mesh, name), tie.slave) for name in sets}  # slaves follow their masters
+    nodes_of: dict[str, NDArray[np.integer]] = {}
+    for name in sets:  # slaves follow their masters
+        nodes_of[name] = np.setdiff1d(facet_set(mesh, name), tie.slave)
     pressed = {load.on for load in scene.loads.values() if isinstance(load, Pressure)}
     held = held_by_supports(mesh, scene)
     check_motions(scene, nodes_of, held)
@@ -59,12 +68,12 @@ def structure_tables(mesh: MeshData, scene: StructureScene) -> tuple[MeshData, S
     supports = {
         name: (nodes_of[support.on], np.isin(list(AXES), support.hold)) for name, support in scene.supports.items()
     }
-    tables = StructureTables(
+    return StructureTables(
         part=mesh.part,
         part_names=mesh.part_names,
         tie=tie,
         master_points=mesh.points[tie.master],
-        moved=moved_slaves,
+        moved=whole.moved,
         held_nodes=held_nodes,
         held=held[held_nodes],
         cut=np.empty(0, np.int32),
@@ -76,11 +85,10 @@ def structure_tables(mesh: MeshData, scene: StructureScene) -> tuple[MeshData, S
         pressed={name: outward_facets(mesh, name) for name in sorted(pressed)},
         watch=point_table(mesh, points, supports, yields=bool(plastic_laws(scene.layer_materials))),
     )
-    return mesh, tables
 
 
 def check_layers(mesh: MeshData, scene: StructureScene) -> None:
-    """Compare the cells and the parts of the mesh with elements and layers; errors as ``structure.tables``."""
+    """Compare the cells and the parts of the mesh with elements and layers; errors as ``tied``."""
     element = scene.structure.element
     if mesh.shape.nodes != NODES[element]:
         raise MeshError(
@@ -96,8 +104,8 @@ def check_layers(mesh: MeshData, scene: StructureScene) -> None:
         )
 
 
-def check_motions(scene: StructureScene, nodes_of: dict[str, NDArray[np.int32]], held: NDArray[np.bool_]) -> None:
-    """Refuse prescribed motions of held components ``(n, 3)``; errors as ``structure.tables``."""
+def check_motions(scene: StructureScene, nodes_of: dict[str, NDArray[np.integer]], held: NDArray[np.bool_]) -> None:
+    """Refuse prescribed motions of held components ``(n, 3)``; errors as ``structure_tables``."""
     for name, load in scene.loads.items():
         if not isinstance(load, PrescribedMotion):
             continue
@@ -110,8 +118,8 @@ def check_motions(scene: StructureScene, nodes_of: dict[str, NDArray[np.int32]],
             )
 
 
-def check_shaken(scene: StructureScene, nodes_of: dict[str, NDArray[np.int32]], held: NDArray[np.bool_]) -> None:
-    """Refuse a large mass on components ``(n, 3)`` that are held in space; errors as ``structure.tables``."""
+def check_shaken(scene: StructureScene, nodes_of: dict[str, NDArray[np.integer]], held: NDArray[np.bool_]) -> None:
+    """Refuse a large mass on components ``(n, 3)`` that are held in space; errors as ``structure_tables``."""
     for name in shaken_supports(scene):
         nodes = nodes_of[scene.supports[name].on]
         count = int(held[nodes].any(axis=1).sum())

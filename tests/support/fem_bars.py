@@ -8,6 +8,7 @@ import numpy as np
 from mpi4py import MPI
 
 from fem.inputs import INPUT, StructureInput
+from fem.materials.elasticity import elasticity_matrix
 from fem.materials.library import LIBRARY
 from fem.structure.run import run_structure
 from meshing.box import write_box
@@ -19,33 +20,30 @@ PEAK = 1e6  # [Pa]
 
 def speed_of(material: str) -> float:
     """Return the speed [m/s] of plane waves along z in a material of the library."""
-    from fem.materials.elasticity import elasticity_matrix
-
     return float(np.sqrt(elasticity_matrix(LIBRARY[material])[2, 2] / LIBRARY[material].density))
 
 
-def write_bar(
-    directory: Path, width: float, cells: tuple[int, int], layers: Mapping[str, dict], pulse: float, **changes
-) -> StructureInput:
+def bar_layers(*layers: tuple[str, float, int, tuple[int, int]]) -> dict[str, dict]:
+    """Return layers ``layer_0``, ``layer_1`` ... from material, thickness [m], elements along the bar and in plane."""
+    names = ("material", "thickness", "cells", "in_plane")
+    return {f"layer_{k}": dict(zip(names, layer, strict=True)) for k, layer in enumerate(layers)}
+
+
+def write_bar(directory: Path, width: float, layers: Mapping[str, dict], pulse: float, **changes) -> StructureInput:
     """Write mesh and input of a bar under a pulse [s]; ``changes`` replace or add whole tables."""
-    directory.mkdir(parents=True, exist_ok=True)
-    (directory / "out").mkdir(exist_ok=True)
-    box = Box((width, width), cells, tuple(BoxLayer(name, **_shape(layer)) for name, layer in layers.items()))
-    write_box(box, directory / "bar.msh")
-    tables = {
+    (directory / "out").mkdir(parents=True, exist_ok=True)
+    shapes = tuple(BoxLayer(name, *list(layer.values())[1:]) for name, layer in layers.items())
+    write_box(Box((width, width), (1, 1), shapes), directory / "bar.msh")
+    tables: dict = {
         "mode": "structure",
         "solver": "explicit",
-        "structure": {"length": width, "width": width, "cells": cells, "layers": dict(layers)},
+        "structure": {"length": width, "width": width, "cells": (1, 1), "layers": dict(layers)},
         "supports": HELD,
         "loads": {"push": {"kind": "pressure", "on": "z_min", "peak": PEAK, "pulse": "haversine", "duration": pulse}},
         "mesh": str(directory / "bar.msh"),
         "output": str(directory / "out"),
     }
     return INPUT.validate_json(json.dumps(tables | changes))
-
-
-def _shape(layer: dict) -> dict:
-    return {name: value for name, value in layer.items() if name != "material"}
 
 
 def run_bar(request: StructureInput, comm: MPI.Comm = MPI.COMM_SELF) -> tuple[dict, dict[str, np.ndarray]]:

@@ -13,6 +13,7 @@ from workflow.report_curves import ENERGIES, MILLI, STYLE, svg
 SOLVER_STYLE: dict[str, dict[str, Any]] = {
     "explicit": {"color": "#0b5fa5", "linestyle": "-", "linewidth": 1.6, "label": "explicit"},
     "implicit": {"color": "#d1495b", "linestyle": "--", "linewidth": 1.3, "label": "implicit"},
+    "dns": {"color": "#2a7d4f", "linestyle": ":", "linewidth": 1.6, "label": "DNS"},
 }
 COMPONENTS = {3: ("x", "y", "z"), 6: ("xx", "yy", "zz", "xy", "yz", "xz")}
 UNITS = {"displacement": "m", "velocity": "m/s", "strain": "m/m", "stress": "Pa", "reaction": "N"}

@@ -15,6 +15,8 @@ from workflow.structure.references import BarWave, Cantilever, FrequencyRange, L
 
 SOLVER_DIFFERENCE = 0.01  # of the histories of watch points, explicit against implicit, relative L2
 JUDGED = ("displacement_difference", "strain_difference")
+TWO_SCALE_ERROR = 0.01  # of the displacements of watch points, coupled models against a DNS, relative L2
+ERRORS_JUDGED = ("two_scale_displacement_error",)
 UNITS = {"wave_speed": "m/s", "tip_deflection": "m", "swing_frequency": "Hz"}
 
 Arrays = Mapping[str, NDArray]
@@ -55,11 +57,28 @@ def of_comparison(case: StructureCase, folders: Mapping[str, Path]) -> Findings:
         found, checks = compared_with_references(case, read_modes(folder), histories[solver])
         metrics |= {prefix + name: value for name, value in found.items()}
         health |= {prefix + name: value for name, value in checks.items()}
-    if len(folders) == 2:
-        differences = solver_differences(*histories.values())
+    first = next(iter(histories.values()))
+    if "implicit" in folders and len(folders) > 1:
+        differences = solver_differences(first, histories["implicit"])
         metrics |= {name: metric(value) for name, value in differences.items()}
         health |= {name: at_most(differences[name], SOLVER_DIFFERENCE) for name in JUDGED if name in differences}
+    if "dns" in folders:
+        errors = two_scale_errors(solver_differences(first, histories["dns"]))
+        metrics |= {name: metric(value) for name, value in errors.items()} | cost_ratio(folders)
+        health |= {name: at_most(errors[name], TWO_SCALE_ERROR) for name in ERRORS_JUDGED if name in errors}
     return Findings(metrics, health)
+
+
+def two_scale_errors(differences: Mapping[str, float]) -> dict[str, float]:
+    """Name differences from a DNS as what they are: errors of two scales."""
+    return {f"two_scale_{name.replace('_difference', '_error')}": value for name, value in differences.items()}
+
+
+def cost_ratio(folders: Mapping[str, Path]) -> dict:
+    """Return the wall time of a coupled run's windows over that of the DNS, on as many ranks."""
+    results = [json.loads((folders[solver] / "result.json").read_text()) for solver in ("explicit", "dns")]
+    coupled, dns = (result["timings"]["windows"] for result in results)
+    return {"two_scale_dns_time_ratio": metric(coupled / dns)}
 
 
 def read_history(folder: Path) -> dict[str, NDArray]:

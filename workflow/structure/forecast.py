@@ -27,6 +27,16 @@ class LayerForecast:
 
 
 @dataclass(frozen=True, slots=True)
+class CoupledForecast:
+    """Two models of a structure: fine layers, window [s], steps in it, predicted wall time on one core [s]."""
+
+    fine: tuple[str, ...]
+    window: float
+    substeps: int
+    seconds: float
+
+
+@dataclass(frozen=True, slots=True)
 class StructureForecast:
     """What a run will be like.
 
@@ -35,6 +45,7 @@ class StructureForecast:
         layers: layer -> size and step.
         steps: time step [s] of each solver.
         solvers: their cost on one core, and which is cheaper.
+        coupled: two models, where there are two.
         seconds: stage -> predicted wall time [s].
     """
 
@@ -42,6 +53,7 @@ class StructureForecast:
     layers: dict[str, LayerForecast]
     steps: dict[str, float]
     solvers: "SolverForecast"
+    coupled: CoupledForecast | None
     seconds: dict[str, float]
 
 
@@ -55,9 +67,27 @@ def forecast_structure(case: StructureCase) -> StructureForecast:
     counts = {solver: ceil(dynamics.duration / step) for solver, step in steps.items()}
     elements = sum(layer.elements for layer in layers.values())
     solvers = forecast_solvers(case.scene, elements, counts["explicit"], counts["implicit"])
-    cost = {"explicit": solvers.explicit.seconds / case.ranks, "implicit": solvers.implicit.seconds}
-    shock = sum(SECONDS_TO_START + cost[solver] for solver in dynamics.solvers)
-    return StructureForecast(effects(case.scene, added_mass(case, layers)), layers, steps, solvers, {"shock": shock})
+    coupled = forecast_coupled(case, layers, solvers.explicit.seconds / counts["explicit"] / elements)
+    alone = solvers.explicit.seconds / case.ranks
+    cost = {"explicit": alone, "implicit": solvers.implicit.seconds, "dns": alone}
+    cost |= {"explicit": coupled.seconds / case.ranks} if coupled else {}
+    seconds = {"shock": sum(SECONDS_TO_START + cost[solver] for solver in dynamics.solvers)}
+    return StructureForecast(effects(case.scene, added_mass(case, layers)), layers, steps, solvers, coupled, seconds)
+
+
+def forecast_coupled(case: StructureCase, layers: Mapping[str, LayerForecast], update: float) -> CoupledForecast | None:
+    """Predict window and cost of two models from the seconds of an element's update; buffers and levels left out."""
+    from fem.structure.parameters import fine_layers
+
+    coupling, dynamics = case.dynamics.coupling, case.dynamics
+    if coupling is None:
+        return None
+    fine = fine_layers(coupling, {name: layer.critical_step for name, layer in layers.items()})
+    coarse = {name: layer for name, layer in layers.items() if name not in fine}
+    window, step = (dynamics.numerics.step_fraction * critical_step(case, some) for some in (coarse, layers))
+    elements = {name: layer.elements for name, layer in layers.items()}
+    updates = sum(count * dynamics.duration / (step if name in fine else window) for name, count in elements.items())
+    return CoupledForecast(fine, window, ceil(window / step), updates * update)
 
 
 def critical_step(case: StructureCase, layers: Mapping[str, LayerForecast]) -> float:
@@ -74,8 +104,10 @@ def forecast_steps(case: StructureCase, layers: Mapping[str, LayerForecast]) -> 
     from fem.structure.pulses import pulse_durations, pulses_of
 
     numerics = case.dynamics.numerics
+    explicit = numerics.explicit_step or numerics.step_fraction * critical_step(case, layers)
     return {
-        "explicit": numerics.explicit_step or numerics.step_fraction * critical_step(case, layers),
+        "explicit": explicit,
+        "dns": explicit,
         "implicit": implicit_step(case.dynamics, pulse_durations(pulses_of(case.loads))),
     }
 

@@ -7,7 +7,7 @@ from workflow.shock_launch import run_fem
 from workflow.stage_runner import Run
 from workflow.structure.case import StructureCase
 
-SOLVERS = ("explicit", "implicit")
+SOLVERS = ("explicit", "implicit", "dns")
 
 
 def run_solver(run: Run[StructureCase], folder: Path, solver: str) -> None:
@@ -16,7 +16,7 @@ def run_solver(run: Run[StructureCase], folder: Path, solver: str) -> None:
     Args:
         run: run folder with the mesh, case, cores.
         folder: where the solver's products go.
-        solver: "explicit" or "implicit".
+        solver: one of ``SOLVERS``.
 
     Raises:
         LaunchError: the run failed; the message has its last words.

@@ -17,11 +17,11 @@ SHARE = 0.12  # of the structure's size, that its deformation is drawn as
 COLUMNS = 3
 
 
-def render_deformation(series: Path, time: float, picture: Path) -> str:
-    """Render a structure at the stored time nearest to a time [s], exaggerated; return a caption."""
-    reader = pyvista.get_reader(series)
-    stored = min(reader.time_values, key=lambda value: abs(value - time))
-    grid = _read(reader, stored)
+def render_deformation(series: list[Path], time: float, picture: Path) -> str:
+    """Render the models of a structure at the stored time nearest to a time [s], exaggerated; return a caption."""
+    readers = [pyvista.get_reader(path) for path in series]
+    grid = pyvista.merge([_read(reader, time) for reader in readers])
+    stored = _nearest(readers[0], time)
     size = np.linalg.norm(grid.point_data["displacement"], axis=1)
     extent = float(np.ptp(grid.points, axis=0).max())
     factor = max(round_down(SHARE * extent / float(size.max())), 1.0) if size.max() > 0.0 else 1.0
@@ -55,9 +55,14 @@ def render_modes(series: Path, modes: list[dict], picture: Path) -> None:
     plotter.close()
 
 
+def _nearest(reader: pyvista.PVDReader, time: float) -> float:
+    """Return the stored time nearest to a time [s]: those of two models differ by rounding."""
+    return min(reader.time_values, key=lambda value: abs(value - time))
+
+
 def _read(reader: pyvista.PVDReader, time: float) -> pyvista.UnstructuredGrid:
-    """Read a stored state with plain cells: those of Lagrange type are drawn with the edges of their tessellation."""
-    reader.set_active_time_value(time)
+    """Read the state nearest to a time [s] with plain cells: those of Lagrange type would show their tessellation."""
+    reader.set_active_time_value(_nearest(reader, time))
     grid = reader.read().combine(merge_points=True)
     nodes = len(grid.cell_connectivity) // grid.n_cells
     plain = pyvista.UnstructuredGrid({CELL_TYPES[nodes]: grid.cell_connectivity.reshape(-1, nodes)}, grid.points)

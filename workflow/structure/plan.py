@@ -6,7 +6,7 @@ from rich.table import Table
 
 from workflow.plan_table import duration, new_table, short
 from workflow.structure.case import StructureCase
-from workflow.structure.forecast import StructureForecast
+from workflow.structure.forecast import CoupledForecast, StructureForecast
 
 if TYPE_CHECKING:
     from fem.solver_cost import SolverCost
@@ -34,8 +34,16 @@ def solvers(case: StructureCase, outlook: StructureForecast) -> Table:
     for name, cost, remark in (("explicit", found.explicit, fraction), ("implicit", found.implicit, factor)):
         unused = "" if name in case.dynamics.solvers else "; not in dynamics.solver"
         table.add_row(name, short(outlook.steps[name]), f"{cost.steps}", _about(cost), _memory(cost), remark + unused)
+    if outlook.coupled:
+        table.add_row("two models", *_coupled(outlook.coupled))
     table.caption, table.caption_justify = found.sentence, "left"
     return table
+
+
+def _coupled(found: CoupledForecast) -> tuple[str, str, str, str, str]:
+    """Window, steps in it, cost of two models."""
+    remark = f"window; fine: {', '.join(found.fine) or 'nothing'}; without buffers and levels inside it"
+    return short(found.window), f"m = {found.substeps}", f"about {duration(found.seconds)}", "", remark
 
 
 def _about(cost: "SolverCost") -> str:

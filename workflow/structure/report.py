@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from workflow import report_two_scales
 from workflow.plan_table import short
 from workflow.report_tables import costs, number, percent, quantity
 from workflow.structure import curves as structure_curves
@@ -17,13 +18,16 @@ from workflow.structure.references import Published
 
 HEADLINE = (
     "first_frequency", "peak_displacement", "displacement_range", "peak_strain", "displacement_difference",
-    "strain_difference", "wave_speed_error", "transmitted_velocity_error", "reflected_velocity_error",
-    "tip_deflection_error", "swing_frequency_error", "energy_balance_error",
+    "strain_difference", "two_scale_dns_time_ratio", "two_scale_displacement_error", "wave_speed_error",
+    "transmitted_velocity_error", "reflected_velocity_error", "tip_deflection_error", "swing_frequency_error",
+    "energy_balance_error",
 )  # fmt: skip
 FRACTIONS = ("_error", "_difference", "_fraction")
 SHORTEST_IN_MM = 1e-5  # m
+ROLES = ("structure", "macro", "meso")
 MODEL_ROWS = (
     ("elements", lambda model: f"{number(model['elements'])} ({model['element']} {model['formulation']})"),
+    ("models", lambda model: ", ".join(f"{role} {number(count)}" for role, count in model["models"].items())),
     ("nodes", lambda model: number(model["nodes"])),
     ("MPI ranks", lambda model: number(model["ranks"])),
     ("critical time step", lambda model: short(model["critical_step"])),
@@ -55,7 +59,20 @@ def add_structure(run_folder: Path, case: StructureCase, context: dict, metrics:
         "cost": costs(results),
     }
     first = next(iter(results))
+    add_two_scales(results[first], context)
     _add_pictures(folder / first, case, histories[first], context)
+
+
+def add_two_scales(result: Mapping, context: dict) -> None:
+    """Add how the models of a run are coupled, where there are two."""
+    coupling = result.get("coupling")
+    if coupling is None:
+        return
+    context["tables"] |= {
+        "two_scales": report_two_scales.two_scales(coupling, result["model"], None),
+        "levels": report_two_scales.levels(coupling),
+        "placement": report_two_scales.placement(coupling),
+    }
 
 
 def meshed_part(case: StructureCase) -> str:
@@ -148,12 +165,17 @@ def _add_pictures(folder: Path, case: StructureCase, history: Mapping[str, np.nd
     modes = read_modes(folder)
     with tempfile.TemporaryDirectory() as temporary:
         bent, shapes = Path(temporary) / "bent.png", Path(temporary) / "modes.png"
-        context["bent_caption"] = render_deformation(folder / "structure.pvd", _peak_time(case, history), bent)
+        context["bent_caption"] = render_deformation(model_series(folder), _peak_time(case, history), bent)
         context["pictures"]["bent"] = base64.b64encode(bent.read_bytes()).decode()
         if modes:
             context["tables"]["modes"] = mode_table(modes)
             render_modes(folder / "modes.pvd", modes[:6], shapes)
             context["pictures"]["modes"] = base64.b64encode(shapes.read_bytes()).decode()
+
+
+def model_series(folder: Path) -> list[Path]:
+    """Return the series of fields of all models of a run."""
+    return [path for role in ROLES if (path := folder / f"{role}.pvd").exists()]
 
 
 def _peak_time(case: StructureCase, history: Mapping[str, np.ndarray]) -> float:

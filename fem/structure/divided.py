@@ -1,0 +1,157 @@
+"""A structure as two models: which layers are fine, how they are divided, the tables of each."""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from fem.agreement import agreed
+from fem.coupling.checks import check_division
+from fem.coupling.divide import Rules, divide
+from fem.coupling.division import Division
+from fem.coupling.placement import Role
+from fem.coupling.record import coupling_record
+from fem.coupling.split import Part, cut_between, part_of
+from fem.coupling.whole import Survey, Treatment, Whole, survey
+from fem.errors import CutError
+from fem.inputs import StructureInput
+from fem.mesh_file import read_mesh
+from fem.model import Divided
+from fem.scene import ModelInput
+from fem.steps import steps_of_division
+from fem.structure.parameters import LayerCoupling, fine_layers
+from fem.structure.tables import StructureTables, structure_tables, tied
+
+
+@dataclass(frozen=True, slots=True)
+class DividedStructure(Divided[StructureTables]):
+    """The models of a structure before they are distributed, and what the result tells of their coupling."""
+
+    coupling: dict[str, Any]
+
+
+def divided_structure(world: MPI.Comm, request: StructureInput) -> DividedStructure:
+    """Read, check and divide the mesh of a structure on rank 0, and tell the other ranks; collective.
+
+    Raises:
+        AgreedError: A mesh that does not fit, or cannot be divided; on every rank.
+    """
+    found = agreed(world, lambda: divided_on_one_rank(request) if world.rank == 0 else None)
+    told: DividedStructure = world.bcast(replace(found, meshes={}) if found else None)
+    return found or told
+
+
+def divided_on_one_rank(request: StructureInput) -> DividedStructure:
+    """Read, check and divide the mesh of a structure; errors as ``tables``, ``coupling.checks``."""
+    coupling, dynamics = request.dynamics.coupling, request.dynamics
+    assert coupling is not None
+    whole = tied(read_mesh(request.mesh), request)
+    treatment = Treatment(request.structure.formulation, dynamics.kinematics, dynamics.numerics.mass_scaled)
+    found = survey(whole.mesh, request.layer_materials, treatment)
+    rules = Rules(
+        coupling=coupling,
+        coarse=coarse_cells(whole, found, coupling),
+        fraction=dynamics.numerics.step_fraction,
+        stiffness=dynamics.damping.coefficients[1],
+        duration=dynamics.duration,
+        samples=dynamics.numerics.history_samples,
+    )
+    division = divide(whole, found, rules)
+    check_division(whole, found, division, rules)
+    inputs = structure_inputs(whole, division, structure_tables(whole, request))
+    return DividedStructure(
+        meshes={role: item.mesh for role, item in inputs.items()},
+        tables={role: item.tables for role, item in inputs.items()},
+        mass_factors={role: found.factor[item.cells] for role, item in inputs.items()},
+        steps=steps_of_division(whole, found, division, rules),
+        rules=rules,
+        scheme=division.scheme,
+        coupling=coupling_record(division, found, len(inputs["macro"].tables.cut)),
+    )
+
+
+def coarse_cells(whole: Whole, found: Survey, coupling: LayerCoupling) -> NDArray[np.bool_]:
+    """Return the cells ``(ne,)`` of the layers that are not fine: neither named, nor, where none is, of small steps.
+
+    Raises:
+        CutError: No layer is fine.
+    """
+    steps = {name: float(found.step[whole.mesh.in_parts(name.__eq__)].min()) for name in whole.mesh.part_names}
+    fine = fine_layers(coupling, steps)
+    if not fine:
+        found_steps = ", ".join(f"{name} {step:.3g} s" for name, step in steps.items())
+        raise CutError(
+            f"no layer is fine: critical steps are {found_steps}, none less than half of the longest; name it in"
+            " dynamics.coupling.fine, or leave dynamics.coupling out"
+        )
+    return whole.mesh.in_parts(lambda name: name not in fine)
+
+
+def structure_inputs(
+    whole: Whole, division: Division, tables: StructureTables
+) -> dict[Role, ModelInput[StructureTables]]:
+    """Split a structure with its tables into the models ``macro`` and ``meso``.
+
+    What both models have counts in the macro model.
+    """
+    macro, meso = part_of(whole, division.macro), part_of(whole, division.meso)
+    cut = cut_between(whole, macro, meso)
+    rest = np.where(macro.number < 0, meso.number, -1), np.where(macro.cell_number < 0, meso.cell_number, -1)
+    level = division.level[division.meso]
+    own = {
+        "macro": restricted(whole, tables, macro, (macro.number, macro.cell_number)),
+        "meso": replace(restricted(whole, tables, meso, rest), level=level, ratios=division.ratios),
+    }
+    parts: dict[Role, Part] = {"macro": macro, "meso": meso}
+    return {
+        role: ModelInput(part.mesh, replace(own[role], cut=part.number[cut]), np.flatnonzero(part.cell_number >= 0))
+        for role, part in parts.items()
+    }
+
+
+def restricted(
+    whole: Whole, tables: StructureTables, part: Part, counted: tuple[NDArray[np.int32], NDArray[np.int32]]
+) -> StructureTables:
+    """Return the tables of a part of a structure.
+
+    Args:
+        whole: The structure.
+        tables: Its tables.
+        part: The part.
+        counted: Own numbers of the nodes ``(n,)`` and cells ``(ne,)`` that are loaded and watched in this model, -1 for
+            those of another one.
+    """
+    node, cell = counted
+    mine = np.flatnonzero(part.number >= 0)
+    order = mine[np.argsort(part.number[mine])]
+    held = part.number[tables.held_nodes].astype(np.int64)
+    return replace(
+        tables,
+        part=part.mesh.part,
+        part_names=part.mesh.part_names,
+        tie=part.tie,
+        master_points=whole.mesh.points[order][part.tie.master],
+        held_nodes=held[held >= 0],
+        held=tables.held[held >= 0],
+        nodes=part.nodes,
+        level=np.zeros(len(part.mesh.cells), np.int32),
+        nodes_of={name: present(node[nodes]) for name, nodes in tables.nodes_of.items()},
+        areas={name: (present(node[nodes]), area[node[nodes] >= 0]) for name, (nodes, area) in tables.areas.items()},
+        pressed={
+            name: replace(item, facets=part.number[item.facets], cells=cell[item.cells])
+            for name, item in tables.pressed.items()
+        },
+        watch=replace(
+            tables.watch,
+            nodes=node[tables.watch.nodes],
+            cells=cell[tables.watch.cells],
+            supports={name: (present(node[nodes]), held) for name, (nodes, held) in tables.watch.supports.items()},
+        ),
+    )
+
+
+def present(numbers: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Return the numbers that are none of another model's."""
+    return numbers[numbers >= 0]

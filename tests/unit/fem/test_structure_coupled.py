@@ -1,0 +1,110 @@
+"""A structure as two models: every node and cell counts once, all loads arrive, the motion is that of one model."""
+
+import numpy as np
+import pytest
+
+from fem.compare import relative_error
+from fem.compare_structures import solver_differences
+from fem.coupling.division import Division
+from fem.errors import CutError
+from fem.estimate import WindowPlan
+from fem.mesh_file import read_mesh
+from fem.structure.checks import problems
+from fem.structure.divided import divided_on_one_rank, structure_inputs
+from fem.structure.tables import structure_tables, tied
+from tests.support.fem_bars import bar_layers, run_bar, write_bar
+
+WIDTH = 2e-3
+LAYERS = bar_layers(("FR4", 6e-3, 6, (2, 2)), ("FR4", 1e-3, 4, (3, 3)), ("FR4", 6e-3, 6, (2, 2)))
+LOADS = {
+    "side": {"kind": "pressure", "on": "x_max", "peak": 1e5, "duration": 1e-5},
+    "pull": {"kind": "motion", "on": "z_max", "component": "z", "peak": 0.1, "duration": 1e-5},
+    "drop": {"kind": "input_g", "peak": 1e4, "duration": 2e-5, "direction": [1.0, 0.0, 0.2]},
+}
+TABLES = {
+    "supports": {
+        "clamp": {"on": "z_min", "hold": ["x", "y", "z"]},
+        "wall": {"on": "y_min", "hold": ["y"]},
+    },
+    "loads": LOADS,
+    "watch": {name: {"at": [0.0, 0.0, z]} for name, z in (("low", 1e-3), ("inside", 6.5e-3), ("high", 12e-3))},
+}
+
+
+def dynamics(**changes) -> dict:
+    numerics = {"history_samples": 60, "field_samples": 2}
+    return {"duration": 2e-5, "coupling": {"scheme": "held_velocity"}, "numerics": numerics} | changes
+
+
+def test_fine_layers_are_those_of_small_steps_and_all_is_counted_once(tmp_path):
+    request = write_bar(tmp_path, WIDTH, LAYERS, 1e-5, **TABLES, dynamics=dynamics())
+    whole = tied(read_mesh(request.mesh), request)
+    tables = structure_tables(whole, request)
+    meso = (whole.mesh.points[whole.mesh.cells].mean(axis=1)[:, 2] > 3e-3) & whole.mesh.in_parts("layer_2".__ne__)
+    plan = WindowPlan(1e-7, 2, 200, 1)
+    division = Division("held_velocity", ~meso, meso, np.zeros(len(meso), np.int32), (), plan)
+    inputs = [item.tables for item in structure_inputs(whole, division, tables).values()]
+    (area,) = tables.areas.values()
+    assert sum(item.areas["x_max"][1].sum(axis=0) for item in inputs) == pytest.approx(area[1].sum(axis=0))
+    assert sum(len(item.areas["x_max"][0]) for item in inputs) == len(area[0])
+    for name, nodes in tables.nodes_of.items():
+        assert sum(len(item.nodes_of[name]) for item in inputs) == len(nodes)
+    for of_watch in ("nodes", "cells"):
+        here = np.array([getattr(item.watch, of_watch) >= 0 for item in inputs])
+        assert np.all(here.sum(axis=0) == 1)
+
+
+def test_the_finest_layer_and_its_buffer_are_the_meso_model(tmp_path):
+    request = write_bar(tmp_path, WIDTH, LAYERS, 1e-5, **TABLES, dynamics=dynamics())
+    found = divided_on_one_rank(request)
+    elements = {role: len(tables.part) for role, tables in found.tables.items()}
+    assert elements == {"macro": 2 * 4 * 4, "meso": 36 + 2 * 2 * 4}
+    assert found.coupling["cut_nodes"] == 2 * 9
+    assert [level["elements"] for level in found.coupling["levels"]] == list(elements.values())
+
+
+def test_layers_that_are_alike_have_none_that_is_fine(tmp_path):
+    layers = LAYERS | {"layer_1": LAYERS["layer_1"] | {"cells": 1, "in_plane": (2, 2)}}
+    request = write_bar(tmp_path, WIDTH, layers, 1e-5, **TABLES, dynamics=dynamics())
+    with pytest.raises(CutError, match=r"less than half of the longest.*name it in dynamics\.coupling\.fine"):
+        divided_on_one_rank(request)
+
+
+@pytest.mark.parametrize("scheme", ["held_velocity", "gravouil_combescure"])
+def test_two_models_move_as_one(tmp_path, scheme):
+    """Within the error of their steps: loads across tie and cut, reactions, watch points of both models."""
+    changes = {"coupling": {"scheme": scheme, "fine": ["layer_1"]}}
+    result, two = run_bar(write_bar(tmp_path / "two", WIDTH, LAYERS, 1e-5, **TABLES, dynamics=dynamics(**changes)))
+    assert all(check["ok"] for check in result["health"].values())
+    assert result["coupling"]["scheme"] == scheme
+    single = dynamics(**changes)
+    request = write_bar(tmp_path / "one", WIDTH, LAYERS, 1e-5, **TABLES, solver="dns", dynamics=single)
+    _, one = run_bar(request)
+    differences = solver_differences(two, one)
+    assert differences["displacement_difference"] < 0.005
+    assert differences["strain_difference"] < 0.02
+    for name in ("reaction@clamp", "external"):
+        values = np.array(
+            [np.interp(one["time"], two["time"], part) for part in two[name].reshape(len(two["time"]), -1).T]
+        )
+        assert relative_error(values, one[name].reshape(len(one["time"]), -1).T) < 0.02, name
+
+
+@pytest.mark.parametrize(
+    ("changes", "key", "words"),
+    [
+        ({"coupling": {"fine": ["layer_3"]}}, "dynamics.coupling.fine", "no such layer"),
+        ({"coupling": {"fine": list(LAYERS)}}, "dynamics.coupling.fine", "leaves no layer"),
+        ({"coupling": {"direction": "one_way"}}, "dynamics.coupling.direction", "coarse mesh"),
+        ({"coupling": {"placement": "disjoint"}}, "dynamics.coupling.placement", "a rank for each"),
+        ({"coupling": {"macro_ranks": 1}}, "dynamics.coupling.macro_ranks", "is for placement"),
+        ({"solver": "implicit"}, "dynamics.solver", "couples nothing"),
+        ({"modes": 2}, "dynamics.modes", "one model"),
+        ({"coupling": {"scheme": "local_steps"}}, "dynamics.coupling.scheme", "not computed yet"),
+        ({"numerics": {"explicit_step": 1e-9}}, "dynamics.numerics.explicit_step", "one model"),
+    ],
+)
+def test_what_two_models_cannot_do_is_said_before_anything_is_computed(tmp_path, changes, key, words):
+    found = problems(write_bar(tmp_path, WIDTH, LAYERS, 1e-5, **TABLES, dynamics=dynamics(**changes)))
+    assert [problem.key for problem in found] == [key]
+    assert words in found[0].message

@@ -1,0 +1,68 @@
+"""Waves through tie and cut of two coupled models: what comes back, the error against exact waves and its order."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fem.compare import relative_error
+from fem.materials.elasticity import elasticity_matrix
+from fem.materials.library import LIBRARY
+from fem.pulse import Haversine
+from tests.support.fem_bars import PEAK, bar_layers, run_bar, speed_of, write_bar
+from workflow.structure.exact_layers import Layers
+
+SCHEMES = ("held_velocity", "gravouil_combescure")
+SPEED = speed_of("FR4")
+PULSE = 20e-3 / SPEED  # as long as 20 macro elements
+END, SECTION = 30e-3, 3e-3
+HEIGHTS = {"near": 18e-3, "beyond": END + SECTION + 10e-3}
+REFLECTED = 0.005  # of the incident velocity
+GRADED = 0.006  # the same where elements change their length along the bar: 0.004 of it at any step
+
+
+def bar(cells: int, finer: int = 1) -> dict[str, dict]:
+    """Return a bar of FR4 whose section of 5 x 5 elements in plane has some along it; all ``finer`` times as many."""
+    end = ("FR4", END, 30 * finer, (2 * finer, 2 * finer))
+    return bar_layers(end, ("FR4", SECTION, cells * finer, (5 * finer, 5 * finer)), end)
+
+
+def run(directory: Path, layers: dict, coupling: dict | None = None, **numerics) -> tuple[dict, dict]:
+    """Run a bar until the pulse has come back from its middle."""
+    numerics = {"history_samples": 200, "field_samples": 2} | numerics
+    dynamics = {"duration": (2 * END - HEIGHTS["near"]) / SPEED + 1.05 * PULSE, "numerics": numerics}
+    dynamics |= {"coupling": coupling} if coupling else {}
+    watch = {name: {"at": [0, 0, z]} for name, z in HEIGHTS.items()}
+    return run_bar(write_bar(directory, 2e-3, layers, PULSE, watch=watch, dynamics=dynamics))
+
+
+@pytest.mark.parametrize(("cells", "limit"), [(3, REFLECTED), (6, GRADED)], ids=["as long", "half as long"])
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_what_the_interface_sends_back_is_small(scheme, cells, limit, tmp_path):
+    """The bar is of one material, so the difference from a bar of the coarse mesh at the same step is reflected.
+
+    The section has 5 x 5 elements in plane between layers of 2 x 2, as long along the bar as these or half as long.
+    """
+    result, found = run(tmp_path / "two", bar(cells), {"scheme": scheme, "fine": ["layer_1"]})
+    assert result["coupling"]["scheme"] == scheme
+    even = bar_layers(("FR4", END, 30, (2, 2)), ("FR4", SECTION, 3, (2, 2)), ("FR4", END, 30, (2, 2)))
+    _, reference = run(tmp_path / "even", even, explicit_step=result["model"]["window"] * (1.0 + 1e-9))
+    assert len(found["time"]) == len(reference["time"])
+    difference = found["velocity@near"] - reference["velocity@near"]
+    assert np.abs(difference).max() < limit * np.abs(reference["velocity@near"]).max()
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_second_order_against_exact_waves(scheme, tmp_path):
+    """Halving elements and with them all steps."""
+    material = LIBRARY["FR4"]
+    stiffness = float(elasticity_matrix(material)[2, 2])
+    exact = Layers((END, SECTION, END), (stiffness,) * 3, (material.density,) * 3)
+    errors = []
+    for finer in (1, 2):
+        _, found = run(tmp_path / f"{finer}", bar(6, finer), {"scheme": scheme, "fine": ["layer_1"]})
+        values = [found[f"velocity@{name}"][:, 2] for name in HEIGHTS]
+        waves = [exact.velocity(z, found["time"], Haversine(PEAK, PULSE).value) for z in HEIGHTS.values()]
+        errors.append(relative_error(np.array(values), np.array(waves)))
+    assert errors[0] < 0.03
+    assert np.log2(errors[0] / errors[1]) > 1.8
