@@ -13,10 +13,15 @@ UNRELATED = {"checkpoint_seconds"}  # numerics that results do not depend on
 
 
 class RunInput(Parameters):
-    """A package on a board, dropped; SI floats. ``checkpoints`` is a folder from which a run continues."""
+    """A package on a board, dropped; SI floats.
+
+    ``meshes`` have all joints fine, ``coarse_joints`` has those that are not; ``checkpoints`` is a folder from which a
+    run continues.
+    """
 
     mode: Literal["two_scale", "dns"]
     meshes: tuple[Path, ...] = Field(min_length=1)
+    coarse_joints: Path | None = None
     shock: Shock
     materials: Materials = Materials()
     output: Path
@@ -27,6 +32,11 @@ class RunInput(Parameters):
         """Return all that results depend on: not where they go, nor which ranks compute them."""
         shock: Any = {"ranks": True, "numerics": UNRELATED}
         return self.model_dump_json(exclude={"output": True, "checkpoints": True, "shock": shock})
+
+    @property
+    def mesh_files(self) -> tuple[Path, ...]:
+        """Return all files of meshes."""
+        return (*self.meshes, self.coarse_joints) if self.coarse_joints else self.meshes
 
     @property
     def implicit(self) -> bool:

@@ -15,12 +15,12 @@ from fem.communicators import Communicators, Role
 from fem.coupling.checks import check_division
 from fem.coupling.divide import Rules, divide
 from fem.coupling.division import SchemeName
+from fem.coupling.fine_joints import read_scene
 from fem.coupling.whole import Treatment, survey
 from fem.inputs import RunInput
 from fem.local_mesh import distribute
 from fem.materials.elasticity import role_of_part
 from fem.mesh import MeshData
-from fem.mesh_file import read_meshes
 from fem.scene import JointTables, Tables, TablesT_co, joined, model_inputs
 from fem.steps import Steps, agreed_minimum, assembled_step, steps_of_division, undivided
 from fem.supports import HELD, SYMMETRY
@@ -71,7 +71,7 @@ def divided_scene(world: MPI.Comm, request: RunInput) -> Divided[JointTables]:
 def divided_on_one_rank(request: RunInput) -> Divided[JointTables]:
     """Read, check and divide all meshes; errors as ``scene``, ``coupling.checks``, ``mesh_file``."""
     shock, numerics = request.shock, request.shock.numerics
-    whole = joined(read_meshes(request.meshes))
+    whole = joined(read_scene(request))
     found = survey(
         whole.mesh, request.materials, Treatment(numerics.formulation, numerics.kinematics, numerics.mass_scaled)
     )

@@ -59,7 +59,7 @@ def run(world: MPI.Comm, request: RunInput) -> None:
         history = make_history(comms, models, steps, pulse, request)
         numerics, fields = request.shock.numerics, make_fields(comms, models, request)
         tables = [Path(request.shock.table)] if request.shock.table else []
-        inputs = request.computed, steps.plan, digest_of_files(*request.meshes, *tables)
+        inputs = request.computed, steps.plan, digest_of_files(*request.mesh_files, *tables)
         checkpoints = Checkpoints(comms.world, request.checkpoints, inputs, numerics.checkpoint_seconds)
         outputs = Outputs(history, fields, numerics.field_samples, checkpoints)
         ready = time.perf_counter()

@@ -70,7 +70,6 @@ def _coupling(coupling: JointCoupling) -> Iterator[Problem]:
         "scheme": ("auto", "held_velocity"),
         "direction": ("two_way",),
         "levels": ("auto", 1),
-        "fine_joints": ("all",),
     }
     for name, choices in served.items():
         value = getattr(coupling, name)

@@ -1,0 +1,66 @@
+"""Which joints of a scene are fine: all others have the coarse mesh."""
+
+from collections.abc import Collection
+from pathlib import Path
+
+from fem.errors import MeshError
+from fem.inputs import RunInput
+from fem.mesh import MeshData, append, select
+from fem.mesh_file import read_mesh, read_meshes
+from fem.names import nearest
+from fem.watch_table import joint_names
+
+KEY = "shock.coupling.fine_joints"
+
+
+def read_scene(request: RunInput) -> MeshData:
+    """Read the meshes of a run, each joint fine or coarse as it asks for.
+
+    Raises:
+        MeshError: As ``with_coarse_joints``, or joints are to be coarse and no file has them.
+    """
+    fine = request.shock.coupling.fine_joints
+    mesh = read_meshes(request.meshes)
+    if fine == "all":
+        return mesh
+    if isinstance(fine, str):
+        raise MeshError(f'{KEY} = "{fine}" names no joint: a run takes a list of names, or "all"')
+    return with_coarse_joints(mesh, read_coarse(request.coarse_joints), fine)
+
+
+def read_coarse(path: Path | None) -> MeshData:
+    """Read the mesh of coarse joints.
+
+    Raises:
+        MeshError: There is none.
+    """
+    if path is None:
+        raise MeshError(f"{KEY} leaves out some joints, and there is no file of coarse joints (coarse_joints)")
+    return read_mesh(path)
+
+
+def with_coarse_joints(mesh: MeshData, coarse: MeshData, fine: Collection[str]) -> MeshData:
+    """Replace all joints of a mesh but the fine ones by those of another; all keep their order.
+
+    Raises:
+        MeshError: An unknown joint, no fine joint at all, or one that neither is fine nor has a coarse mesh.
+    """
+    joints, known = joint_names(mesh), joint_names(coarse)
+    unknown = sorted(set(fine) - set(joints))
+    if unknown:
+        hint = nearest(unknown[0], joints)
+        asked = f"; did you mean {hint}?" if hint else ""
+        raise MeshError(f"{KEY}: the mesh has no joint {unknown[0]}, allowed: {', '.join(joints)}{asked}")
+    if not fine:
+        raise MeshError(f"{KEY} is empty: no joint would be fine, allowed: {', '.join(joints)}")
+    others = [name for name in joints if name not in fine]
+    missing = [name for name in others if name not in known]
+    if missing:
+        raise MeshError(f"{missing[0]} is not fine and has no coarse mesh; coarse joints: {', '.join(known) or 'none'}")
+    kept, _ = select(mesh, lambda part: joint_of(part) not in others)
+    return append([kept, select(coarse, lambda part: joint_of(part) in others)[0]]) if others else mesh
+
+
+def joint_of(part: str) -> str:
+    """Return the joint that a part belongs to, empty where it is no joint's."""
+    return part.partition("@")[2]
