@@ -71,7 +71,10 @@ def write_result(
             "effects": effects(request, summary),
             "failure": verdicts,
             "timings": timings.seconds,
-            "coupling": {"placement": {"chosen": comms.placement.words, **timings.balance}},
+            "coupling": {
+                "fine_joints": request.shock.coupling.fine_joints,
+                "placement": {"chosen": comms.placement.words, **timings.balance},
+            },
             "continued_from": timings.first,
             "model": summary,
             "parts": list(next(iter(models.values())).tables.part_names),

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from workflow.fine_joints import FineJoints
-from workflow.report_tables import nano, number, percent, quantity
+from workflow.report_tables import nano, number, quantity
 
 Record = Mapping[str, Any]
 
@@ -99,7 +99,7 @@ def _micro(seconds: float) -> str:
 
 
 def _share(value: float | None) -> str:
-    return "" if value is None else percent(value)
+    return "" if value is None else f"{100.0 * value:.3g} %"
 
 
 def _number(value: int | None) -> str:
