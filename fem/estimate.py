@@ -8,7 +8,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.coupling.placement import WindowCost, alternatives
+from fem.coupling.placement import ModelCost, WindowCost, alternatives
 from fem.materials.elasticity import elasticity_matrix
 from fem.materials.parameters import Material
 from fem.parameters import Ranks
@@ -17,7 +17,8 @@ from fem.parameters import Ranks
 # those of joints, on one core of an AMD EPYC (AVX-512); boards are boxes in rows, which share their matrices.
 UPDATES_PER_SECOND = 1.2e7
 BOARD_ADVANTAGE = 4.3
-WINDOW_OVERHEAD = 3.0e-5  # [s] messages and interpreter per window, same source
+WINDOW_OVERHEAD = 3.0e-5  # [s] interpreter per window, same source
+STEP_OVERHEAD = 2.5e-5  # [s] interpreter per step of a motion or of a level inside it, same source
 LATENCY = 1.5e-5  # [s] a message between two ranks of one machine, same source
 PULSE_STEPS = 200  # implicit steps in the shortest pulse: 3e-4 of the period of what swings twice in it
 RUN_STEPS = 1000  # implicit steps in a run, at least
@@ -126,8 +127,8 @@ def predict_seconds(
     board = macro_elements / BOARD_ADVANTAGE / UPDATES_PER_SECOND
     work = sum(elements * steps for elements, steps in meso) / UPDATES_PER_SECOND
     sums = sum(steps for _, steps in meso)
-    cost = WindowCost(board, work, sums, LATENCY)
+    cost = WindowCost(ModelCost(board, WINDOW_OVERHEAD, 1), ModelCost(work, sums * STEP_OVERHEAD, sums), LATENCY)
     two_scale = alternatives(ranks, [1.0] * ranks.total, cost)[0].seconds
     everything = board + sum(elements for elements, _ in meso) / UPDATES_PER_SECOND
-    dns = plan.substeps * (everything / ranks.total + (ranks.total > 1) * LATENCY)
-    return plan.windows * (two_scale + WINDOW_OVERHEAD), plan.windows * (dns + WINDOW_OVERHEAD)
+    dns = plan.substeps * (everything / ranks.total + STEP_OVERHEAD + (ranks.total > 1) * LATENCY)
+    return plan.windows * two_scale, plan.windows * dns

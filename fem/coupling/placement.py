@@ -36,19 +36,26 @@ class Placement:
 
 
 @dataclass(frozen=True, slots=True)
-class WindowCost:
-    """What a window costs.
+class ModelCost:
+    """What a window of one model costs.
 
     Attributes:
-        macro: Seconds of the macro model on one rank of speed one.
-        meso: The same of the meso model, all its steps.
-        sums: Sums over the nodes that ranks of the meso model share, each a message.
-        latency: Seconds of a message.
+        work: Seconds that ranks share, on one of speed one.
+        calls: Seconds that each of them spends, however many they are.
+        sums: Sums over the nodes that they share, each a message.
     """
 
-    macro: float
-    meso: float
+    work: float
+    calls: float
     sums: int
+
+
+@dataclass(frozen=True, slots=True)
+class WindowCost:
+    """What a window of two models costs, and a message [s]."""
+
+    macro: ModelCost
+    meso: ModelCost
     latency: float
 
 
@@ -102,13 +109,19 @@ def window_seconds(placement: Placement, speeds: Sequence[float], cost: WindowCo
 
     Ranks that carry both models do them one after the other, ranks that carry one wait for the slower model.
     """
-    power = {role: sum(speeds[rank] for rank in ranks) for role, ranks in placement.ranks.items()}
     several = {role: len(ranks) > 1 for role, ranks in placement.ranks.items()}
-    macro = cost.macro / power["macro"] + several["macro"] * cost.latency
-    meso = cost.meso / power["meso"] + several["meso"] * cost.sums * cost.latency
+    power = {role: sum(speeds[rank] for rank in ranks) for role, ranks in placement.ranks.items()}
+    macro = model_seconds(cost.macro, (power["macro"], several["macro"]), cost.latency)
+    meso = model_seconds(cost.meso, (power["meso"], several["meso"]), cost.latency)
     if placement.name == "shared":
         return macro + meso + several["macro"] * 2.0 * cost.latency
     return max(macro, meso) + 2.0 * cost.latency
+
+
+def model_seconds(cost: ModelCost, ranks: tuple[float, bool], latency: float) -> float:
+    """Return the seconds of a window of one model on ranks whose speeds add up to a number, and may be several."""
+    power, several = ranks
+    return cost.work / power + cost.calls + several * cost.sums * latency
 
 
 def check_size(ranks: Ranks, size: int) -> None:
