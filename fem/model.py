@@ -103,18 +103,24 @@ def divided_on_one_rank(request: RunInput) -> Divided[JointTables]:
 
 
 def build_models(
-    comms: Communicators, divided: Divided[JointTables], request: RunInput
+    comms: Communicators, divided: Divided[JointTables], request: RunInput, ranks: Mapping[Role, NDArray[np.int32]]
 ) -> tuple[dict[Role, Model], Steps]:
     """Distribute and assemble the models of this rank; collective.
+
+    Args:
+        comms: Communicators.
+        divided: The models.
+        request: The input.
+        ranks: On rank 0, of each model on several ranks, the rank ``(ne,)`` of each cell.
 
     Returns:
         The models, and the steps: those of a DNS may be larger than what its elements allow each on its own.
     """
     world, numerics, tables = comms.world, request.shock.numerics, divided.tables
-    given = hand_over(comms, divided)
+    given = hand_over(comms, divided, ranks)
     mine = next(iter(divided.meshes.values()), None)
     dolfinx_api.compile_ahead(world, mine.points[mine.cells[0]] if mine else None)
-    meshes = {role: distribute(comms.models[role], mesh) for role, mesh in given.items()}
+    meshes = {role: distribute(comms.models[role], *mesh) for role, mesh in given.items()}
 
     def pieces_of(role: Role) -> Pieces:
         return make_pieces(meshes[role], tables[role], request.materials, numerics.formulation)
@@ -133,15 +139,19 @@ def build_models(
     return models, steps
 
 
-def hand_over(comms: Communicators, divided: Divided[Tables]) -> dict[Role, MeshData | None]:
-    """Return the meshes of this rank's models: None on all but the first rank that carries a model; collective."""
+Given = tuple[MeshData | None, NDArray[np.int32] | None]
+
+
+def hand_over(
+    comms: Communicators, divided: Divided[Tables], ranks: Mapping[Role, NDArray[np.int32]]
+) -> dict[Role, Given]:
+    """Return mesh and ranks of cells of this rank's models: None on all but the first that carries one; collective."""
     world = comms.world
-    given: dict[Role, MeshData | None] = dict.fromkeys(comms.models)
+    given: dict[Role, Given] = dict.fromkeys(comms.models, (None, None))
     for role, first in comms.first.items():
-        if world.rank == 0 and first == 0:
-            given[role] = divided.meshes[role]
-        elif world.rank == 0:
-            world.send(divided.meshes[role], first)
+        whole = divided.meshes.get(role), ranks.get(role)
+        if world.rank == 0 and first:
+            world.send(whole, first)
         elif world.rank == first:
-            given[role] = world.recv(source=0)
+            given[role] = world.recv(source=0) if first else whole
     return given

@@ -36,7 +36,7 @@ class Timings:
         setup: Until the first window.
         windows: Windows and samples.
         fields: Field files.
-        balance: Where the time of windows went, see ``Stopwatch.summary``.
+        balance: Placement, predicted and measured, see ``planner.summary`` and ``Stopwatch.summary``.
         first: Window from which the run continued, or zero.
     """
 
@@ -71,10 +71,7 @@ def write_result(
             "effects": effects(request, summary),
             "failure": verdicts,
             "timings": timings.seconds,
-            "coupling": {
-                "fine_joints": request.shock.coupling.fine_joints,
-                "placement": {"chosen": comms.placement.words, **timings.balance},
-            },
+            "coupling": {"fine_joints": request.shock.coupling.fine_joints, "placement": timings.balance},
             "continued_from": timings.first,
             "model": summary,
             "parts": list(next(iter(models.values())).tables.part_names),

@@ -12,8 +12,10 @@ from fem.checkpoint import Checkpoints
 from fem.checkpoint_files import digest_of_files
 from fem.communicators import Communicators, Role
 from fem.coupling.division import SchemeName
-from fem.coupling.placement import Placement, admissible, check_size, shared
+from fem.coupling.placement import check_size
+from fem.coupling.planner import Load, Plan, plan_ranks, words
 from fem.coupling.scheme import scheme_of
+from fem.coupling.speeds import Kind
 from fem.coupling.stopwatch import Stopwatch
 from fem.estimate import WindowPlan, implicit_plan, largest_implicit_step
 from fem.exchange import CutChannels, MessageClock
@@ -24,7 +26,7 @@ from fem.inputs import RunInput
 from fem.ledger import Ledger
 from fem.march import Outputs, march
 from fem.materials.elasticity import materials_of_parts
-from fem.model import Model, build_models, divided_scene
+from fem.model import Divided, Model, build_models, divided_scene
 from fem.parameters import Shock
 from fem.participant import Alone, Participant, uncut_motion
 from fem.pulse import Pulse
@@ -47,9 +49,12 @@ def run(world: MPI.Comm, request: RunInput) -> None:
         EnergyError: Energies that do not balance; on every rank.
     """
     start = time.perf_counter()
+    if request.mode == "two_scale":
+        check_size(request.shock.ranks, world.size)
     divided = divided_scene(world, request)
-    with Communicators(world, place(world, request)) as comms:
-        models, steps = build_models(comms, divided, request)
+    ranks = place(world, divided, request)
+    with Communicators(world, ranks.placement) as comms:
+        models, steps = build_models(comms, divided, request, ranks.cells)
         pulse = agreed(comms.world, lambda: shock_pulse(request.shock)).pulse
         if request.implicit:
             largest = largest_implicit_step(request.shock.duration, pulse_durations({"drop": pulse}))
@@ -66,22 +71,26 @@ def run(world: MPI.Comm, request: RunInput) -> None:
         output_seconds = march(comms.world, crew, outputs, stopwatch)
         seconds = time.perf_counter() - ready - output_seconds
         first = checkpoints.continued or 0
-        balance = stopwatch.summary(comms.world, steps.plan.windows - first)
+        balance = ranks.summary | stopwatch.summary(comms.world, steps.plan.windows - first)
         timings = Timings(ready - start, seconds, output_seconds, balance, first)
         write_result(comms, request, (models, steps), history, timings)
         agreed(comms.world, lambda: None)
 
 
-def place(world: MPI.Comm, request: RunInput) -> Placement:
-    """Return which ranks carry which model.
-
-    Raises:
-        RankError: Too few or too many ranks; on every rank.
-    """
-    if request.mode == "dns":
-        return shared(("dns",), world.size)
-    check_size(request.shock.ranks, world.size)
-    return next(admissible(request.shock.ranks, np.ones(world.size).tolist()))
+def place(world: MPI.Comm, divided: Divided, request: RunInput) -> Plan:
+    """Choose which ranks carry which model and which cells, and say so; collective."""
+    shock, steps = request.shock, divided.steps
+    loads: dict[Role, Load] = {}
+    for role, tables in divided.tables.items():
+        _, materials = materials_of_parts(tables.part_names, request.materials)
+        step = steps.step_of(role)
+        kind = Kind(materials, shock.numerics.formulation, shock.numerics.kinematics, step)
+        mesh = divided.meshes.get(role)
+        loads[role] = Load(mesh, tables.level, tables.ratios, round(steps.plan.window / step), kind)
+    plan = plan_ranks(world, loads, shock.ranks, request.checkpoints)
+    if world.rank == 0:
+        print(words(plan), flush=True)
+    return plan
 
 
 def make_crew(

@@ -6,10 +6,11 @@ import numpy as np
 from mpi4py import MPI
 
 from fem.communicators import Communicators
+from fem.coupling.placement import shared
 from fem.inputs import RunInput
 from fem.march import run_window
 from fem.model import build_models, divided_scene
-from fem.run import make_crew, make_history, place
+from fem.run import make_crew, make_history
 from fem.shock_loads import shock_pulse
 
 
@@ -28,8 +29,8 @@ class ProgramRun:
         """Build the models."""
         begin = process_time()
         divided = divided_scene(MPI.COMM_SELF, request)
-        comms = Communicators(MPI.COMM_SELF, place(MPI.COMM_SELF, request))
-        models, steps = build_models(comms, divided, request)
+        comms = Communicators(MPI.COMM_SELF, shared(tuple(divided.tables), 1))
+        models, steps = build_models(comms, divided, request, {})
         self.plan = steps.plan
         self.crew, _ = make_crew(comms, models, (steps.plan, divided.scheme), request.shock)
         self.elements = {role: len(model.body.local.cells) for role, model in models.items()}

@@ -10,6 +10,7 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from fem.checkpoint_files import write_at_once
 from fem.coupling.placement import (
     Alternative,
     ModelCost,
@@ -87,7 +88,8 @@ def plan_ranks(world: MPI.Comm, loads: Mapping[Role, Load], ranks: Ranks, folder
             the same cells on the same ranks, to the same bits.
     """
     family = {role: families(load.mesh, load.kind) for role, load in loads.items() if load.mesh}
-    measured = kept(world, folder) or measure(world, loads, family)
+    present = np.unique(np.concatenate([np.zeros(0, np.int8), *family.values()]))
+    measured = kept(world, folder, present) or measure(world, loads, family)
     if folder is not None and world.rank == 0:
         keep(folder, measured)
     plan = plan_from(loads, family, ranks, measured) if world.rank == 0 else None
@@ -107,13 +109,14 @@ def measure(world: MPI.Comm, loads: Mapping[Role, Load], family: Mapping[Role, N
     return Measured(measured_costs(world, world.bcast(found)), measured_latency(world))
 
 
-def kept(world: MPI.Comm, folder: Path | None) -> Measured | None:
-    """Return what ``keep`` wrote with as many ranks; collective."""
+def kept(world: MPI.Comm, folder: Path | None, present: NDArray[np.int8]) -> Measured | None:
+    """Return what ``keep`` wrote with as many ranks of all families that rank 0 finds ``present``; collective."""
     found = None
     if world.rank == 0 and folder is not None and (folder / KEPT).exists():
         record = json.loads((folder / KEPT).read_text())
         cost = StepCost(np.array(record["fixed"]), np.array(record["element"]))
-        found = Measured(cost, record["latency"]) if len(cost.fixed) == world.size else None
+        fits = len(cost.fixed) == world.size and bool((cost.element[:, present] > 0.0).all())
+        found = Measured(cost, record["latency"]) if fits else None
     return world.bcast(found)
 
 
@@ -121,7 +124,7 @@ def keep(folder: Path, measured: Measured) -> None:
     """Write a measurement for a run that continues."""
     folder.mkdir(parents=True, exist_ok=True)
     cost = {"fixed": measured.cost.fixed.tolist(), "element": measured.cost.element.tolist()}
-    (folder / KEPT).write_text(json.dumps(cost | {"latency": measured.latency}))
+    write_at_once(folder / KEPT, json.dumps(cost | {"latency": measured.latency}).encode())
 
 
 def plan_from(

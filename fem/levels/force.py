@@ -137,7 +137,7 @@ def build_level(comm: MPI.Comm, body: "Body", levels: Levels, number: int, aroun
     if number < len(levels.ratios):
         inner = replace(levels, step=levels.step / levels.ratios[number - 1])
         terms.append(build_level(comm, body, inner, number + 1, nodes))
-    shared = SharedNodes(comm, body.local.nodes[nodes[:free]])
+    shared = SharedNodes(comm, body.local.nodes[nodes[:free]], body.shared.clock)
     mass = np.where(body.mass > 0.0, body.mass, np.inf)[nodes[:free], None]
     return LocalSteps(
         rows=positions(around, nodes),

@@ -88,10 +88,10 @@ def build_coupled(
     comms: Communicators, divided: Divided[StructureTables], request: StructureInput
 ) -> dict[Role, StructureModel]:
     """Distribute and assemble the coupled models of this rank; collective."""
-    given, tables = hand_over(comms, divided), divided.tables
+    given, tables = hand_over(comms, divided, {}), divided.tables
     mine = next(iter(divided.meshes.values()), None)
     dolfinx_api.compile_ahead(comms.world, mine.points[mine.cells[0]] if mine else None)
-    meshes = {role: distribute(comms.models[role], mesh) for role, mesh in given.items()}
+    meshes = {role: distribute(comms.models[role], *mesh) for role, mesh in given.items()}
 
     def pieces_of(role: Role) -> Pieces:
         return make_pieces(meshes[role], tables[role], request.layer_materials, request.structure.formulation)

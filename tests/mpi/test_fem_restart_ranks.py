@@ -33,10 +33,10 @@ def go(changes, name, checkpoints=None, windows=10**9):
     if comm == MPI.COMM_NULL:
         return folder / name
     left = iter(range(windows))
-    def some_windows(crew):
+    def some_windows(crew, stopwatch):
         if next(left, None) is None:
             raise Killed
-        run_window(crew)
+        run_window(crew, stopwatch)
     fem.march.run_window = some_windows
     (folder / name).mkdir(exist_ok=True)
     request = json.loads((folder / "input.json").read_text()) | changes["input"]
@@ -75,7 +75,8 @@ def continue_otherwise():
         if world.rank == 0:
             window = json.loads((found / "result.json").read_text())["continued_from"]
             fields = len(list(found.glob("*.pvtu")) + list(found.glob("*.vtu")))
-            told.append([difference(histories(found), histories(whole)), window, len(list(copy.iterdir())), fields])
+            folders = sum(path.is_dir() for path in copy.iterdir())
+            told.append([difference(histories(found), histories(whole)), window, folders, fields])
     if world.rank == 0:
         energies = {name: float(values[-1]) for name, values in histories(whole).items() if name in ENERGIES}
         (folder / "told.json").write_text(json.dumps([told, energies]))

@@ -99,11 +99,11 @@ def test_implicit_step_follows_the_shortest_pulse():
 
 def test_prediction_of_equal_ranks():
     plan = window_plan(1.0, 0.1, 1.0, 100.0, 10)
-    board, joints = 0.01 * UPDATES_PER_SECOND, 0.001 * UPDATES_PER_SECOND  # updates in that many seconds
+    board, joints = 0.1 * UPDATES_PER_SECOND, 0.01 * UPDATES_PER_SECOND  # updates in that many seconds
     ranks = Ranks(total=2, placement="disjoint", macro=1)
     two_scale, dns = predict_seconds(board * BOARD_ADVANTAGE, [(joints, 10)], plan, ranks)
-    assert two_scale == pytest.approx(100 * 0.01, rel=0.01)
-    assert dns == pytest.approx(100 * 0.055, rel=0.01)
+    assert two_scale == pytest.approx(100 * 0.1, rel=0.01)
+    assert dns == pytest.approx(100 * 0.55, rel=0.01)
 
 
 def test_half_sine_changes_the_velocity_by_two_a_tau_over_pi():

@@ -133,7 +133,10 @@ def test_measurement_is_kept_for_a_run_that_continues(tmp_path):
     assert first.summary["update_seconds"].keys() == {"box", "assembled"}
     assert plan_ranks(MPI.COMM_SELF, loads, Ranks(total=1), tmp_path).summary == first.summary
     keep(tmp_path, measured(2))
-    assert kept(MPI.COMM_SELF, tmp_path) is None
+    assert kept(MPI.COMM_SELF, tmp_path, np.array([0])) is None
+    keep(tmp_path, measured(1))
+    assert kept(MPI.COMM_SELF, tmp_path, np.array([0])) is not None
+    assert kept(MPI.COMM_SELF, tmp_path, np.array([0, 2])) is None
     json.dumps(first.summary)
 
 
