@@ -56,9 +56,7 @@ def run(world: MPI.Comm, request: RunInput) -> None:
     with Communicators(world, ranks.placement) as comms:
         models, steps = build_models(comms, divided, request, ranks.cells)
         pulse = agreed(comms.world, lambda: shock_pulse(request.shock)).pulse
-        if request.implicit:
-            largest = largest_implicit_step(request.shock.duration, pulse_durations({"drop": pulse}))
-            steps = replace(steps, plan=implicit_plan(steps.plan, largest))
+        steps = planned(steps, request, pulse)
         crew, channels = make_crew(comms, models, (steps.plan, divided.scheme), request.shock)
         stopwatch = Stopwatch({role: model.body.shared.clock for role, model in models.items()}, channels)
         history = make_history(comms, models, steps, pulse, request)
@@ -75,6 +73,14 @@ def run(world: MPI.Comm, request: RunInput) -> None:
         timings = Timings(ready - start, seconds, output_seconds, balance, first)
         write_result(comms, request, (models, steps), history, timings)
         agreed(comms.world, lambda: None)
+
+
+def planned(steps: Steps, request: RunInput, pulse: Pulse) -> Steps:
+    """Return the steps of a run that may be implicit."""
+    if not request.implicit:
+        return steps
+    largest = largest_implicit_step(request.shock.duration, pulse_durations({"drop": pulse}))
+    return replace(steps, plan=implicit_plan(steps.plan, largest))
 
 
 def place(world: MPI.Comm, divided: Divided, request: RunInput) -> Plan:

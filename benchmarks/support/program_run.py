@@ -8,9 +8,8 @@ from mpi4py import MPI
 from fem.communicators import Communicators
 from fem.coupling.placement import shared
 from fem.inputs import RunInput
-from fem.march import run_window
 from fem.model import build_models, divided_scene
-from fem.run import make_crew, make_history
+from fem.run import make_crew, make_history, planned
 from fem.shock_loads import shock_pulse
 
 
@@ -31,18 +30,27 @@ class ProgramRun:
         divided = divided_scene(MPI.COMM_SELF, request)
         comms = Communicators(MPI.COMM_SELF, shared(tuple(divided.tables), 1))
         models, steps = build_models(comms, divided, request, {})
+        pulse = shock_pulse(request.shock).pulse
+        steps = planned(steps, request, pulse)
         self.plan = steps.plan
         self.crew, _ = make_crew(comms, models, (steps.plan, divided.scheme), request.shock)
         self.elements = {role: len(model.body.local.cells) for role, model in models.items()}
         self.setup = process_time() - begin
-        self.history = make_history(comms, models, steps, shock_pulse(request.shock).pulse, request)
+        self.history = make_history(comms, models, steps, pulse, request)
+
+    def window(self) -> None:
+        """Go on by one window."""
+        for participant in self.crew.values():
+            participant.begin_window()
+        for participant in self.crew.values():
+            participant.finish_window()
 
     def step(self, seconds: float) -> float:
         """Go on for some simulated time; return the processor seconds of a simulated one."""
         windows = max(1, round(seconds / self.plan.window))
         begin = process_time()
         for _ in range(windows):
-            run_window(self.crew)
+            self.window()
         return (process_time() - begin) / (windows * self.plan.window)
 
     def to_end(self) -> tuple[dict[str, np.ndarray], float]:
@@ -51,7 +59,7 @@ class ProgramRun:
         seconds = 0.0
         for window in range(1, self.plan.windows + 1):
             begin = process_time()
-            run_window(self.crew)
+            self.window()
             seconds += process_time() - begin
             if window % self.plan.stride == 0 or window == self.plan.windows:
                 self.history.sample(self.crew)

@@ -1,0 +1,113 @@
+"""The bars of two scales: what is asked and what is measured; ranks and placements are measured here.
+
+    python benchmarks/coupling.py        (a minute on two free cores; writes coupling.json)
+
+Ranks: 1 to 4 of them in both placements on a small package, whose histories must be equal; on two ranks that share both
+models of a larger one, how busy they are and what the coupling costs. All other rows are from the results of
+``coupling_stability.py``, ``two_scale.py`` and ``two_scale_peers.py``, which take longer.
+"""
+
+import json
+import os
+import tempfile
+from pathlib import Path
+from typing import Any
+
+os.environ["OMP_NUM_THREADS"] = os.environ["NUMBA_NUM_THREADS"] = "1"
+
+from benchmarks.support import turns
+from benchmarks.support.drop_scene import DropScene
+from benchmarks.support.launched_run import largest_difference, launch
+from benchmarks.two_scale import REDUCED
+
+SMALL = (
+    *REDUCED,
+    "package.rows=4",
+    "package.columns=4",
+    "package.substrate.length='5 mm'",
+    "package.substrate.width='5 mm'",
+    "package.die.length='4 mm'",
+    "package.die.width='4 mm'",
+    "board.length='60 mm'",
+    "board.width='40 mm'",
+    "warpage.corner='0.02 mm'",
+)
+SHOCK = {"pulse_duration": 2e-5, "duration": 2e-5, "history_samples": 50, "field_samples": 2}
+EQUAL, OVERHEAD, BUSY = 1e-8, 0.03, 0.9
+SOURCES = ("coupling_stability", "two_scale", "two_scale_peers")
+
+
+def equality(scene: DropScene, scheme: str, folder: Path) -> dict[str, float]:
+    """Return how much the histories of each placement differ from those of one rank."""
+    request = scene.request("two_scale", {"scheme": scheme}, SHOCK)
+    reference, _ = launch(request, {"total": 1, "placement": "shared"}, folder / f"{scheme}_1")
+    found = {}
+    for total in (2, 3, 4):
+        for placement in ("shared", "disjoint"):
+            name = f"{scheme}, {total} ranks {placement}"
+            ranks = {"total": total, "placement": placement}
+            history, _ = launch(request, ranks, folder / f"{scheme}_{total}_{placement}")
+            found[name] = largest_difference(history, reference)
+            print(f"{name}: {found[name]:.2e}", flush=True)
+    return found
+
+
+def balance(scene: DropScene, scheme: str, folder: Path) -> dict[str, Any]:
+    """Return what the program tells of a run on two ranks that share both models."""
+    request = scene.request("two_scale", {"scheme": scheme}, SHOCK)
+    _, result = launch(request, {"total": 2, "placement": "shared"}, folder / f"{scheme}_balance")
+    return {
+        name: result["coupling"]["placement"][name] for name in ("busy_share", "coupling_overhead", "window_seconds")
+    }
+
+
+def own_bars(found: dict[str, dict]) -> dict[str, dict]:
+    """Return the bars of ranks with what was measured."""
+    bars = {f"equal histories: {name}": turns.bar(value, EQUAL, False) for name, value in found["equality"].items()}
+    for scheme, values in found["balance"].items():
+        bars[f"coupling overhead, {scheme}, 2 ranks shared"] = turns.bar(values["coupling_overhead"], OVERHEAD, False)
+        bars[f"busy share, {scheme}, 2 ranks shared"] = turns.bar(values["busy_share"], BUSY)
+    return bars
+
+
+def table(bars: dict[str, dict[str, dict]]) -> str:
+    """Return the bars of all results as a table for people."""
+    rows = [
+        f"| {source} | {name} | {item['holds_if']} {item['limit']:.3g} | {item['value']:.3g} |"
+        f" {'holds' if item['ok'] else 'MISSED'} |"
+        for source, items in bars.items()
+        for name, item in items.items()
+    ]
+    return "\n".join(["| from | what | bar | measured | |", "|---|---|---|---|---|", *rows])
+
+
+def other_bars() -> dict[str, dict[str, dict]]:
+    """Return the bars in the results of the other benchmarks."""
+    found = {}
+    for name in SOURCES:
+        path = turns.RESULTS / f"{name}.json"
+        if path.exists():
+            found[name] = json.loads(path.read_text())["bars"]
+        else:
+            print(f"no {path.name}: run benchmarks/{name}.py")
+    return found
+
+
+def main() -> None:
+    schemes = ("held_velocity", "local_steps", "gravouil_combescure")
+    with tempfile.TemporaryDirectory() as directory:
+        folder = Path(directory)
+        for name in ("small", "reduced"):
+            (folder / name).mkdir()
+        small, reduced = DropScene.write(folder / "small", SMALL), DropScene.write(folder / "reduced", REDUCED)
+        found = {
+            "equality": {k: value for scheme in schemes for k, value in equality(small, scheme, folder).items()},
+            "balance": {scheme: balance(reduced, scheme, folder) for scheme in schemes[:2]},
+        }
+    bars = own_bars(found)
+    turns.write("coupling", found | {"cores": len(os.sched_getaffinity(0)), "bars": bars})
+    print(table({"coupling": bars} | other_bars()))
+
+
+if __name__ == "__main__":
+    main()

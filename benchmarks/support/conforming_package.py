@@ -1,0 +1,80 @@
+"""A small package whose joints match board and package node for node: what programs without ties can compute, too."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+
+from fem.materials.library import COPPER, SAC405, SILICON
+from fem.materials.parameters import Isotropic
+from fem.materials.roles import Materials
+from fem.mesh import MeshData, boundary_facets, without_unused_nodes
+from tests.support.fem_models import CYCLIC, grid, mesh_of, on
+
+# Peers take isotropic materials in this comparison: a board of the in-plane stiffness of FR4.
+BOARD = Isotropic(density=1910.0, young_modulus=27.9e9, poisson_ratio=0.11)
+MATERIALS = Materials(board=BOARD, substrate=BOARD, die=SILICON, copper=COPPER, solder=SAC405.elastic)
+LENGTH, WIDTH, THICKNESS, PACKAGE = 8e-3, 6e-3, 1e-3, 2e-3  # [m], of a quarter
+JOINTS = {"B2": (0.5e-3, 0.5e-3), "B3": (1.5e-3, 0.5e-3), "A2": (0.5e-3, 1.5e-3), "A3": (1.5e-3, 1.5e-3)}
+RADIUS, COPPER_THICKNESS, GAP, LAYER = 0.2e-3, 2e-5, 0.3e-3, 0.4e-3
+
+
+def conforming_package(refinement: int = 1) -> MeshData:
+    """Return the mesh; each element of refinement 1 is cut into ``refinement`` in each direction."""
+    top = GAP + 2 * COPPER_THICKNESS
+    levels = [(-THICKNESS, 4), (0.0, 1), (COPPER_THICKNESS, 4), (COPPER_THICKNESS + GAP, 1), (top, 2), (top + LAYER, 2)]
+    z = lines([level for level, _ in levels] + [top + 2 * LAYER], [count * refinement for _, count in levels])
+    x, y = (in_plane(length, refinement) for length in (LENGTH, WIDTH))
+    points, cells = grid(x, y, z)
+    part = parts(points[cells].mean(axis=1), top)
+    kept = part != ""
+    facets = {
+        "symmetry_x": on(0, 0.0),
+        "symmetry_y": on(1, 0.0),
+        "mounting_holes": lambda c: (np.abs(c[:, 0] - LENGTH) < 1e-9) & (c[:, 2] < 0.0),
+        "board_bottom": on(2, -THICKNESS),
+    }
+    return without_unused_nodes(with_pads(mesh_of(points, cells[kept], part[kept], facets)))[0]
+
+
+def in_plane(length: float, refinement: int) -> np.ndarray:
+    """Return the grid lines along one side: through the joints' edges and axes, then half a millimetre apart."""
+    joints = [value for centre in (0.5e-3, 1.5e-3) for value in (centre - RADIUS, centre, centre + RADIUS)]
+    breaks = [0.0, *joints[:3], 1e-3, *joints[3:], PACKAGE, length]
+    return lines(breaks, [refinement] * 8 + [refinement * round((length - PACKAGE) / 0.5e-3)])
+
+
+def lines(breaks: Sequence[float], counts: Sequence[int]) -> np.ndarray:
+    """Return grid lines with ``counts`` equal elements between breaks."""
+    gaps = zip(pairwise(breaks), counts, strict=True)
+    pieces = [np.linspace(low, high, count + 1)[:-1] for (low, high), count in gaps]
+    return np.append(np.concatenate(pieces), breaks[-1])
+
+
+def parts(centre: np.ndarray, top: float) -> np.ndarray:
+    """Return the part of each cell from its centre, empty outside."""
+    x, y, z = centre.T
+    part = np.full(len(centre), "", dtype=object)
+    part[z < 0.0] = "board"
+    above = (x < PACKAGE) & (y < PACKAGE) & (z > top)
+    part[above] = np.where(z[above] < top + LAYER, "substrate", "die")
+    for name, (at_x, at_y) in JOINTS.items():
+        inside = (np.abs(x - at_x) < RADIUS) & (np.abs(y - at_y) < RADIUS) & (z > 0.0) & (z < top)
+        kind = np.select(
+            [z < COPPER_THICKNESS, z > COPPER_THICKNESS + GAP], ["copper_board", "copper_package"], "solder"
+        )
+        part[inside] = [f"{role}@{name}" for role in kind[inside]]
+    return part.astype(str)
+
+
+def with_pads(mesh: MeshData) -> MeshData:
+    """Return the mesh with the facet sets between solder and copper."""
+    facets = dict(mesh.facets)
+    for name in JOINTS:
+        solder = mesh.cells[mesh.in_parts(f"solder@{name}".__eq__)]
+        outside = boundary_facets(solder)[:, CYCLIC]
+        height = mesh.points[outside].mean(axis=1)[:, 2]
+        for end, z in (("board", COPPER_THICKNESS), ("package", COPPER_THICKNESS + GAP)):
+            facets[f"pad_{end}@{name}"] = outside[np.abs(height - z) < 1e-9]
+    return replace(mesh, facets=facets)
