@@ -32,9 +32,10 @@ from fem.implicit import ImplicitMotion
 from fem.inputs import INPUT, StructureInput
 from fem.materials.library import FR4
 from fem.solver_cost import forecast_solvers
+from fem.structure.crew import make_participant
 from fem.structure.model import build_structure
 from fem.structure.pulses import pulse_durations, pulses_of
-from fem.structure.run import make_history, make_participant
+from fem.structure.run import make_history
 from meshing.box import write_box
 from meshing.box_plan import Box, BoxHoles, BoxLayer
 from tests.support.fem_bodies import dns_body
@@ -109,7 +110,7 @@ def run(setting: Setting) -> tuple[dict, dict[str, np.ndarray]]:
     begin = process_time()
     participant = make_participant(MPI.COMM_SELF, model, request, pulses)
     setup = process_time() - begin
-    history, plan, seconds = make_history(MPI.COMM_SELF, model, request, pulses), participant.plan, 0.0
+    history, plan, seconds = make_history(MPI.COMM_SELF, {"structure": model}, request, pulses), participant.plan, 0.0
     history.sample({"structure": participant})
     for _ in range(plan.windows):
         begin = process_time()

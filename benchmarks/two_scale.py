@@ -89,7 +89,7 @@ def error_table(scene: DropScene, names: list[str], shock: dict, folder: Path) -
         arrays, seconds = ProgramRun(scene.request(mode, coupling, shock)).to_end()
         files[name] = folder / f"{name}.npz"
         np.savez(files[name], **arrays)
-        rows[name] = compare_histories(files[name], files["dns"]) | {"seconds": seconds}
+        rows[name] = compare_histories(files[name], files["dns"], coupling.get("fine_joints")) | {"seconds": seconds}
         print(name, rows[name], flush=True)
     return rows
 

@@ -44,7 +44,7 @@ def row(name: str, scene: DropScene, fraction: float, folder: Path) -> dict:
     arrays, seconds = run.to_end()
     path, reference = (folder / f"{key}_{fraction}.npz" for key in (name, "dns"))
     np.savez(path, **arrays)
-    errors = compare_histories(path, reference)
+    errors = compare_histories(path, reference, coupling.get("fine_joints"))
     return {
         "setting": name,
         "fraction": fraction,

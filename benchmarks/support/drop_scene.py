@@ -68,6 +68,7 @@ class DropScene:
         return RunInput(
             mode=mode,
             meshes=(self.folder / "assembly.msh", self.folder / "joints.msh"),
+            coarse_joints=self.folder / "coarse_joints.msh",
             shock=tables,
             materials=self.case.materials,
             output=self.folder,
