@@ -54,11 +54,13 @@ class Response:
 
     Attributes:
         kinematics: Whether rotations and strains are small.
-        step: dt [s], of laws that depend on the rate; infinity stands for slow.
+        step: dt [s], of laws that depend on the rate, and of levels below it; infinity stands for slow.
+        stiffness: beta of damping [s], which levels make room for.
     """
 
     kinematics: Kinematics = "small"
     step: float = np.inf
+    stiffness: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,7 +179,9 @@ def response_terms(
         return force_terms(body.elements, materials, response.kinematics, response.step)
     check_elastic(materials, response.kinematics, tables.ratios)
     level = tables.level[body.local.cell_numbers]
-    levels = LocalSteps.build(comm, body, Levels(level, tables.ratios, response.step))
+    levels = LocalSteps.build(
+        comm, body, Levels(level, tables.ratios, response.step, response.stiffness / response.step)
+    )
     return [*linear_terms(body.elements.subset(level == 0)), levels]
 
 

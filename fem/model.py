@@ -134,7 +134,7 @@ def build_models(
         steps = undivided(steps, max(found, alone), divided.rules)
     models = {}
     for role, own in pieces.items():
-        response = Response(numerics.kinematics, steps.step_of(role))
+        response = Response(numerics.kinematics, steps.step_of(role), request.shock.damping.coefficients[1])
         models[role] = Model(tables[role], make_body(comms.models[role], own, tables[role], factors[role], response))
     return models, steps
 

@@ -1,5 +1,6 @@
 """Which level each element takes its steps at, and how many steps: least predicted cost of a window."""
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
@@ -24,13 +25,29 @@ class Pace:
         steps: ``(ne,)`` critical step of each element [s].
         cost: ``(ne,)`` cost of an update of each element, in those of a box.
         window: Step of level 0 [s].
-        fraction: Largest step over critical step.
+        fraction: Largest step over critical step, the latter without damping.
+        stiffness: beta of damping [s].
     """
 
     steps: NDArray[np.float64]
     cost: NDArray[np.float64]
     window: float
     fraction: float
+    stiffness: float = 0.0
+
+    @property
+    def damping(self) -> float:
+        """Return beta over the window."""
+        return self.stiffness / self.window
+
+    @property
+    def outermost(self) -> float:
+        """Return the smallest step [s], times the fraction, of an element that takes the window.
+
+        Damping needs DT^2 (1 + 2 beta / DT) below the square of the critical step; inside levels it is their nu that
+        makes room for it.
+        """
+        return self.window * math.sqrt(1.0 + 2.0 * self.fraction * self.damping)
 
 
 def choose_levels(
@@ -55,20 +72,20 @@ def choose_levels(
         LevelError: The elements need more than ``LARGEST_RATIO`` steps of a level.
     """
     needed = governing_steps(cells, tie, pace.fraction * pace.steps)
-    if needed.min() >= pace.window * (1.0 - ROUNDING):
+    if needed.min() >= pace.outermost * (1.0 - ROUNDING):
         return np.zeros(len(cells), np.int32), ()
     order = np.argsort(needed)
     cost = np.concatenate([[0.0], np.cumsum(pace.cost[order])])
-    candidates = list(all_ratios(pace.window / needed.min(), (), most))
+    candidates = list(all_ratios(pace, pace.window / needed.min(), (), most))
     if not candidates:
         raise LevelError(
             f"the window {pace.window:.3e} s is {pace.window / needed.min():.3g} times the smallest step of an element,"
             f" {needed.min():.3e} s: allowed are {LARGEST_RATIO} steps a level, and {most} levels"
         )
-    finer = [np.searchsorted(needed[order], bounds(ratios, pace.window)) for ratios in candidates]
+    finer = [np.searchsorted(needed[order], bounds(ratios, pace)) for ratios in candidates]
     totals = [window_cost(cost[below], ratios) for below, ratios in zip(finer, candidates, strict=True)]
     ratios = candidates[int(np.argmin(totals))]
-    limits = bounds(ratios, pace.window)
+    limits = bounds(ratios, pace)
     return np.sum(needed[:, None] < limits, axis=1, dtype=np.int32), ratios
 
 
@@ -85,31 +102,32 @@ def governing_steps(cells: NDArray[np.int32], tie: Tie, steps: NDArray[np.float6
     return node[cells].min(axis=1)
 
 
-def bounds(ratios: tuple[int, ...], window: float) -> NDArray[np.float64]:
-    """Return the allowed steps ``(levels,)`` [s] below which elements need level 1, 2, ...: those of level 0, 1, ..."""
-    count, limits = 1, [1.0]
+def bounds(ratios: tuple[int, ...], pace: Pace) -> NDArray[np.float64]:
+    """Return the steps ``(levels,)`` [s], times the fraction, below which elements need level 1, 2, ..."""
+    count, limits = 1, [pace.outermost]
     for level, ratio in enumerate(ratios[:-1], 1):
         count *= ratio
-        limits.append(1.0 / (count * Substeps.of(ratio, level).reach))
-    return window * np.array(limits) * (1.0 - ROUNDING)
+        limits.append(pace.window / (count * Substeps.of(ratio, level, pace.damping).reach))
+    return np.array(limits) * (1.0 - ROUNDING)
 
 
-def all_ratios(needed: float, inner: tuple[int, ...], most: int) -> Iterator[tuple[int, ...]]:
+def all_ratios(pace: Pace, needed: float, inner: tuple[int, ...], most: int) -> Iterator[tuple[int, ...]]:
     """Yield ratios of one to ``most`` levels that make ``needed`` steps of a window.
 
     Args:
+        pace: What the steps follow.
         needed: Step of level 0 over the smallest one.
         inner: Ratios of the levels around.
         most: Levels that may follow.
     """
     level = len(inner) + 1
     for ratio in range(2, LARGEST_RATIO + 1):
-        reached = ratio * Substeps.of(ratio, level).reach
+        reached = ratio * Substeps.of(ratio, level, pace.damping).reach
         if reached >= needed * (1.0 - ROUNDING):
             yield (*inner, ratio)
             return
         if most > 1:
-            yield from all_ratios(needed / ratio, (*inner, ratio), most - 1)
+            yield from all_ratios(pace, needed / ratio, (*inner, ratio), most - 1)
 
 
 def window_cost(finer: NDArray[np.float64], ratios: tuple[int, ...]) -> float:

@@ -42,12 +42,14 @@ class Levels:
     Attributes:
         level: ``(ne,)`` level of each element of the rank, 0 for those that take the step of the model.
         ratios: Steps of level k + 1 in one of level k.
-        step: Step of the model DT [s].
+        step: Step of the model DT [s]; inside a level, of the level around it.
+        damping: beta of damping over the step of the model.
     """
 
     level: NDArray[np.int32]
     ratios: tuple[int, ...]
     step: float
+    damping: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,13 +129,13 @@ def build_level(comm: MPI.Comm, body: "Body", levels: Levels, number: int, aroun
     Args:
         comm: Communicator of the model.
         body: The model.
-        levels: Levels of its elements; ``step`` is that of the level around.
+        levels: Levels of its elements.
         number: Which level.
         around: ``(m,)`` nodes of the level around it.
     """
     nodes, free = level_nodes(body, levels.level, number)
     terms = own_terms(body, levels.level == number, nodes)
-    substeps = Substeps.of(levels.ratios[number - 1], number)
+    substeps = Substeps.of(levels.ratios[number - 1], number, levels.damping)
     if number < len(levels.ratios):
         inner = replace(levels, step=levels.step / levels.ratios[number - 1])
         terms.append(build_level(comm, body, inner, number + 1, nodes))

@@ -10,7 +10,7 @@ from mpi4py import MPI
 
 from fem.levels import chebyshev
 from fem.levels.chebyshev import Substeps
-from fem.levels.choose import bounds, governing_steps
+from fem.levels.choose import Pace, bounds, governing_steps
 from fem.materials.library import SAC405
 from fem.materials.parameters import Isotropic
 from fem.materials.roles import Materials
@@ -33,7 +33,7 @@ def chain_stiffness(levels: np.ndarray, stiffness: np.ndarray, chosen: int) -> n
 
 
 def chain_effective(
-    levels: np.ndarray, stiffness: np.ndarray, mass: np.ndarray, ratios: tuple[int, ...], step: float
+    levels: np.ndarray, stiffness: np.ndarray, mass: np.ndarray, ratios: tuple[int, ...], pace: Pace
 ) -> np.ndarray:
     """Return K_eff of a chain by the substeps themselves, all columns at a time."""
 
@@ -45,7 +45,7 @@ def chain_effective(
             return matrix
         outer = np.zeros(ELEMENTS + 1, dtype=bool)
         outer[CELLS[levels < number]] = True
-        steps, place = Substeps.of(ratios[number - 1], number), np.eye(ELEMENTS + 1)
+        steps, place = Substeps.of(ratios[number - 1], number, pace.damping), np.eye(ELEMENTS + 1)
         change, total = np.zeros_like(place), np.zeros_like(place)
         for memory, rate, weight in zip(steps.memory, steps.rate, steps.weight, strict=True):
             force = matrix @ place
@@ -54,36 +54,47 @@ def chain_effective(
             place = place + change
         return total
 
-    return effective(0, step)
+    return effective(0, pace.window)
 
 
-def extreme_eigenvalues(random: np.random.Generator, ratios: tuple[int, ...], fraction: float) -> tuple[float, float]:
-    """Return the smallest and the largest eigenvalue of DT^2 M^-1 K_eff of a random chain; DT is ``fraction``."""
-    limits = np.append(bounds(ratios, 1.0), 1.0 / (np.prod(ratios) * Substeps.of(ratios[-1], len(ratios)).reach))
+def extreme_eigenvalues(
+    random: np.random.Generator, ratios: tuple[int, ...], fraction: float, damping: float
+) -> tuple[float, float]:
+    """Return the smallest and the largest eigenvalue of DT^2 M^-1 K_eff of a random chain; DT is 1."""
+    pace = Pace(np.ones(ELEMENTS), np.ones(ELEMENTS), 1.0, fraction, damping)
+    innermost = 1.0 / (np.prod(ratios) * Substeps.of(ratios[-1], len(ratios), damping).reach)
+    limits = np.append(bounds(ratios, pace), innermost) / fraction
     runs = random.integers(1, 7, ELEMENTS)
     level = np.repeat(random.integers(0, len(limits), ELEMENTS), runs)[:ELEMENTS]
     steps = limits[level] * random.uniform(1.0, random.choice([1.0 + 1e-9, 1.3, 4.0]), ELEMENTS)
     impedance = 10.0 ** np.repeat(random.uniform(-1.0, 1.0, ELEMENTS), runs)[:ELEMENTS]
     stiffness, mass = impedance / steps, np.zeros(ELEMENTS + 1)
     np.add.at(mass, CELLS, 0.5 * (impedance * steps)[:, None])
-    levels = np.sum(governing_steps(CELLS, Tie.none(), steps)[:, None] < bounds(ratios, 1.0), axis=1)
-    matrix = chain_effective(levels, stiffness, mass, ratios, fraction)
+    needed = governing_steps(CELLS, Tie.none(), fraction * steps)
+    levels = np.sum(needed[:, None] < bounds(ratios, pace), axis=1)
+    matrix = chain_effective(levels, stiffness, mass, ratios, pace)
     assert np.abs(matrix - matrix.T).max() <= 1e-9 * np.abs(matrix).max()
-    values = np.linalg.eigvalsh(fraction**2 * (matrix + matrix.T) / (2.0 * np.sqrt(np.outer(mass, mass))))
+    values = np.linalg.eigvalsh((matrix + matrix.T) / (2.0 * np.sqrt(np.outer(mass, mass))))
     return values[0], values[-1]
 
 
-def grown(fraction: float, ratios: tuple[int, ...]) -> int:
-    """Return how many of some random chains grow."""
+def grown(fraction: float, ratios: tuple[int, ...], damping: float = 0.0) -> int:
+    """Return how many of some random chains grow; damping half a step late needs z (1 + 2 damping) <= 4."""
     random = np.random.default_rng(sum(ratios))
-    found = [extreme_eigenvalues(random, ratios, fraction) for _ in range(SAMPLES)]
-    return sum(high > 4.0 or low < -1e-9 * 4.0 for low, high in found)
+    found = [extreme_eigenvalues(random, ratios, fraction, damping) for _ in range(SAMPLES)]
+    return sum(high * (1.0 + 2.0 * damping) > 4.0 or low < -4e-9 for low, high in found)
 
 
 @pytest.mark.parametrize("fraction", [0.5, 0.9, 0.95])
 @pytest.mark.parametrize("ratios", RATIOS, ids=str)
 def test_random_chains_do_not_grow(fraction, ratios):
     assert grown(fraction, ratios) == 0
+
+
+@pytest.mark.parametrize("damping", [0.006, 0.03])
+@pytest.mark.parametrize("ratios", RATIOS[::3], ids=str)
+def test_damped_chains_do_not_grow(damping, ratios):
+    assert grown(0.9, ratios, damping) == 0
 
 
 def test_chains_without_stabilisation_or_with_the_same_on_all_levels_do_grow(monkeypatch):
