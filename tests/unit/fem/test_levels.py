@@ -135,5 +135,5 @@ def test_damping_takes_more_substeps_and_has_a_limit():
     assert Substeps.of(8, 1, 0.02).reach < Substeps.of(8, 1).reach
     damped = Pace(np.ones(12), np.ones(12), 0.9, 0.9, stiffness=0.01)
     assert choose_levels(CHAIN, Tie.none(), damped, 1)[0].min() == 1  # the window is too large for damped elements
-    with pytest.raises(LevelError, match="too strong for levels, which bear 0.03"):
+    with pytest.raises(LevelError, match=r"too strong for levels, which bear 0\.03"):
         Substeps.of(8, 1, 0.04)
