@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from workflow.board_drop_case import BoardDropCase
 
 MACRO = "board"  # role of the parts whose elements the window follows
-MOST_LEVELS = 3  # that are tried where the case leaves the number open
+MOST_LEVELS = 4  # that are tried where the case leaves the number open
 
 
 @dataclass(frozen=True, slots=True)
@@ -195,13 +195,14 @@ def _coupled(case: "BoardDropCase", parts: Parts) -> tuple[tuple[str, str], tupl
 
 
 def forecast_scheme(case: "BoardDropCase", parts: Parts) -> tuple[str, str]:
-    """Return the scheme of the coupling, and why."""
-    chosen = case.shock.coupling.scheme
-    if chosen != "auto":
-        return chosen, f"shock.coupling.scheme = {chosen}"
-    if is_linear(parts):
-        return "local_steps", "all elements are linear elastic"
-    return "held_velocity", "solder that yields, or turns, has a path, which local steps would not follow"
+    """Return the scheme of the coupling, and why; layers of board around the joints are taken to be there."""
+    from fem.coupling.choice import choose_scheme
+
+    wanted = case.shock.coupling.scheme
+    if wanted != "auto":
+        return wanted, f"shock.coupling.scheme = {wanted}"
+    choice = choose_scheme(is_linear(parts), buffer_possible=True)
+    return choice.scheme, choice.why
 
 
 def _models(parts: Parts, substeps: int) -> tuple[tuple[int, ...], dict[str, int]]:
