@@ -13,9 +13,10 @@ from fem.agreement import agreed
 from fem.body import Body, Pieces, Response, make_body, make_pieces
 from fem.communicators import Communicators, Role
 from fem.coupling.checks import check_division
-from fem.coupling.divide import Rules, divide
+from fem.coupling.divide import divide
 from fem.coupling.division import SchemeName
 from fem.coupling.fine_joints import read_scene
+from fem.coupling.rules import Rules
 from fem.coupling.whole import Treatment, survey
 from fem.inputs import RunInput
 from fem.local_mesh import distribute

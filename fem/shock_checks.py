@@ -67,9 +67,7 @@ def _finite(shock: Shock) -> Iterator[Problem]:
 def _coupling(coupling: JointCoupling) -> Iterator[Problem]:
     """Refuse what is not computed yet."""
     served = {
-        "scheme": ("auto", "held_velocity"),
         "direction": ("two_way",),
-        "levels": ("auto", 1),
     }
     for name, choices in served.items():
         value = getattr(coupling, name)

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from fem.body import Pieces, make_body
 from fem.communicators import Role
 from fem.coupling.checks import steps_of
-from fem.coupling.divide import Rules
 from fem.coupling.division import Division
+from fem.coupling.rules import Rules
 from fem.coupling.whole import Survey, Whole
 from fem.estimate import WindowPlan, damped_critical_step
 from fem.materials.roles import Materials

@@ -6,8 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem.coupling.buffer import grown, touching
-from fem.coupling.divide import Rules, cut_nodes, seeds_of
+from fem.coupling.divide import cut_nodes, seeds_of
+from fem.coupling.divide_levels import LARGEST_STIFFNESS
 from fem.coupling.division import Division
+from fem.coupling.rules import Rules
 from fem.coupling.whole import Survey, Whole
 from fem.errors import CutError
 from fem.estimate import damped_critical_step
@@ -26,6 +28,8 @@ def check_division(whole: Whole, survey: Survey, division: Division, rules: Rule
             raise CutError(nothing_left(role, whole, rules))
     if division.scheme == "held_velocity" and rules.coupling.direction == "two_way":
         check_buffer(whole, survey, division, rules)
+    if division.scheme == "local_steps":
+        check_linear(survey, division, rules)
     check_steps(whole, survey, division, rules)
 
 
@@ -65,6 +69,23 @@ def check_buffer(whole: Whole, survey: Survey, division: Division, rules: Rules)
             f"{np.sum(close)} elements of the macro model are too close to the joints, the first"
             f" {place_of(whole, close)}: at least two layers of board elements must lie between"
             f" (coupling.buffer_layers = {layers})"
+        )
+
+
+def check_linear(survey: Survey, division: Division, rules: Rules) -> None:
+    """Check that local steps are taken by linear elements, damped little; errors as ``check_division``."""
+    path = division.meso & ~survey.linear
+    if path.any():
+        roles = ", ".join(np.unique(survey.role[path]).tolist())
+        raise CutError(
+            f"coupling.scheme = local_steps is for linear elastic elements at small strains: {np.sum(path)} elements of"
+            f" {roles} have a path; held_velocity or gravouil_combescure serve them"
+        )
+    largest = LARGEST_STIFFNESS * division.plan.window
+    if rules.stiffness > largest:
+        raise CutError(
+            f"stiffness-proportional damping of {rules.stiffness:.3g} s is too large for coupling.scheme = local_steps"
+            f" with a window of {division.plan.window:.3g} s: at most {largest:.3g} s, or scheme = held_velocity"
         )
 
 

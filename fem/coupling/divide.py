@@ -1,53 +1,39 @@
 """The choice of models, levels and window from the cells of a whole mesh and their critical steps."""
 
-from dataclasses import dataclass
-from typing import cast
-
 import numpy as np
 from numpy.typing import NDArray
 
 from fem.coupling.buffer import grown, nodes_of, touching
+from fem.coupling.choice import Choice, choose_scheme
+from fem.coupling.divide_levels import LARGEST_STIFFNESS, by_levels
 from fem.coupling.division import Division, SchemeName
+from fem.coupling.rules import Rules
 from fem.coupling.whole import Survey, Whole
-from fem.estimate import WindowPlan, damped_critical_step, window_plan
-from fem.parameters import Coupling
-
-
-@dataclass(frozen=True, slots=True)
-class Rules:
-    """What a division follows.
-
-    Attributes:
-        coupling: What the user wants.
-        coarse: ``(ne,)`` cells that are the macro model's where velocities or forces are coupled: a board's.
-        fraction: Of the critical step that is used.
-        stiffness: beta of damping [s].
-        duration: Simulated time [s].
-        samples: History samples wanted.
-    """
-
-    coupling: Coupling
-    coarse: NDArray[np.bool_]
-    fraction: float
-    stiffness: float
-    duration: float
-    samples: int
-
-    def plan(self, macro_step: float, meso_step: float) -> WindowPlan:
-        """Return the windows that follow from two critical steps [s]."""
-        return window_plan(macro_step, meso_step, self.fraction, self.duration, self.samples)
+from fem.estimate import damped_critical_step
 
 
 def divide(whole: Whole, survey: Survey, rules: Rules) -> Division:
-    """Choose scheme, models, levels and window; ``checks.check_division`` says whether they can be coupled."""
-    divided = {"held_velocity": by_buffer, "gravouil_combescure": at_ties}[choose_scheme(rules)]
-    return divided(whole, survey, rules)
+    """Choose scheme, models, levels and window; ``checks.check_division`` says whether they can be coupled.
+
+    Raises:
+        LevelError: Steps that differ by more than levels bridge.
+    """
+    divided = {"held_velocity": by_buffer, "gravouil_combescure": at_ties, "local_steps": by_levels}
+    return divided[scheme_for(whole, survey, rules).scheme](whole, survey, rules)
 
 
-def choose_scheme(rules: Rules) -> SchemeName:
-    """Return the scheme that the user wants."""
-    scheme = rules.coupling.scheme
-    return "held_velocity" if scheme == "auto" else cast(SchemeName, scheme)
+def scheme_for(whole: Whole, survey: Survey, rules: Rules) -> Choice:
+    """Return the scheme that the user wants, or that the scene calls for, and why."""
+    wanted = rules.coupling.scheme
+    if wanted != "auto":
+        return Choice(wanted, f"coupling.scheme = {wanted}")
+    coarse_step = float(survey.step[rules.coarse].min(initial=np.inf))
+    light = rules.stiffness <= LARGEST_STIFFNESS * rules.fraction * coarse_step
+    linear = bool(survey.linear.all())
+    choice = choose_scheme(linear and light, bool(by_buffer(whole, survey, rules).macro.any()))
+    if linear and not light:
+        return Choice(choice.scheme, f"stiffness-proportional damping of {rules.stiffness:.3g} s leaves no local steps")
+    return choice
 
 
 def seeds_of(whole: Whole, fine: NDArray[np.bool_]) -> NDArray[np.bool_]:

@@ -132,8 +132,8 @@ def test_joint_beside_the_board_ends_all_ranks(tmp_path):
 
 
 def test_energy_that_does_not_balance_ends_all_ranks(assembly):
-    numerics = SHOCK["numerics"] | {"energy_balance_limit": 1e-12}
-    fails(assembly, 2, "energy_balance_limit", mode="two_scale", shock=SHOCK | {"numerics": numerics})
+    numerics, held = SHOCK["numerics"] | {"energy_balance_limit": 1e-12}, {"scheme": "held_velocity"}
+    fails(assembly, 2, "energy_balance_limit", mode="two_scale", shock=SHOCK | {"numerics": numerics, "coupling": held})
 
 
 def test_crash_of_one_rank_ends_all(assembly, tmp_path):

@@ -2,8 +2,9 @@
 
 from collections.abc import Callable
 
-from fem.coupling.divide import Rules, divide, held, two_steps
+from fem.coupling.divide import divide, held, two_steps
 from fem.coupling.division import Division
+from fem.coupling.rules import Rules
 from fem.coupling.whole import Survey, Treatment, Whole, survey
 from fem.materials.elasticity import role_of_part
 from fem.materials.parameters import Material
@@ -13,7 +14,7 @@ from fem.parameters import Coupling
 from fem.scene import joined
 
 Divide = Callable[[Whole, Survey, Rules], Division]
-DEFAULTS, TWO_WAY = Materials(), Coupling()
+DEFAULTS, HELD = Materials(), Coupling(scheme="held_velocity")
 DURATION = 1e-2  # [s] so long that a whole number of windows shortens none
 
 
@@ -21,7 +22,7 @@ def surveyed(
     mesh: MeshData,
     materials: Materials | dict[str, Material] = DEFAULTS,
     fraction: float = 0.9,
-    coupling: Coupling = TWO_WAY,
+    coupling: Coupling = HELD,
 ) -> tuple[Whole, Survey, Rules]:
     """Return a mesh, its survey, and the rules of its division, in which boards are coarse."""
     whole = joined(mesh)

@@ -1,0 +1,78 @@
+"""Division by step levels: the macro model takes the window, the meso model is all that needs smaller steps."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem.coupling.division import Division
+from fem.coupling.rules import Rules
+from fem.coupling.whole import Survey, Whole
+from fem.errors import LevelError
+from fem.estimate import BOARD_ADVANTAGE, UPDATES_PER_SECOND, WINDOW_OVERHEAD, damped_critical_step
+from fem.levels.choose import SUBSTEP_COST, Pace, choose_levels
+
+MOST = 4  # levels that "auto" tries
+# Of the coarse cells, those that may need less than the window: none, a few at the walls of holes, the finer half.
+EXCEPTIONS = (0.0, 0.02, 0.5)
+SHARES = (1.0, 1.0 / 1.5, 0.5)  # of these windows: on packages the largest is within 5 % of the best there is
+WINDOW_COST = WINDOW_OVERHEAD * UPDATES_PER_SECOND * BOARD_ADVANTAGE  # in updates of a box
+# beta over the window, at most: the highest frequency that levels leave, 1.93 / DT, then still has a stable step.
+LARGEST_STIFFNESS = 0.03
+
+
+def by_levels(whole: Whole, survey: Survey, rules: Rules) -> Division:
+    """Choose window and levels of least predicted cost: local steps.
+
+    Raises:
+        LevelError: No window allows levels.
+    """
+    critical = damped_critical_step(survey.step, rules.stiffness)
+    found, failure = [], LevelError("no window was tried")
+    for step in window_steps(critical[rules.coarse if rules.coarse.any() else ...]):
+        try:
+            found.append(levels_below(whole, survey.cost, critical, (step, rules)))
+        except LevelError as error:
+            failure = error
+    if not found:
+        raise failure
+    useful = [division for division in found if division.meso.any() and division.macro.any()]
+    return min(useful or found, key=lambda division: predicted_cost(division, survey.cost))
+
+
+def window_steps(coarse: NDArray[np.float64]) -> Iterator[float]:
+    """Yield critical steps [s] of which the window may be the allowed fraction, from those of coarse cells."""
+    natural = np.quantile(coarse, EXCEPTIONS, method="lower")
+    yield from np.unique(np.outer(natural, SHARES)).tolist()
+
+
+def levels_below(
+    whole: Whole, cost: NDArray[np.float64], critical: NDArray[np.float64], chosen: tuple[float, Rules]
+) -> Division:
+    """Return the division of one window.
+
+    Args:
+        whole: The mesh.
+        cost: ``(ne,)`` of an update.
+        critical: ``(ne,)`` critical steps [s].
+        chosen: The critical step that the window follows [s], and the rules.
+
+    Raises:
+        LevelError: See ``choose_levels``.
+    """
+    step, rules = chosen
+    plan, wanted = rules.plan(step, step), rules.coupling.levels
+    most = MOST if wanted == "auto" else wanted
+    pace = Pace(critical, cost, plan.window, rules.fraction)
+    level, ratios = choose_levels(whole.mesh.cells, whole.tie, pace, most)
+    plan = replace(plan, substeps=math.prod(ratios))
+    return Division("local_steps", level == 0, level > 0, level, ratios, plan)
+
+
+def predicted_cost(division: Division, cost: NDArray[np.float64]) -> float:
+    """Return the cost of a second of simulated time in updates of a box, ``cost (ne,)`` that of an update."""
+    counts = np.cumprod([1, *division.ratios])
+    updates = float(cost @ counts[division.level]) + SUBSTEP_COST * float(counts[1:].sum())
+    return (updates + WINDOW_COST) / division.plan.window
