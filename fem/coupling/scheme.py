@@ -34,7 +34,7 @@ class Scheme(Protocol):
 
 
 class LocalSteps:
-    """Another scheme whose meso model takes whole windows: its smaller steps are inside its force."""
+    """Another scheme both of whose models take whole windows: the smaller steps are inside the meso model's force."""
 
     def __init__(self, scheme: Scheme) -> None:
         """Take the scheme that couples at whole windows."""
@@ -42,7 +42,7 @@ class LocalSteps:
 
     def macro(self, body: Body, loads: list[Load], plan: WindowPlan, channels: CutChannels) -> Participant:
         """Return the macro model's participant."""
-        return self._scheme.macro(body, loads, plan, channels)
+        return self._scheme.macro(body, loads, replace(plan, substeps=1), channels)
 
     def meso(self, body: Body, loads: list[Load], plan: WindowPlan, channels: CutChannels) -> Participant:
         """Return the meso model's participant."""
