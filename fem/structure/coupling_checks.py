@@ -33,8 +33,6 @@ def _scheme(coupling: LayerCoupling) -> Iterator[Problem]:
     if coupling.direction == "one_way":
         message = "needs a coarse mesh of the fine part, too, which only a package has"
         yield Problem(f"{KEY}.direction", "one_way", message, "two_way")
-    if coupling.scheme == "local_steps":
-        yield Problem(f"{KEY}.scheme", "local_steps", "is not computed yet", "held_velocity, gravouil_combescure")
 
 
 def _ranks(coupling: LayerCoupling, ranks: int) -> Iterator[Problem]:

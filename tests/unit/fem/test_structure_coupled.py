@@ -70,7 +70,7 @@ def test_layers_that_are_alike_have_none_that_is_fine(tmp_path):
         divided_on_one_rank(request)
 
 
-@pytest.mark.parametrize("scheme", ["held_velocity", "gravouil_combescure"])
+@pytest.mark.parametrize("scheme", ["held_velocity", "gravouil_combescure", "local_steps"])
 def test_two_models_move_as_one(tmp_path, scheme):
     """Within the error of their steps: loads across tie and cut, reactions, watch points of both models."""
     changes = {"coupling": {"scheme": scheme, "fine": ["layer_1"]}}
@@ -100,7 +100,6 @@ def test_two_models_move_as_one(tmp_path, scheme):
         ({"coupling": {"macro_ranks": 1}}, "dynamics.coupling.macro_ranks", "is for placement"),
         ({"solver": "implicit"}, "dynamics.solver", "couples nothing"),
         ({"modes": 2}, "dynamics.modes", "one model"),
-        ({"coupling": {"scheme": "local_steps"}}, "dynamics.coupling.scheme", "not computed yet"),
         ({"numerics": {"explicit_step": 1e-9}}, "dynamics.numerics.explicit_step", "one model"),
     ],
 )
