@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from fem.elements.element import Elements
 from fem.energy import Energy
 from fem.force_assembled import AssembledElements
-from fem.force_congruent import CongruentElements, is_box
+from fem.force_congruent import CongruentElements, in_rows
 from fem.force_nonlinear import NonlinearElements
 from fem.kernels.nonlinear import Path
 from fem.kernels.plasticity import FIRST_YIELD, plastic_constants
@@ -57,7 +57,7 @@ def force_terms(
 
 def linear_terms(elements: Elements) -> list[ForceTerm]:
     """Return the force terms of elements that stay elastic and turn little: boxes share stiffnesses."""
-    box = is_box(elements.points[elements.cells])
+    box = in_rows(elements)
     terms: list[ForceTerm] = []
     if box.any():
         terms.append(CongruentElements.build(elements.subset(box)))

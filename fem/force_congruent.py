@@ -22,6 +22,7 @@ UPPER = np.triu_indices(3)
 VOIGT = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))
 TURNS = ((0, 1, 2), (1, 2, 0), (2, 0, 1))  # proper rotations that bring each axis to the front
 BOX_TOLERANCE = 1e-9
+FEW = 64  # boxes whose assembled matrices cost no more than the calls of a term of their own
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,6 +89,12 @@ def is_box(corners: NDArray[np.float64]) -> NDArray[np.bool_]:
     position = upper @ np.array([1, 2, 4])
     complete = np.all(np.sort(position, axis=1) == np.arange(8), axis=1)
     return complete & ~off.any(axis=(1, 2))
+
+
+def in_rows(elements: Elements) -> NDArray[np.bool_]:
+    """Return which elements ``(ne,)`` are worth a term of boxes: boxes, unless they are few among others."""
+    box = is_box(elements.points[elements.cells])
+    return box if box.all() or np.sum(box) >= FEW else np.zeros_like(box)
 
 
 def aligned(elements: Elements) -> Elements:

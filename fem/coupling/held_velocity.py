@@ -16,7 +16,7 @@ from fem.body import Body
 from fem.communicators import Role
 from fem.estimate import WindowPlan
 from fem.exchange import CutChannels
-from fem.kernels.motion import add_impulse
+from fem.kernels.motion import add_impulse, add_rows
 from fem.loads import Load
 from fem.motion import Motion
 from fem.participant import Continued
@@ -46,17 +46,18 @@ class Answered(Continued):
         """Take a motion that is ready to advance by windows."""
         self.motion, self.plan, self._channels = motion, plan, channels
         self._received = np.zeros_like(motion.force)
-        self._counted = counted_cut(motion.body)
+        self._cut, self._counted = local_cut(motion.body), counted_cut(motion.body)
         self.interface_work = 0.0
 
     def take_force(self) -> None:
         """Receive the meso model's force, and count the work across the cut."""
-        motion = self.motion
-        before = self._received[self._counted]
+        motion, counted, half = self.motion, self._counted, 0.5 * self.motion.step
+        impulse = np.zeros((len(counted), 3))
+        add_impulse(counted, self._received, half, impulse)
         self._channels.forces.receive(self._received)
-        motion.force += self._received
-        impulse = 0.5 * motion.step * (before + self._received[self._counted])
-        self.interface_work -= float(np.sum(impulse * motion.velocity[self._counted]))
+        add_impulse(counted, self._received, half, impulse)
+        add_rows(self._cut, self._received, motion.force)
+        self.interface_work -= float(np.vdot(impulse, motion.velocity[counted]))
 
     def cut_force(self) -> NDArray[np.float64]:
         """Return the received force at the cut."""

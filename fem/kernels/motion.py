@@ -103,3 +103,11 @@ def add_impulse(rows, force, scale, impulse):
     for i in range(len(rows)):
         for c in range(3):
             impulse[i, c] += scale * force[rows[i], c]
+
+
+@njit(cache=True)
+def add_rows(rows, values, total):
+    """Add some rows of ``values (n, 3)`` to those of a sum; each row once."""
+    for i in range(len(rows)):
+        for c in range(3):
+            total[rows[i], c] += values[rows[i], c]

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from fem.elements.element import Elements
 from fem.energy import InternalForce
 from fem.force_assembled import AssembledElements
-from fem.force_congruent import CongruentElements, is_box
+from fem.force_congruent import CongruentElements, in_rows
 from fem.tie import Tie
 
 
@@ -16,7 +16,7 @@ def tied_terms(elements: Elements, tie: Tie) -> list[InternalForce]:
 
     Boxes with a slave share no stiffness with others any more: they are assembled.
     """
-    box = is_box(elements.points[elements.cells]) & ~np.isin(elements.cells, tie.slave).any(axis=1)
+    box = in_rows(elements) & ~np.isin(elements.cells, tie.slave).any(axis=1)
     terms: list[InternalForce] = []
     if box.any():
         terms.append(CongruentElements.build(elements.subset(box)))

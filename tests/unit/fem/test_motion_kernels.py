@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fem.exchange import rank_order
-from fem.kernels.motion import STRIP, advance, sum_in_rank_order
+from fem.kernels.motion import STRIP, add_rows, advance, sum_in_rank_order
 
 
 @pytest.mark.parametrize("count", [1, 2, STRIP // 3, STRIP // 3 + 1, STRIP + 5])
@@ -44,3 +44,12 @@ def test_a_node_moves_alike_wherever_it_stands():
         part = state[:, first:].copy()
         advance(part, mobility[first:].copy(), gravity, 0.1)
         assert np.array_equal(part, whole[:, first:])
+
+
+def test_some_rows_are_added():
+    values, total = np.random.default_rng(7).uniform(-1, 1, (2, 9, 3))
+    rows = np.array([7, 0, 4], np.int32)
+    expected = total.copy()
+    expected[rows] += values[rows]
+    add_rows(rows, values, total)
+    assert np.array_equal(total, expected)
