@@ -40,10 +40,12 @@ def ledger_sums(participant: Participant, sign: float) -> NDArray[np.float64]:
             sign * participant.interface_work,
             motion.step_energy(participant.foreign_force()),
         ]
-    points, owned = motion.body.local.points, motion.body.shared.owned
-    cut = participant.cut_force()[owned]
-    cut_load = -sign * net_load(points[owned], cut)
-    cut_scale = 0.5 * abs(sign) * load_scale(points[owned], cut)
+    body = motion.body
+    here = body.cut[body.cut >= 0]
+    here = here[body.shared.owned[here]]
+    points, cut = body.local.points[here], participant.cut_force()[here]
+    cut_load = -sign * net_load(points, cut)
+    cut_scale = 0.5 * abs(sign) * load_scale(points, cut)
     tie_load, tie_scale = tie_residual(participant)
     return np.concatenate([energies, cut_load, cut_scale, tie_load, tie_scale])
 
@@ -55,12 +57,14 @@ def load_scale(points: NDArray[np.float64], force: NDArray[np.float64]) -> NDArr
 
 def tie_residual(participant: Participant) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return net force and moment ``(6,)`` of the slaves minus those that arrive at their masters, and the scales."""
-    body = participant.motion.body
-    slaves = np.zeros_like(participant.motion.force)
-    slaves[body.tie.slave] = participant.motion.slave_force
-    before, scale = net_load(body.local.points, slaves), load_scale(body.local.points, slaves)
-    body.tie.gather(slaves)
-    return before - net_load(body.local.points, slaves), scale
+    motion = participant.motion
+    tie, points = motion.body.tie, motion.body.local.points
+    given = points[tie.slave], motion.slave_force
+    force = np.zeros_like(motion.force)
+    force[tie.slave] = motion.slave_force
+    tie.gather(force)
+    masters = np.unique(tie.master)
+    return net_load(*given) - net_load(points[masters], force[masters]), load_scale(*given)
 
 
 @dataclass(slots=True)

@@ -130,7 +130,7 @@ class Motion(Loaded):
         With this product its change over a step is exactly the work of the forces (central differences conserve it
         together with the strain energy), while m v^2 / 2 of the mean velocity is larger by m (a dt)^2 / 8.
         """
-        return 0.5 * float(self.ledger_mass @ np.sum(self.velocity * self._following_velocity(), axis=1))
+        return 0.5 * float(np.einsum("n,ni,ni->", self.ledger_mass, self.velocity, self._following_velocity()))
 
     def present_velocity(self) -> NDArray[np.float64]:
         """Return the velocity ``(n, 3)`` [m/s] at ``time``, half a step after ``velocity``; not that of slaves."""

@@ -1,8 +1,11 @@
 """From the mesh of a structure to its body on each rank: read, check, distribute, choose steps, assemble."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
+import numpy as np
 from mpi4py import MPI
+from numpy.typing import NDArray
 
 from fem import dolfinx_api
 from fem.agreement import agreed
@@ -85,10 +88,13 @@ def choose_steps(comm: MPI.Comm, pieces: Pieces, request: StructureInput, pulses
 
 
 def build_coupled(
-    comms: Communicators, divided: Divided[StructureTables], request: StructureInput
+    comms: Communicators,
+    divided: Divided[StructureTables],
+    request: StructureInput,
+    ranks: Mapping[Role, NDArray[np.int32]],
 ) -> dict[Role, StructureModel]:
-    """Distribute and assemble the coupled models of this rank; collective."""
-    given, tables = hand_over(comms, divided, {}), divided.tables
+    """Distribute and assemble the coupled models of this rank; ``ranks`` as ``fem.model.build_models``; collective."""
+    given, tables = hand_over(comms, divided, ranks), divided.tables
     mine = next(iter(divided.meshes.values()), None)
     dolfinx_api.compile_ahead(comms.world, mine.points[mine.cells[0]] if mine else None)
     meshes = {role: distribute(comms.models[role], *mesh) for role, mesh in given.items()}
@@ -97,10 +103,11 @@ def build_coupled(
         return make_pieces(meshes[role], tables[role], request.layer_materials, request.structure.formulation)
 
     pieces = agreed(comms.world, lambda: {role: pieces_of(role) for role in meshes})
+    dynamics = request.dynamics
     models = {}
     for role, own in pieces.items():
         factor = divided.mass_factors[role][meshes[role].cell_numbers]
-        response = Response(request.dynamics.kinematics, divided.steps.step_of(role))
+        response = Response(dynamics.kinematics, divided.steps.step_of(role), dynamics.damping.coefficients[1])
         body = make_body(comms.models[role], own, tables[role], factor, response)
         models[role] = StructureModel(tables[role], body, divided.steps)
     return models

@@ -77,7 +77,7 @@ def write_result(
             "health": health(history, summary, request),
             "effects": effects(request, summary["added_mass"], max(found.peaks["neglected_strain"].values()))
             | strain_effect(model.tables.watch),
-            **coupling_of(found, comms, timings),
+            **coupling_of(found, timings),
             "timings": timings.seconds,
             "balance": timings.balance,
             "continued_from": timings.first,
@@ -147,11 +147,11 @@ def cost_metrics(summary: dict[str, Any], timings: Timings) -> dict[str, Any]:
     }
 
 
-def coupling_of(found: Found, comms: Communicators, timings: Timings) -> dict[str, Any]:
+def coupling_of(found: Found, timings: Timings) -> dict[str, Any]:
     """Return how two models are coupled and placed; nothing where there is one."""
     if found.coupling is None:
         return {}
-    return {"coupling": found.coupling | {"placement": {"chosen": comms.placement.words, **timings.balance}}}
+    return {"coupling": found.coupling | {"placement": timings.balance}}
 
 
 def factor_metrics(cost: FactorCost | None) -> dict[str, Any]:

@@ -8,12 +8,15 @@ from typing import Any
 
 import numpy as np
 from mpi4py import MPI
+from numpy.typing import NDArray
 
 from fem.agreement import agreed
 from fem.checkpoint import Checkpoints
 from fem.checkpoint_files import digest_of_files
 from fem.communicators import Communicators, Role
-from fem.coupling.placement import Placement, admissible, shared
+from fem.coupling.placement import shared
+from fem.coupling.planner import Load, Plan, plan_ranks, words
+from fem.coupling.speeds import Kind
 from fem.coupling.stopwatch import Stopwatch
 from fem.exchange import MessageClock
 from fem.fields import Fields
@@ -23,14 +26,16 @@ from fem.inputs import StructureInput
 from fem.ledger import Ledger
 from fem.march import Outputs, march
 from fem.materials.effects import plastic_laws
+from fem.materials.elasticity import materials_of_parts
 from fem.parameters import Ranks
 from fem.participant import Participant
 from fem.pulse import Pulse
 from fem.result import Timings
 from fem.structure.crew import couple_models, make_participant
-from fem.structure.divided import divided_structure
+from fem.structure.divided import DividedStructure, divided_structure
 from fem.structure.model import StructureModel, build_coupled, build_structure
 from fem.structure.modes import ModeTable, find_modes
+from fem.structure.parameters import LayerCoupling
 from fem.structure.pulses import pulse_durations, pulses_of
 from fem.structure.result import Found, element_peaks, write_result
 from fem.watch_points import PointWatch
@@ -66,8 +71,13 @@ def run_structure(world: MPI.Comm, request: StructureInput) -> None:
     """
     start = time.perf_counter()
     pulses = agreed(world, lambda: pulses_of(request.loads))
-    with Communicators(world, place(world, request)) as comms:
-        started = (start_two if request.coupled else start_one)(comms, request, pulses)
+    divided = divided_structure(world, request) if request.coupled else None
+    ranks = place(world, divided, request) if divided else Plan(shared(("structure",), world.size), {}, {})
+    with Communicators(world, ranks.placement) as comms:
+        if divided is None:
+            started = start_one(comms, request, pulses)
+        else:
+            started = start_two(comms, request, pulses, divided, ranks.cells)
         models, crew = started.models, started.crew
         outputs = make_outputs(comms, models, request, pulses)
         stopwatch = Stopwatch({role: model.body.shared.clock for role, model in models.items()}, started.channels)
@@ -75,7 +85,7 @@ def run_structure(world: MPI.Comm, request: StructureInput) -> None:
         output_seconds = march(comms.world, crew, outputs, stopwatch)
         seconds = time.perf_counter() - ready - output_seconds
         first = outputs.checkpoints.continued or 0
-        balance = stopwatch.summary(comms.world, next(iter(crew.values())).plan.windows - first)
+        balance = ranks.summary | stopwatch.summary(comms.world, next(iter(crew.values())).plan.windows - first)
         timings = Timings(ready - start, seconds, output_seconds, balance, first)
         peaks = element_peaks(comms.world, outputs.fields.values(), next(iter(models.values())).tables.part_names)
         motion = next(iter(crew.values())).motion
@@ -85,13 +95,22 @@ def run_structure(world: MPI.Comm, request: StructureInput) -> None:
         agreed(comms.world, lambda: None)
 
 
-def place(world: MPI.Comm, request: StructureInput) -> Placement:
-    """Return which ranks carry which model."""
-    coupling = request.dynamics.coupling
-    if not request.coupled or coupling is None:
-        return shared(("structure",), world.size)
+def place(world: MPI.Comm, divided: DividedStructure, request: StructureInput) -> Plan:
+    """Choose which ranks carry which model and which cells, and say so; collective."""
+    coupling, steps = divided.rules.coupling, divided.steps
+    loads: dict[Role, Load] = {}
+    for role, tables in divided.tables.items():
+        _, materials = materials_of_parts(tables.part_names, request.layer_materials)
+        step = steps.step_of(role)
+        kind = Kind(materials, request.structure.formulation, request.dynamics.kinematics, step)
+        mesh = divided.meshes.get(role)
+        loads[role] = Load(mesh, tables.level, tables.ratios, round(steps.plan.window / step), kind)
+    assert isinstance(coupling, LayerCoupling)
     ranks = Ranks(total=world.size, placement=coupling.placement, macro=coupling.macro_ranks)
-    return next(admissible(ranks, np.ones(world.size).tolist()))
+    plan = plan_ranks(world, loads, ranks, request.checkpoints)
+    if world.rank == 0:
+        print(words(plan), flush=True)
+    return plan
 
 
 def start_one(comms: Communicators, request: StructureInput, pulses: dict[str, Pulse]) -> Started:
@@ -102,10 +121,15 @@ def start_one(comms: Communicators, request: StructureInput, pulses: dict[str, P
     return Started({"structure": model}, {"structure": make_participant(comm, model, request, pulses)}, modes)
 
 
-def start_two(comms: Communicators, request: StructureInput, pulses: dict[str, Pulse]) -> Started:
-    """Return the coupled models of this rank; collective."""
-    divided = divided_structure(comms.world, request)
-    models = build_coupled(comms, divided, request)
+def start_two(
+    comms: Communicators,
+    request: StructureInput,
+    pulses: dict[str, Pulse],
+    divided: DividedStructure,
+    cells: Mapping[Role, NDArray[np.int32]],
+) -> Started:
+    """Return the coupled models of this rank; ``cells`` are those of ``planner.Plan``; collective."""
+    models = build_coupled(comms, divided, request, cells)
     crew, channels = couple_models(comms, models, request, pulses, divided.scheme)
     return Started(models, crew, None, channels, divided.coupling)
 
