@@ -8,8 +8,8 @@ from fem.coupling.division import Division
 from fem.coupling.whole import Survey
 
 
-def coupling_record(division: Division, survey: Survey, cut_nodes: int) -> dict[str, Any]:
-    """Return scheme, share of the meso model, nodes of the cut, and the levels of time steps with their elements."""
+def coupling_record(division: Division, survey: Survey, why: str, cut_nodes: int) -> dict[str, Any]:
+    """Return scheme and why, share of the meso model, nodes of the cut, levels of time steps with their elements."""
     plan = division.plan
     held = division.scheme != "local_steps"
     level = division.meso.astype(np.int32) if held else division.level
@@ -17,6 +17,7 @@ def coupling_record(division: Division, survey: Survey, cut_nodes: int) -> dict[
     cost = np.array([float(survey.cost[level == k].sum()) / step for k, step in enumerate(steps)])
     return {
         "scheme": division.scheme,
+        "why": why,
         "ratios": [plan.substeps] if held else list(division.ratios),
         "meso_share": float(division.meso.mean()),
         "cut_nodes": cut_nodes,

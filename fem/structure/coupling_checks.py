@@ -14,7 +14,7 @@ def coupling_problems(scene: StructureScene) -> Iterator[Problem]:
     if coupling is None:
         return
     yield from _fine(coupling, scene)
-    yield from _scheme(coupling)
+    yield from _scheme(coupling, scene)
     yield from _ranks(coupling, scene.dynamics.ranks)
     yield from _one_model(scene)
 
@@ -29,10 +29,16 @@ def _fine(coupling: LayerCoupling, scene: StructureScene) -> Iterator[Problem]:
         yield Problem(f"{KEY}", None, f"couples hexahedra, the element is {scene.structure.element}", "hexahedron")
 
 
-def _scheme(coupling: LayerCoupling) -> Iterator[Problem]:
+def _scheme(coupling: LayerCoupling, scene: StructureScene) -> Iterator[Problem]:
     if coupling.direction == "one_way":
         message = "needs a coarse mesh of the fine part, too, which only a package has"
         yield Problem(f"{KEY}.direction", "one_way", message, "two_way")
+    materials = {name: scene.known_materials.get(layer.material) for name, layer in scene.structure.layers.items()}
+    plastic = [name for name, material in materials.items() if material and material.plasticity is not None]
+    if coupling.scheme == "local_steps" and (plastic or scene.dynamics.kinematics == "finite"):
+        why = f"layers that yield: {', '.join(plastic)}" if plastic else "dynamics.kinematics = finite"
+        message = f"needs elastic layers at small strains, there are {why}"
+        yield Problem(f"{KEY}.scheme", "local_steps", message, "held_velocity, gravouil_combescure, auto")
 
 
 def _ranks(coupling: LayerCoupling, ranks: int) -> Iterator[Problem]:

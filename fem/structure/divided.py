@@ -9,10 +9,11 @@ from numpy.typing import NDArray
 
 from fem.agreement import agreed
 from fem.coupling.checks import check_division
-from fem.coupling.divide import Rules, divide
+from fem.coupling.divide import divide, scheme_for
 from fem.coupling.division import Division
 from fem.coupling.placement import Role
 from fem.coupling.record import coupling_record
+from fem.coupling.rules import Rules
 from fem.coupling.split import Part, cut_between, part_of
 from fem.coupling.whole import Survey, Treatment, Whole, survey
 from fem.errors import CutError
@@ -68,7 +69,7 @@ def divided_on_one_rank(request: StructureInput) -> DividedStructure:
         steps=steps_of_division(whole, found, division, rules),
         rules=rules,
         scheme=division.scheme,
-        coupling=coupling_record(division, found, len(inputs["macro"].tables.cut)),
+        coupling=coupling_record(division, found, scheme_for(whole, found, rules).why, len(inputs["macro"].tables.cut)),
     )
 
 

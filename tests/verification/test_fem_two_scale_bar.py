@@ -12,7 +12,7 @@ from fem.pulse import Haversine
 from tests.support.fem_bars import PEAK, bar_layers, run_bar, speed_of, write_bar
 from workflow.structure.exact_layers import Layers
 
-SCHEMES = ("held_velocity", "gravouil_combescure")
+SCHEMES = ("held_velocity", "gravouil_combescure", "local_steps")
 SPEED = speed_of("FR4")
 PULSE = 20e-3 / SPEED  # as long as 20 macro elements
 END, SECTION = 30e-3, 3e-3

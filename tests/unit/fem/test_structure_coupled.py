@@ -100,6 +100,7 @@ def test_two_models_move_as_one(tmp_path, scheme):
         ({"coupling": {"macro_ranks": 1}}, "dynamics.coupling.macro_ranks", "is for placement"),
         ({"solver": "implicit"}, "dynamics.solver", "couples nothing"),
         ({"modes": 2}, "dynamics.modes", "one model"),
+        ({"kinematics": "finite", "coupling": {"scheme": "local_steps"}}, "dynamics.coupling.scheme", "elastic"),
         ({"numerics": {"explicit_step": 1e-9}}, "dynamics.numerics.explicit_step", "one model"),
     ],
 )
