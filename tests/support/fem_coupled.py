@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from mpi4py import MPI
 
-from fem.body import Body, Pieces, make_body, make_pieces
+from fem.body import Body, Pieces, Response, make_body, make_pieces
 from fem.coupling.gravouil_combescure import GravouilCombescure
 from fem.coupling.one_way import OneWay
 from fem.coupling.scheme import Scheme
@@ -24,8 +24,15 @@ from fem.tie import Tie, net_load, tie_joints
 Models = dict[str, tuple[Pieces, Tables]]
 
 
-def split(mesh: MeshData, materials: Materials | Mapping[str, Material], macro: np.ndarray, meso: np.ndarray) -> Models:
+def split(
+    mesh: MeshData,
+    materials: Materials | Mapping[str, Material],
+    macro: np.ndarray,
+    meso: np.ndarray,
+    levels: tuple[np.ndarray, tuple[int, ...]] | None = None,
+) -> Models:
     """Return the pieces and tables of the cells of two models, (ne,) bool each, joined by ties and common nodes."""
+    level, ratios = levels or (np.zeros(len(mesh.cells), np.int32), ())
     mesh, tie, moved = tie_joints(mesh)
     numbers = {"macro": numbering(mesh, tie, macro), "meso": numbering(mesh, tie, meso)}
     common = (numbers["macro"] >= 0) & (numbers["meso"] >= 0)
@@ -48,8 +55,8 @@ def split(mesh: MeshData, materials: Materials | Mapping[str, Material], macro: 
             held=held[held.any(axis=1)],
             cut=number[common],
             nodes=int(number.max()) + 1,
-            level=np.zeros(len(part.cells), np.int32),
-            ratios=(),
+            level=level[cells],
+            ratios=ratios if level[cells].any() else (),
         )
         result[role] = make_pieces(distribute(MPI.COMM_SELF, part), tables, materials), tables
     return result
@@ -66,8 +73,12 @@ def numbering(mesh: MeshData, tie: Tie, cells: np.ndarray) -> np.ndarray:
     return number
 
 
-def bodies_of(models: Models) -> dict[str, Body]:
-    return {role: make_body(MPI.COMM_SELF, *model, np.ones(len(model[0].steps))) for role, model in models.items()}
+def bodies_of(models: Models, step: float = np.inf) -> dict[str, Body]:
+    """Return the bodies of both models; ``step`` is that of levels and of laws that depend on the rate."""
+    return {
+        role: make_body(MPI.COMM_SELF, *model, np.ones(len(model[0].steps)), Response(step=step))
+        for role, model in models.items()
+    }
 
 
 class Coupled:

@@ -1,21 +1,25 @@
 """Pairs of a coarse board and a finer block on it, for which any scheme's window can be tried."""
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
 from fem.body import Body
+from fem.coupling.gravouil_combescure import GravouilCombescure
 from fem.coupling.held_velocity import Answered, HeldVelocity, Macro
-from fem.coupling.scheme import Scheme
+from fem.coupling.scheme import Scheme, scheme_of
 from fem.estimate import WindowPlan
 from fem.exchange import CutChannels
 from fem.loads import Load
+from fem.levels.choose import Pace, choose_levels
 from fem.materials.library import FR4
 from fem.materials.parameters import Isotropic
 from fem.materials.roles import Materials
 from fem.mesh import MeshData, append
 from fem.motion import Motion
+from fem.tie import tie_joints
 from tests.support.fem_coupled import Coupled, Models, bodies_of, split
 from tests.support.fem_models import grid, mesh_of, on
 
@@ -37,6 +41,7 @@ class Pair:
         layers: Of the board.
         columns: Elements of the board in plane, each way.
         height: Layers of the block.
+        thinnest: Thickness of the block's top layer over that of the others.
     """
 
     substeps: int = 4
@@ -47,6 +52,7 @@ class Pair:
     layers: int = 4
     columns: int = 3
     height: int = 2
+    thinnest: float = 1.0
 
     def mesh(self) -> MeshData:
         ticks = np.arange(self.columns + 1) * SIZE
@@ -55,9 +61,10 @@ class Pair:
             "board",
             {"board_side": on(2, 0.0)} | ({} if self.free else {"mounting_holes": on(0, ticks[-1])}),
         )
-        cells = int(np.clip(round(self.ratio), 1, 4))
+        cells = int(np.clip(round(self.ratio), 1, 3))
         side = 0.13 * SIZE + np.arange(cells + 1) * SIZE / self.ratio
         levels = np.arange(self.height + 1) * THICKNESS / self.ratio
+        levels[-1] -= (1.0 - self.thinnest) * THICKNESS / self.ratio
         sets = {"foot@A1": on(2, 0.0), "pad_board@A1": on(2, 0.0), "pad_package@A1": on(2, levels[-1])}
         block = mesh_of(*grid(side, side, levels), "solder@A1", sets)
         return shaped(append([board, block]), self.shape)
@@ -75,25 +82,47 @@ class Pair:
     def models(self, materials: Materials, buffer: int = 0) -> Models:
         """Return the models: the block is meso, and so many layers of board around it."""
         mesh = self.mesh()
-        macro = board_cells(mesh)
+        macro, (_, tie, _) = board_cells(mesh), tie_joints(mesh)
         near = np.zeros(len(mesh.points), bool)
-        if buffer:
-            _, tables = split(mesh, materials, macro, ~macro)["meso"]
-            masters = np.unique(tables.master_points.reshape(-1, 3), axis=0)
-            near = (np.linalg.norm(mesh.points[:, None] - masters, axis=2) < 1e-9).any(axis=1)
+        near[tie.master] = True
         for _ in range(buffer):
             layer = macro & near[mesh.cells].any(axis=1)
             near[mesh.cells[layer]] = True
             macro = macro & ~layer
         return split(mesh, materials, macro, ~macro)
 
-    def coupled(self, scheme: Scheme, buffer: int = 0, fraction: float = FRACTION, loads=()) -> Coupled:
+    def coupled(self, scheme: Scheme, buffer: int = 0, fraction: float = FRACTION, loads: Sequence[Load] = ()) -> Coupled:
+        """Return both models at the steps that follow from those of board and block."""
         models = self.models(self.materials(), buffer)
         board = min(pieces.steps[pieces.roles == "board"].min(initial=np.inf) for pieces, _ in models.values())
-        window = fraction * board
         smallest = min(pieces.steps.min() for pieces, _ in models.values())
-        substeps = int(np.ceil(window / (fraction * smallest)))
-        return Coupled(bodies_of(models), WindowPlan(window, substeps, 1, 1), scheme, loads)
+        plan = WindowPlan(fraction * board, int(np.ceil(board / smallest)), 1, 1)
+        return Coupled(bodies_of(models), plan, scheme, loads)
+
+    def leveled(self, most: int = 1, fraction: float = FRACTION, loads: Sequence[Load] = ()) -> Coupled:
+        """Return both models of local steps: macro are the elements of level 0."""
+        mesh, materials = self.mesh(), self.materials()
+        moved, tie, _ = tie_joints(mesh)
+        whole = np.ones(len(mesh.cells), bool)
+        pieces, _ = split(mesh, materials, whole, whole)["macro"]
+        steps = np.empty(len(mesh.cells))
+        steps[pieces.local.cell_numbers] = pieces.steps
+        window = fraction * steps[board_cells(mesh)].min()
+        pace = Pace(steps, np.full(len(steps), 1e5), window, fraction)  # many elements each: levels are worth while
+        level, ratios = choose_levels(moved.cells, tie, pace, most)
+        models = split(mesh, materials, level == 0, level > 0, (level, ratios))
+        plan = WindowPlan(window, int(np.prod(ratios)), 1, 1)
+        return Coupled(bodies_of(models, window), plan, scheme_of("local_steps"), loads)
+
+
+Maker = Callable[[Pair, float], Coupled]
+SCHEMES: dict[str, Maker] = {
+    "held_velocity": lambda pair, fraction: pair.coupled(HeldVelocity(), 2, fraction),
+    "gravouil_combescure": lambda pair, fraction: pair.coupled(GravouilCombescure(), 0, fraction),
+    "local_steps": lambda pair, fraction: pair.leveled(1, fraction),
+    "local_steps of 3 levels": lambda pair, fraction: pair.leveled(3, fraction),
+}
+PRINTED = "as printed"
 
 
 def board_cells(mesh: MeshData) -> np.ndarray:
@@ -128,3 +157,6 @@ class PrintedMacro(Macro):
         channels.forces.receive(np.zeros((len(body.mass), 3)))
         motion = Motion(body, loads, plan.window, np.empty(0, np.int32), np.zeros(len(body.mass)))
         Answered.__init__(self, motion, plan, channels)
+
+
+ALL_SCHEMES = SCHEMES | {PRINTED: lambda pair, fraction: pair.coupled(Printed(), 0, fraction)}
