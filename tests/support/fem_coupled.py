@@ -1,84 +1,60 @@
-"""Two coupled models on one rank: any scheme, by the program's own operators, from any two sets of cells."""
+"""Two coupled models on one rank: any scheme, by the program's own operators and division."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from mpi4py import MPI
 
 from fem.body import Body, Pieces, Response, make_body, make_pieces
+from fem.coupling.checks import check_division
+from fem.coupling.divide import divide
+from fem.coupling.division import Division
 from fem.coupling.gravouil_combescure import GravouilCombescure
 from fem.coupling.one_way import OneWay
 from fem.coupling.scheme import Scheme
 from fem.estimate import WindowPlan
 from fem.exchange import CutChannels
-from fem.ledger import ledger_sums
+from fem.ledger import ENERGIES, ledger_sums
 from fem.loads import Load
 from fem.local_mesh import distribute
-from fem.materials.parameters import Material
 from fem.materials.roles import Materials
 from fem.mesh import MeshData
-from fem.scene import Tables
-from fem.supports import HELD, held_components
-from fem.tie import Tie, net_load, tie_joints
+from fem.parameters import Coupling
+from fem.scene import ModelInput, Tables, model_inputs
+from fem.tie import net_load
+from tests.support.fem_division import surveyed
 
-Models = dict[str, tuple[Pieces, Tables]]
-
-
-def split(
-    mesh: MeshData,
-    materials: Materials | Mapping[str, Material],
-    macro: np.ndarray,
-    meso: np.ndarray,
-    levels: tuple[np.ndarray, tuple[int, ...]] | None = None,
-) -> Models:
-    """Return the pieces and tables of the cells of two models, (ne,) bool each, joined by ties and common nodes."""
-    level, ratios = levels or (np.zeros(len(mesh.cells), np.int32), ())
-    mesh, tie, moved = tie_joints(mesh)
-    numbers = {"macro": numbering(mesh, tie, macro), "meso": numbering(mesh, tie, meso)}
-    common = (numbers["macro"] >= 0) & (numbers["meso"] >= 0)
-    common[tie.slave] = False
-    result = {}
-    for role, cells in (("macro", macro), ("meso", meso)):
-        number = numbers[role]
-        mine = number[tie.slave] >= 0
-        used = np.unique(mesh.cells[cells])
-        facets = {name: number[quads[np.isin(quads, used).all(axis=1)]] for name, quads in mesh.facets.items()}
-        part = MeshData(mesh.points[used], number[mesh.cells[cells]], mesh.part[cells], mesh.part_names, facets)
-        held = held_components(part, HELD)
-        tables = Tables(
-            part=part.part,
-            part_names=part.part_names,
-            tie=Tie(number[tie.slave[mine]], number[tie.master[mine]], tie.weight[mine]),
-            master_points=mesh.points[tie.master[mine]],
-            moved=moved,
-            held_nodes=np.flatnonzero(held.any(axis=1)),
-            held=held[held.any(axis=1)],
-            cut=number[common],
-            nodes=int(number.max()) + 1,
-            level=level[cells],
-            ratios=ratios if level[cells].any() else (),
-        )
-        result[role] = make_pieces(distribute(MPI.COMM_SELF, part), tables, materials), tables
-    return result
+MANY = 1e5  # elements that each of a mesh stands for where costs are weighed, so that levels are worth while
 
 
-def numbering(mesh: MeshData, tie: Tie, cells: np.ndarray) -> np.ndarray:
-    """Return the number of each node in a model of some cells, masters without a cell last, -1 elsewhere."""
-    number = np.full(len(mesh.points), -1, np.int32)
-    used = np.unique(mesh.cells[cells])
-    number[used] = np.arange(len(used))
-    masters = tie.master[number[tie.slave] >= 0]
-    absent = np.unique(masters[number[masters] < 0])
-    number[absent] = np.arange(len(used), len(used) + len(absent))
-    return number
+class Models(NamedTuple):
+    """Pieces and tables of each model, as divided."""
+
+    parts: dict[str, tuple[Pieces, Tables]]
+    division: Division
+
+    def bodies(self) -> dict[str, Body]:
+        step = self.division.meso_step
+        return {
+            role: make_body(MPI.COMM_SELF, *part, np.ones(len(part[0].steps)), Response(step=step))
+            for role, part in self.parts.items()
+        }
 
 
-def bodies_of(models: Models, step: float = np.inf) -> dict[str, Body]:
-    """Return the bodies of both models; ``step`` is that of levels and of laws that depend on the rate."""
-    return {
-        role: make_body(MPI.COMM_SELF, *model, np.ones(len(model[0].steps)), Response(step=step))
-        for role, model in models.items()
-    }
+def models_of(mesh: MeshData, materials: Materials, coupling: Coupling, fraction: float) -> Models:
+    """Divide a mesh as the program does, its checks included."""
+    whole, found, rules = surveyed(mesh, materials, fraction, coupling)
+    found = replace(found, cost=MANY * found.cost)
+    division = divide(whole, found, rules)
+    check_division(whole, found, division, rules)
+    inputs = model_inputs(whole, division)
+    return Models({role: pieces_of(item, materials) for role, item in inputs.items()}, division)
+
+
+def pieces_of(item: ModelInput, materials: Materials) -> tuple[Pieces, Tables]:
+    return make_pieces(distribute(MPI.COMM_SELF, item.mesh), item.tables, materials), item.tables
 
 
 class Coupled:
@@ -102,6 +78,38 @@ class Coupled:
             part.begin_window()
         for part in self.parts:
             part.finish_window()
+
+    def swing(self, speed: np.ndarray) -> None:
+        """Start with a velocity (3,) [m/s] that changes its sign once across both models, and is smooth."""
+        low, high = (getattr(self.macro.motion.body.local.points[:, 0], end)() for end in ("min", "max"))
+        for part in self.parts:
+            motion = part.motion
+            wave = np.cos(np.pi * (motion.body.local.points[:, 0] - low) / (high - low))
+            motion.velocity[:] = np.where(motion.mobility > 0.0, np.outer(wave, speed), 0.0)
+
+    def energies(self) -> dict[str, float]:
+        """Return the ledger's energies of both models."""
+        return dict(zip(ENERGIES, self.sums().tolist(), strict=False))
+
+    def drift(self, windows: int, samples: int) -> tuple[float, float]:
+        """Run; return how far kinetic plus internal energy drifts, and the most that the interface holds, of the first.
+
+        The energy swings with what the interface holds; its drift is that of its mean, from the first tenth of the run
+        to the last.
+        """
+        first, found = self.held(), []
+        for _ in range(samples):
+            for _ in range(windows // samples):
+                self.run()
+            found.append((self.held(), abs(self.energies()["interface"])))
+        energy, interface = np.array(found).T / first
+        tenth = samples // 10
+        return abs(float(energy[-tenth:].mean() - energy[:tenth].mean())), float(interface.max())
+
+    def held(self) -> float:
+        """Return kinetic plus internal energy."""
+        energies = self.energies()
+        return energies["kinetic"] + energies["internal"]
 
     def sums(self) -> np.ndarray:
         """Return the ledger's sums of both models."""

@@ -1,26 +1,25 @@
 """Pairs of a coarse board and a finer block on it, for which any scheme's window can be tried."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
 from fem.body import Body
-from fem.coupling.gravouil_combescure import GravouilCombescure
 from fem.coupling.held_velocity import Answered, HeldVelocity, Macro
-from fem.coupling.scheme import Scheme, scheme_of
+from fem.coupling.scheme import scheme_of
 from fem.estimate import WindowPlan
 from fem.exchange import CutChannels
 from fem.loads import Load
-from fem.levels.choose import Pace, choose_levels
 from fem.materials.library import FR4
 from fem.materials.parameters import Isotropic
 from fem.materials.roles import Materials
 from fem.mesh import MeshData, append
 from fem.motion import Motion
-from fem.tie import tie_joints
-from tests.support.fem_coupled import Coupled, Models, bodies_of, split
+from fem.parameters import Coupling
+from tests.support.fem_coupled import Coupled, Models, models_of
+from tests.support.fem_division import surveyed
 from tests.support.fem_models import grid, mesh_of, on
 
 SIZE, THICKNESS = 0.5e-3, 0.25e-3  # of a board element [m]
@@ -72,57 +71,35 @@ class Pair:
     def materials(self) -> Materials:
         """Return materials with the impedance of the block whose critical step is a little above 1/m of the board's."""
         trial = Materials(solder=Isotropic(density=1e3, young_modulus=1e9, poisson_ratio=0.35))
-        board, block = (pieces.steps.min() for pieces, _ in self.models(trial).values())
+        _, found, _ = surveyed(self.mesh(), trial)
+        board, block = (found.step[found.role == role].min() for role in ("board", "solder"))
         slowness = 1e-3 * board / block / (self.substeps - 0.02)
         product = self.impedance * BOARD_IMPEDANCE
         return Materials(
             solder=Isotropic(density=product * slowness, young_modulus=product / slowness, poisson_ratio=0.35)
         )
 
-    def models(self, materials: Materials, buffer: int = 0) -> Models:
-        """Return the models: the block is meso, and so many layers of board around it."""
-        mesh = self.mesh()
-        macro, (_, tie, _) = board_cells(mesh), tie_joints(mesh)
-        near = np.zeros(len(mesh.points), bool)
-        near[tie.master] = True
-        for _ in range(buffer):
-            layer = macro & near[mesh.cells].any(axis=1)
-            near[mesh.cells[layer]] = True
-            macro = macro & ~layer
-        return split(mesh, materials, macro, ~macro)
+    def divided(self, coupling: Coupling, fraction: float = FRACTION) -> Models:
+        """Return both models as the program divides them."""
+        return models_of(self.mesh(), self.materials(), coupling, fraction)
 
-    def coupled(self, scheme: Scheme, buffer: int = 0, fraction: float = FRACTION, loads: Sequence[Load] = ()) -> Coupled:
-        """Return both models at the steps that follow from those of board and block."""
-        models = self.models(self.materials(), buffer)
-        board = min(pieces.steps[pieces.roles == "board"].min(initial=np.inf) for pieces, _ in models.values())
-        smallest = min(pieces.steps.min() for pieces, _ in models.values())
-        plan = WindowPlan(fraction * board, int(np.ceil(board / smallest)), 1, 1)
-        return Coupled(bodies_of(models), plan, scheme, loads)
+    def coupled(self, coupling: Coupling, fraction: float = FRACTION, loads: Sequence[Load] = ()) -> Coupled:
+        """Return both models at the steps that the program chooses."""
+        models = self.divided(coupling, fraction)
+        return Coupled(models.bodies(), models.division.plan, scheme_of(models.division.scheme), loads)
 
-    def leveled(self, most: int = 1, fraction: float = FRACTION, loads: Sequence[Load] = ()) -> Coupled:
-        """Return both models of local steps: macro are the elements of level 0."""
-        mesh, materials = self.mesh(), self.materials()
-        moved, tie, _ = tie_joints(mesh)
-        whole = np.ones(len(mesh.cells), bool)
-        pieces, _ = split(mesh, materials, whole, whole)["macro"]
-        steps = np.empty(len(mesh.cells))
-        steps[pieces.local.cell_numbers] = pieces.steps
-        window = fraction * steps[board_cells(mesh)].min()
-        pace = Pace(steps, np.full(len(steps), 1e5), window, fraction)  # many elements each: levels are worth while
-        level, ratios = choose_levels(moved.cells, tie, pace, most)
-        models = split(mesh, materials, level == 0, level > 0, (level, ratios))
-        plan = WindowPlan(window, int(np.prod(ratios)), 1, 1)
-        return Coupled(bodies_of(models, window), plan, scheme_of("local_steps"), loads)
+    def printed(self, fraction: float = FRACTION) -> Coupled:
+        """Return both models as the paper prints it, at the steps that it takes: those of its two models."""
+        models = self.divided(Coupling(scheme="gravouil_combescure"), fraction)
+        return Coupled(models.bodies(), models.division.plan, Printed())
 
 
-Maker = Callable[[Pair, float], Coupled]
-SCHEMES: dict[str, Maker] = {
-    "held_velocity": lambda pair, fraction: pair.coupled(HeldVelocity(), 2, fraction),
-    "gravouil_combescure": lambda pair, fraction: pair.coupled(GravouilCombescure(), 0, fraction),
-    "local_steps": lambda pair, fraction: pair.leveled(1, fraction),
-    "local_steps of 3 levels": lambda pair, fraction: pair.leveled(3, fraction),
+SCHEMES = {
+    "held_velocity": Coupling(scheme="held_velocity"),
+    "gravouil_combescure": Coupling(scheme="gravouil_combescure"),
+    "local_steps": Coupling(scheme="local_steps", levels=1),
+    "local_steps, levels auto": Coupling(scheme="local_steps"),
 }
-PRINTED = "as printed"
 
 
 def board_cells(mesh: MeshData) -> np.ndarray:
@@ -157,6 +134,3 @@ class PrintedMacro(Macro):
         channels.forces.receive(np.zeros((len(body.mass), 3)))
         motion = Motion(body, loads, plan.window, np.empty(0, np.int32), np.zeros(len(body.mass)))
         Answered.__init__(self, motion, plan, channels)
-
-
-ALL_SCHEMES = SCHEMES | {PRINTED: lambda pair, fraction: pair.coupled(Printed(), 0, fraction)}

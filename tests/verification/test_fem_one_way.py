@@ -4,15 +4,18 @@ from dataclasses import replace
 
 import numpy as np
 
+from fem.body import Pieces
 from fem.coupling.held_velocity import HeldVelocity
 from fem.coupling.one_way import OneWay
-from fem.estimate import WindowPlan
 from fem.ledger import Ledger, ledger_sums
 from fem.loads import half_sine_drop
 from fem.materials.library import SAC405
 from fem.materials.roles import Materials
+from fem.parameters import Coupling
+from fem.scene import Tables, model_inputs
 from tests.support.fem_bodies import motion_of
-from tests.support.fem_coupled import Coupled, Models, bodies_of, split
+from tests.support.fem_coupled import Coupled, Models, models_of, pieces_of
+from tests.support.fem_division import surveyed
 from tests.support.fem_pairs import FRACTION, Pair
 
 LOADS = [half_sine_drop(peak=1.5e4, duration=1e-5)]
@@ -21,26 +24,13 @@ SOLDER = Materials(solder=SAC405.elastic)
 FINE, COARSE = Pair(ratio=2, height=4), Pair(ratio=1, height=2)  # the same block
 
 
-def fine_models(driver: Models) -> tuple[Models, WindowPlan]:
-    """Return the two models with the fine block, and windows that suit the driver, too."""
-    models = FINE.models(SOLDER, buffer=2)
-    window = FRACTION * min(driver["macro"][0].steps.min(), models["macro"][0].steps.min())
-    return models, WindowPlan(window, int(np.ceil(window / (FRACTION * models["meso"][0].steps.min()))), WINDOWS, 1)
-
-
-def coarse_model() -> Models:
-    """Return a board of its own with the coarse block."""
-    mesh = COARSE.mesh()
-    whole = np.ones(len(mesh.cells), bool)
-    return {"macro": split(mesh, SOLDER, whole, whole)["macro"]}
-
-
-def one_way(driver: Models, models: Models, plan: WindowPlan) -> Coupled:
-    """Return the fine block and its buffer, driven by the board with the coarse block."""
-    (pieces, tables), (fine, meso) = driver["macro"], models["meso"]
+def driver_of(models: Models) -> tuple[Pieces, Tables]:
+    """Return a board of its own with the coarse block, which knows the cut of the fine block's model."""
+    whole, _, _ = surveyed(COARSE.mesh(), SOLDER)
+    pieces, tables = pieces_of(model_inputs(whole, "dns")["dns"], SOLDER)
+    fine, meso = models.parts["meso"]
     cut = nearest(pieces.local.points, fine.local.points[fine.local.locate(meso.cut)])
-    tables = replace(tables, cut=pieces.local.nodes[cut].astype(np.int32))
-    return Coupled(bodies_of({"macro": (pieces, tables), "meso": models["meso"]}), plan, OneWay(), LOADS)
+    return pieces, replace(tables, cut=pieces.local.nodes[cut].astype(np.int32))
 
 
 def nearest(points: np.ndarray, wanted: np.ndarray) -> np.ndarray:
@@ -55,9 +45,14 @@ def top(coupled: Coupled) -> np.ndarray:
 
 
 def test_submodel_follows_and_the_driver_does_not_notice():
-    driver = coarse_model()
-    models, plan = fine_models(driver)
-    submodel, two_way = one_way(driver, models, plan), Coupled(bodies_of(models), plan, HeldVelocity(), LOADS)
+    models = models_of(FINE.mesh(), SOLDER, Coupling(scheme="held_velocity"), FRACTION)
+    driver = driver_of(models)
+    window = FRACTION * driver[0].steps.min()  # the block is stiffer than the board
+    assert window < models.division.plan.window
+    plan = replace(models.division.plan, window=window)
+    one_way = {"macro": driver, "meso": models.parts["meso"]}
+    submodel = Coupled(models._replace(parts=one_way).bodies(), plan, OneWay(), LOADS)
+    two_way = Coupled(models.bodies(), plan, HeldVelocity(), LOADS)
     alone = motion_of(submodel.macro.motion.body, plan.window, LOADS)
     ledgers = [Ledger(limit=1e-9, trivial=0.0) for _ in submodel.parts]
     ours, reference = [], []

@@ -1,0 +1,94 @@
+"""Growth of one window of every coupling scheme over a grid of pairs, long runs, and momentum of a free pair.
+
+    python benchmarks/coupling_stability.py [--quick]       (half an hour, one core; writes coupling_stability.json)
+
+A board of orthotropic FR4 and a block tied to it off its grid: m from 1 to 40, impedances from a tenth to ten times the
+board's, mesh ratios from 1 to 8, flat, distorted and curved interfaces, cuts below the block and beside it. The
+amplification matrix of a window is made of the program's own operators at the steps that the program chooses, step
+fractions 0.9 and the largest that is allowed, 0.95; its spectral radius must be at most 1 + 1e-8. The paper's scheme
+(fine elements at the interface, internal force only, no interface mass) is in the same table.
+"""
+
+import argparse
+import json
+import os
+from collections.abc import Iterator
+from itertools import product
+from pathlib import Path
+
+os.environ["OMP_NUM_THREADS"] = os.environ["NUMBA_NUM_THREADS"] = "1"
+
+import numpy as np
+
+from tests.stability.test_fem_window_grid import GROWTH, PUSH, momentum_error
+from tests.support.fem_pairs import SCHEMES, Pair
+
+RESULTS = Path(__file__).parent / "results" / "coupling_stability.json"
+PRINTED = "as printed"
+RATIOS = (1.0, 1.5, 8 / 3, 4.0, 8.0)
+LONG, SAMPLES = 100_000, 1000
+LARGEST_FRACTION = 0.95
+
+
+def grid() -> Iterator[tuple[Pair, float]]:
+    """Yield pairs and step fractions."""
+    for substeps, impedance, ratio in product((1, 2, 3, 5, 8, 13, 24, 40), (0.1, 0.3, 1.0, 3.0, 10.0), RATIOS):
+        yield Pair(substeps, impedance, ratio), 0.9
+    for shape, substeps, impedance, ratio in product(("distorted", "curved"), (2, 12, 40), (0.1, 1.0, 10.0), RATIOS):
+        yield Pair(substeps, impedance, ratio, shape), 0.9
+    for substeps, impedance, ratio in product((3, 13, 40), (0.1, 1.0, 10.0), (4.0, 8.0)):
+        yield Pair(substeps, impedance, ratio, columns=4), LARGEST_FRACTION
+    for substeps, impedance, thinnest in product((2, 6), (0.1, 1.0, 10.0), (0.1, 0.3)):
+        yield Pair(substeps, impedance, 2.0, height=3, thinnest=thinnest), LARGEST_FRACTION
+
+
+def growths(pair: Pair, fraction: float) -> dict[str, float]:
+    """Return spectral radius - 1 of every scheme."""
+    made = {name: pair.coupled(coupling, fraction) for name, coupling in SCHEMES.items()}
+    made[PRINTED] = pair.printed(fraction)
+    return {name: coupled.spectral_radius() - 1.0 for name, coupled in made.items()}
+
+
+def table(rows: list[dict]) -> dict[str, dict]:
+    """Return per scheme how many samples grow, and the worst of them."""
+    result = {}
+    for name in rows[0]["growth"]:
+        found = np.array([row["growth"][name] for row in rows])
+        worst = rows[int(np.argmax(found))]
+        unstable = int(np.sum(found > GROWTH))
+        result[name] = {"samples": len(rows), "unstable": unstable, "worst": float(found.max()), "where": worst["pair"]}
+    return result
+
+
+def long_runs(windows: int) -> dict[str, dict]:
+    """Return drift of energy, and what the interface holds, after a push without damping."""
+    result = {}
+    for name in ("held_velocity", "local_steps"):
+        coupled = Pair(3, 3.0, 2, layers=3).coupled(SCHEMES[name])
+        coupled.swing(PUSH)
+        drift, interface = coupled.drift(windows, SAMPLES)
+        result[name] = {"windows": windows, "energy_drift": drift, "largest_interface_energy": interface}
+    return result
+
+
+def main() -> None:
+    """Measure, print and write."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--quick", action="store_true", help="every twentieth pair, 1e4 windows")
+    quick = parser.parse_args().quick
+    rows = []
+    for pair, fraction in list(grid())[:: 20 if quick else 1]:
+        rows.append({"pair": repr(pair), "fraction": fraction, "growth": growths(pair, fraction)})
+        print(len(rows), rows[-1]["pair"], {name: f"{value:.1e}" for name, value in rows[-1]["growth"].items()})
+    momentum = {name: momentum_error(coupling, 0.9) for name, coupling in SCHEMES.items()}
+    result = {"limit": GROWTH, "schemes": table(rows), "long_runs": long_runs(LONG // 10 if quick else LONG)}
+    result |= {"momentum_error": momentum, "rows": rows}
+    for name, line in result["schemes"].items():
+        print(f"{name:28s} {line['unstable']:4d} of {line['samples']} grow, worst {line['worst']:.1e} a window")
+    print(json.dumps({name: result[name] for name in ("long_runs", "momentum_error")}, indent=1))
+    RESULTS.parent.mkdir(exist_ok=True)
+    RESULTS.write_text(json.dumps(result, indent=1))
+
+
+if __name__ == "__main__":
+    main()

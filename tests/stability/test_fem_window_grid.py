@@ -1,0 +1,78 @@
+"""No window grows, whatever scheme the program may choose: amplification matrices of its own operators.
+
+A sample of the grid of benchmarks/coupling_stability.py: m up to 40, impedances a tenth to ten times the board's, mesh
+ratios up to 8, flat, distorted and curved interfaces, at the steps that the program chooses. The paper's scheme is
+measured beside them, and is seen to fail.
+"""
+
+import numpy as np
+import pytest
+
+from fem.parameters import Coupling
+from tests.support.fem_pairs import SCHEMES, SIZE, Pair
+
+GROWTH = 1e-8
+PUSH = np.array([0.3, 0.1, 1.0])  # [m/s]
+SAMPLES = {
+    "equal": Pair(1, 1.0, 1),
+    "stiff": Pair(3, 10.0, 1.5),
+    "soft": Pair(3, 0.1, 8 / 3),
+    "distorted": Pair(5, 1.0, 2, "distorted"),
+    "curved": Pair(5, 10.0, 2, "curved"),
+    "fine": Pair(8, 10.0, 8),
+    "fast": Pair(40, 10.0, 1.5),
+    "thin": Pair(3, 3.0, 2, height=3, thinnest=0.2),
+}
+
+
+@pytest.mark.parametrize("sample", SAMPLES)
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_window_does_not_grow(scheme, sample):
+    pair = SAMPLES[sample]
+    coupled = pair.coupled(SCHEMES[scheme])
+    assert coupled.plan.substeps >= pair.substeps
+    assert coupled.spectral_radius() <= 1.0 + GROWTH
+
+
+def test_levels_are_nested_where_that_is_worth_while():
+    assert len(SAMPLES["thin"].divided(SCHEMES["local_steps, levels auto"]).division.ratios) > 1
+
+
+@pytest.mark.parametrize("sample", ["stiff", "distorted", "curved", "fast"])
+def test_scheme_as_printed_grows(sample):
+    assert SAMPLES[sample].printed().spectral_radius() > 1.0 + 1e-3
+
+
+@pytest.mark.parametrize("scheme", ["held_velocity", "local_steps"])
+def test_energy_does_not_drift_over_many_windows(scheme):
+    """1e4 windows after the push, no damping; benchmarks/coupling_stability.py takes 1e5."""
+    coupled = Pair(3, 3.0, 2, layers=3).coupled(SCHEMES[scheme])
+    coupled.swing(PUSH)
+    drift, interface = coupled.drift(windows=10_000, samples=200)
+    assert drift <= 1e-3
+    assert interface <= 1e-2  # of three elements across the wave; of second order in the window
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_momentum_of_a_free_pair(scheme):
+    """Kept by local steps; by the other schemes, whose forces act in each model's own steps, to second order."""
+    errors = [momentum_error(SCHEMES[scheme], fraction) for fraction in (0.9, 0.45)]
+    if scheme.startswith("local_steps"):
+        assert max(errors) <= 1e-10
+    else:
+        assert 1e-10 < errors[0] < 5e-3
+        assert errors[1] < 0.5 * errors[0]
+
+
+def momentum_error(coupling: Coupling, fraction: float) -> float:
+    """Return the largest change of linear and angular momentum over that of all nodes by magnitude."""
+    coupled = Pair(4, 3.0, 2, free=True).coupled(coupling, fraction)
+    coupled.swing(PUSH)
+    start = coupled.momentum()
+    mass = sum(part.motion.ledger_mass.sum() for part in coupled.parts)
+    scale = mass * np.linalg.norm(PUSH) * np.array([1.0] * 3 + [3 * SIZE] * 3)
+    largest = 0.0
+    for _ in range(round(180 / fraction)):
+        coupled.run()
+        largest = max(largest, float(np.abs((coupled.momentum() - start) / scale).max()))
+    return largest
