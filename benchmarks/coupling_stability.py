@@ -92,7 +92,7 @@ def main() -> None:
         print(len(rows), rows[-1]["pair"], {name: f"{value:.1e}" for name, value in rows[-1]["growth"].items()})
     momentum = {name: momentum_error(coupling, 0.9) for name, coupling in SCHEMES.items()}
     result = {"limit": GROWTH, "schemes": table(rows), "long_runs": long_runs(LONG // 10 if quick else LONG)}
-    result |= {"momentum_error": momentum, "rows": rows}
+    result |= {"momentum_error": momentum}
     for name, line in result["schemes"].items():
         print(f"{name:28s} {line['unstable']:4d} of {line['samples']} grow, worst {line['worst']:.1e} a window")
     print(json.dumps({name: result[name] for name in ("long_runs", "momentum_error")}, indent=1))
