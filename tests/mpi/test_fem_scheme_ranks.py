@@ -1,0 +1,52 @@
+"""Gravouil-Combescure through the program: the same on one rank and on three, close to held velocity, and in balance."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.support.fem_models import write_small_assembly
+from tests.support.fem_program import run_program
+
+SHOCK = {
+    "peak_acceleration": 14709.975,
+    "pulse_duration": 5e-4,
+    "duration": 1e-5,
+    "numerics": {"mass_scaled": ["copper"], "history_samples": 25, "field_samples": 2},
+}
+WATCHED = ("board_centre", "die_centre", "von_mises_board", "von_mises_package", "board_strain")
+
+
+@pytest.fixture(scope="module")
+def assembly(tmp_path_factory) -> Path:
+    directory = tmp_path_factory.mktemp("assembly")
+    write_small_assembly(directory)
+    return directory
+
+
+def history(directory: Path, scheme: str, ranks: dict) -> dict[str, np.ndarray]:
+    output = directory / f"{scheme}_{ranks['total']}"
+    shock = SHOCK | {"coupling": {"scheme": scheme}, "ranks": ranks}
+    meshes = [str(directory / "assembly.msh"), str(directory / "joints.msh")]
+    path = directory / "input.json"
+    path.write_text(json.dumps({"mode": "two_scale", "meshes": meshes, "shock": shock, "output": str(output)}))
+    done = run_program(path, ranks["total"])
+    assert done.returncode == 0, done.stderr
+    result = json.loads((output / "result.json").read_text())
+    assert all(check["ok"] for check in result["health"].values())
+    assert result["model"]["substeps"] > 1
+    with np.load(output / "history.npz") as arrays:
+        return dict(arrays)
+
+
+def difference(first: dict[str, np.ndarray], second: dict[str, np.ndarray]) -> float:
+    return max(float(np.abs(first[name] - second[name]).max() / np.abs(first[name]).max()) for name in WATCHED)
+
+
+def test_link_is_the_same_on_more_ranks_and_close_to_held_velocity(assembly):
+    one = history(assembly, "gravouil_combescure", {"total": 1, "placement": "shared"})
+    three = history(assembly, "gravouil_combescure", {"total": 3, "placement": "disjoint", "macro": 1})
+    assert difference(one, three) <= 1e-8
+    assert np.abs(one["balance"]).max() <= 1e-3 * np.abs(one["external"]).max()
+    assert difference(one, history(assembly, "held_velocity", {"total": 1, "placement": "shared"})) <= 0.02
