@@ -1,4 +1,4 @@
-"""Gravouil-Combescure through the program: the same on one rank and on three, close to held velocity, and in balance."""
+"""Gravouil-Combescure through the program: the same on one rank and on three, close to held velocity, balanced."""
 
 import json
 from pathlib import Path
