@@ -73,18 +73,19 @@ def damped_critical_step(critical: Step, stiffness: float) -> Step:
 
 
 def window_plan(macro_step: float, meso_step: float, fraction: float, duration: float, samples: int) -> WindowPlan:
-    """Choose window and substeps from critical steps.
+    """Choose window and substeps from critical steps; runs of other steps have their samples at the same times.
 
     Args:
         macro_step: Smallest element critical step of the macro model and of the elements that touch the cut [s].
         meso_step: Smallest element critical step of the meso model [s].
         fraction: Of the critical step that is used.
         duration: Simulated time [s]; a whole number of samples, each a whole number of windows.
-        samples: History samples wanted.
+        samples: History samples wanted; fewer where there are fewer windows.
     """
     least = math.ceil(duration / (fraction * macro_step))
-    stride = max(1, least // samples)
-    windows = stride * math.ceil(least / stride)
+    samples = min(samples, least)
+    stride = math.ceil(least / samples)
+    windows = stride * samples
     window = duration / windows
     substeps = math.ceil(window / (fraction * meso_step))
     return WindowPlan(window, substeps, windows, stride)

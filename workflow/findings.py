@@ -1,5 +1,6 @@
 """What stages found: metrics and health checks in the form of ``summary.json``, with the limits of health."""
 
+import json
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -243,6 +244,14 @@ def _comparison(results: Mapping[str, dict], folder: Path) -> dict:
 
     files = [folder / mode / "history.npz" for mode in ("two_scale", "dns")]
     errors = compare_histories(files[0], files[1], fine_joints_of(results["two_scale"]))
-    seconds = {mode: result["metrics"]["window_seconds"]["value"] for mode, result in results.items()}
-    ratio = {"two_scale_dns_time_ratio": metric(seconds["two_scale"] / seconds["dns"])}
-    return {name: metric(value) for name, value in errors.items()} | ratio
+    seconds = {mode: _wall_time(result) for mode, result in results.items()}
+    ratios = {"two_scale_dns_time_ratio": seconds["two_scale"] / seconds["dns"]}
+    search = folder / "coarse/result.json"
+    if search.exists():
+        ratios["coarse_run_dns_time_ratio"] = _wall_time(json.loads(search.read_text())) / seconds["dns"]
+    return {name: metric(value) for name, value in (errors | ratios).items()}
+
+
+def _wall_time(result: Mapping[str, Any]) -> float:
+    """Wall time of a run's windows over the time that they simulate: windows of two runs may differ."""
+    return result["metrics"]["window_seconds"]["value"] / result["model"]["window"]

@@ -53,7 +53,8 @@ def forecast(case: BoardDropCase) -> Forecast:
     shock = forecast_shock(case, parts)
     numerics = case.shock.numerics
     dns = shock.implicit if numerics.dns_solver == "implicit" else shock.dns
-    wall = sum(seconds for mode, seconds in (("two_scale", shock.two_scale), ("dns", dns)) if mode in numerics.modes)
+    modes = {"two_scale": shock.search + shock.two_scale, "dns": dns}
+    wall = sum(modes[mode] for mode in numerics.modes)
     return Forecast(
         effects=decide_effects(max(distinct, key=lambda geometry: geometry.gap), case.solder)
         | material_effects(case.materials.by_role)

@@ -142,6 +142,8 @@ def _shock(case: BoardDropCase, outlook: Forecast) -> Table:
     table.add_row("window", short(shock.window), f"step of the macro model, {shock.windows} windows")
     table.add_row("steps in a window", *_levels(shock))
     table.add_row("step ratio m", f"{shock.substeps}", f"step of the DNS {short(shock.window / shock.substeps)}")
+    if shock.search:
+        table.add_row("coarse run", f"about {duration(shock.search)}", "all joints coarse: it finds the critical ones")
     table.add_row("two-scale", f"about {duration(shock.two_scale)}", _placement(case) + _absent("two_scale", case))
     table.add_row("DNS", f"about {duration(shock.dns)}", f"all {every} ranks on one model" + _absent("dns", case))
     table.add_row(

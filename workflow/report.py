@@ -168,18 +168,22 @@ def _add_shock(run_folder: Path, case, context: dict, summary: dict) -> None:
     from workflow.report_curves import energy_curves, history_curves
 
     main_mode = next(iter(histories))
+    ranked = "dns" if "dns" in results and findings.fine_joints_of(results[main_mode]) else main_mode
     critical_joint = summary["metrics"]["critical_joint"]["value"]
     context["late_peak"] = tables.late_peak(histories[main_mode])
     context["curves"]["histories"] = history_curves(histories, critical_joint)
     context["curves"]["energy"] = energy_curves(histories[main_mode])
+    context["ranked_by"] = (
+        f"of the {tables.mode_name(ranked)}, whose joints are all fine" if ranked != main_mode else ""
+    )
     context["tables"].update(
         model=tables.models(results),
         comparison=tables.comparison(summary["metrics"]),
         joints=tables.ranked_joints(
-            histories[main_mode],
+            histories[ranked],
             tables.joint_records(run_folder),
-            results[main_mode]["failure"],
-            findings.fine_joints_of(results[main_mode]),
+            results[ranked]["failure"],
+            findings.fine_joints_of(results[ranked]),
         ),
         energy=tables.energies(histories),
         cost=tables.costs(results),

@@ -26,6 +26,7 @@ COMPARISON = (
     ("die_displacement_error", "die centre displacement, relative L2"),
     ("board_displacement_error", "board centre displacement, relative L2"),
     ("two_scale_dns_time_ratio", "wall time, two-scale over DNS on as many ranks"),
+    ("coarse_run_dns_time_ratio", "wall time of the coarse run that finds the critical joints, over DNS"),
     ("two_scale_ideal_ratio", "the same if all element updates cost the same and all else nothing"),
 )
 PACKAGES = (
@@ -254,7 +255,7 @@ def energies(histories: dict[str, dict]) -> dict:
         for term, values in largest.items()
         if any(values) or term in always
     ]
-    return {"head": ["largest magnitude", *(_mode(mode) for mode in histories)], "rows": rows}
+    return {"head": ["largest magnitude", *(mode_name(mode) for mode in histories)], "rows": rows}
 
 
 def models(results: dict[str, dict]) -> dict:
@@ -266,7 +267,7 @@ def models(results: dict[str, dict]) -> dict:
         [f"critical time step, {role}", *(nano(record["critical_steps"].get(role)) for record in records)]
         for role in roles
     ]
-    return {"head": ["model", *(_mode(mode) for mode in results)], "rows": rows}
+    return {"head": ["model", *(mode_name(mode) for mode in results)], "rows": rows}
 
 
 def costs(results: dict[str, dict]) -> dict:
@@ -278,7 +279,7 @@ def _side_by_side(results: dict[str, dict], section: str, title: str) -> dict:
     keys = list(dict.fromkeys(key for result in results.values() for key in _flat(result[section])))
     flat = [_flat(result[section]) for result in results.values()]
     rows = [[key.replace("_", " "), *(_cell(record.get(key)) for record in flat)] for key in keys]
-    return {"head": [title, *(_mode(mode) for mode in results)], "rows": rows}
+    return {"head": [title, *(mode_name(mode) for mode in results)], "rows": rows}
 
 
 def _flat(record: dict, prefix: str = "") -> dict:
@@ -297,7 +298,8 @@ def _cell(value) -> str:
     return quantity(value) if isinstance(value, dict) else number(value)
 
 
-def _mode(mode: str) -> str:
+def mode_name(mode: str) -> str:
+    """Name of a mode for people."""
     return {"two_scale": "two-scale", "dns": "DNS"}.get(mode, mode)
 
 

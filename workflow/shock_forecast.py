@@ -52,7 +52,8 @@ class ShockForecast:
         window: step of the macro model [s].
         substeps: m, steps of a DNS in a window.
         windows: number of windows.
-        two_scale: predicted wall time of the two-scale run [s], with that of a coarse run before it.
+        search: predicted wall time of the run that finds the critical joints [s], zero where there is none.
+        two_scale: the same of the two-scale run.
         dns: predicted wall time of the DNS [s] in explicit steps.
         implicit: the same in implicit steps on one rank, where everything is elastic.
         updates_per_second: element updates per second and rank that the prediction assumes.
@@ -63,6 +64,7 @@ class ShockForecast:
     window: float
     substeps: int
     windows: int
+    search: float
     two_scale: float
     dns: float
     implicit: float
@@ -129,17 +131,15 @@ def forecast_shock(case: "BoardDropCase", parts: Parts) -> ShockForecast:
     from fem.solver_cost import implicit_cost, plate_nodes
 
     shock = case.shock
-    two_scale = two_scale_parts(case)
-    scheme, levels, seconds = _coupled(case, two_scale)
-    if shock.coupling.fine_joints == "critical":
-        seconds += _coupled(case, coarse_parts(case))[2]
+    scheme, levels, seconds = _coupled(case, two_scale_parts(case))
+    search = _coupled(case, coarse_parts(case))[2] if shock.coupling.fine_joints == "critical" else 0.0
     plan, dns = _direct(case, parts)
     pulses = [shock.pulse_duration] if shock.pulse_duration else []
     slow = implicit_plan(plan, largest_implicit_step(shock.duration, pulses))
     elements = sum(part.elements for part in parts.values())
     implicit = implicit_cost(plate_nodes(elements), slow.windows * slow.substeps).seconds
     return ShockForecast(
-        scheme, levels, plan.window, plan.substeps, plan.windows, seconds, dns, implicit, UPDATES_PER_SECOND
+        scheme, levels, plan.window, plan.substeps, plan.windows, search, seconds, dns, implicit, UPDATES_PER_SECOND
     )
 
 

@@ -84,6 +84,14 @@ def test_window_is_below_both_limits_and_divides_the_duration():
     assert plan.windows % plan.stride == 0
 
 
+def test_runs_of_other_steps_are_sampled_at_the_same_times():
+    for step in (8.4e-8, 8.55e-8, 6.0e-8):
+        plan = window_plan(step, 1.1e-8, 0.9, 1.5e-3, 600)
+        assert plan.windows == 600 * plan.stride
+        assert plan.window <= 0.9 * step
+    assert window_plan(8.4e-8, 1.1e-8, 0.9, 1e-6, 600).stride == 1
+
+
 def test_implicit_steps_have_the_samples_of_the_windows():
     plan = window_plan(8.4e-8, 1.1e-8, 0.9, 1.5e-3, 600)
     implicit = implicit_plan(plan, 1e-6)
