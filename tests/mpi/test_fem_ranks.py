@@ -32,10 +32,12 @@ def start(directory: Path, ranks: int, **changes) -> subprocess.CompletedProcess
     return run_program(path, ranks)
 
 
-def history(directory: Path, ranks: tuple[int, int], mode: str, placement: str = "disjoint") -> dict[str, np.ndarray]:
-    output = directory / f"{mode}_{ranks[0]}_{ranks[1]}_{placement}"
+def history(
+    directory: Path, ranks: tuple[int, int], mode: str, placement: str = "disjoint", scheme: str = "held_velocity"
+) -> dict[str, np.ndarray]:
+    output = directory / f"{mode}_{ranks[0]}_{ranks[1]}_{placement}_{scheme}"
     macro = {"macro": ranks[0]} if placement == "disjoint" else {}
-    shock = SHOCK | {"ranks": {"total": sum(ranks), "placement": placement} | macro}
+    shock = SHOCK | {"ranks": {"total": sum(ranks), "placement": placement} | macro, "coupling": {"scheme": scheme}}
     done = start(directory, sum(ranks), mode=mode, shock=shock, output=str(output))
     assert done.returncode == 0, done.stderr
     result = json.loads((output / "result.json").read_text())
@@ -71,6 +73,12 @@ def test_two_scale_is_the_same_on_more_ranks(assembly, reference, ranks):
 @pytest.mark.parametrize("ranks", [(1, 0), (1, 1), (1, 2), (2, 2)])
 def test_two_scale_is_the_same_when_ranks_carry_both_models(assembly, reference, ranks):
     assert_same(reference, history(assembly, ranks, "two_scale", "shared"))
+
+
+def test_local_steps_are_the_same_on_any_ranks(assembly):
+    one = history(assembly, (1, 0), "two_scale", "shared", "local_steps")
+    assert_same(one, history(assembly, (1, 2), "two_scale", "disjoint", "local_steps"))
+    assert_same(one, history(assembly, (2, 2), "two_scale", "shared", "local_steps"))
 
 
 def test_ranks_that_carry_both_models_do_not_wait_for_large_messages(tmp_path):
