@@ -7,12 +7,13 @@ from numpy.typing import NDArray
 
 from fem.coupling.buffer import grown, touching
 from fem.coupling.divide import cut_nodes, seeds_of
-from fem.coupling.divide_levels import LARGEST_STIFFNESS
 from fem.coupling.division import Division
 from fem.coupling.rules import Rules
 from fem.coupling.whole import Survey, Whole
 from fem.errors import CutError
 from fem.estimate import damped_critical_step
+from fem.levels.chebyshev import LARGEST_DAMPING
+from fem.levels.choose import Pace, least_steps
 
 ROUNDING = 1e-9
 
@@ -81,7 +82,7 @@ def check_linear(survey: Survey, division: Division, rules: Rules) -> None:
             f"coupling.scheme = local_steps is for linear elastic elements at small strains: {np.sum(path)} elements of"
             f" {roles} have a path; held_velocity or gravouil_combescure serve them"
         )
-    largest = LARGEST_STIFFNESS * division.plan.window
+    largest = LARGEST_DAMPING * division.plan.window
     if rules.stiffness > largest:
         raise CutError(
             f"stiffness-proportional damping of {rules.stiffness:.3g} s is too large for coupling.scheme = local_steps"
@@ -91,8 +92,7 @@ def check_linear(survey: Survey, division: Division, rules: Rules) -> None:
 
 def check_steps(whole: Whole, survey: Survey, division: Division, rules: Rules) -> None:
     """Check every step against the critical step of each element that takes it; errors as ``check_division``."""
-    critical = damped_critical_step(survey.step, rules.stiffness)
-    for name, step, cells in steps_of(whole, division):
+    for name, step, cells, critical in steps_of(whole, survey, division, rules):
         above = cells & (step > (1.0 + ROUNDING) * rules.fraction * critical)
         if above.any():
             lowest = float(critical[above].min())
@@ -103,19 +103,23 @@ def check_steps(whole: Whole, survey: Survey, division: Division, rules: Rules) 
             )
 
 
-def steps_of(whole: Whole, division: Division) -> Iterator[tuple[str, float, NDArray[np.bool_]]]:
-    """Yield the name of each step, its size [s], and the cells ``(ne,)`` whose critical steps limit it."""
+def steps_of(
+    whole: Whole, survey: Survey, division: Division, rules: Rules
+) -> Iterator[tuple[str, float, NDArray[np.bool_], NDArray[np.float64]]]:
+    """Yield the name of each step, its size [s], the cells ``(ne,)`` that limit it, and by which step ``(ne,)`` [s]."""
     cells, plan = whole.mesh.cells, division.plan
     if division.scheme == "local_steps":
+        pace = Pace(survey.step, survey.cost, plan.window, rules.fraction, rules.stiffness)
         steps = plan.window / np.cumprod([1, *division.ratios])
-        for level, step in enumerate(steps.tolist()):
-            yield f"the step of level {level}", step, division.level == level
+        shares = steps / least_steps(division.ratios, pace)  # of a critical step that a level may use
+        for level, (step, share) in enumerate(zip(steps.tolist(), shares.tolist(), strict=True)):
+            yield f"the step of level {level}", step, division.level == level, share * survey.step
         return
-    slow = division.macro
+    critical, slow = damped_critical_step(survey.step, rules.stiffness), division.macro
     if division.scheme == "held_velocity":
         slow = slow | touching(cells, cut_nodes(cells, division.meso, len(whole.mesh.points)))
-    yield "the window", plan.window, slow
-    yield "the step", plan.step, division.meso
+    yield "the window", plan.window, slow, critical
+    yield "the step", plan.step, division.meso, critical
 
 
 def place_of(whole: Whole, cells: NDArray[np.bool_]) -> str:

@@ -5,11 +5,12 @@ from numpy.typing import NDArray
 
 from fem.coupling.buffer import grown, nodes_of, touching
 from fem.coupling.choice import Choice, choose_scheme
-from fem.coupling.divide_levels import LARGEST_STIFFNESS, by_levels
+from fem.coupling.divide_levels import by_levels
 from fem.coupling.division import Division, SchemeName
 from fem.coupling.rules import Rules
 from fem.coupling.whole import Survey, Whole
 from fem.estimate import damped_critical_step
+from fem.levels.chebyshev import LARGEST_DAMPING
 
 
 def divide(whole: Whole, survey: Survey, rules: Rules) -> Division:
@@ -28,7 +29,7 @@ def scheme_for(whole: Whole, survey: Survey, rules: Rules) -> Choice:
     if wanted != "auto":
         return Choice(wanted, f"coupling.scheme = {wanted}")
     coarse_step = float(survey.step[rules.coarse].min(initial=np.inf))
-    light = rules.stiffness <= LARGEST_STIFFNESS * rules.fraction * coarse_step
+    light = rules.stiffness <= LARGEST_DAMPING * rules.fraction * coarse_step
     linear = bool(survey.linear.all())
     choice = choose_scheme(linear and light, bool(by_buffer(whole, survey, rules).macro.any()))
     if linear and not light:

@@ -19,8 +19,6 @@ MOST = 4  # levels that "auto" tries
 EXCEPTIONS = (0.0, 0.02, 0.5)
 SHARES = (1.0, 1.0 / 1.5, 0.5)  # of these windows: on packages the largest is within 5 % of the best there is
 WINDOW_COST = WINDOW_OVERHEAD * UPDATES_PER_SECOND * BOARD_ADVANTAGE  # in updates of a box
-# beta over the window, at most: the highest frequency that levels leave, 1.93 / DT, then still has a stable step.
-LARGEST_STIFFNESS = 0.03
 
 
 def by_levels(whole: Whole, survey: Survey, rules: Rules) -> Division:
@@ -33,7 +31,7 @@ def by_levels(whole: Whole, survey: Survey, rules: Rules) -> Division:
     found, failure = [], LevelError("no window was tried")
     for step in window_steps(critical[rules.coarse if rules.coarse.any() else ...]):
         try:
-            found.append(levels_below(whole, survey.cost, critical, (step, rules)))
+            found.append(levels_below(whole, survey, step, rules))
         except LevelError as error:
             failure = error
     if not found:
@@ -48,24 +46,11 @@ def window_steps(coarse: NDArray[np.float64]) -> Iterator[float]:
     yield from np.unique(np.outer(natural, SHARES)).tolist()
 
 
-def levels_below(
-    whole: Whole, cost: NDArray[np.float64], critical: NDArray[np.float64], chosen: tuple[float, Rules]
-) -> Division:
-    """Return the division of one window.
-
-    Args:
-        whole: The mesh.
-        cost: ``(ne,)`` of an update.
-        critical: ``(ne,)`` critical steps [s].
-        chosen: The critical step that the window follows [s], and the rules.
-
-    Raises:
-        LevelError: See ``choose_levels``.
-    """
-    step, rules = chosen
+def levels_below(whole: Whole, survey: Survey, step: float, rules: Rules) -> Division:
+    """Return the division of the window that follows a critical step [s]; errors as ``choose_levels``."""
     plan, wanted = rules.plan(step, step), rules.coupling.levels
     most = MOST if wanted == "auto" else wanted
-    pace = Pace(critical, cost, plan.window, rules.fraction)
+    pace = Pace(survey.step, survey.cost, plan.window, rules.fraction, rules.stiffness)
     level, ratios = choose_levels(whole.mesh.cells, whole.tie, pace, most)
     plan = replace(plan, substeps=math.prod(ratios))
     return Division("local_steps", level == 0, level > 0, level, ratios, plan)

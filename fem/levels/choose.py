@@ -82,11 +82,10 @@ def choose_levels(
             f"the window {pace.window:.3e} s is {pace.window / needed.min():.3g} times the smallest step of an element,"
             f" {needed.min():.3e} s: allowed are {LARGEST_RATIO} steps a level, and {most} levels"
         )
-    finer = [np.searchsorted(needed[order], bounds(ratios, pace)) for ratios in candidates]
+    finer = [np.searchsorted(needed[order], least_steps(ratios, pace)[:-1]) for ratios in candidates]
     totals = [window_cost(cost[below], ratios) for below, ratios in zip(finer, candidates, strict=True)]
     ratios = candidates[int(np.argmin(totals))]
-    limits = bounds(ratios, pace)
-    return np.sum(needed[:, None] < limits, axis=1, dtype=np.int32), ratios
+    return np.sum(needed[:, None] < least_steps(ratios, pace)[:-1], axis=1, dtype=np.int32), ratios
 
 
 def governing_steps(cells: NDArray[np.int32], tie: Tie, steps: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -102,13 +101,11 @@ def governing_steps(cells: NDArray[np.int32], tie: Tie, steps: NDArray[np.float6
     return node[cells].min(axis=1)
 
 
-def bounds(ratios: tuple[int, ...], pace: Pace) -> NDArray[np.float64]:
-    """Return the steps ``(levels,)`` [s], times the fraction, below which elements need level 1, 2, ..."""
-    count, limits = 1, [pace.outermost]
-    for level, ratio in enumerate(ratios[:-1], 1):
-        count *= ratio
-        limits.append(pace.window / (count * Substeps.of(ratio, level, pace.damping).reach))
-    return np.array(limits) * (1.0 - ROUNDING)
+def least_steps(ratios: tuple[int, ...], pace: Pace) -> NDArray[np.float64]:
+    """Return the smallest critical step times the fraction that levels 0, 1, ... bear: ``(levels + 1,)`` [s]."""
+    counts = np.cumprod(ratios)
+    reaches = [Substeps.of(ratio, level, pace.damping).reach for level, ratio in enumerate(ratios, 1)]
+    return np.array([pace.outermost, *(pace.window / (counts * reaches))]) * (1.0 - ROUNDING)
 
 
 def all_ratios(pace: Pace, needed: float, inner: tuple[int, ...], most: int) -> Iterator[tuple[int, ...]]:

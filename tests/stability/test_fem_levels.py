@@ -10,7 +10,7 @@ from mpi4py import MPI
 
 from fem.levels import chebyshev
 from fem.levels.chebyshev import Substeps
-from fem.levels.choose import Pace, bounds, governing_steps
+from fem.levels.choose import Pace, governing_steps, least_steps
 from fem.materials.library import SAC405
 from fem.materials.parameters import Isotropic
 from fem.materials.roles import Materials
@@ -62,8 +62,7 @@ def extreme_eigenvalues(
 ) -> tuple[float, float]:
     """Return the smallest and the largest eigenvalue of DT^2 M^-1 K_eff of a random chain; DT is 1."""
     pace = Pace(np.ones(ELEMENTS), np.ones(ELEMENTS), 1.0, fraction, damping)
-    innermost = 1.0 / (np.prod(ratios) * Substeps.of(ratios[-1], len(ratios), damping).reach)
-    limits = np.append(bounds(ratios, pace), innermost) / fraction
+    limits = least_steps(ratios, pace) / fraction
     runs = random.integers(1, 7, ELEMENTS)
     level = np.repeat(random.integers(0, len(limits), ELEMENTS), runs)[:ELEMENTS]
     steps = limits[level] * random.uniform(1.0, random.choice([1.0 + 1e-9, 1.3, 4.0]), ELEMENTS)
@@ -71,7 +70,7 @@ def extreme_eigenvalues(
     stiffness, mass = impedance / steps, np.zeros(ELEMENTS + 1)
     np.add.at(mass, CELLS, 0.5 * (impedance * steps)[:, None])
     needed = governing_steps(CELLS, Tie.none(), fraction * steps)
-    levels = np.sum(needed[:, None] < bounds(ratios, pace), axis=1)
+    levels = np.sum(needed[:, None] < fraction * limits[:-1], axis=1)
     matrix = chain_effective(levels, stiffness, mass, ratios, pace)
     assert np.abs(matrix - matrix.T).max() <= 1e-9 * np.abs(matrix).max()
     values = np.linalg.eigvalsh((matrix + matrix.T) / (2.0 * np.sqrt(np.outer(mass, mass))))

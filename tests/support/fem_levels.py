@@ -8,7 +8,7 @@ from mpi4py import MPI
 from fem.body import Body, Response, make_body, make_pieces
 from fem.elements.element import element_stiffness
 from fem.levels.chebyshev import Substeps, stabilisation
-from fem.levels.choose import Pace, bounds, governing_steps
+from fem.levels.choose import Pace, governing_steps, least_steps
 from fem.local_mesh import distribute
 from fem.materials.roles import Materials
 from fem.mesh import MeshData, append
@@ -55,7 +55,7 @@ def levelled(
     window = fraction * min(steps.max(), steps.min() * np.prod(ratios) * reach)
     pace = Pace(steps, np.ones(len(steps)), window, fraction)
     needed = governing_steps(item.mesh.cells, item.tables.tie, fraction * steps)
-    level = np.sum(needed[:, None] < bounds(ratios, pace), axis=1, dtype=np.int32)
+    level = np.sum(needed[:, None] < least_steps(ratios, pace)[:-1], axis=1, dtype=np.int32)
     tables = replace(item.tables, level=level, ratios=ratios)
     pieces = make_pieces(distribute(comm, item.mesh if comm.rank == 0 else None), item.tables, materials)
     factor = np.ones(len(pieces.steps))
