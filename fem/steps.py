@@ -52,7 +52,7 @@ class Steps:
 def steps_of_division(whole: Whole, survey: Survey, division: Division, rules: Rules) -> Steps:
     """Return the steps of a divided mesh."""
     critical = damped_critical_step(survey.step, rules.stiffness)
-    slow = next(cells for _, _, cells in steps_of(whole, division))
+    _, _, slow, _ = next(steps_of(whole, survey, division, rules))
     roles = np.unique(survey.role).tolist()
     return Steps(
         plan=division.plan,
