@@ -30,6 +30,7 @@ from fem.checkpoint_files import (
 )
 from fem.errors import CheckpointError
 from fem.portable import State
+from fem.whereabouts import HERE
 
 LIBRARIES = ("numpy", "scipy", "numba")
 GENERATIONS = 2
@@ -40,7 +41,6 @@ class Checkpoints:
     """The checkpoint files of one run.
 
     Attributes:
-        latest: The latest checkpoint, of this run or from which it continued; None where there is none.
         continued: Window from which the run continued, None where it began anew.
         moved: Whether the run continued from another division into ranks.
     """
@@ -55,12 +55,21 @@ class Checkpoints:
             interval: Wall time between two checkpoints [s].
         """
         self._comm, self._folder, self._interval = comm, folder, interval
-        self.latest: Checkpoint | None = None
+        self._latest: Checkpoint | None = None
         self.continued: int | None = None
         self.moved = False
         self._owner = digest_of(repr(inputs).encode() + _code())
         self._own, self._first = Path(), set[str]()
         self._written, self._generation = monotonic(), 0
+
+    @property
+    def latest(self) -> Checkpoint | None:
+        """Return the latest checkpoint, of this run or from which it continued; None where there is none."""
+        return self._latest
+
+    @latest.setter
+    def latest(self, checkpoint: Checkpoint) -> None:
+        self._latest, HERE.checkpoint = checkpoint, str(checkpoint)
 
     def read(self, like: State) -> dict[str, Any] | None:
         """Return this rank's values at the latest window of which all files are whole, None where there is none.
@@ -91,7 +100,10 @@ class Checkpoints:
         """Return whether the interval has passed on rank 0; collective."""
         if self._folder is None:
             return False
-        return bool(self._comm.bcast(monotonic() - self._written >= self._interval))
+        HERE.wait_for("rank 0 to say whether a checkpoint is due")
+        due = bool(self._comm.bcast(monotonic() - self._written >= self._interval))
+        HERE.go_on()
+        return due
 
     def write(self, window: int, time: float, state: State) -> None:
         """Write this rank's state at a window and a time [s] over the older generation; after ``read``; collective."""

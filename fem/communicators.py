@@ -6,6 +6,7 @@ from typing import Self
 from mpi4py import MPI
 
 from fem.coupling.placement import Placement, Role
+from fem.whereabouts import HERE
 
 
 class Communicators:
@@ -27,6 +28,7 @@ class Communicators:
             for role, ranks in placement.ranks.items()
         }
         self.models: dict[Role, MPI.Comm] = {role: comm for role, comm in split.items() if comm != MPI.COMM_NULL}
+        HERE.models = ", ".join(self.models)
 
     def __enter__(self) -> Self:
         """Return self."""

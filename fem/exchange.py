@@ -8,6 +8,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from fem.kernels.motion import pack, sum_in_rank_order, unpack
+from fem.whereabouts import HERE
 
 SHARED_TAG, CHANNEL_TAG = 11, 12
 
@@ -84,6 +85,8 @@ class SharedNodes:
             if len(rows):
                 self._requests.append(comm.Recv_init(self._received[part], other, SHARED_TAG))
                 self._requests.append(comm.Send_init(self._sent[part], other, SHARED_TAG))
+        neighbours = [other for other, rows in enumerate(local) if len(rows)]
+        self._mark = f"the sum over shared nodes with {HERE.names(comm, neighbours)}"
         ranks = np.repeat(np.arange(comm.size), [len(rows) for rows in local])
         self._nodes, self._pointer, self._source = rank_order(self._rows, ranks, comm.rank)
 
@@ -93,8 +96,10 @@ class SharedNodes:
             begin = time.perf_counter()
             pack(values, self._rows, self._sent)
             packed = time.perf_counter()
+            HERE.wait_for(self._mark)
             MPI.Prequest.Startall(self._requests)
             MPI.Prequest.Waitall(self._requests)
+            HERE.go_on()
             arrived = time.perf_counter()
             sum_in_rank_order(self._nodes, self._pointer, self._source, self._received, values)
             self.clock.count(begin, packed, arrived)
@@ -163,6 +168,9 @@ class Channel:
         others = [other for other in range(comm.size) if other != comm.rank]
         self._sends = [comm.Send_init(sent[k], k, CHANNEL_TAG) for k in others if len(sent[k])]
         self._receives = [comm.Recv_init(received[k], k, CHANNEL_TAG) for k in others if len(received[k])]
+        takers, givers = ([k for k in others if len(rows[k])] for rows in (sent, received))
+        self._taken = f"values of the cut to be taken by {HERE.names(comm, takers)}"
+        self._given = f"values of the cut from {HERE.names(comm, givers)}"
 
     def send(self, values: NDArray[np.float64]) -> None:
         """Send the cut rows of ``values (n, 3)``.
@@ -175,7 +183,9 @@ class Channel:
         packed = time.perf_counter()
         MPI.Prequest.Startall(self._sends)
         if self._receiver_waits:
+            HERE.wait_for(self._taken)
             MPI.Prequest.Waitall(self._sends)
+            HERE.go_on()
         self.clock.count(begin, packed, time.perf_counter())
 
     def receive(self, values: NDArray[np.float64]) -> None:
@@ -184,8 +194,10 @@ class Channel:
         MPI.Prequest.Startall(self._receives)
         self._own[1][:] = self._own[0]
         packed = time.perf_counter()
+        HERE.wait_for(self._given)
         MPI.Prequest.Waitall(self._receives)
         MPI.Prequest.Waitall(self._sends)
+        HERE.go_on()
         arrived = time.perf_counter()
         unpack(self._received, self._in_rows, values)
         self.clock.count(begin, packed, arrived)

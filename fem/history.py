@@ -13,6 +13,7 @@ from fem.ledger import Ledger, ledger_sums
 from fem.participant import Participant
 from fem.portable import Log, Same, State
 from fem.watch import Watch
+from fem.whereabouts import HERE
 
 SIDE: dict[Role, float] = {"macro": 1.0, "meso": -1.0, "dns": 0.0, "structure": 0.0}
 Signal = Callable[[float], float]
@@ -67,7 +68,9 @@ class History:
 
     def _combine(self, part: NDArray[np.float64], operation: MPI.Op = MPI.SUM) -> NDArray[np.float64]:
         result = np.empty_like(part)
+        HERE.wait_for("the sums of a sample, with all ranks")
         self._world.Allreduce(part, result, operation)
+        HERE.go_on()
         return result
 
     def arrays(self) -> dict[str, NDArray]:

@@ -9,7 +9,7 @@ from fem.materials.roles import Materials
 from fem.parameters import Parameters, Shock
 from fem.structure.parameters import SolverName, StructureScene
 
-UNRELATED = {"checkpoint_seconds"}  # numerics that results do not depend on
+UNRELATED = {"checkpoint_seconds", "watchdog_seconds"}  # numerics that results do not depend on
 
 
 class RunInput(Parameters):
@@ -26,6 +26,11 @@ class RunInput(Parameters):
     materials: Materials = Materials()
     output: Path
     checkpoints: Path | None = None
+
+    @property
+    def watchdog_seconds(self) -> float:
+        """Return how long one wait of a rank may last [s]."""
+        return self.shock.numerics.watchdog_seconds
 
     @property
     def computed(self) -> str:
@@ -55,6 +60,11 @@ class StructureInput(StructureScene):
     solver: SolverName
     output: Path
     checkpoints: Path | None = None
+
+    @property
+    def watchdog_seconds(self) -> float:
+        """Return how long one wait of a rank may last [s]."""
+        return self.dynamics.numerics.watchdog_seconds
 
     @property
     def computed(self) -> str:

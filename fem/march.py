@@ -17,6 +17,7 @@ from fem.fields import Fields, FieldSample
 from fem.history import History
 from fem.participant import Participant
 from fem.portable import State
+from fem.whereabouts import HERE
 
 PROGRESS_INTERVAL = 0.5  # [s] between two progress lines
 FLATTENED = "the step is that of the undeformed body: where elements are pressed flat, step_fraction must be smaller"
@@ -57,6 +58,7 @@ def march(world: MPI.Comm, crew: Crew, outputs: Outputs, stopwatch: Stopwatch) -
         first = outputs.checkpoints.continued + 1
         output_seconds += resume(crew, outputs, state, [window for window in sorted(field_windows) if window < first])
     for window in range(first, plan.windows + 1):
+        HERE.window = window
         if window:
             run_window(crew, stopwatch)
         sampled = window % plan.stride == 0 or window == plan.windows
@@ -71,6 +73,7 @@ def march(world: MPI.Comm, crew: Crew, outputs: Outputs, stopwatch: Stopwatch) -
         if world.rank == 0 and time.perf_counter() - told > PROGRESS_INTERVAL:
             told = time.perf_counter()
             print(json.dumps({"progress": window / plan.windows, "time": time_of(crew)}), flush=True)
+    HERE.slow = "writes the results"
     for file in outputs.fields.values():
         file.close()
     return output_seconds
@@ -90,6 +93,7 @@ def run_window(crew: Crew, stopwatch: Stopwatch) -> None:
         for role, participant in crew.items():
             participant.finish_window()
             stopwatch.lap(role)
+        HERE.slow = ""  # from here on all kernels are compiled
     except InvertedElementError as error:
         raise InvertedElementError(f"time {time_of(crew):.6e} s: {error}; {FLATTENED}") from error
 
@@ -102,11 +106,12 @@ def time_of(crew: Crew) -> float:
 def write_fields(crew: Crew, outputs: Outputs, window: int) -> float:
     """Write the fields of all models of this rank, and keep them for a restart; return the seconds it took."""
     begin = time.perf_counter()
-    for role, participant in crew.items():
-        fields = outputs.fields[role]
-        sample = sample_fields(participant, fields)
-        fields.write(sample)
-        outputs.checkpoints.keep(f"{role}-{window}", {role: fields.state(sample)})
+    with HERE.busy("writes fields"):
+        for role, participant in crew.items():
+            fields = outputs.fields[role]
+            sample = sample_fields(participant, fields)
+            fields.write(sample)
+            outputs.checkpoints.keep(f"{role}-{window}", {role: fields.state(sample)})
     return time.perf_counter() - begin
 
 
@@ -123,7 +128,8 @@ def state_of(crew: Crew, outputs: Outputs) -> State:
 
 def save(crew: Crew, outputs: Outputs, window: int) -> None:
     """Write a checkpoint at the end of a window."""
-    outputs.checkpoints.write(window, time_of(crew), state_of(crew, outputs))
+    with HERE.busy("writes a checkpoint"):
+        outputs.checkpoints.write(window, time_of(crew), state_of(crew, outputs))
 
 
 def resume(crew: Crew, outputs: Outputs, state: dict[str, Any], field_windows: list[int]) -> float:

@@ -106,6 +106,7 @@ class ShockNumerics(Parameters):
     field_samples: int = Field(12, ge=2)
     energy_balance_limit: float = Field(0.02, gt=0)
     checkpoint_seconds: Annotated[float, "s"] = Field(60.0, gt=0)
+    watchdog_seconds: Annotated[float, "s"] = Field(60.0, gt=0)
 
     @field_validator("kinematics")
     @classmethod

@@ -1,4 +1,4 @@
-"""The program that each rank runs: read the input, run the shock, end all ranks when one fails."""
+"""The program that each rank runs: read the input, run the shock, end all ranks when one fails or waits too long."""
 
 import json
 import sys
@@ -13,30 +13,39 @@ from fem.inputs import INPUT, RunInput, StructureInput
 from fem.run import run
 from fem.structure.checks import check
 from fem.structure.run import run_structure
+from fem.watchdog import Watchdog
 
 
 def main(world: MPI.Comm, arguments: list[str]) -> int:
     """Run the input file named by the only argument on all ranks of ``world``; return the exit code."""
     try:
         request = agreed(world, lambda: read_input(arguments))
+    except AgreedError as error:
+        if world.rank == 0:
+            print(f"error: {error}", file=sys.stderr, flush=True)
+        return 1
+    watchdog = Watchdog(world, request.output, request.watchdog_seconds)
+    try:
         if isinstance(request, StructureInput):
             run_structure(world, request)
         else:
             run(world, request)
     except (AgreedError, EnergyError, RankError) as error:  # raised on every rank
         if world.rank == 0:
-            print(f"error: {error}", file=sys.stderr, flush=True)
+            watchdog.speak(str(error))
         return 1
     except InvertedElementError as error:
-        end_all(world, str(error))
+        end_all(world, watchdog, str(error))
     except Exception:
-        end_all(world, f"\n{traceback.format_exc()}")
+        end_all(world, watchdog, f"\n{traceback.format_exc().rstrip()}")
+    finally:
+        watchdog.stop()
     return 0
 
 
-def end_all(world: MPI.Comm, message: str) -> None:
+def end_all(world: MPI.Comm, watchdog: Watchdog, message: str) -> None:
     """Tell of an error that only this rank knows, and end the ranks that wait for it."""
-    print(f"error on rank {world.rank}: {message}", file=sys.stderr, flush=True)
+    watchdog.speak(f"rank {world.rank}: {message}")
     world.Abort(1)
 
 

@@ -174,6 +174,7 @@ class DynamicsNumerics(Parameters):
     history_samples: int = Field(600, ge=2)
     field_samples: int = Field(12, ge=2)
     checkpoint_seconds: Annotated[float, "s"] = Field(300.0, gt=0)
+    watchdog_seconds: Annotated[float, "s"] = Field(60.0, gt=0)
 
 
 class Dynamics(Parameters):

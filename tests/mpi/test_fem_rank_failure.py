@@ -1,0 +1,103 @@
+"""A rank that dies, raises or stops ends all ranks, with its message and where the run could continue."""
+
+import json
+import re
+import time
+from pathlib import Path
+
+import pytest
+
+from tests.support.fem_models import write_small_assembly
+from tests.support.fem_program import run_python
+
+# The program, but rank 1 does something in a window or in set-up; standard error is told of where it is.
+SCRIPT = """
+import os, signal, sys, time
+from pathlib import Path
+from mpi4py import MPI
+import fem.march, fem.program, fem.run
+from fem.errors import InvertedElementError
+
+world, what, where = MPI.COMM_WORLD, sys.argv[2], sys.argv[3]
+count = iter(range(10**9))
+
+def misfortune():
+    Path(sys.argv[1]).with_name("begin").write_text(str(time.time()))
+    if what == "raise":
+        raise ZeroDivisionError("broken rank")
+    if what == "invert":
+        raise InvertedElementError("element 7")
+    if what == "exit":
+        os._exit(3)
+    os.kill(os.getpid(), getattr(signal, what))
+
+def broken(real):
+    def call(*arguments, **named):
+        if world.rank == 1 and (where == "set-up" or next(count) == 20):
+            misfortune()
+        return real(*arguments, **named)
+    return call
+
+if where == "set-up":
+    fem.run.make_history = broken(fem.run.make_history)
+else:
+    fem.march.run_window = broken(fem.march.run_window)
+sys.exit(fem.program.main(world, sys.argv[1:2]))
+"""
+
+
+@pytest.fixture(scope="module")
+def assembly(tmp_path_factory) -> Path:
+    directory = tmp_path_factory.mktemp("failure")
+    meshes = [str(path) for path in write_small_assembly(directory, 1, size=1e-3)]
+    shock = {
+        "service_condition": "B",
+        "duration": 2e-5,
+        "ranks": {"total": 2, "placement": "disjoint"},
+        "numerics": {"history_samples": 100, "field_samples": 2, "checkpoint_seconds": 1e-9, "watchdog_seconds": 2.0},
+    }
+    request = {"mode": "two_scale", "meshes": meshes, "shock": shock, "output": str(directory / "out")}
+    (directory / "input.json").write_text(json.dumps(request))
+    (directory / "script.py").write_text(SCRIPT)
+    return directory
+
+
+def errors_of(directory: Path, checkpoints: Path, what: str, where: str) -> str:
+    """Return what a run with a misfortune says."""
+    path = checkpoints.parent / "input.json"
+    path.write_text(json.dumps(json.loads((directory / "input.json").read_text()) | {"checkpoints": str(checkpoints)}))
+    done = run_python([str(directory / "script.py"), str(path), what, where], 2)
+    assert done.returncode != 0
+    assert time.time() - float((checkpoints.parent / "begin").read_text()) < 30.0
+    told = [line for line in done.stderr.splitlines() if line.startswith("error: ")]
+    assert len(told) == 1, done.stderr
+    return done.stderr
+
+
+@pytest.mark.parametrize(
+    "what, message",
+    [
+        ("raise", "ZeroDivisionError: broken rank"),
+        ("invert", "error: rank 1: element 7"),
+        ("exit", r"error: rank 1 \(meso\) has died, all ranks are ended in window 2"),
+        ("SIGKILL", r"error: rank 1 \(meso\) has died, all ranks are ended in window 2"),
+        (
+            "SIGSTOP",
+            r"rank 0 \(macro\): in window 21 it has waited [2-9] s for values of the cut (from|to be taken by) rank 1",
+        ),
+    ],
+)
+def test_misfortune_of_one_rank_ends_all(assembly, tmp_path, what, message):
+    checkpoints = tmp_path / "checkpoints"
+    said = errors_of(assembly, checkpoints, what, "window")
+    assert re.search(message, said), said
+    (folder,) = checkpoints.iterdir()
+    assert re.search(f"; last checkpoint: {folder} .window (19|20|21), time [0-9.]+e-06 s", said), said
+    if what == "SIGSTOP":
+        assert "rank 1 (meso): no sign of life for" in said
+
+
+def test_misfortune_in_set_up_ends_all(assembly, tmp_path):
+    said = errors_of(assembly, tmp_path / "checkpoints", "raise", "set-up")
+    assert "ZeroDivisionError: broken rank" in said
+    assert "checkpoint:" not in said
