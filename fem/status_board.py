@@ -50,12 +50,11 @@ class Status:
         """Return whether its process is gone; False where that cannot be known, as on another machine."""
         if self.host != socket.gethostname():
             return False
-        with suppress(PermissionError):
-            try:
-                os.kill(self.process, 0)
-            except ProcessLookupError:
-                return True
-        return False
+        try:
+            state = Path(f"/proc/{self.process}/stat").read_text().rpartition(")")[2].split()[0]
+        except FileNotFoundError:
+            return True
+        return state in "ZX"  # it has ended, its parent has not looked yet
 
     def told(self, silence: float) -> str:
         """Return in words what it does; a rank not heard of for ``silence`` seconds may be stopped."""

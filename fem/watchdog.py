@@ -38,6 +38,7 @@ class Watchdog:
         name = world.bcast(f".watchdog-{os.getpid()}")
         self._rank, self._limit, self._tick = world.rank, limit, min(TICK, limit / TICKS)
         self._board = StatusBoard(folder / name)
+        self._board.write(self._status(0.0))
         self._heard, wakeup = os.pipe()
         os.set_blocking(wakeup, False)
         self._wakeup = wakeup

@@ -76,7 +76,7 @@ def continue_otherwise():
         if world.rank == 0:
             window = json.loads((found / "result.json").read_text())["continued_from"]
             fields = len(list(found.glob("*.pvtu")) + list(found.glob("*.vtu")))
-            told.append([difference(histories(found), histories(whole)), window, len(list(copy.iterdir())), fields])
+            told.append([difference(histories(found), histories(whole)), window, len(list(copy.glob("*/"))), fields])
     if world.rank == 0:
         energies = {name: float(values[-1]) for name, values in histories(whole).items() if name in ENERGIES}
         (folder / "told.json").write_text(json.dumps([told, energies]))
