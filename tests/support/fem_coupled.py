@@ -8,8 +8,7 @@ import numpy as np
 from mpi4py import MPI
 
 from fem.body import Body, Pieces, Response, make_body, make_pieces
-from fem.coupling.checks import check_division
-from fem.coupling.divide import divide
+from fem.communicators import Role
 from fem.coupling.division import Division
 from fem.coupling.gravouil_combescure import GravouilCombescure
 from fem.coupling.one_way import OneWay
@@ -24,7 +23,7 @@ from fem.mesh import MeshData
 from fem.parameters import Coupling
 from fem.scene import ModelInput, Tables, model_inputs
 from fem.tie import net_load
-from tests.support.fem_division import surveyed
+from tests.support.fem_division import Divide, checked, surveyed
 
 MANY = 1e5  # elements that each of a mesh stands for where costs are weighed, so that levels are worth while
 
@@ -32,10 +31,10 @@ MANY = 1e5  # elements that each of a mesh stands for where costs are weighed, s
 class Models(NamedTuple):
     """Pieces and tables of each model, as divided."""
 
-    parts: dict[str, tuple[Pieces, Tables]]
+    parts: dict[Role, tuple[Pieces, Tables]]
     division: Division
 
-    def bodies(self) -> dict[str, Body]:
+    def bodies(self) -> dict[Role, Body]:
         step = self.division.meso_step
         return {
             role: make_body(MPI.COMM_SELF, *part, np.ones(len(part[0].steps)), Response(step=step))
@@ -43,14 +42,14 @@ class Models(NamedTuple):
         }
 
 
-def models_of(mesh: MeshData, materials: Materials, coupling: Coupling, fraction: float) -> Models:
-    """Divide a mesh as the program does, its checks included."""
+def models_of(
+    mesh: MeshData, materials: Materials, coupling: Coupling, fraction: float, division: Divide = checked
+) -> Models:
+    """Divide a mesh, as the program does or otherwise."""
     whole, found, rules = surveyed(mesh, materials, fraction, coupling)
-    found = replace(found, cost=MANY * found.cost)
-    division = divide(whole, found, rules)
-    check_division(whole, found, division, rules)
-    inputs = model_inputs(whole, division)
-    return Models({role: pieces_of(item, materials) for role, item in inputs.items()}, division)
+    divided = division(whole, replace(found, cost=MANY * found.cost), rules)
+    inputs = model_inputs(whole, divided)
+    return Models({role: pieces_of(item, materials) for role, item in inputs.items()}, divided)
 
 
 def pieces_of(item: ModelInput, materials: Materials) -> tuple[Pieces, Tables]:
@@ -61,7 +60,7 @@ class Coupled:
     """Macro and meso model on one rank, taking turns; its window as a matrix."""
 
     def __init__(
-        self, bodies: Mapping[str, Body], plan: WindowPlan, scheme: Scheme, loads: Sequence[Load] = ()
+        self, bodies: Mapping[Role, Body], plan: WindowPlan, scheme: Scheme, loads: Sequence[Load] = ()
     ) -> None:
         self.plan, self._scheme = plan, scheme
         channels = CutChannels.open(MPI.COMM_SELF, bodies["macro"].cut, bodies["meso"].cut, receiver_waits=False)

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 
+from fem.coupling.checks import check_division
 from fem.coupling.divide import divide, held, two_steps
 from fem.coupling.division import Division
 from fem.coupling.rules import Rules
@@ -30,6 +31,13 @@ def surveyed(
     return whole, survey(whole.mesh, materials, Treatment()), Rules(coupling, coarse, fraction, 0.0, DURATION, 1)
 
 
+def checked(whole: Whole, found: Survey, rules: Rules) -> Division:
+    """Divide as the program does, its checks included."""
+    division = divide(whole, found, rules)
+    check_division(whole, found, division, rules)
+    return division
+
+
 def by_patch(whole: Whole, found: Survey, rules: Rules) -> Division:
     """Give the meso model the board's patch and all that is no board."""
     return held(whole, found, rules, whole.mesh.in_parts(lambda name: name != "board"))
@@ -41,4 +49,4 @@ def naive(whole: Whole, found: Survey, rules: Rules) -> Division:
     return two_steps("held_velocity", rules, (macro, ~macro), (macro, found.step))
 
 
-__all__ = ["Divide", "by_patch", "divide", "naive", "surveyed"]
+__all__ = ["Divide", "by_patch", "checked", "divide", "naive", "surveyed"]
