@@ -16,8 +16,8 @@ OVERDRAWN = 1.01  # energy taken by damping over energy given: more is possible 
 EXPLANATION = "most likely the time step is too large for this mesh and material, or a load acts on what nothing holds"
 
 INTERFACE = (
-    "the coupling of both models holds most of what is missing: a smaller numerics.step_fraction or finer macro elements"
-    " resolve what crosses the cut"
+    "the coupling of both models holds most of what is missing: a smaller numerics.step_fraction or finer macro"
+    " elements resolve what crosses the cut"
 )
 
 

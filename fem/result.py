@@ -123,12 +123,12 @@ def cost_metrics(summary: dict[str, Any], timings: Timings) -> dict[str, Any]:
 
 
 def health_metrics(history: History) -> dict[str, Any]:
-    """Return what the ledger found; the fraction is what the works across the cut differ by, of the largest energy."""
+    """Return what the ledger found; the fraction is by how much both models' works across the cut differ."""
     interface = float(np.abs(history.arrays()["interface"]).max())
     return {
         "energy_balance_error": quantity(history.ledger.balance_error),
         "interface_force_residual": quantity(history.ledger.force_residual),
-        "interface_energy_fraction": quantity(interface / max(history.ledger.largest, np.finfo(float).tiny)),
+        "interface_energy_fraction": quantity(interface / history.ledger.largest if interface else 0.0),
     }
 
 
