@@ -49,5 +49,9 @@ class CheckpointError(RuntimeError):
     """Checkpoint files that lack a part of the model."""
 
 
+class RecordingError(ValueError):
+    """Recorded messages that do not fit the participant that wants them."""
+
+
 class InvertedElementError(RuntimeError):
     """An element that the motion has turned inside out."""

@@ -2,6 +2,7 @@
 
 import time
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from mpi4py import MPI
@@ -133,6 +134,23 @@ def rank_order(
     return nodes.astype(np.int32), pointer.astype(np.int32), source[order].astype(np.int32)
 
 
+class Messages(Protocol):
+    """What a participant asks of a channel."""
+
+    @property
+    def clock(self) -> MessageClock:
+        """Return the time spent on its messages."""
+
+    def send(self, values: NDArray[np.float64]) -> None:
+        """Send the cut rows of ``values (n, 3)``."""
+
+    def receive(self, values: NDArray[np.float64]) -> None:
+        """Receive the cut rows of ``values (n, 3)``."""
+
+    def free(self) -> None:
+        """Give back what it needs."""
+
+
 class Channel:
     """Messages of cut values ``(., 3)`` from the ranks of one model to those of another.
 
@@ -219,8 +237,8 @@ def split_rows(buffer: NDArray[np.float64], parts: list[NDArray[np.int64]]) -> l
 class CutChannels:
     """The two channels of a window: velocities to the meso model, forces to the macro model."""
 
-    velocities: Channel
-    forces: Channel
+    velocities: Messages
+    forces: Messages
 
     @classmethod
     def open(
