@@ -63,7 +63,7 @@ class DropScene:
         numerics = {key: shock[key] for key in shock if key in type(self.case.shock.numerics).model_fields}
         tables = self.case.shock.model_dump() | {key: value for key, value in shock.items() if key not in numerics}
         tables["numerics"] |= numerics
-        tables["coupling"] |= coupling
+        tables["coupling"] = coupling  # of the case nothing: every run here says its own
         tables["ranks"] = Ranks(total=1, placement="shared").model_dump()
         return RunInput(
             mode=mode,
