@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from fem.errors import LevelError
 
-LARGEST_DAMPING = 0.03
+LARGEST_DAMPING, ROUNDING = 0.03, 1e-9
 FIRST, GROWTH = 0.15, 2.5  # nu of the outermost level; each inner one must stay below what the level around it bears
 
 
@@ -68,7 +68,7 @@ def stabilisation(level: int, damping: float = 0.0) -> float:
     Raises:
         LevelError: The damping is too strong.
     """
-    if damping > LARGEST_DAMPING:
+    if damping > LARGEST_DAMPING * (1.0 + ROUNDING):
         raise LevelError(
             f"stiffness-proportional damping of {damping:.3g} times the window is too strong for levels, which bear"
             f" {LARGEST_DAMPING:g}: take a larger window, less damping or scheme = held_velocity"

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from fem.damping import RayleighDamping
 from fem.levels import chebyshev
 from fem.levels.chebyshev import Substeps
 from fem.levels.choose import Pace, governing_steps, least_steps
@@ -138,3 +139,21 @@ def test_energy_stays_over_many_windows():
             motion.advance()
             motion.update_force()
     assert np.ptp(found) <= 1e-10 * found[0]
+
+
+@pytest.mark.parametrize("damping", [0.006, 0.03])
+def test_damping_takes_the_energy_that_is_missing(damping):
+    """As strong as levels bear: the highest modes, to which it does most, must fall as well."""
+    model = levelled(joint_on_board(solder=4), Materials(), (5, 3), damping=damping)
+    loads = [RayleighDamping.build(model.body, (0.0, damping * model.window))]
+    motion = Motion(model.body, loads, model.window, np.empty(0, np.int32), np.zeros(len(model.body.mass)))
+    motion.launch(np.array([1.0, 0.5, -0.3]))
+    held = []
+    for _ in range(40):
+        held.append((motion.kinetic_energy() + motion.internal_energy().strain, motion.damping_energy))
+        for _ in range(20):
+            motion.advance()
+            motion.update_force()
+    energy, taken = np.array(held).T
+    assert np.ptp(energy + taken) <= 1e-10 * energy[0]
+    assert np.diff(energy).max() < 0.0

@@ -7,7 +7,7 @@ from mpi4py import MPI
 
 from fem.body import Body, Response, make_body, make_pieces
 from fem.elements.element import element_stiffness
-from fem.levels.chebyshev import Substeps, stabilisation
+from fem.levels.chebyshev import stabilisation
 from fem.levels.choose import Pace, governing_steps, least_steps
 from fem.local_mesh import distribute
 from fem.materials.roles import Materials
@@ -16,6 +16,7 @@ from fem.scene import prepare
 from tests.support.fem_models import grid, joint_mesh, mesh_of, on
 
 EDGE = 1.5e-3
+FRACTION = 0.9
 
 
 def joint_on_board(solder: int = 7, edges: int = 3, held: bool = True) -> MeshData:
@@ -43,23 +44,23 @@ def levelled(
     mesh: MeshData,
     materials: Materials,
     ratios: tuple[int, ...],
-    fraction: float = 0.9,
     comm: MPI.Comm = MPI.COMM_SELF,
+    damping: float = 0.0,
 ) -> Levelled:
-    """Return a body whose smallest elements go to ``fraction`` of the largest step that the innermost level allows."""
+    """Return a body whose smallest elements go to what the innermost level bears; ``damping``: beta over the window."""
     item = prepare(mesh, "dns")["dns"]
     alone = make_pieces(distribute(MPI.COMM_SELF, item.mesh), item.tables, materials)
     steps = np.empty(len(alone.steps))
     steps[alone.local.cell_numbers] = alone.steps
-    reach = Substeps.of(ratios[-1], len(ratios)).reach
-    window = fraction * min(steps.max(), steps.min() * np.prod(ratios) * reach)
-    pace = Pace(steps, np.ones(len(steps)), window, fraction)
-    needed = governing_steps(item.mesh.cells, item.tables.tie, fraction * steps)
+    least = least_steps(ratios, Pace(steps, np.ones(len(steps)), 1.0, FRACTION, damping))
+    window = FRACTION * min(steps.max() / least[0], steps.min() / least[-1])
+    pace = Pace(steps, np.ones(len(steps)), window, FRACTION, damping * window)
+    needed = governing_steps(item.mesh.cells, item.tables.tie, FRACTION * steps)
     level = np.sum(needed[:, None] < least_steps(ratios, pace)[:-1], axis=1, dtype=np.int32)
     tables = replace(item.tables, level=level, ratios=ratios)
     pieces = make_pieces(distribute(comm, item.mesh if comm.rank == 0 else None), item.tables, materials)
     factor = np.ones(len(pieces.steps))
-    body = make_body(comm, pieces, tables, factor, Response("small", window))
+    body = make_body(comm, pieces, tables, factor, Response("small", window, damping * window))
     plain = make_body(comm, pieces, item.tables, factor)
     return Levelled(body, plain, level[pieces.local.cell_numbers], ratios, window)
 

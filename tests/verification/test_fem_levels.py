@@ -7,15 +7,16 @@ import pytest
 import scipy.linalg
 from mpi4py import MPI
 
-from fem.body import Response, make_body
+from fem.coupling.division import Division
 from fem.coupling.scheme import scheme_of
 from fem.estimate import WindowPlan
 from fem.levels.force import Levels, LocalSteps
 from fem.materials.roles import Materials
 from fem.motion import Motion
+from fem.scene import joined, model_inputs
 from fem.tie import net_load
 from tests.support.fem_bodies import dense_stiffness, motion_of
-from tests.support.fem_coupled import Coupled, split
+from tests.support.fem_coupled import Coupled, Models, pieces_of
 from tests.support.fem_levels import Levelled, joint_on_board, levelled
 
 MESH = joint_on_board(solder=4)
@@ -86,12 +87,11 @@ def test_two_models_that_share_the_levels_move_as_one(ratios):
     whole = levelled(MESH, Materials(), ratios)
     level = np.empty_like(whole.level)
     level[whole.body.local.cell_numbers] = whole.level
-    bodies = {}
-    for role, (pieces, tables) in split(MESH, Materials(), level == 0, level > 0).items():
-        mine = level[level > 0] if role == "meso" else level[level == 0]
-        tables = replace(tables, level=mine, ratios=ratios if role == "meso" else ())
-        bodies[role] = make_body(MPI.COMM_SELF, pieces, tables, np.ones(len(mine)), Response("small", whole.window))
-    pair = Coupled(bodies, WindowPlan(whole.window, int(np.prod(ratios)), 200, 1), scheme_of("local_steps"))
+    plan = WindowPlan(whole.window, int(np.prod(ratios)), 200, 1)
+    division = Division("local_steps", level == 0, level > 0, level, ratios, plan)
+    inputs = model_inputs(joined(MESH), division)
+    models = Models({role: pieces_of(item, Materials()) for role, item in inputs.items()}, division)
+    pair = Coupled(models.bodies(), plan, scheme_of("local_steps"))
     alone = motion_of(whole.body, whole.window)
     for motion in (alone, pair.macro.motion, pair.meso.motion):
         motion.launch(np.array([1.0, 0.5, -0.3]))
