@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Generic
+from typing import Any, Generic
 
 import numpy as np
 from mpi4py import MPI
@@ -13,9 +13,10 @@ from fem.agreement import agreed
 from fem.body import Body, Pieces, Response, make_body, make_pieces
 from fem.communicators import Communicators, Role
 from fem.coupling.checks import check_division
-from fem.coupling.divide import divide
+from fem.coupling.divide import divide, scheme_for
 from fem.coupling.division import SchemeName
 from fem.coupling.fine_joints import read_scene
+from fem.coupling.record import coupling_record
 from fem.coupling.rules import Rules
 from fem.coupling.whole import Treatment, survey
 from fem.inputs import RunInput
@@ -48,6 +49,7 @@ class Divided(Generic[TablesT_co]):
         steps: Their steps.
         rules: What their division followed.
         scheme: How they are coupled.
+        coupling: What the result tells of it.
     """
 
     meshes: Mapping[Role, MeshData]
@@ -56,6 +58,7 @@ class Divided(Generic[TablesT_co]):
     steps: Steps
     rules: Rules
     scheme: SchemeName
+    coupling: dict[str, Any]
 
 
 def divided_scene(world: MPI.Comm, request: RunInput) -> Divided[JointTables]:
@@ -93,6 +96,7 @@ def divided_on_one_rank(request: RunInput) -> Divided[JointTables]:
     else:
         check_division(whole, found, division, rules)
         inputs = model_inputs(whole, division, held)
+    first = next(iter(inputs.values()))
     return Divided(
         meshes={role: item.mesh for role, item in inputs.items()},
         tables={role: item.tables for role, item in inputs.items()},
@@ -100,6 +104,8 @@ def divided_on_one_rank(request: RunInput) -> Divided[JointTables]:
         steps=steps,
         rules=rules,
         scheme=division.scheme,
+        coupling={"direction": shock.coupling.direction}
+        | coupling_record(division, found, scheme_for(whole, found, rules).why, len(first.tables.cut)),
     )
 
 

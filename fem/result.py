@@ -52,11 +52,13 @@ class Timings:
         return {"setup": self.setup, "windows": self.windows, "fields": self.fields}
 
 
-def write_result(
-    comms: Communicators, request: RunInput, built: tuple[dict[Role, Model], Steps], history: History, timings: Timings
-) -> None:
-    """Write both files on rank 0; collective. ``built`` are the models of this rank and the steps of the run."""
-    models, steps = built
+# The models of this rank, the steps of the run, and what is told of its coupling.
+Built = tuple[dict[Role, Model], Steps, dict[str, Any]]
+
+
+def write_result(comms: Communicators, request: RunInput, built: Built, history: History, timings: Timings) -> None:
+    """Write both files on rank 0; collective."""
+    models, steps, coupling = built
     summary = model_summary(comms, request, models, steps)
     if comms.world.rank == 0:
         history.write(request.output)
@@ -71,12 +73,18 @@ def write_result(
             "effects": effects(request, summary),
             "failure": verdicts,
             "timings": timings.seconds,
-            "coupling": {"fine_joints": request.shock.coupling.fine_joints, "placement": timings.balance},
+            "coupling": coupling_of(request, coupling) | {"placement": timings.balance},
             "continued_from": timings.first,
             "model": summary,
             "parts": list(next(iter(models.values())).tables.part_names),
         }
         (request.output / "result.json").write_text(json.dumps(result, indent=1))
+
+
+def coupling_of(request: RunInput, coupling: dict[str, Any]) -> dict[str, Any]:
+    """Return what a run tells of its coupling: of a DNS only which joints are fine."""
+    fine = {"fine_joints": request.shock.coupling.fine_joints}
+    return fine | coupling if request.mode == "two_scale" else fine
 
 
 def quantity(value: Any, unit: str = "") -> dict[str, Any]:

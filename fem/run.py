@@ -11,14 +11,15 @@ from fem.agreement import agreed
 from fem.checkpoint import Checkpoints
 from fem.checkpoint_files import digest_of_files
 from fem.communicators import Communicators, Role
+from fem.coupling.crew import Crew, couple
 from fem.coupling.division import SchemeName
 from fem.coupling.placement import check_size
 from fem.coupling.planner import Load, Plan, plan_ranks, words
 from fem.coupling.scheme import scheme_of
+from fem.coupling.self_check import recorded
 from fem.coupling.speeds import Kind
 from fem.coupling.stopwatch import Stopwatch
 from fem.estimate import WindowPlan, implicit_plan, largest_implicit_step
-from fem.exchange import CutChannels, MessageClock
 from fem.fields import Fields
 from fem.history import History
 from fem.implicit import ImplicitMotion
@@ -28,7 +29,7 @@ from fem.march import Outputs, march
 from fem.materials.elasticity import materials_of_parts
 from fem.model import Divided, Model, build_models, divided_scene
 from fem.parameters import Shock
-from fem.participant import Alone, Participant, uncut_motion
+from fem.participant import Alone, uncut_motion
 from fem.pulse import Pulse
 from fem.result import Timings, write_result
 from fem.shock_loads import shock_loads, shock_pulse
@@ -57,7 +58,7 @@ def run(world: MPI.Comm, request: RunInput) -> None:
         models, steps = build_models(comms, divided, request, ranks.cells)
         pulse = agreed(comms.world, lambda: shock_pulse(request.shock)).pulse
         steps = planned(steps, request, pulse)
-        crew, channels = make_crew(comms, models, (steps.plan, divided.scheme), request.shock)
+        crew, channels, checked = make_crew(comms, models, (steps.plan, divided.scheme), request.shock)
         stopwatch = Stopwatch({role: model.body.shared.clock for role, model in models.items()}, channels)
         history = make_history(comms, models, steps, pulse, request)
         numerics, fields = request.shock.numerics, make_fields(comms, models, request)
@@ -71,7 +72,8 @@ def run(world: MPI.Comm, request: RunInput) -> None:
         first = checkpoints.continued or 0
         balance = ranks.summary | stopwatch.summary(comms.world, steps.plan.windows - first)
         timings = Timings(ready - start, seconds, output_seconds, balance, first)
-        write_result(comms, request, (models, steps), history, timings)
+        coupling = divided.coupling | recorded(checked)
+        write_result(comms, request, (models, steps, coupling), history, timings)
         agreed(comms.world, lambda: None)
 
 
@@ -101,28 +103,19 @@ def place(world: MPI.Comm, divided: Divided, request: RunInput) -> Plan:
 
 def make_crew(
     comms: Communicators, models: dict[Role, Model], chosen: tuple[WindowPlan, SchemeName], shock: Shock
-) -> tuple[dict[Role, Participant], list[MessageClock]]:
-    """Return the participants of this rank in the order of their turns, and the clocks of channels; collective.
-
-    ``chosen`` are the steps of the run and its scheme.
-    """
+) -> Crew:
+    """Return the participants of this rank, from the steps of the run and its scheme; collective."""
     plan, name = chosen
     bodies = {role: model.body for role, model in models.items()}
     loads = {
         role: shock_loads(comms.models[role], role, model.body, model.tables, shock) for role, model in models.items()
     }
-    if "dns" in bodies:
-        model = bodies["dns"], loads["dns"], plan.step
-        implicit = shock.numerics.dns_solver == "implicit"
-        motion = ImplicitMotion(comms.models["dns"], *model) if implicit else uncut_motion(*model)
-        return {"dns": Alone(motion, plan)}, []
-    absent = np.full_like(next(iter(bodies.values())).cut, -1)
-    macro, meso = (bodies[role].cut if role in bodies else absent for role in ("macro", "meso"))
-    channels = CutChannels.open(comms.world, macro, meso, receiver_waits=len(comms.models) == 1)
-    scheme = scheme_of(name, shock.coupling.direction)
-    make = {"macro": scheme.macro, "meso": scheme.meso}
-    made = {role: make[role](bodies[role], loads[role], plan, channels) for role in scheme.order if role in bodies}
-    return {role: made[role] for role in comms.models}, channels.clocks
+    if "dns" not in bodies:
+        return couple(comms, bodies, loads, plan, scheme_of(name, shock.coupling.direction))
+    model = bodies["dns"], loads["dns"], plan.step
+    implicit = shock.numerics.dns_solver == "implicit"
+    motion = ImplicitMotion(comms.models["dns"], *model) if implicit else uncut_motion(*model)
+    return Crew({"dns": Alone(motion, plan)}, [])
 
 
 def make_history(

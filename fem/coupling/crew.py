@@ -1,16 +1,26 @@
 """The participants of a coupled run on one rank, and the channels between them."""
 
 from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
 
 from fem.body import Body
 from fem.communicators import Communicators, Role
 from fem.coupling.scheme import Scheme
+from fem.coupling.self_check import SelfCheck, self_check
 from fem.estimate import WindowPlan
 from fem.exchange import CutChannels, MessageClock
 from fem.loads import Load
 from fem.participant import Participant
+
+
+class Crew(NamedTuple):
+    """Participants of this rank in the order of their turns, clocks of their channels, what was checked before."""
+
+    participants: dict[Role, Participant]
+    clocks: list[MessageClock]
+    checked: SelfCheck | None = None
 
 
 def couple(
@@ -19,8 +29,8 @@ def couple(
     loads: Mapping[Role, list[Load]],
     plan: WindowPlan,
     scheme: Scheme,
-) -> tuple[dict[Role, Participant], list[MessageClock]]:
-    """Return the participants of this rank, in the order of their turns, and the clocks of channels; collective.
+) -> "Crew":
+    """Open the channels of a coupled run, check what must be exact, and make the participants; collective.
 
     Args:
         comms: The communicators of both models.
@@ -28,10 +38,17 @@ def couple(
         loads: What acts on each of them.
         plan: Windows and substeps.
         scheme: How they are coupled.
+
+    Raises:
+        AgreedError: Fields, forces or masses that are not exact; on every rank.
     """
     absent = np.full_like(next(iter(bodies.values())).cut, -1)
     macro, meso = (bodies[role].cut if role in bodies else absent for role in ("macro", "meso"))
     channels = CutChannels.open(comms.world, macro, meso, receiver_waits=len(comms.models) == 1)
+    checked = self_check(comms.world, bodies, channels)
+    checked.judge()
+    if comms.world.rank == 0:
+        print(checked.words, flush=True)
     make = {"macro": scheme.macro, "meso": scheme.meso}
     made = {role: make[role](bodies[role], loads[role], plan, channels) for role in scheme.order if role in bodies}
-    return {role: made[role] for role in comms.models}, channels.clocks
+    return Crew({role: made[role] for role in comms.models}, channels.clocks, checked)

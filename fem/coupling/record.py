@@ -18,6 +18,7 @@ def coupling_record(division: Division, survey: Survey, why: str, cut_nodes: int
     return {
         "scheme": division.scheme,
         "why": why,
+        "m": plan.substeps,
         "ratios": [plan.substeps] if held else list(division.ratios),
         "meso_share": float(division.meso.mean()),
         "cut_nodes": cut_nodes,

@@ -6,16 +6,15 @@ import numpy as np
 from mpi4py import MPI
 
 from fem.communicators import Communicators, Role
-from fem.coupling.crew import couple
+from fem.coupling.crew import Crew, couple
 from fem.coupling.division import SchemeName
 from fem.coupling.scheme import scheme_of
 from fem.errors import AgreedError
-from fem.exchange import MessageClock
 from fem.implicit import ImplicitMotion
 from fem.inputs import StructureInput
 from fem.loads import Load
 from fem.moving import Moving
-from fem.participant import Alone, Participant, uncut_motion
+from fem.participant import Alone, uncut_motion
 from fem.pulse import Pulse
 from fem.structure.loads import damping_loads, structure_loads
 from fem.structure.model import StructureModel
@@ -36,15 +35,15 @@ def couple_models(
     request: StructureInput,
     pulses: Pulses,
     scheme: SchemeName,
-) -> tuple[dict[Role, Participant], list[MessageClock]]:
-    """Return the coupled models of this rank, ready to move, and the clocks of their channels; collective."""
+) -> Crew:
+    """Return the coupled models of this rank, ready to move; collective."""
     bodies = {role: model.body for role, model in models.items()}
     loads = {role: loads_of(comms.models[role], model, request, pulses) for role, model in models.items()}
     plan = next(iter(models.values())).steps.plan
-    crew, clocks = couple(comms, bodies, loads, plan, scheme_of(scheme))
-    for participant in crew.values():
+    crew = couple(comms, bodies, loads, plan, scheme_of(scheme))
+    for participant in crew.participants.values():
         launch(participant.motion, request)
-    return crew, clocks
+    return crew
 
 
 def loads_of(comm: MPI.Comm, model: StructureModel, request: StructureInput, pulses: Pulses) -> list[Load]:

@@ -1,7 +1,6 @@
 """A structure as two models: which layers are fine, how they are divided, the tables of each."""
 
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 from mpi4py import MPI
@@ -25,12 +24,7 @@ from fem.steps import steps_of_division
 from fem.structure.parameters import LayerCoupling, fine_layers
 from fem.structure.tables import StructureTables, structure_tables, tied
 
-
-@dataclass(frozen=True, slots=True)
-class DividedStructure(Divided[StructureTables]):
-    """The models of a structure before they are distributed, and what the result tells of their coupling."""
-
-    coupling: dict[str, Any]
+DividedStructure = Divided[StructureTables]
 
 
 def divided_structure(world: MPI.Comm, request: StructureInput) -> DividedStructure:
@@ -62,7 +56,7 @@ def divided_on_one_rank(request: StructureInput) -> DividedStructure:
     division = divide(whole, found, rules)
     check_division(whole, found, division, rules)
     inputs = structure_inputs(whole, division, structure_tables(whole, request))
-    return DividedStructure(
+    return Divided(
         meshes={role: item.mesh for role, item in inputs.items()},
         tables={role: item.tables for role, item in inputs.items()},
         mass_factors={role: found.factor[item.cells] for role, item in inputs.items()},

@@ -16,6 +16,7 @@ from fem.checkpoint_files import digest_of_files
 from fem.communicators import Communicators, Role
 from fem.coupling.placement import shared
 from fem.coupling.planner import Load, Plan, plan_ranks, words
+from fem.coupling.self_check import recorded
 from fem.coupling.speeds import Kind
 from fem.coupling.stopwatch import Stopwatch
 from fem.exchange import MessageClock
@@ -130,8 +131,8 @@ def start_two(
 ) -> Started:
     """Return the coupled models of this rank; ``cells`` are those of ``planner.Plan``; collective."""
     models = build_coupled(comms, divided, request, cells)
-    crew, channels = couple_models(comms, models, request, pulses, divided.scheme)
-    return Started(models, crew, None, channels, divided.coupling)
+    crew, channels, checked = couple_models(comms, models, request, pulses, divided.scheme)
+    return Started(models, crew, None, channels, divided.coupling | recorded(checked))
 
 
 def make_outputs(comms: Communicators, models: Models, request: StructureInput, pulses: dict[str, Pulse]) -> Outputs:
