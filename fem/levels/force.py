@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from fem.energy import Energy, InternalForce, linear_energy
 from fem.errors import LevelError
 from fem.exchange import SharedNodes
-from fem.force import Kinematics
+from fem.force import ForceTerm, Kinematics, linear_terms
 from fem.kernels.levels import begin_substeps, end_substeps, take_substep
 from fem.levels.chebyshev import Substeps
 from fem.levels.tied_elements import tied_terms
@@ -68,6 +68,7 @@ class LocalSteps:
         foreign: Those of its free nodes whose force another rank gives: the lowest that holds them.
         change: ``(nf, 3)`` [m] of the latest substep.
         state: ``(3, n, 3)``: displacement [m], force [N] there, weighted sum of forces [N]; only ``add`` reads it.
+        plain: Terms of its elements without levels, where they have hourglass control: for its share of the energy.
         history: Empty: the force follows from the displacement.
     """
 
@@ -79,6 +80,7 @@ class LocalSteps:
     foreign: NDArray[np.int32]
     change: NDArray[np.float64]
     state: NDArray[np.float64]
+    plain: Sequence[ForceTerm] = ()
     history: dict[str, NDArray] = field(default_factory=dict)
 
     @classmethod
@@ -90,7 +92,9 @@ class LocalSteps:
             body: The model, whatever its terms. The nodes of its cut are held.
             levels: Levels of its elements, which must be linear elastic.
         """
-        return build_level(comm, body, levels, 1, np.arange(len(body.mass), dtype=np.int32))
+        term = build_level(comm, body, levels, 1, np.arange(len(body.mass), dtype=np.int32))
+        elements = body.elements.subset(levels.level > 0)
+        return replace(term, plain=linear_terms(elements)) if elements.kind.hourglass else term
 
     def add(self, displacement: NDArray[np.float64], force: NDArray[np.float64]) -> None:
         """Subtract K_eff u from the force; collective."""
@@ -104,8 +108,9 @@ class LocalSteps:
         end_substeps(self.rows, self.foreign, self.state, force)
 
     def energy(self, displacement: NDArray[np.float64]) -> Energy:
-        """Return u . K_eff u / 2 as strain energy; collective."""
-        return linear_energy(self, displacement, None)
+        """Return u . K_eff u / 2, of which hourglass modes have what they have without levels; collective."""
+        hourglass = sum(term.energy(displacement).hourglass for term in self.plain)
+        return Energy(linear_energy(self, displacement, None).strain - hourglass, hourglass=hourglass)
 
 
 def check_elastic(materials: Sequence[Material], kinematics: Kinematics, ratios: tuple[int, ...]) -> None:

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from fem.elements.one_point import ONE_POINT
 from fem.energy import Energy
 from fem.errors import LevelError
+from fem.force import linear_terms
 from fem.levels.chebyshev import Substeps
 from fem.levels.choose import Pace, choose_levels, governing_steps
 from fem.levels.force import Levels, LocalSteps, check_elastic
@@ -78,6 +80,19 @@ def test_energy_is_that_of_the_effective_stiffness(model):
     held = sum((term.energy(displacement) for term in model.body.terms), Energy())
     work = -0.5 * np.vdot(displacement, total_force(model, displacement))
     assert held.strain == pytest.approx(work, rel=1e-12)
+
+
+def test_hourglass_energy_is_told_apart():
+    model = levelled(joint_on_board(solder=4), Materials(), (5, 3))
+    body = replace(model.plain, elements=replace(model.plain.elements, kind=ONE_POINT))
+    displacement = 1e-6 * np.sin(np.arange(3 * len(body.mass))).reshape(-1, 3)
+    body.tie.spread(displacement)
+    elements = body.elements.subset(model.level > 0)
+    exact = sum((term.energy(displacement) for term in linear_terms(elements)), Energy())
+    found = LocalSteps.build(MPI.COMM_SELF, body, Levels(model.level, model.ratios, 1e-6 * model.window))
+    assert exact.hourglass > 0.01 * exact.strain
+    assert found.energy(displacement).strain == pytest.approx(exact.strain, rel=1e-9)
+    assert found.energy(displacement).hourglass == pytest.approx(exact.hourglass, rel=1e-9)
 
 
 def test_levels_need_linear_elastic_elements():
