@@ -44,6 +44,11 @@ class RunInput(Parameters):
         return (*self.meshes, self.coarse_joints) if self.coarse_joints else self.meshes
 
     @property
+    def one_way(self) -> bool:
+        """Whether a coarse model of all drives a finer one of some joints."""
+        return self.mode == "two_scale" and self.shock.coupling.direction == "one_way"
+
+    @property
     def implicit(self) -> bool:
         """Whether the run takes implicit steps."""
         return self.mode == "dns" and self.shock.numerics.dns_solver == "implicit"

@@ -15,7 +15,7 @@ from fem.communicators import Communicators, Role
 from fem.coupling.checks import check_division
 from fem.coupling.divide import divide, scheme_for
 from fem.coupling.division import SchemeName
-from fem.coupling.fine_joints import read_scene
+from fem.coupling.fine_joints import copied_joints, read_scene
 from fem.coupling.record import coupling_record
 from fem.coupling.rules import Rules
 from fem.coupling.whole import Treatment, survey
@@ -86,6 +86,7 @@ def divided_on_one_rank(request: RunInput) -> Divided[JointTables]:
         stiffness=shock.damping.coefficients[1],
         duration=shock.duration,
         samples=numerics.history_samples,
+        **(dict(zip(("copied", "copy"), copied_joints(whole.mesh), strict=True)) if request.one_way else {}),
     )
     division = divide(whole, found, rules)
     steps = steps_of_division(whole, found, division, rules)

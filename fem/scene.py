@@ -107,7 +107,7 @@ def model_inputs(
         part = part_of(whole, np.ones(len(whole.mesh.cells), dtype=bool))
         return {"dns": scene.model_input(part, np.empty(0, np.int32), (part.number, part.cell_number))}
     macro, meso = part_of(whole, division.macro), part_of(whole, division.meso)
-    cut = cut_between(whole, macro, meso)
+    cut = cut_between(whole, part_of(whole, division.around), meso)
     rest = np.where(macro.number < 0, meso.number, -1), np.where(macro.cell_number < 0, meso.cell_number, -1)
     inputs: dict[Role, ModelInput[JointTables]] = {
         "macro": scene.model_input(macro, cut, (macro.number, macro.cell_number)),

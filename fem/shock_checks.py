@@ -65,11 +65,8 @@ def _finite(shock: Shock) -> Iterator[Problem]:
 
 
 def _coupling(coupling: JointCoupling) -> Iterator[Problem]:
-    """Refuse what is not computed yet."""
-    served = {
-        "direction": ("two_way",),
-    }
-    for name, choices in served.items():
-        value = getattr(coupling, name)
-        if value not in choices:
-            yield Problem(f"shock.coupling.{name}", value, "is not computed yet", ", ".join(map(str, choices)))
+    """Refuse schemes that need an answer, or to be the whole model, where nothing is answered."""
+    if coupling.direction == "one_way" and coupling.scheme not in ("auto", "held_velocity"):
+        yield Problem(
+            "shock.coupling.scheme", coupling.scheme, "does not go with direction = one_way", "auto, held_velocity"
+        )

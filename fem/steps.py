@@ -54,13 +54,14 @@ def steps_of_division(whole: Whole, survey: Survey, division: Division, rules: R
     critical = damped_critical_step(survey.step, rules.stiffness)
     _, _, slow, _ = next(steps_of(whole, survey, division, rules))
     roles = np.unique(survey.role).tolist()
+    counted = division.macro if division.overlaps else ...
     return Steps(
         plan=division.plan,
         critical={role: float(survey.plain_step[survey.role == role].min()) for role in roles},
         cut=float(critical[slow].min()),
         smallest=float(critical.min()),
-        added_mass=float(survey.added_mass.sum()),
-        model_mass=float(survey.mass.sum()),
+        added_mass=float(survey.added_mass[counted].sum()),
+        model_mass=float(survey.mass[counted].sum()),
         meso_step=division.meso_step,
     )
 

@@ -27,7 +27,7 @@ def check_division(whole: Whole, survey: Survey, division: Division, rules: Rule
     for role, cells in (("macro", division.macro), ("meso", division.meso)):
         if not cells.any():
             raise CutError(nothing_left(role, whole, rules))
-    if division.scheme == "held_velocity" and rules.coupling.direction == "two_way":
+    if division.scheme == "held_velocity" and not division.overlaps:
         check_buffer(whole, survey, division, rules)
     if division.scheme == "local_steps":
         check_linear(survey, division, rules)
@@ -116,7 +116,7 @@ def steps_of(
             yield f"the step of level {level}", step, division.level == level, share * survey.step
         return
     critical, slow = damped_critical_step(survey.step, rules.stiffness), division.macro
-    if division.scheme == "held_velocity":
+    if division.scheme == "held_velocity" and not division.overlaps:
         slow = slow | touching(cells, cut_nodes(cells, division.meso, len(whole.mesh.points)))
     yield "the window", plan.window, slow, critical
     yield "the step", plan.step, division.meso, critical

@@ -1,5 +1,7 @@
 """The choice of models, levels and window from the cells of a whole mesh and their critical steps."""
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -19,6 +21,8 @@ def divide(whole: Whole, survey: Survey, rules: Rules) -> Division:
     Raises:
         LevelError: Steps that differ by more than levels bridge.
     """
+    if rules.copied is not None and rules.copy is not None:
+        return submodel(whole, survey, rules, rules.copied, rules.copy)
     divided = {"held_velocity": by_buffer, "gravouil_combescure": at_ties, "local_steps": by_levels}
     return divided[scheme_for(whole, survey, rules).scheme](whole, survey, rules)
 
@@ -26,6 +30,8 @@ def divide(whole: Whole, survey: Survey, rules: Rules) -> Division:
 def scheme_for(whole: Whole, survey: Survey, rules: Rules) -> Choice:
     """Return the scheme that the user wants, or that the scene calls for, and why."""
     wanted = rules.coupling.scheme
+    if rules.copied is not None:
+        return Choice("held_velocity", "coupling.direction = one_way: nothing comes back that could grow")
     if wanted != "auto":
         return Choice(wanted, f"coupling.scheme = {wanted}")
     coarse_step = float(survey.step[rules.coarse].min(initial=np.inf))
@@ -58,6 +64,22 @@ def held(whole: Whole, survey: Survey, rules: Rules, meso: NDArray[np.bool_]) ->
     """Return the division of held velocity whose meso model has given cells ``(ne,)``."""
     slow = ~meso | touching(whole.mesh.cells, cut_nodes(whole.mesh.cells, meso, len(whole.mesh.points)))
     return two_steps("held_velocity", rules, (~meso, meso), (slow, survey.step))
+
+
+def submodel(
+    whole: Whole, survey: Survey, rules: Rules, copied: NDArray[np.bool_], copy: NDArray[np.bool_]
+) -> Division:
+    """Give the meso model fine cells ``(ne,)`` and layers of all around them; the macro model has all, them as copies.
+
+    Layers grow through ties, too: another joint on the same element is in the meso model as coarse as it is.
+    """
+    cells, meso = whole.mesh.cells, copied.copy()
+    for _ in range(rules.coupling.buffer_layers):
+        nodes = seeds_of(whole, meso)
+        nodes[whole.tie.slave[nodes[whole.tie.master].any(axis=1)]] = True
+        meso |= ~copied & ~copy & touching(cells, nodes)
+    division = two_steps("held_velocity", rules, (~copied, meso), (~copied, survey.step))
+    return replace(division, copy=copy)
 
 
 def cut_nodes(cells: NDArray[np.int32], meso: NDArray[np.bool_], count: int) -> NDArray[np.bool_]:

@@ -22,6 +22,7 @@ class Division:
         level: ``(ne,)`` int32 level of the step of each cell, 0 for the window.
         ratios: Steps of level k + 1 in one of level k.
         plan: Window and substeps.
+        copy: One way, ``(ne,)`` cells of the macro model that stand for finer ones of the meso model.
     """
 
     scheme: SchemeName
@@ -30,6 +31,18 @@ class Division:
     level: NDArray[np.int32]
     ratios: tuple[int, ...]
     plan: WindowPlan
+    copy: NDArray[np.bool_] | None = None
+
+    @property
+    def around(self) -> NDArray[np.bool_]:
+        """Return the cells ``(ne,)`` outside the meso model, up to which it reaches."""
+        outside = self.macro & ~self.meso
+        return outside if self.copy is None else outside & ~self.copy
+
+    @property
+    def overlaps(self) -> bool:
+        """Whether both models have some cells."""
+        return bool((self.macro & self.meso).any())
 
     @property
     def meso_step(self) -> float:

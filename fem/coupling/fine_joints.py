@@ -1,7 +1,11 @@
 """Which joints of a scene are fine: all others have the coarse mesh."""
 
 from collections.abc import Collection
+from dataclasses import replace
 from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
 
 from fem.errors import MeshError
 from fem.inputs import RunInput
@@ -10,6 +14,7 @@ from fem.mesh_file import read_mesh, read_meshes
 from fem.names import nearest
 from fem.watch_table import joint_names
 
+COPY = "solder_coarse@"
 KEY = "shock.coupling.fine_joints"
 
 
@@ -21,6 +26,9 @@ def read_scene(request: RunInput) -> MeshData:
     """
     fine = request.shock.coupling.fine_joints
     mesh = read_meshes(request.meshes)
+    if request.one_way:
+        coarse, names = read_coarse(request.coarse_joints), joint_names(mesh) if fine == "all" else fine
+        return append([with_coarse_joints(mesh, coarse, names), copies(coarse, names)])
     if fine == "all":
         return mesh
     if isinstance(fine, str):
@@ -59,6 +67,29 @@ def with_coarse_joints(mesh: MeshData, coarse: MeshData, fine: Collection[str]) 
         raise MeshError(f"{missing[0]} is not fine and has no coarse mesh; coarse joints: {', '.join(known) or 'none'}")
     kept, _ = select(mesh, lambda part: joint_of(part) not in others)
     return append([kept, select(coarse, lambda part: joint_of(part) in others)[0]]) if others else mesh
+
+
+def copies(coarse: MeshData, fine: Collection[str]) -> MeshData:
+    """Return coarse joints that stand beside fine ones, as a driving model has them: named apart, and not watched.
+
+    Raises:
+        MeshError: A fine joint has no coarse mesh.
+    """
+    missing = sorted(set(fine) - set(joint_names(coarse)))
+    if missing:
+        raise MeshError(f"{missing[0]} has no coarse mesh, as shock.coupling.direction = one_way needs")
+    chosen, _ = select(coarse, lambda part: joint_of(part) in fine)
+    names = tuple(name.replace("solder@", COPY) for name in chosen.part_names)
+    return replace(
+        chosen, part_names=names, facets={k: v for k, v in chosen.facets.items() if not k.startswith("pad_")}
+    )
+
+
+def copied_joints(mesh: MeshData) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Return the cells ``(ne,)`` of fine joints that have a coarse copy beside them, and of these copies."""
+    copied = {joint_of(name) for name in mesh.part_names if name.startswith(COPY)}
+    copy = mesh.in_parts(lambda name: name.startswith(COPY))
+    return mesh.in_parts(lambda name: joint_of(name) in copied) & ~copy, copy
 
 
 def joint_of(part: str) -> str:

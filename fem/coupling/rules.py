@@ -20,6 +20,8 @@ class Rules:
         stiffness: beta of damping [s].
         duration: Simulated time [s].
         samples: History samples wanted.
+        copied: One way, ``(ne,)`` fine cells of which the driving model has a coarse copy.
+        copy: These copies.
     """
 
     coupling: Coupling
@@ -28,6 +30,8 @@ class Rules:
     stiffness: float
     duration: float
     samples: int
+    copied: NDArray[np.bool_] | None = None
+    copy: NDArray[np.bool_] | None = None
 
     def plan(self, macro_step: float, meso_step: float) -> WindowPlan:
         """Return the windows that follow from two critical steps [s]."""

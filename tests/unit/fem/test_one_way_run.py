@@ -1,0 +1,84 @@
+"""A package whose coarse model drives a fine one of a joint, through the program."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from fem.errors import AgreedError
+from fem.inputs import RunInput
+from fem.mesh import append
+from fem.run import run
+from fem.shock_checks import problems
+from tests.support.fem_models import SITES, joint_mesh, write_msh, write_small_assembly
+
+SHOCK = {
+    "peak_acceleration": 14709.975,
+    "pulse_duration": 5e-4,
+    "duration": 2e-5,
+    "ranks": {"total": 1},
+    "numerics": {"history_samples": 50, "field_samples": 2},
+}
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory) -> Path:
+    directory = tmp_path_factory.mktemp("one_way")
+    write_small_assembly(directory)
+    coarse = []
+    for name, place in SITES.items():
+        mesh = joint_mesh(name, *place, layers=2, edges=1)
+        coarse.append(replace(mesh, part=0 * mesh.part, part_names=(f"solder@{name}",)))
+    write_msh(append(coarse), directory / "coarse.msh")
+    return directory
+
+
+def request(files: Path, name: str, **coupling) -> RunInput:
+    return RunInput(
+        mode="two_scale",
+        meshes=(files / "assembly.msh", files / "joints.msh"),
+        coarse_joints=files / "coarse.msh",
+        shock=SHOCK | {"coupling": coupling},
+        output=files / name,
+    )
+
+
+def results(files: Path, name: str, **coupling) -> tuple[dict, dict[str, np.ndarray]]:
+    (files / name).mkdir()
+    run(MPI.COMM_SELF, request(files, name, **coupling))
+    with np.load(files / name / "history.npz") as arrays:
+        return json.loads((files / name / "result.json").read_text()), dict(arrays)
+
+
+def test_driven_joint_is_stressed_as_a_coupled_one(files):
+    one, driven = results(files, "one_way", direction="one_way", fine_joints=("A3",))
+    two, coupled = results(files, "two_way", scheme="held_velocity", fine_joints=("A3",))
+    assert one["coupling"]["direction"] == "one_way"
+    assert all(check["ok"] for check in (one["health"] | two["health"]).values())
+    assert list(driven["joints"]) == list(coupled["joints"])
+    joint = list(driven["joints"]).index("A3")
+    for end in ("von_mises_board", "von_mises_package"):
+        stress, expected = driven[end][:, joint], coupled[end][:, joint]
+        assert np.linalg.norm(stress - expected) < 0.1 * np.linalg.norm(expected), end
+    assert one["model"]["elements"]["macro"] + one["model"]["elements"]["meso"] > sum(two["model"]["elements"].values())
+    assert one["model"]["model_mass"] == pytest.approx(two["model"]["model_mass"], rel=0.02)  # copper is in one only
+
+
+def test_all_joints_can_be_driven(files):
+    result, history = results(files, "all", direction="one_way")
+    assert result["model"]["substeps"] >= 2
+    assert (history["von_mises_board"].max(axis=0) > 0.0).all()
+
+
+def test_one_way_without_coarse_joints_is_an_error(files):
+    whole = request(files, "none", direction="one_way").model_copy(update={"coarse_joints": None})
+    with pytest.raises(AgreedError, match="no file of coarse joints"):
+        run(MPI.COMM_SELF, whole)
+
+
+def test_schemes_that_need_an_answer_are_refused_one_way(files):
+    found = problems(request(files, "x", direction="one_way", scheme="gravouil_combescure").shock)
+    assert [problem.key for problem in found] == ["shock.coupling.scheme"]
