@@ -14,11 +14,15 @@ SCHEMES = {
     "gravouil_combescure": "Gravouil-Combescure, at the joints' own facets",
 }
 DIRECTIONS = {"two_way": "two-way", "one_way": "one-way: the macro model takes nothing back"}
-MASSES = {
-    "macro": "mass of the macro model",
-    "interface": "mass at the cut that both share",
-    "meso": "mass of the meso model",
-    "expected": "density times volume, all",
+SELF_CHECK = {
+    "rigid": "rigid motion through tie and cut, error",
+    "linear": "linear field through tie and cut, error",
+    "tie": "net force and moment lost at the tie",
+    "cut": "net force and moment lost at the cut",
+    "macro_mass": "mass of the macro model",
+    "interface_mass": "mass at the cut, of the meso model",
+    "meso_mass": "mass of the rest of the meso model",
+    "volume_mass": "density times volume, all",
 }
 
 
@@ -41,11 +45,7 @@ def two_scales(coupling: Record, model: Record, fine: FineJoints | None) -> dict
         ("step ratio m", number(model["substeps"])),
         ("meso share f of the elements", _share(coupling.get("meso_share"))),
         ("nodes of the cut", _number(coupling.get("cut_nodes"))),
-        *(
-            (f"self-check, {name.replace('_', ' ')}", f"{value:.1e}")
-            for name, value in _numbers(coupling, "self_check")
-        ),
-        *((MASSES.get(name, name), _mass(value)) for name, value in _numbers(coupling, "mass")),
+        *((SELF_CHECK.get(name, name), _checked(name, value)) for name, value in _numbers(coupling, "self_check")),
     ]
     return {"head": ["two scales", ""], "rows": [[name, text] for name, text in rows if text]}
 
@@ -106,5 +106,5 @@ def _number(value: int | None) -> str:
     return "" if value is None else number(value)
 
 
-def _mass(value: float) -> str:
-    return quantity({"value": value, "unit": "kg"})
+def _checked(name: str, value: float) -> str:
+    return quantity({"value": value, "unit": "kg"}) if name.endswith("_mass") else f"{value:.1e}"

@@ -21,8 +21,7 @@ COUPLING = {
         {"step": 10e-9, "elements": 100, "cost_share": 0.5},
     ],
     "meso_share": 0.4,
-    "self_check": {"rigid_motion": 2e-16},
-    "mass": {"macro": 1e-3},
+    "self_check": {"rigid": 2e-16, "macro_mass": 1e-3},
     "placement": {
         "chosen": "shared by 2",
         "alternatives": {"shared by 2": 3e-4, "macro 0, meso 1": 4e-4},
@@ -45,7 +44,7 @@ def test_the_section_tells_scheme_joints_and_checks():
     assert rows["fine joints"] == "A4 B4"
     assert rows["how they were found"] == "the most stressed"
     assert rows["meso share f of the elements"] == "40 %"
-    assert rows["self-check, rigid motion"] == "2.0e-16"
+    assert rows["rigid motion through tie and cut, error"] == "2.0e-16"
     assert rows["mass of the macro model"] == "1000 mg"
 
 
