@@ -84,6 +84,7 @@ def write_result(comms: Communicators, request: RunInput, built: Built, history:
 def coupling_of(request: RunInput, coupling: dict[str, Any]) -> dict[str, Any]:
     """Return what a run tells of its coupling: of a DNS only which joints are fine."""
     fine = {"fine_joints": request.shock.coupling.fine_joints}
+    coupling = coupling | {"direction": request.shock.coupling.direction}
     return fine | coupling if request.mode == "two_scale" else fine
 
 

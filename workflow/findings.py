@@ -211,25 +211,21 @@ def _coupling_metrics(result: Mapping[str, Any]) -> dict:
     balance = coupling.get("placement", {})
     found = {
         "meso_share": coupling.get("meso_share"),
-        "two_scale_ideal_ratio": ideal_ratio(coupling, result.get("model", {})),
         "coupling_overhead": balance.get("coupling_overhead"),
         "busy_share": balance.get("busy_share"),
     }
     return {name: metric(value) for name, value in found.items() if value is not None}
 
 
-def ideal_ratio(coupling: Mapping[str, Any], model: Mapping[str, Any]) -> float | None:
-    """Return the time of a two-scale run over that of a DNS if each element update cost the same and all else nothing.
+def ideal_ratio(coupling: Mapping[str, Any], dns: Mapping[str, Any]) -> float | None:
+    """Return the time of a two-scale run over that of a DNS if all element updates cost the same and all else nothing.
 
-    Of levels this is the sum of elements over their steps, in that of all elements at the smallest step: with one level
-    f + (1 - f) / m.
+    Args:
+        coupling: of the two-scale run; None is returned where it does not tell its levels.
+        dns: model of the DNS, which takes the smallest step everywhere.
     """
-    steps = [(record["elements"], record["step"]) for record in coupling.get("levels", ())]
-    if steps:
-        smallest = min(step for _, step in steps)
-        return sum(elements * smallest / step for elements, step in steps) / sum(elements for elements, _ in steps)
-    share = coupling.get("meso_share")
-    return None if share is None else share + (1.0 - share) / model["substeps"]
+    rates = [record["elements"] / record["step"] for record in coupling.get("levels", ())]
+    return sum(rates) * dns["step"] / sum(dns["elements"].values()) if rates else None
 
 
 def in_words_continued(results: Mapping[str, dict]) -> str:
@@ -246,6 +242,8 @@ def _comparison(results: Mapping[str, dict], folder: Path) -> dict:
     errors = compare_histories(files[0], files[1], fine_joints_of(results["two_scale"]))
     seconds = {mode: _wall_time(result) for mode, result in results.items()}
     ratios = {"two_scale_dns_time_ratio": seconds["two_scale"] / seconds["dns"]}
+    ideal = ideal_ratio(results["two_scale"].get("coupling", {}), results["dns"]["model"])
+    ratios |= {} if ideal is None else {"two_scale_ideal_ratio": ideal}
     search = folder / "coarse/result.json"
     if search.exists():
         ratios["coarse_run_dns_time_ratio"] = _wall_time(json.loads(search.read_text())) / seconds["dns"]

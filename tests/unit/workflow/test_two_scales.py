@@ -9,7 +9,7 @@ from workflow import report_two_scales as section
 from workflow.findings import fine_joints_of, ideal_ratio, of_shock
 from workflow.fine_joints import FineJoints
 
-MODEL = {"window": 80e-9, "substeps": 8, "ranks": 2}
+MODEL = {"window": 80e-9, "step": 10e-9, "substeps": 8, "ranks": 2, "elements": {"dns": 1000}}
 COUPLING = {
     "scheme": "local_steps",
     "why": "all is linear",
@@ -78,9 +78,11 @@ def test_the_cheaper_of_two_scales_and_implicit_steps_is_named(seconds, winner):
 
 
 def test_the_ideal_ratio_counts_element_updates():
-    assert ideal_ratio({}, {}) is None
-    assert ideal_ratio({"meso_share": 0.25}, {"substeps": 15}) == pytest.approx(0.25 + 0.75 / 15)
-    assert ideal_ratio(COUPLING, MODEL) == pytest.approx((600 / 8 + 300 / 2 + 100) / 1000)
+    dns = {"step": 10e-9, "elements": {"dns": 1000}}
+    assert ideal_ratio({}, dns) is None
+    assert ideal_ratio(COUPLING, dns) == pytest.approx((600 / 8 + 300 / 2 + 100) / 1000)
+    one = {"levels": [{"step": 15.0, "elements": 75}, {"step": 1.0, "elements": 25}]}
+    assert ideal_ratio(one, {"step": 1.0, "elements": {"dns": 100}}) == pytest.approx(0.25 + 0.75 / 15)
 
 
 def test_coupling_and_comparison_become_metrics(tmp_path):
