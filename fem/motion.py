@@ -122,7 +122,8 @@ class Motion(Loaded):
     def acceleration(self, nodes: NDArray[np.integer] | slice = slice(None)) -> NDArray[np.float64]:
         """Return the acceleration ``(k, 3)`` [m/s^2] of some local nodes, zero where it does not follow from forces."""
         inverse = self.mobility[nodes]
-        return self.force[nodes] * inverse + np.where(inverse > 0.0, self.gravity, 0.0)
+        moved = self.force[nodes] * inverse
+        return moved + np.where(inverse > 0.0, self.gravity, 0.0) if self.gravity.any() else moved
 
     def kinetic_energy(self) -> float:
         """Return the kinetic energy [J] of this rank's share at ``time``: v(t - dt/2) . M v(t + dt/2) / 2.
@@ -164,7 +165,7 @@ class Motion(Loaded):
         for load in self._loads:
             load.remove(force)
         owned = self.body.shared.owned
-        return 0.125 * self.step**2 * float(np.sum((force**2 * self.mobility)[owned]))
+        return 0.125 * self.step**2 * float(owned @ np.einsum("ni,ni,ni->n", force, force, self.mobility))
 
     def state(self) -> State:
         """Return all that changes with time, for a checkpoint."""

@@ -56,6 +56,27 @@ def test_motion_against_its_exact_solution(name, tmp_path):
     assert set(health) == ERRORS[name]
 
 
+SMALL_BAR = (
+    "structure.cells=[2,2]", "structure.length=1 mm", "structure.width=1 mm", "structure.layers.section.in_plane=[3,3]",
+)  # fmt: skip
+
+
+def test_two_scales_of_a_bar_from_case_file_to_report(tmp_path):
+    """As the case, but narrower: waves are plane."""
+    result = command("run", "two_scale_bar", tmp_path, *SMALL_BAR)
+    assert result.returncode == 0, result.stdout + result.stderr
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    errors = {"wave_speed_error", "transmitted_velocity_error", "reflected_velocity_error"}
+    assert set(summary["health"]) >= errors | {f"dns_{name}" for name in errors} | {"two_scale_displacement_error"}
+    assert summary["metrics"]["two_scale_dns_time_ratio"]["value"] > 0.0
+    result = json.loads((tmp_path / "shock" / "explicit" / "result.json").read_text())
+    assert result["coupling"]["scheme"] == "local_steps" and result["model"]["substeps"] > 4
+    page = (tmp_path / "report.html").read_text()
+    assert "Two scales" in page and "LTS-leapfrog" in page and "Levels of time steps" in page
+    plan = command("plan", "two_scale_bar", tmp_path, *SMALL_BAR).stdout
+    assert "two models" in plan and "fine: section" in plan
+
+
 def test_bad_input_is_refused_before_anything_is_computed(tmp_path):
     result = command("run", "bar_wave", tmp_path, "references.wave.transmitted=beyon", "loads.push.on=z_mid")
     assert result.returncode == 2

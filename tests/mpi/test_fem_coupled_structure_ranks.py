@@ -1,0 +1,45 @@
+"""Two coupled models of a structure give the same on one rank and on several, placed either way."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.support.fem_bars import bar_layers, write_bar
+from tests.support.fem_program import run_program
+
+LAYERS = bar_layers(("FR4", 6e-3, 6, (2, 2)), ("FR4", 1e-3, 4, (3, 3)), ("FR4", 6e-3, 6, (2, 2)))
+TABLES = {
+    "supports": {"clamp": {"on": "z_min", "hold": ["x", "y", "z"]}},
+    "loads": {
+        "side": {"kind": "pressure", "on": "x_max", "peak": 1e5, "duration": 1e-5},
+        "pull": {"kind": "motion", "on": "z_max", "component": "z", "peak": 0.1, "duration": 1e-5},
+    },
+    "watch": {name: {"at": [0.0, 0.0, z]} for name, z in (("low", 1e-3), ("inside", 6.5e-3), ("high", 12e-3))},
+}
+
+
+def history(directory: Path, ranks: int, scheme: str, placement: str) -> dict[str, np.ndarray]:
+    coupling = {"scheme": scheme, "placement": placement}
+    numerics = {"history_samples": 20, "field_samples": 2}
+    dynamics = {"duration": 1e-5, "ranks": ranks, "coupling": coupling, "numerics": numerics}
+    request = write_bar(directory, 2e-3, LAYERS, 1e-5, **TABLES, dynamics=dynamics)
+    (directory / "input.json").write_text(request.model_dump_json())
+    done = run_program(directory / "input.json", ranks)
+    assert done.returncode == 0, done.stderr
+    result = json.loads((directory / "out" / "result.json").read_text())
+    assert result["model"]["placement"] == placement
+    assert set(result["model"]["models"]) == {"macro", "meso"}
+    with np.load(directory / "out" / "history.npz") as arrays:
+        return {name: array for name, array in arrays.items() if array.dtype.kind == "f"}
+
+
+@pytest.mark.parametrize("scheme", ["held_velocity", "local_steps"])
+def test_placements_give_what_one_rank_gives(tmp_path, scheme):
+    one = history(tmp_path / "one", 1, scheme, "shared")
+    for placement, ranks in (("shared", 2), ("disjoint", 3)):
+        other = history(tmp_path / placement, ranks, scheme, placement)
+        for name in one.keys() - {"balance", "interface"}:  # differences of the others
+            scale = one["internal" if name == "hourglass" else name]  # of full elements it is a small difference
+            assert np.abs(one[name] - other[name]).max() <= 1e-8 * np.abs(scale).max(), name
