@@ -34,7 +34,7 @@ class Watchdog:
             folder: Which all ranks see.
             limit: How long a wait may last [s].
         """
-        HERE.world = world
+        HERE.begin(world)
         name = world.bcast(f".watchdog-{os.getpid()}")
         self._rank, self._limit, self._tick = world.rank, limit, min(TICK, limit / TICKS)
         self._board = StatusBoard(folder / name)
@@ -55,6 +55,7 @@ class Watchdog:
         os.write(self._wakeup, b"\0")
         self._thread.join()
         self._board.close(self._rank == 0)
+        HERE.world = None
 
     def speak(self, text: str, details: str = "") -> None:
         """Say why the run ends, and from where it could continue, unless another rank has."""

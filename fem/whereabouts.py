@@ -32,6 +32,11 @@ class Whereabouts:
     slow: str = "sets up"
     checkpoint: str = ""
 
+    def begin(self, world: MPI.Comm) -> None:
+        """Begin a run."""
+        self.world, self.models, self.window, self.waiting = world, "", -1, ""
+        self.slow, self.checkpoint = "sets up", ""
+
     def wait_for(self, what: str) -> None:
         """Begin to wait."""
         self.waits += 1

@@ -77,9 +77,15 @@ def launch(command: Sequence[str], on_line: Callable[[str], None], log: Path) ->
             end_group(process)
             raise
     if code != 0:
-        words = "\n".join(log.read_text(errors="replace").strip().splitlines()[-LAST_LINES:])
-        told = words.removeprefix(TOLD)
-        raise LaunchError(told if told != words else f"{program} {ending(code)}: {words or 'it said nothing'}")
+        lines = log.read_text(errors="replace").strip().splitlines()
+        words = "\n".join(lines[-LAST_LINES:]) or "it said nothing"
+        raise LaunchError(told(lines) or f"{program} {ending(code)}: {words}")
+
+
+def told(lines: Sequence[str]) -> str:
+    """Return what a program says of an error that it knows, from the last line that begins so; nothing without one."""
+    begins = [k for k, line in enumerate(lines) if line.startswith(TOLD)]
+    return "\n".join(lines[begins[-1] :]).removeprefix(TOLD) if begins else ""
 
 
 def ending(code: int) -> str:

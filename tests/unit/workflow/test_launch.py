@@ -49,6 +49,13 @@ def test_a_failure_that_the_program_tells_is_told_alone(tmp_path):
         launch([sys.executable, "-c", program], print, tmp_path / "log.txt")
 
 
+def test_all_that_a_program_tells_of_a_failure_is_told(tmp_path):
+    lines = ["a warning", "error: rank 1: ", *(f"line {k}" for k in range(30)), "broken; last checkpoint: folder"]
+    program = f"import sys; sys.exit({chr(10).join(lines)!r})"
+    with pytest.raises(LaunchError, match=r"(?s)^rank 1: .*line 0\n.*; last checkpoint: folder$"):
+        launch([sys.executable, "-c", program], print, tmp_path / "log.txt")
+
+
 def test_a_program_that_is_killed(tmp_path):
     program = "import os, signal; os.kill(os.getpid(), signal.SIGKILL)"
     with pytest.raises(LaunchError, match="was killed, as the system does when memory is short: it said nothing"):
