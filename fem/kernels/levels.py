@@ -8,11 +8,11 @@ from numba import njit
 
 @njit(cache=True)
 def begin_substeps(rows, values, state):
-    """Take the displacements of a level from rows of ``values``; force and sum are zero."""
-    state[1:] = 0.0
+    """Take the displacements of a level from rows of ``values``; force and sum are zero between calls."""
+    place = state[0]
     for i in range(len(rows)):
-        for c in range(3):
-            state[0, i, c] = values[rows[i], c]
+        row = rows[i]
+        place[i, 0], place[i, 1], place[i, 2] = values[row, 0], values[row, 1], values[row, 2]
 
 
 @njit(cache=True)  # rounds alike wherever a node stands, see kernels.motion.advance
@@ -42,10 +42,21 @@ def take_substep(coefficients, inverse, change, state):
 
 @njit(cache=True)
 def end_substeps(rows, foreign, state, values):
-    """Add the sum of a level's forces to rows of ``values``; ``foreign`` are free nodes whose sum another rank adds."""
+    """Add the sum of a level's forces to rows of ``values``, and zero it.
+
+    Args:
+        rows: ``(n,)`` of ``values``.
+        foreign: Free nodes whose sum another rank adds.
+        state: See above.
+        values: ``(>= n, 3)`` [N].
+    """
     total = state[2]
     for i in range(len(foreign)):
         total[foreign[i]] = 0.0
     for i in range(len(rows)):
-        for c in range(3):
-            values[rows[i], c] += total[i, c]
+        row = rows[i]
+        x, y, z = total[i, 0], total[i, 1], total[i, 2]
+        values[row, 0] += x
+        values[row, 1] += y
+        values[row, 2] += z
+        total[i, 0] = total[i, 1] = total[i, 2] = 0.0
