@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from fem.materials.parameters import Material
+from workflow.problems import CaseError, Problem
 
 if TYPE_CHECKING:
     from meshing.estimate import PartEstimate
@@ -82,9 +83,11 @@ def forecast_parts(case: "BoardDropCase") -> dict[str, PartForecast]:
 
 
 def two_scale_parts(case: "BoardDropCase") -> dict[str, PartForecast]:
-    """Predict the same of a two-scale run, in which joints may be coarse."""
+    """Predict the same of a two-scale run, in which joints may be coarse; of a one-way run those of both models."""
     from meshing.estimate import count_elements
 
+    if case.shock.coupling.direction == "one_way":
+        return _driven_parts(case) | coarse_parts(case)
     return _forecasts(case, count_elements(case.package, case.board, case.warpage, fine_joint_count(case)))
 
 
@@ -93,6 +96,22 @@ def coarse_parts(case: "BoardDropCase") -> dict[str, PartForecast]:
     from meshing.estimate import count_elements
 
     return _forecasts(case, count_elements(case.package, case.board, case.warpage, 0))
+
+
+def _driven_parts(case: "BoardDropCase") -> dict[str, PartForecast]:
+    """Predict the same of the fine joints of a one-way run; the board around them is left out."""
+    from meshing.estimate import count_elements
+
+    estimates = count_elements(case.package, case.board, case.warpage, fine_joint_count(case))
+    return _forecasts(case, {name: part for name, part in estimates.items() if name in ("solder", "copper")})
+
+
+def _driven_parts(case: "BoardDropCase") -> dict[str, PartForecast]:
+    """Predict the same of the fine joints of a one-way run; the board around them is left out."""
+    from meshing.estimate import count_elements
+
+    estimates = count_elements(case.package, case.board, case.warpage, fine_joint_count(case))
+    return _forecasts(case, {name: part for name, part in estimates.items() if name in ("solder", "copper")})
 
 
 def fine_joint_count(case: "BoardDropCase") -> int | None:
@@ -154,12 +173,18 @@ def is_linear(parts: Parts) -> bool:
     return all(part.cost == 1.0 for part in parts.values())
 
 
+def _slow(case: "BoardDropCase", parts: Parts) -> frozenset[str]:
+    """Return the parts that the window follows: the board, or all that drives."""
+    driving = coarse_parts(case) if case.shock.coupling.direction == "one_way" else ()
+    return frozenset(driving or (name for name in parts if role_of(name) == MACRO))
+
+
 def _plan(case: "BoardDropCase", parts: Parts):
     """Return the windows of a mesh; scaled masses follow the smallest step of the others, so they do not limit it."""
     from fem.estimate import damped_critical_step, window_plan
 
     shock, numerics = case.shock, case.shock.numerics
-    macro = min(part.critical_step for name, part in parts.items() if role_of(name) == MACRO)
+    macro = min(parts[name].critical_step for name in _slow(case, parts) & parts.keys())
     limiting = [part.critical_step for part in parts.values() if not part.mass_scaled]
     meso = min(limiting, default=macro)
     macro, meso = (damped_critical_step(step, shock.damping.coefficients[1]) for step in (macro, meso))
@@ -177,12 +202,13 @@ def _direct(case: "BoardDropCase", parts: Parts):
 
 def _coupled(case: "BoardDropCase", parts: Parts) -> tuple[tuple[str, str], tuple[LevelForecast, ...], float]:
     """Return scheme, levels and seconds of a two-scale run."""
-    from fem.estimate import predict_seconds
+    from fem.estimate import BOARD_ADVANTAGE, predict_seconds
 
     plan, scheme = _plan(case, parts), forecast_scheme(case, parts)
-    ratios, level_of = (
-        _levels(case, parts, plan.window) if scheme[0] == "local_steps" else _models(parts, plan.substeps)
-    )
+    if scheme[0] == "local_steps":
+        ratios, level_of = _levels(case, parts, plan.window)
+    else:
+        ratios, level_of = (plan.substeps,), {name: int(name not in macro_parts(case, parts)) for name in parts}
     levels, count = [], 1
     for level in range(len(ratios) + 1):
         count *= ratios[level - 1] if level else 1
@@ -191,7 +217,8 @@ def _coupled(case: "BoardDropCase", parts: Parts) -> tuple[tuple[str, str], tupl
         cost = sum(part.elements * part.cost for part in here.values())
         levels.append(LevelForecast(tuple(here), plan.window / count, count, elements, cost))
     work = [(level.cost, level.count) for level in levels[1:]]
-    return scheme, tuple(levels), predict_seconds(levels[0].elements, work, plan, case.shock.ranks)[0]
+    boxes = sum(parts[name].elements * (1.0 if role_of(name) == MACRO else BOARD_ADVANTAGE) for name in levels[0].parts)
+    return scheme, tuple(levels), predict_seconds(boxes, work, plan, case.shock.ranks)[0]
 
 
 def forecast_scheme(case: "BoardDropCase", parts: Parts) -> tuple[str, str]:
@@ -199,21 +226,24 @@ def forecast_scheme(case: "BoardDropCase", parts: Parts) -> tuple[str, str]:
     from fem.coupling.choice import choose_scheme
 
     wanted = case.shock.coupling.scheme
+    if case.shock.coupling.direction == "one_way":
+        return "held_velocity", "shock.coupling.direction = one_way: nothing comes back"
     if wanted != "auto":
         return wanted, f"shock.coupling.scheme = {wanted}"
     choice = choose_scheme(is_linear(parts), buffer_possible=True)
     return choice.scheme, choice.why
 
 
-def _models(parts: Parts, substeps: int) -> tuple[tuple[int, ...], dict[str, int]]:
-    """Return one ratio and which parts take it: all but the macro model."""
-    return (substeps,), {name: int(name != MACRO) for name in parts}
+def macro_parts(case: "BoardDropCase", parts: Parts) -> frozenset[str]:
+    """Return the parts of the macro model where each model takes one step: not the board close to the joints."""
+    return _slow(case, parts) if case.shock.coupling.direction == "one_way" else frozenset({MACRO})
 
 
 def _levels(case: "BoardDropCase", parts: Parts, window: float) -> tuple[tuple[int, ...], dict[str, int]]:
     """Return the ratios of step levels and the level of each part, as if parts did not touch."""
     import numpy as np
 
+    from fem.errors import LevelError
     from fem.estimate import BOARD_ADVANTAGE
     from fem.levels.choose import Pace, choose_levels
     from fem.tie import Tie
@@ -225,7 +255,10 @@ def _levels(case: "BoardDropCase", parts: Parts, window: float) -> tuple[tuple[i
     wanted = case.shock.coupling.levels
     most = MOST_LEVELS if wanted == "auto" else wanted
     pace = Pace(steps, cost, window, case.shock.numerics.step_fraction)
-    level, ratios = choose_levels(np.arange(len(steps), dtype=np.int32)[:, None], Tie.none(), pace, most)
+    try:
+        level, ratios = choose_levels(np.arange(len(steps), dtype=np.int32)[:, None], Tie.none(), pace, most)
+    except LevelError as error:
+        raise CaseError("plan", [Problem("shock.coupling.levels", str(error), wanted, "auto, or more")]) from error
     return ratios, dict(zip(parts, level.tolist(), strict=True))
 
 

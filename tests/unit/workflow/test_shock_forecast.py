@@ -60,3 +60,12 @@ def test_the_wanted_scheme_is_taken():
 
 def test_an_elastic_drop_has_an_implicit_cost_to_compare_with():
     assert implicit_seconds(read_case(SMALL_CASE)) > 0.0
+
+
+def test_one_way_the_coarse_model_takes_the_window_of_all_its_parts():
+    shock = foreseen("shock.coupling.direction=one_way", "shock.coupling.fine_joints=['A4']")
+    macro, meso = shock.levels
+    assert shock.scheme[0] == "held_velocity"
+    assert "die" in macro.parts
+    assert meso.parts == ("solder", "copper")
+    assert macro.step < foreseen().window
