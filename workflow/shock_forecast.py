@@ -106,14 +106,6 @@ def _driven_parts(case: "BoardDropCase") -> dict[str, PartForecast]:
     return _forecasts(case, {name: part for name, part in estimates.items() if name in ("solder", "copper")})
 
 
-def _driven_parts(case: "BoardDropCase") -> dict[str, PartForecast]:
-    """Predict the same of the fine joints of a one-way run; the board around them is left out."""
-    from meshing.estimate import count_elements
-
-    estimates = count_elements(case.package, case.board, case.warpage, fine_joint_count(case))
-    return _forecasts(case, {name: part for name, part in estimates.items() if name in ("solder", "copper")})
-
-
 def fine_joint_count(case: "BoardDropCase") -> int | None:
     """Return how many joints of a two-scale run are fine, None if all."""
     coupling = case.shock.coupling
