@@ -1,0 +1,112 @@
+"""Placements of two models on ranks: predicted and measured windows, how busy ranks are, what coupling costs.
+
+    python benchmarks/placement.py [RANKS ...]        (default 1 2; two minutes; writes results/placement.json)
+
+The package of ``cases/bga_drop`` on its board, copper at its true mass, all joints fine, with both schemes. The script
+starts itself on the ranks. Ranks wait for each other, so that on a loaded machine what other programs take counts
+twice: figures are means over the fastest twentieth of the windows, and so are predictions of the least of few samples.
+"""
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+os.environ["OMP_NUM_THREADS"] = os.environ["NUMBA_NUM_THREADS"] = "1"
+
+import numpy as np
+from mpi4py import MPI
+
+from benchmarks.support import turns
+from benchmarks.support.drop_scene import DropScene
+from fem.communicators import Communicators
+from fem.coupling.stopwatch import Stopwatch
+from fem.inputs import RunInput
+from fem.march import run_window
+from fem.model import build_models, divided_scene
+from fem.parameters import Ranks
+from fem.run import make_crew, place
+from workflow.launch import mpi_command, own_environment
+
+SCHEMES = ("held_velocity", "local_steps")
+WINDOWS, FASTEST = 300, 15
+PREDICTION, OVERHEAD, BUSY = 0.3, 0.03, 0.9
+
+
+def measure(world: MPI.Comm, request: RunInput) -> dict:
+    """Return the prediction, and the time of windows on all ranks."""
+    divided = divided_scene(world, request)
+    plan = place(world, divided, request)
+    comms = Communicators(world, plan.placement)
+    models, steps = build_models(comms, divided, request, plan.cells)
+    crew, channels, _ = make_crew(comms, models, (steps.plan, divided.scheme), request.shock)
+    sums = {role: model.body.shared.clock for role, model in models.items()}
+    records = np.empty((WINDOWS, 4))
+    for record in records:
+        stopwatch = Stopwatch(sums, channels)
+        run_window(crew, stopwatch)
+        waits = sum(clock.waiting for clock in sums.values()), sum(clock.waiting for clock in channels)
+        record[:] = sum(stopwatch.turns.values()), *waits, sum(clock.packing for clock in channels)
+    ranks = np.array(world.allgather(records))
+    chosen = np.argsort(ranks[:, :, 0].max(axis=0))[:FASTEST]
+    total, sum_waiting, coupling_waiting, packing = ranks[:, chosen].mean(axis=1).T
+    return plan.summary | {
+        "substeps": steps.plan.substeps,
+        "window_seconds": float(total.max()),
+        "measured / predicted": float(total.max() / plan.summary["predicted_window_seconds"]),
+        "busy_shares": (1.0 - (sum_waiting + coupling_waiting) / total).tolist(),
+        "busy_share": float(1.0 - (sum_waiting + coupling_waiting).sum() / total.sum()),
+        "coupling_overhead": float(((packing + coupling_waiting) / total).min()),
+        "load_average": os.getloadavg()[0],
+    }
+
+
+def requests(scene: DropScene, size: int) -> dict[str, str]:
+    """Return the inputs of all placements of both schemes on some ranks."""
+    found = {}
+    for scheme in SCHEMES:
+        for placement in ("shared", "disjoint") if size > 1 else ("shared",):
+            request = scene.request("two_scale", {"scheme": scheme, "fine_joints": "all"}, {})
+            shock = request.shock.model_copy(update={"ranks": Ranks(total=size, placement=placement)})
+            name = f"{scheme}, {placement}, {size}"
+            found[name] = request.model_copy(update={"shock": shock}).model_dump_json()
+    return found
+
+
+def main(counts: list[int]) -> None:
+    table: dict[str, dict] = {}
+    with tempfile.TemporaryDirectory() as folder:
+        scene, path = DropScene.write(Path(folder)), Path(folder) / "requests.json"
+        for count in counts:
+            path.write_text(json.dumps(requests(scene, count)))
+            program = [sys.executable, "-m", "mpi4py", __file__, str(path)]
+            command = mpi_command(count, program, oversubscribe=True)
+            subprocess.run(command, env=own_environment(os.environ), stdout=subprocess.DEVNULL, check=True)
+            table |= json.loads(path.read_text())
+    turns.write("placement", {"rows": table, "bars": {name: bars(row) for name, row in table.items()}})
+
+
+def bars(row: dict) -> dict:
+    """Return what is asked of a placement: that of the ranks' work only where they share both models."""
+    found = {
+        "error of the prediction": turns.bar(abs(row["measured / predicted"] - 1.0), PREDICTION, at_least=False),
+        "coupling_overhead": turns.bar(row["coupling_overhead"], OVERHEAD, at_least=False),
+    }
+    return found | ({"busy_share": turns.bar(row["busy_share"], BUSY)} if row["chosen"].startswith("shared") else {})
+
+
+def on_ranks(world: MPI.Comm, path: Path) -> None:
+    """Measure the inputs of a file, and write what was found in their place."""
+    given = json.loads(path.read_text())
+    found = {name: measure(world, RunInput.model_validate_json(text)) for name, text in given.items()}
+    if world.rank == 0:
+        path.write_text(json.dumps(found))
+
+
+if __name__ == "__main__":
+    if sys.argv[-1].endswith(".json"):
+        on_ranks(MPI.COMM_WORLD, Path(sys.argv[-1]))
+    else:
+        main([int(value) for value in sys.argv[1:]] or [1, 2])
