@@ -1,0 +1,84 @@
+"""Four ranks, three of which meet at one corner of the cut: what they add up there is exact."""
+
+import pytest
+
+from tests.support.fem_program import run_script
+
+SCRIPT = """
+import contextlib, json, sys
+import numpy as np
+from mpi4py import MPI
+from fem.body import Response, make_body, make_pieces
+from fem.communicators import Communicators
+from fem.coupling.crew import couple
+from fem.coupling.placement import shared
+from fem.coupling.scheme import scheme_of
+from fem.local_mesh import distribute
+from fem.materials.roles import Materials
+from fem.mesh import append
+from fem.parameters import Coupling
+from fem.scene import model_inputs
+from tests.stability.test_fem_division import board, joint
+from tests.support.fem_division import checked, surveyed
+
+world = MPI.COMM_WORLD
+
+
+def quarters(points, corner):  # of the plane around a vertical edge, one for each rank
+    side = points[:, :2] > corner + 1e-6
+    return ((side[:, 0] + 2 * side[:, 1]) % world.size).astype(np.int32)
+
+
+def moved(scheme):
+    whole, found, rules = surveyed(append([board(4), joint(0.25e-3, 0.25e-3)]), coupling=Coupling(scheme=scheme))
+    division = checked(whole, found, rules)
+    inputs, bodies = model_inputs(whole, division), {}
+    corner = inputs["macro"].mesh.points[inputs["macro"].tables.cut].max(axis=0)[:2]
+    comms = Communicators(world, shared(("macro", "meso"), world.size))
+    for role, item in inputs.items():
+        centre = item.mesh.points[item.mesh.cells].mean(axis=1)
+        ranks = quarters(centre, corner if role == "macro" else corner / 3)
+        mesh = (item.mesh, ranks) if world.rank == 0 else (None, None)
+        pieces = make_pieces(distribute(comms.models[role], *mesh), item.tables, Materials())
+        step = division.plan.window if role == "macro" else division.meso_step
+        factor = np.ones(len(pieces.steps))
+        bodies[role] = make_body(comms.models[role], pieces, item.tables, factor, Response(step=step))
+    at_corner = [(np.abs(body.local.points[:, :2] - corner).max(axis=1) < 1e-9).any() for body in bodies.values()]
+    crew, _, found = couple(comms, bodies, dict.fromkeys(bodies, []), division.plan, scheme_of(scheme))
+    for part in crew.values():
+        motion = part.motion
+        wave = np.sin(1e3 * motion.body.local.points @ [1.0, 0.7, 0.4])
+        motion.velocity[:] = np.where(motion.mobility > 0.0, wave[:, None] * [1.0, -0.5, 0.3], 0.0)
+    for _ in range(40):
+        for part in crew.values():
+            part.begin_window()
+        for part in crew.values():
+            part.finish_window()
+    sums = np.zeros(4)
+    for part in crew.values():
+        motion, owned = part.motion, part.motion.body.shared.owned
+        pattern = np.cos(2e3 * motion.body.local.points[owned] @ [0.3, -0.8, 1.0])
+        sums[:3] += pattern @ motion.displacement[owned]
+        sums[3] += np.abs(motion.displacement[owned]).sum()
+    exact = max(found.rigid, found.linear, found.tie, found.cut)
+    return world.allreduce(sums).tolist(), world.allreduce(int(any(at_corner))), exact
+
+
+with contextlib.redirect_stdout(sys.stderr):
+    found = {scheme: moved(scheme) for scheme in ("held_velocity", "local_steps", "gravouil_combescure")}
+if world.rank == 0:
+    print(json.dumps(found))
+"""
+
+
+@pytest.fixture(scope="module")
+def found(tmp_path_factory) -> dict[int, dict]:
+    return {ranks: run_script(SCRIPT, tmp_path_factory.mktemp(f"ranks{ranks}"), ranks) for ranks in (1, 4)}
+
+
+@pytest.mark.parametrize("scheme", ["held_velocity", "local_steps", "gravouil_combescure"])
+def test_corner_of_the_cut_where_three_ranks_meet(found, scheme):
+    (alone, _, _), (together, holders, exact) = found[1][scheme], found[4][scheme]
+    assert holders >= 3
+    assert exact < 1e-12
+    assert max(abs(a - b) for a, b in zip(alone, together, strict=True)) < 1e-10 * alone[-1]

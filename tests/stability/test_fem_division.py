@@ -1,0 +1,120 @@
+"""Divisions of hard shapes: what the program chooses is stable, exact at tie and cut, and refused where it is neither."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from fem.coupling.buffer import touching
+from fem.coupling.checks import check_division
+from fem.coupling.divide import cut_nodes, divide, held
+from fem.coupling.scheme import scheme_of
+from fem.coupling.self_check import self_check
+from fem.errors import CutError
+from fem.exchange import CutChannels
+from fem.materials.roles import Materials
+from fem.mesh import MeshData, append
+from fem.parameters import Coupling
+from tests.support.fem_coupled import Coupled, models_of
+from tests.support.fem_division import surveyed
+from tests.support.fem_models import grid, joint_mesh, mesh_of, on
+
+SIZE, LAYER = 0.5e-3, 0.25e-3
+
+
+def board(cells: int = 4, layers: int = 4, copper: float = 0.0, layer: float = LAYER) -> MeshData:
+    """A block of board, held at its far side, under a plate of copper of some thickness that shares its nodes."""
+    ticks, heights = np.arange(cells + 1) * SIZE, layer * np.arange(-layers, 1.0)
+    top = copper if copper else 0.0
+    points, hexahedra = grid(ticks, ticks, np.append(heights, copper) if copper else heights)
+    above = points[hexahedra].mean(axis=1)[:, 2] > 0.0
+    sets = {"mounting_holes": on(0, cells * SIZE), "board_side": on(2, top), "board_bottom": on(2, heights[0])}
+    return mesh_of(points, hexahedra, np.where(above, "copper_board", "board"), sets)
+
+
+def joint(x: float, y: float, z: float = 0.0, held_above: bool = False) -> MeshData:
+    mesh = joint_mesh("A1", x, y, layers=2)
+    facets = {name: quads for name, quads in mesh.facets.items() if held_above or not name.startswith("head@")}
+    return MeshData(mesh.points + [0.0, 0.0, z], mesh.cells, mesh.part, mesh.part_names, facets)
+
+
+def overhang() -> MeshData:
+    """A joint under a plate of 0.05 mm that hangs over it by more than a millimetre."""
+    low = joint_mesh("A1", 0.0, 0.0, layers=2).points[:, 2].max()
+    ticks = np.arange(4) * SIZE
+    plate = mesh_of(*grid(ticks, ticks, [low, low + 0.05e-3]), "substrate", {"package_side": on(2, low)})
+    return append([board(), joint(0.5 * SIZE, 0.5 * SIZE, held_above=True), plate])
+
+
+def radius(mesh: MeshData, scheme: str) -> float:
+    models = models_of(mesh, Materials(), Coupling(scheme=scheme), 0.9)
+    assert models.division.plan.substeps > 3
+    return Coupled(models.bodies(), models.division.plan, scheme_of(scheme)).spectral_radius()
+
+
+def test_cut_through_copper_and_board_is_stable_in_local_steps():
+    mesh = append([board(4, 2, copper=0.5e-3, layer=0.15e-3), joint(0.7e-3, 0.7e-3, z=0.5e-3)])
+    scene = surveyed(mesh, coupling=Coupling(scheme="local_steps", levels=1))
+    division = divide(*scene)
+    at_cut = touching(mesh.cells, cut_nodes(mesh.cells, division.meso, len(mesh.points)))
+    assert {"board", "copper"} <= set(scene[1].role[at_cut & division.macro])
+    assert "copper" in scene[1].role[at_cut & division.meso]
+    assert radius(mesh, "local_steps") <= 1 + 1e-8
+    with pytest.raises(CutError, match=r"must belong to the board, found \d+ of copper.*local_steps may cut there"):
+        check_division(*scene[:2], held(*scene, division.meso), scene[2])
+
+
+@pytest.mark.parametrize("scheme", ["held_velocity", "local_steps"])
+def test_thin_overhang_is_stable(scheme):
+    assert radius(overhang(), scheme) <= 1 + 1e-8
+
+
+def test_meso_model_in_a_corner_touches_two_faces_and_an_edge():
+    scene = surveyed(append([board(), joint(0.25e-3, 0.25e-3)]))
+    division = divide(*scene)
+    check_division(*scene[:2], division, scene[2])
+    mesh = scene[0].mesh
+    cut = mesh.points[cut_nodes(mesh.cells, division.meso, len(mesh.points))]
+    on_faces = np.abs(cut[:, :2]) < 1e-12
+    assert on_faces.any(axis=0).all()
+    assert on_faces.all(axis=1).any()
+    buffer = division.meso & scene[2].coarse
+    assert buffer.sum() == 3 * 3 * 2  # one facet of masters, and two layers around its nodes
+
+
+def test_meso_models_may_be_several_regions():
+    apart = joint(4.25e-3, 4.25e-3)
+    names = tuple(name.replace("A1", "B2") for name in apart.part_names)
+    facets = {name.replace("A1", "B2"): quads for name, quads in apart.facets.items()}
+    second = MeshData(apart.points, apart.cells, apart.part, names, facets)
+    scene = surveyed(append([board(9, 4), joint(0.25e-3, 0.25e-3), second]))
+    division = divide(*scene)
+    check_division(*scene[:2], division, scene[2])
+    assert (division.meso & scene[2].coarse).sum() == 2 * 3 * 3 * 2
+
+
+@pytest.mark.parametrize("off", [[-1e-9, 0.0, 0.0], [-1e-9, -1e-9, -1e-9], [0.0, 0.0, 1e-9]])
+def test_points_a_little_outside_the_interface_are_tied_exactly(off):
+    foot = joint(0.2e-3, 0.2e-3)
+    foot.points[:] += off
+    scene = surveyed(append([board(), foot]))
+    assert 0.0 < scene[0].moved < 2e-9
+    models = models_of(append([board(), foot]), Materials(), Coupling(scheme="held_velocity"), 0.9)
+    bodies = models.bodies()
+    channels = CutChannels.open(MPI.COMM_SELF, bodies["macro"].cut, bodies["meso"].cut, receiver_waits=False)
+    checked = self_check(MPI.COMM_SELF, bodies, channels)
+    checked.judge()
+    assert max(checked.rigid, checked.linear, checked.tie, checked.cut) < 1e-12
+    assert checked.interface_mass > 0.0
+
+
+def test_self_check_sees_a_weight_that_is_wrong():
+    models = models_of(append([board(), joint(0.5e-3, 0.5e-3)]), Materials(), Coupling(scheme="held_velocity"), 0.9)
+    bodies = models.bodies()
+    channels = CutChannels.open(MPI.COMM_SELF, bodies["macro"].cut, bodies["meso"].cut, receiver_waits=False)
+    bodies["meso"].tie.weight[0] += [1e-9, -1e-9, 0.0, 0.0]
+    checked = self_check(MPI.COMM_SELF, bodies, channels)
+    assert min(checked.linear, checked.tie) > 1e-12
+    with pytest.raises(RuntimeError, match="residuals must be at most 1e-12"):
+        checked.judge()
+
+
