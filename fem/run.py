@@ -11,6 +11,7 @@ from fem.agreement import agreed
 from fem.checkpoint import Checkpoints
 from fem.checkpoint_files import digest_of_files
 from fem.communicators import Communicators, Role
+from fem.coupling.checks import check_pulses
 from fem.coupling.crew import Crew, couple
 from fem.coupling.division import SchemeName
 from fem.coupling.placement import check_size
@@ -53,10 +54,10 @@ def run(world: MPI.Comm, request: RunInput) -> None:
     if request.mode == "two_scale":
         check_size(request.shock.ranks, world.size)
     divided = divided_scene(world, request)
+    pulse = agreed(world, lambda: pulse_of(request, divided.steps.plan.window))
     ranks = place(world, divided, request)
     with Communicators(world, ranks.placement) as comms:
         models, steps = build_models(comms, divided, request, ranks.cells)
-        pulse = agreed(comms.world, lambda: shock_pulse(request.shock)).pulse
         steps = planned(steps, request, pulse)
         crew, channels, checked = make_crew(comms, models, (steps.plan, divided.scheme), request.shock)
         stopwatch = Stopwatch({role: model.body.shared.clock for role, model in models.items()}, channels)
@@ -75,6 +76,14 @@ def run(world: MPI.Comm, request: RunInput) -> None:
         coupling = divided.coupling | recorded(checked)
         write_result(comms, request, (models, steps, coupling), history, timings)
         agreed(comms.world, lambda: None)
+
+
+def pulse_of(request: RunInput, window: float) -> Pulse:
+    """Return the pulse of a run whose window is given [s]; errors as ``shock_pulse`` and ``check_pulses``."""
+    pulse = shock_pulse(request.shock).pulse
+    if request.mode == "two_scale":
+        check_pulses(pulse_durations({"drop": pulse}), window, request.shock.numerics.step_fraction)
+    return pulse
 
 
 def planned(steps: Steps, request: RunInput, pulse: Pulse) -> Steps:

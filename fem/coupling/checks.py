@@ -1,6 +1,6 @@
 """What a division must keep so that the coupled models neither grow nor stand still."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +10,7 @@ from fem.coupling.divide import cut_nodes, seeds_of
 from fem.coupling.division import Division
 from fem.coupling.rules import Rules
 from fem.coupling.whole import Survey, Whole
-from fem.errors import CutError
+from fem.errors import CutError, PulseError
 from fem.estimate import damped_critical_step
 from fem.levels.chebyshev import LARGEST_DAMPING
 from fem.levels.choose import Pace, least_steps
@@ -120,6 +120,25 @@ def steps_of(
         slow = slow | touching(cells, cut_nodes(cells, division.meso, len(whole.mesh.points)))
     yield "the window", plan.window, slow, critical
     yield "the step", plan.step, division.meso, critical
+
+
+def check_pulses(durations: Iterable[float], window: float, fraction: float) -> None:
+    """Check that no pulse is over before two models meet again.
+
+    Args:
+        durations: Of the loads [s].
+        window: The coupling interval [s].
+        fraction: Of the critical step that the window is.
+
+    Raises:
+        PulseError: A pulse is shorter than a window.
+    """
+    shortest = min(durations, default=np.inf)
+    if shortest < window:
+        raise PulseError(
+            f"a pulse of {shortest:.4g} s is shorter than a window of {window:.4g} s, the time between two exchanges of"
+            f" the models: a step_fraction below {fraction * shortest / window:.2g}, or one model (dns), resolves it"
+        )
 
 
 def place_of(whole: Whole, cells: NDArray[np.bool_]) -> str:

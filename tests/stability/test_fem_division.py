@@ -1,4 +1,4 @@
-"""Divisions of hard shapes: what the program chooses is stable, exact at tie and cut, and refused where it is neither."""
+"""Divisions of hard shapes: what the program chooses is stable, exact at tie and cut; what is neither is refused."""
 
 import numpy as np
 import pytest
@@ -116,5 +116,3 @@ def test_self_check_sees_a_weight_that_is_wrong():
     assert min(checked.linear, checked.tie) > 1e-12
     with pytest.raises(RuntimeError, match="residuals must be at most 1e-12"):
         checked.judge()
-
-

@@ -82,3 +82,10 @@ def test_one_way_without_coarse_joints_is_an_error(files):
 def test_schemes_that_need_an_answer_are_refused_one_way(files):
     found = problems(request(files, "x", direction="one_way", scheme="gravouil_combescure").shock)
     assert [problem.key for problem in found] == ["shock.coupling.scheme"]
+
+
+def test_pulse_that_is_over_within_a_window_is_an_error_that_names_both(files):
+    short = request(files, "short", direction="one_way")
+    short = short.model_copy(update={"shock": short.shock.model_copy(update={"pulse_duration": 1e-9})})
+    with pytest.raises(AgreedError, match=r"a pulse of 1e-09 s is shorter than a window of \S+e-0[89] s"):
+        run(MPI.COMM_SELF, short)
