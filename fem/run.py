@@ -104,7 +104,7 @@ def place(world: MPI.Comm, divided: Divided, request: RunInput) -> Plan:
         kind = Kind(materials, shock.numerics.formulation, shock.numerics.kinematics, step)
         mesh = divided.meshes.get(role)
         loads[role] = Load(mesh, tables.level, tables.ratios, round(steps.plan.window / step), kind)
-    plan = plan_ranks(world, loads, shock.ranks, request.checkpoints)
+    plan = plan_ranks(world, loads, shock.ranks, request.checkpoints, divided.scheme)
     if world.rank == 0:
         print(words(plan), flush=True)
     return plan

@@ -52,11 +52,19 @@ class ModelCost:
 
 @dataclass(frozen=True, slots=True)
 class WindowCost:
-    """What a window of two models costs, and a message [s]."""
+    """What a window of two models costs.
+
+    Attributes:
+        macro: The macro model.
+        meso: The meso model.
+        latency: Seconds of a message.
+        overlap: Whether models with ranks of their own work at the same time, as the scheme allows.
+    """
 
     macro: ModelCost
     meso: ModelCost
     latency: float
+    overlap: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,7 +123,7 @@ def window_seconds(placement: Placement, speeds: Sequence[float], cost: WindowCo
     meso = model_seconds(cost.meso, (power["meso"], several["meso"]), cost.latency)
     if placement.name == "shared":
         return macro + meso + several["macro"] * 2.0 * cost.latency
-    return max(macro, meso) + 2.0 * cost.latency
+    return (max if cost.overlap else sum)((macro, meso)) + 2.0 * cost.latency
 
 
 def model_seconds(cost: ModelCost, ranks: tuple[float, bool], latency: float) -> float:

@@ -11,6 +11,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from fem.checkpoint_files import write_at_once
+from fem.coupling.division import SchemeName
 from fem.coupling.placement import (
     Alternative,
     ModelCost,
@@ -28,6 +29,7 @@ from fem.partition import partition
 
 CALLS = 2.5e-5  # [s] of the interpreter in a step of a motion
 KEPT = "speeds.json"
+ALTERNATING: tuple[SchemeName, ...] = ("gravouil_combescure",)  # schemes whose models wait for each other
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +79,9 @@ class Measured:
     latency: float
 
 
-def plan_ranks(world: MPI.Comm, loads: Mapping[Role, Load], ranks: Ranks, folder: Path | None) -> Plan:
+def plan_ranks(
+    world: MPI.Comm, loads: Mapping[Role, Load], ranks: Ranks, folder: Path | None, scheme: SchemeName = "held_velocity"
+) -> Plan:
     """Measure, predict and choose; collective.
 
     Args:
@@ -86,13 +90,14 @@ def plan_ranks(world: MPI.Comm, loads: Mapping[Role, Load], ranks: Ranks, folder
         ranks: What the input asks for.
         folder: Where a run keeps its checkpoints. Its measurement is kept there, too: a run that continues does so with
             the same cells on the same ranks, to the same bits.
+        scheme: How two models are coupled.
     """
     family = {role: families(load.mesh, load.kind) for role, load in loads.items() if load.mesh}
     present = np.unique(np.concatenate([np.zeros(0, np.int8), *family.values()]))
     measured = kept(world, folder, present) or measure(world, loads, family)
     if folder is not None and world.rank == 0:
         keep(folder, measured)
-    plan = plan_from(loads, family, ranks, measured) if world.rank == 0 else None
+    plan = plan_from(loads, family, ranks, (measured, scheme not in ALTERNATING)) if world.rank == 0 else None
     told = world.bcast((plan.placement, plan.summary) if plan else None)
     return plan or Plan(told[0], {}, told[1])
 
@@ -128,9 +133,10 @@ def keep(folder: Path, measured: Measured) -> None:
 
 
 def plan_from(
-    loads: Mapping[Role, Load], family: Mapping[Role, NDArray[np.int8]], ranks: Ranks, measured: Measured
+    loads: Mapping[Role, Load], family: Mapping[Role, NDArray[np.int8]], ranks: Ranks, known: tuple[Measured, bool]
 ) -> Plan:
-    """Choose a placement, and the rank of each cell, from a measurement."""
+    """Choose a placement, and the rank of each cell, from a measurement and from whether two models work at once."""
+    measured, overlap = known
     cost, size = measured.cost, len(measured.cost.fixed)
     seconds = {role: rank_seconds(load, family[role], cost) for role, load in loads.items()}
     speeds = speeds_of(np.sum([work for work, _ in seconds.values()], axis=0))
@@ -140,7 +146,7 @@ def plan_from(
         for used in [np.unique(loads[role].level)]
     }
     if "macro" in models:
-        window = WindowCost(models["macro"], models["meso"], measured.latency)
+        window = WindowCost(models["macro"], models["meso"], measured.latency, overlap)
         found = alternatives(ranks, speeds.tolist(), window)
     else:
         [(role, model)] = models.items()

@@ -109,7 +109,7 @@ def place(world: MPI.Comm, divided: DividedStructure, request: StructureInput) -
         loads[role] = Load(mesh, tables.level, tables.ratios, round(steps.plan.window / step), kind)
     assert isinstance(coupling, LayerCoupling)
     ranks = Ranks(total=world.size, placement=coupling.placement, macro=coupling.macro_ranks)
-    plan = plan_ranks(world, loads, ranks, request.checkpoints)
+    plan = plan_ranks(world, loads, ranks, request.checkpoints, divided.scheme)
     if world.rank == 0:
         print(words(plan), flush=True)
     return plan

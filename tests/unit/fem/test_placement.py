@@ -46,6 +46,12 @@ def test_number_of_macro_ranks_follows_the_work():
     assert len(best(4, window=cost(3e-3, 1e-3)).ranks["macro"]) == 3
 
 
+def test_models_that_wait_for_each_other_share_ranks():
+    assert best(2, window=replace(EVEN, overlap=False)).name == "shared"
+    apart = window_seconds(disjoint([0], 2), [1.0, 1.0], replace(EVEN, overlap=False))
+    assert apart == pytest.approx(2e-3 + 2e-5)
+
+
 def test_slow_ranks_get_the_small_model():
     """One core of half the speed takes a third of the work of a fast one and itself."""
     assert best(2, [1.0, 0.5], cost(0.5e-3, 1e-3)) == disjoint([1], 2)
@@ -102,7 +108,7 @@ def measured(ranks: int, box: float = 1e-7, assembled: float = 4e-7, slow: float
 
 def planned(ranks: Ranks, measurement: Measured, **loads: Load):
     family = {role: families(load.mesh, load.kind) for role, load in loads.items()}
-    return plan_from(loads, family, ranks, measurement)
+    return plan_from(loads, family, ranks, (measurement, True))
 
 
 def test_families_and_levels_make_the_work():
