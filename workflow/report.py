@@ -208,7 +208,9 @@ def _add_two_scales(run_folder: Path, case: BoardDropCase, context: dict, result
         placement=scales.placement(coupling),
     )
     seconds = implicit_seconds(case)
-    context["oracle"] = scales.oracle(seconds, result) if seconds is not None else ""
+    search = run_folder / "shock/coarse/result.json"
+    runs = [result, json.loads(search.read_text())] if search.exists() else [result]
+    context["oracle"] = scales.oracle(seconds, runs) if seconds is not None else ""
 
 
 def _add_shock_pictures(folder: Path, history: dict, result: dict, context: dict) -> None:

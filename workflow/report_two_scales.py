@@ -1,6 +1,6 @@
 """Section "Two scales" of the report: how the models are coupled, what that costs, and what else would cost."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from workflow.fine_joints import FineJoints
@@ -74,18 +74,19 @@ def placement(coupling: Record) -> dict | None:
     return {"head": ["placement", ""], "rows": [list(row) for row in rows]} if rows else None
 
 
-def oracle(seconds: float, result: Record) -> str:
+def oracle(seconds: float, results: Sequence[Record]) -> str:
     """Say what one model in implicit steps would cost beside the two-scale run, and which of both wins.
 
     Args:
         seconds: predicted for the implicit run on one rank.
-        result: of the two-scale run.
+        results: of the two-scale run, and of the coarse run before it.
     """
-    core_seconds = result["timings"]["windows"] * result["model"]["ranks"]
+    core_seconds = sum(result["timings"]["windows"] * result["model"]["ranks"] for result in results)
+    told = "the two-scale run" if len(results) == 1 else "the two-scale run and the coarse run before it"
     winner = "implicit steps win" if seconds < core_seconds else "two scales win"
     return (
         f"All is linear elastic here, so {winner}: one model in implicit steps (MUMPS, factored once) is predicted to"
-        f" take {seconds:.0f} core seconds, the two-scale run took {core_seconds:.0f}. Solder that yields, finite"
+        f" take {seconds:.0f} core seconds, {told} took {core_seconds:.0f}. Solder that yields, finite"
         " rotations and failure need explicit steps."
     )
 

@@ -74,7 +74,9 @@ def test_predictions_stand_beside_what_was_measured():
 
 @pytest.mark.parametrize(("seconds", "winner"), [(10.0, "implicit steps win"), (100.0, "two scales win")])
 def test_the_cheaper_of_two_scales_and_implicit_steps_is_named(seconds, winner):
-    assert winner in section.oracle(seconds, {"timings": {"windows": 20.0}, "model": MODEL})
+    run = {"timings": {"windows": 20.0}, "model": MODEL}
+    assert winner in section.oracle(seconds, [run])
+    assert "took 80." in section.oracle(seconds, [run, run])
 
 
 def test_the_ideal_ratio_counts_element_updates():
