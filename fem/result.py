@@ -64,8 +64,9 @@ def write_result(comms: Communicators, request: RunInput, built: Built, history:
         history.write(request.output)
         arrays = history.arrays()
         verdicts = judge(failure_criteria(request.shock.failure), arrays)
+        told = coupling_of(request, coupling)
         result = {
-            "metrics": cost_metrics(summary, timings)
+            "metrics": cost_metrics(summary, updates_a_window(summary, told), timings)
             | health_metrics(history)
             | shock_metrics(arrays)
             | failure_metrics(verdicts),
@@ -73,7 +74,7 @@ def write_result(comms: Communicators, request: RunInput, built: Built, history:
             "effects": effects(request, summary),
             "failure": verdicts,
             "timings": timings.seconds,
-            "coupling": coupling_of(request, coupling) | {"placement": timings.balance},
+            "coupling": told | {"placement": timings.balance},
             "continued_from": timings.first,
             "model": summary,
             "parts": list(next(iter(models.values())).tables.part_names),
@@ -118,10 +119,15 @@ def model_summary(comms: Communicators, request: RunInput, models: dict[Role, Mo
     }
 
 
-def cost_metrics(summary: dict[str, Any], timings: Timings) -> dict[str, Any]:
-    """Return the speed of a run."""
+def updates_a_window(summary: dict[str, Any], coupling: dict[str, Any]) -> int:
+    """Return how many elements are updated in a window, each as often as its level is."""
+    levels = coupling.get("levels", [{"elements": sum(summary["elements"].values()), "step": summary["step"]}])
+    return sum(level["elements"] * round(summary["window"] / level["step"]) for level in levels)
+
+
+def cost_metrics(summary: dict[str, Any], updates: int, timings: Timings) -> dict[str, Any]:
+    """Return the speed of a run with so many updates of elements in a window."""
     windows, substeps = summary["windows"] - timings.first, summary["substeps"]
-    updates = sum(count * (1 if role == "macro" else substeps) for role, count in summary["elements"].items())
     return {
         "steps_per_second": quantity(windows * substeps / timings.windows, "1/s"),
         "window_seconds": quantity(timings.windows / windows, "s"),

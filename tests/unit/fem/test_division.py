@@ -1,0 +1,117 @@
+"""Cells of a small package given to models: by buffer, at ties, by levels; what does not fit is refused."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fem.coupling.buffer import grown
+from fem.coupling.checks import check_division
+from fem.coupling.divide import divide, scheme_for
+from fem.coupling.split import cut_between, part_of
+from fem.errors import CutError
+from fem.materials.library import SAC305
+from fem.materials.roles import Materials
+from fem.mesh import append
+from fem.parameters import Coupling
+from fem.scene import model_inputs
+from tests.support.fem_division import surveyed
+from tests.support.fem_models import small_assembly
+
+ELASTIC, YIELDING = Materials(), Materials(solder=SAC305)
+
+
+@pytest.fixture(scope="module")
+def mesh():
+    return append(small_assembly())
+
+
+def scene(mesh, materials=ELASTIC, **coupling):
+    return surveyed(mesh, materials, coupling=Coupling(**coupling))
+
+
+def refused(parts, division, words):
+    with pytest.raises(CutError, match=words):
+        check_division(parts[0], parts[1], division, parts[2])
+
+
+@pytest.mark.parametrize("scheme", ["held_velocity", "gravouil_combescure", "local_steps"])
+def test_every_cell_is_in_one_model_and_ties_are_complete(mesh, scheme):
+    parts = scene(mesh, scheme=scheme)
+    division = divide(*parts)
+    check_division(*parts[:2], division, parts[2])
+    assert np.array_equal(division.macro, ~division.meso)
+    macro, meso = (part_of(parts[0], cells) for cells in (division.macro, division.meso))
+    assert len(macro.tie.slave) + len(meso.tie.slave) >= len(parts[0].tie.slave)
+    assert (meso.tie.master >= 0).all()
+    cut = cut_between(parts[0], macro, meso)
+    assert not np.isin(cut, parts[0].tie.slave).any()
+    tables = {role: item.tables for role, item in model_inputs(parts[0], division).items()}
+    assert len(tables["macro"].cut) == len(tables["meso"].cut) == len(cut)
+
+
+def test_cut_of_gravouil_combescure_are_the_masters(mesh):
+    parts = scene(mesh, scheme="gravouil_combescure")
+    division = divide(*parts)
+    cut = cut_between(parts[0], part_of(parts[0], division.macro), part_of(parts[0], division.meso))
+    on_board = parts[0].tie.master[parts[0].mesh.points[parts[0].tie.slave][:, 2] < 1e-9]
+    assert np.array_equal(cut, np.unique(on_board))
+
+
+def test_more_buffer_layers_are_more_cells(mesh):
+    cells = [int(divide(*scene(mesh, scheme="held_velocity", buffer_layers=k)).meso.sum()) for k in (2, 3)]
+    assert cells[1] > cells[0]
+
+
+def test_layers_grow_by_nodes():
+    cells = np.array([[0, 1], [1, 2], [2, 3], [3, 4]], np.int32)
+    seeds = np.array([True, False, False, False, False])
+    assert grown(cells, seeds, np.ones(4, bool), 2).tolist() == [True, True, False, False]
+    assert grown(cells, seeds, np.array([True, False, True, True]), 4).tolist() == [True, False, False, False]
+
+
+def test_levels_of_the_program_are_integer_parts_of_the_window(mesh):
+    parts = scene(mesh, scheme="local_steps", levels=2)
+    division = divide(*parts)
+    assert division.plan.substeps == np.prod(division.ratios)
+    assert division.level.max() == len(division.ratios) <= 2
+    assert division.meso_step == division.plan.window
+    steps = division.plan.window / np.cumprod([1, *division.ratios])
+    assert (steps[division.level] <= 0.9 * parts[1].step * (1 + 1e-9)).all()
+
+
+@pytest.mark.parametrize(
+    ("materials", "coupling", "scheme"),
+    [
+        (ELASTIC, {}, "local_steps"),
+        (YIELDING, {}, "held_velocity"),
+        (YIELDING, {"buffer_layers": 20}, "gravouil_combescure"),
+        (ELASTIC, {"scheme": "held_velocity"}, "held_velocity"),
+    ],
+)
+def test_scheme_follows_from_materials_and_room(mesh, materials, coupling, scheme):
+    assert scheme_for(*scene(mesh, materials, **coupling)).scheme == scheme
+
+
+def test_strong_stiffness_damping_leaves_held_velocity(mesh):
+    whole, found, rules = scene(mesh)
+    choice = scheme_for(whole, found, replace(rules, stiffness=1e-8))
+    assert choice.scheme == "held_velocity"
+    assert "damping" in choice.why
+
+
+def test_yielding_solder_is_no_business_of_local_steps(mesh):
+    parts = scene(mesh, YIELDING, scheme="local_steps")
+    refused(parts, divide(*parts), r"elements of solder have a path; held_velocity or gravouil_combescure")
+
+
+def test_window_above_the_elements_step_is_refused(mesh):
+    parts = scene(mesh, scheme="held_velocity")
+    division = divide(*parts)
+    larger = replace(division, plan=replace(division.plan, window=1.01 * division.plan.window))
+    refused(parts, larger, r"the window of .* is above step_fraction = 0\.9 of .* elements \(board\).* is stable")
+
+
+def test_board_that_is_all_buffer_is_refused(mesh):
+    parts = scene(mesh, scheme="held_velocity", buffer_layers=20)
+    refused(parts, divide(*parts), r"nothing is left for the macro model: .*20 layers")
