@@ -15,13 +15,14 @@ from fem.coupling.record import coupling_record
 from fem.coupling.rules import Rules
 from fem.coupling.split import Part, cut_between, part_of
 from fem.coupling.whole import Survey, Treatment, Whole, survey
-from fem.errors import CutError
+from fem.errors import CutError, StepError
 from fem.inputs import StructureInput
 from fem.mesh_file import read_mesh
 from fem.model import Divided
 from fem.scene import ModelInput
 from fem.steps import steps_of_division
 from fem.structure.parameters import LayerCoupling, fine_layers
+from fem.structure.pulses import pulse_durations, pulses_of
 from fem.structure.tables import StructureTables, structure_tables, tied
 
 DividedStructure = Divided[StructureTables]
@@ -55,6 +56,7 @@ def divided_on_one_rank(request: StructureInput) -> DividedStructure:
     )
     division = divide(whole, found, rules)
     check_division(whole, found, division, rules)
+    check_pulses(request, division.plan.window)
     inputs = structure_inputs(whole, division, structure_tables(whole, request))
     return Divided(
         meshes={role: item.mesh for role, item in inputs.items()},
@@ -65,6 +67,21 @@ def divided_on_one_rank(request: StructureInput) -> DividedStructure:
         scheme=division.scheme,
         coupling=coupling_record(division, found, scheme_for(whole, found, rules).why, len(inputs["macro"].tables.cut)),
     )
+
+
+def check_pulses(request: StructureInput, window: float) -> None:
+    """Refuse a pulse that is shorter than a window [s], in which the macro model would not see it.
+
+    Raises:
+        StepError: With both durations.
+    """
+    for name, pulse in pulses_of(request.loads).items():
+        shortest = min(pulse_durations({name: pulse}), default=window)
+        if shortest < window:
+            raise StepError(
+                f"loads.{name} lasts {shortest:.4g} s, less than the window of two models, {window:.4g} s: smaller"
+                " elements of the coarse layers make the window shorter, and without dynamics.coupling there is none"
+            )
 
 
 def coarse_cells(whole: Whole, found: Survey, coupling: LayerCoupling) -> NDArray[np.bool_]:

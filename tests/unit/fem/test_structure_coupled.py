@@ -6,7 +6,7 @@ import pytest
 from fem.compare import relative_error
 from fem.compare_structures import solver_differences
 from fem.coupling.division import Division
-from fem.errors import CutError
+from fem.errors import CutError, StepError
 from fem.estimate import WindowPlan
 from fem.mesh_file import read_mesh
 from fem.structure.checks import problems
@@ -67,6 +67,12 @@ def test_layers_that_are_alike_have_none_that_is_fine(tmp_path):
     layers = LAYERS | {"layer_1": LAYERS["layer_1"] | {"cells": 1, "in_plane": (2, 2)}}
     request = write_bar(tmp_path, WIDTH, layers, 1e-5, **TABLES, dynamics=dynamics())
     with pytest.raises(CutError, match=r"less than half of the longest.*name it in dynamics\.coupling\.fine"):
+        divided_on_one_rank(request)
+
+
+def test_a_pulse_shorter_than_a_window_is_refused_with_both_durations(tmp_path):
+    request = write_bar(tmp_path, WIDTH, LAYERS, 1e-8, dynamics=dynamics())
+    with pytest.raises(StepError, match=r"loads\.push lasts 1e-08 s, less than the window of two models, 1\.\d+e-07 s"):
         divided_on_one_rank(request)
 
 
