@@ -73,7 +73,7 @@ def bars_of(result: dict) -> dict[str, dict]:
 def long_runs(windows: int) -> dict[str, dict]:
     """Return drift of energy, and what the interface holds, after a push without damping."""
     result = {}
-    for name in ("held_velocity", "local_steps"):
+    for name in ("held_velocity", "impulse", "local_steps"):
         coupled = Pair(3, 3.0, 2, layers=3).coupled(SCHEMES[name])
         coupled.swing(PUSH)
         drift, interface = coupled.drift(windows, SAMPLES)

@@ -51,11 +51,13 @@ class Ranks(Parameters):
 class Coupling(Parameters):
     """How two models are coupled; ``auto`` takes local steps where all that is fine is linear, else held velocity.
 
-    ``one_way`` drives the meso model by the macro model, which takes nothing back. ``levels`` are those of the meso
-    model's steps below the window. ``buffer_layers`` of board elements lie between joints and a cut of held velocity.
+    Where no buffer fits, ``auto`` takes ``gravouil_combescure``, which needs none. ``impulse`` has the buffer of held
+    velocity and keeps momentum exactly; its models wait for each other. ``one_way`` drives the meso model by the macro
+    model, which takes nothing back. ``levels`` are those of the meso model's steps below the window. ``buffer_layers``
+    of board elements lie between joints and a cut of held velocity.
     """
 
-    scheme: Literal["auto", "held_velocity", "local_steps", "gravouil_combescure"] = "auto"
+    scheme: Literal["auto", "held_velocity", "local_steps", "impulse", "gravouil_combescure"] = "auto"
     direction: Literal["two_way", "one_way"] = "two_way"
     levels: Literal["auto"] | Annotated[int, Field(ge=1)] = "auto"
     buffer_layers: int = Field(2, ge=2, le=20)

@@ -11,6 +11,7 @@ Record = Mapping[str, Any]
 SCHEMES = {
     "held_velocity": "held velocity, its cut inside the board",
     "local_steps": "local time steps (LTS-leapfrog)",
+    "impulse": "impulses on a cut inside the board, which the meso model carries",
     "gravouil_combescure": "Gravouil-Combescure, at the joints' own facets",
 }
 DIRECTIONS = {"two_way": "two-way", "one_way": "one-way: the macro model takes nothing back"}

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from fem.coupling.buffer import grown, touching
 from fem.coupling.divide import cut_nodes, seeds_of
-from fem.coupling.division import Division
+from fem.coupling.division import BUFFERED, Division
 from fem.coupling.rules import Rules
 from fem.coupling.whole import Survey, Whole
 from fem.errors import CutError, PulseError
@@ -27,7 +27,7 @@ def check_division(whole: Whole, survey: Survey, division: Division, rules: Rule
     for role, cells in (("macro", division.macro), ("meso", division.meso)):
         if not cells.any():
             raise CutError(nothing_left(role, whole, rules))
-    if division.scheme == "held_velocity" and not division.overlaps:
+    if division.scheme in BUFFERED and not division.overlaps:
         check_buffer(whole, survey, division, rules)
     if division.scheme == "local_steps":
         check_linear(survey, division, rules)
@@ -116,7 +116,7 @@ def steps_of(
             yield f"the step of level {level}", step, division.level == level, share * survey.step
         return
     critical, slow = damped_critical_step(survey.step, rules.stiffness), division.macro
-    if division.scheme == "held_velocity" and not division.overlaps:
+    if division.scheme in BUFFERED and not division.overlaps:
         slow = slow | touching(cells, cut_nodes(cells, division.meso, len(whole.mesh.points)))
     yield "the window", plan.window, slow, critical
     yield "the step", plan.step, division.meso, critical

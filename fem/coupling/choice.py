@@ -16,10 +16,10 @@ class Choice:
 def choose_scheme(elastic: bool, buffer_possible: bool) -> Choice:
     """Choose the scheme of a two-way run whose user leaves it open.
 
-    All three are stable at the steps that a run chooses (benchmarks/coupling_stability.py). Local steps keep energy and
+    All are stable at the steps that a run chooses (benchmarks/coupling_stability.py). Local steps keep energy and
     momentum but know no path: plastic strains would be those of a mean motion, half as large or twice (PHYSICS 4). Held
-    velocity lets both models work at the same time, and takes no energy from what moves; Gravouil-Combescure's link
-    does, and has them wait for each other.
+    velocity lets both models work at the same time; impulses, which keep momentum exactly along a path, do not, and are
+    taken where the user asks for them. Gravouil-Combescure's link takes energy from what moves, and waits, too.
 
     Args:
         elastic: Whether all of the meso model is linear elastic at small strains.

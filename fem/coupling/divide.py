@@ -23,7 +23,12 @@ def divide(whole: Whole, survey: Survey, rules: Rules) -> Division:
     """
     if rules.copied is not None and rules.copy is not None:
         return submodel(whole, survey, rules, rules.copied, rules.copy)
-    divided = {"held_velocity": by_buffer, "gravouil_combescure": at_ties, "local_steps": by_levels}
+    divided = {
+        "held_velocity": by_buffer,
+        "impulse": carried,
+        "gravouil_combescure": at_ties,
+        "local_steps": by_levels,
+    }
     return divided[scheme_for(whole, survey, rules).scheme](whole, survey, rules)
 
 
@@ -58,6 +63,11 @@ def by_buffer(whole: Whole, survey: Survey, rules: Rules) -> Division:
     cells = whole.mesh.cells
     buffer = grown(cells, seeds_of(whole, ~rules.coarse), rules.coarse, rules.coupling.buffer_layers)
     return held(whole, survey, rules, ~rules.coarse | buffer)
+
+
+def carried(whole: Whole, survey: Survey, rules: Rules) -> Division:
+    """Give the models the cells that they have with held velocity; the cut is the meso model's: impulses."""
+    return replace(by_buffer(whole, survey, rules), scheme="impulse")
 
 
 def held(whole: Whole, survey: Survey, rules: Rules, meso: NDArray[np.bool_]) -> Division:

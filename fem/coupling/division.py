@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 
 from fem.estimate import WindowPlan
 
-SchemeName = Literal["held_velocity", "local_steps", "gravouil_combescure"]
+SchemeName = Literal["held_velocity", "local_steps", "impulse", "gravouil_combescure"]
+BUFFERED: tuple[SchemeName, ...] = ("held_velocity", "impulse")  # schemes whose cut lies below layers of board
 
 
 @dataclass(frozen=True, slots=True)

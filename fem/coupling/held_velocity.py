@@ -105,10 +105,17 @@ class WindowMotion(Motion):
     only, and in free fall the two would part.
     """
 
-    def __init__(self, body: Body, loads: list[Load], plan: WindowPlan) -> None:
-        """Start at rest."""
+    def __init__(
+        self,
+        body: Body,
+        loads: list[Load],
+        plan: WindowPlan,
+        held: NDArray[np.integer],
+        extra_mass: NDArray[np.float64],
+    ) -> None:
+        """Start at rest; ``held`` and ``extra_mass`` as those of ``Motion``."""
         self._substeps = plan.substeps
-        super().__init__(body, loads, plan.step, local_cut(body), np.zeros(len(body.mass)))
+        super().__init__(body, loads, plan.step, held, extra_mass)
 
     def body_acceleration(self, time: float) -> NDArray[np.float64]:
         """Return m times the loads' accelerations ``(3,)`` [m/s^2] where a window begins, nothing between."""
@@ -122,7 +129,7 @@ class Driven(Continued):
     def __init__(self, body: Body, loads: list[Load], plan: WindowPlan, channels: CutChannels) -> None:
         """Start at rest."""
         self._channels = channels
-        self.motion = WindowMotion(body, loads, plan)
+        self.motion = WindowMotion(body, loads, plan, local_cut(body), np.zeros(len(body.mass)))
         self.plan = plan
         self.interface_work = 0.0
         self._counted = counted_cut(body)

@@ -8,6 +8,7 @@ from fem.communicators import Role
 from fem.coupling.division import SchemeName
 from fem.coupling.gravouil_combescure import GravouilCombescure
 from fem.coupling.held_velocity import HeldVelocity
+from fem.coupling.impulse import Impulse
 from fem.coupling.one_way import OneWay
 from fem.estimate import WindowPlan
 from fem.exchange import CutChannels
@@ -59,5 +60,7 @@ def scheme_of(name: SchemeName, direction: Direction = "two_way") -> Scheme:
         if direction == "one_way":
             raise ValueError("gravouil_combescure links two models; one_way needs held_velocity or local_steps")
         return GravouilCombescure()
+    if name == "impulse" and direction == "two_way":
+        return Impulse()
     scheme = OneWay() if direction == "one_way" else HeldVelocity()
     return LocalSteps(scheme) if name == "local_steps" else scheme

@@ -38,7 +38,7 @@ def _scheme(coupling: LayerCoupling, scene: StructureScene) -> Iterator[Problem]
     if coupling.scheme == "local_steps" and (plastic or scene.dynamics.kinematics == "finite"):
         why = f"layers that yield: {', '.join(plastic)}" if plastic else "dynamics.kinematics = finite"
         message = f"needs elastic layers at small strains, there are {why}"
-        yield Problem(f"{KEY}.scheme", "local_steps", message, "held_velocity, gravouil_combescure, auto")
+        yield Problem(f"{KEY}.scheme", "local_steps", message, "held_velocity, impulse, gravouil_combescure, auto")
 
 
 def _ranks(coupling: LayerCoupling, ranks: int) -> Iterator[Problem]:

@@ -7,9 +7,7 @@ from fem.coupling.scheme import scheme_of
 from fem.materials.library import SAC405
 from fem.materials.roles import Materials
 from fem.parameters import Coupling
-from fem.portable import values
 from fem.tie import net_load
-from tests.support.fem_bodies import dns_body, motion_of
 from tests.support.fem_coupled import Coupled, models_of
 from tests.support.fem_pairs import FRACTION, SIZE, Pair
 
@@ -40,22 +38,6 @@ def link_momentum(coupled: Coupled) -> np.ndarray:
     body = coupled.macro.motion.body
     impulse = 2.0 * body.mass[body.cut, None] / coupled.plan.window * gap(coupled)
     return net_load(body.local.points[body.cut], impulse)
-
-
-def test_one_substep_a_window_is_the_dns():
-    pair = Pair(substeps=1, ratio=2)
-    coupled = kicked(pair)
-    assert coupled.plan.substeps == 1
-    body, _ = dns_body(pair.mesh(), materials=pair.materials())
-    dns = motion_of(body, coupled.plan.step)
-    macro = coupled.macro.motion
-    twin = np.array([np.argmin(np.linalg.norm(body.local.points - point, axis=1)) for point in macro.body.local.points])
-    dns.velocity[twin] = macro.velocity
-    for _ in range(300):
-        coupled.run()
-        dns.advance()
-        dns.update_force()
-    assert np.abs(macro.displacement - dns.displacement[twin]).max() < 1e-11 * np.abs(dns.displacement).max()
 
 
 @pytest.mark.parametrize("pair", [Pair(5, 10.0, 2, free=True), Pair(40, 0.1, 8, free=True)], ids=["stiff", "soft"])
@@ -104,20 +86,6 @@ def test_free_flight_stays_free_of_forces():
         coupled.run()
     assert np.abs(coupled.momentum() - start).max() < 1e-12 * np.abs(start).max()
     assert coupled.energies()["internal"] < 1e-12 * np.abs(start).max()
-
-
-def test_a_run_continues_from_its_state_to_the_same_bits():
-    first, second = kicked(Pair(5, 3.0, 2)), Pair(5, 3.0, 2).coupled(LINK)
-    for _ in range(20):
-        first.run()
-    for ours, others in zip(second.parts, first.parts, strict=True):
-        ours.restore(values(others.state()))
-    for _ in range(20):
-        first.run()
-        second.run()
-    for ours, others in zip(second.parts, first.parts, strict=True):
-        assert np.array_equal(ours.motion.displacement, others.motion.displacement)
-        assert ours.interface_work == others.interface_work
 
 
 def test_solder_that_yields_is_linked_stably():

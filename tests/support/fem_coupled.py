@@ -11,6 +11,7 @@ from fem.body import Body, Pieces, Response, make_body, make_pieces
 from fem.communicators import Role
 from fem.coupling.division import Division
 from fem.coupling.gravouil_combescure import GravouilCombescure
+from fem.coupling.impulse import Impulse
 from fem.coupling.one_way import OneWay
 from fem.coupling.scheme import Scheme
 from fem.estimate import WindowPlan
@@ -150,7 +151,10 @@ class Coupled:
     def _complete(self, link: np.ndarray) -> None:
         """Let all that follows from displacements and link follow: slaves, the held cut, forces."""
         macro, meso = self.macro.motion, self.meso.motion
-        if not self._linked:
+        pushed = isinstance(self._scheme, Impulse)
+        if pushed:
+            macro.displacement[macro.body.cut] = meso.displacement[meso.body.cut]
+        elif not self._linked:
             meso.displacement[meso.body.cut] = macro.displacement[macro.body.cut]
         for part in self.parts:
             part.motion.body.tie.spread(part.motion.displacement)
@@ -159,6 +163,9 @@ class Coupled:
             self.meso.foreign_force()[meso.body.cut] = link
             meso.force += self.meso.foreign_force()
             self.macro.foreign_force()[macro.body.cut] = -link
+        elif pushed:
+            self.meso.cut_force()[meso.body.cut] = macro.force[macro.body.cut]
+            meso.force += self.meso.foreign_force()
         elif not isinstance(self._scheme, OneWay):
             self.macro.foreign_force()[macro.body.cut] = meso.force[meso.body.cut]
         macro.force += self.macro.foreign_force()

@@ -96,6 +96,7 @@ class Pair:
 
 SCHEMES = {
     "held_velocity": Coupling(scheme="held_velocity"),
+    "impulse": Coupling(scheme="impulse"),
     "gravouil_combescure": Coupling(scheme="gravouil_combescure"),
     "local_steps": Coupling(scheme="local_steps", levels=1),
     "local_steps, levels auto": Coupling(scheme="local_steps"),

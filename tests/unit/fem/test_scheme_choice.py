@@ -23,6 +23,6 @@ def test_scheme_follows_the_scene(elastic, buffer_possible, scheme, reason):
 
 
 def test_every_scheme_is_made_in_an_order_of_both_models():
-    for name in ("held_velocity", "local_steps", "gravouil_combescure"):
+    for name in ("held_velocity", "local_steps", "impulse", "gravouil_combescure"):
         assert sorted(scheme_of(name).order) == ["macro", "meso"]
     assert isinstance(scheme_of("held_velocity", "one_way"), OneWay)

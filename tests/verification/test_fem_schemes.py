@@ -1,0 +1,94 @@
+"""What every coupling scheme must do: be the DNS at equal steps, account for all energy, continue."""
+
+import numpy as np
+import pytest
+
+from fem.portable import values
+from tests.support.fem_bodies import dns_body, motion_of
+from tests.support.fem_coupled import Coupled
+from tests.support.fem_pairs import SCHEMES, Pair
+
+PUSH = np.array([0.3, 0.1, 1.0])  # [m/s]
+OF_TWO_STEPS = [name for name, coupling in SCHEMES.items() if coupling.scheme != "local_steps"]
+
+
+def pushed(scheme: str, pair: Pair, fraction: float = 0.9) -> Coupled:
+    coupled = pair.coupled(SCHEMES[scheme], fraction)
+    coupled.swing(PUSH)
+    return coupled
+
+
+def twins(points: np.ndarray, others: np.ndarray) -> np.ndarray:
+    return np.array([np.argmin(np.linalg.norm(others - point, axis=1)) for point in points])
+
+
+def dns_beside(coupled: Coupled, pair: Pair):
+    """Return a DNS at the coupled models' small steps from their state, and the nodes of the macro model in it."""
+    body, _ = dns_body(pair.mesh(), materials=pair.materials())
+    dns = motion_of(body, coupled.plan.step)
+    for part in coupled.parts:
+        motion = part.motion
+        moving = motion.mobility.any(axis=1)
+        twin = twins(motion.body.local.points[moving], body.local.points)
+        dns.velocity[twin] = motion.velocity[moving]
+    return dns, twins(coupled.macro.motion.body.local.points, body.local.points)
+
+
+@pytest.mark.parametrize("scheme", OF_TWO_STEPS)
+def test_one_substep_a_window_is_the_dns(scheme):
+    pair = Pair(substeps=1, ratio=2)
+    coupled = pushed(scheme, pair)
+    assert coupled.plan.substeps == 1
+    dns, twin = dns_beside(coupled, pair)
+    for _ in range(300):
+        coupled.run()
+        dns.advance()
+        dns.update_force()
+    macro = coupled.macro.motion.displacement
+    assert np.abs(macro - dns.displacement[twin]).max() < 1e-11 * np.abs(macro).max()
+
+
+@pytest.mark.parametrize("scheme", OF_TWO_STEPS)
+def test_displacements_are_of_second_order_in_the_window(scheme):
+    errors = []
+    for fraction in (0.8, 0.4):
+        pair = Pair(4, 2.0, 2)
+        coupled = pushed(scheme, pair, fraction)
+        dns, twin = dns_beside(coupled, pair)
+        error, size = 0.0, 0.0
+        for _ in range(round(80 / fraction)):
+            coupled.run()
+            for _ in range(coupled.plan.substeps):
+                dns.advance()
+                dns.update_force()
+            error += float(np.sum((coupled.macro.motion.displacement - dns.displacement[twin]) ** 2))
+            size += float(np.sum(dns.displacement[twin] ** 2))
+        errors.append(np.sqrt(error / size))
+    assert errors[0] < 0.06  # three elements across the wave
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(2.0, abs=0.6)
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_what_is_held_and_what_the_interface_has_add_up(scheme):
+    coupled = pushed(scheme, Pair(5, 3.0, 2, free=True))
+    sums = []
+    for _ in range(200):
+        sums.append(coupled.held() + coupled.energies()["interface"])
+        coupled.run()
+    assert np.ptp(sums) < 1e-11 * sums[0]
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_a_run_continues_from_its_state_to_the_same_bits(scheme):
+    pair = Pair(3, 3.0, 2, layers=3)
+    first, second = pushed(scheme, pair), pair.coupled(SCHEMES[scheme])
+    for _ in range(20):
+        first.run()
+    for ours, others in zip(second.parts, first.parts, strict=True):
+        ours.restore(values(others.state()))
+    for _ in range(20):
+        first.run()
+        second.run()
+    for ours, others in zip(second.parts, first.parts, strict=True):
+        assert np.array_equal(ours.motion.displacement, others.motion.displacement)
+        assert ours.interface_work == others.interface_work
