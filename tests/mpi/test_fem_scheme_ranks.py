@@ -12,8 +12,8 @@ from tests.support.fem_program import run_program
 SHOCK = {
     "peak_acceleration": 14709.975,
     "pulse_duration": 5e-4,
-    "duration": 5e-6,
-    "numerics": {"mass_scaled": ["copper"], "history_samples": 10, "field_samples": 2},
+    "duration": 1e-5,
+    "numerics": {"mass_scaled": ["copper"], "history_samples": 25, "field_samples": 2},
 }
 WATCHED = ("board_centre", "die_centre", "von_mises_board", "von_mises_package", "board_strain")
 
