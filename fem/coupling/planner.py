@@ -29,7 +29,7 @@ from fem.partition import partition
 
 CALLS = 2.5e-5  # [s] of the interpreter in a step of a motion
 KEPT = "speeds.json"
-ALTERNATING: tuple[SchemeName, ...] = ("gravouil_combescure",)  # schemes whose models wait for each other
+ALTERNATING: tuple[SchemeName, ...] = ("gravouil_combescure", "impulse")  # schemes whose models wait for each other
 
 
 @dataclass(frozen=True, slots=True)
