@@ -140,7 +140,7 @@ def scenes(tmp_path_factory) -> Path:
     write_strip(directory / "yielding", "explicit", (2, 3, 1), materials={"steel": WEAK})
     write_strip(directory / "implicit", "implicit", (2, 1))
     (directory / "script.py").write_text(SCRIPT)
-    done = run_python([str(directory / "script.py"), str(directory)], 3)
+    done = run_python([str(directory / "script.py"), str(directory)], 3, timeout=400.0)
     assert done.returncode == 0, done.stderr
     return directory
 

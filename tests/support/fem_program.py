@@ -24,7 +24,7 @@ def run_script(text: str, directory: Path, ranks: int) -> dict:
     return json.loads(done.stdout)
 
 
-def run_python(arguments: list[str], ranks: int) -> subprocess.CompletedProcess:
+def run_python(arguments: list[str], ranks: int, timeout: float = 120.0) -> subprocess.CompletedProcess:
     """Run Python on several ranks, with this tree's packages."""
     return subprocess.run(
         [*MPIRUN, str(ranks), sys.executable, *arguments],
@@ -32,6 +32,6 @@ def run_python(arguments: list[str], ranks: int) -> subprocess.CompletedProcess:
         env=os.environ | {"PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"},
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=timeout,
         check=False,
     )
