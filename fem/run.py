@@ -15,11 +15,11 @@ from fem.coupling.checks import check_pulses
 from fem.coupling.crew import Crew, couple
 from fem.coupling.division import SchemeName
 from fem.coupling.placement import check_size
-from fem.coupling.planner import Load, Plan, plan_ranks, words
+from fem.coupling.planner import Plan, loads_of, plan_ranks
 from fem.coupling.scheme import scheme_of
 from fem.coupling.self_check import recorded
-from fem.coupling.speeds import Kind
 from fem.coupling.stopwatch import Stopwatch
+from fem.coupling.whole import Treatment
 from fem.estimate import WindowPlan, implicit_plan, largest_implicit_step
 from fem.fields import Fields
 from fem.history import History
@@ -96,18 +96,10 @@ def planned(steps: Steps, request: RunInput, pulse: Pulse) -> Steps:
 
 def place(world: MPI.Comm, divided: Divided, request: RunInput) -> Plan:
     """Choose which ranks carry which model and which cells, and say so; collective."""
-    shock, steps = request.shock, divided.steps
-    loads: dict[Role, Load] = {}
-    for role, tables in divided.tables.items():
-        _, materials = materials_of_parts(tables.part_names, request.materials)
-        step = steps.step_of(role)
-        kind = Kind(materials, shock.numerics.formulation, shock.numerics.kinematics, step)
-        mesh = divided.meshes.get(role)
-        loads[role] = Load(mesh, tables.level, tables.ratios, round(steps.plan.window / step), kind)
-    plan = plan_ranks(world, loads, shock.ranks, request.checkpoints, divided.scheme)
-    if world.rank == 0:
-        print(words(plan), flush=True)
-    return plan
+    numerics = request.shock.numerics
+    treatment = Treatment(numerics.formulation, numerics.kinematics)
+    loads = loads_of(divided, request.materials, treatment)
+    return plan_ranks(world, loads, request.shock.ranks, request.checkpoints, divided.scheme)
 
 
 def make_crew(

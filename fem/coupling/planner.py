@@ -4,7 +4,7 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from mpi4py import MPI
@@ -23,9 +23,17 @@ from fem.coupling.placement import (
     shared,
 )
 from fem.coupling.speeds import FAMILIES, Kind, StepCost, families, measured_costs, measured_latency, samples, speeds_of
+from fem.coupling.whole import Treatment
+from fem.materials.elasticity import materials_of_parts
+from fem.materials.parameters import Material
+from fem.materials.roles import Materials
 from fem.mesh import MeshData
 from fem.parameters import Ranks
 from fem.partition import partition
+from fem.scene import Tables
+
+if TYPE_CHECKING:
+    from fem.model import Divided
 
 CALLS = 2.5e-5  # [s] of the interpreter in a step of a motion
 KEPT = "speeds.json"
@@ -79,10 +87,24 @@ class Measured:
     latency: float
 
 
+def loads_of(
+    divided: "Divided[Tables]", materials: Materials | Mapping[str, Material], treatment: Treatment
+) -> dict[Role, Load]:
+    """Return the models of a divided mesh as what is to be distributed."""
+    loads: dict[Role, Load] = {}
+    for role, tables in divided.tables.items():
+        _, assigned = materials_of_parts(tables.part_names, materials)
+        step = divided.steps.step_of(role)
+        kind = Kind(assigned, treatment.formulation, treatment.kinematics, step)
+        steps = round(divided.steps.plan.window / step)
+        loads[role] = Load(divided.meshes.get(role), tables.level, tables.ratios, steps, kind)
+    return loads
+
+
 def plan_ranks(
     world: MPI.Comm, loads: Mapping[Role, Load], ranks: Ranks, folder: Path | None, scheme: SchemeName = "held_velocity"
 ) -> Plan:
-    """Measure, predict and choose; collective.
+    """Measure, predict, choose, and say so; collective.
 
     Args:
         world: All ranks.
@@ -98,6 +120,8 @@ def plan_ranks(
     if folder is not None and world.rank == 0:
         keep(folder, measured)
     plan = plan_from(loads, family, ranks, (measured, scheme not in ALTERNATING)) if world.rank == 0 else None
+    if plan:
+        print(words(plan), flush=True)
     told = world.bcast((plan.placement, plan.summary) if plan else None)
     return plan or Plan(told[0], {}, told[1])
 

@@ -16,10 +16,10 @@ from fem.checkpoint_files import digest_of_files
 from fem.communicators import Communicators, Role
 from fem.coupling.checks import check_pulses
 from fem.coupling.placement import shared
-from fem.coupling.planner import Load, Plan, plan_ranks, words
+from fem.coupling.planner import Plan, loads_of, plan_ranks
 from fem.coupling.self_check import recorded
-from fem.coupling.speeds import Kind
 from fem.coupling.stopwatch import Stopwatch
+from fem.coupling.whole import Treatment
 from fem.exchange import MessageClock
 from fem.fields import Fields
 from fem.history import History
@@ -28,7 +28,6 @@ from fem.inputs import StructureInput
 from fem.ledger import Ledger
 from fem.march import Outputs, march
 from fem.materials.effects import plastic_laws
-from fem.materials.elasticity import materials_of_parts
 from fem.parameters import Ranks
 from fem.participant import Participant
 from fem.pulse import Pulse
@@ -99,20 +98,12 @@ def run_structure(world: MPI.Comm, request: StructureInput) -> None:
 
 def place(world: MPI.Comm, divided: DividedStructure, request: StructureInput) -> Plan:
     """Choose which ranks carry which model and which cells, and say so; collective."""
-    coupling, steps = divided.rules.coupling, divided.steps
-    loads: dict[Role, Load] = {}
-    for role, tables in divided.tables.items():
-        _, materials = materials_of_parts(tables.part_names, request.layer_materials)
-        step = steps.step_of(role)
-        kind = Kind(materials, request.structure.formulation, request.dynamics.kinematics, step)
-        mesh = divided.meshes.get(role)
-        loads[role] = Load(mesh, tables.level, tables.ratios, round(steps.plan.window / step), kind)
+    coupling = divided.rules.coupling
     assert isinstance(coupling, LayerCoupling)
+    treatment = Treatment(request.structure.formulation, request.dynamics.kinematics)
+    loads = loads_of(divided, request.layer_materials, treatment)
     ranks = Ranks(total=world.size, placement=coupling.placement, macro=coupling.macro_ranks)
-    plan = plan_ranks(world, loads, ranks, request.checkpoints, divided.scheme)
-    if world.rank == 0:
-        print(words(plan), flush=True)
-    return plan
+    return plan_ranks(world, loads, ranks, request.checkpoints, divided.scheme)
 
 
 def start_one(comms: Communicators, request: StructureInput, pulses: dict[str, Pulse]) -> Started:
