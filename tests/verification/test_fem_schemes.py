@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from fem.errors import EnergyError
+from fem.ledger import Ledger
 from fem.portable import values
 from tests.support.fem_bodies import dns_body, motion_of
 from tests.support.fem_coupled import Coupled
@@ -92,3 +94,13 @@ def test_a_run_continues_from_its_state_to_the_same_bits(scheme):
     for ours, others in zip(second.parts, first.parts, strict=True):
         assert np.array_equal(ours.motion.displacement, others.motion.displacement)
         assert ours.interface_work == others.interface_work
+
+
+def test_energy_that_the_interface_has_is_told_as_such():
+    coupled = pushed("held_velocity", Pair(4, 3.0, 2, layers=3))
+    ledger = Ledger(limit=1e-4, trivial=0.0)
+    ledger.judge(coupled.sums(), 0.0)
+    with pytest.raises(EnergyError, match="the coupling of both models holds most of what is missing"):
+        for window in range(1, 200):
+            coupled.run()
+            ledger.judge(coupled.sums(), window * coupled.plan.window)
