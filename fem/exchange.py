@@ -26,10 +26,6 @@ class MessageClock:
         self.packing += packed - begin + time.perf_counter() - arrived
         self.waiting += arrived - packed
 
-    def reset(self) -> None:
-        """Go back to zero."""
-        self.packing, self.waiting = 0.0, 0.0
-
 
 def holders(comm: MPI.Comm, nodes: NDArray[np.integer]) -> list[NDArray[np.int64]]:
     """Find which nodes this rank shares with which other rank.

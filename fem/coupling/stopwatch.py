@@ -28,11 +28,12 @@ class Stopwatch:
         self.turns: dict[Role, float] = dict.fromkeys(sums, 0.0)
         self._sums, self._coupling = sums, coupling
         self._begin = 0.0
-        for clock in [*sums.values(), *coupling]:
-            clock.reset()
+        self._counted = [(clock, MessageClock()) for clock in [*sums.values(), *coupling]]
 
     def start(self) -> None:
-        """Begin a window."""
+        """Begin a window; messages since the one before are of samples, and do not count."""
+        for clock, counted in self._counted:
+            clock.packing, clock.waiting = counted.packing, counted.waiting
         self._begin = time.perf_counter()
 
     def lap(self, role: Role) -> None:
@@ -40,6 +41,8 @@ class Stopwatch:
         end = time.perf_counter()
         self.turns[role] += end - self._begin
         self._begin = end
+        for clock, counted in self._counted:
+            counted.packing, counted.waiting = clock.packing, clock.waiting
 
     def summary(self, world: MPI.Comm, windows: int) -> dict[str, Any]:
         """Return shares of the time of all windows, on each rank and in all; collective.
@@ -63,6 +66,7 @@ class Stopwatch:
 
     def _record(self) -> dict[str, Any]:
         """Return the seconds of this rank."""
+        self.start()
         return {
             "turns": self.turns,
             "sum_packing": {role: clock.packing for role, clock in self._sums.items()},
