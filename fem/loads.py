@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from fem.body import Body
 from fem.energy import Energy
 from fem.errors import LoadError
+from fem.levels.force import levels_of
 from fem.portable import Entry, Rows, Same, State, Sum
 from fem.pulse import HalfSine, Pulse
 
@@ -57,6 +58,9 @@ class Load:
 
     def begin(self, motion: "Motion") -> None:
         """Take part in the masses and free components of a motion at rest."""
+
+    def carry(self, body: Body) -> None:
+        """Act in the small steps of levels inside the model, too, once all know what moves; collective."""
 
     def drive(self, velocity: NDArray[np.float64], time: float) -> None:
         """Prescribe rows of the mean velocity ``(n, 3)`` [m/s] of the step that begins at a time [s]."""
@@ -164,8 +168,18 @@ class NodalForces(Load):
         pattern[local[here]] = forces[here]
         body.tie.gather(pattern)
         body.shared.add(pattern)
-        rows = np.flatnonzero(pattern.any(axis=1)).astype(np.int32)
-        return cls(rows, pattern[rows], pulse, body.shared.owned[rows])
+        rows, pattern, owned = nodal(body, pattern)
+        return cls(rows, pattern, pulse, owned)
+
+    def carry(self, body: Body) -> None:
+        """Add what levels make of the pattern."""
+        pattern = np.zeros((len(body.mass), 3))
+        pattern[self.nodes] = self.pattern
+        levels = levels_of(body.terms)
+        if levels:
+            carried = np.sum([term.carry(pattern) for term in levels], axis=0)
+            body.shared.add(carried)
+            self.nodes, self.pattern, self.owned = nodal(body, pattern + carried)
 
     def add(self, motion: "Motion") -> None:
         """Add the force of the motion's time."""
@@ -180,6 +194,12 @@ class NodalForces(Load):
         """Add half a step's work."""
         power = np.sum(self.pattern[self.owned] * motion.velocity[self.nodes[self.owned]])
         self.work += 0.5 * motion.step * self._factor * float(power)
+
+
+def nodal(body: Body, pattern: NDArray[np.float64]) -> tuple[NDArray[np.int32], NDArray[np.float64], NDArray[np.bool_]]:
+    """Return the local nodes ``(k,)`` where a pattern ``(n, 3)`` is not zero, its rows, and which this rank counts."""
+    rows = np.flatnonzero(pattern.any(axis=1)).astype(np.int32)
+    return rows, pattern[rows], body.shared.owned[rows]
 
 
 @dataclass

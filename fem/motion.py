@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from fem.body import Body
 from fem.force_nonlinear import NonlinearElements
 from fem.kernels.motion import advance
+from fem.levels.force import levels_of
 from fem.loads import Load, Loaded
 from fem.portable import Rows, Same, Shares, State, Sum
 
@@ -56,6 +57,10 @@ class Motion(Loaded):
         self.gravity = self.body_acceleration(0.0)
         for load in self._loads:
             load.begin(self)
+        for levels in levels_of(body.terms):
+            levels.follow(self.mobility)
+        for load in self._loads:
+            load.carry(body)
         for load in self._loads:
             load.add(self)
         for load in self._loads:

@@ -64,7 +64,8 @@ class LocalSteps:
         terms: Forces at its nodes: of its own elements, and of the next level.
         substeps: Their coefficients.
         shared: Its free nodes that several ranks hold.
-        inverse: ``(nf, 3)`` DT^2 / m of its free nodes [s^2/kg], zero for held components.
+        step: Step of the level around it [s].
+        inverse: ``(nf, 3)`` DT^2 / m of its free nodes [s^2/kg], zero for held components; see ``follow``.
         foreign: Those of its free nodes whose force another rank gives: the lowest that holds them.
         change: ``(nf, 3)`` [m] of the latest substep.
         state: ``(3, n, 3)``: displacement [m], force [N] there, weighted sum of forces [N]; only ``add`` reads it.
@@ -76,6 +77,7 @@ class LocalSteps:
     terms: Sequence[InternalForce]
     substeps: Substeps
     shared: SharedNodes
+    step: float
     inverse: NDArray[np.float64]
     foreign: NDArray[np.int32]
     change: NDArray[np.float64]
@@ -107,10 +109,50 @@ class LocalSteps:
             take_substep(coefficients, self.inverse, self.change, self.state)
         end_substeps(self.rows, self.foreign, self.state, force)
 
+    def follow(self, mobility: NDArray[np.float64]) -> None:
+        """Let the nodes of all levels be as free as in a motion: inverse masses ``(m, 3)`` [1/kg] of the level around.
+
+        What a motion prescribes, or gives a large mass, does not move in substeps; else the elements there would be
+        softer by the square of their steps.
+        """
+        free = len(self.inverse)
+        self.inverse[:] = self.step**2 * mobility[self.rows[:free]]
+        for inner in levels_of(self.terms):
+            inner.follow(mobility[self.rows])
+
+    def carry(self, load: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the mean internal force ``(m, 3)`` [N] at u = 0 of substeps in which a load acts; collective.
+
+        With it the load bends the elements at its nodes as they are, K_eff u = f + carry(f) for K u = f, where f alone
+        would give the nodes a window's free flight. It has no resultant.
+
+        Args:
+            load: ``(m, 3)`` [N] at the nodes of the level around, equal on all copies of a node.
+        """
+        free, place, pull = len(self.inverse), self.state[0], self.state[1]
+        mine, force = load[self.rows], np.zeros_like(load)
+        inside = sum((inner.carry(mine) for inner in levels_of(self.terms)), np.zeros_like(mine))
+        place.fill(0.0)
+        for coefficients in zip(self.substeps.memory, self.substeps.rate, self.substeps.weight, strict=True):
+            for term in self.terms:
+                term.add(place, pull)
+            pull += inside
+            self.shared.add(pull)
+            pull[:free] += mine[:free]
+            take_substep(coefficients, self.inverse, self.change, self.state)
+        self.state[2, :free] -= mine[:free]  # the weights add up to one
+        end_substeps(self.rows, self.foreign, self.state, force)
+        return force
+
     def energy(self, displacement: NDArray[np.float64]) -> Energy:
         """Return u . K_eff u / 2, of which hourglass modes have what they have without levels; collective."""
         hourglass = sum(term.energy(displacement).hourglass for term in self.plain)
         return Energy(linear_energy(self, displacement, None).strain - hourglass, hourglass=hourglass)
+
+
+def levels_of(terms: Sequence[InternalForce]) -> list[LocalSteps]:
+    """Return those of some force terms that have levels."""
+    return [term for term in terms if isinstance(term, LocalSteps)]
 
 
 def check_elastic(materials: Sequence[Material], kinematics: Kinematics, ratios: tuple[int, ...]) -> None:
@@ -151,6 +193,7 @@ def build_level(comm: MPI.Comm, body: "Body", levels: Levels, number: int, aroun
         terms=terms,
         substeps=substeps,
         shared=shared,
+        step=levels.step,
         inverse=np.where(body.free[nodes[:free]], levels.step**2 / mass, 0.0),
         foreign=np.flatnonzero(~shared.owned).astype(np.int32),
         change=np.zeros((free, 3)),

@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from fem.loads import NodalForces
 from fem.materials.roles import Materials
 from fem.motion import Motion
+from fem.pulse import HalfSine
 from tests.support.fem_levels import joint_on_board, levelled
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -18,10 +20,12 @@ RATIOS, WINDOWS = (4, 3, 3), 20
 
 
 def march(comm: MPI.Comm) -> tuple[np.ndarray, np.ndarray]:
-    """Return input numbers of this rank's nodes and their displacements after some windows of free vibration."""
+    """Return input numbers of this rank's nodes and their displacements after some windows under loads at many."""
     model = levelled(joint_on_board(), Materials(), RATIOS, comm=comm)
     body = model.body
-    motion = Motion(body, [], model.window, np.empty(0, np.int32), np.zeros(len(body.mass)))
+    nodes = np.arange(0, comm.allreduce(int(body.local.nodes.max()), MPI.MAX), 5)
+    push = NodalForces.build(body, nodes, np.sin(np.arange(3 * len(nodes))).reshape(-1, 3), HalfSine(1.0, 1e-6))
+    motion = Motion(body, [push], model.window, np.empty(0, np.int32), np.zeros(len(body.mass)))
     motion.launch(np.array([1.0, 0.5, -0.3]))
     for _ in range(WINDOWS):
         motion.advance()

@@ -12,9 +12,12 @@ from fem.errors import LevelError
 from fem.force import linear_terms
 from fem.levels.chebyshev import Substeps
 from fem.levels.choose import Pace, choose_levels, governing_steps
-from fem.levels.force import Levels, LocalSteps, check_elastic
+from fem.levels.force import Levels, LocalSteps, check_elastic, levels_of
+from fem.loads import PrescribedMotion
 from fem.materials.library import FR4, SAC405
 from fem.materials.roles import Materials
+from fem.motion import Motion
+from fem.pulse import HalfSine
 from fem.tie import Tie, net_load
 from tests.support.fem_bodies import dense_stiffness
 from tests.support.fem_levels import Levelled, dense_effective_stiffness, joint_on_board, levelled
@@ -64,6 +67,41 @@ def test_rigid_motion_gives_no_force_and_any_motion_no_resultant(model):
     assert np.abs(total_force(model, rigid)).max() <= 1e-10 * scale
     assert np.abs(net_load(points, force)[:3]).max() <= 1e-12 * scale
     assert np.abs(net_load(points, force)[3:]).max() <= 1e-12 * scale * np.abs(points).max()
+
+
+def test_a_load_on_fine_nodes_bends_them_as_it_bends_the_plain_body(model):
+    """K_eff u = f + carry(f) for K u = f: at rest, levels add nothing to what a load does."""
+    body = model.body
+    (levels,) = levels_of(body.terms)
+    free = body.free.ravel()
+    load = np.sin(np.arange(free.size)).reshape(-1, 3) * body.free
+    carried = levels.carry(load)
+    assert np.abs(carried).max() > 0.1 * np.abs(load).max()
+    place = np.zeros_like(load)
+    place[body.free] = np.linalg.solve(dense_stiffness(model.plain)[np.ix_(free, free)], load[body.free])
+    residual = (total_force(model, place) + load + carried)[body.free]
+    assert np.abs(residual).max() <= 1e-9 * np.abs(total_force(model, place)).max()
+    scale = np.abs(carried).sum()
+    assert np.abs(net_load(body.local.points, carried)).max() <= 1e-12 * scale
+
+
+def test_what_a_motion_prescribes_does_not_move_in_substeps():
+    """Held in the motion or held in the body: the same force."""
+    mesh, ratios = joint_on_board(), (7, 3)
+    model, held = levelled(mesh, Materials(), ratios), levelled(mesh, Materials(), ratios)
+    body = model.body
+    top = np.flatnonzero(body.local.points[:, 2] == body.local.points[:, 2].max())
+    held.body.free[top, 0] = False
+    levels = LocalSteps.build(MPI.COMM_SELF, held.body, Levels(held.level, ratios, held.window))
+    motion = Motion(
+        body, [PrescribedMotion(top, 0, HalfSine(1.0, 1e-6))], model.window, np.empty(0, int), 0.0 * body.mass
+    )
+    motion.displacement[:] = 1e-6 * np.sin(np.arange(motion.displacement.size)).reshape(-1, 3)
+    body.tie.spread(motion.displacement)
+    force, expected = np.zeros((2, len(body.mass), 3))
+    body.terms[-1].add(motion.displacement, force)
+    levels.add(motion.displacement, expected)
+    assert np.abs(force - expected).max() <= 1e-12 * np.abs(expected).max()
 
 
 def test_one_substep_is_the_plain_force():
