@@ -22,6 +22,7 @@ test-mpi: setup  ## run the tests that start several MPI ranks
 lint: setup  ## ruff, mypy, import rules
 	$(PYTHON) -m pytest tests/unit/test_code.py
 
+bench: export PYTHONPATH = $(CURDIR)
 bench: setup  ## run the benchmarks; JSON in benchmarks/results
 	@for script in benchmarks/*.py; do [ -e "$$script" ] || continue; echo "$$script"; $(PYTHON) "$$script" || exit 1; done
 
