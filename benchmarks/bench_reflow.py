@@ -1,6 +1,6 @@
 """Error against cost of the reflow of joints: spacing, time step, gap; and of the derivatives that the seed takes.
 
-Run: .venv/bin/python benchmarks/bench_reflow.py   (about a minute; writes benchmarks/results/reflow.json)
+Run: .venv/bin/python benchmarks/bench_reflow.py   (about a minute; writes results/reflow.json)
 Errors are relative to the Young-Laplace meridian; seconds are those of one core after compilation.
 """
 

@@ -1,6 +1,6 @@
 """Cost of a step against the number of particles, on one and two threads: a cube that spreads to 60 degrees.
 
-Run: .venv/bin/python benchmarks/bench_reflow_scale.py   (two minutes; writes benchmarks/results/reflow_scale.json)
+Run: .venv/bin/python benchmarks/bench_reflow_scale.py   (two minutes; writes results/reflow_scale.json)
 Each row runs in a process of its own; bytes are the growth of its largest resident size over that of 343 particles.
 """
 

@@ -1,6 +1,6 @@
 """The bars of two scales: what is asked and what is measured; ranks and placements are measured here.
 
-    PYTHONPATH=. .venv/bin/python benchmarks/coupling.py        (a minute on two free cores; writes coupling.json)
+    PYTHONPATH=. python benchmarks/coupling.py  (a minute on two free cores; writes coupling.json)
 
 Ranks: 1 to 4 of them in both placements on a small package, whose histories must be equal; on two ranks that share both
 models of a larger one, how busy they are and what the coupling costs. All other rows are from the results of

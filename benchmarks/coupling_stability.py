@@ -1,6 +1,6 @@
 """Growth of one window of every coupling scheme over a grid of pairs, long runs, and momentum of a free pair.
 
-    PYTHONPATH=. .venv/bin/python benchmarks/coupling_stability.py [--quick]       (half an hour, one core; writes coupling_stability.json)
+    PYTHONPATH=. python benchmarks/coupling_stability.py [--quick]  (half an hour, one core)
 
 A board of orthotropic FR4 and a block tied to it off its grid: m from 1 to 40, impedances from a tenth to ten times the
 board's, mesh ratios from 1 to 8, flat, distorted and curved interfaces, cuts below the block and beside it. The

@@ -1,6 +1,6 @@
 """The same sessile drop by OpenFOAM's interFoam (volume of fluid) and by this program: time to rest and errors.
 
-Run: .venv/bin/python benchmarks/interfoam_drop.py   (four minutes; writes benchmarks/results/interfoam_drop.json)
+Run: .venv/bin/python benchmarks/interfoam_drop.py   (four minutes; writes results/interfoam_drop.json)
 Without interFoam (Debian package openfoam) it says so and measures nothing. 1 mm^3, 60 degrees, slip wall, no gravity,
 the values that Hu et al. print. interFoam starts from a cylinder as high as the cube and solves a wedge of a body of
 revolution: one layer of cells against particles in three dimensions, which is to its advantage; its lengths are

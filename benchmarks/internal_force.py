@@ -1,6 +1,6 @@
 """Element updates per second of the internal force: this program's paths, PETSc and dolfinx in one run; memory.
 
-    PYTHONPATH=. .venv/bin/python benchmarks/internal_force.py        (a minute, one core; writes benchmarks/results/internal_force.json)
+    PYTHONPATH=. python benchmarks/internal_force.py  (a minute, one core; writes results/internal_force.json)
 
 All act on a cube of 40^3 hexahedra, sides in turns, medians of processor seconds. dolfinx assembles the plain trilinear
 form of linear elasticity with 2 x 2 x 2 Gauss points and the best flags of its compiler; ours have incompatible modes,

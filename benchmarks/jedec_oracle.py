@@ -1,6 +1,6 @@
 """The bare JEDEC board at 1500 G, 0.5 ms: explicit against implicit steps, error against cost, forecast against both.
 
-    PYTHONPATH=. .venv/bin/python benchmarks/jedec_oracle.py [--quick]    (one core, some minutes; writes benchmarks/results/jedec_oracle.json)
+    PYTHONPATH=. python benchmarks/jedec_oracle.py [--quick]  (one core, some minutes; writes results/jedec_oracle.json)
 
 Three tables, all of histories at the centre of the board (relative L2 norms over 2 ms):
 ``steps``  one mesh, implicit steps of many sizes and explicit ones: against explicit steps a tenth as large.

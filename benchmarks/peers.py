@@ -1,6 +1,6 @@
 """This program, Akantu and Kratos on the same cube of 40^3 linear hexahedra, one thread each, in turns.
 
-    PYTHONPATH=. .venv/bin/python benchmarks/peers.py        (a minute; writes benchmarks/results/peers.json)
+    PYTHONPATH=. python benchmarks/peers.py  (a minute; writes results/peers.json)
 
 The peers come from PyPI into an environment of their own under ``build/``. All compute linear elasticity of small
 strains on 8-node hexahedra: the peers from 2 x 2 x 2 Gauss points at each call, through strains and stresses; this

@@ -1,6 +1,6 @@
 """Placements of two models on ranks: predicted and measured windows, how busy ranks are, what coupling costs.
 
-    PYTHONPATH=. .venv/bin/python benchmarks/placement.py [RANKS ...]        (default 1 2; two minutes; writes results/placement.json)
+    PYTHONPATH=. python benchmarks/placement.py [RANKS ...]  (default 1 2; two minutes; writes results/placement.json)
 
 The package of ``cases/bga_drop`` on its board, copper at its true mass, all joints fine, with both schemes. The script
 starts itself on the ranks. Ranks wait for each other, so that on a loaded machine what other programs take counts

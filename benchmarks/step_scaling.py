@@ -1,6 +1,6 @@
 """A whole step against its force alone, and two ranks against one, on the cube of 40^3 boxes of steel.
 
-    PYTHONPATH=. .venv/bin/python benchmarks/step_scaling.py        (half a minute; writes benchmarks/results/step_scaling.json)
+    PYTHONPATH=. python benchmarks/step_scaling.py  (half a minute; writes results/step_scaling.json)
 
 The script starts itself on two MPI ranks. Rank 0 first measures a model of its own (``COMM_SELF``) while rank 1
 sleeps, then both step the same cube cut in two by DOLFINx, and so on in turns. A step is Motion.advance and

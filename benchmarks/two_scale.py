@@ -1,6 +1,6 @@
 """Two scales against DNS on the composition of H 4.4: time ratio, error of the critical joint and of the die.
 
-    PYTHONPATH=. .venv/bin/python benchmarks/two_scale.py [--full] [--only NAME ...]        (some minutes, one core; writes two_scale.json)
+    PYTHONPATH=. python benchmarks/two_scale.py [--full] [--only NAME ...]  (some minutes, one core)
 
 A quarter of a 10 x 10 array on its board, copper of 0.02 mm at its true mass, a quarter of all elements in the meso
 model. Costs are processor seconds of a simulated second, both modes in turns in one run, once with the kernels that the

@@ -1,6 +1,6 @@
 """What two scales cost and how exact they are: scheme, levels, buffer, direction and window against error and time.
 
-    PYTHONPATH=. .venv/bin/python benchmarks/two_scale_accuracy.py [--quick]        (some minutes, one core; writes two_scale_accuracy.json)
+    PYTHONPATH=. python benchmarks/two_scale_accuracy.py [--quick]  (some minutes, one core)
 
 A quarter of 16 joints on a small board, copper of 0.02 mm at its true mass, under a half sine that is short enough to
 bend it. Each setting is run with smaller and smaller windows, the steps of the fine model with them; errors are

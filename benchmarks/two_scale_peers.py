@@ -1,6 +1,6 @@
 """Two scales against Akantu with one step for all: the same package, error against cost, in one run.
 
-    PYTHONPATH=. .venv/bin/python benchmarks/two_scale_peers.py        (two minutes, one core each; writes two_scale_peers.json)
+    PYTHONPATH=. python benchmarks/two_scale_peers.py  (two minutes, one core each; writes two_scale_peers.json)
 
 The quarter of a small package whose joints match the board node for node (Akantu knows no ties), copper of 0.02 mm,
 under a half sine. Errors are relative L2 over the histories of the centres of board and die against this program's DNS
