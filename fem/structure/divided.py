@@ -21,7 +21,7 @@ from fem.mesh_file import read_mesh
 from fem.model import Divided
 from fem.scene import ModelInput
 from fem.steps import steps_of_division
-from fem.structure.parameters import LayerCoupling, fine_layers
+from fem.structure.parameters import LayerCoupling, PrescribedMotion, fine_layers
 from fem.structure.pulses import pulse_durations, pulses_of
 from fem.structure.tables import StructureTables, structure_tables, tied
 
@@ -58,6 +58,7 @@ def divided_on_one_rank(request: StructureInput) -> DividedStructure:
     check_division(whole, found, division, rules)
     check_pulses(request, division.plan.window)
     inputs = structure_inputs(whole, division, structure_tables(whole, request))
+    check_motions_at_cut(division, inputs["macro"].tables, request)
     return Divided(
         meshes={role: item.mesh for role, item in inputs.items()},
         tables={role: item.tables for role, item in inputs.items()},
@@ -82,6 +83,22 @@ def check_pulses(request: StructureInput, window: float) -> None:
                 f"loads.{name} lasts {shortest:.4g} s, less than the window of two models, {window:.4g} s: smaller"
                 " elements of the coarse layers make the window shorter, and without dynamics.coupling there is none"
             )
+
+
+def check_motions_at_cut(division: Division, tables: StructureTables, request: StructureInput) -> None:
+    """Check that the model that moves the cut knows what prescribes its motion: what both models have is the macro's.
+
+    Raises:
+        CutError: A motion of the cut where the meso model carries it.
+    """
+    for name, load in request.loads.items():
+        if division.scheme == "impulse" and isinstance(load, PrescribedMotion):
+            count = len(np.intersect1d(tables.nodes_of[load.on], tables.cut))
+            if count:
+                raise CutError(
+                    f"loads.{name} moves {count} nodes of the cut, which the meso model carries with coupling.scheme ="
+                    " impulse: held_velocity, local_steps or gravouil_combescure let them be moved"
+                )
 
 
 def coarse_cells(whole: Whole, found: Survey, coupling: LayerCoupling) -> NDArray[np.bool_]:
