@@ -17,7 +17,7 @@ class BoardDropCase(Case):
 
     kind = "package"
     pipeline = BOARD_DROP
-    ranks_key = "shock.ranks"
+    ranks_key = "shock.ranks.total"
 
     package: Package
     board: Board
@@ -59,7 +59,7 @@ class BoardDropCase(Case):
         geometries = joint_geometries(pad_table(self.package, self.board, self.warpage))
         impossible += fine_joints.problems(self)
         found = impossible + of_particles(particles_checks.problems(self.solder, geometries, self.package.pitch))
-        return (found + self._flow_problems()) or self._impossible_steps()
+        return (found + self._flow_problems() + self._coupling_problems()) or self._impossible_steps()
 
     def _impossible_steps(self) -> list[Problem]:
         from workflow.forecast import step_problems
@@ -79,6 +79,18 @@ class BoardDropCase(Case):
             message = f"is linear, {' and '.join(yielding)} yields"
             found.append(Problem("shock.numerics.dns_solver", message, "implicit", "explicit, or elastic materials"))
         return found
+
+    def _coupling_problems(self) -> list[Problem]:
+        """Find local steps of what has a path."""
+        if self.shock.coupling.scheme != "local_steps" or "two_scale" not in self.shock.numerics.modes:
+            return []
+        yielding = [role for role, material in self.materials.by_role.items() if material.plasticity is not None]
+        if not yielding and self.shock.numerics.kinematics == "small":
+            return []
+        why = f"{' and '.join(yielding)} yields" if yielding else "shock.numerics.kinematics is finite"
+        message = f"needs elastic materials at small strains, {why}"
+        allowed = "held_velocity, impulse, gravouil_combescure, auto"
+        return [Problem("shock.coupling.scheme", message, "local_steps", allowed)]
 
     @property
     def ranks(self) -> int:

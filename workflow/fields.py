@@ -182,9 +182,10 @@ def _choice(field: FieldInfo) -> str:
 
 
 def _metadata(field: FieldInfo) -> Iterator[object]:
-    """Yield units and bounds of a field, or of the items of its list."""
+    """Yield units and bounds of a field, or of the items of its list, which may be absent."""
     yield from field.metadata
-    for item in typing.get_args(field.annotation)[:1]:
+    outer = typing.get_args(field.annotation)[:1]
+    for item in (*outer, *(inner for kind in outer for inner in typing.get_args(kind)[:1])):
         for extra in getattr(item, "__metadata__", ()):
             yield from extra.metadata if isinstance(extra, FieldInfo) else (extra,)
 

@@ -10,7 +10,7 @@ from workflow.case import available_cores
 from workflow.fine_joints import coarse_joints_effect
 from workflow.problems import Problem
 from workflow.reflow_pool import distinct_geometries, joint_geometries
-from workflow.shock_forecast import PartForecast, ShockForecast, forecast_parts, forecast_shock, two_scale_parts
+from workflow.shock_forecast import PartForecast, ShockForecast, forecast_parts, forecast_shock, shorter_than_window, two_scale_parts
 from workflow.step_limit import too_many_steps
 
 
@@ -70,7 +70,7 @@ def forecast(case: BoardDropCase) -> Forecast:
 
 
 def step_problems(case: BoardDropCase) -> Iterator[Problem]:
-    """Find more steps than any run takes."""
+    """Find more steps than any run takes, and what is over before two models meet again."""
     import numpy as np
 
     from fem.estimate import damped_critical_step
@@ -79,6 +79,8 @@ def step_problems(case: BoardDropCase) -> Iterator[Problem]:
         steps = [part.critical_step for part in forecast_parts(case).values() if not part.mass_scaled]
         step = damped_critical_step(min(steps), case.shock.damping.coefficients[1]) if steps else math.inf
     yield from too_many_steps("shock.duration", case.shock.duration, step, "explicit")
+    if "two_scale" in case.shock.numerics.modes and min(steps, default=0.0) > 0.0:
+        yield from shorter_than_window(case)
 
 
 def with_critical_step(quality: dict, materials: Materials) -> dict:

@@ -1,10 +1,11 @@
 """Scheme, levels, time steps and cost of a shock, from the parameters of its case alone."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from fem.materials.parameters import Material
+from workflow.plan_table import short
 from workflow.problems import CaseError, Problem
 
 if TYPE_CHECKING:
@@ -181,6 +182,23 @@ def _plan(case: "BoardDropCase", parts: Parts):
     meso = min(limiting, default=macro)
     macro, meso = (damped_critical_step(step, shock.damping.coefficients[1]) for step in (macro, meso))
     return window_plan(macro, meso, numerics.step_fraction, shock.duration, numerics.history_samples)
+
+
+def shorter_than_window(case: "BoardDropCase") -> Iterator[Problem]:
+    """Find a pulse, or a whole shock, that ends within the first window of the two-scale run."""
+    from fem.estimate import damped_critical_step
+
+    shock, parts = case.shock, two_scale_parts(case)
+    slowest = min(parts[name].critical_step for name in _slow(case, parts) & parts.keys())
+    longest = shock.numerics.step_fraction * damped_critical_step(slowest, shock.damping.coefficients[1])
+    for key, duration, window in (
+        ("shock.duration", shock.duration, longest),
+        ("shock.pulse_duration", shock.pulse_duration, min(longest, _plan(case, parts).window)),
+    ):
+        if duration is not None and duration < window:
+            message = f"is shorter than a window of {short(window)}, the time between two exchanges of the models"
+            allowed = f'>= {short(window)}, a smaller shock.numerics.step_fraction, or shock.numerics.modes = ["dns"]'
+            yield Problem(key, message, short(duration), allowed)
 
 
 def _direct(case: "BoardDropCase", parts: Parts):
