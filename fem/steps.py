@@ -58,7 +58,7 @@ def steps_of_division(whole: Whole, survey: Survey, division: Division, rules: R
     return Steps(
         plan=division.plan,
         critical={role: float(survey.plain_step[survey.role == role].min()) for role in roles},
-        cut=float(critical[slow].min()),
+        cut=float(critical[slow if slow.any() else ...].min()),  # of all where no macro model is left
         smallest=float(critical.min()),
         added_mass=float(survey.added_mass[counted].sum()),
         model_mass=float(survey.mass[counted].sum()),

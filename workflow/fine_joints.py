@@ -98,7 +98,7 @@ def _unknown(name: str, sites: "list[PadSite]", case: "BoardDropCase") -> Iterat
     names = [site.name for site in sites]
     if name in names:
         return
-    image = _image(name, sites, case)
+    image = "" if name.upper() in names else _image(name.upper(), sites, case)
     message = "lies in another quarter than the model" if image else "no such joint"
     yield Problem(FINE, message, name, f"{names[0]} to {names[-1]}", image or nearest(name, names, alike=0.5))
 
@@ -110,7 +110,7 @@ def _image(name: str, sites: "list[PadSite]", case: "BoardDropCase") -> str:
     package = case.package
     for site in sites if case.board.symmetry == "quarter" else ():
         rows, columns = (site.row, package.rows - 1 - site.row), (site.column, package.columns - 1 - site.column)
-        if name.upper() in {joint_name(row, column) for row in rows for column in columns}:
+        if name in {joint_name(row, column) for row in rows for column in columns}:
             return site.name
     return ""
 

@@ -42,7 +42,8 @@ def render_shapes(surface_folder: Path, joints: list[dict], picture: Path) -> No
         height=70 / plotter.window_size[1],
         color="black",
     )
-    centre = (0.5 * (columns - 1) * spacing, 0.0, -0.5 * (rows - 1) * spacing)
+    middle = 0.5 * max(joint["standoff"] for joint in ordered) / MILLI  # labels lie above their joints
+    centre = (0.5 * (columns - 1) * spacing, 0.0, middle - 0.5 * (rows - 1) * spacing)
     plotter.camera_position = [(centre[0], -100.0, centre[2] + 14.0), centre, (0.0, 0.0, 1.0)]
     plotter.enable_parallel_projection()
     plotter.camera.parallel_scale = 0.5 * columns * spacing * plotter.window_size[1] / plotter.window_size[0]
@@ -73,7 +74,7 @@ def render_joints(series: list[Path], history: dict, parts: list[str], picture: 
         scalars="von Mises [MPa]",
         cmap="turbo",
         clim=(0.0, float(1.0e-6 * stress.max())),
-        scalar_bar_args=SCALAR_BAR | {"fmt": "%.0f"},
+        scalar_bar_args=SCALAR_BAR | {"fmt": "%.3g"},
         show_edges=True,
         edge_color="#3a4048",
         line_width=0.3,
@@ -123,7 +124,7 @@ def render_board(series: list[Path], history: dict, parts: list[str], picture: P
         show_edges=True,
         edge_color="#55606b",
         line_width=0.4,
-        scalar_bar_args=SCALAR_BAR | {"fmt": "%.1f"},
+        scalar_bar_args=SCALAR_BAR | {"fmt": "%.3g"},
     )
     flat = grid.copy()
     flat.points = flat.points / MILLI

@@ -23,7 +23,7 @@ SELF_CHECK = {
     "macro_mass": "mass of the macro model",
     "interface_mass": "mass at the cut, of the meso model",
     "meso_mass": "mass of the rest of the meso model",
-    "volume_mass": "density times volume, all",
+    "volume_mass": "density times volume, mass scaling included",
 }
 
 

@@ -43,8 +43,8 @@ def nothing_left(role: str, whole: Whole, rules: Rules) -> str:
         )
     return (
         f"nothing is left for the macro model: all board elements are among the {rules.coupling.buffer_layers} layers"
-        " around the joints (coupling.buffer_layers); a larger board, smaller elements or scheme = gravouil_combescure,"
-        " which needs no buffer, leave some"
+        " around the joints (coupling.buffer_layers); fewer layers, a larger board, smaller elements or scheme ="
+        " gravouil_combescure, which needs no buffer, leave some"
     )
 
 

@@ -32,7 +32,7 @@ class Placement:
         """Return which ranks carry which model, for people."""
         if self.name == "shared":
             return f"shared by {len(next(iter(self.ranks.values())))}"
-        return ", ".join(f"{role} on {'+'.join(map(str, ranks))}" for role, ranks in self.ranks.items())
+        return ", ".join(f"{role} on rank {'+'.join(map(str, ranks))}" for role, ranks in self.ranks.items())
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,6 +15,7 @@ from fem.materials.roles import Materials
 from fem.mesh import append
 from fem.parameters import Coupling
 from fem.scene import model_inputs
+from fem.steps import steps_of_division
 from tests.support.fem_division import surveyed
 from tests.support.fem_models import small_assembly
 
@@ -114,4 +115,6 @@ def test_window_above_the_elements_step_is_refused(mesh):
 
 def test_board_that_is_all_buffer_is_refused(mesh):
     parts = scene(mesh, scheme="held_velocity", buffer_layers=20)
-    refused(parts, divide(*parts), r"nothing is left for the macro model: .*20 layers")
+    division = divide(*parts)
+    assert steps_of_division(*parts[:2], division, parts[2]).cut > 0.0
+    refused(parts, division, r"nothing is left for the macro model: .*20 layers")

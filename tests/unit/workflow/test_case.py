@@ -67,7 +67,10 @@ BAD_VALUES = {
     "unknown constant of plasticity": ("materials.solder.plasticity.D=1", ["unknown key", "one of A, B, n, C"]),
     "table below a value": ("package.rows.all=1", ["package.rows.all", "lies below a value"]),
     "no setting": ("package.rows", ["package.rows", "is no setting", "dotted.key=value"]),
-    "more ranks than cores": ("shock.ranks.total=4096", ["shock.ranks", "4096 MPI ranks", "--oversubscribe"]),
+    "more ranks than cores": (
+        "shock.ranks.total=4096",
+        ["shock.ranks.total = 4096", "4096 MPI ranks", "--oversubscribe"],
+    ),
     "pads overlapping": (
         "package.pitch=0.5 mm",
         ["package.board_pad.mask_opening", '"0.58 mm"', "0.5 mm, the pitch"],

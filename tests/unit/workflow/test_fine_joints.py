@@ -17,9 +17,10 @@ from workflow.fine_joints import (
 from workflow.problems import CaseError
 
 FAULTS = {
-    "shock.coupling.fine_joints=['A9']": ("no such joint", "A3 to B4"),
+    "shock.coupling.fine_joints=['A9']": ("no such joint", "A3 to B4", "did you mean A4?"),
     "shock.coupling.fine_joints=['a3']": ("no such joint", "did you mean A3?"),
     "shock.coupling.fine_joints=['D1']": ("another quarter", "did you mean A4?"),
+    "shock.coupling.fine_joints=['d1']": ("another quarter", "did you mean A4?"),
     "shock.coupling.fine_joints=[]": ("leaves nothing", "at least one name"),
     "shock.coupling.fine_joints='criticl'": ("all, critical, or a list of names", "did you mean critical?"),
     "shock.coupling.fine_joints=[3]": ("shock.coupling.fine_joints = [3]", "a list of names"),

@@ -46,6 +46,11 @@ FAULTS = {
     PULSE + 'damping = { stiffness_ratio = 0.9, frequency = "1e-6 Hz" }\n': ["shock.duration", "more than 1e+10"],
     PULSE + 'damping = { stiffness_coefficient = "1e308 s" }\n': ["shock.duration", "has no explicit step"],
     PULSE + 'method = "large_mas"\n': ["shock.method", "did you mean large_mass?"],
+    PULSE.replace("0.02 ms", "10 ns"): [
+        'shock.pulse_duration = "10 ns"',
+        "shorter than a window of 75 ns",
+        "allowed: >= 75 ns",
+    ],
     PULSE + 'gravity = "yes"\n': ["shock.gravity", "one of auto, on, off"],
 }
 
@@ -56,3 +61,22 @@ def test_impossible_shock_is_said(tmp_path, pulse):
         read_case(case_with(tmp_path, pulse))
     text = "\n".join(str(problem) for problem in error.value.problems)
     assert [word for word in FAULTS[pulse] if word not in text] == [], text
+
+
+def test_a_shock_within_one_window_is_refused():
+    with pytest.raises(CaseError, match=r'shock.duration = "10 ns": is shorter than a window of 75.6 ns'):
+        read_case(SMALL_CASE, ["shock.duration=10 ns"])
+    assert read_case(SMALL_CASE, ["shock.duration=10 ns", 'shock.numerics.modes=["dns"]']).shock.duration == 1e-8
+
+
+@pytest.mark.parametrize(
+    ("setting", "why"),
+    [("materials.solder=SAC305", "solder yields"), ("shock.numerics.kinematics=finite", "kinematics is finite")],
+)
+def test_local_steps_along_a_path_are_refused(setting, why):
+    local = "shock.coupling.scheme=local_steps"
+    with pytest.raises(
+        CaseError, match=rf'shock.coupling.scheme = "local_steps": needs elastic .*{why}; allowed: held'
+    ):
+        read_case(SMALL_CASE, [local, setting])
+    assert read_case(SMALL_CASE, [local]).shock.coupling.scheme == "local_steps"

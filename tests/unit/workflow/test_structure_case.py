@@ -31,6 +31,10 @@ BAD_VALUES = {
     "list too long": ('watch.centre.at=["1 mm","1 mm","1 mm","1 mm"]', ["watch.centre.at", "list of 3 items"]),
     "item without unit": ('structure.holes.spacing=["24 mm","3"]', ["structure.holes.spacing", 'such as "3 mm"']),
     "item out of range": ("structure.cells=[0,3]", ["structure.cells = [0, 3]", ">= 1 and <= 2000"]),
+    "item out of range in an optional list": (
+        "structure.layers.board.in_plane=[0,3]",
+        ["structure.layers.board.in_plane = [0, 3]", ">= 1 and <= 2000"],
+    ),
     "item unknown": ('structure.symmetry=["z"]', ["structure.symmetry", "any of x, y"]),
     "unknown name": ("structure.element=hexahedra", ["structure.element", "did you mean hexahedron?"]),
     "unknown condition": ("loads.drop.service_condition=X", ["service_condition", "one of A, B, C"]),

@@ -24,7 +24,7 @@ COUPLING = {
     "self_check": {"rigid": 2e-16, "macro_mass": 1e-3},
     "placement": {
         "chosen": "shared by 2",
-        "alternatives": {"shared by 2": 3e-4, "macro on 0, meso on 1": 4e-4},
+        "alternatives": {"shared by 2": 3e-4, "macro on rank 0, meso on rank 1": 4e-4},
         "window_seconds": 3.3e-4,
         "busy_share": 0.93,
         "busy_shares": [0.95, 0.92],
@@ -66,7 +66,7 @@ def test_levels_begin_with_the_window():
 def test_predictions_stand_beside_what_was_measured():
     rows = rows_of(section.placement(COUPLING))
     assert rows["window, predicted, shared by 2 (chosen)"] == "300.0 µs"
-    assert rows["window, predicted, macro on 0, meso on 1"] == "400.0 µs"
+    assert rows["window, predicted, macro on rank 0, meso on rank 1"] == "400.0 µs"
     assert rows["window, measured"] == "330.0 µs"
     assert rows["rank 1 computes"] == "92 %"
     assert rows["coupling, share of a window"] == "2 %"
