@@ -175,11 +175,7 @@ class NodalForces(Load):
         """Add what levels make of the pattern."""
         pattern = np.zeros((len(body.mass), 3))
         pattern[self.nodes] = self.pattern
-        levels = levels_of(body.terms)
-        if levels:
-            carried = np.sum([term.carry(pattern) for term in levels], axis=0)
-            body.shared.add(carried)
-            self.nodes, self.pattern, self.owned = nodal(body, pattern + carried)
+        self.nodes, self.pattern, self.owned = nodal(body, pattern + carried(body, pattern, np.zeros(3)))
 
     def add(self, motion: "Motion") -> None:
         """Add the force of the motion's time."""
@@ -200,6 +196,54 @@ def nodal(body: Body, pattern: NDArray[np.float64]) -> tuple[NDArray[np.int32], 
     """Return the local nodes ``(k,)`` where a pattern ``(n, 3)`` is not zero, its rows, and which this rank counts."""
     rows = np.flatnonzero(pattern.any(axis=1)).astype(np.int32)
     return rows, pattern[rows], body.shared.owned[rows]
+
+
+def carried(body: Body, load: NDArray[np.float64], fall: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return what levels inside a body add to a load ``(n, 3)`` [N] and a fall, as ``LocalSteps.carry``; collective."""
+    force = sum((levels.carry(load, fall) for levels in levels_of(body.terms)), np.zeros_like(load))
+    body.shared.add(force)
+    return force
+
+
+class FineSupports(Load):
+    """How supports of elements in levels bear body forces: what levels add to them.
+
+    Attributes:
+        nodes: ``(k,)`` local nodes.
+        pattern: ``(3, k, 3)`` force [N] for a unit acceleration of the body along each axis, summed over ranks.
+        owned: ``(k,)`` whether the node counts on this rank.
+    """
+
+    kept: ClassVar[Mapping[str, Kept]] = {"work": "sum", "_factor": "same"}
+
+    def __init__(self) -> None:
+        """Begin without acceleration."""
+        self.nodes, self.pattern, self.owned = np.empty(0, np.intp), np.zeros((3, 0, 3)), np.empty(0, dtype=bool)
+        self._factor = np.zeros(3)
+
+    def carry(self, body: Body) -> None:
+        """Find the pattern."""
+        nothing = np.zeros((len(body.mass), 3))
+        pattern = np.array([carried(body, nothing, fall) for fall in np.eye(3)])
+        self.nodes = np.flatnonzero(pattern.any(axis=(0, 2)))
+        self.pattern, self.owned = pattern[:, self.nodes], body.shared.owned[self.nodes]
+
+    def add(self, motion: "Motion") -> None:
+        """Add the force for the motion's body acceleration."""
+        self._factor = motion.gravity
+        motion.force[self.nodes] += self._force()
+
+    def remove(self, force: NDArray[np.float64]) -> None:
+        """Subtract it from a copy."""
+        force[self.nodes] -= self._force()
+
+    def collect(self, motion: "Motion") -> None:
+        """Add half a step's work."""
+        power = np.sum((self._force() * motion.velocity[self.nodes])[self.owned])
+        self.work += 0.5 * motion.step * float(power)
+
+    def _force(self) -> NDArray[np.float64]:
+        return np.tensordot(self._factor, self.pattern, 1)
 
 
 @dataclass

@@ -10,7 +10,7 @@ from fem.body import Body
 from fem.force_nonlinear import NonlinearElements
 from fem.kernels.motion import advance
 from fem.levels.force import levels_of
-from fem.loads import Load, Loaded
+from fem.loads import FineSupports, Load, Loaded
 from fem.portable import Rows, Same, Shares, State, Sum
 
 
@@ -43,7 +43,8 @@ class Motion(Loaded):
             extra_mass: ``(n,)`` [kg] that another model adds at the cut.
         """
         self.body, self.step, self.time, self._body_work = body, step, 0.0, 0.0
-        self._loads = sorted(loads, key=lambda load: load.account == "damping")
+        carried = [FineSupports()] if levels_of(body.terms) else []
+        self._loads = sorted([*loads, *carried], key=lambda load: load.account == "damping")
         mass = body.mass + extra_mass
         free = body.free.copy()
         free[held] = False

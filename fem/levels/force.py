@@ -120,26 +120,31 @@ class LocalSteps:
         for inner in levels_of(self.terms):
             inner.follow(mobility[self.rows])
 
-    def carry(self, load: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the mean internal force ``(m, 3)`` [N] at u = 0 of substeps in which a load acts; collective.
+    def carry(self, load: NDArray[np.float64], fall: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the mean internal force ``(m, 3)`` [N] at u = 0 of substeps in which loads act; collective.
 
-        With it the load bends the elements at its nodes as they are, K_eff u = f + carry(f) for K u = f, where f alone
+        With it a load bends the elements at its nodes as they are, K_eff u = f + carry(f) for K u = f, where f alone
         would give the nodes a window's free flight. It has no resultant.
 
         Args:
             load: ``(m, 3)`` [N] at the nodes of the level around, equal on all copies of a node.
+            fall: ``(3,)`` [m/s^2] acceleration of all but what is held: in a frame that falls, this moves against it.
         """
-        free, place, pull = len(self.inverse), self.state[0], self.state[1]
+        steps, place, pull = self.substeps, self.state[0], self.state[1]
+        free = len(self.inverse)
         mine, force = load[self.rows], np.zeros_like(load)
-        inside = sum((inner.carry(mine) for inner in levels_of(self.terms)), np.zeros_like(mine))
+        inside = sum((inner.carry(mine, fall) for inner in levels_of(self.terms)), np.zeros_like(mine))
+        held, speed = np.where(self.inverse == 0.0, fall, 0.0), 0.0
         place.fill(0.0)
-        for coefficients in zip(self.substeps.memory, self.substeps.rate, self.substeps.weight, strict=True):
+        for coefficients in zip(steps.memory, steps.rate, steps.weight, strict=True):
             for term in self.terms:
                 term.add(place, pull)
             pull += inside
             self.shared.add(pull)
             pull[:free] += mine[:free]
             take_substep(coefficients, self.inverse, self.change, self.state)
+            speed = coefficients[0] * speed + coefficients[1] * self.step**2
+            place[:free] -= speed * held
         self.state[2, :free] -= mine[:free]  # the weights add up to one
         end_substeps(self.rows, self.foreign, self.state, force)
         return force

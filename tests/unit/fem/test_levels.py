@@ -75,7 +75,7 @@ def test_a_load_on_fine_nodes_bends_them_as_it_bends_the_plain_body(model):
     (levels,) = levels_of(body.terms)
     free = body.free.ravel()
     load = np.sin(np.arange(free.size)).reshape(-1, 3) * body.free
-    carried = levels.carry(load)
+    carried = levels.carry(load, np.zeros(3))
     assert np.abs(carried).max() > 0.1 * np.abs(load).max()
     place = np.zeros_like(load)
     place[body.free] = np.linalg.solve(dense_stiffness(model.plain)[np.ix_(free, free)], load[body.free])
@@ -83,6 +83,15 @@ def test_a_load_on_fine_nodes_bends_them_as_it_bends_the_plain_body(model):
     assert np.abs(residual).max() <= 1e-9 * np.abs(total_force(model, place)).max()
     scale = np.abs(carried).sum()
     assert np.abs(net_load(body.local.points, carried)).max() <= 1e-12 * scale
+
+
+def test_only_supports_bear_a_falling_body(model):
+    fall, body = np.array([1.0, -0.5, 0.3]), model.body
+    carried = body.terms[-1].carry(np.zeros((len(body.mass), 3)), fall)
+    assert np.abs(carried).max() > 0.0
+    assert np.abs(net_load(body.local.points, carried)).max() <= 1e-12 * np.abs(carried).sum()
+    loose = levelled(joint_on_board(held=False), Materials(), model.ratios).body
+    assert np.all(loose.terms[-1].carry(np.zeros((len(loose.mass), 3)), fall) == 0.0)
 
 
 def test_what_a_motion_prescribes_does_not_move_in_substeps():
