@@ -1,6 +1,6 @@
 """From input files to one model on each rank: read, divide, distribute, assemble."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Generic
 
@@ -19,9 +19,12 @@ from fem.coupling.fine_joints import copied_joints, read_scene
 from fem.coupling.record import coupling_record
 from fem.coupling.rules import Rules
 from fem.coupling.whole import Treatment, survey
+from fem.force import Kinematics
 from fem.inputs import RunInput
 from fem.local_mesh import distribute
 from fem.materials.elasticity import role_of_part
+from fem.materials.parameters import Material
+from fem.materials.roles import Materials
 from fem.mesh import MeshData
 from fem.scene import JointTables, Tables, TablesT_co, joined, model_inputs
 from fem.steps import Steps, agreed_minimum, assembled_step, steps_of_division, undivided
@@ -67,8 +70,13 @@ def divided_scene(world: MPI.Comm, request: RunInput) -> Divided[JointTables]:
     Raises:
         AgreedError: Meshes that do not fit; on every rank.
     """
-    found = agreed(world, lambda: divided_on_one_rank(request) if world.rank == 0 else None)
-    told: Divided[JointTables] = world.bcast(replace(found, meshes={}) if found else None)
+    return told_to_all(world, lambda: divided_on_one_rank(request))
+
+
+def told_to_all(world: MPI.Comm, divided: Callable[[], Divided[TablesT_co]]) -> Divided[TablesT_co]:
+    """Divide on rank 0, and tell the other ranks all but the meshes; collective, errors of rank 0 on every rank."""
+    found = agreed(world, lambda: divided() if world.rank == 0 else None)
+    told: Divided[TablesT_co] = world.bcast(replace(found, meshes={}) if found else None)
     return found or told
 
 
@@ -124,27 +132,46 @@ def build_models(
     Returns:
         The models, and the steps: those of a DNS may be larger than what its elements allow each on its own.
     """
-    world, numerics, tables = comms.world, request.shock.numerics, divided.tables
+    world, numerics, steps = comms.world, request.shock.numerics, divided.steps
+    pieces = distributed(comms, divided, ranks, request.materials, numerics.formulation)
+    if "dns" in pieces and numerics.critical_step == "power_iteration":
+        factor = divided.mass_factors["dns"][pieces["dns"].local.cell_numbers]
+        found = assembled_step(comms.models["dns"], (pieces["dns"], divided.tables["dns"]), factor)
+        alone = agreed_minimum(world, [pieces["dns"].steps * np.sqrt(factor)])
+        steps = undivided(steps, max(found, alone), divided.rules)
+    bodies = assembled(comms, replace(divided, steps=steps), pieces, numerics.kinematics)
+    return {role: Model(divided.tables[role], body) for role, body in bodies.items()}, steps
+
+
+def distributed(
+    comms: Communicators,
+    divided: Divided[TablesT_co],
+    ranks: Mapping[Role, NDArray[np.int32]],
+    materials: Materials | Mapping[str, Material],
+    formulation: str,
+) -> dict[Role, Pieces]:
+    """Distribute the models, and give the elements of this rank their materials; arguments as ``build_models``."""
     given = hand_over(comms, divided, ranks)
     mine = next(iter(divided.meshes.values()), None)
-    dolfinx_api.compile_ahead(world, mine.points[mine.cells[0]] if mine else None)
+    dolfinx_api.compile_ahead(comms.world, mine.points[mine.cells[0]] if mine else None)
     meshes = {role: distribute(comms.models[role], *mesh) for role, mesh in given.items()}
 
     def pieces_of(role: Role) -> Pieces:
-        return make_pieces(meshes[role], tables[role], request.materials, numerics.formulation)
+        return make_pieces(meshes[role], divided.tables[role], materials, formulation)
 
-    pieces = agreed(world, lambda: {role: pieces_of(role) for role in meshes})
-    factors = {role: divided.mass_factors[role][meshes[role].cell_numbers] for role in pieces}
-    steps = divided.steps
-    if "dns" in pieces and numerics.critical_step == "power_iteration":
-        found = assembled_step(comms.models["dns"], (pieces["dns"], tables["dns"]), factors["dns"])
-        alone = agreed_minimum(world, [pieces["dns"].steps * np.sqrt(factors["dns"])])
-        steps = undivided(steps, max(found, alone), divided.rules)
-    models = {}
+    return agreed(comms.world, lambda: {role: pieces_of(role) for role in meshes})
+
+
+def assembled(
+    comms: Communicators, divided: Divided[TablesT_co], pieces: Mapping[Role, Pieces], kinematics: Kinematics
+) -> dict[Role, Body]:
+    """Assemble the bodies of this rank's models, each for its step; collective."""
+    bodies = {}
     for role, own in pieces.items():
-        response = Response(numerics.kinematics, steps.step_of(role), request.shock.damping.coefficients[1])
-        models[role] = Model(tables[role], make_body(comms.models[role], own, tables[role], factors[role], response))
-    return models, steps
+        factor = divided.mass_factors[role][own.local.cell_numbers]
+        response = Response(kinematics, divided.steps.step_of(role), divided.rules.stiffness)
+        bodies[role] = make_body(comms.models[role], own, divided.tables[role], factor, response)
+    return bodies
 
 
 Given = tuple[MeshData | None, NDArray[np.int32] | None]

@@ -6,7 +6,6 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from fem.agreement import agreed
 from fem.coupling.checks import check_division
 from fem.coupling.divide import divide, scheme_for
 from fem.coupling.division import Division
@@ -18,7 +17,7 @@ from fem.coupling.whole import Survey, Treatment, Whole, survey
 from fem.errors import CutError, StepError
 from fem.inputs import StructureInput
 from fem.mesh_file import read_mesh
-from fem.model import Divided
+from fem.model import Divided, told_to_all
 from fem.scene import ModelInput
 from fem.steps import steps_of_division
 from fem.structure.parameters import LayerCoupling, PrescribedMotion, fine_layers
@@ -34,9 +33,7 @@ def divided_structure(world: MPI.Comm, request: StructureInput) -> DividedStruct
     Raises:
         AgreedError: A mesh that does not fit, or cannot be divided; on every rank.
     """
-    found = agreed(world, lambda: divided_on_one_rank(request) if world.rank == 0 else None)
-    told: DividedStructure = world.bcast(replace(found, meshes={}) if found else None)
-    return found or told
+    return told_to_all(world, lambda: divided_on_one_rank(request))
 
 
 def divided_on_one_rank(request: StructureInput) -> DividedStructure:

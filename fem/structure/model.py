@@ -7,7 +7,6 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from fem import dolfinx_api
 from fem.agreement import agreed
 from fem.body import Body, Pieces, Response, make_body, make_pieces
 from fem.communicators import Communicators, Role
@@ -16,7 +15,7 @@ from fem.inputs import StructureInput
 from fem.local_mesh import distribute
 from fem.mesh import MeshData
 from fem.mesh_file import read_mesh
-from fem.model import Divided, hand_over
+from fem.model import Divided, assembled, distributed
 from fem.power_iteration import highest_frequency
 from fem.steps import Steps
 from fem.structure.steps import check_step, explicit_steps, implicit_steps, with_critical
@@ -94,20 +93,6 @@ def build_coupled(
     ranks: Mapping[Role, NDArray[np.int32]],
 ) -> dict[Role, StructureModel]:
     """Distribute and assemble the coupled models of this rank; ``ranks`` as ``fem.model.build_models``; collective."""
-    given, tables = hand_over(comms, divided, ranks), divided.tables
-    mine = next(iter(divided.meshes.values()), None)
-    dolfinx_api.compile_ahead(comms.world, mine.points[mine.cells[0]] if mine else None)
-    meshes = {role: distribute(comms.models[role], *mesh) for role, mesh in given.items()}
-
-    def pieces_of(role: Role) -> Pieces:
-        return make_pieces(meshes[role], tables[role], request.layer_materials, request.structure.formulation)
-
-    pieces = agreed(comms.world, lambda: {role: pieces_of(role) for role in meshes})
-    dynamics = request.dynamics
-    models = {}
-    for role, own in pieces.items():
-        factor = divided.mass_factors[role][meshes[role].cell_numbers]
-        response = Response(dynamics.kinematics, divided.steps.step_of(role), dynamics.damping.coefficients[1])
-        body = make_body(comms.models[role], own, tables[role], factor, response)
-        models[role] = StructureModel(tables[role], body, divided.steps)
-    return models
+    pieces = distributed(comms, divided, ranks, request.layer_materials, request.structure.formulation)
+    bodies = assembled(comms, divided, pieces, request.dynamics.kinematics)
+    return {role: StructureModel(divided.tables[role], body, divided.steps) for role, body in bodies.items()}
