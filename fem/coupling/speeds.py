@@ -22,7 +22,7 @@ from fem.mesh_elements import elements_of
 
 FAMILIES = ("box", "assembled", "path")
 LARGE, SMALL = 8192, 128  # elements of a sample; the large one is no larger than a rank's share
-BATCHES, BATCH_SECONDS = 5, 0.004
+BATCHES, BATCH_SECONDS = 24, 0.001  # short: some fall between two turns of another program on the core
 ALIKE = 1.2  # ratio of two speeds below which they may be one, measured twice
 MESSAGE_ROWS, MESSAGES = 500, 40
 
