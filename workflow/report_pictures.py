@@ -113,7 +113,7 @@ def render_board(series: list[Path], history: dict, parts: list[str], picture: P
     grid = _of_role(grid, parts, "board")
     grid["deflection [mm]"] = grid.point_data["displacement"][:, 2] / MILLI
     length = max(grid.bounds[1] - grid.bounds[0], grid.bounds[3] - grid.bounds[2])
-    factor = round_down(0.12 * length / float(np.abs(grid.point_data["displacement"][:, 2]).max()))
+    factor = exaggeration(length, float(np.abs(grid.point_data["displacement"][:, 2]).max()))
     bent = grid.warp_by_vector("displacement", factor=factor)
     bent.points = bent.points / MILLI
     plotter = new_plotter((1800, 900))
@@ -198,6 +198,11 @@ def _linear(grid: pyvista.UnstructuredGrid) -> pyvista.UnstructuredGrid:
     plain.point_data.update({"displacement": grid.point_data["displacement"]})
     plain.cell_data.update({name: grid.cell_data[name] for name in ("von_mises", "part")})
     return plain
+
+
+def exaggeration(length: float, deflection: float) -> float:
+    """Return how many times as large a deflection is drawn; once where a board is still at rest."""
+    return round_down(0.12 * length / deflection) if deflection > 0.0 else 1.0
 
 
 def round_down(factor: float) -> float:

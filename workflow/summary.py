@@ -36,8 +36,10 @@ def collect_summary(run_folder: Path, case_name: str) -> dict:
             continue
         record = json.loads(path.read_text())
         summary["timings"][stage] = record["seconds"]
-        for key in ("metrics", "effects", "health"):
+        for key in ("metrics", "health"):
             summary[key].update(record[key])
+        for name, effect in record["effects"].items():  # the shock has a gravity of its own
+            summary["effects"][f"{name}_in_the_{stage}" if name in summary["effects"] else name] = effect
     return summary
 
 

@@ -11,11 +11,11 @@ from pydantic import ValidationError
 from fem.communicators import Communicators
 from fem.coupling.placement import ModelCost, WindowCost, alternatives, disjoint, shared, window_seconds
 from fem.coupling.planner import Load, Measured, keep, kept, plan_from, plan_ranks, words
-from fem.coupling.speeds import Kind, StepCost, families, line_through, speeds_of
+from fem.coupling.speeds import Kind, StepCost, families, line_through, sample_terms, seconds_of_step, speeds_of
 from fem.estimate import WindowPlan, predict_seconds
 from fem.materials.library import LIBRARY
 from fem.parameters import Ranks
-from tests.support.fem_models import grid, mesh_of
+from tests.support.fem_models import grid, joint_mesh, mesh_of
 
 EVEN = WindowCost(ModelCost(1e-3, 0.0, 1), ModelCost(1e-3, 0.0, 8), 1e-5)
 KIND = Kind([LIBRARY["FR4"], LIBRARY["copper"]], "incompatible_modes", "small", 1e-8)
@@ -27,6 +27,12 @@ def cost(macro: float, meso: float, latency: float = 1e-5) -> WindowCost:
 
 def best(total: int, speeds: list[float] | None = None, window: WindowCost = EVEN, **asked):
     return alternatives(Ranks(total=total, **asked), speeds or [1.0] * total, window)[0].placement
+
+
+def test_elements_that_turn_are_timed_at_rest():
+    joint = joint_mesh("A1", 0.0, 0.0)
+    kind = replace(KIND, materials=[LIBRARY["FR4"]] * len(joint.part_names), kinematics="finite")
+    assert seconds_of_step(sample_terms(joint, kind), len(joint.points)) > 0.0
 
 
 def test_one_rank_carries_both_models():

@@ -10,6 +10,7 @@ from fem.parameters import Failure
 from workflow import report_body
 from workflow import report_tables as tables
 from workflow.report_curves import array_map, energy_curves, history_curves
+from workflow.report_pictures import exaggeration
 from workflow.summary import collect_summary, inputs_digest, write_summary
 
 JOINT = {"standoff": 3.2e-4, "max_width": 5.5e-4}
@@ -95,11 +96,17 @@ def test_curves_are_inline_svg(history):
 def test_summary_merges_the_stages_that_have_run(tmp_path):
     for stage, value in (("geometry", 25), ("shock", 1e8)):
         (tmp_path / stage).mkdir()
-        record = {"seconds": 1.5, "metrics": {stage: {"value": value, "unit": ""}}, "health": {}, "effects": {}}
+        record = {
+            "seconds": 1.5,
+            "metrics": {stage: {"value": value, "unit": ""}},
+            "health": {},
+            "effects": {"gravity": stage},
+        }
         (tmp_path / stage / "stage.json").write_text(json.dumps(record))
     summary = collect_summary(tmp_path, "small")
     assert summary["timings"] == {"geometry": 1.5, "shock": 1.5}
     assert set(summary["metrics"]) == {"geometry", "shock"}
+    assert summary["effects"] == {"gravity": "geometry", "gravity_in_the_shock": "shock"}
     write_summary(tmp_path, summary)
     assert json.loads((tmp_path / "summary.json").read_text()) == summary
 
@@ -110,3 +117,8 @@ def test_digest_changes_with_any_input(tmp_path):
     before = inputs_digest(tmp_path)
     (tmp_path / "inputs/shock.json").write_text('{"a": 1}')
     assert inputs_digest(tmp_path) != before
+
+
+def test_a_board_at_rest_is_drawn_as_it_is():
+    assert exaggeration(0.1, 2e-3) == 5.0
+    assert exaggeration(0.1, 0.0) == 1.0
