@@ -66,9 +66,10 @@ class StructureCase(StructureScene, Case):
         return found or self._impossible_steps()
 
     def _impossible_steps(self) -> list[Problem]:
+        from workflow.structure.findings import waves_that_do_not_pass
         from workflow.structure.forecast import step_problems
 
-        return list(step_problems(self))
+        return [*step_problems(self), *waves_that_do_not_pass(self)]
 
     def _unreadable_tables(self) -> Iterator[Problem]:
         from fem.errors import PulseError

@@ -139,17 +139,21 @@ def measure(
     speed = (heights["far"] - heights["near"]) / (far[0] - near[0])
     result = {"wave_speed": speed, "wave_speed_exact": layers.speeds[0]}
     result["wave_speed_error"] = speed / layers.speeds[0] - 1.0
-    first = layers.lengths[0]
-    starts = {
-        "transmitted_velocity": ("beyond", layers.travel(0.0, heights["beyond"])),
-        "reflected_velocity": ("far", layers.travel(0.0, first) + layers.travel(heights["far"], first)),
-    }
-    for name, (point, start) in starts.items():
+    for name, (point, start) in passes(layers, heights).items():
         here = (time >= start) & (time <= start + pulse.duration)
         found, right = (_largest(values[point][here]) / incident for values in (history, exact))
         result |= {name: found, f"{name}_exact": right, f"{name}_error": found - right}
     together = [np.concatenate([values[name] for name in heights]) for values in (history, exact)]
     return result | {"wave_error": float(np.linalg.norm(together[0] - together[1]) / np.linalg.norm(together[1]))}
+
+
+def passes(layers: Layers, heights: Mapping[str, float]) -> dict[str, tuple[str, float]]:
+    """Return at which point, and from when on [s], each of the compared waves passes."""
+    first = layers.lengths[0]
+    return {
+        "transmitted_velocity": ("beyond", layers.travel(0.0, heights["beyond"])),
+        "reflected_velocity": ("far", layers.travel(0.0, first) + layers.travel(heights["far"], first)),
+    }
 
 
 def _largest(values: NDArray[np.float64]) -> float:

@@ -1,13 +1,15 @@
 """What the stages of a structure found: its mesh, its motion against references, one solver against the other."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from workflow.findings import at_least, at_most, in_words_continued, metric
+from workflow.plan_table import short
+from workflow.problems import Problem
 from workflow.stage_runner import Findings
 from workflow.structure import exact_bar, exact_cantilever, exact_layers
 from workflow.structure.case import StructureCase
@@ -136,6 +138,19 @@ def layers_of(case: StructureCase) -> exact_layers.Layers:
         tuple(float(elasticity_matrix(material)[2, 2]) for material in materials),
         tuple(material.density for material in materials),
     )
+
+
+def waves_that_do_not_pass(case: StructureCase) -> Iterator[Problem]:
+    """Find runs that end before the waves that a layered bar compares have passed by half."""
+    for key, reference in case.references.items():
+        if isinstance(reference, LayeredBar):
+            roles = zip(("near", "far", "beyond"), [*reference.incident, reference.transmitted], strict=True)
+            heights = {role: case.watch[name].at[2] for role, name in roles}
+            starts = [start for _, start in exact_layers.passes(layers_of(case), heights).values()]
+            least = max(starts) + 0.5 * _pulse_of(case, reference.load).duration
+            if case.dynamics.duration < least:
+                message = f"ends before the waves of references.{key} have passed its watch points"
+                yield Problem("dynamics.duration", message, short(case.dynamics.duration), f">= {short(least)}")
 
 
 def strip_of(case: StructureCase, reference: Cantilever) -> exact_cantilever.Strip:

@@ -83,8 +83,10 @@ def forecast_coupled(case: StructureCase, layers: Mapping[str, LayerForecast], u
     if coupling is None:
         return None
     fine = fine_layers(coupling, {name: layer.critical_step for name, layer in layers.items()})
-    coarse = {name: layer for name, layer in layers.items() if name not in fine}
-    window, step = (dynamics.numerics.step_fraction * critical_step(case, some) for some in (coarse, layers))
+    unscaled = {name: layer for name, layer in layers.items() if name not in fine and not layer.mass_scaled}
+    window, step = (
+        dynamics.numerics.step_fraction * critical_step(case, some) for some in (unscaled or layers, layers)
+    )
     elements = {name: layer.elements for name, layer in layers.items()}
     updates = sum(count * dynamics.duration / (step if name in fine else window) for name, count in elements.items())
     return CoupledForecast(fine, window, ceil(window / step), updates * update)
@@ -133,6 +135,21 @@ def step_problems(case: StructureCase) -> Iterator[Problem]:
     steps = forecast_steps(case, layers)
     for solver in case.dynamics.solvers:
         yield from too_many_steps("dynamics.duration", case.dynamics.duration, steps[solver], solver)
+    coupled = forecast_coupled(case, layers, 0.0)
+    if coupled is not None:
+        yield from shorter_than_window(case, coupled.window)
+
+
+def shorter_than_window(case: StructureCase, window: float) -> Iterator[Problem]:
+    """Find pulses that are over before two models meet again."""
+    from fem.structure.pulses import pulse_durations, pulses_of
+
+    for name, pulse in pulses_of(case.loads).items():
+        shortest = min(pulse_durations({name: pulse}), default=window)
+        if shortest < window:
+            message = f"is shorter than a window of {short(window)}, the time between two exchanges of the models"
+            allowed = f">= {short(window)}, smaller elements of the coarse layers, or no dynamics.coupling"
+            yield Problem(f"loads.{name}.duration", message, short(shortest), allowed)
 
 
 def forecast_layers(case: StructureCase) -> dict[str, LayerForecast]:

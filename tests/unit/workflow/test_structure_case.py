@@ -207,3 +207,23 @@ def test_effects_have_reasons():
     assert effects["input_g"] == {"on": True, "why": "loads.drop"}
     assert not effects["finite_rotation"]["on"]
     assert effects["mass_scaling"]["why"].startswith("dynamics.numerics.mass_scaled = ['cover']")
+
+
+@pytest.mark.parametrize(
+    ("setting", "words"),
+    [
+        (
+            "loads.push.duration=10 ns",
+            r'loads.push.duration = "10 ns": is shorter than a window of .* no dynamics.coup',
+        ),
+        ("dynamics.duration=12 us", r'dynamics.duration = "12 us": ends before the waves of references.wave'),
+    ],
+)
+def test_two_models_of_a_bar_need_time(setting, words):
+    with pytest.raises(CaseError, match=words):
+        read_case(templates()["two_scale_bar"], [setting])
+
+
+def test_a_window_of_layers_that_are_all_scaled_is_the_step():
+    case = read_case(templates()["two_scale_bar"], ['dynamics.numerics.mass_scaled=["lower","upper"]'])
+    assert forecast_structure(case).coupled.substeps == 1
