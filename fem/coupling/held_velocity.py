@@ -98,11 +98,10 @@ class Macro(Answered):
 
 
 class WindowMotion(Motion):
-    """The motion of a driven model: a body acceleration pushes it once a window, as it does the model that drives it.
+    """The motion of a model beside another one that takes whole windows: body accelerations push both alike.
 
-    Acting in every substep, it would let the model run ahead of a cut that is held over the window and come back: it
-    ends where it began, but what pulled it back (DT^2 a / 12 times the stiffness at the cut, or so) acts on one model
-    only, and in free fall the two would part.
+    All substeps of a window are pushed as it begins, the first also by what makes the mean velocity of the window that
+    of a step of the other model, (m - 1) / 2 times the change since the window before: in free fall the two never part.
     """
 
     def __init__(
@@ -118,13 +117,22 @@ class WindowMotion(Motion):
         super().__init__(body, loads, plan.step, held, extra_mass)
 
     def body_acceleration(self, time: float) -> NDArray[np.float64]:
-        """Return m times the loads' accelerations ``(3,)`` [m/s^2] where a window begins, nothing between."""
-        at_window = round(time / self.step) % self._substeps == 0
-        return self._substeps * super().body_acceleration(time) if at_window else np.zeros(3)
+        """Return the acceleration ``(3,)`` [m/s^2] of the substep that begins at a time [s]."""
+        now = self.window_acceleration(time)
+        if round(time / self.step) % self._substeps:
+            return now
+        before = self.window_acceleration(max(time - self._substeps * self.step, 0.0))
+        return now + 0.5 * (self._substeps - 1) * (now - before)
+
+    def window_acceleration(self, time: float) -> NDArray[np.float64]:
+        """Return the sum of the loads' accelerations ``(3,)`` [m/s^2] as the window of a time [s] begins."""
+        return super().body_acceleration(time - round(time / self.step) % self._substeps * self.step)
 
 
 class Driven(Continued):
     """A meso model whose cut moves at the macro model's velocity."""
+
+    motion: WindowMotion
 
     def __init__(self, body: Body, loads: list[Load], plan: WindowPlan, channels: CutChannels) -> None:
         """Start at rest."""
@@ -132,21 +140,31 @@ class Driven(Continued):
         self.motion = WindowMotion(body, loads, plan, local_cut(body), np.zeros(len(body.mass)))
         self.plan = plan
         self.interface_work = 0.0
-        self._counted = counted_cut(body)
+        self._cut, self._counted = local_cut(body), counted_cut(body)
         self._zero = np.zeros((len(body.mass), 3))
 
     def follow(self) -> float:
-        """Take m substeps at the received velocity of the cut; return the work that came in across it [J]."""
-        motion = self.motion
+        """Take m substeps at the received velocity of the cut; return the work that came in across it [J].
+
+        Inside the window the cut falls as all else does, and ends where the macro model's is.
+        """
+        motion, count = self.motion, self.plan.substeps
         self._channels.velocities.receive(motion.velocity)
-        impulse = np.zeros((len(self._counted), 3))
+        given, impulse = motion.velocity[self._cut], np.zeros((len(self._counted), 3))
+        acceleration = motion.window_acceleration(motion.time)
+        falls = motion.step * np.outer(np.arange(count) - 0.5 * (count - 1), acceleration)
+        sums = [motion.force[self._counted].sum(axis=0)]
         add_impulse(self._counted, motion.force, 0.5 * motion.step, impulse)
-        for _ in range(self.plan.substeps):
+        for fall in falls:
+            motion.velocity[self._cut] = given + fall
             motion.advance()
             motion.update_force()
             add_impulse(self._counted, motion.force, motion.step, impulse)
+            sums.append(motion.force[self._counted].sum(axis=0))
         add_impulse(self._counted, motion.force, -0.5 * motion.step, impulse)
-        return -float(np.sum(impulse * motion.velocity[self._counted]))
+        motion.velocity[self._cut] = given
+        mean = 0.5 * motion.step * (np.array(sums[1:]) + np.array(sums[:-1]))
+        return -float(np.sum(impulse * motion.velocity[self._counted]) + np.sum(mean * falls))
 
     def finish_window(self) -> None:
         """Do nothing: the window is done."""
