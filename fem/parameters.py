@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
 
+MOST_LEVELS = 4  # below the window, that "auto" tries
 ServiceCondition = Literal["A", "B", "C", "D", "E", "F", "G", "H"]
 
 
@@ -61,6 +62,19 @@ class Coupling(Parameters):
     direction: Literal["two_way", "one_way"] = "two_way"
     levels: Literal["auto"] | Annotated[int, Field(ge=1)] = "auto"
     buffer_layers: int = Field(2, ge=2, le=20)
+
+    @field_validator("levels")
+    @classmethod
+    def _of_local_steps(cls, value: int | str, info: ValidationInfo) -> int | str:
+        scheme = info.data.get("scheme", "auto")
+        if value != "auto" and scheme not in ("auto", "local_steps"):
+            raise PydanticCustomError("inadmissible", f"does not go with scheme = {scheme}", {"allowed": "auto"})
+        return value
+
+    @property
+    def most_levels(self) -> int:
+        """Return how many levels below the window may be tried."""
+        return MOST_LEVELS if self.levels == "auto" else self.levels
 
 
 class JointCoupling(Coupling):

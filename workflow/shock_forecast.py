@@ -13,7 +13,6 @@ if TYPE_CHECKING:
     from workflow.board_drop_case import BoardDropCase
 
 MACRO = "board"  # role of the parts whose elements the window follows
-MOST_LEVELS = 4  # that are tried where the case leaves the number open
 
 
 @dataclass(frozen=True, slots=True)
@@ -262,13 +261,16 @@ def _levels(case: "BoardDropCase", parts: Parts, window: float) -> tuple[tuple[i
     steps = np.array([scaled_to if part.mass_scaled else part.critical_step for part in parts.values()])
     box = np.array([role_of(name) == MACRO for name in parts])
     cost = np.array([part.elements * part.cost for part in parts.values()]) * np.where(box, 1.0, BOARD_ADVANTAGE)
-    wanted = case.shock.coupling.levels
-    most = MOST_LEVELS if wanted == "auto" else wanted
+    coupling = case.shock.coupling
     pace = Pace(steps, cost, window, case.shock.numerics.step_fraction)
     try:
-        level, ratios = choose_levels(np.arange(len(steps), dtype=np.int32)[:, None], Tie.none(), pace, most)
+        level, ratios = choose_levels(
+            np.arange(len(steps), dtype=np.int32)[:, None], Tie.none(), pace, coupling.most_levels
+        )
     except LevelError as error:
-        raise CaseError("plan", [Problem("shock.coupling.levels", str(error), wanted, "auto, or more")]) from error
+        raise CaseError(
+            "plan", [Problem("shock.coupling.levels", str(error), coupling.levels, "auto, or more")]
+        ) from error
     return ratios, dict(zip(parts, level.tolist(), strict=True))
 
 

@@ -14,7 +14,6 @@ from fem.errors import LevelError
 from fem.estimate import BOARD_ADVANTAGE, UPDATES_PER_SECOND, WINDOW_OVERHEAD, damped_critical_step
 from fem.levels.choose import SUBSTEP_COST, Pace, choose_levels
 
-MOST = 4  # levels that "auto" tries
 # Of the coarse cells, those that may need less than the window: none, a few at the walls of holes, the finer half.
 EXCEPTIONS = (0.0, 0.02, 0.5)
 SHARES = (1.0, 1.0 / 1.5, 0.5)  # of these windows: on packages the largest is within 5 % of the best there is
@@ -48,8 +47,7 @@ def window_steps(coarse: NDArray[np.float64]) -> Iterator[float]:
 
 def levels_below(whole: Whole, survey: Survey, step: float, rules: Rules) -> Division:
     """Return the division of the window that follows a critical step [s]; errors as ``choose_levels``."""
-    plan, wanted = rules.plan(step, step), rules.coupling.levels
-    most = MOST if wanted == "auto" else wanted
+    plan, most = rules.plan(step, step), rules.coupling.most_levels
     pace = Pace(survey.step, survey.cost, plan.window, rules.fraction, rules.stiffness)
     level, ratios = choose_levels(whole.mesh.cells, whole.tie, pace, most)
     plan = replace(plan, substeps=math.prod(ratios))

@@ -58,7 +58,7 @@ def scheme_of(name: SchemeName, direction: Direction = "two_way") -> Scheme:
     """
     if name == "gravouil_combescure":
         if direction == "one_way":
-            raise ValueError("gravouil_combescure links two models; one_way needs held_velocity or local_steps")
+            raise ValueError("gravouil_combescure links two models; one_way needs held_velocity")
         return GravouilCombescure()
     if name == "impulse" and direction == "two_way":
         return Impulse()

@@ -42,6 +42,11 @@ def test_more_critical_joints_than_joints_are_refused():
         read_case(SMALL_CASE, ["shock.coupling.fine_joints=critical", "shock.coupling.critical_joints=5"])
 
 
+def test_levels_are_refused_where_the_scheme_has_none():
+    with pytest.raises(CaseError, match=r"levels = 2: does not go with scheme = held_velocity; allowed: auto"):
+        read_case(SMALL_CASE, ["shock.coupling.scheme=held_velocity", "shock.coupling.levels=2"])
+
+
 def test_a_new_case_shows_what_the_keys_take():
     text = case_text(read_case(SMALL_CASE), "small")
     lines = {line.split(" = ")[0]: line for line in text.splitlines()}
