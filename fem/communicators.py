@@ -28,7 +28,7 @@ class Communicators:
             for role, ranks in placement.ranks.items()
         }
         self.models: dict[Role, MPI.Comm] = {role: comm for role, comm in split.items() if comm != MPI.COMM_NULL}
-        HERE.models = ", ".join(self.models)
+        HERE.carry(self.models)
 
     def __enter__(self) -> Self:
         """Return self."""

@@ -39,6 +39,7 @@ class Watchdog:
         self._rank, self._limit, self._tick = world.rank, limit, min(TICK, limit / TICKS)
         self._board = StatusBoard(folder / name)
         self._board.write(self._status(0.0))
+        HERE.tell = lambda: self._board.write(self._status(0.0))
         self._heard, wakeup = os.pipe()
         os.set_blocking(wakeup, False)
         self._wakeup = wakeup
@@ -55,7 +56,7 @@ class Watchdog:
         os.write(self._wakeup, b"\0")
         self._thread.join()
         self._board.close(self._rank == 0)
-        HERE.world = None
+        HERE.world, HERE.tell = None, None
 
     def speak(self, text: str, details: str = "") -> None:
         """Say why the run ends, and from where it could continue, unless another rank has."""

@@ -3,7 +3,7 @@
 A mark costs some tens of nanoseconds: no clock, no lock, no text is made.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
@@ -22,6 +22,7 @@ class Whereabouts:
         waits: How many waits there were.
         slow: What it does that may take any time while others wait; empty while it does no such thing.
         checkpoint: The latest checkpoint; empty without one.
+        tell: Lets the other ranks know of it at once.
     """
 
     world: MPI.Comm | None = None
@@ -31,11 +32,18 @@ class Whereabouts:
     waits: int = 0
     slow: str = "sets up"
     checkpoint: str = ""
+    tell: Callable[[], None] | None = None
 
     def begin(self, world: MPI.Comm) -> None:
         """Begin a run."""
         self.world, self.models, self.window, self.waiting = world, "", -1, ""
         self.slow, self.checkpoint = "sets up", ""
+
+    def carry(self, models: Iterable[str]) -> None:
+        """Carry some models from here on."""
+        self.models = ", ".join(models)
+        if self.tell is not None:
+            self.tell()
 
     def wait_for(self, what: str) -> None:
         """Begin to wait."""
