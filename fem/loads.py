@@ -5,7 +5,7 @@ step's work. The work of a force over a step is the mean of its values at both e
 them, so that with ``Motion.kinetic_energy`` the ledger of a linear model is exact at any step.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
@@ -192,7 +192,10 @@ class NodalForces(Load):
         self.work += 0.5 * motion.step * self._factor * float(power)
 
 
-def nodal(body: Body, pattern: NDArray[np.float64]) -> tuple[NDArray[np.int32], NDArray[np.float64], NDArray[np.bool_]]:
+NodalPattern = tuple[NDArray[np.int32], NDArray[np.float64], NDArray[np.bool_]]
+
+
+def nodal(body: Body, pattern: NDArray[np.float64]) -> NodalPattern:
     """Return the local nodes ``(k,)`` where a pattern ``(n, 3)`` is not zero, its rows, and which this rank counts."""
     rows = np.flatnonzero(pattern.any(axis=1)).astype(np.int32)
     return rows, pattern[rows], body.shared.owned[rows]
@@ -209,41 +212,44 @@ class FineSupports(Load):
     """How supports of elements in levels bear body forces: what levels add to them.
 
     Attributes:
-        nodes: ``(k,)`` local nodes.
-        pattern: ``(3, k, 3)`` force [N] for a unit acceleration of the body along each axis, summed over ranks.
-        owned: ``(k,)`` whether the node counts on this rank.
+        patterns: Per axis, for a unit acceleration of the body along it: local nodes ``(k,)``, their forces ``(k, 3)``
+            [N] summed over ranks, whether they count on this rank. Most supports bear nothing along most axes.
     """
 
     kept: ClassVar[Mapping[str, Kept]] = {"work": "sum", "_factor": "same"}
 
     def __init__(self) -> None:
         """Begin without acceleration."""
-        self.nodes, self.pattern, self.owned = np.empty(0, np.intp), np.zeros((3, 0, 3)), np.empty(0, dtype=bool)
+        self.patterns: list[NodalPattern] = []
         self._factor = np.zeros(3)
 
     def carry(self, body: Body) -> None:
-        """Find the pattern."""
+        """Find the patterns."""
         nothing = np.zeros((len(body.mass), 3))
-        pattern = np.array([carried(body, nothing, fall) for fall in np.eye(3)])
-        self.nodes = np.flatnonzero(pattern.any(axis=(0, 2)))
-        self.pattern, self.owned = pattern[:, self.nodes], body.shared.owned[self.nodes]
+        self.patterns = [nodal(body, carried(body, nothing, fall)) for fall in np.eye(3)]
 
     def add(self, motion: "Motion") -> None:
         """Add the force for the motion's body acceleration."""
         self._factor = motion.gravity
-        motion.force[self.nodes] += self._force()
+        for factor, (nodes, force, _) in self._acting():
+            motion.force[nodes] += factor * force
 
     def remove(self, force: NDArray[np.float64]) -> None:
         """Subtract it from a copy."""
-        force[self.nodes] -= self._force()
+        for factor, (nodes, own, _) in self._acting():
+            force[nodes] -= factor * own
 
     def collect(self, motion: "Motion") -> None:
         """Add half a step's work."""
-        power = np.sum((self._force() * motion.velocity[self.nodes])[self.owned])
-        self.work += 0.5 * motion.step * float(power)
+        for factor, (nodes, force, owned) in self._acting():
+            power = np.sum(force[owned] * motion.velocity[nodes[owned]])
+            self.work += 0.5 * motion.step * factor * float(power)
 
-    def _force(self) -> NDArray[np.float64]:
-        return np.tensordot(self._factor, self.pattern, 1)
+    def _acting(self) -> Iterator[tuple[float, NodalPattern]]:
+        """Yield the accelerations that some nodes bear, with their patterns."""
+        for factor, pattern in zip(self._factor, self.patterns, strict=True):
+            if factor and len(pattern[0]):
+                yield float(factor), pattern
 
 
 @dataclass
