@@ -13,7 +13,7 @@ from fem.agreement import agreed
 from fem.body import Body, Pieces, Response, make_body, make_pieces
 from fem.communicators import Communicators, Role
 from fem.coupling.checks import check_division
-from fem.coupling.divide import divide, scheme_for
+from fem.coupling.divide import divide
 from fem.coupling.division import SchemeName
 from fem.coupling.fine_joints import copied_joints, read_scene
 from fem.coupling.record import coupling_record
@@ -113,8 +113,7 @@ def divided_on_one_rank(request: RunInput) -> Divided[JointTables]:
         steps=steps,
         rules=rules,
         scheme=division.scheme,
-        coupling={"direction": shock.coupling.direction}
-        | coupling_record(division, found, scheme_for(whole, found, rules).why, len(first.tables.cut)),
+        coupling={"direction": shock.coupling.direction} | coupling_record(division, found, len(first.tables.cut)),
     )
 
 

@@ -21,15 +21,16 @@ def divide(whole: Whole, survey: Survey, rules: Rules) -> Division:
     Raises:
         LevelError: Steps that differ by more than levels bridge.
     """
+    choice = scheme_for(whole, survey, rules)
     if rules.copied is not None and rules.copy is not None:
-        return submodel(whole, survey, rules, rules.copied, rules.copy)
+        return replace(submodel(whole, survey, rules, rules.copied, rules.copy), why=choice.why)
     divided = {
         "held_velocity": by_buffer,
         "impulse": carried,
         "gravouil_combescure": at_ties,
         "local_steps": by_levels,
     }
-    return divided[scheme_for(whole, survey, rules).scheme](whole, survey, rules)
+    return replace(divided[choice.scheme](whole, survey, rules), why=choice.why)
 
 
 def scheme_for(whole: Whole, survey: Survey, rules: Rules) -> Choice:

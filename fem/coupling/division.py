@@ -24,6 +24,7 @@ class Division:
         ratios: Steps of level k + 1 in one of level k.
         plan: Window and substeps.
         copy: One way, ``(ne,)`` cells of the macro model that stand for finer ones of the meso model.
+        why: Why this scheme, in words.
     """
 
     scheme: SchemeName
@@ -33,6 +34,7 @@ class Division:
     ratios: tuple[int, ...]
     plan: WindowPlan
     copy: NDArray[np.bool_] | None = None
+    why: str = ""
 
     @property
     def around(self) -> NDArray[np.bool_]:

@@ -8,7 +8,7 @@ from fem.coupling.division import Division
 from fem.coupling.whole import Survey
 
 
-def coupling_record(division: Division, survey: Survey, why: str, cut_nodes: int) -> dict[str, Any]:
+def coupling_record(division: Division, survey: Survey, cut_nodes: int) -> dict[str, Any]:
     """Return scheme and why, share of the meso model, nodes of the cut, levels of time steps with their elements."""
     plan = division.plan
     held = division.scheme != "local_steps"
@@ -17,7 +17,7 @@ def coupling_record(division: Division, survey: Survey, why: str, cut_nodes: int
     cost = np.array([float(survey.cost[level == k].sum()) / step for k, step in enumerate(steps)])
     return {
         "scheme": division.scheme,
-        "why": why,
+        "why": division.why,
         "m": plan.substeps,
         "ratios": [plan.substeps] if held else list(division.ratios),
         "meso_share": float(division.meso.mean()),

@@ -7,7 +7,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from fem.coupling.checks import check_division
-from fem.coupling.divide import divide, scheme_for
+from fem.coupling.divide import divide
 from fem.coupling.division import Division
 from fem.coupling.placement import Role
 from fem.coupling.record import coupling_record
@@ -63,7 +63,7 @@ def divided_on_one_rank(request: StructureInput) -> DividedStructure:
         steps=steps_of_division(whole, found, division, rules),
         rules=rules,
         scheme=division.scheme,
-        coupling=coupling_record(division, found, scheme_for(whole, found, rules).why, len(inputs["macro"].tables.cut)),
+        coupling=coupling_record(division, found, len(inputs["macro"].tables.cut)),
     )
 
 

@@ -14,7 +14,6 @@ from fem.agreement import agreed
 from fem.checkpoint import Checkpoints
 from fem.checkpoint_files import digest_of_files
 from fem.communicators import Communicators, Role
-from fem.coupling.checks import check_pulses
 from fem.coupling.placement import shared
 from fem.coupling.planner import Plan, loads_of, plan_ranks
 from fem.coupling.self_check import recorded
@@ -122,8 +121,6 @@ def start_two(
     cells: Mapping[Role, NDArray[np.int32]],
 ) -> Started:
     """Return the coupled models of this rank; ``cells`` are those of ``planner.Plan``; collective."""
-    window, fraction = divided.steps.plan.window, request.dynamics.numerics.step_fraction
-    agreed(comms.world, lambda: check_pulses(pulse_durations(pulses), window, fraction))
     models = build_coupled(comms, divided, request, cells)
     crew, channels, checked = couple_models(comms, models, request, pulses, divided.scheme)
     return Started(models, crew, None, channels, divided.coupling | recorded(checked))
