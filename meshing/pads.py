@@ -1,6 +1,8 @@
 """The pad table: where every joint sits, what solder can wet, and the gap that it bridges."""
 
 import json
+import math
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TypeVar
@@ -18,7 +20,16 @@ Length = TypeVar("Length", float, np.ndarray)
 
 @dataclass(frozen=True, slots=True)
 class PadSite:
-    """One joint's place: axis (x, y), copper-to-copper gap and radii, all in metres; row and column from 0."""
+    """One joint's place: its pads, the package's relative to the board's; in metres, row and column from 0.
+
+    Attributes:
+        name: JEDEC name.
+        x, y: centre of the pad on the board.
+        gap: height of the centre of the package's pad over that of the board's, copper to copper.
+        z_board: height of the board's copper over the board.
+        offset: x and y of the centre of the package's pad, seen from the board's.
+        tilt: rotation vector of the package's pad about its centre: turns about the x and the y axis [rad].
+    """
 
     name: str
     row: int
@@ -31,6 +42,8 @@ class PadSite:
     pad_radius_board: float
     pad_radius_package: float
     z_board: float
+    offset: tuple[float, float] = (0.0, 0.0)
+    tilt: tuple[float, float] = (0.0, 0.0)
 
 
 def row_name(row: int) -> str:
@@ -56,7 +69,7 @@ def pad_table(package: Package, board: Board, warpage: Warpage) -> list[PadSite]
     Args:
         package: array, pads, standoff.
         board: its symmetry decides whether only x > 0, y > 0 is kept.
-        warpage: lift of the package, which widens or narrows each gap.
+        warpage: lift of the package, which widens or narrows each gap and tilts the pads above it.
     """
     corner = corner_axis(package)
     sites = []
@@ -68,18 +81,30 @@ def pad_table(package: Package, board: Board, warpage: Warpage) -> list[PadSite]
             if name in package.depopulated or (board.symmetry == "quarter" and (x < 0 or y < 0)):
                 continue
             gap = package.standoff + float(lift(package, warpage, x, y))
-            sites.append(PadSite(name, row, column, x, y, gap, **_pad_sizes(package)))
+            tilt = _tilt(package, warpage, x, y)
+            sites.append(PadSite(name, row, column, x, y, gap, *_pad_sizes(package), tilt=tilt))
     return sites
 
 
-def _pad_sizes(package: Package) -> dict[str, float]:
-    return {
-        "wetted_radius_board": package.board_pad.wetted_radius,
-        "wetted_radius_package": package.package_pad.wetted_radius,
-        "pad_radius_board": 0.5 * package.board_pad.diameter,
-        "pad_radius_package": 0.5 * package.package_pad.diameter,
-        "z_board": package.copper.thickness,
-    }
+def _tilt(package: Package, warpage: Warpage, x: float, y: float) -> tuple[float, float]:
+    """Return the rotation vector (x, y) [rad] that lays a pad into the tangent plane of the lift w(x, y).
+
+    Its normal is that of the surface, (-w_x, -w_y, 1), reached from the z axis by the smallest turn.
+    """
+    corner = corner_axis(package)
+    if corner == (0.0, 0.0):
+        return 0.0, 0.0
+    slope_x, slope_y = warpage.slope(x, y, *corner)
+    steepness = math.hypot(slope_x, slope_y)
+    turn = math.atan(steepness) / steepness if steepness else 1.0
+    return turn * slope_y, -turn * slope_x
+
+
+def _pad_sizes(package: Package) -> tuple[float, float, float, float, float]:
+    """Return wetted radii, radii of the copper (each board, package) and height of the board's copper [m]."""
+    board, upper = package.board_pad, package.package_pad
+    wetted = board.wetted_radius, upper.wetted_radius
+    return *wetted, 0.5 * board.diameter, 0.5 * upper.diameter, package.copper.thickness
 
 
 def has_rim(pad_radius: float, wetted_radius: float) -> bool:
@@ -95,11 +120,12 @@ def lift(package: Package, warpage: Warpage, x: Length, y: Length) -> Length:
     return warpage.height(x, y, corner_x, corner_y)
 
 
-def write_pads(path: Path, sites: list[PadSite]) -> None:
+def write_pads(path: Path, sites: Iterable[PadSite]) -> None:
     """Write the pad table as JSON."""
     path.write_text(json.dumps([asdict(site) for site in sites], indent=1) + "\n")
 
 
 def read_pads(path: Path) -> list[PadSite]:
     """Read a pad table written by ``write_pads``."""
-    return [PadSite(**record) for record in json.loads(path.read_text())]
+    pairs = ("offset", "tilt")
+    return [PadSite(**record | {key: tuple(record[key]) for key in pairs}) for record in json.loads(path.read_text())]

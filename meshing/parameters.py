@@ -127,3 +127,8 @@ class Warpage(Parameters):
     def height(self, x, y, corner_x: float, corner_y: float):
         """Return the lift of the package's underside at (x, y) [m]; scalars or arrays [m]."""
         return self.corner * (x**2 + y**2) / (corner_x**2 + corner_y**2)
+
+    def slope(self, x, y, corner_x: float, corner_y: float):
+        """Return the derivatives of the lift along x and y; scalars or arrays."""
+        twice = 2.0 * self.corner / (corner_x**2 + corner_y**2)
+        return twice * x, twice * y

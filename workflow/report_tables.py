@@ -101,7 +101,7 @@ def versions() -> dict:
 
 def joint_records(run_folder: Path) -> list[dict]:
     """Join pad table, reflow metrics and mesh quality: one flat record a joint, SI units."""
-    pads = json.loads((run_folder / "geometry" / "pads.json").read_text())
+    pads = json.loads((run_folder / "reflow" / "pads.json").read_text())
     reflow = json.loads((run_folder / "reflow" / "joints.json").read_text())
     quality = json.loads((run_folder / "solder_mesh" / "quality.json").read_text())
     records = []

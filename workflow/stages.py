@@ -37,7 +37,7 @@ def geometry(run: Run[BoardDropCase], folder: Path) -> Findings:
 
 def reflow(run: Run[BoardDropCase], folder: Path) -> Findings:
     """Melt the solder of each distinct joint between its pads."""
-    from meshing.pads import read_pads
+    from meshing.pads import read_pads, write_pads
     from particles.effects import decide_effects
     from particles.products import write_shapes
     from workflow import reflow_pool as pool
@@ -51,6 +51,7 @@ def reflow(run: Run[BoardDropCase], folder: Path) -> Findings:
     touching = pool.mark_bridges(joints, pads, mirrored=run.case.board.symmetry == "quarter")
     write_shapes(folder / "shapes.h5", shapes | pool.bridge_shapes(touching, groups, shapes, solder))
     write_json(folder / "joints.json", joints)
+    write_pads(folder / "pads.json", pads)
     highest = max(distinct.values(), key=lambda geometry: geometry.gap)
     found = findings.of_reflow(joints, decide_effects(highest, solder))
     return replace(found, continued=f"{continued} of {len(distinct)} joints" if continued else "")
@@ -86,7 +87,7 @@ def solder_mesh(run: Run[BoardDropCase], folder: Path) -> Findings:
     kinds = {"": mesh_joint} | ({"coarse_": mesh_coarse_joint} if needs_coarse_joints(case.shock.coupling) else {})
     bodies = [
         (read_surface(run.folder / f"surface/{shape_of[site.name]['shape']}.vtu"), site)
-        for site in read_pads(run.folder / "geometry/pads.json")
+        for site in read_pads(run.folder / "reflow/pads.json")
     ]
     qualities = {}
     for kind, mesh_of in kinds.items():

@@ -1,4 +1,5 @@
 import pytest
+from scipy.spatial.transform import Rotation
 
 from meshing.pads import has_rim, joint_name, pad_table, read_pads, row_name, write_pads
 from meshing.parameters import Warpage
@@ -54,3 +55,14 @@ def test_table_survives_its_file(tmp_path):
     sites = pad_table(package(), board(), Warpage(corner=0.03 * MM))
     write_pads(tmp_path / "pads.json", sites)
     assert read_pads(tmp_path / "pads.json") == sites
+
+
+def test_pads_lie_in_the_tangent_plane_of_the_lift():
+    """The normal of a turned pad is that of the lifted surface: (-w_x, -w_y, 1)."""
+    sites = pad_table(package(rows=10, columns=10), board(), Warpage(corner=0.5 * MM))
+    for site in sites:
+        normal = Rotation.from_rotvec([*site.tilt, 0.0]).apply([0.0, 0.0, 1.0])
+        slope = 2.0 * 0.5 * MM / (2.0 * (4.5 * MM) ** 2)
+        assert normal / normal[2] == pytest.approx([-slope * site.x, -slope * site.y, 1.0], rel=1e-12)
+        assert site.offset == (0.0, 0.0)
+    assert not any(any(site.tilt) for site in pad_table(package(), board(), Warpage()))
