@@ -4,6 +4,7 @@ from pathlib import Path
 
 from fem.materials.roles import Materials
 from fem.parameters import Shock
+from fem.thermal.parameters import Thermal
 from meshing.parameters import Board, Package, Warpage
 from particles.parameters import Solder
 from workflow import fields
@@ -22,6 +23,7 @@ class BoardDropCase(Case):
     package: Package
     board: Board
     warpage: Warpage = Warpage()
+    thermal: Thermal | None = None
     solder: Solder
     materials: Materials = Materials()
     shock: Shock
@@ -42,6 +44,7 @@ class BoardDropCase(Case):
     def problems(self) -> list[Problem]:
         """Find parameters that make no possible package, joint, board or shock together."""
         from fem import shock_checks
+        from fem.thermal import checks as thermal_checks
         from meshing import checks as meshing_checks
         from meshing.pads import pad_table
         from particles import checks as particles_checks
@@ -49,10 +52,13 @@ class BoardDropCase(Case):
         from workflow.reflow_pool import joint_geometries
 
         contradictions = meshing_checks.problems(self.package, self.board, self.warpage)
+        heated = (
+            thermal_checks.problems(self.thermal, self.materials.by_role, self.warpage.corner) if self.thermal else []
+        )
         known = {key: field for key, _, field in fields.leaves(self)}
         impossible = [
             Problem(found.key, found.message, fields.shown(found.value, known.get(found.key)), found.allowed)
-            for found in contradictions or shock_checks.problems(self.shock)
+            for found in contradictions or shock_checks.problems(self.shock) + heated
         ]
         if contradictions:
             return impossible

@@ -79,7 +79,11 @@ BOARD_DROP = Pipeline(
             ("geometry/assembly.msh", "geometry/pads.json", "geometry/preview.png"),
         ),
         Stage(
-            "reflow", (*ARRAY, "solder"), (), ("reflow/shapes.h5", "reflow/joints.json", "reflow/pads.json"), pads=True
+            "reflow",
+            (*ARRAY, "thermal", "solder"),
+            (),
+            ("reflow/shapes.h5", "reflow/joints.json", "reflow/pads.json"),
+            pads=True,
         ),
         Stage("surface", (), ("reflow",), ("surface/surfaces.json",)),
         Stage(

@@ -84,6 +84,7 @@ KINDS = {
     "surface tension": "N/m",
     "viscosity": "Pa*s",
     "temperature": "K",
+    "thermal expansion": "ppm/K",
     "mass": "kg",
     "force": "N",
     "frequency": "Hz",

@@ -1,4 +1,4 @@
-"""Parameters of materials: elasticity of three symmetries, plasticity of Johnson and Cook.
+"""Parameters of materials: elasticity of three symmetries, thermal expansion, plasticity of Johnson and Cook.
 
 All values are SI floats; see ``meshing.parameters`` for what the unit strings mean.
 """
@@ -15,6 +15,30 @@ Pressure = Annotated[float, "GPa"]
 Stress = Annotated[float, "MPa"]
 Density = Annotated[float, "kg/m^3"]
 Temperature = Annotated[float, "degC"]
+Expansion = Annotated[float | None, "ppm/K"]
+
+
+class Expanding(Parameters):
+    """Base of materials: their coefficients of thermal expansion, which need not be known where nothing warms up."""
+
+    EXPANSION: ClassVar[tuple[str, str, str]]
+
+    @property
+    def unknown_expansion(self) -> tuple[str, ...]:
+        """Return the names of the coefficients that are not given."""
+        return tuple(name for name in dict.fromkeys(self.EXPANSION) if getattr(self, name) is None)
+
+    @property
+    def expansion(self) -> tuple[float, float, float]:
+        """Return the coefficients of linear thermal expansion along x, y, z [1/K].
+
+        Raises:
+            ValueError: One is not given.
+        """
+        if self.unknown_expansion:
+            raise ValueError(f"{' and '.join(self.unknown_expansion)} of {self!r} is not given")
+        x, y, z = (getattr(self, name) for name in self.EXPANSION)
+        return x, y, z
 
 
 class EngineeringConstants(NamedTuple):
@@ -68,13 +92,15 @@ class JohnsonCook(Parameters):
         return 1.0 - max(0.0, relative) ** self.m
 
 
-class Isotropic(Parameters):
+class Isotropic(Expanding):
     """Isotropic linear elastic material; ``plasticity`` makes it yield, ``temperature`` softens that."""
 
+    EXPANSION: ClassVar[tuple[str, str, str]] = ("thermal_expansion",) * 3
     kind: Literal["isotropic"] = "isotropic"
     density: Density = Field(gt=0)
     young_modulus: Pressure = Field(gt=0)
     poisson_ratio: float = Field(gt=-1, lt=0.5)
+    thermal_expansion: Expansion = None
     plasticity: JohnsonCook | None = None
     temperature: Temperature = Field(298.15, gt=0, validate_default=True)
 
@@ -109,13 +135,18 @@ class Isotropic(Parameters):
         return self.model_copy(update={"plasticity": None})
 
 
-class Orthotropic(Parameters):
+class Orthotropic(Expanding):
     """Orthotropic linear elastic laminate, equal in x and y (z is the thickness).
 
     ``poisson_ratio_out_of_plane`` is nu_xz: contraction in z under tension in x.
     """
 
     plasticity: ClassVar[None] = None
+    EXPANSION: ClassVar[tuple[str, str, str]] = (
+        "thermal_expansion_in_plane",
+        "thermal_expansion_in_plane",
+        "thermal_expansion_out_of_plane",
+    )
     kind: Literal["orthotropic"] = "orthotropic"
     density: Density = Field(gt=0)
     young_modulus_in_plane: Pressure = Field(gt=0)
@@ -124,6 +155,8 @@ class Orthotropic(Parameters):
     poisson_ratio_out_of_plane: float
     shear_modulus_in_plane: Pressure = Field(gt=0)
     shear_modulus_out_of_plane: Pressure = Field(gt=0)
+    thermal_expansion_in_plane: Expansion = None
+    thermal_expansion_out_of_plane: Expansion = None
 
     @field_validator("poisson_ratio_out_of_plane")
     @classmethod
@@ -148,13 +181,14 @@ class Orthotropic(Parameters):
         )
 
 
-class GeneralOrthotropic(Parameters):
+class GeneralOrthotropic(Expanding):
     """Orthotropic linear elastic material with nine constants along the axes x, y, z.
 
     ``poisson_ratio_xy`` is the contraction in y under tension in x, the others likewise.
     """
 
     plasticity: ClassVar[None] = None
+    EXPANSION: ClassVar[tuple[str, str, str]] = ("thermal_expansion_x", "thermal_expansion_y", "thermal_expansion_z")
     kind: Literal["general_orthotropic"] = "general_orthotropic"
     density: Density = Field(gt=0)
     young_modulus_x: Pressure = Field(gt=0)
@@ -166,6 +200,9 @@ class GeneralOrthotropic(Parameters):
     shear_modulus_xy: Pressure = Field(gt=0)
     shear_modulus_yz: Pressure = Field(gt=0)
     shear_modulus_xz: Pressure = Field(gt=0)
+    thermal_expansion_x: Expansion = None
+    thermal_expansion_y: Expansion = None
+    thermal_expansion_z: Expansion = None
 
     @field_validator("poisson_ratio_xy", "poisson_ratio_yz", "poisson_ratio_xz")
     @classmethod

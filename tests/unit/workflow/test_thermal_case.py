@@ -1,0 +1,71 @@
+"""The reflow's temperatures in a case file, how materials expand, and what is said about impossible values."""
+
+import pytest
+
+from fem.materials.library import FR4, LIBRARY
+from tests.support.workflow_command import SMALL_CASE
+from workflow.case import display_values, read_case
+from workflow.problems import CaseError
+
+PAPER = ['thermal.peak="200 degC"', 'thermal.melting="25 degC"', 'thermal.solidification="200 degC"']
+MOVED = ['thermal.package="moved"', 'thermal.corner_displacement="-0.1 mm"']
+GLASS = 'materials.board={ kind = "isotropic", density = "2 g/cm^3", young_modulus = "70 GPa", poisson_ratio = 0.2 }'
+
+
+def read(*settings: str):
+    return read_case(SMALL_CASE, ['warpage.corner="0 mm"', *settings], oversubscribe=True)
+
+
+def test_without_the_table_nothing_warms_up():
+    assert read_case(SMALL_CASE, oversubscribe=True).thermal is None
+
+
+def test_the_papers_course_of_temperatures():
+    case = read(*PAPER, *MOVED)
+    thermal, shown = case.thermal, display_values(case)
+    assert thermal.melting == thermal.reference == pytest.approx(298.15)
+    assert [thermal.corner(t) for t in (298.15, 385.65, 473.15)] == pytest.approx([0.0, -0.5e-4, -1e-4])
+    assert (shown["thermal.peak"], shown["thermal.corner_displacement"]) == ("200 degC", "-0.1 mm")
+    assert shown["materials.board.thermal_expansion_out_of_plane"] == "84 ppm/K"
+
+
+def test_a_material_expands_as_it_says():
+    assert read(
+        "thermal.steps=2", GLASS.replace(" }", ', thermal_expansion = "9 ppm/degC" }')
+    ).materials.board.expansion
+    assert read(GLASS).materials.board.unknown_expansion == ("thermal_expansion",)
+    assert FR4.expansion == (16e-6, 16e-6, 84e-6)
+    assert not any(material.unknown_expansion for material in LIBRARY.values())
+
+
+FAULTS = {
+    "cools": (['thermal.peak="5 degC"'], ['thermal.peak = "5 degC"', ">= 25 degC, the reference"]),
+    "melts above the peak": (PAPER[:1], ["thermal.melting", ">= 25 degC, the reference and <= 200 degC, the peak"]),
+    "freezes above the peak": (
+        ['thermal.solidification="250 degC"'],
+        ['thermal.solidification = "250 degC"', "<= 245 degC, the peak"],
+    ),
+    "liquid in the end": (['thermal.final="0.5 kK"'], ["thermal.final", "<= 217 degC, the solidification"]),
+    "no temperature": (['thermal.peak="3 mm"'], ["is a length; wanted is a temperature"]),
+    "floats and is moved": (MOVED[1:], ["thermal.corner_displacement", "does not go with package = floating"]),
+    "moved nowhere": (MOVED[:1], ["thermal.corner_displacement: is missing"]),
+    "name": (["thermal.corner_displacment=1"], ["did you mean thermal.corner_displacement?"]),
+    "switch": (["thermal.effects.flexible=yes"], ["one of auto, on, off"]),
+    "steps": (["thermal.steps=0"], [">= 1 and <= 200"]),
+    "warped twice": (
+        ["thermal.steps=1", 'warpage.corner="0.08 mm"'],
+        ["warpage.corner", "which computes the warpage", "thermal.effects.flexible = off"],
+    ),
+    "no expansion": (["thermal.steps=1", GLASS], ["materials.board.thermal_expansion: is missing", "16 ppm/K"]),
+    "no expansion coefficient": (
+        [GLASS.replace(" }", ', thermal_expansion = "9 K" }')],
+        ["materials.board.thermal_expansion", "wanted is a thermal expansion, e.g. in ppm/K"],
+    ),
+}
+
+
+@pytest.mark.parametrize(("settings", "words"), FAULTS.values(), ids=FAULTS.keys())
+def test_impossible_courses_are_refused_by_key(settings, words):
+    with pytest.raises(CaseError) as caught:
+        read(*settings)
+    assert [word for word in words if word not in str(caught.value)] == []
