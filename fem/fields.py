@@ -1,5 +1,6 @@
 """Fields for ParaView: displacement, and per cell von Mises stress [Pa], neglected and plastic strain, and part."""
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -91,3 +92,15 @@ class Fields:
     def close(self) -> None:
         """Close the file."""
         self._file.close()
+
+
+def element_peaks(world: MPI.Comm, files: Iterable[Fields], parts: Sequence[str]) -> dict[str, dict[str, float]]:
+    """Return the largest value of each cell field in each part, over all models and field samples; collective."""
+    found = [file.peaks for file in files]
+    return {
+        field: {
+            name: world.allreduce(max(peaks[field].get(part, 0.0) for peaks in found), MPI.MAX)
+            for part, name in enumerate(parts)
+        }
+        for field in found[0]
+    }

@@ -13,6 +13,7 @@ from fem.communicators import Communicators, Role
 from fem.elements.hexahedron import HEXAHEDRON
 from fem.history import History
 from fem.inputs import RunInput
+from fem.kinematics import finite_rotation
 from fem.materials.effects import failure_effect, material_effects
 from fem.materials.failure import Verdicts, failed_joints, failure_criteria, judge, worst
 from fem.model import Model
@@ -52,13 +53,31 @@ class Timings:
         return {"setup": self.setup, "windows": self.windows, "fields": self.fields}
 
 
+@dataclass(frozen=True, slots=True)
+class Found:
+    """What a run has found.
+
+    Attributes:
+        history: Samples and ledger.
+        peaks: Cell field -> part -> largest value of an element at the times of the fields.
+    """
+
+    history: History
+    peaks: dict[str, dict[str, float]]
+
+    @property
+    def neglected_strain(self) -> float:
+        """Largest strain that small kinematics have left out."""
+        return max(self.peaks["neglected_strain"].values())
+
+
 # The models of this rank, the steps of the run, and what is told of its coupling.
 Built = tuple[dict[Role, Model], Steps, dict[str, Any]]
 
 
-def write_result(comms: Communicators, request: RunInput, built: Built, history: History, timings: Timings) -> None:
+def write_result(comms: Communicators, request: RunInput, built: Built, found: Found, timings: Timings) -> None:
     """Write both files on rank 0; collective."""
-    models, steps, coupling = built
+    (models, steps, coupling), history = built, found.history
     summary = model_summary(comms, request, models, steps)
     if comms.world.rank == 0:
         history.write(request.output)
@@ -69,9 +88,10 @@ def write_result(comms: Communicators, request: RunInput, built: Built, history:
             "metrics": cost_metrics(summary, updates_a_window(summary, told), timings)
             | health_metrics(history)
             | shock_metrics(arrays)
+            | {"peak_neglected_strain": quantity(found.neglected_strain)}
             | failure_metrics(verdicts),
             "health": health(history, summary, request) | worst(verdicts),
-            "effects": effects(request, summary),
+            "effects": effects(request, summary, found.neglected_strain),
             "failure": verdicts,
             "timings": timings.seconds,
             "coupling": told | {"placement": timings.balance},
@@ -210,8 +230,9 @@ def checked(checks: Mapping[str, tuple[float, float]]) -> dict[str, Any]:
     return {name: {"value": value, "limit": limit, "ok": value <= limit} for name, (value, limit) in checks.items()}
 
 
-def effects(request: RunInput, summary: dict[str, Any]) -> dict[str, Any]:
+def effects(request: RunInput, summary: dict[str, Any], neglected_strain: float) -> dict[str, Any]:
     """Return which effects the run simulated, and why."""
+    finite, why = finite_rotation("shock.numerics", request.shock.numerics.kinematics, neglected_strain)
     scaled, tied = request.shock.numerics.mass_scaled, summary["tied_nodes"]
     ratio = f"step ratio m = {summary['substeps']}"
     pulse, damping = shock_pulse(request.shock), request.shock.damping.coefficients
@@ -232,6 +253,7 @@ def effects(request: RunInput, summary: dict[str, Any]) -> dict[str, Any]:
             "on": any(damping),
             "why": f"Rayleigh damping, alpha = {damping[0]:.4g} 1/s, beta = {damping[1]:.4g} s",
         },
+        "finite_rotation": {"on": finite, "why": why},
         **material_effects(request.materials.by_role),
         **failure_effect(request.shock.failure),
     }

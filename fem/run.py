@@ -21,7 +21,7 @@ from fem.coupling.self_check import recorded
 from fem.coupling.stopwatch import Stopwatch
 from fem.coupling.whole import Treatment
 from fem.estimate import WindowPlan, implicit_plan, largest_implicit_step
-from fem.fields import Fields
+from fem.fields import Fields, element_peaks
 from fem.history import History
 from fem.implicit import ImplicitMotion
 from fem.inputs import RunInput
@@ -32,7 +32,7 @@ from fem.model import Divided, Model, build_models, divided_scene
 from fem.parameters import Shock
 from fem.participant import Alone, uncut_motion
 from fem.pulse import Pulse
-from fem.result import Timings, write_result
+from fem.result import Found, Timings, write_result
 from fem.shock_loads import shock_loads, shock_pulse
 from fem.steps import Steps
 from fem.structure.pulses import pulse_durations
@@ -74,7 +74,8 @@ def run(world: MPI.Comm, request: RunInput) -> None:
         balance = ranks.summary | stopwatch.summary(comms.world, steps.plan.windows - first)
         timings = Timings(ready - start, seconds, output_seconds, balance, first)
         coupling = divided.coupling | recorded(checked)
-        write_result(comms, request, (models, steps, coupling), history, timings)
+        peaks = element_peaks(comms.world, fields.values(), next(iter(models.values())).tables.part_names)
+        write_result(comms, request, (models, steps, coupling), Found(history, peaks), timings)
         agreed(comms.world, lambda: None)
 
 

@@ -3,10 +3,9 @@
 from collections.abc import Iterator
 from typing import Any
 
+from fem.kinematics import finite_rotation
 from fem.materials.effects import material_effects
 from fem.structure.parameters import StructureScene
-
-NEGLIGIBLE_STRAIN = 1e-4  # a tenth or less of the strains for which boards are tested
 
 
 def effects(scene: StructureScene, added_mass: float, neglected_strain: float | None = None) -> dict[str, Any]:
@@ -17,7 +16,8 @@ def effects(scene: StructureScene, added_mass: float, neglected_strain: float | 
         added_mass: Mass that scaling has added [kg].
         neglected_strain: Largest strain that a run of small kinematics has left out; None before a run.
     """
-    others = [*_loads(scene), _kinematics(scene, neglected_strain), *_scheme(scene, added_mass)]
+    rotation = finite_rotation("dynamics", scene.dynamics.kinematics, neglected_strain)
+    others = [*_loads(scene), ("finite_rotation", *rotation), *_scheme(scene, added_mass)]
     return material_effects(scene.layer_materials) | {name: {"on": on, "why": why} for name, on, why in others}
 
 
@@ -28,17 +28,6 @@ def _loads(scene: StructureScene) -> Iterator[tuple[str, bool, str]]:
         yield effect, bool(names), ", ".join(names) or f"no load of kind {kind}"
     velocity = scene.dynamics.initial_velocity
     yield "initial_velocity", any(velocity), f"dynamics.initial_velocity = {list(velocity)} m/s"
-
-
-def _kinematics(scene: StructureScene, neglected_strain: float | None) -> tuple[str, bool, str]:
-    finite = scene.dynamics.kinematics == "finite"
-    why = f"dynamics.kinematics = {scene.dynamics.kinematics}"
-    if not finite and neglected_strain is not None:
-        strain = f"{1e6 * neglected_strain:.3g} um/m"
-        why += f"; it leaves out strains of up to {strain} (half the squared displacement gradient)"
-        if neglected_strain > NEGLIGIBLE_STRAIN:
-            why += ": not negligible, compare with a run of kinematics = finite"
-    return "finite_rotation", finite, why
 
 
 def _scheme(scene: StructureScene, added_mass: float) -> Iterator[tuple[str, bool, str]]:

@@ -1,17 +1,15 @@
 """``history.npz`` and ``result.json`` of a structure."""
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from mpi4py import MPI
 from numpy.typing import NDArray
 
 from fem.communicators import Communicators, Role
 from fem.factorisation import FactorCost
-from fem.fields import Fields
 from fem.history import History
 from fem.inputs import StructureInput
 from fem.result import ADDED_MASS_LIMIT, Timings, checked, hourglass_check, quantity
@@ -39,18 +37,6 @@ class Found:
     peaks: dict[str, dict[str, float]]
     factor: FactorCost | None
     coupling: dict[str, Any] | None
-
-
-def element_peaks(world: MPI.Comm, files: Iterable[Fields], parts: Sequence[str]) -> dict[str, dict[str, float]]:
-    """Return the largest value of each cell field in each part over all models and field samples; collective."""
-    found = [file.peaks for file in files]
-    return {
-        field: {
-            name: world.allreduce(max(peaks[field].get(part, 0.0) for peaks in found), MPI.MAX)
-            for part, name in enumerate(parts)
-        }
-        for field in found[0]
-    }
 
 
 def write_result(

@@ -20,7 +20,7 @@ from fem.coupling.self_check import recorded
 from fem.coupling.stopwatch import Stopwatch
 from fem.coupling.whole import Treatment
 from fem.exchange import MessageClock
-from fem.fields import Fields
+from fem.fields import Fields, element_peaks
 from fem.history import History
 from fem.implicit import ImplicitMotion
 from fem.inputs import StructureInput
@@ -37,7 +37,7 @@ from fem.structure.model import StructureModel, build_coupled, build_structure
 from fem.structure.modes import ModeTable, find_modes
 from fem.structure.parameters import LayerCoupling
 from fem.structure.pulses import pulse_durations, pulses_of
-from fem.structure.result import Found, element_peaks, write_result
+from fem.structure.result import Found, write_result
 from fem.watch_points import PointWatch
 
 Models = Mapping[Role, StructureModel]
