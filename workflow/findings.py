@@ -178,15 +178,17 @@ def of_solder_mesh(qualities: Mapping[str, Records], effects: Mapping[str, Any])
     return Findings(metrics, health, dict(effects))
 
 
-def of_shock(results: Mapping[str, dict], folder: Path) -> Findings:
+def of_shock(results: Mapping[str, dict], folder: Path, thickness: float) -> Findings:
     """Judge the shock: the two-scale run by itself, and by the DNS where both were run.
 
     Args:
         results: ``result.json`` of each mode, the one whose figures count first.
         folder: where each mode's history is.
+        thickness: of the board [m]; small kinematics hold for deflections well below it.
     """
     first = next(iter(results))
     metrics, health = dict(results[first]["metrics"]), dict(results[first]["health"])
+    metrics["deflection_over_thickness"] = metric(metrics["peak_board_displacement"]["value"] / thickness)
     metrics |= _coupling_metrics(results[first])
     for mode, result in results.items():
         if mode != first:

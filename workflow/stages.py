@@ -105,7 +105,7 @@ def shock(run: Run[BoardDropCase], folder: Path) -> Findings:
     fine = find_fine_joints(run, folder)
     for mode in run.case.shock.numerics.modes:
         run_mode(run, folder / mode, mode, fine)
-    return findings.of_shock(read_results(folder), folder)
+    return findings.of_shock(read_results(folder), folder, run.case.board.thickness)
 
 
 def report(run: Run, folder: Path) -> Findings:

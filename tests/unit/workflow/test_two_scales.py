@@ -89,7 +89,8 @@ def test_the_ideal_ratio_counts_element_updates():
 
 def test_coupling_and_comparison_become_metrics(tmp_path):
     window = {"window_seconds": {"value": 1.0, "unit": "s"}}
-    result = {"metrics": window, "health": {}, "effects": {}, "model": MODEL}
+    bent = {"peak_board_displacement": {"value": 3e-3, "unit": "m"}}
+    result = {"metrics": window | bent, "health": {}, "effects": {}, "model": MODEL}
     for mode, factor in (("two_scale", 0.9), ("dns", 1.0)):
         (tmp_path / mode).mkdir()
         wave = factor * np.sin(np.linspace(0.0, 1.0, 5))
@@ -98,8 +99,9 @@ def test_coupling_and_comparison_become_metrics(tmp_path):
             tmp_path / mode / "history.npz", time=np.arange(5.0), joints=np.array(["A3", "A4", "B3"]), die_centre=wave,
             board_centre=wave, board_strain=wave, von_mises_board=stress, von_mises_package=stress,
         )  # fmt: skip
-    found = of_shock({"two_scale": result | {"coupling": COUPLING}, "dns": result}, tmp_path)
+    found = of_shock({"two_scale": result | {"coupling": COUPLING}, "dns": result}, tmp_path, 1e-3)
     metrics = {name: metric["value"] for name, metric in found.metrics.items()}
+    assert metrics["deflection_over_thickness"] == pytest.approx(3.0)
     assert metrics["meso_share"] == 0.4
     assert metrics["busy_share"] == 0.93
     assert metrics["coupling_overhead"] == 0.02
