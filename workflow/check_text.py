@@ -7,7 +7,7 @@ UNITS = {r".*peel_stress": "Pa", r".*plastic_work_density": "J/m^3", r"(\w+_)?fr
 
 def against_limit(name: str, check: dict) -> tuple[str, str]:
     """Return value and limit of a check."""
-    from workflow.report_tables import quantity
+    from workflow.report.tables import quantity
 
     unit = next((unit for pattern, unit in UNITS.items() if re.fullmatch(pattern, name)), "")
     value, limit = (quantity({"value": check[key], "unit": unit}) for key in ("value", "limit"))

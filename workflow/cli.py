@@ -101,7 +101,7 @@ def status(case: CasePath, settings: Settings = None, out: Out = None) -> None:
 @app.command()
 def report(case: CasePath, settings: Settings = None, out: Out = None) -> None:
     """Write the report again, from the products that are there and the values that they were made with."""
-    from workflow.report import write_report
+    from workflow.report.page import write_report
 
     _, folder = _load(case, settings, out, True)
     if not (folder / CASE).is_file():

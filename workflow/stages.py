@@ -110,7 +110,7 @@ def shock(run: Run[BoardDropCase], folder: Path) -> Findings:
 
 def report(run: Run, folder: Path) -> Findings:
     """Write report.html and summary.json from the products."""
-    from workflow.report import write_report
+    from workflow.report.page import write_report
 
     write_report(run.folder, run.case)
     return Findings()

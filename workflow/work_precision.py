@@ -11,8 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from workflow.case_text import CASES
-from workflow.report_curves import STYLE
-from workflow.report_tables import number, percent
+from workflow.report.curves import STYLE
+from workflow.report.tables import number, percent
 
 STORED = CASES / "sessile_drop" / "work_precision.json"
 PICTURE, README = STORED.with_suffix(".png"), STORED.with_name("README.md")

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from workflow import report_two_scales
 from workflow.plan_table import short
-from workflow.report_tables import costs, number, percent, quantity
+from workflow.report import two_scales
+from workflow.report.tables import costs, number, percent, quantity
 from workflow.structure import curves as structure_curves
 from workflow.structure.case import StructureCase
 from workflow.structure.findings import read_history, read_modes
@@ -69,9 +69,9 @@ def add_two_scales(result: Mapping, context: dict) -> None:
     if coupling is None:
         return
     context["tables"] |= {
-        "two_scales": report_two_scales.two_scales(coupling, result["model"], None),
-        "levels": report_two_scales.levels(coupling),
-        "placement": report_two_scales.placement(coupling),
+        "two_scales": two_scales.two_scales(coupling, result["model"], None),
+        "levels": two_scales.levels(coupling),
+        "placement": two_scales.placement(coupling),
     }
 
 

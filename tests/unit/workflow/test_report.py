@@ -7,10 +7,10 @@ import pytest
 
 from fem.materials.failure import failure_criteria, judge
 from fem.parameters import Failure
-from workflow import report_body
-from workflow import report_tables as tables
-from workflow.report_curves import array_map, energy_curves, history_curves
-from workflow.report_pictures import exaggeration
+from workflow.report import body as report_body
+from workflow.report import tables
+from workflow.report.curves import array_map, energy_curves, history_curves
+from workflow.report.pictures import exaggeration
 from workflow.summary import collect_summary, inputs_digest, write_summary
 
 JOINT = {"standoff": 3.2e-4, "max_width": 5.5e-4}

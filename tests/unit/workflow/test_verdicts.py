@@ -6,8 +6,8 @@ from types import SimpleNamespace
 import pytest
 
 from workflow import findings
-from workflow import report_tables as tables
 from workflow.reflow_pool import ReflowError, mark_bridges, refuse_joints_without_mesh
+from workflow.report import tables
 
 PADS = [SimpleNamespace(name=f"A{k}", x=k * 1e-3, y=2.5e-3) for k in (1, 2, 3, 4)]
 

@@ -8,9 +8,9 @@ import numpy as np
 import pyvista
 from matplotlib import pyplot
 
-from workflow.report_curves import MICRO, MILLI, STYLE, svg
-from workflow.report_pictures import new_plotter, save
-from workflow.report_tables import number, percent, quantity
+from workflow.report.curves import MICRO, MILLI, STYLE, svg
+from workflow.report.pictures import new_plotter, save
+from workflow.report.tables import number, percent, quantity
 
 if TYPE_CHECKING:
     from particles.shape import JointShape, Snapshot

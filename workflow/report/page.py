@@ -9,8 +9,8 @@ import jinja2
 import numpy as np
 
 from workflow import findings
-from workflow import report_tables as tables
 from workflow.board_drop_case import BoardDropCase
+from workflow.report import tables
 from workflow.structure.case import StructureCase
 from workflow.summary import collect_summary, write_summary
 
@@ -63,7 +63,7 @@ def _context(run_folder: Path, case, summary: dict) -> dict:
         "pictures": {},
     }
     if summary["timings"]:
-        from workflow.report_curves import timing_bars
+        from workflow.report.curves import timing_bars
 
         context["curves"]["timings"] = timing_bars(summary["timings"])
     _add_preview(run_folder, context)
@@ -89,8 +89,8 @@ def _add_joints(run_folder: Path, context: dict) -> None:
     path = run_folder / "solder_mesh" / "quality.json"
     if not path.exists():
         return
-    from workflow.report_curves import array_map
-    from workflow.report_pictures import render_shapes
+    from workflow.report.curves import array_map
+    from workflow.report.pictures import render_shapes
 
     joints = tables.joint_records(run_folder)
     context["tables"]["shapes"] = tables.shapes(joints)
@@ -104,7 +104,7 @@ def _add_joints(run_folder: Path, context: dict) -> None:
 def _add_bridge(run_folder: Path, context: dict) -> None:
     """Add the picture of two joints that became one, the only shape under two names."""
     from particles.products import read_shapes
-    from workflow.report_body import render_stages
+    from workflow.report.body import render_stages
 
     for name, shape in read_shapes(run_folder / "reflow" / "shapes.h5").items():
         if "+" in name:
@@ -122,8 +122,9 @@ def _add_body(run_folder: Path, kind: str, context: dict, summary: dict) -> None
     if not (run_folder / "reflow" / "shape.h5").exists():
         return
     from particles.products import read_body
-    from workflow import report_body, work_precision
-    from workflow.report_curves import svg
+    from workflow import work_precision
+    from workflow.report import body as report_body
+    from workflow.report.curves import svg
 
     shape, meridian = read_body(run_folder / "reflow")
     context["headline"] = report_body.headline(summary["metrics"])
@@ -165,7 +166,7 @@ def _add_shock(run_folder: Path, case, context: dict, summary: dict) -> None:
             results[mode] = json.loads((folder / "result.json").read_text())
     if not histories:
         return
-    from workflow.report_curves import energy_curves, history_curves
+    from workflow.report.curves import energy_curves, history_curves
 
     main_mode = next(iter(histories))
     ranked = "dns" if "dns" in results and findings.fine_joints_of(results[main_mode]) else main_mode
@@ -194,8 +195,8 @@ def _add_shock(run_folder: Path, case, context: dict, summary: dict) -> None:
 
 def _add_two_scales(run_folder: Path, case: BoardDropCase, context: dict, results: dict[str, dict]) -> None:
     """Add how the models are coupled, where they are."""
-    from workflow import report_two_scales as scales
     from workflow.fine_joints import read_fine_joints
+    from workflow.report import two_scales as scales
     from workflow.shock_forecast import implicit_seconds
 
     result = results.get("two_scale")
@@ -214,7 +215,7 @@ def _add_two_scales(run_folder: Path, case: BoardDropCase, context: dict, result
 
 
 def _add_shock_pictures(folder: Path, history: dict, result: dict, context: dict) -> None:
-    from workflow.report_pictures import render_board, render_joints
+    from workflow.report.pictures import render_board, render_joints
 
     names = ("dns", "macro", "meso")
     whole = {name: folder / f"{name}.pvd" for name in names if (folder / f"{name}.pvd").exists()}

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from workflow.fine_joints import FineJoints
-from workflow.report_tables import nano, number, quantity
+from workflow.report.tables import nano, number, quantity
 
 Record = Mapping[str, Any]
 
