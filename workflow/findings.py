@@ -8,6 +8,7 @@ from typing import Any
 from workflow.stage_runner import Findings
 
 WIDTH_ERROR = 0.05  # of a joint's width, against the Young-Laplace shape of its volume, pads and gap
+WIDTH_REFERENCE_ERROR = 2.0e-3  # of that shape, which is coaxial: what offset and tilt may change of the width
 VOLUME_DRIFT = 1.0e-3  # of a joint's volume during its reflow
 SURFACE_VOLUME_ERROR = 1.0e-3  # of a closed surface, against the particles' own volume
 VOLUME_ERROR = 0.005  # of a joint's hexahedra, against its closed surface
@@ -66,7 +67,7 @@ def of_geometry(joints: int, elements: Mapping[str, int]) -> Findings:
 def of_reflow(joints: Records, effects: Mapping[str, Any]) -> Findings:
     """Judge the joints' shapes by volume, by the Young-Laplace shape and by their verdicts.
 
-    An open joint has no shape to compare with.
+    An open joint has no shape to compare with, nor has one that leans too much for a coaxial reference.
     """
 
     def values(name: str) -> list[float]:
@@ -75,7 +76,7 @@ def of_reflow(joints: Records, effects: Mapping[str, Any]) -> Findings:
     def count(verdict: str) -> int:
         return sum(joint["verdict"] == verdict for joint in joints.values())
 
-    closed = [joint for joint in joints.values() if joint["verdict"] != "open"]
+    closed = [joint for joint in joints.values() if joint["verdict"] != "open" and _has_reference(joint["metrics"])]
     width_error = worst(joint["metrics"]["width_error"]["value"] for joint in closed)
     drift = worst(values("volume_drift"))
     return Findings(
@@ -95,6 +96,11 @@ def of_reflow(joints: Records, effects: Mapping[str, Any]) -> Findings:
         },
         effects=dict(effects),
     )
+
+
+def _has_reference(metrics: Mapping[str, dict]) -> bool:
+    """Whether a joint leans so little that the coaxial joint of its gap is a reference for its width."""
+    return metrics.get("width_reference_error", {"value": 0.0})["value"] <= WIDTH_REFERENCE_ERROR
 
 
 def of_drop(metrics: Numbers, verdict: str, effects: Mapping[str, Any]) -> Findings:

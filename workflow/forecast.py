@@ -9,7 +9,7 @@ from workflow.board_drop_case import BoardDropCase
 from workflow.case import available_cores
 from workflow.fine_joints import coarse_joints_effect
 from workflow.problems import Problem
-from workflow.reflow_pool import distinct_geometries, joint_geometries
+from workflow.reflow_pool import distinct_joints, joint_geometries
 from workflow.shock_forecast import (
     PartForecast,
     ShockForecast,
@@ -52,7 +52,7 @@ def forecast(case: BoardDropCase) -> Forecast:
     from particles.estimate import particle_count, reflow_seconds
 
     geometries = joint_geometries(pad_table(case.package, case.board, case.warpage))
-    distinct = list(distinct_geometries(geometries).values())
+    distinct = [group.geometry for group in distinct_joints(geometries)]
     counts = [particle_count(case.solder, geometry) for geometry in distinct]
     workers = min(available_cores(), len(distinct))
     reflow = sum(reflow_seconds(case.solder, geometry) for geometry in distinct) / workers

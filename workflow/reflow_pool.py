@@ -7,7 +7,7 @@ import queue
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,11 +17,12 @@ if TYPE_CHECKING:
     from meshing.pads import PadSite
     from particles.bridges import Contact
     from particles.geometry import JointGeometry
+    from particles.orientation import Orientation
     from particles.shape import JointShape
 
 logger = logging.getLogger(__name__)
 
-ALIKE = 12  # decimals of a metre to which gaps and radii of joints are compared: a picometre
+ALIKE = 1e-9  # of joints that count as equal: differences of gap, radii, offset, and tilt times radius [m]
 POLL = 0.2  # seconds between two looks at the progress
 
 _progress: Any = None  # the queue of a worker process: a pool has no other place for it
@@ -48,31 +49,73 @@ def joint_geometries(pads: "Sequence[PadSite]") -> "dict[str, JointGeometry]":
     return {pad.name: JointGeometry(pad.gap, pad.wetted_radius_board, pad.wetted_radius_package) for pad in pads}
 
 
-def distinct_geometries(geometries: "Mapping[str, JointGeometry]") -> "dict[tuple[str, ...], JointGeometry]":
-    """Group joints of equal geometry.
+@dataclass(frozen=True, slots=True)
+class Alike:
+    """Joints that are alike but for how they lie.
+
+    Attributes:
+        geometry: of the first of them, in canonical orientation.
+        members: name of each -> how it lies, seen from there.
+    """
+
+    geometry: "JointGeometry"
+    members: "dict[str, Orientation]"
+
+    @property
+    def name(self) -> str:
+        """Name of the first joint, which is that of their shape."""
+        return next(iter(self.members))
+
+
+def distinct_joints(geometries: "Mapping[str, JointGeometry]") -> list[Alike]:
+    """Group joints that are equal to ALIKE but for a turn about z and a mirror image, in the given order.
 
     Args:
         geometries: joint name -> geometry.
+    """
+    from particles.orientation import canonical, sizes
+
+    found: list[Alike] = []
+    for name, geometry in geometries.items():
+        upright, orientation = canonical(geometry)
+        size = sizes(upright)
+        twin = next((group for group in found if abs(sizes(group.geometry) - size).max() < ALIKE), None)
+        if twin is None:
+            found.append(Alike(upright, {name: orientation}))
+        else:
+            twin.members[name] = orientation
+    return found
+
+
+def joint_records(
+    groups: Sequence[Alike], geometries: "Mapping[str, JointGeometry]", shapes: "Mapping[str, JointShape]"
+) -> dict:
+    """Return per joint its shape, place and metrics.
+
+    Args:
+        groups: joints that are alike.
+        geometries: joint name -> geometry.
+        shapes: name of the first of each group -> shape in canonical orientation.
 
     Returns:
-        Names of the joints that are alike -> their geometry.
+        Joint name -> ``shape``, ``turn`` [rad] and ``mirror`` (how it lies seen from that shape: mirrored first, y to
+        -y, then turned about z), ``place`` of the package's pad over the board's, ``verdict``, ``metrics``.
     """
-    groups: dict[tuple[float, ...], list[str]] = {}
-    for name, geometry in geometries.items():
-        discs = (geometry.gap, geometry.radius_board, geometry.radius_package)
-        sizes = (*discs, *geometry.offset, *geometry.tilt)
-        groups.setdefault(tuple(round(size, ALIKE) for size in sizes), []).append(name)
-    return {tuple(names): geometries[names[0]] for names in groups.values()}
-
-
-def joint_records(groups: "Mapping[tuple[str, ...], JointGeometry]", shapes: "Mapping[str, JointShape]") -> dict:
-    """Return per joint the name of its shape, the verdict on it and its metrics."""
     records: dict[str, dict] = {}
-    for names in groups:
-        shape = shapes[names[0]]
+    for group in groups:
+        shape = shapes[group.name]
         metrics = {key: {"value": value, "unit": unit} for key, (value, unit) in shape.metrics.items()}
-        records |= {name: {"shape": names[0], "verdict": shape.verdict, "metrics": metrics} for name in names}
-    return records
+        for name, orientation in group.members.items():
+            geometry = geometries[name]
+            records[name] = {
+                "shape": group.name,
+                "turn": orientation.turn,
+                "mirror": orientation.mirror,
+                "place": {"gap": geometry.gap, "offset": geometry.offset, "tilt": geometry.tilt},
+                "verdict": shape.verdict,
+                "metrics": metrics,
+            }
+    return {name: records[name] for name in geometries}
 
 
 def mark_bridges(records: dict[str, dict], pads: "Sequence[PadSite]", mirrored: bool) -> "list[Contact]":
@@ -97,31 +140,29 @@ def mark_bridges(records: dict[str, dict], pads: "Sequence[PadSite]", mirrored: 
 
 
 def bridge_shapes(
-    found: "Sequence[Contact]",
-    groups: "Mapping[tuple[str, ...], JointGeometry]",
-    shapes: "Mapping[str, JointShape]",
-    solder: Solder,
+    found: "Sequence[Contact]", geometries: "Mapping[str, JointGeometry]", solder: Solder
 ) -> "dict[str, JointShape]":
     """Flow the two joints that overlap most into one: its shape under both names, "A9+A10"; nothing where none touch.
 
+    The bridge is a picture of what happens: its joints are taken as upright and in line.
+
     Args:
         found: the pairs that touch, the largest overlap first.
-        groups: names of the joints that are alike -> their geometry.
-        shapes: first of these names -> shape at rest, alone.
+        geometries: joint name -> geometry.
         solder: of one joint.
     """
     from particles.bridge import solve_bridge
     from particles.cloud_level_set import CannotRebuild
+    from particles.reflow import solve_joint
     from particles.rest import NoRest
 
-    geometry_of = {name: geometry for names, geometry in groups.items() for name in names}
-    shape_of = {name: shapes[names[0]] for names in groups for name in names}
     bridges = {}
     for pair in found[:1]:
-        ends, name = (pair.first, pair.second), f"{pair.first}+{pair.second}"
+        ends = [replace(geometries[end], offset=(0.0, 0.0), tilt=(0.0, 0.0)) for end in (pair.first, pair.second)]
+        name = f"{pair.first}+{pair.second}"
         try:
-            alone = [geometry_of[end] for end in ends], [shape_of[end] for end in ends]
-            bridges[name] = solve_bridge(*alone, pair.distance, solder)
+            alone = [solve_joint(end, solder) for end in ends]
+            bridges[name] = solve_bridge(ends, alone, pair.distance, solder)
         except (CannotRebuild, NoRest) as error:  # the verdict stands without it
             logger.warning("%s are bridged, but their common body was not found: %s", name, error)
     return bridges

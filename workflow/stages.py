@@ -43,13 +43,14 @@ def reflow(run: Run[BoardDropCase], folder: Path) -> Findings:
     from workflow import reflow_pool as pool
 
     pads, solder = read_pads(run.folder / "geometry/pads.json"), run.case.solder
-    groups = pool.distinct_geometries(pool.joint_geometries(pads))
-    distinct = {names[0]: geometry for names, geometry in groups.items()}
+    geometries = pool.joint_geometries(pads)
+    groups = pool.distinct_joints(geometries)
+    distinct = {group.name: group.geometry for group in groups}
     with progress_bar(f"reflow of {len(distinct)} distinct joints") as progress:
         shapes, continued = pool.solve_joints(distinct, solder, run.cores, progress, run.checkpoints("reflow"))
-    joints = pool.joint_records(groups, shapes)
+    joints = pool.joint_records(groups, geometries, shapes)
     touching = pool.mark_bridges(joints, pads, mirrored=run.case.board.symmetry == "quarter")
-    write_shapes(folder / "shapes.h5", shapes | pool.bridge_shapes(touching, groups, shapes, solder))
+    write_shapes(folder / "shapes.h5", shapes | pool.bridge_shapes(touching, geometries, solder))
     write_json(folder / "joints.json", joints)
     write_pads(folder / "pads.json", pads)
     highest = max(distinct.values(), key=lambda geometry: geometry.gap)
@@ -58,14 +59,17 @@ def reflow(run: Run[BoardDropCase], folder: Path) -> Findings:
 
 
 def surface(run: Run[BoardDropCase], folder: Path) -> Findings:
-    """Close the surface of each distinct joint and measure it."""
+    """Close the surface of each joint, in its own orientation, and measure it."""
     from meshing.surface import close_surface, measure, write_surface
+    from particles.orientation import Orientation, oriented
     from particles.products import read_shapes
     from workflow.reflow_pool import refuse_joints_without_mesh
 
-    refuse_joints_without_mesh(read_json(run.folder / "reflow/joints.json"))
-    surfaces = {}
-    for name, shape in read_shapes(run.folder / "reflow/shapes.h5").items():
+    joints = read_json(run.folder / "reflow/joints.json")
+    refuse_joints_without_mesh(joints)
+    shapes, surfaces = read_shapes(run.folder / "reflow/shapes.h5"), {}
+    for name, joint in joints.items():
+        shape = oriented(shapes[joint["shape"]], Orientation(joint["turn"], joint["mirror"]))
         closed = close_surface(shape.surface_points, shape.triangles, shape.ring_board, shape.ring_package)
         write_surface(folder / f"{name}.vtu", closed)
         measures = measure(closed)
@@ -83,10 +87,10 @@ def solder_mesh(run: Run[BoardDropCase], folder: Path) -> Findings:
     from workflow.fine_joints import coarse_joints_effect, needs_coarse_joints
     from workflow.forecast import with_critical_step
 
-    case, shape_of = run.case, read_json(run.folder / "reflow/joints.json")
+    case = run.case
     kinds = {"": mesh_joint} | ({"coarse_": mesh_coarse_joint} if needs_coarse_joints(case.shock.coupling) else {})
     bodies = [
-        (read_surface(run.folder / f"surface/{shape_of[site.name]['shape']}.vtu"), site)
+        (read_surface(run.folder / f"surface/{site.name}.vtu"), site)
         for site in read_pads(run.folder / "reflow/pads.json")
     ]
     qualities = {}
