@@ -1,0 +1,76 @@
+"""Boards and packages for tests of thermoelasticity: layered strips and plates over a plain board, and their pads."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from mpi4py import MPI
+
+from fem.materials.parameters import Isotropic
+from fem.materials.roles import Materials
+from fem.mesh import MeshData, append
+from fem.thermal.pads import Pads
+from fem.thermal.parameters import Thermal
+from fem.thermal.state import Assembly
+from fem.thermal.structure import ThermalStructure
+from tests.support.fem_models import COPPER, GAP, SITES, grid, mesh_of, on, write_msh, write_small_assembly
+
+LIFT = 1e-3  # height of the layers' lower face
+REFERENCE = 298.15
+STIFF = Isotropic(density=2330.0, young_modulus=130e9, poisson_ratio=0.0, thermal_expansion=2e-6)
+SOFT = Isotropic(density=1900.0, young_modulus=25e9, poisson_ratio=0.0, thermal_expansion=16e-6)
+
+
+@dataclass(frozen=True, slots=True)
+class Layers:
+    """A quarter of a plate [m]: substrate below, die above, ``cells`` along x, y and through either layer."""
+
+    length: float
+    width: float
+    thickness: tuple[float, float]
+    cells: tuple[int, int, int, int]
+
+    def mesh(self, planes: Sequence[str] = ("symmetry_x", "symmetry_y")) -> MeshData:
+        """Return board and package; the board is one cell of the same size with its top at z = 0."""
+        x = np.linspace(0.0, 0.5 * self.length, self.cells[0] + 1)
+        y = np.linspace(0.0, 0.5 * self.width, self.cells[1] + 1)
+        lower = np.linspace(0.0, self.thickness[0], self.cells[2] + 1)
+        upper = self.thickness[0] + np.linspace(0.0, self.thickness[1], self.cells[3] + 1)
+        sides = {name: on(axis, 0.0) for axis, name in enumerate(("symmetry_x", "symmetry_y")) if name in planes}
+        points, cells = grid(x, y, LIFT + np.concatenate([lower, upper[1:]]))
+        height = points[cells].mean(axis=1)[:, 2] - LIFT
+        part = np.where(height > self.thickness[0], "die", "substrate")
+        package = mesh_of(points, cells, part, sides | {"package_side": on(2, LIFT)})
+        board = mesh_of(*grid(x[[0, -1]], y[[0, -1]], [-1e-3, 0.0]), "board", sides | {"board_side": on(2, 0.0)})
+        return append([board, package])
+
+
+def structure_of(
+    mesh: MeshData, folder: Path, pads: Pads, materials: Mapping, thermal: Mapping | None = None
+) -> ThermalStructure:
+    """Return the structure of a mesh; materials of roles as in a case."""
+    path = folder / "assembly.msh"
+    write_msh(mesh, path)
+    given = Materials.model_validate(dict(materials))
+    assembly = Assembly(path, pads, given, Thermal.model_validate(dict(thermal or {})), gravity=0.0)
+    return ThermalStructure.build(MPI.COMM_SELF, assembly)
+
+
+def pads_at(places: Sequence[tuple[float, float]], radius: float) -> Pads:
+    """Return pads without copper under layers of ``Layers``."""
+    flat = np.array(places, float)
+    centres = np.stack([np.column_stack([flat, np.full(len(flat), height)]) for height in (0.0, LIFT)], axis=1)
+    return Pads([f"J{number}" for number in range(len(flat))], centres, np.full((len(flat), 2), radius))
+
+
+def small_pads(radius: float = 0.2e-3) -> Pads:
+    """Return the pads of ``fem_models.small_assembly``, on copper."""
+    centres = [[(x, y, COPPER), (x, y, COPPER + GAP)] for x, y in SITES.values()]
+    return Pads(tuple(SITES), np.array(centres), np.full((len(SITES), 2), radius))
+
+
+def small_structure(folder: Path, gravity: float = 9.81, **thermal) -> Assembly:
+    """Write the quarter package on its board of ``fem_models``; fields of ``Thermal`` as keywords."""
+    mesh = write_small_assembly(folder)[0]
+    return Assembly(mesh, small_pads(), Materials(), Thermal.model_validate(thermal), gravity)
