@@ -1,6 +1,7 @@
 """The assembly: board with holes, package above it, as named structured hexahedra in one Gmsh file.
 
-Joints are not in it: they are meshed after reflow and tied to ``board_side`` and ``package_side``.
+It is flat, as drawn; ``displaced_assembly.py`` moves the package to where the solder froze. Joints are not in it: they
+are meshed after reflow and tied to ``board_side`` and ``package_side``.
 """
 
 from collections.abc import Iterable
@@ -8,7 +9,6 @@ from itertools import chain
 from pathlib import Path
 
 import gmsh
-import numpy as np
 
 from meshing.blocks import (
     MILLI,
@@ -23,18 +23,17 @@ from meshing.blocks import (
     plan_surfaces,
 )
 from meshing.gmsh_session import gmsh_model, name_groups, write_msh
-from meshing.pads import lift
-from meshing.parameters import Board, Package, Warpage
+from meshing.package_side import underside
+from meshing.parameters import Board, Package
 from meshing.plan import blocks_within, board_plan, footprint, hole_rings, package_plan, patch
 
 
-def write_assembly(package: Package, board: Board, warpage: Warpage, path: Path) -> dict[str, int]:
-    """Mesh board and package and write them as Gmsh 4.1 in metres.
+def write_assembly(package: Package, board: Board, path: Path) -> dict[str, int]:
+    """Mesh board and package, both flat, and write them as Gmsh 4.1 in metres.
 
     Args:
         package: array, pads, layers.
         board: sizes, holes, symmetry.
-        warpage: lift of the package.
         path: the ``.msh`` file to write.
 
     Returns:
@@ -45,7 +44,6 @@ def write_assembly(package: Package, board: Board, warpage: Warpage, path: Path)
     """
     with gmsh_model("assembly"):
         parts = _board_parts(package, board)
-        first_of_package = gmsh.model.geo.getMaxTag(3) + 1
         parts |= _package_parts(package, board)
         gmsh.model.geo.synchronize()
         facets = {name: tags for name, tags in parts.items() if name.endswith("_side") or name == "board_bottom"}
@@ -54,7 +52,6 @@ def write_assembly(package: Package, board: Board, warpage: Warpage, path: Path)
         name_groups(3, volumes)
         name_groups(2, facets)
         gmsh.model.mesh.generate(3)
-        _lift_package(package, warpage, [tag for _, tag in gmsh.model.getEntities(3) if tag >= first_of_package])
         check_elements("assembly")
         write_msh(path, MILLI)
         return {name: count_elements(tags) for name, tags in volumes.items()}
@@ -86,11 +83,10 @@ def _board_parts(package: Package, board: Board) -> dict[str, list[int]]:
 def _package_parts(package: Package, board: Board) -> dict[str, list[int]]:
     """Extrude copper plate (if any), substrate and die upwards from the package's underside."""
     plan, copper = package_plan(package, board), package.copper
-    plate = copper.layout == "plate"
-    underside = plan_surfaces(plan, package.standoff + (1 if plate else 2) * copper.thickness)
-    parts = {"package_side": _flat(underside)}
-    seat = underside
-    if plate:
+    faces = plan_surfaces(plan, underside(package))
+    parts = {"package_side": _flat(faces)}
+    seat = faces
+    if copper.layout == "plate":
         volumes, seat = extrude(seat, copper.thickness, 1)
         parts["copper_package"] = _flat(volumes)
     volumes, top = extrude(seat, package.substrate.thickness, package.substrate.elements)
@@ -115,15 +111,6 @@ def _planes_and_holes(board: Board) -> dict[str, list[int]]:
         elif lies_within_hole(tag, hole, board.holes.diameter):
             names["mounting_holes"].append(tag)
     return names
-
-
-def _lift_package(package: Package, warpage: Warpage, volumes: list[int]) -> None:
-    nodes = [gmsh.model.mesh.getNodes(3, volume, includeBoundary=True)[:2] for volume in volumes]
-    tags, first = np.unique(np.concatenate([part[0] for part in nodes]), return_index=True)
-    points = np.concatenate([part[1] for part in nodes]).reshape(-1, 3)[first]
-    points[:, 2] += lift(package, warpage, points[:, 0] * MILLI, points[:, 1] * MILLI) / MILLI
-    for tag, point in zip(tags, points, strict=True):
-        gmsh.model.mesh.setNode(tag, point, [])
 
 
 def _select(surfaces: Surfaces, blocks: Iterable[Block]) -> Surfaces:

@@ -3,7 +3,7 @@
 import json
 import math
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TypeVar
 
@@ -80,10 +80,20 @@ def pad_table(package: Package, board: Board, warpage: Warpage) -> list[PadSite]
             name = joint_name(row, column)
             if name in package.depopulated or (board.symmetry == "quarter" and (x < 0 or y < 0)):
                 continue
-            gap = package.standoff + float(lift(package, warpage, x, y))
-            tilt = _tilt(package, warpage, x, y)
-            sites.append(PadSite(name, row, column, x, y, gap, *_pad_sizes(package), tilt=tilt))
-    return sites
+            sites.append(PadSite(name, row, column, x, y, package.standoff, *_pad_sizes(package)))
+    return lifted(sites, package, warpage)
+
+
+def lifted(sites: Iterable[PadSite], package: Package, warpage: Warpage) -> list[PadSite]:
+    """Return joints that are as drawn with the gaps and tilts that a warpage of the package gives them."""
+    return [
+        replace(
+            site,
+            gap=site.gap + float(lift(package, warpage, site.x, site.y)),
+            tilt=_tilt(package, warpage, site.x, site.y),
+        )
+        for site in sites
+    ]
 
 
 def _tilt(package: Package, warpage: Warpage, x: float, y: float) -> tuple[float, float]:

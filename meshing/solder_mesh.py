@@ -7,14 +7,16 @@ import numpy as np
 
 from meshing.butterfly import Butterfly, butterfly
 from meshing.hexahedra import quad_areas, scaled_jacobian, shortest_lengths, volumes
+from meshing.joint_place import JointPlace
 from meshing.levels import Levels, layer_cells, solder_levels
-from meshing.package_side import side_lift
-from meshing.pads import PadSite, has_rim, lift
-from meshing.parameters import Package, Warpage
+from meshing.package_side import PackageSide
+from meshing.pads import PadSite, has_rim
+from meshing.parameters import JointNumerics, Package
 from meshing.surface import ClosedSurface
 
 MINIMUM_SCALED_JACOBIAN = 0.2
 GAP_TOLERANCE = 1.0e-3
+HEAD_TOLERANCE = 0.03  # of the gap: mean distance of the solder's upper face from the package's pad
 
 
 class JointMeshError(ValueError):
@@ -32,7 +34,7 @@ class JointMesh:
         facets: facet set name -> (f, 4) int32, seen from outside counter-clockwise.
         volume_error: of the solder in its place against the body that it fills, relative.
         section_scale: factor by which the inner sections were scaled to keep the volume.
-        head_mismatch: largest distance of a head node from the bilinear facets of the meshed package [m].
+        head_mismatch: largest distance by which its head was sheared to lie on the package's underside [m].
     """
 
     name: str
@@ -44,76 +46,53 @@ class JointMesh:
     head_mismatch: float
 
 
-def mesh_joint(surface: ClosedSurface, site: PadSite, package: Package, warpage: Warpage) -> JointMesh:
+def mesh_joint(surface: ClosedSurface, site: PadSite, package: Package, side: PackageSide) -> JointMesh:
     """Mesh a joint and put it in its place.
 
     Args:
         surface: closed surface in the joint's own frame.
         site: where it sits.
         package: copper and numerics.
-        warpage: lift of the package, which the joint's head follows.
+        side: the package's underside, which the joint's head follows.
 
     Raises:
-        JointMeshError: the surface spans another gap, has sections that are not star-shaped, needs more layers to keep
-            its volume, or the scaled Jacobian is too small.
+        JointMeshError: the surface spans another gap, or one in which the package is not; it has sections that are not
+            star-shaped, needs more layers to keep its volume, or the scaled Jacobian is too small.
     """
     copper = package.copper.thickness if package.copper.layout == "pads" else None
-    return _mesh(surface, site, _Place(site, package, warpage), copper)
+    place = JointPlace.of(surface, site, side, copper or 0.0)
+    return _mesh(surface, place, package.joint_numerics, copper)
 
 
-def mesh_coarse_joint(surface: ClosedSurface, site: PadSite, package: Package, warpage: Warpage) -> JointMesh:
+def mesh_coarse_joint(surface: ClosedSurface, site: PadSite, package: Package, side: PackageSide) -> JointMesh:
     """Mesh a joint by few hexahedra of solder alone, which also fill the place of the copper on its wetted discs.
 
     Args and errors as ``mesh_joint``.
     """
-    coarse = package.model_copy(update={"joint_numerics": package.coarse_joint_numerics})
     overhang = package.copper.thickness if package.copper.layout == "pads" else 0.0
-    return _mesh(surface, site, _Place(site, coarse, warpage), None, overhang)
-
-
-@dataclass(frozen=True, slots=True)
-class _Place:
-    """Where a joint goes: its site under a package that is warped."""
-
-    site: PadSite
-    package: Package
-    warpage: Warpage
-
-    def __call__(self, points: np.ndarray) -> np.ndarray:
-        """Move the joint to its site and shear its solder in z so that its head lies on the warped package."""
-        site, package = self.site, self.package
-        x, y = points[:, 0] + site.x, points[:, 1] + site.y
-        rise = package.standoff - site.gap + lift(package, self.warpage, x, y)
-        share = np.clip(points[:, 2] / site.gap, 0.0, 1.0)
-        return np.column_stack([x, y, site.z_board + points[:, 2] + share * rise])
-
-    def head_mismatch(self, head: np.ndarray) -> float:
-        """Return the largest distance of nodes (n, 3) from the bilinear facets of the meshed package [m]."""
-        x, y = head[:, 0], head[:, 1]
-        flat, curved = (side(self.package, self.warpage, x, y) for side in (side_lift, lift))
-        return float(np.abs(flat - curved).max())
+    place = JointPlace.of(surface, site, side, overhang)
+    return _mesh(surface, place, package.coarse_joint_numerics, None, overhang)
 
 
 def _mesh(
-    surface: ClosedSurface, site: PadSite, place: _Place, copper: float | None, overhang: float = 0.0
+    surface: ClosedSurface, place: JointPlace, numerics: JointNumerics, copper: float | None, overhang: float = 0.0
 ) -> JointMesh:
     """Mesh a joint with copper pads of a thickness [m], or without, its ends drawn out by ``overhang`` [m]."""
+    site = place.site
     _check_gap(surface, site)
-    numerics = place.package.joint_numerics
     section = butterfly(numerics.core, numerics.rings)
     try:
         levels = solder_levels(surface, section, numerics.layers, place, overhang)
+        stack = _stack(levels, section, site, copper)
+        points, rise = place(stack.points), place.rise(levels.points[-1])
     except ValueError as error:
         raise JointMeshError(f"joint {site.name}: {error}") from error
-    stack = _stack(levels, section, site, copper)
-    points = place(stack.points)
+    _check_head(rise, site)
     _check_quality(points, stack.cells)
-    head = points[np.unique(stack.facets[f"head@{site.name}"])]
     volume = volumes(points, stack.cells[f"solder@{site.name}"]).sum()
     volume_error = float(abs(volume / levels.volume - 1.0))
-    return JointMesh(
-        site.name, points, stack.cells, stack.facets, volume_error, levels.scale, place.head_mismatch(head)
-    )
+    mismatch = float(np.abs(rise).max())
+    return JointMesh(site.name, points, stack.cells, stack.facets, volume_error, levels.scale, mismatch)
 
 
 def joint_quality(mesh: JointMesh) -> dict:
@@ -191,6 +170,13 @@ def _check_gap(surface: ClosedSurface, site: PadSite) -> None:
     if max(abs(bottom), abs(top - site.gap)) > GAP_TOLERANCE * site.gap:
         span = f"z = {bottom:.6g} to {top:.6g} m, allowed 0 to its gap of {site.gap:.6g} m"
         raise JointMeshError(f"joint {site.name}: its surface spans {span}")
+
+
+def _check_head(rise: np.ndarray, site: PadSite) -> None:
+    limit, mean = HEAD_TOLERANCE * site.gap, float(rise.mean())
+    if abs(mean) > limit:
+        above = f"{mean:.3g} m above its upper face, allowed +-{limit:.3g} m"
+        raise JointMeshError(f"joint {site.name}: the package is {above} ({HEAD_TOLERANCE:g} of its gap)")
 
 
 def _check_quality(points: np.ndarray, cells: dict[str, np.ndarray]) -> None:

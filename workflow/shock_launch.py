@@ -13,7 +13,7 @@ from workflow.progress import progress_bar
 from workflow.stage_runner import Run
 
 MODES = {"two_scale": "two-scale", "dns": "DNS"}
-ASSEMBLY, JOINTS, COARSE_JOINTS = "geometry/assembly.msh", "solder_mesh/joints.msh", "solder_mesh/coarse_joints.msh"
+ASSEMBLY, JOINTS, COARSE_JOINTS = (f"solder_mesh/{name}.msh" for name in ("assembly", "joints", "coarse_joints"))
 
 
 def find_fine_joints(run: Run[BoardDropCase], folder: Path) -> FineJoints:

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-ARRAY = (
+DRAWN = (
     "package.rows",
     "package.columns",
     "package.depopulated",
@@ -11,8 +11,8 @@ ARRAY = (
     "package.board_pad",
     "package.package_pad",
     "board.symmetry",
-    "warpage",
 )
+PADS = (*DRAWN, "warpage")
 JOINT_MESHES = (
     "package.joint_numerics",
     "package.coarse_joint_numerics",
@@ -29,8 +29,8 @@ class Stage:
         name: name of the stage and of its folder.
         parameters: dotted keys of the parameters, or tables of them, that it depends on.
         follows: stages whose products it depends on: when they ran, it has to run.
-        pads: whether it reads the pad table. Its ``parameters`` then contain all that this table depends on, so that
-            it need not run again when the geometry changes elsewhere.
+        pads: whether it reads the pad table as drawn. Its ``parameters`` then contain all that this table depends on,
+            so that it need not run again when the geometry changes elsewhere.
         products: files that it writes, relative to the run folder.
     """
 
@@ -74,13 +74,13 @@ BOARD_DROP = Pipeline(
     (
         Stage(
             "geometry",
-            (*ARRAY, "package.copper", "package.substrate", "package.die", "package.numerics", "board"),
+            (*DRAWN, "package.copper", "package.substrate", "package.die", "package.numerics", "board"),
             (),
             ("geometry/assembly.msh", "geometry/pads.json", "geometry/preview.png"),
         ),
         Stage(
             "reflow",
-            (*ARRAY, "thermal", "solder"),
+            (*PADS, "thermal", "solder"),
             (),
             ("reflow/shapes.h5", "reflow/joints.json", "reflow/pads.json"),
             pads=True,
@@ -88,12 +88,11 @@ BOARD_DROP = Pipeline(
         Stage("surface", (), ("reflow",), ("surface/surfaces.json",)),
         Stage(
             "solder_mesh",
-            (*ARRAY, "package.copper", *JOINT_MESHES, "materials.copper", "materials.solder"),
-            ("surface",),
-            ("solder_mesh/joints.msh", "solder_mesh/quality.json"),
-            pads=True,
+            ("warpage", *JOINT_MESHES, "materials.copper", "materials.solder"),
+            ("geometry", "surface"),
+            ("solder_mesh/assembly.msh", "solder_mesh/joints.msh", "solder_mesh/quality.json"),
         ),
-        Stage("shock", ("shock", "materials"), ("geometry", "solder_mesh"), ()),
+        Stage("shock", ("shock", "materials"), ("solder_mesh",), ()),
         Stage(
             "report",
             ("case",),

@@ -22,34 +22,36 @@ from workflow.structure.stages import STRUCTURE_STAGES
 
 
 def geometry(run: Run[BoardDropCase], folder: Path) -> Findings:
-    """Mesh board and package; tabulate the pads."""
+    """Mesh board and package, both flat; tabulate the pads."""
     from meshing.assembly import write_assembly
     from meshing.pads import pad_table, write_pads
+    from meshing.parameters import Warpage
     from meshing.preview import write_preview
 
     case = run.case
-    pads = pad_table(case.package, case.board, case.warpage)
+    pads = pad_table(case.package, case.board, Warpage())
     write_pads(folder / "pads.json", pads)
-    counts = write_assembly(case.package, case.board, case.warpage, folder / "assembly.msh")
+    counts = write_assembly(case.package, case.board, folder / "assembly.msh")
     write_preview([folder / "assembly.msh"], folder / "preview.png")
     return findings.of_geometry(len(pads), counts)
 
 
 def reflow(run: Run[BoardDropCase], folder: Path) -> Findings:
     """Melt the solder of each distinct joint between its pads."""
-    from meshing.pads import read_pads, write_pads
+    from meshing.pads import lifted, read_pads, write_pads
     from particles.effects import decide_effects
     from particles.products import write_shapes
     from workflow import reflow_pool as pool
 
-    pads, solder = read_pads(run.folder / "geometry/pads.json"), run.case.solder
+    case, solder = run.case, run.case.solder
+    pads = lifted(read_pads(run.folder / "geometry/pads.json"), case.package, case.warpage)
     geometries = pool.joint_geometries(pads)
     groups = pool.distinct_joints(geometries)
     distinct = {group.name: group.geometry for group in groups}
     with progress_bar(f"reflow of {len(distinct)} distinct joints") as progress:
         shapes, continued = pool.solve_joints(distinct, solder, run.cores, progress, run.checkpoints("reflow"))
     joints = pool.joint_records(groups, geometries, shapes)
-    touching = pool.mark_bridges(joints, pads, mirrored=run.case.board.symmetry == "quarter")
+    touching = pool.mark_bridges(joints, pads, mirrored=case.board.symmetry == "quarter")
     write_shapes(folder / "shapes.h5", shapes | pool.bridge_shapes(touching, geometries, solder))
     write_json(folder / "joints.json", joints)
     write_pads(folder / "pads.json", pads)
@@ -79,7 +81,12 @@ def surface(run: Run[BoardDropCase], folder: Path) -> Findings:
 
 
 def solder_mesh(run: Run[BoardDropCase], folder: Path) -> Findings:
-    """Mesh every joint in its place with hexahedra, with few of them also where the shock needs coarse joints."""
+    """Put the package where the solder froze and mesh every joint in its place with hexahedra.
+
+    Where the shock needs coarse joints, all are also meshed with few of them.
+    """
+    from meshing.displaced_assembly import write_displaced_assembly
+    from meshing.displacement import prescribed
     from meshing.joints_file import write_joints
     from meshing.pads import read_pads
     from meshing.solder_mesh import joint_quality, mesh_coarse_joint, mesh_joint
@@ -88,6 +95,8 @@ def solder_mesh(run: Run[BoardDropCase], folder: Path) -> Findings:
     from workflow.forecast import with_critical_step
 
     case = run.case
+    displacement = prescribed(case.package, case.warpage)
+    side = write_displaced_assembly(run.folder / "geometry/assembly.msh", displacement, folder / "assembly.msh")
     kinds = {"": mesh_joint} | ({"coarse_": mesh_coarse_joint} if needs_coarse_joints(case.shock.coupling) else {})
     bodies = [
         (read_surface(run.folder / f"surface/{site.name}.vtu"), site)
@@ -95,7 +104,7 @@ def solder_mesh(run: Run[BoardDropCase], folder: Path) -> Findings:
     ]
     qualities = {}
     for kind, mesh_of in kinds.items():
-        meshes = [mesh_of(surface, site, case.package, case.warpage) for surface, site in bodies]
+        meshes = [mesh_of(surface, site, case.package, side) for surface, site in bodies]
         write_joints(meshes, folder / f"{kind}joints.msh")
         qualities[kind] = {mesh.name: with_critical_step(joint_quality(mesh), case.materials) for mesh in meshes}
         write_json(folder / f"{kind}quality.json", qualities[kind])

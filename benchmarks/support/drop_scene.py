@@ -11,7 +11,10 @@ from fem.inputs import RunInput
 from fem.mesh_file import read_mesh
 from fem.parameters import Ranks
 from meshing.assembly import write_assembly
+from meshing.displaced_assembly import write_displaced_assembly
+from meshing.displacement import prescribed
 from meshing.joints_file import write_joints
+from meshing.package_side import PackageSide
 from meshing.pads import PadSite, pad_table
 from meshing.solder_mesh import JointMesh, mesh_coarse_joint, mesh_joint
 from meshing.surface import ClosedSurface
@@ -43,9 +46,12 @@ class DropScene:
         """Mesh the case ``bga_drop`` with other values, ``key=value`` each."""
         case = read_case(CASE, ("shock.numerics.mass_scaled=[]", *overrides))
         assert isinstance(case, BoardDropCase)
-        write_assembly(case.package, case.board, case.warpage, folder / "assembly.msh")
+        write_assembly(case.package, case.board, folder / "flat.msh")
+        displacement = prescribed(case.package, case.warpage)
+        side = write_displaced_assembly(folder / "flat.msh", displacement, folder / "assembly.msh")
+        (folder / "flat.msh").unlink()
         for name, mesher in (("joints.msh", mesh_joint), ("coarse_joints.msh", mesh_coarse_joint)):
-            write_joints([joint(case, site, mesher) for site in sites(case)], folder / name)
+            write_joints([joint(case, site, mesher, side) for site in sites(case)], folder / name)
         return cls(case, folder)
 
     def without_boxes(self, folder: Path) -> "DropScene":
@@ -80,9 +86,9 @@ def sites(case: BoardDropCase) -> list[PadSite]:
     return pad_table(case.package, case.board, case.warpage)
 
 
-def joint(case: BoardDropCase, site: PadSite, mesher: Mesher) -> JointMesh:
+def joint(case: BoardDropCase, site: PadSite, mesher: Mesher, side: PackageSide) -> JointMesh:
     """Return a joint's mesh."""
-    return mesher(barrel_of(site, case.solder.volume), site, case.package, case.warpage)
+    return mesher(barrel_of(site, case.solder.volume), site, case.package, side)
 
 
 def barrel_of(site: PadSite, volume: float) -> ClosedSurface:

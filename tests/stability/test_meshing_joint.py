@@ -14,7 +14,7 @@ from meshing.pads import pad_table
 from meshing.parameters import Warpage
 from meshing.solder_mesh import joint_quality, mesh_joint
 from tests.support.joint_surfaces import barrel
-from tests.support.meshing_models import MM, board, package
+from tests.support.meshing_models import MM, board, package, side_of
 
 HARD = {
     "strongly bulged": {"bulge": 0.20 * MM},
@@ -34,7 +34,7 @@ def quality_of(warpage=None, **shape):
     wetted = {"wetted_radius_board": lower, "wetted_radius_package": upper}
     site = dataclasses.replace(site, **wetted, pad_radius_board=lower, pad_radius_package=0.32 * MM)
     surface = barrel(site.gap, **({"bulge": 0.0} | shape))
-    return joint_quality(mesh_joint(surface, site, package(), warpage))
+    return joint_quality(mesh_joint(surface, site, package(), side_of(warpage, package())))
 
 
 @pytest.mark.parametrize("shape", HARD.values(), ids=HARD.keys())
@@ -71,9 +71,9 @@ def test_random_joints(shape, corner):
 
 def write_whole(folder, the_package, the_board, warpage):
     """Mesh assembly and joints; return their element counts."""
-    counts = write_assembly(the_package, the_board, warpage, folder / "assembly.msh")
+    counts = write_assembly(the_package, the_board, folder / "assembly.msh")
     meshes = [
-        mesh_joint(barrel(site.gap, 0.02 * MM), site, the_package, warpage)
+        mesh_joint(barrel(site.gap, 0.02 * MM), site, the_package, side_of(warpage, the_package))
         for site in pad_table(the_package, the_board, warpage)
     ]
     assert min(write_joints(meshes, folder / "joints.msh").values()) > 0.2
@@ -106,7 +106,7 @@ def test_single_layers_everywhere(tmp_path):
     the_package = package(substrate=flat, die=flat)
     the_board = board(numerics={"layers": 2, "patch_layers": 1, "patch_margin": 1})
     assert not problems(the_package, the_board, Warpage())
-    counts = write_assembly(the_package, the_board, Warpage(), tmp_path / "assembly.msh")
+    counts = write_assembly(the_package, the_board, tmp_path / "assembly.msh")
     assert counts["die"] == counts["substrate"] == 25
 
 
@@ -131,6 +131,6 @@ def test_random_assemblies_are_refused_or_upright(tmp_path_factory, parameters):
     the_package, the_board = parameters
     if problems(the_package, the_board, Warpage()):
         return
-    counts = write_assembly(the_package, the_board, Warpage(), tmp_path_factory.mktemp("random") / "assembly.msh")
+    counts = write_assembly(the_package, the_board, tmp_path_factory.mktemp("random") / "assembly.msh")
     estimate = count_elements(the_package, the_board)
     assert counts == {name: estimate[name].elements for name in counts}

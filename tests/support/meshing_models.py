@@ -1,6 +1,7 @@
 """A small package on a small board, to be varied."""
 
-from meshing.parameters import Board, Package
+from meshing.package_side import PackageSide
+from meshing.parameters import Board, Package, Warpage
 
 MM = 1.0e-3
 PLATE = {"thickness": 0.02 * MM, "layout": "plate"}
@@ -30,3 +31,8 @@ def board(**changes) -> Board:
         "holes": {"diameter": 2.0 * MM, "inset_x": 3.0 * MM, "inset_y": 3.0 * MM},
     }
     return Board.model_validate(values | changes)
+
+
+def side_of(warpage: Warpage, the_package: Package) -> PackageSide:
+    """The whole underside of a package with a prescribed warpage."""
+    return PackageSide.prescribed(the_package, board(symmetry="full"), warpage)

@@ -1,39 +1,26 @@
-import meshio
 import numpy as np
 import pytest
 
 from meshing.assembly import write_assembly
 from meshing.estimate import count_elements
-from meshing.hexahedra import quad_areas, scaled_jacobian, volumes
-from meshing.pads import lift
+from meshing.hexahedra import scaled_jacobian
 from meshing.parameters import Warpage
+from tests.support.mesh_file import MeshFile
 from tests.support.meshing_models import MM, PLATE, board, package
 
 
-class Assembly:
+class Assembly(MeshFile):
     """An assembly as a reader of the file sees it."""
 
     def __init__(self, folder, *parameters):
         path = folder / "assembly.msh"
         self.counts = write_assembly(*parameters, path)
-        self.mesh = meshio.read(path)
-        self.points = self.mesh.points
-
-    def cells(self, name, kind="hexahedron"):
-        """Cells of a physical group, by meshio's cell sets."""
-        blocks = zip(self.mesh.cells, self.mesh.cell_sets[name], strict=True)
-        return np.vstack([block.data[chosen] for block, chosen in blocks if block.type == kind and len(chosen)])
-
-    def volume(self, name):
-        return volumes(self.points, self.cells(name)).sum()
-
-    def area(self, name):
-        return quad_areas(self.points, self.cells(name, "quad")).sum()
+        super().__init__(path)
 
 
 @pytest.fixture(scope="module")
 def quarter(tmp_path_factory):
-    return Assembly(tmp_path_factory.mktemp("quarter"), package(), board(), Warpage())
+    return Assembly(tmp_path_factory.mktemp("quarter"), package(), board())
 
 
 def test_every_hexahedron_is_in_one_part(quarter):
@@ -93,18 +80,8 @@ def test_holes_are_round(quarter):
     assert np.ptp(walls[:, :, 2]) == pytest.approx(1.0 * MM)
 
 
-def test_warpage_lifts_the_package_only(tmp_path):
-    warpage = Warpage(corner=0.2 * MM)
-    warped = Assembly(tmp_path, package(), board(), warpage)
-    under = warped.points[np.unique(warped.cells("package_side", "quad"))]
-    expected = 0.35 * MM + lift(package(), warpage, under[:, 0], under[:, 1])
-    assert under[:, 2] == pytest.approx(expected, rel=1e-9)
-    assert warped.points[np.unique(warped.cells("board"))][:, 2].max() < 1e-12
-    assert warped.volume("substrate") == pytest.approx((2.5 * MM) ** 2 * 0.4 * MM)
-
-
 def test_full_model_is_four_quarters(tmp_path, quarter):
-    full = Assembly(tmp_path, package(), board(symmetry="full"), Warpage())
+    full = Assembly(tmp_path, package(), board(symmetry="full"))
     assert full.counts == {name: 4 * count for name, count in quarter.counts.items()}
     assert not {"symmetry_x", "symmetry_y"} & set(full.mesh.field_data)
     assert len(full.cells("mounting_holes", "quad")) == 4 * len(quarter.cells("mounting_holes", "quad"))
@@ -128,7 +105,7 @@ def test_estimate_counts_what_is_meshed(tmp_path, symmetry, copper):
     odd = {"length": 3.3 * MM, "width": 5.0 * MM, "thickness": 0.4 * MM, "elements": 1}
     the_package, the_board = package(copper=copper, die=odd), board(symmetry=symmetry)
     estimate = count_elements(the_package, the_board)
-    counts = write_assembly(the_package, the_board, Warpage(), tmp_path / "assembly.msh")
+    counts = write_assembly(the_package, the_board, tmp_path / "assembly.msh")
     assert {name: estimate[name].elements for name in counts} == counts
 
 

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from meshing.hexahedra import quad_areas, volumes
-from meshing.pads import lift, pad_table
+from meshing.pads import pad_table
 from meshing.parameters import Warpage
 from meshing.solder_mesh import JointMeshError, joint_quality, mesh_coarse_joint, mesh_joint
 from meshing.surface import enclosed_volume
 from tests.support.joint_surfaces import barrel
-from tests.support.meshing_models import MM, PLATE, board, package
+from tests.support.meshing_models import MM, PLATE, board, package, side_of
 
 WARPAGE = Warpage(corner=0.03 * MM)
 
@@ -19,7 +19,7 @@ def coarse_corner(bulge=0.04 * MM, warpage=WARPAGE, **changes):
     the_package = package(**changes)
     site = {site.name: site for site in pad_table(the_package, board(), warpage)}["A4"]
     surface = barrel(site.gap, bulge)
-    return mesh_coarse_joint(surface, site, the_package, warpage), surface, (site, the_package)
+    return mesh_coarse_joint(surface, site, the_package, side_of(warpage, the_package)), surface, (site, the_package)
 
 
 def test_it_is_eight_hexahedra_of_solder_with_named_faces():
@@ -48,7 +48,7 @@ def test_it_spans_from_the_board_to_the_warped_package():
     mesh, _, (_, the_package) = coarse_corner()
     foot, head = (mesh.points[np.unique(mesh.facets[name])] for name in ("foot@A4", "head@A4"))
     assert foot[:, 2] == pytest.approx(0.0, abs=1e-15)
-    assert head[:, 2] == pytest.approx(0.35 * MM + lift(the_package, WARPAGE, head[:, 0], head[:, 1]), rel=1e-12)
+    assert head[:, 2] == pytest.approx(side_of(WARPAGE, the_package).height(head[:, 0], head[:, 1]), rel=1e-12)
 
 
 def test_on_copper_plates_it_spans_the_gap_alone():
@@ -60,7 +60,7 @@ def test_on_copper_plates_it_spans_the_gap_alone():
 
 def test_it_stands_where_the_fine_joint_stands():
     coarse, surface, (site, the_package) = coarse_corner(warpage=Warpage())
-    fine = mesh_joint(surface, site, the_package, Warpage())
+    fine = mesh_joint(surface, site, the_package, side_of(Warpage(), the_package))
     for name in ("foot@A4", "head@A4"):
         ends = [mesh.points[np.unique(mesh.facets[name])].mean(axis=0) for mesh in (coarse, fine)]
         assert ends[0] == pytest.approx(ends[1], abs=1e-3 * site.gap)

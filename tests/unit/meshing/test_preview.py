@@ -17,7 +17,7 @@ def test_parts_have_the_colour_of_their_role(part, role):
 
 
 def test_picture_shows_green_board_and_golden_substrate(tmp_path):
-    write_assembly(package(), board(), Warpage(), tmp_path / "assembly.msh")
+    write_assembly(package(), board(), tmp_path / "assembly.msh")
     write_preview([tmp_path / "assembly.msh"], tmp_path / "preview.png")
     red, green, blue = np.moveaxis(matplotlib.image.imread(tmp_path / "preview.png")[:, :, :3], 2, 0)
     assert np.mean((green > 1.3 * red) & (green > 1.3 * blue)) > 0.1  # share of the picture

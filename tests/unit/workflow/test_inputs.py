@@ -19,10 +19,10 @@ RERUN = {
     "materials.die.young_modulus=130 GPa": ("shock", "report"),
     "materials.solder.young_modulus=40 GPa": AFTER["solder_mesh"],
     "solder.surface_tension=0.5 N/m": AFTER["reflow"],
-    "warpage.corner=0.03 mm": NAMES,
+    "warpage.corner=0.03 mm": AFTER["reflow"],
     "package.joint_numerics.layers=8": AFTER["solder_mesh"],
-    "package.die.thickness=0.3 mm": ("geometry", "shock", "report"),
-    "board.numerics.coarse_size=4 mm": ("geometry", "shock", "report"),
+    "package.die.thickness=0.3 mm": ("geometry", "solder_mesh", "shock", "report"),
+    "board.numerics.coarse_size=4 mm": ("geometry", "solder_mesh", "shock", "report"),
     "case.title=Another": ("report",),
 }
 
