@@ -45,7 +45,7 @@ class StructuredFace:
             raise NotStructuredError(f"{len(points)} nodes are no grid of {shape[0]} x {shape[1]} lines")
         grid = np.empty((*shape, values.shape[1]))
         grid[places[0], places[1]] = values
-        return cls(*lines, grid)
+        return cls(lines[0], lines[1], grid)
 
     def __call__(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Return the values at points (k,), (k,) [m]: (k, c).

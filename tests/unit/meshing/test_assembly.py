@@ -91,7 +91,7 @@ def test_full_model_is_four_quarters(tmp_path, quarter):
 
 
 def test_copper_plates_lie_under_and_above_the_joints(tmp_path):
-    plates = Assembly(tmp_path, package(copper=PLATE), board(), Warpage())
+    plates = Assembly(tmp_path, package(copper=PLATE), board())
     for part, low in (("copper_board", 0.0), ("copper_package", 0.33)):
         heights = plates.points[np.unique(plates.cells(part))][:, 2] / MM
         assert (heights.min(), heights.max()) == pytest.approx((low, low + 0.02), abs=1e-9)

@@ -10,7 +10,7 @@ from meshing.pads import pad_table
 from meshing.parameters import Warpage
 from meshing.solder_mesh import joint_quality, mesh_joint
 from tests.support.joint_surfaces import barrel
-from tests.support.meshing_models import MM, board, package
+from tests.support.meshing_models import MM, board, package, side_of
 
 WARPAGE = Warpage(corner=0.03 * MM)
 
@@ -18,7 +18,7 @@ WARPAGE = Warpage(corner=0.03 * MM)
 @pytest.fixture
 def meshes():
     return [
-        mesh_joint(barrel(site.gap, 0.03 * MM, offset=0.02 * MM), site, package(), WARPAGE)
+        mesh_joint(barrel(site.gap, 0.03 * MM, offset=0.02 * MM), site, package(), side_of(WARPAGE, package()))
         for site in pad_table(package(), board(), WARPAGE)
     ]
 

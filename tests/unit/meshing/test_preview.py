@@ -3,7 +3,6 @@ import numpy as np
 import pytest
 
 from meshing.assembly import write_assembly
-from meshing.parameters import Warpage
 from meshing.preview import COLOURS, colour, write_preview
 from tests.support.meshing_models import board, package
 
