@@ -13,8 +13,8 @@ setup:  ## install what is missing: Debian packages, .venv
 demo: setup  ## run the default case from case file to report
 	$(PYTHON) -m workflow run $(CASE)
 
-test: setup  ## run every check and test
-	$(PYTHON) -m pytest
+test: setup  ## run every check and test, on all cores
+	$(PYTHON) -m pytest --numprocesses=logical --maxprocesses=8 --dist=loadfile
 
 test-mpi: setup  ## run the tests that start several MPI ranks
 	$(PYTHON) -m pytest tests/mpi
