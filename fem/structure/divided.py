@@ -43,9 +43,10 @@ def divided_on_one_rank(request: StructureInput) -> DividedStructure:
     whole = tied(read_mesh(request.mesh), request)
     treatment = Treatment(request.structure.formulation, dynamics.kinematics, dynamics.numerics.mass_scaled)
     found = survey(whole.mesh, request.layer_materials, treatment)
+    fine = layers_that_are_fine(whole, found, coupling)
     rules = Rules(
         coupling=coupling,
-        coarse=coarse_cells(whole, found, coupling),
+        coarse=whole.mesh.in_parts(lambda name: name not in fine),
         fraction=dynamics.numerics.step_fraction,
         stiffness=dynamics.damping.coefficients[1],
         duration=dynamics.duration,
@@ -63,7 +64,8 @@ def divided_on_one_rank(request: StructureInput) -> DividedStructure:
         steps=steps_of_division(whole, found, division, rules),
         rules=rules,
         scheme=division.scheme,
-        coupling=coupling_record(division, found, len(inputs["macro"].tables.cut)),
+        coupling=coupling_record(division, found, len(inputs["macro"].tables.cut))
+        | {"fine_layers": fine, "direction": "two_way"},
     )
 
 
@@ -98,8 +100,8 @@ def check_motions_at_cut(division: Division, tables: StructureTables, request: S
                 )
 
 
-def coarse_cells(whole: Whole, found: Survey, coupling: LayerCoupling) -> NDArray[np.bool_]:
-    """Return the cells ``(ne,)`` of the layers that are not fine: neither named, nor, where none is, of small steps.
+def layers_that_are_fine(whole: Whole, found: Survey, coupling: LayerCoupling) -> tuple[str, ...]:
+    """Return the layers that are fine: those that are named or, where none is, those of small steps.
 
     Raises:
         CutError: No layer is fine.
@@ -112,7 +114,7 @@ def coarse_cells(whole: Whole, found: Survey, coupling: LayerCoupling) -> NDArra
             f"no layer is fine: critical steps are {found_steps}, none less than half of the longest; name it in"
             " dynamics.coupling.fine, or leave dynamics.coupling out"
         )
-    return whole.mesh.in_parts(lambda name: name not in fine)
+    return fine
 
 
 def structure_inputs(

@@ -1,4 +1,4 @@
-"""Curves and maps of the report, as inline SVG."""
+"""Curves of the report, as inline SVG."""
 
 import io
 
@@ -7,6 +7,8 @@ import numpy as np
 
 matplotlib.use("Agg")
 from matplotlib import pyplot
+
+from workflow.report.histories import joint_stress
 
 MODE_STYLE = {
     "two_scale": {"color": "#0b5fa5", "linestyle": "-", "linewidth": 1.6, "label": "two-scale"},
@@ -26,22 +28,6 @@ ENERGIES = {
     "external": "#333333", "kinetic": "#0b5fa5", "internal": "#e09f3e", "plastic": "#d1495b", "hourglass": "#7a5ea8",
     "damping": "#2a7d4f",
 }  # fmt: skip
-
-
-def array_map(joints: list[dict]) -> str:
-    """Draw standoff and width of every joint at its place in the array.
-
-    Args:
-        joints: records with name, x, y [m], standoff [m], max_width [m].
-
-    Returns:
-        An SVG element.
-    """
-    with pyplot.rc_context(STYLE):
-        figure, axes = pyplot.subplots(1, 2, figsize=(9.2, 3.9), constrained_layout=True)
-        _map_panel(axes[0], joints, "standoff", "standoff [µm]")
-        _map_panel(axes[1], joints, "max_width", "maximum width [µm]")
-        return svg(figure)
 
 
 def history_curves(histories: dict[str, dict], critical_joint: str) -> str:
@@ -69,6 +55,26 @@ def history_curves(histories: dict[str, dict], critical_joint: str) -> str:
         axes[0, 0].legend(frameon=False)
         for axis in axes[1]:
             axis.set_xlabel("time [ms]")
+        return svg(figure)
+
+
+def difference_curves(histories: dict[str, dict], critical_joint: str) -> str:
+    """Draw by how much two scales differ from the DNS: die displacement and the critical joint's stress.
+
+    Returns:
+        An SVG element; empty unless both were run.
+    """
+    if len(histories) < 2:
+        return ""
+    ours, reference = histories["two_scale"], histories["dns"]
+    time = ours["time"] / MILLI
+    stresses = [joint_stress(history, critical_joint) / 1.0e6 for history in (ours, reference)]
+    with pyplot.rc_context(STYLE):
+        figure, (left, right) = pyplot.subplots(1, 2, figsize=(9.2, 2.6), constrained_layout=True)
+        left.plot(time, (ours["die_centre"] - reference["die_centre"])[:, 2] / MICRO, color="#0b5fa5")
+        left.set(xlabel="time [ms]", ylabel="die centre, difference [µm]")
+        right.plot(time, stresses[0] - stresses[1], color="#0b5fa5")
+        right.set(xlabel="time [ms]", ylabel=f"von Mises of {critical_joint},\ndifference [MPa]")
         return svg(figure)
 
 
@@ -103,31 +109,15 @@ def timing_bars(timings: dict[str, float]) -> str:
         return svg(figure)
 
 
-def _map_panel(axis, joints: list[dict], key: str, label: str) -> None:
-    values = np.array([joint[key] for joint in joints]) / MICRO
-    x = np.array([joint["x"] for joint in joints]) / MILLI
-    y = np.array([joint["y"] for joint in joints]) / MILLI
-    marks = axis.scatter(x, y, c=values, s=620, cmap="viridis", edgecolors="white")
-    middle = 0.5 * (values.min() + values.max())
-    for joint, value, px, py in zip(joints, values, x, y, strict=True):
-        color = "white" if value <= middle else "black"
-        axis.annotate(f"{joint['name']}\n{value:.0f}", (px, py), ha="center", va="center", fontsize=6.5, color=color)
-    axis.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal")
-    axis.margins(0.14)
-    axis.figure.colorbar(marks, ax=axis, label=label)
-
-
 def _draw_histories(axes, mode: str, history: dict, critical_joint: str) -> None:
     time, style = history["time"] / MILLI, MODE_STYLE[mode]
-    column = list(history["joints"]).index(critical_joint)
     axes[0, 0].plot(time, history["board_centre"][:, 2] / MILLI, **style)
     axes[0, 0].set_ylabel("board centre, relative to table [mm]")
     axes[0, 1].plot(time, history["die_centre"][:, 2] / MILLI, **style)
     axes[0, 1].set_ylabel("die centre, relative to table [mm]")
     axes[1, 0].plot(time, 1.0e3 * history["board_strain"], **style)
     axes[1, 0].set_ylabel("largest board strain under the package [1e-3]")
-    stress = np.maximum(history["von_mises_board"][:, column], history["von_mises_package"][:, column])
-    axes[1, 1].plot(time, stress / 1.0e6, **style)
+    axes[1, 1].plot(time, joint_stress(history, critical_joint) / 1.0e6, **style)
     axes[1, 1].set_ylabel(f"von Mises at the pads of {critical_joint} [MPa]")
 
 

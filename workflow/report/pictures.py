@@ -1,53 +1,21 @@
-"""Rendered pictures of the report: joint shapes, stressed joints, the bent board."""
+"""Rendered pictures of the report: stressed joints, the bent board, and what all pictures share."""
 
+import base64
+import tempfile
+from collections.abc import Callable
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 import pyvista
 from matplotlib import pyplot
 
+Told = TypeVar("Told")
+
 MILLI = 1.0e-3
 MEGA = 1.0e6
 WINDOW = (1600, 800)
 SCALAR_BAR = {"vertical": True, "position_x": 0.88, "position_y": 0.3, "height": 0.5, "color": "black", "n_labels": 4}
-
-
-def render_shapes(surface_folder: Path, joints: list[dict], picture: Path) -> None:
-    """Render every distinct joint shape in rows, by increasing standoff.
-
-    Args:
-        surface_folder: folder of the closed surfaces, one VTU file a shape.
-        joints: records with shape, name, standoff, max_width [m].
-        picture: PNG file to write.
-    """
-    firsts = {joint["shape"]: joint for joint in reversed(joints)}
-    ordered = sorted(firsts.values(), key=lambda joint: joint["standoff"])
-    columns = min(len(ordered), 7)
-    rows = -(-len(ordered) // columns)
-    spacing = 1.3 * max(joint["max_width"] for joint in ordered) / MILLI
-    plotter = new_plotter((1800, 110 + round(1800 * rows / columns)))
-    limits = _radius_limits(ordered)
-    for index, joint in enumerate(ordered):
-        row, column = divmod(index, columns)
-        surface = pyvista.read(surface_folder / f"{joint['shape']}.vtu")
-        _add_shape(plotter, surface, joint, (column * spacing, 0.0, -row * spacing), limits)
-    plotter.add_scalar_bar(
-        title="radius [um]",
-        n_labels=3,
-        fmt="%.0f",
-        vertical=False,
-        position_x=0.36,
-        position_y=0.01,
-        width=0.28,
-        height=70 / plotter.window_size[1],
-        color="black",
-    )
-    middle = 0.5 * max(joint["standoff"] for joint in ordered) / MILLI  # labels lie above their joints
-    centre = (0.5 * (columns - 1) * spacing, 0.0, middle - 0.5 * (rows - 1) * spacing)
-    plotter.camera_position = [(centre[0], -100.0, centre[2] + 14.0), centre, (0.0, 0.0, 1.0)]
-    plotter.enable_parallel_projection()
-    plotter.camera.parallel_scale = 0.5 * columns * spacing * plotter.window_size[1] / plotter.window_size[0]
-    save(plotter, picture)
 
 
 def render_joints(series: list[Path], history: dict, parts: list[str], picture: Path) -> str:
@@ -138,40 +106,10 @@ def render_board(series: list[Path], history: dict, parts: list[str], picture: P
     return f"The board at {1e3 * time:.3f} ms, deflection drawn {factor:g} times as large; grey: at rest."
 
 
-def _add_shape(plotter: pyvista.Plotter, surface, joint: dict, place: tuple, limits: tuple[float, float]) -> None:
-    """Add one closed joint surface at a place [mm] of the gallery: wetted discs, free surface by radius, label."""
-    surface["radius [um]"] = 1.0e6 * np.hypot(surface.points[:, 0], surface.points[:, 1])
-    surface.points = surface.points / MILLI + np.array(place)
-    boundary = surface.cell_data["boundary"]
-    plotter.add_mesh(surface.extract_cells(boundary != 0), color="#b87333")
-    plotter.add_mesh(
-        surface.extract_cells(boundary == 0), scalars="radius [um]", cmap="viridis", clim=limits, show_scalar_bar=False
-    )
-    label = f"{joint['name']}  {1e6 * joint['standoff']:.0f} x {1e6 * joint['max_width']:.0f} um"
-    plotter.add_point_labels(
-        [(place[0], 0.0, surface.points[:, 2].max() + 0.12)],
-        [label],
-        shape=None,
-        font_size=17,
-        text_color="black",
-        show_points=False,
-        always_visible=True,
-        justification_horizontal="center",
-    )
-
-
 def _of_role(grid: pyvista.UnstructuredGrid, parts: list[str], role: str) -> pyvista.UnstructuredGrid:
     """Cells of the parts whose names start with ``role``."""
     chosen = [number for number, name in enumerate(parts) if name.startswith(role)]
     return grid.extract_cells(np.isin(grid.cell_data["part"].astype(int), chosen))
-
-
-def _radius_limits(joints: list[dict]) -> tuple[float, float]:
-    """Colour range [um] from the narrowest contact to the widest joint, the same for all."""
-    narrow = min(
-        min(joint["contact_radius_board"], joint["contact_radius_package"], 0.5 * joint["waist"]) for joint in joints
-    )
-    return 1.0e6 * narrow, 0.5e6 * max(joint["max_width"] for joint in joints)
 
 
 def _add_part(plotter: pyvista.Plotter, part: pyvista.DataSet, **style) -> None:
@@ -228,3 +166,11 @@ def save(plotter: pyvista.Plotter, picture: Path) -> None:
     margin = 12
     box = image[max(rows[0] - margin, 0) : rows[-1] + margin, max(columns[0] - margin, 0) : columns[-1] + margin]
     pyplot.imsave(picture, box)
+
+
+def embedded(draw: Callable[[Path], Told]) -> tuple[str, Told]:
+    """Let a function write a PNG file; return it in base64, and what the function returned."""
+    with tempfile.TemporaryDirectory() as folder:
+        picture = Path(folder) / "picture.png"
+        told = draw(picture)
+        return base64.b64encode(picture.read_bytes()).decode(), told

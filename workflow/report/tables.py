@@ -1,17 +1,16 @@
 """Tables of the report: products turned into rows of text with units."""
 
-import json
-from collections.abc import Collection, Mapping
 from importlib import metadata
-from pathlib import Path
 
 import numpy as np
 
 from workflow.check_text import against_limit
 
+SHAPE_EFFECT = "shape_effect_on_peak_stress"
 HEADLINE = (
     ("critical_joint", "critical joint"),
     ("peak_von_mises", "peak von Mises at its pads"),
+    (SHAPE_EFFECT, "of it from the joints' real shapes, against identical ones"),
     ("peak_board_strain", "peak board strain under the package"),
     ("critical_joint_stress_error", "stress history, two-scale against DNS"),
     ("two_scale_dns_time_ratio", "wall time, two-scale over DNS"),
@@ -26,8 +25,8 @@ COMPARISON = (
     ("die_displacement_error", "die centre displacement, relative L2"),
     ("board_displacement_error", "board centre displacement, relative L2"),
     ("two_scale_dns_time_ratio", "wall time, two-scale over DNS on as many ranks"),
-    ("coarse_run_dns_time_ratio", "wall time of the coarse run that finds the critical joints, over DNS"),
     ("two_scale_ideal_ratio", "the same if all element updates cost the same and all else nothing"),
+    ("coarse_run_dns_time_ratio", "wall time of the coarse run that finds the critical joints, over DNS"),
 )
 PACKAGES = (
     "numpy",
@@ -81,11 +80,11 @@ def parameters(case) -> dict:
 
 
 def effects(records: dict) -> dict:
-    """Which effects were simulated, and why."""
+    """Which effects were simulated, and why: in prose."""
     rows = [
         [name.replace("_", " "), "on" if record["on"] else "off", record["why"]] for name, record in records.items()
     ]
-    return {"head": ["effect", "state", "why"], "rows": rows}
+    return {"head": ["effect", "state", "why"], "rows": rows, "prose": True}
 
 
 def versions() -> dict:
@@ -97,140 +96,6 @@ def versions() -> dict:
         except metadata.PackageNotFoundError:
             rows.append([name, "not found"])
     return {"head": ["library", "version"], "rows": rows}
-
-
-def joint_records(run_folder: Path) -> list[dict]:
-    """Join pad table, reflow metrics and mesh quality: one flat record a joint, SI units."""
-    pads = json.loads((run_folder / "reflow" / "pads.json").read_text())
-    reflow = json.loads((run_folder / "reflow" / "joints.json").read_text())
-    quality = json.loads((run_folder / "solder_mesh" / "quality.json").read_text())
-    records = []
-    for pad in pads:
-        joint = reflow[pad["name"]]
-        metrics = {name: metric["value"] for name, metric in joint["metrics"].items()}
-        records.append({**pad, "shape": joint["shape"], **metrics, **quality[pad["name"]]})
-    return records
-
-
-def shapes(joints: list[dict]) -> dict:
-    """One row a distinct shape, by increasing standoff."""
-    head = [
-        "joints",
-        "standoff [µm]",
-        "max. width [µm]",
-        "width error",
-        "axial force [mN]",
-        "volume drift",
-        "mesh volume error",
-        "min. scaled Jacobian",
-    ]
-    names: dict[str, list[str]] = {}
-    for joint in joints:
-        names.setdefault(joint["shape"], []).append(joint["name"])
-    firsts = {joint["shape"]: joint for joint in reversed(joints)}
-    rows = [
-        [
-            " ".join(names[shape]),
-            micro(joint["standoff"]),
-            micro(joint["max_width"]),
-            percent(joint["width_error"]),
-            f"{1e3 * joint['axial_force']:+.3f}",
-            percent(joint["volume_drift"]),
-            percent(joint["volume_error"]),
-            f"{joint['minimum_scaled_jacobian']:.2f}",
-        ]
-        for shape, joint in sorted(firsts.items(), key=lambda item: item[1]["standoff"])
-    ]
-    return {"head": head, "rows": rows}
-
-
-def verdicts(run_folder: Path) -> dict:
-    """Verdict of the reflow on every joint, those that are not ok first."""
-    joints = json.loads((run_folder / "reflow" / "joints.json").read_text())
-    rows = [
-        [
-            name,
-            joint["verdict"],
-            " ".join(joint.get("touches", ())) or "–",
-            micro(joint["metrics"]["standoff"]["value"]),
-            micro(joint["metrics"]["max_width"]["value"]),
-        ]
-        for name, joint in sorted(joints.items(), key=lambda item: item[1]["verdict"] == "ok")
-    ]
-    return {"head": ["joint", "verdict", "touches", "standoff [µm]", "max. width alone [µm]"], "rows": rows}
-
-
-def ranked_joints(
-    history: dict, joints: list[dict], failure: Mapping[str, dict], fine: Collection[str] | None = None
-) -> dict:
-    """Joints ranked by peak von Mises stress at their pads.
-
-    Args:
-        history: of one mode.
-        joints: ``joint_records``.
-        failure: criterion -> joint -> value, limit, ok; of the same mode.
-        fine: names of the fine joints, where some are coarse.
-    """
-    shape = {joint["name"]: joint for joint in joints}
-    at_pads = np.maximum(history["von_mises_board"], history["von_mises_package"])
-    peel = np.maximum(history["peel_board"], history["peel_package"])
-    rows = []
-    for column in np.argsort(-at_pads.max(axis=0)):
-        name, row = str(history["joints"][column]), int(np.argmax(at_pads[:, column]))
-        side = "board" if history["von_mises_board"][row, column] == at_pads[row, column] else "package"
-        rows.append(
-            [
-                name,
-                mega(at_pads[row, column]),
-                side,
-                f"{1e3 * history['time'][row]:.3f}",
-                mega(peel[:, column].max()),
-                mega(history["von_mises_max"][:, column].max()),
-                micro(shape[name]["standoff"]),
-                micro(shape[name]["max_width"]),
-                *failure_cells(history, column, failure),
-                *([] if fine is None else ["fine" if name in fine else "coarse"]),
-            ]
-        )
-    head = [
-        "joint",
-        "von Mises at pad [MPa]",
-        "pad",
-        "time [ms]",
-        "peel stress [MPa]",
-        "largest in an element [MPa]",
-        "standoff [µm]",
-        "width [µm]",
-        *(["plastic work at pad [kJ/m³]"] if "plastic_work_board" in history else []),
-        *(["fails by"] if failure else []),
-        *([] if fine is None else ["mesh"]),
-    ]
-    return {"head": head, "rows": rows}
-
-
-def failure_cells(history: dict, column: int, failure: Mapping[str, dict]) -> list[str]:
-    """Plastic work and failed criteria of the joint in a column of the history: only what the run has."""
-    cells = []
-    if "plastic_work_board" in history:
-        work = max(history[f"plastic_work_{end}"][:, column].max() for end in ("board", "package"))
-        cells.append(number(1e-3 * work))
-    if failure:
-        joint = str(history["joints"][column])
-        failed = [name.replace("_", " ") for name, verdicts in failure.items() if not verdicts[joint]["ok"]]
-        cells.append(", ".join(failed) or "–")
-    return cells
-
-
-def late_peak(history: dict) -> str:
-    """A warning if the worst joint's stress is largest at the end of the simulated time; empty if it is not."""
-    at_pads = np.maximum(history["von_mises_board"], history["von_mises_package"]).max(axis=1)
-    if np.argmax(at_pads) < len(at_pads) - max(2, len(at_pads) // 50):
-        return ""
-    end = 1e3 * history["time"][-1]
-    return (
-        f"The stress is still rising when the simulated time ends ({end:.3g} ms): "
-        "a longer shock.duration gives a higher peak."
-    )
 
 
 def comparison(metrics: dict) -> dict | None:
@@ -305,6 +170,8 @@ def mode_name(mode: str) -> str:
 
 def named_quantity(metrics: dict, name: str) -> str:
     """Text of a metric: errors as per cent, strains in microstrain, others as ``quantity``."""
+    if name == SHAPE_EFFECT:
+        return f"{100.0 * metrics[name]['value']:+.2f} %"
     if "_error" in name:
         return percent(metrics[name]["value"])
     if name.endswith("_strain"):
@@ -351,7 +218,7 @@ def micro(value: float) -> str:
 
 def mega(value: float) -> str:
     """Pascals as megapascals."""
-    return f"{1e-6 * value:.1f}"
+    return f"{1e-6 * value:.1f}" if abs(value) >= 1e6 or value == 0.0 else f"{1e-6 * value:.2g}"
 
 
 def percent(value: float) -> str:

@@ -41,6 +41,7 @@ def two_scales(coupling: Record, model: Record, fine: FineJoints | None) -> dict
         ("why", coupling.get("why")),
         ("direction", DIRECTIONS.get(coupling.get("direction", ""))),
         ("fine joints", " ".join(joints) if joints is not None and not isinstance(joints, str) else joints),
+        ("fine layers", " ".join(coupling.get("fine_layers", ()))),
         ("how they were found", fine and fine.why),
         ("window", nano(model["window"])),
         ("step ratio m", number(model["substeps"])),

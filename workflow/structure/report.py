@@ -1,7 +1,5 @@
 """Report of a structure: what moved how, against what, at what cost."""
 
-import base64
-import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -160,17 +158,15 @@ def mode_table(modes: list[dict]) -> dict:
 
 
 def _add_pictures(folder: Path, case: StructureCase, history: Mapping[str, np.ndarray], context: dict) -> None:
+    from workflow.report.pictures import embedded
     from workflow.structure.pictures import render_deformation, render_modes
 
-    modes = read_modes(folder)
-    with tempfile.TemporaryDirectory() as temporary:
-        bent, shapes = Path(temporary) / "bent.png", Path(temporary) / "modes.png"
-        context["bent_caption"] = render_deformation(model_series(folder), _peak_time(case, history), bent)
-        context["pictures"]["bent"] = base64.b64encode(bent.read_bytes()).decode()
-        if modes:
-            context["tables"]["modes"] = mode_table(modes)
-            render_modes(folder / "modes.pvd", modes[:6], shapes)
-            context["pictures"]["modes"] = base64.b64encode(shapes.read_bytes()).decode()
+    modes, series, time = read_modes(folder), model_series(folder), _peak_time(case, history)
+    pictures = context["pictures"]
+    pictures["bent"], context["bent_caption"] = embedded(lambda path: render_deformation(series, time, path))
+    if modes:
+        context["tables"]["modes"] = mode_table(modes)
+        pictures["modes"], _ = embedded(lambda path: render_modes(folder / "modes.pvd", modes[:6], path))
 
 
 def model_series(folder: Path) -> list[Path]:

@@ -8,8 +8,10 @@ import pytest
 from fem.materials.failure import failure_criteria, judge
 from fem.parameters import Failure
 from workflow.report import body as report_body
-from workflow.report import tables
-from workflow.report.curves import array_map, energy_curves, history_curves
+from workflow.report import joint_tables, tables
+from workflow.report.array_map import array_map
+from workflow.report.curves import energy_curves, history_curves
+from workflow.report.histories import late_peak
 from workflow.report.pictures import exaggeration
 from workflow.summary import collect_summary, inputs_digest, write_summary
 
@@ -38,7 +40,7 @@ def history():
 
 
 def test_joints_are_ranked_by_their_worse_pad(history):
-    table = tables.ranked_joints(history, [{"name": name, **JOINT} for name in ("A9", "A10")], {})
+    table = joint_tables.ranked_joints(history, [{"name": name, **JOINT} for name in ("A9", "A10")], {})
     assert [row[0] for row in table["rows"]] == ["A10", "A9"]
     assert table["rows"][0][1:6] == ["100.0", "board", "0.500", "9.0", "150.0"]
     assert table["rows"][1][2] == "package"
@@ -49,7 +51,7 @@ def test_joints_that_fail_say_by_what(history):
     yielding = history | {"plastic_work_board": work, "plastic_work_package": 0.5 * work}
     joints = [{"name": name, **JOINT} for name in ("A9", "A10")]
     found = judge(failure_criteria(Failure(peel_stress=8e6, plastic_work_density=3e5)), yielding)
-    table = tables.ranked_joints(yielding, joints, found)
+    table = joint_tables.ranked_joints(yielding, joints, found)
     assert table["head"][-2:] == ["plastic work at pad [kJ/m³]", "fails by"]
     assert [row[0] for row in table["rows"]] == ["A10", "A9"]
     assert [row[-2:] for row in table["rows"]] == [["200", "peel stress"], ["100", "–"]]
@@ -61,9 +63,9 @@ def test_a_drop_may_stand_anywhere():
 
 
 def test_a_peak_at_the_end_is_said(history):
-    assert tables.late_peak(history) == ""
+    assert late_peak(history) == ""
     rising = {**history, "von_mises_board": np.outer(history["time"], [1e11, 2e11])}
-    assert "still rising when the simulated time ends (1 ms)" in tables.late_peak(rising)
+    assert "still rising when the simulated time ends (1 ms)" in late_peak(rising)
 
 
 @pytest.mark.parametrize(

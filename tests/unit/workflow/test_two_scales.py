@@ -48,6 +48,12 @@ def test_the_section_tells_scheme_joints_and_checks():
     assert rows["mass of the macro model"] == "1000 mg"
 
 
+def test_a_structure_tells_its_fine_layers_and_its_direction():
+    rows = rows_of(section.two_scales({"fine_layers": ["solder", "copper"], "direction": "two_way"}, MODEL, None))
+    assert rows["fine layers"] == "solder copper"
+    assert rows["direction"] == "two-way"
+
+
 def test_what_a_run_does_not_tell_is_left_out():
     rows = rows_of(section.two_scales({}, MODEL, None))
     assert set(rows) == {"window", "step ratio m"}

@@ -7,7 +7,7 @@ import pytest
 
 from workflow import findings
 from workflow.reflow_pool import ReflowError, mark_bridges, refuse_joints_without_mesh
-from workflow.report import tables
+from workflow.report import joint_tables
 
 PADS = [SimpleNamespace(name=f"A{k}", x=k * 1e-3, y=2.5e-3) for k in (1, 2, 3, 4)]
 
@@ -61,6 +61,6 @@ def test_they_have_no_mesh(records):
 def test_the_report_lists_them_first(records, tmp_path):
     (tmp_path / "reflow").mkdir()
     (tmp_path / "reflow/joints.json").write_text(json.dumps(records))
-    rows = tables.verdicts(tmp_path)["rows"]
+    rows = joint_tables.verdicts(tmp_path)["rows"]
     assert [row[0] for row in rows] == ["A2", "A3", "A4", "A1"]
     assert rows[0][1:3] == ["bridged", "A3"]

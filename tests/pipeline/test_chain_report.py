@@ -1,0 +1,37 @@
+"""The report of the full chain, and of a run that ended after the reflow."""
+
+import shutil
+
+from tests.support.chain_products import add_chain
+from tests.support.workflow_command import reflowshock
+
+LATER = ("surface", "solder_mesh", "shock")
+
+
+def test_the_report_tells_warpage_shape_effect_and_interface(run_folder):
+    add_chain(run_folder)
+    result = reflowshock("report", run_folder)
+    assert result.returncode == 0, result.stderr
+    page = (run_folder / "report.html").read_text()
+    sections = ("Result", "Warpage", "Joint shapes", "Joint meshes", "Shock", "What the real shapes change",
+                "Stress at the package", "Two scales", "Energy ledger", "Cost")  # fmt: skip
+    places = [page.index(f"<h2>{section}</h2>") for section in sections]
+    assert places == sorted(places)
+    assert "The real shapes lower the peak stress" in page
+    assert "published: two-scale" in page and "0.285" in page
+    assert len(page) < 15e6
+
+
+def test_without_such_effects_there_are_no_such_sections(first_run):
+    page = (first_run[0] / "report.html").read_text()
+    for section in ("Warpage", "What the real shapes change", "Stress at the package"):
+        assert f"<h2>{section}</h2>" not in page
+
+
+def test_a_run_that_ended_after_the_reflow_has_a_report(run_folder):
+    for stage in LATER:
+        shutil.rmtree(run_folder / stage)
+    assert reflowshock("report", run_folder).returncode == 0
+    page = (run_folder / "report.html").read_text()
+    assert "<h2>Joint shapes</h2>" in page and "standoff over the array" in page and 'alt="Distinct shapes' in page
+    assert "<h2>Joint meshes</h2>" not in page and "<h2>Shock</h2>" not in page

@@ -1,0 +1,171 @@
+"""Sections of the report on the full chain, from small made-up products."""
+
+import json
+
+import numpy as np
+import pytest
+
+from tests.support.chain_products import BOW, MICRO, MILLI, bowed_structure, interface
+from workflow.report import cost, joint_tables, shape_effect, shock, warpage
+from workflow.report import interface as section
+from workflow.report.array_map import array_map
+from workflow.report.joints import headline
+
+NAMES = ["A3", "A4", "B3", "B4"]
+X, Y = np.array([0.5, 1.5, 0.5, 1.5]) * MILLI, np.array([1.5, 1.5, 0.5, 0.5]) * MILLI
+HALF = 2.5 * MILLI
+
+
+@pytest.fixture(scope="module")
+def structure():
+    return bowed_structure(NAMES, X, Y, HALF)
+
+
+def test_faces_are_the_underside_and_the_board_below_it(structure):
+    package, board = warpage.faces(structure)
+    assert package.warpage == pytest.approx(BOW["package"])
+    assert board.warpage == pytest.approx(BOW["board"])
+    assert package.at(np.array([HALF]), np.array([HALF])) == pytest.approx(BOW["package"])
+    assert np.isnan(package.at(np.array([2 * HALF]), np.array([0.0]))).all()
+
+
+def test_warpage_is_told_in_words_and_by_load_step(structure):
+    gaps = (BOW["package"] - BOW["board"]) * (X**2 + Y**2) / (2 * HALF**2) / MICRO
+    words = warpage.in_words(structure)
+    assert "underside warps by 70.0 µm" in words and "below it by 12.0 µm" in words
+    assert f"{gaps.min():+.1f} to {gaps.max():+.1f} µm" in words
+    table = warpage.load_steps(structure)
+    assert table["head"][:3] == ["load step", "temperature [degC]", "gap change, B3 [µm]"]  # no corner is moved
+    assert table["rows"][-1][1:4] == ["217.0", f"{gaps.min():+.2f}", f"{gaps.max():+.2f}"]
+    assert table["rows"][-1][-2:] == ["4", "6.0e-04"]
+
+
+def test_warpage_is_drawn(structure):
+    joints = [{"x": x, "y": y} for x, y in zip(X, Y, strict=True)]
+    for drawing in (warpage.warpage_maps(structure, joints), warpage.profiles(structure)):
+        assert drawing.startswith("<svg")
+
+
+def test_no_structure_no_section(tmp_path):
+    assert warpage.read_structure(tmp_path) is None
+
+
+def test_stresses_of_both_modes_differ_by_their_factor():
+    times = np.array([0.5e-3, 1.0e-3])
+    reference, ours = interface(NAMES, X, Y, times), interface(NAMES, X, Y, times, 1.01)
+    both = {"two_scale": ours, "dns": reference}
+    assert section.comparable(both) == NAMES
+    assert section.difference(ours, reference, NAMES, 1) == pytest.approx(0.01)
+    assert section.areas(ours, "A3").sum() == pytest.approx((0.34 * MILLI) ** 2)
+    table = section.table(both)
+    assert [row[0] for row in table["rows"]] == ["0.5", "1"]
+    assert table["rows"][1][1:3] == ["6.6", "A4"]
+    assert table["rows"][1][-1] == "1 %"
+    assert section.interface_maps(both).startswith("<svg")
+
+
+def test_joints_with_other_faces_are_not_compared():
+    times = np.array([1.0e-3])
+    reference, ours = interface(NAMES, X, Y, times), interface(NAMES, X, Y, times)
+    ours["von_mises@A3"] = ours["von_mises@A3"][:, :9]
+    assert section.comparable({"two_scale": ours, "dns": reference}) == ["A4", "B3", "B4"]
+    assert section.comparable({"two_scale": ours}) == []
+    assert len(section.table({"dns": reference})["head"]) == 4
+
+
+def history_of(*peaks: float) -> dict[str, np.ndarray]:
+    wave = np.sin(np.linspace(0.0, np.pi, 21))
+    stress = np.outer(wave, peaks)
+    return {"time": np.linspace(0.0, 1e-3, 21), "joints": np.array(NAMES), "von_mises_board": stress,
+            "von_mises_package": 0.5 * stress}  # fmt: skip
+
+
+def test_the_shape_effect_is_that_of_the_critical_joint():
+    real, flat = history_of(40e6, 90e6, 50e6, 60e6), history_of(40e6, 75e6, 50e6, 80e6)
+    joints = [{"name": name, "standoff": 0.3e-3} for name in NAMES]
+    words = shape_effect.in_words(real, flat)
+    assert "raise the peak stress of A4 by 20 %: 90.0 MPa instead of 75.0 MPa" in words
+    assert "there B4 would be the critical one" in words
+    assert shape_effect.table(real, flat, joints)["rows"][0] == ["A4", "90.0", "75.0", "+20.00 %", "300.0"]
+    assert shape_effect.curves(real, flat).startswith("<svg")
+
+
+def record(name: str, **others) -> dict:
+    pad = {"name": name, "x": 0.0, "y": 0.0, "shape": "A4", "standoff": 3e-4, "max_width": 5e-4, "verdict": "ok"}
+    return pad | others
+
+
+def test_of_joints_that_share_a_shape_the_worst_mesh_is_told():
+    joints = [
+        record("A4", method="swept", volume_error=1e-4, minimum_scaled_jacobian=0.7, shape_deviation=1e-6),
+        record("A3", method="swept", volume_error=-2e-3, minimum_scaled_jacobian=0.5, shape_deviation=3e-6),
+        record("B4", shape="B4", standoff=4e-4, method="free-form", volume_error=0.0, minimum_scaled_jacobian=0.25),
+    ]
+    table = joint_tables.meshes(joints)
+    assert table["head"] == ["joints", "method", "volume error", "largest deviation [µm]", "min. scaled Jacobian"]
+    assert table["rows"] == [
+        ["A4 A3", "swept", "-0.2 %", "3.0", "0.50"],
+        ["B4", "free-form", "< 0.0001 %", "–", "0.25"],
+    ]
+    assert joint_tables.meshes([record("A4")]) is None
+    assert [item["value"] for item in headline(joints)] == ["300 to 400 µm", "3 / 2"]
+
+
+def test_records_are_complete_for_what_has_run(tmp_path):
+    (tmp_path / "reflow").mkdir()
+    pads = [{"name": name, "x": 0.0, "y": 0.0, "tilt": [3e-3, 4e-3]} for name in ("A4", "B4")]
+    metrics = {"standoff": {"value": 3e-4, "unit": "m"}}
+    (tmp_path / "reflow/pads.json").write_text(json.dumps(pads))
+    (tmp_path / "reflow/joints.json").write_text(
+        json.dumps({"A4": {"shape": "A4", "verdict": "ok", "metrics": metrics}})
+    )
+    (tmp_path / "surface").mkdir()
+    (tmp_path / "surface/surfaces.json").write_text(json.dumps({"A4": {"standoff": 1.0}, "B4": {"standoff": 2e-4}}))
+    reflowed, given = joint_tables.joint_records(tmp_path)
+    assert (reflowed["standoff"], reflowed["verdict"], reflowed["tilted"]) == (3e-4, "ok", pytest.approx(5e-3))
+    assert (given["standoff"], given["verdict"], given["shape"]) == (2e-4, "given", "B4")
+
+
+def test_maps_show_what_the_joints_have():
+    joints = [record(name, x=x, y=y, tilted=1e-3) for name, x, y in zip(NAMES, X, Y, strict=True)]
+    drawing = array_map(joints)
+    assert "tilt of the package" in drawing and "contact angle" not in drawing
+
+
+def test_margins_name_the_joint_that_is_nearest_to_its_limit():
+    verdicts = {"A3": {"value": 4e7, "limit": 6e7, "ok": True}, "A4": {"value": 5e7, "limit": 6e7, "ok": True}}
+    (figure,) = shock.margins({"failure": {"peel_stress": verdicts}})
+    assert figure == {"value": "1.20", "label": "least margin, limit over peel stress of A4"}
+    assert shock.margins({}) == []
+
+
+def test_small_kinematics_are_told_where_they_matter():
+    metrics = {
+        "peak_neglected_strain": {"value": 8e-3, "unit": ""},
+        "peak_board_strain": {"value": 2.2e-3, "unit": ""},
+        "deflection_over_thickness": {"value": 7.6, "unit": ""},
+    }
+    told = shock.kinematics_note(metrics, "small")
+    assert "7.6 times its thickness" in told and "up to 8000 µm/m" in told and '= "finite"' in told
+    assert shock.kinematics_note(metrics, "finite") == ""
+    assert shock.kinematics_note({"peak_neglected_strain": {"value": 1e-6, "unit": ""}}, "small") == ""
+
+
+def test_costs_stand_beside_the_published_ones():
+    model = {"window": 80e-9, "step": 10e-9, "substeps": 8, "windows": 100, "ranks": 2}
+    dns = {"model": model | {"mode": "dns", "elements": {"dns": 1000}}, "timings": {"windows": 200.0}, "metrics": {}}
+    ours = {
+        "model": model | {"mode": "two_scale", "elements": {"macro": 900, "meso": 200}},
+        "timings": {"windows": 50.0},
+        "metrics": {},
+        "coupling": {"levels": [{"step": 80e-9}, {"step": 10e-9}], "placement": {"chosen": "shared by 2"}},
+    }
+    table = cost.table({"two_scale": ours, "dns": dns}, {"two_scale_dns_time_ratio": {"value": 0.25, "unit": ""}})
+    rows = {row[0]: row[1:] for row in table["rows"]}
+    assert rows["time over the DNS"] == ["1", "0.250", "1.0", "0.285"]
+    assert rows["time of the windows"][:2] == ["3.3 min", "50.0 s"]
+    assert rows["hexahedra"][1] == "900 macro + 200 meso"
+    assert rows["time step"] == ["10 ns", "80 ns, 10 ns", "–", "–"]
+    assert rows["steps"][:2] == ["800", "100, 800"]
+    assert "memory" not in rows
+    assert cost.table({"two_scale": ours}, {}) is None

@@ -1,0 +1,51 @@
+"""Histories of the modes of a shock, and what the report takes from them."""
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+Arrays = Mapping[str, NDArray]
+
+MODES = ("two_scale", "dns")
+
+
+def read_modes(shock: Path, modes: tuple[str, ...] = MODES) -> tuple[dict[str, dict], dict[str, dict]]:
+    """Read histories and results of those modes that were run, by mode."""
+    histories, results = {}, {}
+    for mode in modes:
+        folder = shock / mode
+        if (folder / "history.npz").exists():
+            with np.load(folder / "history.npz") as arrays:
+                histories[mode] = dict(arrays)
+            results[mode] = json.loads((folder / "result.json").read_text())
+    return histories, results
+
+
+def at_pads(history: Arrays) -> NDArray[np.float64]:
+    """Von Mises stress `(k, joints)` [Pa] at the worse of each joint's pads, averaged over the solder there."""
+    return np.maximum(history["von_mises_board"], history["von_mises_package"])
+
+
+def joint_stress(history: Arrays, joint: str) -> NDArray[np.float64]:
+    """The same of one joint `(k,)` [Pa]."""
+    return at_pads(history)[:, list(map(str, history["joints"])).index(joint)]
+
+
+def peaks(history: Arrays) -> dict[str, float]:
+    """Peak of the same by joint [Pa]."""
+    return dict(zip(map(str, history["joints"]), at_pads(history).max(axis=0).tolist(), strict=True))
+
+
+def late_peak(history: Arrays) -> str:
+    """A warning if the worst joint's stress is largest at the end of the simulated time; empty if it is not."""
+    stress = at_pads(history).max(axis=1)
+    if np.argmax(stress) < len(stress) - max(2, len(stress) // 50):
+        return ""
+    end = 1e3 * history["time"][-1]
+    return (
+        f"The stress is still rising when the simulated time ends ({end:.3g} ms): "
+        "a longer shock.duration gives a higher peak."
+    )

@@ -1,0 +1,124 @@
+"""Von Mises stress of all joints where they meet the package, two-scale beside DNS, at given times."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+from matplotlib import pyplot
+from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
+from numpy.typing import NDArray
+
+from workflow.report.curves import MILLI, STYLE, svg
+from workflow.report.tables import mega, mode_name, percent
+
+Arrays = Mapping[str, NDArray]
+
+MEGA = 1e6
+ROWS_DRAWN = 3  # times that are drawn; the table has all of them
+PANEL = 4.4  # inches
+
+
+def read_interfaces(shock: Path, modes: Sequence[str]) -> dict[str, dict[str, NDArray]]:
+    """Read ``interface.npz`` of the modes that have it."""
+    found = {}
+    for mode in modes:
+        path = shock / mode / "interface.npz"
+        if path.exists():
+            with np.load(path) as arrays:
+                found[mode] = dict(arrays)
+    return found
+
+
+def joints_of(interface: Arrays) -> list[str]:
+    """Return the joints that an interface has, in its order."""
+    return [name.split("@")[1] for name in interface if name.startswith("von_mises@")]
+
+
+def areas(interface: Arrays, joint: str) -> NDArray[np.float64]:
+    """Return the areas ``(q,)`` [m^2] of the faces of a joint, from their diagonals."""
+    corners = interface[f"points@{joint}"][interface[f"quads@{joint}"]]
+    diagonals = corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]
+    return 0.5 * np.linalg.norm(np.cross(*diagonals), axis=1)
+
+
+def difference(ours: Arrays, reference: Arrays, joints: Sequence[str], row: int) -> float:
+    """Return the relative L2 difference of two stress fields over the faces of joints: root of the mean square."""
+    squares = np.zeros(2)
+    for joint in joints:
+        exact = reference[f"von_mises@{joint}"][row]
+        weight = areas(reference, joint)
+        squares += weight @ (ours[f"von_mises@{joint}"][row] - exact) ** 2, weight @ exact**2
+    return float(np.sqrt(squares[0] / squares[1])) if squares[1] > 0.0 else float(np.sqrt(squares[0]))
+
+
+def comparable(interfaces: Mapping[str, Arrays]) -> list[str]:
+    """Return the joints that both modes have with the same faces; none where only one mode was run."""
+    if len(interfaces) < 2:
+        return []
+    first, second = interfaces.values()
+    keys = {joint: f"von_mises@{joint}" for joint in joints_of(first)}
+    return [joint for joint, key in keys.items() if key in second and first[key].shape == second[key].shape]
+
+
+def table(interfaces: Mapping[str, Arrays]) -> dict:
+    """Largest and mean stress of both modes at each time, the joint that has the largest, and how far they differ."""
+    shared = comparable(interfaces)
+    rows = []
+    for row, time in enumerate(next(iter(interfaces.values()))["times"]):
+        cells = [cell for interface in interfaces.values() for cell in _extremes(interface, row)]
+        if shared:
+            first, second = interfaces.values()
+            cells.append(percent(difference(first, second, shared, row)))
+        rows.append([f"{time / MILLI:.4g}", *cells])
+    heads = [head for mode in interfaces for head in (f"{mode_name(mode)}: largest [MPa]", "in joint", "mean [MPa]")]
+    last = [f"relative L2 difference of {len(shared)} joints"] if shared else []
+    return {"head": ["time [ms]", *heads, *last], "rows": rows}
+
+
+def interface_maps(interfaces: Mapping[str, Arrays]) -> str:
+    """Draw the faces of all joints seen from above, a row a time, a column a mode, one colour scale a time."""
+    times = next(iter(interfaces.values()))["times"][:ROWS_DRAWN]
+    with pyplot.rc_context(STYLE | {"axes.grid": False}):
+        size = (PANEL * len(interfaces) + 0.8, (PANEL - 0.2) * len(times))
+        figure, axes = pyplot.subplots(len(times), len(interfaces), figsize=size, layout="constrained", squeeze=False)
+        for row, time in enumerate(times):
+            top = max(_largest(interface, row) for interface in interfaces.values()) / MEGA
+            for axis, (mode, interface) in zip(axes[row], interfaces.items(), strict=True):
+                drawn = _draw_joints(axis, interface, row, top)
+                axis.set_title(f"{mode_name(mode)}, {time / MILLI:.4g} ms", fontsize=9)
+            figure.colorbar(drawn, ax=axes[row].tolist(), label="von Mises [MPa]", shrink=0.85)
+        return svg(figure)
+
+
+def _largest(interface: Arrays, row: int) -> float:
+    return max(float(interface[f"von_mises@{joint}"][row].max()) for joint in joints_of(interface))
+
+
+def _extremes(interface: Arrays, row: int) -> tuple[str, str, str]:
+    """Return the largest stress at a time, the joint that has it, and the mean over all faces."""
+    joints = joints_of(interface)
+    peaks = [float(interface[f"von_mises@{joint}"][row].max()) for joint in joints]
+    worst = int(np.argmax(peaks))
+    weights = [areas(interface, joint) for joint in joints]
+    force = sum(
+        float(weight @ interface[f"von_mises@{joint}"][row]) for joint, weight in zip(joints, weights, strict=True)
+    )
+    return mega(peaks[worst]), joints[worst], mega(force / sum(float(weight.sum()) for weight in weights))
+
+
+def _draw_joints(axis: Axes, interface: Arrays, row: int, top: float) -> PolyCollection:
+    """Draw the faces of all joints at a time, on a scale that ends at ``top`` [MPa]."""
+    joints = joints_of(interface)
+    places = [interface[f"points@{joint}"][interface[f"quads@{joint}"]][:, :, :2] / MILLI for joint in joints]
+    values = np.concatenate([interface[f"von_mises@{joint}"][row] for joint in joints]) / MEGA
+    faces = PolyCollection(np.concatenate(places), array=values, cmap="turbo", linewidths=0.0, rasterized=True)
+    faces.set_clim(0.0, top)
+    axis.add_collection(faces)
+    for joint, corners in zip(joints, places, strict=True):
+        x, low, high = corners[..., 0].mean(), corners[..., 1].min(), corners[..., 1].max()
+        axis.annotate(joint, (x, low - 0.08 * (high - low)), ha="center", va="top", fontsize=6, color="#5f6c7b")
+    axis.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal")
+    axis.margins(0.05)
+    axis.autoscale_view()
+    return faces
