@@ -26,9 +26,10 @@ from fem.coupling.stopwatch import Stopwatch
 from fem.inputs import RunInput
 from fem.march import run_window
 from fem.model import build_models, divided_scene
+from fem.own_job import own_environment
 from fem.parameters import Ranks
 from fem.run import make_crew, place
-from workflow.launch import mpi_command, own_environment
+from workflow.launch import mpi_command
 
 SCHEMES = ("held_velocity", "local_steps")
 WINDOWS, FASTEST = 300, 15

@@ -29,9 +29,10 @@ from fem.loads import Load, half_sine_drop
 from fem.local_mesh import distribute
 from fem.materials.roles import Materials
 from fem.motion import Motion
+from fem.own_job import own_environment
 from fem.scene import prepare
 from tests.support.fem_bodies import motion_of
-from workflow.launch import mpi_command, own_environment
+from workflow.launch import mpi_command
 
 ROUNDS, CALLS = 40, 10
 FRACTION = 0.5  # of the critical step

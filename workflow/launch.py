@@ -4,9 +4,11 @@ import os
 import shutil
 import signal
 import subprocess
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
+
+from fem.own_job import own_environment
 
 GRACE = 5.0  # seconds that a program has to end by itself after SIGTERM
 TOLD = "error: "  # begins what a program says of an error that it knows
@@ -15,14 +17,6 @@ LAST_LINES = 15
 # In front of a command: the system sends the signal when the process that starts it ends, however that happens.
 END_WITH_PARENT = ("setpriv", "--pdeathsig", "TERM")
 DIE_WITH_PARENT = ("setpriv", "--pdeathsig", "KILL")
-
-# What Open MPI leaves in the environment of a process that initialised MPI. An mpirun that inherits it takes itself for
-# a part of that job and fails (seen from notebooks and test runs that imported mpi4py).
-OTHER_MPI_JOB = (
-    "PMIX_NAMESPACE", "PMIX_RANK", "PMIX_SERVER_", "PMIX_DSTORE_", "PMIX_SECURITY_MODE", "PMIX_GDS_MODULE",
-    "PMIX_BFROP_BUFFER_TYPE", "PMIX_VERSION", "PMIX_HOSTNAME", "PMIX_SYSTEM_TMPDIR", "PMIX_MCA_psec", "ORTE_",
-    "OMPI_COMM_WORLD_", "OMPI_APP_CTX_", "OMPI_MCA_ess", "OMPI_MCA_orte_", "OMPI_MCA_pmix",
-)  # fmt: skip
 
 
 class LaunchError(RuntimeError):
@@ -94,11 +88,6 @@ def ending(code: int) -> str:
     if number == signal.SIGKILL:
         return "was killed, as the system does when memory is short"
     return f"ended with exit code {code}"
-
-
-def own_environment(environment: Mapping[str, str]) -> dict[str, str]:
-    """Return an environment without the traces of an MPI job that this process may be part of."""
-    return {name: value for name, value in environment.items() if not name.startswith(OTHER_MPI_JOB)}
 
 
 def end_group(process: subprocess.Popen) -> None:

@@ -1,0 +1,16 @@
+"""Processes apart from the MPI job that their parent may be part of. Loads no MPI."""
+
+from collections.abc import Mapping
+
+# What Open MPI leaves in the environment of a process that initialised MPI. An mpirun, or a child, that inherits it
+# takes itself for a part of that job and fails (seen from notebooks and test runs that imported mpi4py).
+OTHER_MPI_JOB = (
+    "PMIX_NAMESPACE", "PMIX_RANK", "PMIX_SERVER_", "PMIX_DSTORE_", "PMIX_SECURITY_MODE", "PMIX_GDS_MODULE",
+    "PMIX_BFROP_BUFFER_TYPE", "PMIX_VERSION", "PMIX_HOSTNAME", "PMIX_SYSTEM_TMPDIR", "PMIX_MCA_psec", "ORTE_",
+    "OMPI_COMM_WORLD_", "OMPI_APP_CTX_", "OMPI_MCA_ess", "OMPI_MCA_orte_", "OMPI_MCA_pmix",
+)  # fmt: skip
+
+
+def own_environment(environment: Mapping[str, str]) -> dict[str, str]:
+    """Return an environment without the traces of an MPI job that this process may be part of."""
+    return {name: value for name, value in environment.items() if not name.startswith(OTHER_MPI_JOB)}
