@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from fem.materials.roles import Materials
+from workflow.board_deflection import kinematics_effect
 from workflow.board_drop_case import BoardDropCase
 from workflow.case import available_cores
 from workflow.fine_joints import coarse_joints_effect
@@ -64,6 +65,7 @@ def forecast(case: BoardDropCase) -> Forecast:
     wall = sum(modes[mode] for mode in numerics.modes)
     return Forecast(
         effects=decide_effects(max(distinct, key=lambda geometry: geometry.gap), case.solder)
+        | kinematics_effect(case)
         | material_effects(case.materials.by_role)
         | failure_effect(case.shock.failure)
         | coarse_joints_effect(case.shock.coupling),

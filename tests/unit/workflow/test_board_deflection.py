@@ -1,0 +1,38 @@
+"""The deflection that a plan expects, against exact responses and a run."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from workflow.board_deflection import SHARE, expected_deflection, first_mode_peak, kinematics_effect
+from workflow.case import read_case
+
+CASE = Path(__file__).parents[3] / "cases/bga_drop/case.toml"
+
+
+@pytest.mark.parametrize("ratio", [0.05, 0.3, 0.45])
+def test_a_half_sine_gives_its_shock_response(ratio):
+    """Residual amplitude of a half sine A of duration T: q omega^2 / A = 4 r cos(pi r) / (1 - 4 r^2), r = f T."""
+    peak, duration = 1.5e4, 5.0e-4
+    omega = 2.0 * np.pi * ratio / duration
+
+    def velocity(time: float) -> float:
+        return peak * duration / np.pi * (1.0 - np.cos(np.pi * min(time, duration) / duration))
+
+    exact = SHARE * peak / omega**2 * 4.0 * ratio * np.cos(np.pi * ratio) / (1.0 - 4.0 * ratio**2)
+    assert first_mode_peak(omega, velocity, 40.0 * duration / ratio) == pytest.approx(exact, rel=0.01)
+
+
+def test_the_default_board_deflects_about_as_far_as_its_run_found():
+    deflection, slope = expected_deflection(read_case(CASE, (), True))
+    assert deflection == pytest.approx(7.6e-3, rel=0.25)  # cases/bga_drop
+    assert slope == pytest.approx(np.pi / 0.19 * deflection)
+
+
+def test_a_plan_says_what_small_kinematics_would_leave_out():
+    effect = kinematics_effect(read_case(CASE, (), True))["finite_rotation"]
+    assert not effect["on"]
+    assert "times its thickness" in effect["why"] and "shock.numerics.kinematics = finite" in effect["why"]
+    finite = read_case(CASE, ["shock.numerics.kinematics=finite", "shock.coupling.scheme=held_velocity"], True)
+    assert kinematics_effect(finite)["finite_rotation"]["on"]

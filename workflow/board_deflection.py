@@ -1,0 +1,60 @@
+"""How far the board of a drop will about deflect, from its parameters alone, and what small kinematics leave out."""
+
+import math
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from workflow.board_drop_case import BoardDropCase
+
+SHARE = 4.0 / math.pi  # of the base's acceleration in the first mode of a pinned beam, at its middle
+SAMPLES, SAMPLES_A_PERIOD = 1000, 100
+
+
+def expected_deflection(case: "BoardDropCase") -> tuple[float, float]:
+    """Return the largest deflection of the board's middle [m], and of its slope.
+
+    The board is a beam between its holes that swings in its first mode, q'' + omega^2 q = 4/pi a(t): w = q sin(pi x/L).
+    Width, package and later modes are left out.
+    """
+    from fem.shock_loads import shock_pulse
+
+    board, (young_x, young_y, _) = case.board, case.materials.board.engineering_constants.young
+    holes = board.holes
+    spans = ((board.length - 2.0 * holes.inset_x, young_x), (board.width - 2.0 * holes.inset_y, young_y))
+    length, young = max(spans)
+    stiffness = young * board.thickness**2 / 12.0 / case.materials.board.density
+    omega = (math.pi / length) ** 2 * math.sqrt(stiffness)
+    deflection = first_mode_peak(omega, shock_pulse(case.shock).pulse.integral, case.shock.duration)
+    return deflection, math.pi / length * deflection
+
+
+def first_mode_peak(omega: float, velocity: Callable[[float], float], duration: float) -> float:
+    """Return the largest |q| [m] of q'' + omega^2 q = 4/pi a(t) from rest, by Duhamel's integral.
+
+    Args:
+        omega: angular frequency [rad/s].
+        velocity: integral of a from 0 to a time [m/s].
+        duration: of what is looked at [s].
+    """
+    count = max(SAMPLES, math.ceil(SAMPLES_A_PERIOD * omega * duration / math.tau))
+    ends = np.linspace(0.0, duration, count + 1)
+    middle = 0.5 * (ends[1:] + ends[:-1])
+    pushes = SHARE * np.diff([velocity(moment) for moment in ends])
+    swing = np.sin(omega * middle) * np.cumsum(pushes * np.cos(omega * middle))
+    swing -= np.cos(omega * middle) * np.cumsum(pushes * np.sin(omega * middle))
+    return float(np.abs(swing).max()) / omega
+
+
+def kinematics_effect(case: "BoardDropCase") -> dict:
+    """Return whether rotations are finite, and why, as an effect of a plan."""
+    from fem.kinematics import finite_rotation
+
+    deflection, slope = expected_deflection(case)
+    finite, why = finite_rotation("shock.numerics", case.shock.numerics.kinematics, 0.5 * slope**2)
+    if not finite:
+        ratio = deflection / case.board.thickness
+        why = f"the board is expected to deflect by about {ratio:.2g} times its thickness; {why}"
+    return {"finite_rotation": {"on": finite, "why": why}}
