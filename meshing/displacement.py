@@ -5,6 +5,7 @@ it, u_package(x) - u_board(top face, same x and y).
 """
 
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -28,6 +29,12 @@ def prescribed(package: Package, warpage: Warpage) -> Displacement:
         return np.column_stack([np.zeros_like(points[:, :2]), height])
 
     return displacement
+
+
+def read_computed(path: Path) -> Displacement:
+    """Read the displacement that a reflow left in its ``structure.npz``; errors as ``computed``."""
+    with np.load(path) as arrays:
+        return computed(arrays["points"], arrays["displacement"], arrays["package"])
 
 
 def computed(points: np.ndarray, displacement: np.ndarray, is_package: np.ndarray) -> Displacement:

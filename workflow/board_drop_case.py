@@ -1,6 +1,8 @@
-"""The case of a package on a board: its joints reflowed, then the board dropped."""
+"""The cases of a package on a board: its joints reflowed; then the board dropped, where a shock is given."""
 
+from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 from fem.materials.roles import Materials
 from fem.parameters import Shock
@@ -10,15 +12,13 @@ from particles.parameters import Solder
 from workflow import fields
 from workflow.case_kind import Case, of_particles
 from workflow.problems import Problem
-from workflow.stage_table import BOARD_DROP
+from workflow.stage_table import Pipeline, package_pipeline
 
 
-class BoardDropCase(Case):
-    """A package on a board: its joints reflowed, then the board dropped."""
+class PackageCase(Case):
+    """A package on a board, whose joints are reflowed and meshed."""
 
     kind = "package"
-    pipeline = BOARD_DROP
-    ranks_key = "shock.ranks.total"
 
     package: Package
     board: Board
@@ -26,7 +26,50 @@ class BoardDropCase(Case):
     thermal: Thermal | None = None
     solder: Solder
     materials: Materials = Materials()
+
+    @property
+    def pipeline(self) -> Pipeline:
+        """The stages: with temperatures, the reflow needs the mesh of board and package."""
+        return package_pipeline(heated=self.thermal is not None, dropped=False)
+
+    def problems(self) -> list[Problem]:
+        """Find parameters that make no possible package, joint or board together."""
+        from fem.thermal import checks as thermal_checks
+        from meshing import checks as meshing_checks
+        from meshing.pads import pad_table
+        from particles import checks as particles_checks
+        from workflow.reflow_pool import joint_geometries
+
+        contradictions = meshing_checks.problems(self.package, self.board, self.warpage)
+        if contradictions:
+            return self.in_words(contradictions)
+        heated = (
+            thermal_checks.problems(self.thermal, self.materials.by_role, self.warpage.corner) if self.thermal else []
+        )
+        geometries = joint_geometries(pad_table(self.package, self.board, self.warpage))
+        of_solder = of_particles(particles_checks.problems(self.solder, geometries, self.package.pitch))
+        return self.in_words(heated) + of_solder
+
+    def in_words(self, found: Iterable[Any]) -> list[Problem]:
+        """Say what checks of meshing or fem found in the words of a case file, values in the user's units."""
+        known = {key: field for key, _, field in fields.leaves(self)}
+        return [
+            Problem(problem.key, problem.message, fields.shown(problem.value, known.get(problem.key)), problem.allowed)
+            for problem in found
+        ]
+
+
+class BoardDropCase(PackageCase):
+    """A package on a board: its joints reflowed, then the board dropped."""
+
+    ranks_key = "shock.ranks.total"
+
     shock: Shock
+
+    @property
+    def pipeline(self) -> Pipeline:
+        """The stages: those of the package, then the shock."""
+        return package_pipeline(heated=self.thermal is not None, dropped=True)
 
     @classmethod
     def located(cls, table: dict, folder: Path) -> dict:
@@ -44,27 +87,13 @@ class BoardDropCase(Case):
     def problems(self) -> list[Problem]:
         """Find parameters that make no possible package, joint, board or shock together."""
         from fem import shock_checks
-        from fem.thermal import checks as thermal_checks
         from meshing import checks as meshing_checks
-        from meshing.pads import pad_table
-        from particles import checks as particles_checks
         from workflow import fine_joints
-        from workflow.reflow_pool import joint_geometries
 
-        contradictions = meshing_checks.problems(self.package, self.board, self.warpage)
-        heated = (
-            thermal_checks.problems(self.thermal, self.materials.by_role, self.warpage.corner) if self.thermal else []
-        )
-        known = {key: field for key, _, field in fields.leaves(self)}
-        impossible = [
-            Problem(found.key, found.message, fields.shown(found.value, known.get(found.key)), found.allowed)
-            for found in contradictions or shock_checks.problems(self.shock) + heated
-        ]
-        if contradictions:
-            return impossible
-        geometries = joint_geometries(pad_table(self.package, self.board, self.warpage))
-        impossible += fine_joints.problems(self)
-        found = impossible + of_particles(particles_checks.problems(self.solder, geometries, self.package.pitch))
+        found = super().problems()
+        if meshing_checks.problems(self.package, self.board, self.warpage):
+            return found
+        found += self.in_words(shock_checks.problems(self.shock)) + list(fine_joints.problems(self))
         return (found + self._flow_problems() + self._coupling_problems()) or self._impossible_steps()
 
     def _impossible_steps(self) -> list[Problem]:

@@ -9,9 +9,10 @@ from pydantic import ValidationError
 
 from fem.names import nearest
 from workflow import fields
-from workflow.board_drop_case import BoardDropCase
-from workflow.case_kind import Case
+from workflow.board_drop_case import BoardDropCase, PackageCase
+from workflow.case_kind import FULL, Case
 from workflow.problems import CaseError, Problem
+from workflow.scales import choose, take_scales
 from workflow.scene_cases import DropCase, DropsCase, JointCase, OscillationCase
 from workflow.structure.case import StructureCase
 from workflow.validation import translate
@@ -28,6 +29,8 @@ def kind_of(table: Mapping) -> type[Case]:
         CaseError: the file has the tables of no kind, or of several.
     """
     found = [kind for kind in KINDS if kind in table]
+    if found == [PackageCase.kind] and not any(nearest(name, ("shock",)) for name in table):
+        return PackageCase
     if len(found) == 1:
         return KINDS[found[0]]
     choice = "exactly one of " + ", ".join(f"[{kind}]" for kind in KINDS)
@@ -43,7 +46,8 @@ def read_case(path: Path, overrides: Sequence[str] = (), oversubscribe: bool = F
 
     Args:
         path: TOML file.
-        overrides: "dotted.key=value" settings, applied over the file; values are TOML, quotes may be left out.
+        overrides: "dotted.key=value" settings, applied over the file and its scale; values are TOML, quotes may be
+            left out.
         oversubscribe: whether more MPI ranks than cores are welcome.
 
     Returns:
@@ -53,12 +57,12 @@ def read_case(path: Path, overrides: Sequence[str] = (), oversubscribe: bool = F
         CaseError: with all problems found: syntax, names, units, ranges, and geometry that cannot be.
     """
     problems: list[Problem] = []
-    table = _read_toml(path)
-    overridden = _apply(table, overrides, problems)
+    table = read_toml(path)
+    origins = _override(table, overrides, path, problems)
     try:
         kind = kind_of(table)
     except CaseError as error:
-        raise CaseError(str(path), error.problems + problems, overridden) from None
+        raise CaseError(str(path), error.problems + problems, origins) from None
     values = kind.located(fields.to_si_table(kind, table, "", problems), path.parent)
     case = None
     try:
@@ -68,7 +72,7 @@ def read_case(path: Path, overrides: Sequence[str] = (), oversubscribe: bool = F
     if case is not None and not problems:
         problems = case.problems() + too_many_ranks(case, oversubscribe)
     if case is None or problems:
-        raise CaseError(str(path), problems, overridden)
+        raise CaseError(str(path), problems, origins)
     return case
 
 
@@ -91,7 +95,8 @@ def available_cores() -> int:
     return len(os.sched_getaffinity(0))
 
 
-def _read_toml(path: Path) -> dict:
+def read_toml(path: Path) -> dict:
+    """Read a TOML file; CaseError where it cannot be read."""
     try:
         return tomllib.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError as error:
@@ -102,18 +107,26 @@ def _read_toml(path: Path) -> dict:
         raise CaseError(str(path), [Problem("", f"is not TOML: {error}")]) from error
 
 
-def _apply(table: dict, overrides: Sequence[str], problems: list[Problem]) -> list[str]:
-    """Write overrides into a table; return their keys."""
-    keys = []
-    for override in overrides:
-        key, equals, text = override.partition("=")
-        key = key.strip()
-        keys.append(key)
-        if not equals or not all(key.split(".")):
-            problems.append(Problem(key, "is no setting", override, "--set dotted.key=value"))
-        elif not _set(table, key.split("."), _override_value(text.strip())):
-            problems.append(Problem(key, "lies below a value, not a table", text))
-    return keys
+def _override(table: dict, overrides: Sequence[str], path: Path, problems: list[Problem]) -> dict[str, str]:
+    """Write the values of the chosen scale, then overrides, into a table; return where each key was given."""
+    settings = [_setting(override, problems) for override in overrides]
+    scales, chosen = take_scales(table, problems), table.get("scale", FULL)
+    chosen = next((value for key, value in reversed(settings) if key == "scale"), chosen)
+    of_scale = choose(chosen, scales, problems)
+    for key, value in [*of_scale.items(), *settings]:
+        if all(key.split(".")) and not _set(table, key.split("."), value):
+            problems.append(Problem(key, "lies below a value, not a table", value))
+    return dict.fromkeys(of_scale, f"{path} [scales.{chosen}]") | {key: "--set" for key, _ in settings}
+
+
+def _setting(override: str, problems: list[Problem]) -> tuple[str, object]:
+    """Return key and value of an override."""
+    key, equals, text = override.partition("=")
+    key = key.strip()
+    if not equals or not all(key.split(".")):
+        problems.append(Problem(key, "is no setting", override, "--set dotted.key=value"))
+        return "", None
+    return key, _override_value(text.strip())
 
 
 def _override_value(text: str) -> object:

@@ -13,6 +13,7 @@ from workflow.stage_table import Pipeline
 if TYPE_CHECKING:
     from particles.checks import Problem as ParticlesProblem
 
+FULL = "full"  # the scale of a case as its file says it
 NAME = r"^[A-Za-z0-9][A-Za-z0-9_.-]*$"
 
 
@@ -30,18 +31,30 @@ class Case(BaseModel):
 
     Attributes:
         kind: the table that makes a file a case of this kind.
-        pipeline: its stages.
+        stages: of all cases of this kind.
         ranks_key: key of the MPI ranks that it asks for.
         case: its name.
+        scale: "full", or the name of the table of ``[scales]`` whose values replace those of the file.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     kind: ClassVar[str]
-    pipeline: ClassVar[Pipeline]
+    stages: ClassVar[Pipeline]
     ranks_key: ClassVar[str] = ""
 
     case: Title
+    scale: str = FULL
+
+    @property
+    def run_name(self) -> str:
+        """Name of its run folder, where none is given."""
+        return self.case.name if self.scale == FULL else f"{self.case.name}-{self.scale}"
+
+    @property
+    def pipeline(self) -> Pipeline:
+        """The stages of this case."""
+        return self.stages
 
     @abstractmethod
     def problems(self) -> list[Problem]:

@@ -9,10 +9,11 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
 from fem.names import nearest
-from workflow.case import read_case
+from workflow.case import read_case, read_toml
 from workflow.case_kind import NAME, Case, Title
 from workflow.fields import allowed, alternatives, display, holds_named_tables, literal_names, models_of, unit_of
 from workflow.problems import CaseError, Problem, as_toml
+from workflow.scales import scales_text, take_scales
 from workflow.validation import NAMES
 
 CASES = Path(__file__).resolve().parent.parent / "cases"
@@ -53,7 +54,8 @@ def write_new_case(name: str, template: str, folder: Path = Path()) -> Path:
     if path.exists():
         raise CaseError("new", [Problem("NAME", f"{path} exists already", name)])
     case = read_case(known[template], [f"case.name='{name}'"], oversubscribe=True)
-    path.write_text(case_text(case, template))
+    scales = scales_text(take_scales(read_toml(known[template]), []))
+    path.write_text("\n".join([case_text(case, template), *scales]))
     return path
 
 

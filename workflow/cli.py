@@ -31,7 +31,9 @@ CasePath = Annotated[Path, typer.Argument(metavar="CASE", help="case file (TOML)
 Settings = Annotated[
     list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help='override, e.g. "shock.peak_acceleration=1000 G"')
 ]
-Out = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="run folder [default: runs/<case name>]")]
+Out = Annotated[
+    Path | None, typer.Option("--out", metavar="DIR", help="run folder [default: runs/<case name>, with its scale]")
+]
 Oversubscribe = Annotated[bool, typer.Option("--oversubscribe", help="allow more MPI ranks than cores")]
 
 
@@ -186,7 +188,7 @@ def _options(
 
 def _load(path: Path, settings: list[str] | None, out: Path | None, oversubscribe: bool) -> tuple[Case, Path]:
     case = read_case(path, settings or [], oversubscribe)
-    return case, out or Path("runs") / case.case.name
+    return case, out or Path("runs") / case.run_name
 
 
 def _has_work(folder: Path, case: Case, until: str) -> bool:

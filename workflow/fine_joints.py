@@ -25,13 +25,15 @@ class FineJoints:
     why: str
 
 
-def needs_coarse_joints(coupling: "JointCoupling") -> bool:
+def needs_coarse_joints(coupling: "JointCoupling | None") -> bool:
     """Whether some joint, or the macro model of a one-way run, needs the coarse mesh of joints."""
-    return coupling.fine_joints != "all" or coupling.direction == "one_way"
+    return coupling is not None and (coupling.fine_joints != "all" or coupling.direction == "one_way")
 
 
-def coarse_joints_effect(coupling: "JointCoupling") -> dict:
-    """Return whether joints are also meshed coarse, and why, as an effect."""
+def coarse_joints_effect(coupling: "JointCoupling | None") -> dict:
+    """Return whether joints are also meshed coarse, and why, as an effect; no entry where there is no shock."""
+    if coupling is None:
+        return {}
     if coupling.direction == "one_way":
         why = "shock.coupling.direction = one_way: the macro model has all joints coarse"
     elif coupling.fine_joints == "all":

@@ -2,11 +2,11 @@
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from fem.materials.roles import Materials
 from workflow.board_deflection import kinematics_effect
-from workflow.board_drop_case import BoardDropCase
+from workflow.board_drop_case import BoardDropCase, PackageCase
 from workflow.case import available_cores
 from workflow.fine_joints import coarse_joints_effect
 from workflow.problems import Problem
@@ -31,8 +31,8 @@ class Forecast:
         joints: number of joints.
         distinct: number of joints that have to be computed.
         particles: smallest and largest number of particles of a joint.
-        parts: part of the mesh -> its size and step; those of the two-scale run where there is one.
-        shock: time steps and wall time.
+        parts: part of the mesh -> its size and step in the shock; those of the two-scale run where there is one.
+        shock: time steps and wall time; None without a shock.
         seconds: stage -> predicted wall time [s], where there is a prediction.
     """
 
@@ -41,13 +41,12 @@ class Forecast:
     distinct: int
     particles: tuple[int, int]
     parts: dict[str, PartForecast]
-    shock: ShockForecast
+    shock: ShockForecast | None
     seconds: dict[str, float]
 
 
-def forecast(case: BoardDropCase) -> Forecast:
+def forecast(case: PackageCase) -> Forecast:
     """Predict sizes, time steps and cost of a run."""
-    from fem.materials.effects import failure_effect, material_effects
     from meshing.pads import pad_table
     from particles.effects import decide_effects
     from particles.estimate import particle_count, reflow_seconds
@@ -56,25 +55,36 @@ def forecast(case: BoardDropCase) -> Forecast:
     distinct = [group.geometry for group in distinct_joints(geometries)]
     counts = [particle_count(case.solder, geometry) for geometry in distinct]
     workers = min(available_cores(), len(distinct))
-    reflow = sum(reflow_seconds(case.solder, geometry) for geometry in distinct) / workers
+    of_reflow = Forecast(
+        effects=decide_effects(max(distinct, key=lambda geometry: geometry.gap), case.solder),
+        joints=len(geometries),
+        distinct=len(distinct),
+        particles=(min(counts), max(counts)),
+        parts={},
+        shock=None,
+        seconds={"reflow": sum(reflow_seconds(case.solder, geometry) for geometry in distinct) / workers},
+    )
+    return _with_shock(of_reflow, case) if isinstance(case, BoardDropCase) else of_reflow
+
+
+def _with_shock(of_reflow: Forecast, case: BoardDropCase) -> Forecast:
+    from fem.materials.effects import failure_effect, material_effects
+
     parts = forecast_parts(case)
     shock = forecast_shock(case, parts)
     numerics = case.shock.numerics
     dns = shock.implicit if numerics.dns_solver == "implicit" else shock.dns
     modes = {"two_scale": shock.search + shock.two_scale, "dns": dns}
-    wall = sum(modes[mode] for mode in numerics.modes)
-    return Forecast(
-        effects=decide_effects(max(distinct, key=lambda geometry: geometry.gap), case.solder)
+    return replace(
+        of_reflow,
+        effects=of_reflow.effects
         | kinematics_effect(case)
         | material_effects(case.materials.by_role)
         | failure_effect(case.shock.failure)
         | coarse_joints_effect(case.shock.coupling),
-        joints=len(geometries),
-        distinct=len(distinct),
-        particles=(min(counts), max(counts)),
         parts=two_scale_parts(case) if "two_scale" in numerics.modes else parts,
         shock=shock,
-        seconds={"reflow": reflow, "shock": wall},
+        seconds=of_reflow.seconds | {"shock": sum(modes[mode] for mode in numerics.modes)},
     )
 
 

@@ -7,9 +7,9 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from workflow.board_drop_case import BoardDropCase
+from workflow.board_drop_case import BoardDropCase, PackageCase
 from workflow.case import available_cores
-from workflow.case_kind import Case
+from workflow.case_kind import FULL, Case
 from workflow.fields import display, leaves
 from workflow.forecast import Forecast, forecast
 from workflow.inputs import Change, Verdict, examine
@@ -30,12 +30,16 @@ SCHEMES = {
 
 def show_plan(case: Case, run_folder: Path, console: Console) -> None:
     """Print stages to run and why, effects, sizes, time steps, predicted cost and rank placement."""
-    console.print(f"[bold]{case.case.name}[/]  {case.case.title}\n")
-    if isinstance(case, BoardDropCase):
+    scale = "" if case.scale == FULL else f", scale {case.scale}"
+    console.print(f"[bold]{case.case.name}{scale}[/]  {case.case.title}\n")
+    if isinstance(case, PackageCase):
         outlook = forecast(case)
-        _show(case, run_folder, outlook, console, "reflow and shock")
-        console.print(_sizes(outlook))
-        console.print(_shock(case, outlook))
+        _show(case, run_folder, outlook, console, "reflow" if outlook.shock is None else "reflow and shock")
+        console.print(_sizes(outlook) if outlook.parts else f"\n{_joints(outlook)}")
+        if not isinstance(case, BoardDropCase) or outlook.shock is None:
+            console.print("\n[dim]Costs assume the reflow speed in particles/estimate.py, as benchmarks/ measured it.")
+            return
+        console.print(_shock(case, outlook.shock))
         rate = f"{outlook.shock.updates_per_second:.1e} element updates per second and rank (fem/estimate.py)"
         console.print(f"\n[dim]Costs assume {rate}")
         console.print("[dim]and the reflow speed in particles/estimate.py, both as benchmarks/ measured them.")
@@ -117,10 +121,8 @@ def _effects(effects: Mapping[str, Any], of_what: str) -> Table:
 
 
 def _sizes(outlook: Forecast) -> Table:
-    smallest, largest = outlook.particles
-    particles = f"{smallest}" if smallest == largest else f"{smallest} to {largest}"
     table = new_table("\nSizes and critical time steps", "part", "hexahedra", "critical step", "time step")
-    step = {name: level for level in outlook.shock.levels for name in level.parts}
+    step = {name: level for level in (outlook.shock.levels if outlook.shock else ()) for name in level.parts}
     for name, part in outlook.parts.items():
         remark = f"{short(step[name].step)}, {step[name].count} in a window" if name in step else ""
         if part.mass_scaled:
@@ -128,13 +130,19 @@ def _sizes(outlook: Forecast) -> Table:
         table.add_row(name, f"{part.elements}", short(part.critical_step), remark)
     total = sum(part.elements for part in outlook.parts.values())
     table.add_row("all", f"{total}", "", "", style="bold")
-    table.caption = f"{outlook.joints} joints, {outlook.distinct} of them distinct, {particles} particles each"
+    table.caption = _joints(outlook)
     table.caption_justify = "left"
     return table
 
 
-def _shock(case: BoardDropCase, outlook: Forecast) -> Table:
-    shock, every = outlook.shock, case.shock.ranks.total
+def _joints(outlook: Forecast) -> str:
+    smallest, largest = outlook.particles
+    particles = f"{smallest}" if smallest == largest else f"{smallest} to {largest}"
+    return f"{outlook.joints} joints, {outlook.distinct} of them distinct, {particles} particles each"
+
+
+def _shock(case: BoardDropCase, shock: ShockForecast) -> Table:
+    every = case.shock.ranks.total
     table = new_table("\nShock", "what", "value", "remark")
     scheme, why = shock.scheme
     table.add_row("scheme", scheme.replace("_", " "), why)

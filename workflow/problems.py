@@ -1,8 +1,9 @@
 """What is wrong with a case: records that name the key, the value and what is allowed."""
 
 import json
-from collections.abc import Iterable
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,10 +37,11 @@ class Problem:
 class CaseError(ValueError):
     """A case that must not run, with everything that is wrong with it."""
 
-    def __init__(self, source: str, problems: list[Problem], overridden: Iterable[str] = ()) -> None:
+    def __init__(self, source: str, problems: list[Problem], origins: Mapping[str, str] = MappingProxyType({})) -> None:
+        """Take what is wrong, the file, and where keys were given that were not given there."""
         self.source = source
         self.problems = problems
-        self.overridden = frozenset(overridden)
+        self.origins = origins
         super().__init__("\n".join(self.lines()))
 
     def lines(self) -> list[str]:
@@ -47,8 +49,8 @@ class CaseError(ValueError):
         return [f"{self._place(problem)}: {problem}" for problem in self.problems]
 
     def _place(self, problem: Problem) -> str:
-        given = any(f"{key}.".startswith(f"{problem.key}.") for key in self.overridden)
-        return "--set" if given else self.source
+        places = [place for key, place in self.origins.items() if f"{key}.".startswith(f"{problem.key}.")]
+        return places[-1] if places else self.source
 
 
 def as_toml(value: object) -> str:

@@ -27,7 +27,7 @@ class DropCase(SceneCase):
     """A drop of solder on a wall or pad."""
 
     kind = "drop"
-    pipeline = DROP
+    stages = DROP
 
     drop: Drop
 
@@ -42,7 +42,7 @@ class JointCase(SceneCase):
     """A joint of solder between two pads."""
 
     kind = "joint"
-    pipeline = JOINT
+    stages = JOINT
 
     joint: Joint
 
@@ -57,7 +57,7 @@ class DropsCase(SceneCase):
     """Two drops that become one, or stay apart."""
 
     kind = "drops"
-    pipeline = DROPS
+    stages = DROPS
 
     drops: Drops
 
@@ -72,7 +72,7 @@ class OscillationCase(Case):
     """A free drop that swings."""
 
     kind = "oscillation"
-    pipeline = OSCILLATION
+    stages = OSCILLATION
 
     oscillation: Oscillation
     solder: Liquid = Liquid()

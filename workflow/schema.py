@@ -8,11 +8,17 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
+from workflow.board_drop_case import PackageCase
 from workflow.case import KINDS
 from workflow.case_kind import Case
 from workflow.fields import allowed, display, models_of, unit_of
 from workflow.units import QUANTITY, dimension
 
+SCALES = {
+    "description": "values, by dotted keys, that replace those of the file where its scale is chosen",
+    "type": "object",
+    "additionalProperties": {"type": "object"},
+}
 PATTERN = re.sub(r"\?P<\w+>", "", f"^{QUANTITY.pattern}$")
 
 
@@ -20,9 +26,11 @@ def case_schema() -> dict:
     """Return the JSON schema (draft 2020-12) of a case file: that of any kind."""
     kinds: list[dict] = []
     definitions: dict = {}
-    for name, kind in KINDS.items():
-        schema = _with_own_names(_kind_schema(kind), name, definitions)
+    models: list[type[Case]] = [*KINDS.values(), PackageCase]
+    for kind in models:
+        schema = _with_own_names(_kind_schema(kind), kind.kind, definitions)
         definitions |= schema.pop("$defs")
+        schema["properties"]["scales"] = SCALES
         kinds.append(schema)
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",

@@ -20,6 +20,8 @@ JOINT_MESHES = (
     "shock.coupling.direction",
 )
 
+REPORT, REPORT_PRODUCTS = ("case", "scale"), ("report.html", "summary.json")
+
 
 @dataclass(frozen=True, slots=True)
 class Stage:
@@ -70,43 +72,54 @@ class Pipeline:
         return self.stages[: self.names.index(name) + 1]
 
 
-BOARD_DROP = Pipeline(
-    (
-        Stage(
-            "geometry",
-            (*DRAWN, "package.copper", "package.substrate", "package.die", "package.numerics", "board"),
-            (),
-            ("geometry/assembly.msh", "geometry/pads.json", "geometry/preview.png"),
-        ),
-        Stage(
-            "reflow",
-            (*PADS, "thermal", "solder"),
-            (),
-            ("reflow/shapes.h5", "reflow/joints.json", "reflow/pads.json"),
-            pads=True,
-        ),
-        Stage("surface", (), ("reflow",), ("surface/surfaces.json",)),
-        Stage(
-            "solder_mesh",
-            ("warpage", *JOINT_MESHES, "materials.copper", "materials.solder"),
-            ("geometry", "surface"),
-            ("solder_mesh/assembly.msh", "solder_mesh/joints.msh", "solder_mesh/quality.json"),
-        ),
-        Stage("shock", ("shock", "materials"), ("solder_mesh",), ()),
-        Stage(
-            "report",
-            ("case",),
-            ("geometry", "reflow", "surface", "solder_mesh", "shock"),
-            ("report.html", "summary.json"),
-        ),
+DRAWN_MESH = (*DRAWN, "package.copper", "package.substrate", "package.die", "package.numerics", "board")
+HEATED = tuple(
+    f"thermal.{name}"
+    for name in (
+        "reference", "peak", "melting", "solidification", "steps", "package", "corner_displacement", "tolerance",
+        "effects.flexible", "effects.solder_force",
     )
-)
+)  # fmt: skip
+STRUCTURE_ROLES = tuple(f"materials.{role}" for role in ("board", "substrate", "die", "copper"))
+COOLED = ("thermal.solidification", "thermal.final", "thermal.effects.residual_stress")
+
+
+def package_pipeline(heated: bool, dropped: bool) -> Pipeline:
+    """Return the stages of a package on a board.
+
+    Args:
+        heated: whether the reflow has temperatures: it then needs the mesh of board and package.
+        dropped: whether there is a shock.
+    """
+    geometry = Stage(
+        "geometry", DRAWN_MESH, (), ("geometry/assembly.msh", "geometry/pads.json", "geometry/preview.png")
+    )
+    solid = ("reflow/shapes.h5", "reflow/joints.json", "reflow/pads.json")
+    if heated:
+        parameters = (*PADS, *HEATED, *STRUCTURE_ROLES, "solder")
+        reflow = Stage("reflow", parameters, ("geometry",), (*solid, "reflow/structure.npz"))
+    else:
+        reflow = Stage("reflow", (*PADS, "thermal", "solder"), (), solid, pads=True)
+    solder_mesh = Stage(
+        "solder_mesh",
+        ("warpage", *JOINT_MESHES, "materials.copper", "materials.solder"),
+        ("geometry", "surface"),
+        ("solder_mesh/assembly.msh", "solder_mesh/joints.msh", "solder_mesh/quality.json"),
+    )
+    surface = Stage("surface", (), ("reflow",), ("surface/surfaces.json",))
+    shock = Stage("shock", ("shock", "materials", *COOLED), ("solder_mesh",), ())
+    stages = (geometry, reflow, surface, solder_mesh, *((shock,) if dropped else ()))
+    follows = tuple(stage.name for stage in stages)
+    return Pipeline((*stages, Stage("report", REPORT, follows, REPORT_PRODUCTS)))
+
+
+BOARD_DROP = package_pipeline(heated=False, dropped=True)
 
 
 def _one_body(scene: str) -> Pipeline:
     """Reflow of one scene, and its report."""
     reflow = Stage("reflow", (scene, "solder", "gravity"), (), ("reflow/shape.h5", "reflow/particles.vtu"))
-    return Pipeline((reflow, Stage("report", ("case",), ("reflow",), ("report.html", "summary.json"))))
+    return Pipeline((reflow, Stage("report", REPORT, ("reflow",), REPORT_PRODUCTS)))
 
 
 DROP = _one_body("drop")
@@ -125,6 +138,6 @@ STRUCTURE = Pipeline(
         ),
         Stage("shock", ("structure", "materials", "supports", "loads", "watch", "dynamics"), ("geometry",), ()),
         Stage("comparison", ("references",), ("shock",), ("comparison/comparison.json",)),
-        Stage("report", ("case",), ("geometry", "shock", "comparison"), ("report.html", "summary.json")),
+        Stage("report", REPORT, ("geometry", "shock", "comparison"), REPORT_PRODUCTS),
     )
 )

@@ -1,8 +1,8 @@
 """The pipelines, one function a stage; which kind of case has which stages stands at the end.
 
-Board drop: geometry -> reflow -> surface -> solder_mesh -> shock -> report. Scenes of solder alone (their reflow is in
-`scene_stages.py`): reflow -> report. Structures (`structure/stages.py`): geometry -> shock ->
-comparison -> report.
+Package on a board: geometry -> reflow -> surface -> solder_mesh -> shock -> report, the shock only where it is given.
+Scenes of solder alone (their reflow is in `scene_stages.py`): reflow -> report. Structures (`structure/stages.py`):
+geometry -> shock -> comparison -> report.
 
 Each reads products of earlier stages from ``run.folder``, writes its own into ``folder``, and returns what it found.
 Packages are imported inside the functions, so that a stage loads only what it uses.
@@ -12,7 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from workflow import findings
-from workflow.board_drop_case import BoardDropCase
+from workflow.board_drop_case import BoardDropCase, PackageCase
 from workflow.products import read_json, write_json
 from workflow.progress import progress_bar
 from workflow.scene_stages import REFLOW_SCENES
@@ -21,7 +21,7 @@ from workflow.structure.case import StructureCase
 from workflow.structure.stages import STRUCTURE_STAGES
 
 
-def geometry(run: Run[BoardDropCase], folder: Path) -> Findings:
+def geometry(run: Run[PackageCase], folder: Path) -> Findings:
     """Mesh board and package, both flat; tabulate the pads."""
     from meshing.assembly import write_assembly
     from meshing.pads import pad_table, write_pads
@@ -36,7 +36,7 @@ def geometry(run: Run[BoardDropCase], folder: Path) -> Findings:
     return findings.of_geometry(len(pads), counts)
 
 
-def reflow(run: Run[BoardDropCase], folder: Path) -> Findings:
+def reflow(run: Run[PackageCase], folder: Path) -> Findings:
     """Melt the solder of each distinct joint between its pads."""
     from meshing.pads import lifted, read_pads, write_pads
     from particles.effects import decide_effects
@@ -60,7 +60,7 @@ def reflow(run: Run[BoardDropCase], folder: Path) -> Findings:
     return replace(found, continued=f"{continued} of {len(distinct)} joints" if continued else "")
 
 
-def surface(run: Run[BoardDropCase], folder: Path) -> Findings:
+def surface(run: Run[PackageCase], folder: Path) -> Findings:
     """Close the surface of each joint, in its own orientation, and measure it."""
     from meshing.surface import close_surface, measure, write_surface
     from particles.orientation import Orientation, oriented
@@ -80,13 +80,13 @@ def surface(run: Run[BoardDropCase], folder: Path) -> Findings:
     return findings.of_surface(surfaces)
 
 
-def solder_mesh(run: Run[BoardDropCase], folder: Path) -> Findings:
+def solder_mesh(run: Run[PackageCase], folder: Path) -> Findings:
     """Put the package where the solder froze and mesh every joint in its place with hexahedra.
 
     Where the shock needs coarse joints, all are also meshed with few of them.
     """
     from meshing.displaced_assembly import write_displaced_assembly
-    from meshing.displacement import prescribed
+    from meshing.displacement import prescribed, read_computed
     from meshing.joints_file import write_joints
     from meshing.pads import read_pads
     from meshing.solder_mesh import joint_quality, mesh_coarse_joint, mesh_joint
@@ -94,10 +94,11 @@ def solder_mesh(run: Run[BoardDropCase], folder: Path) -> Findings:
     from workflow.fine_joints import coarse_joints_effect, needs_coarse_joints
     from workflow.forecast import with_critical_step
 
-    case = run.case
-    displacement = prescribed(case.package, case.warpage)
+    case, structure = run.case, run.folder / "reflow/structure.npz"
+    coupling = case.shock.coupling if isinstance(case, BoardDropCase) else None
+    displacement = read_computed(structure) if structure.exists() else prescribed(case.package, case.warpage)
     side = write_displaced_assembly(run.folder / "geometry/assembly.msh", displacement, folder / "assembly.msh")
-    kinds = {"": mesh_joint} | ({"coarse_": mesh_coarse_joint} if needs_coarse_joints(case.shock.coupling) else {})
+    kinds = {"": mesh_joint} | ({"coarse_": mesh_coarse_joint} if needs_coarse_joints(coupling) else {})
     bodies = [
         (read_surface(run.folder / f"surface/{site.name}.vtu"), site)
         for site in read_pads(run.folder / "reflow/pads.json")
@@ -108,7 +109,7 @@ def solder_mesh(run: Run[BoardDropCase], folder: Path) -> Findings:
         write_joints(meshes, folder / f"{kind}joints.msh")
         qualities[kind] = {mesh.name: with_critical_step(joint_quality(mesh), case.materials) for mesh in meshes}
         write_json(folder / f"{kind}quality.json", qualities[kind])
-    return findings.of_solder_mesh(qualities, coarse_joints_effect(case.shock.coupling))
+    return findings.of_solder_mesh(qualities, coarse_joints_effect(coupling))
 
 
 def shock(run: Run[BoardDropCase], folder: Path) -> Findings:
@@ -130,7 +131,7 @@ def report(run: Run, folder: Path) -> Findings:
 
 
 STAGE_FUNCTIONS: dict[str, dict[str, StageFunction]] = {
-    BoardDropCase.kind: {
+    PackageCase.kind: {
         "geometry": geometry,
         "reflow": reflow,
         "surface": surface,

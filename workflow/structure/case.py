@@ -17,7 +17,7 @@ class StructureCase(StructureScene, Case):
     """A box of layers under supports and loads."""
 
     kind = "structure"
-    pipeline = STRUCTURE
+    stages = STRUCTURE
     ranks_key = "dynamics.ranks"
 
     references: dict[str, AnyReference] = Field(default_factory=dict)
