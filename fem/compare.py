@@ -27,19 +27,26 @@ def compare_histories(two_scale: Path, dns: Path, fine: Collection[str] | None =
         ``critical_joint`` (largest interface-averaged von Mises of the DNS); relative L2 errors:
         ``critical_joint_stress_error`` (its board and package side), ``worst_joint_stress_error`` (of the fine ones),
         ``die_displacement_error`` and ``board_displacement_error`` (their centres), ``board_strain_error``; with
-        ``fine`` also ``critical_joint_coarse``: 1 if the critical joint is not among them.
+        ``fine`` also ``critical_joint_coarse``: 1 if the critical joint is not among them; of a DNS that ends early
+        ``compared_duration`` [s].
+
+    A reference that ends early is compared with over the time that it has; the critical joint is then that of the
+    two-scale run.
 
     Raises:
-        ValueError: The files have different sample times or joints.
+        ValueError: The files have different sample times or joints, or the reference lasts longer.
     """
     with np.load(two_scale) as first, np.load(dns) as second:
         ours, reference = dict(first), dict(second)
-    same = len(ours["time"]) == len(reference["time"]) and np.allclose(ours["time"], reference["time"], rtol=1e-9)
+    count = len(reference["time"])
+    same = len(ours["time"]) >= count and np.allclose(ours["time"][:count], reference["time"], rtol=1e-9)
     if not same or not np.array_equal(ours["joints"], reference["joints"]):
         raise ValueError(f"{two_scale} and {dns} have different sample times or joints and cannot be compared")
     result: dict[str, float | str] = {
-        f"{name}_error": relative_error(ours[array], reference[array]) for name, array in COMPARED.items()
+        f"{name}_error": relative_error(ours[array][:count], reference[array]) for name, array in COMPARED.items()
     }
+    if count < len(ours["time"]):
+        result["compared_duration"] = float(reference["time"][-1])
     if len(reference["joints"]):
         result |= joint_errors(ours, reference, fine)
     return result
@@ -52,8 +59,10 @@ def joint_errors(
     layers = ("von_mises_board", "von_mises_package")
     values = np.stack([ours[name] for name in layers])
     exact = np.stack([reference[name] for name in layers])
-    critical = int(np.argmax(exact.max(axis=(0, 1))))
-    errors = [relative_error(values[:, :, j], exact[:, :, j]) for j in range(exact.shape[2])]
+    count = exact.shape[1]
+    longest = exact if count == values.shape[1] else values
+    critical = int(np.argmax(longest.max(axis=(0, 1))))
+    errors = [relative_error(values[:, :count, j], exact[:, :, j]) for j in range(exact.shape[2])]
     names = [str(name) for name in reference["joints"]]
     compared = [error for name, error in zip(names, errors, strict=True) if fine is None or name in fine]
     return {

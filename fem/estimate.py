@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
@@ -21,6 +21,7 @@ WINDOW_OVERHEAD = 3.0e-5  # [s] interpreter per window, same source
 STEP_OVERHEAD = 2.5e-5  # [s] interpreter per step of a motion or of a level inside it, same source
 LATENCY = 1.5e-5  # [s] a message between two ranks of one machine, same source
 PULSE_STEPS = 200  # implicit steps in the shortest pulse: 3e-4 of the period of what swings twice in it
+ROUNDING = 1e-9  # of a duration
 RUN_STEPS = 1000  # implicit steps in a run, at least
 Step = TypeVar("Step", float, NDArray[np.float64])
 
@@ -95,6 +96,12 @@ def implicit_plan(plan: WindowPlan, largest: float) -> WindowPlan:
     """Return windows from sample to sample of another plan, in implicit steps of at most ``largest`` [s]."""
     spacing = plan.stride * plan.window
     return WindowPlan(spacing, math.ceil(spacing / largest), plan.windows // plan.stride, 1)
+
+
+def shortened(plan: WindowPlan, duration: float) -> WindowPlan:
+    """Return the first windows of a plan, up to the sample at a duration [s] or the next one after it."""
+    samples = math.ceil(duration / (plan.stride * plan.window) * (1.0 - ROUNDING))
+    return replace(plan, windows=min(plan.windows, plan.stride * samples))
 
 
 def largest_implicit_step(duration: float, pulses: Iterable[float]) -> float:

@@ -2,9 +2,9 @@
 
 import json
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from mpi4py import MPI
@@ -26,6 +26,25 @@ GUARD = 500  # steps between two looks at the energies, whatever the samples
 Crew = Mapping[Role, Participant]
 
 
+class Pictures(Protocol):
+    """Something that is taken of all models at some windows.
+
+    Attributes:
+        windows: At whose ends.
+    """
+
+    windows: frozenset[int]
+
+    def sample(self, crew: Crew) -> None:
+        """Take it now; collective over all models."""
+
+    def state(self) -> State:
+        """Return what was taken so far, for a checkpoint."""
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Continue from the values of what ``state`` returned."""
+
+
 @dataclass(frozen=True, slots=True)
 class Outputs:
     """Where a run writes to.
@@ -35,12 +54,14 @@ class Outputs:
         fields: A field file per model of this rank.
         field_samples: How many times each of them is written.
         checkpoints: From which the run continues, and to which it writes.
+        pictures: What else is taken, at windows of its own.
     """
 
     history: History
     fields: dict[Role, Fields]
     field_samples: int
     checkpoints: Checkpoints
+    pictures: Sequence[Pictures] = ()
 
 
 def march(world: MPI.Comm, crew: Crew, outputs: Outputs, stopwatch: Stopwatch) -> float:
@@ -49,9 +70,8 @@ def march(world: MPI.Comm, crew: Crew, outputs: Outputs, stopwatch: Stopwatch) -
     Raises:
         EnergyError: On every rank, see ``Ledger.judge``.
     """
-    plan, history = next(iter(crew.values())).plan, outputs.history
+    plan = next(iter(crew.values())).plan
     field_windows = set(np.linspace(0, plan.windows, outputs.field_samples).round().astype(int).tolist())
-    guard = max(1, GUARD // plan.substeps)
     told, output_seconds, first = time.perf_counter(), 0.0, 0
     state = outputs.checkpoints.read(state_of(crew, outputs))
     if state is not None and outputs.checkpoints.continued is not None:
@@ -61,11 +81,7 @@ def march(world: MPI.Comm, crew: Crew, outputs: Outputs, stopwatch: Stopwatch) -
         HERE.window = window
         if window:
             run_window(crew, stopwatch)
-        sampled = window % plan.stride == 0 or window == plan.windows
-        if sampled:
-            history.sample(crew)
-        elif window % guard == 0:
-            history.check(crew)
+        sampled = watch(crew, outputs, window)
         if window in field_windows:
             output_seconds += write_fields(crew, outputs, window)
         if sampled and window < plan.windows and outputs.checkpoints.is_due():
@@ -77,6 +93,20 @@ def march(world: MPI.Comm, crew: Crew, outputs: Outputs, stopwatch: Stopwatch) -
     for file in outputs.fields.values():
         file.close()
     return output_seconds
+
+
+def watch(crew: Crew, outputs: Outputs, window: int) -> bool:
+    """Take what is due after a window; return whether there was a sample. Errors as ``march``."""
+    plan = next(iter(crew.values())).plan
+    sampled = window % plan.stride == 0 or window == plan.windows
+    if sampled:
+        outputs.history.sample(crew)
+    elif window % max(1, GUARD // plan.substeps) == 0:
+        outputs.history.check(crew)
+    for pictures in outputs.pictures:
+        if window in pictures.windows:
+            pictures.sample(crew)
+    return sampled
 
 
 def run_window(crew: Crew, stopwatch: Stopwatch) -> None:
@@ -123,7 +153,9 @@ def sample_fields(participant: Participant, fields: Fields) -> FieldSample:
 
 def state_of(crew: Crew, outputs: Outputs) -> State:
     """Return all that changes with time on this rank."""
-    return {role: participant.state() for role, participant in crew.items()} | {"history": outputs.history.state()}
+    models: dict[str, State] = {role: participant.state() for role, participant in crew.items()}
+    pictures = {f"pictures-{k}": some.state() for k, some in enumerate(outputs.pictures)}
+    return models | {"history": outputs.history.state()} | pictures
 
 
 def save(crew: Crew, outputs: Outputs, window: int) -> None:
@@ -138,6 +170,8 @@ def resume(crew: Crew, outputs: Outputs, state: dict[str, Any], field_windows: l
     for role, participant in crew.items():
         participant.restore(state[role])
     outputs.history.restore(state["history"])
+    for k, pictures in enumerate(outputs.pictures):
+        pictures.restore(state[f"pictures-{k}"])
     begin = time.perf_counter()
     like = {role: outputs.fields[role].state(sample_fields(crew[role], outputs.fields[role])) for role in crew}
     for window in field_windows:

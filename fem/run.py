@@ -20,11 +20,12 @@ from fem.coupling.scheme import scheme_of
 from fem.coupling.self_check import recorded
 from fem.coupling.stopwatch import Stopwatch
 from fem.coupling.whole import Treatment
-from fem.estimate import WindowPlan, implicit_plan, largest_implicit_step
+from fem.estimate import WindowPlan, implicit_plan, largest_implicit_step, shortened
 from fem.fields import Fields, element_peaks
 from fem.history import History
 from fem.implicit import ImplicitMotion
 from fem.inputs import RunInput
+from fem.interface import InterfaceStress, picture_windows
 from fem.ledger import Ledger
 from fem.march import Outputs, march
 from fem.materials.elasticity import materials_of_parts
@@ -66,7 +67,8 @@ def run(world: MPI.Comm, request: RunInput) -> None:
         tables = [Path(request.shock.table)] if request.shock.table else []
         inputs = request.computed, steps.plan, digest_of_files(*request.mesh_files, *tables)
         checkpoints = Checkpoints(comms.world, request.checkpoints, inputs, numerics.checkpoint_seconds)
-        outputs = Outputs(history, fields, numerics.field_samples, checkpoints)
+        pictures = make_pictures(comms, models, steps.plan, request.shock)
+        outputs = Outputs(history, fields, numerics.field_samples, checkpoints, pictures)
         ready = time.perf_counter()
         output_seconds = march(comms.world, crew, outputs, stopwatch)
         seconds = time.perf_counter() - ready - output_seconds
@@ -76,6 +78,8 @@ def run(world: MPI.Comm, request: RunInput) -> None:
         coupling = divided.coupling | recorded(checked)
         peaks = element_peaks(comms.world, fields.values(), next(iter(models.values())).tables.part_names)
         write_result(comms, request, (models, steps, coupling), Found(history, peaks), timings)
+        for some in pictures:
+            some.write(request.output)
         agreed(comms.world, lambda: None)
 
 
@@ -88,7 +92,9 @@ def pulse_of(request: RunInput, window: float) -> Pulse:
 
 
 def planned(steps: Steps, request: RunInput, pulse: Pulse) -> Steps:
-    """Return the steps of a run that may be implicit."""
+    """Return the steps of a run that may be implicit, and of a DNS that may end early."""
+    if request.mode == "dns" and request.shock.numerics.dns_duration is not None:
+        steps = replace(steps, plan=shortened(steps.plan, request.shock.numerics.dns_duration))
     if not request.implicit:
         return steps
     largest = largest_implicit_step(request.shock.duration, pulse_durations({"drop": pulse}))
@@ -131,6 +137,16 @@ def make_history(
     ledger = Ledger(shock.numerics.energy_balance_limit, trivial, plan.step, steps.smallest)
     watches = {role: JointWatch(model.tables.watch, model.body, yields) for role, model in models.items()}
     return History(comms.world, watches, ledger, {"base_acceleration": pulse.value})
+
+
+def make_pictures(
+    comms: Communicators, models: dict[Role, Model], plan: WindowPlan, shock: Shock
+) -> list[InterfaceStress]:
+    """Return what is taken at ``shock.picture_times``; nothing where none is given."""
+    if not shock.picture_times:
+        return []
+    tables = {role: (model.tables.interface, model.body) for role, model in models.items()}
+    return [InterfaceStress(comms.world, tables, picture_windows(shock.picture_times, plan))]
 
 
 def make_fields(comms: Communicators, models: dict[Role, Model], request: RunInput) -> dict[Role, Fields]:

@@ -12,6 +12,7 @@ from fem.coupling.placement import Role
 from fem.coupling.split import Part, cut_between, part_of
 from fem.coupling.whole import Whole
 from fem.cut import find_cut
+from fem.interface_table import InterfaceTable, whole_interface
 from fem.mesh import MeshData, merge_nodes
 from fem.supports import HELD, held_components
 from fem.tie import Tie, tie_joints
@@ -56,10 +57,12 @@ class JointTables(Tables):
     Attributes:
         watch: Its watch points.
         shaken: ``(k,)`` nodes of the mounting holes.
+        interface: Where its joints meet the package.
     """
 
     watch: WatchTable
     shaken: NDArray[np.int32]
+    interface: InterfaceTable
 
 
 TablesT_co = TypeVar("TablesT_co", bound=Tables, covariant=True)
@@ -124,11 +127,13 @@ class Scene:
     whole: Whole
     held: NDArray[np.bool_]
     watch: WatchTable
+    interface: InterfaceTable
 
     @classmethod
     def of(cls, whole: Whole, rules: Mapping[str, Sequence[int]]) -> "Scene":
         """Find out what is held and watched."""
-        return cls(whole, held_components(whole.mesh, rules), whole_watch(whole.mesh))
+        mesh = whole.mesh
+        return cls(whole, held_components(mesh, rules), whole_watch(mesh), whole_interface(mesh))
 
     def model_input(
         self, part: Part, cut: NDArray[np.integer], counted: tuple[NDArray[np.int32], NDArray[np.int32]]
@@ -159,5 +164,6 @@ class Scene:
             ratios=(),
             watch=self.watch.within(*counted),
             shaken=shaken[shaken >= 0],
+            interface=self.interface.within(counted[1]),
         )
         return ModelInput(part.mesh, tables, np.flatnonzero(part.cell_number >= 0))

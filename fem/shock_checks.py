@@ -10,6 +10,7 @@ def problems(shock: Shock) -> list[Problem]:
     """Find what cannot work before anything is meshed or computed."""
     return [
         *_pulse(shock),
+        *_beyond_the_end(shock),
         *_damping(shock.damping),
         *_large_mass(shock),
         *_finite(shock),
@@ -41,6 +42,15 @@ def _damping(damping: Damping) -> Iterator[Problem]:
     used = [name for name, value in ratios.items() if value]
     if used and damping.frequency is None:
         yield Problem("shock.damping.frequency", None, f"is missing: at which {' and '.join(used)} is meant", "> 0 Hz")
+
+
+def _beyond_the_end(shock: Shock) -> Iterator[Problem]:
+    """Find times after the end of the shock."""
+    ends = {"shock.numerics.dns_duration": shock.numerics.dns_duration, "shock.picture_times": shock.picture_times}
+    for key, given in ends.items():
+        latest = max(given, default=0.0) if isinstance(given, tuple) else given or 0.0
+        if latest > shock.duration:
+            yield Problem(key, given, "is after the end of the shock", "<= shock.duration")
 
 
 def _large_mass(shock: Shock) -> Iterator[Problem]:

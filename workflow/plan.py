@@ -153,11 +153,14 @@ def _shock(case: BoardDropCase, shock: ShockForecast) -> Table:
     if shock.search:
         table.add_row("coarse run", f"about {duration(shock.search)}", "all joints coarse: it finds the critical ones")
     table.add_row("two-scale", f"about {duration(shock.two_scale)}", _placement(case) + _absent("two_scale", case))
-    table.add_row("DNS", f"about {duration(shock.dns)}", f"all {every} ranks on one model" + _absent("dns", case))
+    part = f"; the first {short(shock.dns_share * case.shock.duration)}" if shock.dns_share < 1.0 else ""
+    dns = f"all {every} ranks on one model{part}" + _absent("dns", case)
+    table.add_row("DNS", f"about {duration(shock.dns)}", dns)
     table.add_row(
         "DNS, implicit steps", f"about {duration(shock.implicit)}", "one rank; elastic only (shock.numerics.dns_solver)"
     )
-    table.add_row("two-scale / DNS", f"{shock.two_scale / shock.dns:.2f}", "predicted ratio of wall times")
+    per_time = " for as much simulated time" if part else ""
+    table.add_row("two-scale / DNS", f"{shock.ratio:.2f}", f"predicted ratio of wall times{per_time}")
     return table
 
 

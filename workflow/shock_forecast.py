@@ -56,6 +56,7 @@ class ShockForecast:
         search: predicted wall time of the run that finds the critical joints [s], zero where there is none.
         two_scale: the same of the two-scale run.
         dns: predicted wall time of the DNS [s] in explicit steps.
+        dns_share: of the windows, those that the DNS has.
         implicit: the same in implicit steps on one rank, where everything is elastic.
         updates_per_second: element updates per second and rank that the prediction assumes.
     """
@@ -68,8 +69,14 @@ class ShockForecast:
     search: float
     two_scale: float
     dns: float
+    dns_share: float
     implicit: float
     updates_per_second: float
+
+    @property
+    def ratio(self) -> float:
+        """Return the wall time of the two-scale run over that of a DNS of all windows."""
+        return self.two_scale * self.dns_share / self.dns
 
 
 Parts = Mapping[str, PartForecast]
@@ -138,19 +145,31 @@ def forecast_shock(case: "BoardDropCase", parts: Parts) -> ShockForecast:
         case: the case.
         parts: of the mesh with all joints fine.
     """
-    from fem.estimate import UPDATES_PER_SECOND, implicit_plan, largest_implicit_step
+    from fem.estimate import UPDATES_PER_SECOND, implicit_plan, largest_implicit_step, shortened
     from fem.solver_cost import implicit_cost, plate_nodes
 
     shock = case.shock
     scheme, levels, seconds = _coupled(case, two_scale_parts(case))
     search = _coupled(case, coarse_parts(case))[2] if shock.coupling.fine_joints == "critical" else 0.0
     plan, dns = _direct(case, parts)
+    direct = shortened(plan, shock.numerics.dns_duration or shock.duration)
+    share = direct.windows / plan.windows
     pulses = [shock.pulse_duration] if shock.pulse_duration else []
-    slow = implicit_plan(plan, largest_implicit_step(shock.duration, pulses))
+    slow = implicit_plan(direct, largest_implicit_step(shock.duration, pulses))
     elements = sum(part.elements for part in parts.values())
     implicit = implicit_cost(plate_nodes(elements), slow.windows * slow.substeps).seconds
     return ShockForecast(
-        scheme, levels, plan.window, plan.substeps, plan.windows, search, seconds, dns, implicit, UPDATES_PER_SECOND
+        scheme=scheme,
+        levels=levels,
+        window=plan.window,
+        substeps=plan.substeps,
+        windows=plan.windows,
+        search=search,
+        two_scale=seconds,
+        dns=share * dns,
+        dns_share=share,
+        implicit=implicit,
+        updates_per_second=UPDATES_PER_SECOND,
     )
 
 

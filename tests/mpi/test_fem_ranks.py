@@ -19,6 +19,7 @@ SHOCK = {
     "peak_acceleration": 14709.975,
     "pulse_duration": 5e-4,
     "duration": 2e-5,
+    "picture_times": [1e-5, 2e-5],
     "numerics": {"mass_scaled": ["copper"], "history_samples": 50, "field_samples": 2},
 }
 
@@ -43,8 +44,13 @@ def history(
     result = json.loads((output / "result.json").read_text())
     assert all(check["ok"] for check in result["health"].values())
     assert result["model"]["ranks"] == sum(ranks)
-    with np.load(output / "history.npz") as arrays:
-        return dict(arrays)
+    return arrays_of(output)
+
+
+def arrays_of(output: Path) -> dict[str, np.ndarray]:
+    """Return the history and, by names with an @, the pictures of the interface."""
+    with np.load(output / "history.npz") as history, np.load(output / "interface.npz") as interface:
+        return {**history, **interface}
 
 
 @pytest.fixture(scope="module")
@@ -55,7 +61,17 @@ def assembly(tmp_path_factory) -> Path:
 
 
 def assert_same(first: dict[str, np.ndarray], second: dict[str, np.ndarray]) -> None:
-    for name in ("board_centre", "die_centre", "von_mises_board", "von_mises_package", "von_mises_max", "board_strain"):
+    pictures = [name for name in first if "@" in name]
+    assert len(pictures) == 12
+    for name in (
+        *pictures,
+        "board_centre",
+        "die_centre",
+        "von_mises_board",
+        "von_mises_package",
+        "von_mises_max",
+        "board_strain",
+    ):
         scale = np.abs(first[name]).max()
         assert np.abs(first[name] - second[name]).max() <= 1e-8 * scale, name
 
@@ -111,8 +127,7 @@ def test_ranks_that_carry_both_models_do_not_wait_for_large_messages(tmp_path):
 def test_dns_is_the_same_on_one_and_two_ranks(assembly):
     one = start(assembly, 1, output=str(assembly / "dns_1"))
     assert one.returncode == 0, one.stderr
-    with np.load(assembly / "dns_1" / "history.npz") as arrays:
-        assert_same(dict(arrays), history(assembly, (1, 1), "dns"))
+    assert_same(arrays_of(assembly / "dns_1"), history(assembly, (1, 1), "dns"))
 
 
 def fails(directory: Path, ranks: int, message: str, **changes) -> None:
