@@ -77,6 +77,7 @@ class Body:
         cut: ``(nc,)`` local number of each cut node, -1 where another rank has it.
         mass: ``(n,)`` [kg] lumped mass, of slaves moved to their masters.
         free: ``(n, 3)`` whether a displacement component follows from forces.
+        initial_stress: ``(ne, 6)`` [Pa] mean stress of linear elements at no displacement; None where there is none.
     """
 
     local: LocalMesh
@@ -88,6 +89,7 @@ class Body:
     cut: NDArray[np.int32]
     mass: NDArray[np.float64]
     free: NDArray[np.bool_]
+    initial_stress: NDArray[np.float64] | None = None
 
 
 def make_pieces(

@@ -10,6 +10,7 @@ from fem.body import Body
 from fem.energy import InternalForce
 from fem.force import linear_terms
 from fem.loads import Kept, Load
+from fem.residual.pretension import Pretension
 
 if TYPE_CHECKING:
     from fem.motion import Motion
@@ -48,7 +49,8 @@ class RayleighDamping(Load):
         The terms of the body serve for it unless they have a path.
         """
         paths = any(term.history for term in body.terms)
-        return cls(*coefficients, linear_terms(body.elements) if paths and coefficients[1] else body.terms)
+        linear = [term for term in body.terms if not isinstance(term, Pretension)]
+        return cls(*coefficients, linear_terms(body.elements) if paths and coefficients[1] else linear)
 
     def begin(self, motion: "Motion") -> None:
         """Make room."""

@@ -53,5 +53,9 @@ class RecordingError(ValueError):
     """Recorded messages that do not fit the participant that wants them."""
 
 
+class ModesError(RuntimeError):
+    """Incompatible modes of an element that find no equilibrium."""
+
+
 class InvertedElementError(RuntimeError):
     """An element that the motion has turned inside out."""

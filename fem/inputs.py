@@ -12,20 +12,17 @@ from fem.structure.parameters import SolverName, StructureScene
 UNRELATED = {"checkpoint_seconds", "watchdog_seconds"}  # numerics that results do not depend on
 
 
-class RunInput(Parameters):
-    """A package on a board, dropped; SI floats.
+class SceneInput(Parameters):
+    """A package on a board; SI floats.
 
-    ``meshes`` have all joints fine, ``coarse_joints`` has those that are not; ``checkpoints`` is a folder from which a
-    run continues.
+    ``meshes`` have all joints fine, ``coarse_joints`` has those that are not.
     """
 
-    mode: Literal["two_scale", "dns"]
     meshes: tuple[Path, ...] = Field(min_length=1)
     coarse_joints: Path | None = None
     shock: Shock
     materials: Materials = Materials()
     output: Path
-    checkpoints: Path | None = None
 
     @property
     def watchdog_seconds(self) -> float:
@@ -33,15 +30,44 @@ class RunInput(Parameters):
         return self.shock.numerics.watchdog_seconds
 
     @property
-    def computed(self) -> str:
-        """Return all that results depend on: not where they go, nor which ranks compute them."""
-        shock: Any = {"ranks": True, "numerics": UNRELATED}
-        return self.model_dump_json(exclude={"output": True, "checkpoints": True, "shock": shock})
-
-    @property
     def mesh_files(self) -> tuple[Path, ...]:
         """Return all files of meshes."""
         return (*self.meshes, self.coarse_joints) if self.coarse_joints else self.meshes
+
+    @property
+    def one_way(self) -> bool:
+        """Whether a coarse model of all drives a finer one of some joints."""
+        return False
+
+
+class CoolingInput(SceneInput):
+    """Cooling of the whole model from where it is free of stress, ``change`` of temperature [K]."""
+
+    mode: Literal["cooling"]
+    change: float
+
+
+class RunInput(SceneInput):
+    """A package on a board, dropped.
+
+    ``checkpoints`` is a folder from which a run continues, ``cooling`` the file of the state in which it begins.
+    """
+
+    mode: Literal["two_scale", "dns"]
+    checkpoints: Path | None = None
+    cooling: Path | None = None
+
+    @property
+    def computed(self) -> str:
+        """Return all that results depend on: not where they go, nor which ranks compute them."""
+        shock: Any = {"ranks": True, "numerics": UNRELATED}
+        return self.model_dump_json(exclude={"output": True, "checkpoints": True, "cooling": True, "shock": shock})
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """Return all files that results depend on."""
+        tables = (Path(self.shock.table),) if self.shock.table else ()
+        return (*self.mesh_files, *tables, *((self.cooling,) if self.cooling else ()))
 
     @property
     def one_way(self) -> bool:
@@ -91,6 +117,6 @@ class StructureInput(StructureScene):
 
 
 # What ``python -m fem INPUT.json`` reads.
-INPUT: TypeAdapter[RunInput | StructureInput] = TypeAdapter(
-    Annotated[RunInput | StructureInput, Field(discriminator="mode")]
+INPUT: TypeAdapter[RunInput | CoolingInput | StructureInput] = TypeAdapter(
+    Annotated[RunInput | CoolingInput | StructureInput, Field(discriminator="mode")]
 )

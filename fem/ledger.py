@@ -84,6 +84,7 @@ class Ledger:
         balance_error: Largest |balance| / largest energy seen.
         force_residual: Largest relative force or moment residual seen.
         initial: Energy at time zero [J].
+        stored: Energies of the elements at time zero [J], from which those of the motion count.
         latest: Energies of the sample before.
     """
 
@@ -95,6 +96,7 @@ class Ledger:
     balance_error: float = 0.0
     force_residual: float = 0.0
     initial: float = 0.0
+    stored: dict[str, float] = field(default_factory=dict)
     latest: dict[str, float] = field(default_factory=dict)
 
     def judge(self, sums: NDArray[np.float64], time: float) -> dict[str, float]:
@@ -110,9 +112,10 @@ class Ledger:
         present = sum(found[name] for name in ENERGIES[:5]) - found["external"]
         if not np.isfinite(present) or not np.isfinite(found["interface"]):
             raise EnergyError(f"energies are not numbers {self._when(time)}: {self._cause(found)}")
-        self.initial = present if time == 0.0 else self.initial
+        if time == 0.0:
+            self.initial, self.stored = present, {name: found[name] for name in ("internal", "hourglass")}
         balance = present - self.initial
-        self.largest = max(self.largest, *(abs(found[name]) for name in ENERGIES[:6]))
+        self.largest = max(self.largest, *(abs(found[name] - self.stored.get(name, 0.0)) for name in ENERGIES[:6]))
         self._judge_step(found, float(sums[len(ENERGIES)]), time)
         if self.largest > self.trivial:
             self.balance_error = max(self.balance_error, abs(balance) / self.largest)

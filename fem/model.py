@@ -26,6 +26,7 @@ from fem.materials.elasticity import role_of_part
 from fem.materials.parameters import Material
 from fem.materials.roles import Materials
 from fem.mesh import MeshData
+from fem.residual.initial_state import Cooling, InitialState
 from fem.scene import JointTables, Tables, TablesT_co, joined, model_inputs
 from fem.steps import Steps, agreed_minimum, assembled_step, steps_of_division, undivided
 from fem.supports import HELD, SYMMETRY
@@ -53,6 +54,7 @@ class Divided(Generic[TablesT_co]):
         rules: What their division followed.
         scheme: How they are coupled.
         coupling: What the result tells of it.
+        initial: How its models begin, None from rest without stress.
     """
 
     meshes: Mapping[Role, MeshData]
@@ -62,6 +64,7 @@ class Divided(Generic[TablesT_co]):
     rules: Rules
     scheme: SchemeName
     coupling: dict[str, Any]
+    initial: InitialState | None = None
 
 
 def divided_scene(world: MPI.Comm, request: RunInput) -> Divided[JointTables]:
@@ -114,6 +117,9 @@ def divided_on_one_rank(request: RunInput) -> Divided[JointTables]:
         rules=rules,
         scheme=division.scheme,
         coupling={"direction": shock.coupling.direction} | coupling_record(division, found, len(first.tables.cut)),
+        initial=InitialState.of(Cooling.read(request.cooling), whole, inputs, not found.linear.all())
+        if request.cooling
+        else None,
     )
 
 
@@ -169,7 +175,8 @@ def assembled(
     for role, own in pieces.items():
         factor = divided.mass_factors[role][own.local.cell_numbers]
         response = Response(kinematics, divided.steps.step_of(role), divided.rules.stiffness)
-        bodies[role] = make_body(comms.models[role], own, divided.tables[role], factor, response)
+        body = make_body(comms.models[role], own, divided.tables[role], factor, response)
+        bodies[role] = divided.initial.begin(role, body, own.materials) if divided.initial else body
     return bodies
 
 

@@ -9,7 +9,8 @@ from mpi4py import MPI
 
 from fem.agreement import agreed
 from fem.errors import AgreedError, EnergyError, InvertedElementError, RankError
-from fem.inputs import INPUT, RunInput, StructureInput
+from fem.inputs import INPUT, CoolingInput, RunInput, StructureInput
+from fem.residual.cooling import run_cooling
 from fem.run import run
 from fem.structure.checks import check
 from fem.structure.run import run_structure
@@ -28,6 +29,8 @@ def main(world: MPI.Comm, arguments: list[str]) -> int:
     try:
         if isinstance(request, StructureInput):
             run_structure(world, request)
+        elif isinstance(request, CoolingInput):
+            run_cooling(world, request)
         else:
             run(world, request)
     except (AgreedError, EnergyError, RankError) as error:  # raised on every rank
@@ -49,7 +52,7 @@ def end_all(world: MPI.Comm, watchdog: Watchdog, message: str) -> None:
     world.Abort(1)
 
 
-def read_input(arguments: list[str]) -> RunInput | StructureInput:
+def read_input(arguments: list[str]) -> RunInput | CoolingInput | StructureInput:
     """Read and check the input file, and make the output directory."""
     if len(arguments) != 1:
         raise ValueError("usage: mpirun -n N python -m fem INPUT.json")

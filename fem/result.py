@@ -19,7 +19,7 @@ from fem.materials.failure import Verdicts, failed_joints, failure_criteria, jud
 from fem.model import Model
 from fem.shock_loads import shock_pulse
 from fem.steps import Steps
-from fem.watch_joints import FLOW_LAYERS
+from fem.watch_joints import FLOW_LAYERS, LAYERS
 
 FORCE_RESIDUAL_LIMIT = 1e-10
 ADDED_MASS_LIMIT = 0.05
@@ -179,11 +179,13 @@ def shock_metrics(arrays: dict[str, NDArray]) -> dict[str, Any]:
     peak = np.maximum(arrays["von_mises_board"], arrays["von_mises_package"]).max(axis=0)
     peel = np.maximum(arrays["peel_board"], arrays["peel_package"]).max(axis=0)
     critical = int(np.argmax(peak))
+    start = max(float(arrays[name][0, critical]) for name in LAYERS[:2])
     return metrics | {
         "critical_joint": quantity(str(joints[critical])),
         "peak_von_mises": quantity(float(peak[critical]), "Pa"),
         "peak_peel_stress": quantity(float(peel[critical]), "Pa"),
         "peak_element_stress": quantity(float(arrays["von_mises_max"].max()), "Pa"),
+        **({"residual_stress_critical_joint": quantity(start, "Pa")} if start > 0.0 else {}),
         **flow_metrics(arrays),
     }
 

@@ -2,7 +2,6 @@
 
 import time
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 from mpi4py import MPI
@@ -64,8 +63,7 @@ def run(world: MPI.Comm, request: RunInput) -> None:
         stopwatch = Stopwatch({role: model.body.shared.clock for role, model in models.items()}, channels)
         history = make_history(comms, models, steps, pulse, request)
         numerics, fields = request.shock.numerics, make_fields(comms, models, request)
-        tables = [Path(request.shock.table)] if request.shock.table else []
-        inputs = request.computed, steps.plan, digest_of_files(*request.mesh_files, *tables)
+        inputs = request.computed, steps.plan, digest_of_files(*request.files)
         checkpoints = Checkpoints(comms.world, request.checkpoints, inputs, numerics.checkpoint_seconds)
         pictures = make_pictures(comms, models, steps.plan, request.shock)
         outputs = Outputs(history, fields, numerics.field_samples, checkpoints, pictures)

@@ -12,8 +12,9 @@ from fem.stress import element_stress, mean_strain, symmetric, voigt
 class StressRecovery:
     """Averages over some elements of a rank.
 
-    Linear elements follow their elastic law. Where strains and rotations are finite, stress is the Cauchy stress,
-    turned by the rotation R of the element's mean deformation R U, and strain is U - 1.
+    Linear elements follow their elastic law, beside the stress that they begin with. Where strains and rotations are
+    finite, stress is the Cauchy stress, turned by the rotation R of the element's mean deformation R U, and strain is
+    U - 1.
     """
 
     def __init__(self, body: Body, chosen: NDArray[np.integer]) -> None:
@@ -21,6 +22,7 @@ class StressRecovery:
         elements = body.elements.subset(chosen)
         self._cells, self._gradient = elements.cells, body.geometry.gradient[chosen]
         self._elasticity = elements.elasticity[elements.material]
+        self._initial = 0.0 if body.initial_stress is None else body.initial_stress[chosen]
         self._stored: list[tuple[NonlinearElements, NDArray[np.int64], NDArray[np.int32]]] = []
         self._finite = np.zeros(len(chosen), dtype=bool)
         for term in body.terms:
@@ -33,7 +35,7 @@ class StressRecovery:
     def stress(self, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the stresses ``(k, 6)`` [Pa] at a displacement ``(n, 3)`` [m]."""
         local = displacement[self._cells]
-        result = element_stress(self._gradient, self._elasticity, local)
+        result = element_stress(self._gradient, self._elasticity, local) + self._initial
         for term, rows, places in self._stored:
             result[rows] = term.means(places).stress
         finite = self._finite

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem.errors import MeshError
-from fem.inputs import RunInput
+from fem.inputs import SceneInput
 from fem.mesh import MeshData, append, select
 from fem.mesh_file import read_mesh, read_meshes
 from fem.names import nearest
@@ -18,7 +18,7 @@ COPY = "solder_coarse@"
 KEY = "shock.coupling.fine_joints"
 
 
-def read_scene(request: RunInput) -> MeshData:
+def read_scene(request: SceneInput) -> MeshData:
     """Read the meshes of a run, each joint fine or coarse as it asks for.
 
     Raises:

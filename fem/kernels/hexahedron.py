@@ -3,6 +3,8 @@
 Nodes are in tensor order: bit d of the local index is the side in direction d. Voigt order as in ``materials``.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
@@ -111,14 +113,64 @@ def linear_divergence(weights, gradient, basis, result):
                     result[g, a, i] += coefficient * basis[k, g]
 
 
+class StrainBench(NamedTuple):
+    """Arrays of the element at work: three 3 x 3, gradients and divergence ``(8, 8, 3)``, basis ``(4, 8)``."""
+
+    jacobian: NDArray[np.float64]
+    inverse: NDArray[np.float64]
+    centre: NDArray[np.float64]
+    gradient: NDArray[np.float64]
+    divergence: NDArray[np.float64]
+    basis: NDArray[np.float64]
+
+
 @njit(cache=True)
-def stiffness(points, elasticity, material, result):
-    """Write the stiffness of hexahedra with Taylor-modified Wilson modes, 2 x 2 x 2 Gauss points.
+def new_strain_bench():
+    """Return the arrays of an element."""
+    square, nodal = (3, 3), (8, 8, 3)
+    return StrainBench(
+        np.empty(square), np.empty(square), np.empty(square), np.empty(nodal), np.empty(nodal), np.empty((4, 8))
+    )
+
+
+@njit(cache=True)
+def write_strains(points, bench, strain, weights):
+    """Write the strain matrices of a hexahedron with Taylor-modified Wilson modes at 2 x 2 x 2 Gauss points.
 
     The gradients of the modes 1 - xi_k^2 use the Jacobian at the centre, scaled by det J_0 / det J, so that the patch
-    test holds on distorted shapes (Taylor, Beresford & Wilson, IJNME 10, 1976); the nine internal unknowns are
-    condensed. No mode balances the bilinear part of the compatible dilatation, which locks nearly incompressible beams
-    under shear; only its linear part is kept (B-bar; least squares with the weights det J keeps the patch test).
+    test holds on distorted shapes (Taylor, Beresford & Wilson, IJNME 10, 1976). No mode balances the bilinear part of
+    the compatible dilatation, which locks nearly incompressible beams under shear; only its linear part is kept (B-bar;
+    least squares with the weights det J keeps the patch test).
+
+    Args:
+        points: ``(8, 3)`` [m].
+        bench: Arrays to work with.
+        strain: ``(8, 6, 33)`` [1/m] of 24 components at the nodes and three at each mode.
+        weights: ``(8,)`` [m^3].
+    """
+    inverse, centre, gradient, divergence = bench.inverse, bench.centre, bench.gradient, bench.divergence
+    gradient[:] = 0.0
+    centre_determinant = invert_jacobian(points, CENTRE_DERIVATIVES, bench.jacobian, centre)
+    for g in range(8):
+        weights[g] = invert_jacobian(points, GAUSS_DERIVATIVES[g], bench.jacobian, inverse)
+        add_product(GAUSS_DERIVATIVES[g], inverse, 1.0, gradient[g])
+    linear_divergence(weights, gradient, bench.basis, divergence)
+    for g in range(8):
+        for a in range(8):
+            write_strain_columns(strain[g], 3 * a, gradient[g, a, 0], gradient[g, a, 1], gradient[g, a, 2])
+            for i in range(3):
+                for row in range(3):
+                    strain[g, row, 3 * a + i] += (divergence[g, a, i] - gradient[g, a, i]) / 3.0
+        for k in range(3):
+            scale = -2.0 * GAUSS[g, k] * centre_determinant / weights[g]
+            write_strain_columns(
+                strain[g], 24 + 3 * k, scale * centre[k, 0], scale * centre[k, 1], scale * centre[k, 2]
+            )
+
+
+@njit(cache=True)
+def stiffness(points, elasticity, material, result):
+    """Write the stiffness of hexahedra with incompatible modes; the nine internal unknowns are condensed.
 
     Args:
         points: ``(ne, 8, 3)`` [m].
@@ -126,31 +178,15 @@ def stiffness(points, elasticity, material, result):
         material: ``(ne,)`` index into ``elasticity``.
         result: ``(ne, 24, 24)`` [N/m].
     """
-    jacobian, inverse, centre = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
-    gradient, divergence, weights, basis = np.empty((8, 8, 3)), np.empty((8, 8, 3)), np.empty(8), np.empty((4, 8))
-    strain, stress, full = np.empty((6, 33)), np.empty((6, 33)), np.empty((33, 33))
+    bench, strain, weights = new_strain_bench(), np.empty((8, 6, 33)), np.empty(8)
+    stress, full = np.empty((6, 33)), np.empty((33, 33))
     for e in range(len(points)):
         full[:] = 0.0
-        gradient[:] = 0.0
-        centre_determinant = invert_jacobian(points[e], CENTRE_DERIVATIVES, jacobian, centre)
+        write_strains(points[e], bench, strain, weights)
         for g in range(8):
-            weights[g] = invert_jacobian(points[e], GAUSS_DERIVATIVES[g], jacobian, inverse)
-            add_product(GAUSS_DERIVATIVES[g], inverse, 1.0, gradient[g])
-        linear_divergence(weights, gradient, basis, divergence)
-        for g in range(8):
-            for a in range(8):
-                write_strain_columns(strain, 3 * a, gradient[g, a, 0], gradient[g, a, 1], gradient[g, a, 2])
-                for i in range(3):
-                    for row in range(3):
-                        strain[row, 3 * a + i] += (divergence[g, a, i] - gradient[g, a, i]) / 3.0
-            for k in range(3):
-                scale = -2.0 * GAUSS[g, k] * centre_determinant / weights[g]
-                write_strain_columns(
-                    strain, 24 + 3 * k, scale * centre[k, 0], scale * centre[k, 1], scale * centre[k, 2]
-                )
             stress[:] = 0.0
-            add_product(elasticity[material[e]], strain, 1.0, stress)
-            add_product(strain.T, stress, weights[g], full)
+            add_product(elasticity[material[e]], strain[g], 1.0, stress)
+            add_product(strain[g].T, stress, weights[g], full)
         condense(full, 24)
         result[e] = full[:24, :24]
 

@@ -1,0 +1,217 @@
+"""Numba kernels of deformation plasticity (Hencky): the stress as a function of the strain, elements at a displacement.
+
+Under loads that grow in proportion the flow theory of J2 gives what one return from rest along the trial deviator
+gives: with e the deviator of the strain, q_e = 3 G sqrt(2/3 e : e), and p from q_e - 3 G p = Y(p),
+
+    s = 2 G (1 - 3 G p / q_e) e,     pressure elastic:
+
+a secant shear modulus. The stress has a convex potential of the strain, so that equilibrium is a least energy, and its
+tangent, 2 G (1 - 3 G p / q_e) across e and 2 G Y' / (3 G + Y') along it, is symmetric and positive.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from fem.kernels.hexahedron import add_product, condense, new_strain_bench, write_strains
+from fem.kernels.nonlinear_gradient import carried
+from fem.kernels.plasticity import FIRST_YIELD, plastic_increment, yield_stress
+
+NODAL, ALL = 24, 33  # components of a hexahedron at its nodes, and with its incompatible modes
+MODE_ITERATIONS = 60
+MODE_CONVERGED = 1e-12  # force on the modes over the forces that it is the sum of
+OVERSHOOT = 0.9  # of the slope at its start is where a step along a direction ends at most
+LINE_SEARCHES = 12
+
+
+class Law(NamedTuple):
+    """Material of an element: elasticity ``(6, 6)`` [Pa], isotropic where it yields, and its plastic constants."""
+
+    elasticity: NDArray[np.float64]
+    plastic: NDArray[np.float64]
+
+
+class Shape(NamedTuple):
+    """Strain matrices ``(m, 6, k)`` [1/m] of the points of an element and their weights ``(m,)`` [m^3]; k unknowns."""
+
+    strain: NDArray[np.float64]
+    weight: NDArray[np.float64]
+
+
+class State(NamedTuple):
+    """What an element, or each of many, is at a displacement.
+
+    Attributes:
+        points: ``(m, 7)`` stress [Pa] and plastic strain of its points.
+        force: ``(k,)`` [N] internal force.
+        tangent: ``(k, k)`` [N/m].
+    """
+
+    points: NDArray[np.float64]
+    force: NDArray[np.float64]
+    tangent: NDArray[np.float64]
+
+
+@njit(cache=True)
+def hencky(strain, law, stress, tangent):
+    """Write stress ``(6,)`` [Pa] and tangent ``(6, 6)`` [Pa] at a strain ``(6,)``; return the plastic strain."""
+    tangent[:] = law.elasticity
+    stress[:] = 0.0
+    for i in range(6):
+        for j in range(6):
+            stress[i] += law.elasticity[i, j] * strain[j]
+    constants = law.plastic
+    if constants[FIRST_YIELD] == np.inf:
+        return 0.0
+    mean = (stress[0] + stress[1] + stress[2]) / 3.0
+    stress[:3] -= mean
+    square = np.sum(stress[:3] ** 2) + 2.0 * np.sum(stress[3:] ** 2)
+    trial = np.sqrt(1.5 * square)
+    flow = plastic_increment(trial, 0.0, constants, np.inf)
+    if flow > 0.0:
+        lost = constants[0] * flow / trial
+        hardening = constants[2] * constants[3] * flow ** (constants[3] - 1.0)
+        along = 1.0 - lost - hardening / (constants[0] + hardening)
+        soften(stress, 2.0 / 3.0 * constants[0] * lost, 2.0 / 3.0 * constants[0] * along / square, tangent)
+        stress *= 1.0 - lost
+    stress[:3] += mean
+    return flow
+
+
+@njit(cache=True)
+def soften(deviator, across, along, tangent):
+    """Subtract what flow takes from the tangent: of all deviators, and along the one that is there.
+
+    Args:
+        deviator: ``(6,)`` [Pa] elastic one.
+        across: What is lost of 2 G [Pa].
+        along: What is lost besides, over the square of the deviator [1/Pa].
+        tangent: ``(6, 6)`` [Pa].
+    """
+    for i in range(6):
+        for j in range(6):
+            tangent[i, j] -= along * deviator[i] * deviator[j]
+    tangent[:3, :3] += across / 3.0
+    for i in range(6):
+        tangent[i, i] -= across * (1.0 if i < 3 else 0.5)
+
+
+@njit(cache=True)
+def add_points(shape, unknowns, law, state):
+    """Write the state of an element at unknowns ``(k,)`` [m].
+
+    Returns:
+        The largest sum of magnitudes of the forces on an unknown past the nodes'.
+    """
+    tangent, product, local = np.empty((6, 6)), np.empty((6, len(unknowns))), np.empty(6)
+    scale = np.zeros(len(unknowns))
+    state.force[:] = 0.0
+    state.tangent[:] = 0.0
+    for g in range(len(shape.weight)):
+        strain, weight = shape.strain[g], shape.weight[g]
+        local[:] = 0.0
+        for i in range(6):
+            for k in range(len(unknowns)):
+                local[i] += strain[i, k] * unknowns[k]
+        stress = state.points[g, :6]
+        state.points[g, 6] = hencky(local, law, stress, tangent)
+        for k in range(len(unknowns)):
+            force = 0.0
+            for i in range(6):
+                force += strain[i, k] * stress[i]
+            state.force[k] += weight * force
+            scale[k] += weight * abs(force)
+        product[:] = 0.0
+        add_product(tangent, strain, 1.0, product)
+        add_product(strain.T, product, weight, state.tangent)
+    return scale[NODAL:].max() if len(unknowns) > NODAL else 0.0
+
+
+@njit(cache=True)
+def relax_modes(shape, unknowns, law, state):
+    """Bring the incompatible modes into equilibrium by Newton's method; return whether they are.
+
+    The energy is convex: a step that ends beyond the least energy on its way is cut where the slope changes sign.
+    """
+    scale = add_points(shape, unknowns, law, state)
+    for _ in range(MODE_ITERATIONS):
+        rest = state.force[NODAL:]
+        if np.abs(rest).max() <= MODE_CONVERGED * scale:
+            return True
+        step = np.linalg.solve(state.tangent[NODAL:, NODAL:].copy(), -rest)
+        slope, start, length = np.sum(step * rest), unknowns[NODAL:].copy(), 1.0
+        for _ in range(LINE_SEARCHES):
+            unknowns[NODAL:] = start + length * step
+            scale = add_points(shape, unknowns, law, state)
+            after = np.sum(step * rest)
+            if after <= -OVERSHOOT * slope:
+                break
+            length *= slope / (slope - after)
+    return False
+
+
+@njit(cache=True)
+def hexahedra(corners, displacement, materials, states):
+    """Write the states of fully integrated hexahedra with incompatible modes at a displacement.
+
+    Args:
+        corners: ``(ne, 8, 3)`` [m].
+        displacement: ``(ne, 24)`` [m] at the nodes, less free expansion.
+        materials: Elasticities ``(nm, 6, 6)`` [Pa], plastic constants ``(nm, 6)``, index of each element ``(ne,)``.
+        states: ``State`` of arrays ``(ne, 8, 7)``, ``(ne, 24)``, ``(ne, 24, 24)``, written.
+
+    Returns:
+        The first element whose modes found no equilibrium, or the number of elements.
+    """
+    elasticity, plastic, material = materials
+    bench, shape, unknowns = new_strain_bench(), Shape(np.empty((8, 6, ALL)), np.empty(8)), np.empty(ALL)
+    force, tangent = np.empty(ALL), np.empty((ALL, ALL))
+    for e in range(len(corners)):
+        write_strains(corners[e], bench, shape.strain, shape.weight)
+        unknowns[:NODAL], unknowns[NODAL:] = displacement[e], 0.0
+        law = Law(elasticity[material[e]], plastic[material[e]])
+        if not relax_modes(shape, unknowns, law, State(states.points[e], force, tangent)):
+            return e
+        states.force[e] = force[:NODAL]
+        condense(tangent, NODAL)
+        states.tangent[e] = tangent[:NODAL, :NODAL]
+    return len(corners)
+
+
+@njit(cache=True)
+def one_point(shape, displacement, materials, states):
+    """Write the states of one-point hexahedra without their hourglass forces.
+
+    Args:
+        shape: ``Shape`` of arrays ``(ne, 1, 6, 24)``, ``(ne, 1)``: the mean strains.
+        displacement: ``(ne, 24)`` [m] at the nodes, less free expansion.
+        materials: As of ``hexahedra``.
+        states: ``State`` of arrays ``(ne, 1, 7)``, ``(ne, 24)``, ``(ne, 24, 24)``, written.
+    """
+    elasticity, plastic, material = materials
+    for e in range(len(displacement)):
+        law = Law(elasticity[material[e]], plastic[material[e]])
+        own = State(states.points[e], states.force[e], states.tangent[e])
+        add_points(Shape(shape.strain[e], shape.weight[e]), displacement[e], law, own)
+
+
+@njit(cache=True, error_model="numpy")
+def hourglass_share(points, stress, laws, share):
+    """Write which share ``(ne,)`` of elastic hourglass forces sections can carry, see ``nonlinear_gradient``.
+
+    Args:
+        points: ``(ne, 1, 7)`` stress [Pa] and plastic strain of the centres.
+        stress: ``(ne,)`` [Pa] elastic hourglass stress.
+        laws: ``(ne, 6)``, see ``kernels.plasticity.plastic_constants``.
+        share: Result.
+    """
+    for e in range(len(stress)):
+        s = points[e, 0]
+        square = 0.5 * ((s[0] - s[1]) ** 2 + (s[1] - s[2]) ** 2 + (s[2] - s[0]) ** 2)
+        mises = np.sqrt(square + 3.0 * (s[3] ** 2 + s[4] ** 2 + s[5] ** 2))
+        share[e] = 1.0
+        if stress[e] > carried(laws[e, FIRST_YIELD], mises):
+            strength = max(yield_stress(s[6], 0.0, laws[e]), mises)
+            share[e] = min(1.0, carried(strength, mises) / stress[e])

@@ -1,0 +1,1 @@
+"""Residual stress of cooling: the static problem, and the state in which a shock begins."""

@@ -1,0 +1,90 @@
+"""Bodies that have cooled down, on one rank, for tests."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from mpi4py import MPI
+
+from fem.body import Body, Response, make_body, make_pieces
+from fem.local_mesh import distribute
+from fem.materials.parameters import Material
+from fem.mesh import MeshData
+from fem.residual.cooling import pinned
+from fem.residual.equilibrium import Equilibrium, Statics, thermal_force
+from fem.residual.initial_state import begun
+from fem.scene import joined, model_inputs
+from fem.stress_recovery import StressRecovery
+from fem.supports import SYMMETRY
+from tests.support.fem_models import grid, mesh_of, on
+
+SMALL = Response()
+
+
+@dataclass(frozen=True)
+class Cooled:
+    """A body at rest, what cooling did to it, the body that begins with its stress.
+
+    Its smallest critical step [s], and the forces (n, 3) [N] by which it would expand if nothing held it back.
+    """
+
+    plain: Body
+    found: Equilibrium
+    body: Body
+    critical: float
+    thrust: np.ndarray
+
+    @property
+    def stress(self) -> np.ndarray:
+        """Mean stress of the elements (ne, 6) [Pa]."""
+        return StressRecovery(self.body, np.arange(len(self.body.elements.cells))).stress(np.zeros_like(self.start))
+
+    @property
+    def start(self) -> np.ndarray:
+        """Displacement of the body's beginning."""
+        return np.zeros_like(self.plain.local.points)
+
+
+def cooled(
+    mesh: MeshData,
+    materials: Mapping[str, Material],
+    change: float,
+    formulation: str = "incompatible_modes",
+    response: Response = SMALL,
+) -> Cooled:
+    """Cool a mesh on its planes of symmetry, and let it begin with the stress."""
+    item = pinned(model_inputs(joined(mesh), "dns", SYMMETRY)["dns"])
+    pieces = make_pieces(distribute(MPI.COMM_SELF, item.mesh), item.tables, materials, formulation)
+
+    def body() -> Body:
+        return make_body(MPI.COMM_SELF, pieces, item.tables, np.ones(len(pieces.steps)), response)
+
+    found = Statics(MPI.COMM_SELF, body(), pieces.materials, change).solve()
+    plain = body()
+    return Cooled(
+        plain,
+        found,
+        begun(body(), pieces.materials, found.displacement, change, path=True),
+        float(pieces.steps.min()),
+        thermal_force(plain, slice(None), pieces.materials, change),
+    )
+
+
+def layered(x: np.ndarray, y: np.ndarray, layers: Mapping[str, np.ndarray], distorted: float = 0.0) -> MeshData:
+    """Return layers on top of each other from z = 0, on the planes of symmetry x = 0 and y = 0.
+
+    Args:
+        x: Places of nodes.
+        y: The same.
+        layers: Part -> heights of its elements, lowest first.
+        distorted: Size of random moves of inner nodes, of the elements' size.
+    """
+    z = np.concatenate([[0.0], np.cumsum(np.concatenate(list(layers.values())))])
+    names = np.repeat(list(layers), [len(heights) for heights in layers.values()])
+    points, cells = grid(x, y, z)
+    moved = np.random.default_rng(5).uniform(-distorted, distorted, points.shape)
+    for axis, places in enumerate((x, y, z)):
+        inner = (points[:, axis] > places[0]) & (points[:, axis] < places[-1])
+        points[:, axis] += np.where(inner, moved[:, axis] * np.diff(places).min(), 0.0)
+    centre = np.searchsorted(z, points[cells, 2].mean(axis=1)) - 1
+    return mesh_of(points, cells, names[centre], {"symmetry_x": on(0, 0.0), "symmetry_y": on(1, 0.0)})
