@@ -34,8 +34,9 @@ def bowed_structure(names: list[str], x: np.ndarray, y: np.ndarray, half: float 
     return {
         "points": np.concatenate(faces), "displacement": displacement,
         "package": np.repeat([True, False], [len(face) for face in faces]),
-        "temperature": STEPS, "corner_displacement": np.full(len(STEPS), np.nan), "iterations": np.array([1, 3, 3, 4]),
-        "force_residual": np.array([0.0, 2e-4, 3e-4, 6e-4]), "pad_motion": motion, "joints": np.array(names),
+        "temperature": STEPS, "corner_displacement": np.zeros(len(STEPS)), "iterations": np.array([1, 3, 3, 4]),
+        "force_residual": np.array([0.0, 2e-4, 3e-4, 6e-4]), "rigid_residual": np.zeros(len(STEPS)),
+        "pad_motion": motion, "joints": np.array(names),
     }  # fmt: skip
 
 

@@ -67,11 +67,12 @@ def difference_curves(histories: dict[str, dict], critical_joint: str) -> str:
     if len(histories) < 2:
         return ""
     ours, reference = histories["two_scale"], histories["dns"]
-    time = ours["time"] / MILLI
-    stresses = [joint_stress(history, critical_joint) / 1.0e6 for history in (ours, reference)]
+    count = min(len(ours["time"]), len(reference["time"]))  # a DNS may end early
+    time = ours["time"][:count] / MILLI
+    stresses = [joint_stress(history, critical_joint)[:count] / 1.0e6 for history in (ours, reference)]
     with pyplot.rc_context(STYLE):
         figure, (left, right) = pyplot.subplots(1, 2, figsize=(9.2, 2.6), constrained_layout=True)
-        left.plot(time, (ours["die_centre"] - reference["die_centre"])[:, 2] / MICRO, color="#0b5fa5")
+        left.plot(time, (ours["die_centre"][:count] - reference["die_centre"][:count])[:, 2] / MICRO, color="#0b5fa5")
         left.set(xlabel="time [ms]", ylabel="die centre, difference [µm]")
         right.plot(time, stresses[0] - stresses[1], color="#0b5fa5")
         right.set(xlabel="time [ms]", ylabel=f"von Mises of {critical_joint},\ndifference [MPa]")

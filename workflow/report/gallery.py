@@ -8,7 +8,7 @@ import numpy as np
 import pyvista
 
 from meshing.truncated_sphere import TruncatedSphere
-from workflow.report.joint_tables import by_shape
+from workflow.report.joint_records import by_shape
 from workflow.report.pictures import MILLI, new_plotter, save
 
 FREE, WIDTH = 0, 1800

@@ -42,8 +42,13 @@ def areas(interface: Arrays, joint: str) -> NDArray[np.float64]:
     return 0.5 * np.linalg.norm(np.cross(*diagonals), axis=1)
 
 
+def times_of(interfaces: Mapping[str, Arrays]) -> NDArray[np.float64]:
+    """Return all times [s] that a mode has; one that ends early has fewer."""
+    return max((interface["times"] for interface in interfaces.values()), key=len)
+
+
 def difference(ours: Arrays, reference: Arrays, joints: Sequence[str], row: int) -> float:
-    """Return the relative L2 difference of two stress fields over the faces of joints: root of the mean square."""
+    """Return the relative L2 difference of two stress fields over the faces of joints, at a time that both have."""
     squares = np.zeros(2)
     for joint in joints:
         exact = reference[f"von_mises@{joint}"][row]
@@ -58,18 +63,22 @@ def comparable(interfaces: Mapping[str, Arrays]) -> list[str]:
         return []
     first, second = interfaces.values()
     keys = {joint: f"von_mises@{joint}" for joint in joints_of(first)}
-    return [joint for joint, key in keys.items() if key in second and first[key].shape == second[key].shape]
+    return [name for name, key in keys.items() if key in second and first[key].shape[1] == second[key].shape[1]]
 
 
 def table(interfaces: Mapping[str, Arrays]) -> dict:
     """Largest and mean stress of both modes at each time, the joint that has the largest, and how far they differ."""
     shared = comparable(interfaces)
     rows = []
-    for row, time in enumerate(next(iter(interfaces.values()))["times"]):
-        cells = [cell for interface in interfaces.values() for cell in _extremes(interface, row)]
+    for row, time in enumerate(times_of(interfaces)):
+        here = [row < len(interface["times"]) for interface in interfaces.values()]
+        extremes = [
+            _extremes(one, row) if has else 3 * ("–",) for one, has in zip(interfaces.values(), here, strict=True)
+        ]
+        cells = [cell for cells_of_mode in extremes for cell in cells_of_mode]
         if shared:
             first, second = interfaces.values()
-            cells.append(percent(difference(first, second, shared, row)))
+            cells.append(percent(difference(first, second, shared, row)) if all(here) else "–")
         rows.append([f"{time / MILLI:.4g}", *cells])
     heads = [head for mode in interfaces for head in (f"{mode_name(mode)}: largest [MPa]", "in joint", "mean [MPa]")]
     last = [f"relative L2 difference of {len(shared)} joints"] if shared else []
@@ -78,16 +87,19 @@ def table(interfaces: Mapping[str, Arrays]) -> dict:
 
 def interface_maps(interfaces: Mapping[str, Arrays]) -> str:
     """Draw the faces of all joints seen from above, a row a time, a column a mode, one colour scale a time."""
-    times = next(iter(interfaces.values()))["times"][:ROWS_DRAWN]
-    with pyplot.rc_context(STYLE | {"axes.grid": False}):
+    times = times_of(interfaces)[:ROWS_DRAWN]
+    with pyplot.rc_context(STYLE | {"axes.grid": False, "savefig.dpi": 200}):
         size = (PANEL * len(interfaces) + 0.8, (PANEL - 0.2) * len(times))
         figure, axes = pyplot.subplots(len(times), len(interfaces), figsize=size, layout="constrained", squeeze=False)
         for row, time in enumerate(times):
-            top = max(_largest(interface, row) for interface in interfaces.values()) / MEGA
-            for axis, (mode, interface) in zip(axes[row], interfaces.items(), strict=True):
+            here = {mode: interface for mode, interface in interfaces.items() if row < len(interface["times"])}
+            top = max(_largest(interface, row) for interface in here.values()) / MEGA
+            for axis in axes[row][len(here) :]:
+                axis.set_visible(False)
+            for axis, (mode, interface) in zip(axes[row], here.items(), strict=False):
                 drawn = _draw_joints(axis, interface, row, top)
                 axis.set_title(f"{mode_name(mode)}, {time / MILLI:.4g} ms", fontsize=9)
-            figure.colorbar(drawn, ax=axes[row].tolist(), label="von Mises [MPa]", shrink=0.85)
+            figure.colorbar(drawn, ax=axes[row][: len(here)].tolist(), label="von Mises [MPa]", shrink=0.85)
         return svg(figure)
 
 

@@ -5,7 +5,8 @@ from pathlib import Path
 from typing import Any
 
 from workflow.products import read_json
-from workflow.report import joint_tables
+from workflow.report import joint_tables, mesh_tables
+from workflow.report.joint_records import joint_records
 
 BRIDGE_CAPTION = "as one body: particles and free surface, right by pressure above ambient."
 
@@ -18,12 +19,13 @@ def add_joints(run_folder: Path, context: dict) -> None:
     from workflow.report.gallery import render_gallery
     from workflow.report.pictures import embedded
 
-    joints = joint_tables.joint_records(run_folder)
+    joints = joint_records(run_folder)
     context["headline"] += headline(joints)
     context["tables"] |= {
         "verdicts": joint_tables.verdicts(run_folder),
         "shapes": joint_tables.shapes(joints),
-        "meshes": joint_tables.meshes(joints),
+        "meshes": mesh_tables.meshes(joints),
+        "missed_tries": mesh_tables.missed_tries(joints),
     }
     context["curves"]["map"] = array_map(joints)
     context["pictures"]["gallery"], _ = embedded(lambda path: render_gallery(run_folder, joints, path))

@@ -9,6 +9,7 @@ from workflow import findings
 from workflow.board_drop_case import BoardDropCase
 from workflow.report import joint_tables, tables
 from workflow.report.histories import MODES, late_peak, read_modes
+from workflow.report.joint_records import joint_records
 
 
 def add_shock(run_folder: Path, case: BoardDropCase, context: dict, summary: dict) -> None:
@@ -22,7 +23,7 @@ def add_shock(run_folder: Path, case: BoardDropCase, context: dict, summary: dic
 
     main = next(iter(histories))
     metrics = summary["metrics"]
-    joints = joint_tables.joint_records(run_folder)
+    joints = joint_records(run_folder)
     critical = metrics["critical_joint"]["value"]
     context["headline"] = tables.headline(metrics) + margins(results[main]) + context["headline"]
     context["late_peak"] = late_peak(histories[main])

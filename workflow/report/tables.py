@@ -19,6 +19,7 @@ HEADLINE = (
     ("joint_volume_error_max", "joint volume lost in meshing, worst"),
 )
 COMPARISON = (
+    ("compared_duration", "time that both have; the DNS ends before the shock"),
     ("critical_joint", "critical joint of the DNS"),
     ("critical_joint_stress_error", "its von Mises history, relative L2"),
     ("worst_joint_stress_error", "the same of the worst joint that is fine in both"),

@@ -96,24 +96,27 @@ def load_steps(structure: Mapping[str, NDArray]) -> dict:
         ("temperature [degC]", structure["temperature"] - KELVIN, ".1f"),
         ("corner motion [µm]", structure["corner_displacement"] / MICRO, "+.2f"),
         *((f"gap change, {name} [µm]", change / MICRO, "+.2f") for name, change in _extremes(structure)),
-        ("iterations", structure["iterations"], ".0f"),
+        ("exchanges", structure["iterations"], ".0f"),
+        ("forces change by", structure["force_residual"], ".1e"),
+        ("package out of balance by", structure["rigid_residual"], ".1e"),
     ]
-    used = [column for column in columns if np.isfinite(column[1]).all()]
+    used = [column for column in columns if np.any(column[1])]
     rows = [
-        [str(step), *(f"{values[step]:{form}}" for _, values, form in used), f"{structure['force_residual'][step]:.1e}"]
+        [str(step + 1), *(f"{values[step]:{form}}" for _, values, form in used)]
         for step in range(len(structure["temperature"]))
     ]
-    return {"head": ["load step", *(head for head, _, _ in used), "force residual"], "rows": rows}
+    return {"head": ["load step", *(head for head, _, _ in used)], "rows": rows}
 
 
 def in_words(structure: Mapping[str, NDArray]) -> str:
     """Say how far package and board have warped, and by how much the gaps differ for it."""
     package, board = faces(structure)
-    gaps = relative_lift(structure)[-1]
+    gaps = relative_lift(structure)[-1] / MICRO
+    above, below = package.warpage / MICRO, board.warpage / MICRO
     return (
-        f"From {number(structure['temperature'][0] - KELVIN)} °C to solidification the package's underside warps by"
-        f" {package.warpage / MICRO:.1f} µm, the board below it by {board.warpage / MICRO:.1f} µm; the gaps of the"
-        f" joints change by {gaps.min() / MICRO:+.1f} to {gaps.max() / MICRO:+.1f} µm."
+        f"When the solder freezes, at {number(structure['temperature'][-1] - KELVIN)} °C, the package's underside is"
+        f" warped by {above:.1f} µm, the board below it by {below:.1f} µm; the gaps of the joints are {gaps.min():+.1f}"
+        f" to {gaps.max():+.1f} µm from those as drawn."
     )
 
 

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from tests.support.chain_products import BOW, MICRO, MILLI, bowed_structure, interface
-from workflow.report import cost, joint_tables, shape_effect, shock, warpage
+from workflow.report import cost, mesh_tables, shape_effect, shock, warpage
 from workflow.report import interface as section
 from workflow.report.array_map import array_map
+from workflow.report.joint_records import joint_records
 from workflow.report.joints import headline
 
 NAMES = ["A3", "A4", "B3", "B4"]
@@ -32,8 +33,8 @@ def test_faces_are_the_underside_and_the_board_below_it(structure):
 def test_warpage_is_told_in_words_and_by_load_step(structure):
     gaps = (BOW["package"] - BOW["board"]) * (X**2 + Y**2) / (2 * HALF**2) / MICRO
     words = warpage.in_words(structure)
-    assert "underside warps by 70.0 µm" in words and "below it by 12.0 µm" in words
-    assert f"{gaps.min():+.1f} to {gaps.max():+.1f} µm" in words
+    assert "underside is warped by 70.0 µm" in words and "below it by 12.0 µm" in words
+    assert f"{gaps.min():+.1f} to {gaps.max():+.1f} µm" in words and "at 217 °C" in words
     table = warpage.load_steps(structure)
     assert table["head"][:3] == ["load step", "temperature [degC]", "gap change, B3 [µm]"]  # no corner is moved
     assert table["rows"][-1][1:4] == ["217.0", f"{gaps.min():+.2f}", f"{gaps.max():+.2f}"]
@@ -61,6 +62,14 @@ def test_stresses_of_both_modes_differ_by_their_factor():
     assert [row[0] for row in table["rows"]] == ["0.5", "1"]
     assert table["rows"][1][1:3] == ["6.6", "A4"]
     assert table["rows"][1][-1] == "1 %"
+    assert section.interface_maps(both).startswith("<svg")
+
+
+def test_a_dns_that_ends_early_is_compared_as_far_as_it_goes():
+    ours = interface(NAMES, X, Y, np.array([0.5e-3, 1.0e-3]))
+    both = {"two_scale": ours, "dns": interface(NAMES, X, Y, np.array([0.5e-3]), 2.0)}
+    rows = section.table(both)["rows"]
+    assert rows[0][-1] == "75 %" and rows[1][-4:] == ["–", "–", "–", "–"]
     assert section.interface_maps(both).startswith("<svg")
 
 
@@ -101,13 +110,13 @@ def test_of_joints_that_share_a_shape_the_worst_mesh_is_told():
         record("A3", method="swept", volume_error=-2e-3, minimum_scaled_jacobian=0.5, shape_deviation=3e-6),
         record("B4", shape="B4", standoff=4e-4, method="free-form", volume_error=0.0, minimum_scaled_jacobian=0.25),
     ]
-    table = joint_tables.meshes(joints)
+    table = mesh_tables.meshes(joints)
     assert table["head"] == ["joints", "method", "volume error", "largest deviation [µm]", "min. scaled Jacobian"]
     assert table["rows"] == [
         ["A4 A3", "swept", "-0.2 %", "3.0", "0.50"],
         ["B4", "free-form", "< 0.0001 %", "–", "0.25"],
     ]
-    assert joint_tables.meshes([record("A4")]) is None
+    assert mesh_tables.meshes([record("A4")]) is None
     assert [item["value"] for item in headline(joints)] == ["300 to 400 µm", "3 / 2"]
 
 
@@ -121,7 +130,7 @@ def test_records_are_complete_for_what_has_run(tmp_path):
     )
     (tmp_path / "surface").mkdir()
     (tmp_path / "surface/surfaces.json").write_text(json.dumps({"A4": {"standoff": 1.0}, "B4": {"standoff": 2e-4}}))
-    reflowed, given = joint_tables.joint_records(tmp_path)
+    reflowed, given = joint_records(tmp_path)
     assert (reflowed["standoff"], reflowed["verdict"], reflowed["tilted"]) == (3e-4, "ok", pytest.approx(5e-3))
     assert (given["standoff"], given["verdict"], given["shape"]) == (2e-4, "given", "B4")
 

@@ -1,0 +1,65 @@
+"""What products say of the joints, one flat record each, and tables of such records."""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from workflow.products import read_json
+
+Record = Mapping[str, Any]
+Column = tuple[str, str, Callable[[Any], str]]  # head, key of the record, text of its value
+
+
+def joint_records(run_folder: Path) -> list[dict]:
+    """Join pad table, reflow metrics, measures of the surface and mesh quality: one flat record a joint, SI units.
+
+    A joint whose surface was given has no reflow; stages that have not run contribute nothing.
+    """
+    found = (
+        read_json(run_folder / "reflow/joints.json"),
+        _optional(run_folder / "surface/surfaces.json"),
+        _optional(run_folder / "solder_mesh/quality.json"),
+    )
+    return [_record(pad, *found) for pad in read_json(run_folder / "reflow/pads.json")]
+
+
+def _record(pad: Mapping, reflow: Mapping, surfaces: Mapping, quality: Mapping) -> dict:
+    name = pad["name"]
+    joint = reflow.get(name, {})
+    shape = joint.get("shape", name)
+    metrics = {key: metric["value"] for key, metric in joint.get("metrics", {}).items()}
+    record = surfaces.get(name, surfaces.get(shape, {})) | pad | {"shape": shape} | metrics
+    record |= {"verdict": joint.get("verdict", "given")} | quality.get(name, {})
+    angles = (record.get("contact_angle_board"), record.get("contact_angle_package"))
+    if None not in angles:
+        record["angles"] = f"{angles[0]:.1f} / {angles[1]:.1f}"
+    tilt = float(np.hypot(*pad.get("tilt", (0.0, 0.0))))
+    return record | ({"tilted": tilt} if tilt else {})
+
+
+def by_shape(joints: Sequence[Record]) -> list[tuple[list[str], list[Record]]]:
+    """Return names and records of the joints of each distinct shape, by increasing standoff of the first of them."""
+    groups: dict[str, list[Record]] = {}
+    for joint in joints:
+        groups.setdefault(joint["shape"], []).append(joint)
+    ordered = sorted(groups.values(), key=lambda group: group[0]["standoff"])
+    return [([joint["name"] for joint in group], group) for group in ordered]
+
+
+def _optional(path: Path) -> dict:
+    return read_json(path) if path.exists() else {}
+
+
+def record_table(columns: Iterable[Column], groups: list, chosen: Callable[[str, list], Any]) -> dict:
+    """Return a table of the columns that any record has."""
+    known = [column for column in columns if any(column[1] in joint for _, group in groups for joint in group)]
+    rows = [[" ".join(names), *(_text(column, group, chosen) for column in known)] for names, group in groups]
+    return {"head": ["joints", *(head for head, _, _ in known)], "rows": rows}
+
+
+def _text(column: Column, group: Sequence[Record], chosen: Callable[[str, list], Any]) -> str:
+    _, key, text = column
+    values = [joint[key] for joint in group if key in joint]
+    return text(chosen(key, values)) if values else "–"
