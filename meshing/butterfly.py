@@ -34,6 +34,12 @@ def butterfly(core: int, rings: int) -> Butterfly:
     return Butterfly(np.vstack([inner, *layers]), np.vstack(quads), ids[-1])
 
 
+def circumradius(sides: int) -> float:
+    """Return the distance of the corners from the centre of a regular polygon that has the unit disc's area."""
+    angle = 2.0 * np.pi / sides
+    return float(np.sqrt(angle / np.sin(angle)))
+
+
 def _core_points(core: int, diagonal: float, side: float) -> np.ndarray:
     """Square grid of given half-diagonal and half-side: its sides are bent outwards towards the circle."""
     steps = np.linspace(-1.0, 1.0, core + 1)

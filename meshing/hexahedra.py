@@ -38,3 +38,10 @@ def quad_areas(points: np.ndarray, quads: np.ndarray) -> np.ndarray:
     """Area of each flat quadrilateral (q,) [m^2]: half the cross product of its diagonals."""
     corners = points[quads]
     return 0.5 * np.linalg.norm(np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]), axis=-1)
+
+
+def boundary_quads(cells: np.ndarray) -> np.ndarray:
+    """Return the faces (f, 4) that belong to one cell only, seen from outside counter-clockwise."""
+    faces = cells[:, FACES].reshape(-1, 4)
+    _, first, count = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
+    return faces[first[count == 1]]

@@ -8,12 +8,14 @@ import numpy as np
 from meshing.butterfly import Butterfly
 from meshing.hexahedra import volumes
 from meshing.section import cut_segments, radius_by_angle, section_area, section_centroid
-from meshing.surface import ClosedSurface, enclosed_volume
+from meshing.surface import ClosedSurface, enclosed_volume, pad_planes
 
 END = 1.0e-9  # of the height: how far inside the end sections are cut, where the plane still crosses the triangles
 LARGEST_CORRECTION = 0.1
 VOLUME_TOLERANCE = 1.0e-12
 SECANT_STEPS = 20
+
+Placing = Callable[[np.ndarray], np.ndarray]
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,41 +37,46 @@ def solder_levels(
     surface: ClosedSurface,
     section: Butterfly,
     layers: int,
-    place: Callable[[np.ndarray], np.ndarray],
+    place: Placing,
     overhang: float = 0.0,
 ) -> Levels:
     """Cut a body into sections of equal distance and lay the butterfly into each.
 
-    A polygon of few sides encloses less than the section that it follows, and straight layers less than a bulge: each
-    outline is scaled to its section's area, then those between the ends by one common factor to the body's volume.
+    The body is made straight between its pads first, and put back. A polygon of few sides encloses less than the
+    section that it follows, and straight layers less than a bulge: each outline is scaled to its section's area, then
+    those between the ends by one common factor to the body's volume.
 
     Args:
         surface: the body in its own frame.
         section: the butterfly.
         layers: number of layers.
-        place: moves points (n, 3) [m] to where the joint will be, where its volume is kept: a tilted or curved package
-            makes a joint higher here, lower there, and its mean gap another than that on its axis.
+        place: moves points (n, 3) [m] to where the joint will be, where its volume is kept: a curved package makes a
+            joint higher here, lower there, and its mean gap another than that on its axis.
         overhang: height [m] by which each end face is drawn out as a prism, which belongs to the body.
 
     Raises:
         ValueError: a section is not star-shaped, or the layers are too few to keep the volume.
     """
-    bottom, top = float(surface.points[:, 2].min()), float(surface.points[:, 2].max())
-    heights = np.linspace(bottom - overhang, top + overhang, layers + 1)
-    cuts = np.clip(heights, bottom + END * (top - bottom), top - END * (top - bottom))
+    planes = pad_planes(surface)
+    straight = planes.straighten(surface.points)
+    heights = np.linspace(-overhang, planes.gap + overhang, layers + 1)
+    cuts = np.clip(heights, END * planes.gap, (1.0 - END) * planes.gap)
     points = np.empty((layers + 1, len(section.points), 3))
     for level, cut in enumerate(cuts):
-        points[level, :, :2] = _section_nodes(surface, section, cut)
+        points[level, :, :2] = _section_nodes(cut_segments(straight, surface.triangles, cut), section)
     points[:, :, 2] = heights[:, None]
     cells = layer_cells(section.quads, len(section.points), layers)
 
-    def swept_volume(scale: float) -> float:
-        return float(volumes(place(_scaled(points, section, scale).reshape(-1, 3)), cells).sum())
+    def restored(scale: float) -> np.ndarray:
+        return planes.restore(_scaled(points, section, scale).reshape(-1, 3))
 
-    ends = sum(section_area(cut_segments(surface.points, surface.triangles, cut)) for cut in cuts[[0, -1]])
+    def swept_volume(scale: float) -> float:
+        return float(volumes(place(restored(scale)), cells).sum())
+
+    ends = sum(section_area(cut_segments(straight, surface.triangles, cut)) for cut in cuts[[0, -1]])
     volume = enclosed_volume(surface) + overhang * ends
-    scale = _volume_keeping_scale(swept_volume, volume)
-    return Levels(_scaled(points, section, scale), scale, volume)
+    scale = volume_keeping_scale(swept_volume, volume)
+    return Levels(restored(scale).reshape(points.shape), scale, volume)
 
 
 def layer_cells(quads: np.ndarray, nodes: int, layers: int) -> np.ndarray:
@@ -77,9 +84,8 @@ def layer_cells(quads: np.ndarray, nodes: int, layers: int) -> np.ndarray:
     return np.vstack([np.hstack([quads + k * nodes, quads + (k + 1) * nodes]) for k in range(layers)]).astype(np.int32)
 
 
-def _section_nodes(surface: ClosedSurface, section: Butterfly, height: float) -> np.ndarray:
-    """Section nodes at one height, (n, 2) [m]: the unit disc stretched to the outline along each angle."""
-    segments = cut_segments(surface.points, surface.triangles, height)
+def _section_nodes(segments: np.ndarray, section: Butterfly) -> np.ndarray:
+    """Section nodes at one height, (n, 2) [m]: the unit disc stretched to the outline (s, 2, 2) along each angle."""
     centre, area = section_centroid(segments), section_area(segments)
     angles = _angles(section.points[section.rim])
     radii = radius_by_angle(segments, centre, angles)
@@ -90,7 +96,7 @@ def _section_nodes(surface: ClosedSurface, section: Butterfly, height: float) ->
     return centre + np.sqrt(area / polygon) * stretch[:, None] * section.points
 
 
-def _volume_keeping_scale(swept_volume: Callable[[float], float], volume: float) -> float:
+def volume_keeping_scale(swept_volume: Callable[[float], float], volume: float) -> float:
     """Find the scale of the inner outlines at which the swept hexahedra have the volume (secant method)."""
     before, scale = 1.0 - LARGEST_CORRECTION, 1.0
     errors = [swept_volume(value) / volume - 1.0 for value in (before, scale)]

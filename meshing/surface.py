@@ -1,6 +1,7 @@
 """Closed surface of a joint: the particles' free surface and the two wetted discs, checked and measured."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -8,6 +9,8 @@ import meshio
 import numpy as np
 from numpy.polynomial import Legendre
 
+from meshing.outlines import pieces
+from meshing.pad_planes import PadPlanes
 from meshing.section import cut_segments, section_area
 
 FREE, BOARD_PAD, PACKAGE_PAD = 0, 1, 2
@@ -34,21 +37,28 @@ class ClosedSurface:
 def close_surface(
     points: np.ndarray, triangles: np.ndarray, ring_board: np.ndarray, ring_package: np.ndarray
 ) -> ClosedSurface:
-    """Close a free surface with a disc on each pad.
+    """Close the free surface of one joint with a disc on each pad; arguments and errors as ``close_rings``."""
+    return close_rings(points, triangles, (ring_board, ring_package))
+
+
+def close_rings(points: np.ndarray, triangles: np.ndarray, rings: Sequence[np.ndarray]) -> ClosedSurface:
+    """Close a free surface with a disc in each of its contact lines.
 
     Args:
         points: (n, 3) vertices [m]; others than those of the triangles are dropped.
-        triangles: (t, 3) free surface, outward oriented, open along the two rings.
-        ring_board: vertices along the board-side contact line, in order.
-        ring_package: likewise on the package side.
+        triangles: (t, 3) free surface, outward oriented, open along the rings.
+        rings: vertices along each contact line, in order; those in the lower half are the board's.
 
     Raises:
         SurfaceError: the result is not watertight, not outward oriented, or has a degenerate triangle.
     """
-    caps = [_cap(points, ring_board, len(points), -1), _cap(points, ring_package, len(points) + 1, 1)]
+    heights = np.array([points[ring, 2].mean() for ring in rings])
+    upper = heights > 0.5 * (heights.min() + heights.max())
+    caps = [_cap(points, ring, len(points) + k, up) for k, (ring, up) in enumerate(zip(rings, upper, strict=True))]
     vertices = np.vstack([points, *(cap[0] for cap in caps)])
     faces = np.vstack([triangles, *(cap[1] for cap in caps)])
-    boundary = np.repeat([FREE, BOARD_PAD, PACKAGE_PAD], [len(triangles), *(len(cap[1]) for cap in caps)])
+    labels = [FREE, *np.where(upper, PACKAGE_PAD, BOARD_PAD)]
+    boundary = np.repeat(labels, [len(triangles), *(len(cap[1]) for cap in caps)])
     used, compact = np.unique(faces, return_inverse=True)
     surface = ClosedSurface(vertices[used], compact.reshape(-1, 3).astype(np.int32), boundary.astype(np.int32))
     check_surface(surface)
@@ -61,7 +71,7 @@ def check_surface(surface: ClosedSurface) -> None:
     ordered = np.unique(edges, axis=0)
     if len(ordered) != len(edges) or not np.array_equal(ordered, np.unique(edges[:, ::-1], axis=0)):
         raise SurfaceError("surface is not watertight: an edge is not shared by two triangles of opposite direction")
-    areas = _area_vectors(surface)
+    areas = area_vectors(surface.points, surface.triangles)
     sizes = np.linalg.norm(areas, axis=1)
     smallest = int(sizes.argmin())
     if sizes[smallest] < SMALLEST_TRIANGLE * sizes.mean():
@@ -76,37 +86,55 @@ def check_surface(surface: ClosedSurface) -> None:
 
 
 def enclosed_volume(surface: ClosedSurface) -> float:
-    """Volume enclosed by the surface [m^3] (divergence theorem)."""
-    first, second, third = np.moveaxis(surface.points[surface.triangles], 1, 0)
+    """Volume enclosed by the surface [m^3]."""
+    return volume_of(surface.points, surface.triangles)
+
+
+def volume_of(points: np.ndarray, triangles: np.ndarray) -> float:
+    """Volume [m^3] that outward oriented triangles (t, 3) enclose (divergence theorem)."""
+    first, second, third = np.moveaxis(points[triangles], 1, 0)
     return float(np.einsum("ij,ij->", first, np.cross(second, third))) / 6.0
+
+
+def pad_planes(surface: ClosedSurface) -> PadPlanes:
+    """Find the plane of the package's pad, or pads."""
+    return PadPlanes.fit(surface.points, surface.triangles[surface.boundary == PACKAGE_PAD])
 
 
 def measure(surface: ClosedSurface) -> dict[str, float]:
     """Measure a closed surface.
 
-    Width and angles are those of the disc of equal area at every height, a polynomial fitted to the areas A(z) of
-    sections: vertices lie outside the smooth shape and chords inside it, but the integral of A is the volume.
+    Width and angles are those of the disc of equal area at every height of the joint made straight, a polynomial fitted
+    to the areas A(z) of sections: vertices lie outside the smooth shape and chords inside it, but the integral of A is
+    the volume.
 
     Returns:
         volume [m^3], standoff [m], max_width [m], contact_radius_board and _package [m], contact_angle_board and
         _package [rad] (inside the solder, mean over the contact line).
     """
-    bottom, top = float(surface.points[:, 2].min()), float(surface.points[:, 2].max())
-    heights = bottom + (top - bottom) * (np.arange(SECTIONS) + 0.5) / SECTIONS
-    areas = [section_area(cut_segments(surface.points, surface.triangles, height)) for height in heights]
-    profile = Legendre.fit(heights, areas, DEGREE, domain=[bottom, top])
-    largest = max(profile(np.linspace(bottom, top, SAMPLES)))
-    radii = [math.sqrt(_disc_area(surface, pad) / math.pi) for pad in (BOARD_PAD, PACKAGE_PAD)]
-    slopes = [float(profile.deriv()(end)) / (2.0 * math.pi * r) for end, r in zip((bottom, top), radii, strict=True)]
+    planes = pad_planes(surface)
+    straight, top = planes.straighten(surface.points), planes.gap
+    heights = top * (np.arange(SECTIONS) + 0.5) / SECTIONS
+    areas = [section_area(cut_segments(straight, surface.triangles, height)) for height in heights]
+    profile = Legendre.fit(heights, areas, DEGREE, domain=[0.0, top])
+    largest = max(profile(np.linspace(0.0, top, SAMPLES)))
+    radii = [math.sqrt(pad_area(surface, pad) / math.pi) for pad in (BOARD_PAD, PACKAGE_PAD)]
+    slopes = [float(profile.deriv()(end)) / (2.0 * math.pi * r) for end, r in zip((0.0, top), radii, strict=True)]
     return {
         "volume": enclosed_volume(surface),
-        "standoff": top - bottom,
+        "standoff": top,
         "max_width": 2.0 * max(math.sqrt(largest / math.pi), *radii),
         "contact_radius_board": radii[0],
         "contact_radius_package": radii[1],
         "contact_angle_board": 0.5 * math.pi + math.atan(slopes[0]),
         "contact_angle_package": 0.5 * math.pi - math.atan(slopes[1]),
     }
+
+
+def pieces_of(surface: ClosedSurface, pad: int | None = None) -> list[np.ndarray]:
+    """Return the triangles (t, 3) of each connected piece of a surface, or of its pads of one side, largest first."""
+    triangles = surface.triangles if pad is None else surface.triangles[surface.boundary == pad]
+    return [triangles[rows] for rows in pieces(triangles)]
 
 
 def write_surface(path: Path, surface: ClosedSurface) -> None:
@@ -121,19 +149,20 @@ def read_surface(path: Path) -> ClosedSurface:
     return ClosedSurface(mesh.points, mesh.cells[0].data.astype(np.int32), mesh.cell_data["boundary"][0])
 
 
-def _cap(points: np.ndarray, ring: np.ndarray, centre: int, upward: int) -> tuple[np.ndarray, np.ndarray]:
-    """Fan of triangles around the ring's mean point; ``upward`` +1 or -1 is the side it faces."""
+def _cap(points: np.ndarray, ring: np.ndarray, centre: int, upward: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Fan of triangles around the ring's mean point; it faces upward or downward."""
     x, y = points[ring, 0], points[ring, 1]
     counter_clockwise = np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y) > 0.0
-    first, second = (ring, np.roll(ring, -1)) if counter_clockwise == (upward > 0) else (np.roll(ring, -1), ring)
+    first, second = (ring, np.roll(ring, -1)) if counter_clockwise == upward else (np.roll(ring, -1), ring)
     return points[ring].mean(axis=0)[None, :], np.column_stack([first, second, np.full(len(ring), centre)])
 
 
-def _area_vectors(surface: ClosedSurface) -> np.ndarray:
-    """Area vectors (t, 3) [m^2]."""
-    first, second, third = np.moveaxis(surface.points[surface.triangles], 1, 0)
+def area_vectors(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Area vectors of triangles (t, 3) [m^2]."""
+    first, second, third = np.moveaxis(points[triangles], 1, 0)
     return 0.5 * np.cross(second - first, third - first)
 
 
-def _disc_area(surface: ClosedSurface, pad: int) -> float:
-    return float(np.abs(_area_vectors(surface)[surface.boundary == pad, 2].sum()))
+def pad_area(surface: ClosedSurface, pad: int) -> float:
+    """Wetted area of all pads of a side, BOARD_PAD or PACKAGE_PAD [m^2]."""
+    return float(np.linalg.norm(area_vectors(surface.points, surface.triangles[surface.boundary == pad]), axis=1).sum())

@@ -1,7 +1,10 @@
 """Synthetic joint surfaces of which everything is known."""
 
+from dataclasses import replace
+
 import numpy as np
 
+from meshing.pad_planes import PadPlanes
 from meshing.surface import ClosedSurface, close_surface
 
 
@@ -53,3 +56,9 @@ def truncated_sphere(radius: float, half_gap: float, around: int, levels: int):
         "contact_angle_package": 0.5 * np.pi + np.arcsin(half_gap / radius),
     }
     return revolve(np.sqrt(radius**2 - heights**2), 2.0 * half_gap, around), exact
+
+
+def laid_between(surface: ClosedSurface, offset: tuple[float, float], slope: tuple[float, float]) -> ClosedSurface:
+    """A straight joint between a pad at z = 0 and one that is shifted [m] and slopes along x and y."""
+    planes = PadPlanes(float(surface.points[:, 2].max()), np.array(offset), np.array(slope))
+    return replace(surface, points=planes.restore(surface.points))

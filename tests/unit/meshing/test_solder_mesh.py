@@ -1,3 +1,4 @@
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -139,9 +140,11 @@ def test_shape_that_is_not_star_shaped_is_refused_by_name():
         mesh_joint(close_surface(points, triangles, lower, upper), site, the_package, side_of(WARPAGE, the_package))
 
 
-def test_too_few_layers_for_a_ball_are_refused():
-    with pytest.raises(JointMeshError, match=r"A4: its layers hold 0\.\d+ of its volume.*use more layers"):
-        mesh_corner(bulge=0.2 * MM, joint_numerics={"layers": 2})
+def test_too_few_layers_for_a_ball_are_refused_and_more_are_taken():
+    mesh, _ = mesh_corner(bulge=0.2 * MM, joint_numerics={"layers": 2})
+    quality = joint_quality(mesh)
+    assert re.match(r"its layers hold 0\.\d+ of its volume.*use more layers", quality["tries"][0]["missed"])
+    assert (quality["method"], quality["layers"], quality["tries"][0]["layers"]) == ("swept", 4, 2)
 
 
 def test_solder_is_inside_its_cells():

@@ -1,0 +1,166 @@
+"""Surfaces from elsewhere: taken when they enclose a joint, else refused by name, place and what is allowed."""
+
+import meshio
+import numpy as np
+import pytest
+
+from meshing.pads import pad_table
+from meshing.parameters import Warpage
+from meshing.solder_mesh import joint_quality, mesh_joint
+from meshing.surface import SurfaceError, enclosed_volume, measure
+from meshing.user_surface import load_surface
+from tests.support.free_form_surfaces import of_level_set, sphere, with_void
+from tests.support.joint_surfaces import barrel
+from tests.support.meshing_models import MM, board, package, side_of
+
+SITE = {site.name: site for site in pad_table(package(), board(), Warpage())}["A4"]
+SHAPE = barrel(SITE.gap, 0.04 * MM)
+TURN = np.array([[0.96, -0.28, 0.0], [0.28, 0.96, 0.0], [0.0, 0.0, 1.0]])
+
+
+def write(folder, points, triangles, name="joint.stl", scale=1.0 / MM):
+    meshio.write(folder / name, meshio.Mesh(np.asarray(points) * scale, [("triangle", np.asarray(triangles))]))
+    return folder / name
+
+
+def tilted(points, angle=0.1):
+    """Turned about the x axis and pushed away."""
+    turn = np.array([[1, 0, 0], [0, np.cos(angle), -np.sin(angle)], [0, np.sin(angle), np.cos(angle)]])
+    return points @ turn.T + [3.0 * MM, -1.0 * MM, 7.0 * MM]
+
+
+@pytest.mark.parametrize("suffix", ["stl", "ply", "vtu"])
+def test_any_format_gives_the_joint_in_its_own_frame(tmp_path, suffix):
+    path = write(tmp_path, tilted(SHAPE.points), SHAPE.triangles, f"joint.{suffix}")
+    surface = load_surface(path, "mm", SITE)
+    assert enclosed_volume(surface) == pytest.approx(enclosed_volume(SHAPE), rel=1e-5)
+    expected, found = measure(SHAPE), measure(surface)
+    for name in ("standoff", "max_width", "contact_radius_board", "contact_radius_package"):
+        assert found[name] == pytest.approx(expected[name], rel=1e-5)
+    lower = surface.points[np.unique(surface.triangles[surface.boundary == 1])]
+    assert np.abs(lower).max(axis=0)[2] == 0.0
+    assert lower.mean(axis=0) == pytest.approx(0.0, abs=1e-3 * MM)
+
+
+def test_it_is_meshed_as_the_same_shape_from_a_reflow_is(tmp_path):
+    surface = load_surface(write(tmp_path, tilted(SHAPE.points), SHAPE.triangles), "mm", SITE)
+    side = side_of(Warpage(), package())
+    given, own = (joint_quality(mesh_joint(shape, SITE, package(), side)) for shape in (surface, SHAPE))
+    assert given["method"] == "swept"
+    assert given["minimum_scaled_jacobian"] == pytest.approx(own["minimum_scaled_jacobian"], rel=0.05)
+
+
+def test_a_void_and_noise_are_kept(tmp_path):
+    hollow = with_void(SHAPE, (0.0, 0.05 * MM, 0.5 * SITE.gap), 0.06 * MM)
+    noisy = hollow.points + np.random.default_rng(2).normal(0.0, 1e-3 * MM, hollow.points.shape)
+    surface = load_surface(write(tmp_path, noisy, hollow.triangles), "mm", SITE)
+    assert enclosed_volume(surface) == pytest.approx(enclosed_volume(hollow), rel=0.02)
+    quality = joint_quality(mesh_joint(surface, SITE, package(), side_of(Warpage(), package())))
+    assert quality["method"] == "free-form"
+    assert max(quality["volume_error"], quality["contact_area_error"]) < 3e-3
+
+
+def test_heights_are_stretched_to_the_gap_and_tilt_of_the_site(tmp_path):
+    from dataclasses import replace
+
+    site = replace(SITE, gap=1.05 * SITE.gap, tilt=(0.04, -0.03))
+    surface = load_surface(write(tmp_path, SHAPE.points, SHAPE.triangles), "mm", site)
+    upper = surface.points[np.unique(surface.triangles[surface.boundary == 2])]
+    slope = np.tan(0.05) / 0.05 * np.array([0.03, 0.04])
+    assert upper[:, 2] == pytest.approx(site.gap + upper[:, :2] @ slope, rel=1e-5)
+
+
+def hole(points, triangles):
+    return points, np.delete(triangles, 700, axis=0)
+
+
+def flipped(points, triangles):
+    triangles = triangles.copy()
+    triangles[700] = triangles[700, ::-1]
+    return points, triangles
+
+
+def inside_out(points, triangles):
+    return points, triangles[:, ::-1]
+
+
+def doubled(points, triangles):
+    return points, np.vstack([triangles, triangles])
+
+
+def two_shells(points, triangles):
+    return np.vstack([points, 0.99 * points]), np.vstack([triangles, triangles + len(points)])
+
+
+def crossing(points, triangles):
+    """A dent on one side that reaches through the other."""
+    points = points.copy()
+    near = np.exp(-(((points - [0.28 * MM, 0.0, 0.5 * SITE.gap]) / (0.06 * MM)) ** 2).sum(axis=1))
+    points[:, 0] -= 0.7 * MM * near
+    return points, triangles
+
+
+def void_outside(points, triangles):
+    more, shell = sphere((1.0 * MM, 0.0, 0.1 * MM), 0.05 * MM)
+    return np.vstack([points, more]), np.vstack([triangles, shell[:, ::-1] + len(points)])
+
+
+def round_top(points, triangles):
+    points = points.copy()
+    points[:, 2] -= 0.2 * (points[:, 0] ** 2 + points[:, 1] ** 2) / (0.3 * MM) * (points[:, 2] / SITE.gap)
+    return points, triangles
+
+
+def far_too_high(points, triangles):
+    return points * [1.0, 1.0, 1.3], triangles
+
+
+@pytest.mark.parametrize(
+    ("fault", "told"),
+    [
+        (hole, r"open edge: a hole \(3 such edges, allowed 0\), first at \("),
+        (flipped, r"triangle that faces another way than its neighbour"),
+        (inside_out, r"oriented inwards"),
+        (doubled, r"edge of more than two triangles: a double shell"),
+        (two_shells, r"second shell that faces outwards, allowed are voids"),
+        (crossing, r"surface crosses itself at \("),
+        (void_outside, r"void that lies outside the body"),
+        (round_top, r"its upper end, z = .* is flat on a disc of radius"),
+        (far_too_high, r"flat ends are .* m apart, allowed"),
+    ],
+    ids=lambda value: getattr(value, "__name__", ""),
+)
+def test_faults_are_refused_by_place(tmp_path, fault, told):
+    path = write(tmp_path, *fault(SHAPE.points, SHAPE.triangles.astype(np.int64)))
+    with pytest.raises(SurfaceError, match=r"joint A4, .*joint\.stl: .*" + told):
+        load_surface(path, "mm", SITE)
+
+
+def test_another_unit_is_refused_and_the_right_one_named(tmp_path):
+    path = write(tmp_path, SHAPE.points, SHAPE.triangles, scale=1.0e6)
+    with pytest.raises(SurfaceError, match=r"height 0\.31 m with lengths in mm, allowed .*; is it in um\?"):
+        load_surface(path, "mm", SITE)
+
+
+def test_files_that_are_no_surface_are_refused(tmp_path):
+    for name, told in (("joint.obj", "suffix .obj, allowed .stl, .ply, .vtu"), ("none.stl", "no such file")):
+        with pytest.raises(SurfaceError, match=told):
+            load_surface(tmp_path / name, "mm", SITE)
+    (tmp_path / "text.ply").write_text("this is no surface\n")
+    with pytest.raises(SurfaceError, match="cannot be read"):
+        load_surface(tmp_path / "text.ply", "mm", SITE)
+    box = meshio.Mesh(np.eye(4, 3), [("quad", np.array([[0, 1, 2, 3]]))])
+    meshio.write(tmp_path / "quads.vtu", box)
+    with pytest.raises(SurfaceError, match="holds quad, allowed triangles"):
+        load_surface(tmp_path / "quads.vtu", "mm", SITE)
+
+
+def test_marching_cubes_are_taken(tmp_path):
+    def inside(x, y, z):
+        return 0.34 * MM - np.sqrt(x**2 + y**2 + (z - 0.5 * SITE.gap) ** 2)
+
+    voxels = of_level_set(inside, SITE.gap, (0.4 * MM, 0.4 * MM), across=12)
+    surface = load_surface(write(tmp_path, voxels.points @ TURN.T, voxels.triangles), "mm", SITE)
+    quality = joint_quality(mesh_joint(surface, SITE, package(), side_of(Warpage(), package())))
+    assert quality["method"] == "swept"
+    assert quality["shape_deviation"] < 0.03 * MM
