@@ -153,7 +153,8 @@ class Shock(Parameters):
     The pulse is that of a JEDEC service condition, or a half sine of ``peak_acceleration`` and ``pulse_duration``, or a
     table of times and accelerations (CSV). ``method`` gives it to the board as body acceleration, its holes held, or
     to a large mass at the holes. Gravity is left out by ``auto`` where it is less than a thousandth of the peak. The
-    stress at the joints' upper interface is kept at ``picture_times``.
+    stress at the joints' upper interface is kept at ``picture_times``. ``identical_joints`` repeats the shock under a
+    flat package on truncated spheres of the solder's volume: what the joints' own shapes change is the difference.
     """
 
     service_condition: ServiceCondition | None = None
@@ -162,6 +163,7 @@ class Shock(Parameters):
     table: str | None = None
     duration: Annotated[float, "ms"] = Field(gt=0)
     picture_times: Annotated[tuple[Annotated[float, Field(ge=0)], ...], "ms"] = ()
+    identical_joints: bool = False
     method: Literal["direct", "large_mass"] = "direct"
     gravity: Literal["auto", "on", "off"] = "auto"
     damping: Damping = Damping()

@@ -1,4 +1,4 @@
-"""Displacements of the package relative to the board: prescribed as a lift, or computed with the board's own taken off.
+"""Displacements of the package relative to the board: raised flat, lifted as prescribed, or computed.
 
 The board is meshed flat, as drawn, and so are its pads: what counts is where the package is, seen from the board below
 it, u_package(x) - u_board(top face, same x and y).
@@ -29,6 +29,11 @@ def prescribed(package: Package, warpage: Warpage) -> Displacement:
         return np.column_stack([np.zeros_like(points[:, :2]), height])
 
     return displacement
+
+
+def raised(height: float) -> Displacement:
+    """Return the displacement of a flat package that stands higher than drawn [m]."""
+    return lambda points: np.broadcast_to([0.0, 0.0, height], points.shape)
 
 
 def read_computed(path: Path) -> Displacement:

@@ -9,6 +9,7 @@ from workflow.board_deflection import kinematics_effect
 from workflow.board_drop_case import BoardDropCase, PackageCase
 from workflow.case import available_cores
 from workflow.fine_joints import coarse_joints_effect
+from workflow.identical_joints import identical_joints_effect
 from workflow.problems import Problem
 from workflow.reflow_pool import distinct_joints, joint_geometries
 from workflow.shock_forecast import (
@@ -75,16 +76,19 @@ def _with_shock(of_reflow: Forecast, case: BoardDropCase) -> Forecast:
     numerics = case.shock.numerics
     dns = shock.implicit if numerics.dns_solver == "implicit" else shock.dns
     modes = {"two_scale": shock.search + shock.two_scale, "dns": dns}
+    again = shock.two_scale if "two_scale" in numerics.modes else dns
+    identical = again if case.shock.identical_joints else 0.0
     return replace(
         of_reflow,
         effects=of_reflow.effects
         | kinematics_effect(case)
         | material_effects(case.materials.by_role)
         | failure_effect(case.shock.failure)
-        | coarse_joints_effect(case.shock.coupling),
+        | coarse_joints_effect(case.shock.coupling)
+        | identical_joints_effect(case),
         parts=two_scale_parts(case) if "two_scale" in numerics.modes else parts,
         shock=shock,
-        seconds=of_reflow.seconds | {"shock": sum(modes[mode] for mode in numerics.modes)},
+        seconds=of_reflow.seconds | {"shock": identical + sum(modes[mode] for mode in numerics.modes)},
     )
 
 

@@ -13,7 +13,7 @@ from workflow.progress import progress_bar
 from workflow.stage_runner import Run
 
 MODES = {"two_scale": "two-scale", "dns": "DNS"}
-ASSEMBLY, JOINTS, COARSE_JOINTS = (f"solder_mesh/{name}.msh" for name in ("assembly", "joints", "coarse_joints"))
+IDENTICAL_TITLE = "identical joints"
 
 
 def find_fine_joints(run: Run[BoardDropCase], folder: Path) -> FineJoints:
@@ -25,7 +25,7 @@ def find_fine_joints(run: Run[BoardDropCase], folder: Path) -> FineJoints:
     if coupling.fine_joints != "critical" or "two_scale" not in modes:
         return named_joints(coupling)
     all_coarse = coupling.model_copy(update={"fine_joints": "all", "direction": "two_way"})
-    request = _request(run, "two_scale", (ASSEMBLY, COARSE_JOINTS), all_coarse)
+    request = _request(run, "two_scale", ("assembly", "coarse_joints"), all_coarse)
     request["checkpoints"] = str(run.checkpoints("shock").resolve() / "coarse")
     run_fem(run, folder / "coarse", request, "shock, coarse joints")
     fine = most_stressed(folder / "coarse/history.npz", coupling.critical_joints)
@@ -33,7 +33,7 @@ def find_fine_joints(run: Run[BoardDropCase], folder: Path) -> FineJoints:
     return fine
 
 
-def run_mode(run: Run[BoardDropCase], folder: Path, mode: str, fine: FineJoints) -> None:
+def run_mode(run: Run[BoardDropCase], folder: Path, mode: str, fine: FineJoints, prefix: str = "") -> None:
     """Run one mode of the shock on its MPI ranks, showing its progress.
 
     Args:
@@ -41,17 +41,22 @@ def run_mode(run: Run[BoardDropCase], folder: Path, mode: str, fine: FineJoints)
         folder: where the mode's products go.
         mode: "two_scale" or "dns", which has all joints fine.
         fine: the fine joints of a two-scale run.
+        prefix: begins the names of the meshes, where they are not those of the real joints.
 
     Raises:
         LaunchError: the run failed; the message has its last words.
     """
     chosen = fine.names if mode == "two_scale" else "all"
     coupling = run.case.shock.coupling.model_copy(update={"fine_joints": chosen})
-    request = _request(run, mode, (ASSEMBLY, JOINTS), coupling)
+    request = _request(run, mode, (f"{prefix}assembly", f"{prefix}joints"), coupling)
     if mode == "two_scale" and needs_coarse_joints(coupling):
-        request["coarse_joints"] = str(run.folder.resolve() / COARSE_JOINTS)
-    request["checkpoints"] = str(run.checkpoints("shock").resolve() / mode)
-    run_fem(run, folder, request, f"shock, {MODES[mode]}")
+        request["coarse_joints"] = _mesh(run, f"{prefix}coarse_joints")
+    request["checkpoints"] = str(run.checkpoints("shock").resolve() / folder.name)
+    run_fem(run, folder, request, f"shock, {MODES[mode]}" + (f", {IDENTICAL_TITLE}" if prefix else ""))
+
+
+def _mesh(run: Run[BoardDropCase], name: str) -> str:
+    return str(run.folder.resolve() / f"solder_mesh/{name}.msh")
 
 
 def _request(run: Run[BoardDropCase], mode: str, meshes: tuple[str, ...], coupling: JointCoupling) -> dict:
@@ -59,7 +64,7 @@ def _request(run: Run[BoardDropCase], mode: str, meshes: tuple[str, ...], coupli
     shock = run.case.shock.model_copy(update={"coupling": coupling})
     return {
         "mode": mode,
-        "meshes": [str(run.folder.resolve() / name) for name in meshes],
+        "meshes": [_mesh(run, name) for name in meshes],
         "shock": shock.model_dump(mode="json"),
         "materials": run.case.materials.model_dump(mode="json"),
     }

@@ -18,6 +18,7 @@ JOINT_MESHES = (
     "package.coarse_joint_numerics",
     "shock.coupling.fine_joints",
     "shock.coupling.direction",
+    "shock.identical_joints",
 )
 
 REPORT, REPORT_PRODUCTS = ("case", "scale"), ("report.html", "summary.json")
@@ -102,7 +103,7 @@ def package_pipeline(heated: bool, dropped: bool) -> Pipeline:
         reflow = Stage("reflow", (*PADS, "thermal", "solder"), (), solid, pads=True)
     solder_mesh = Stage(
         "solder_mesh",
-        ("warpage", *JOINT_MESHES, "materials.copper", "materials.solder"),
+        ("warpage", "solder.volume", *JOINT_MESHES, "materials.copper", "materials.solder"),
         ("geometry", "surface"),
         ("solder_mesh/assembly.msh", "solder_mesh/joints.msh", "solder_mesh/quality.json"),
     )

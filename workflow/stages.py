@@ -11,7 +11,7 @@ Packages are imported inside the functions, so that a stage loads only what it u
 from dataclasses import replace
 from pathlib import Path
 
-from workflow import findings
+from workflow import findings, identical_joints
 from workflow.board_drop_case import BoardDropCase, PackageCase
 from workflow.products import read_json, write_json
 from workflow.progress import progress_bar
@@ -81,45 +81,33 @@ def surface(run: Run[PackageCase], folder: Path) -> Findings:
 
 
 def solder_mesh(run: Run[PackageCase], folder: Path) -> Findings:
-    """Put the package where the solder froze and mesh every joint in its place with hexahedra.
+    """Put the package where the solder froze and mesh every joint in its place; once more if all were alike."""
+    from workflow.fine_joints import coarse_joints_effect
+    from workflow.joint_meshes import mesh_identical_joints, mesh_real_joints
 
-    Where the shock needs coarse joints, all are also meshed with few of them.
-    """
-    from meshing.displaced_assembly import write_displaced_assembly
-    from meshing.displacement import prescribed, read_computed
-    from meshing.joints_file import write_joints
-    from meshing.pads import read_pads
-    from meshing.solder_mesh import joint_quality, mesh_coarse_joint, mesh_joint
-    from meshing.surface import read_surface
-    from workflow.fine_joints import coarse_joints_effect, needs_coarse_joints
-    from workflow.forecast import with_critical_step
-
-    case, structure = run.case, run.folder / "reflow/structure.npz"
-    coupling = case.shock.coupling if isinstance(case, BoardDropCase) else None
-    displacement = read_computed(structure) if structure.exists() else prescribed(case.package, case.warpage)
-    side = write_displaced_assembly(run.folder / "geometry/assembly.msh", displacement, folder / "assembly.msh")
-    kinds = {"": mesh_joint} | ({"coarse_": mesh_coarse_joint} if needs_coarse_joints(coupling) else {})
-    bodies = [
-        (read_surface(run.folder / f"surface/{site.name}.vtu"), site)
-        for site in read_pads(run.folder / "reflow/pads.json")
-    ]
-    qualities = {}
-    for kind, mesh_of in kinds.items():
-        meshes = [mesh_of(surface, site, case.package, side) for surface, site in bodies]
-        write_joints(meshes, folder / f"{kind}joints.msh")
-        qualities[kind] = {mesh.name: with_critical_step(joint_quality(mesh), case.materials) for mesh in meshes}
-        write_json(folder / f"{kind}quality.json", qualities[kind])
-    return findings.of_solder_mesh(qualities, coarse_joints_effect(coupling))
+    case, qualities = run.case, mesh_real_joints(run, folder)
+    if not isinstance(case, BoardDropCase):
+        return findings.of_solder_mesh(qualities, {})
+    if case.shock.identical_joints:
+        qualities |= mesh_identical_joints(run, folder)
+    effects = coarse_joints_effect(case.shock.coupling) | identical_joints.identical_joints_effect(case)
+    return findings.of_solder_mesh(qualities, effects)
 
 
 def shock(run: Run[BoardDropCase], folder: Path) -> Findings:
-    """Drop the board: each mode is one MPI run of the package fem; two modes are compared."""
+    """Drop the board: each mode is one MPI run of the package fem; two modes are compared, and identical joints."""
     from workflow.shock_launch import find_fine_joints, read_results, run_mode
 
     fine = find_fine_joints(run, folder)
     for mode in run.case.shock.numerics.modes:
         run_mode(run, folder / mode, mode, fine)
-    return findings.of_shock(read_results(folder), folder, run.case.board.thickness)
+    results = read_results(folder)
+    found = findings.of_shock(results, folder, run.case.board.thickness)
+    if not run.case.shock.identical_joints:
+        return found
+    main = next(iter(results))
+    run_mode(run, folder / identical_joints.FOLDER, main, fine, identical_joints.PREFIX)
+    return identical_joints.compared(found, run, folder, main)
 
 
 def report(run: Run, folder: Path) -> Findings:

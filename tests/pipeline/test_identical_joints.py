@@ -1,0 +1,60 @@
+"""The shock once more with identical joints: what the real shapes change is a metric and a section of the report."""
+
+import json
+import shutil
+from pathlib import Path
+
+import meshio
+import numpy as np
+import pytest
+
+from tests.support.workflow_command import SMALL_CASE, reflowshock
+from workflow.case import read_case
+from workflow.identical_joints import identical_sphere
+from workflow.problems import CaseError
+
+SETTINGS = ("shock.identical_joints=true", "shock.coupling.fine_joints=['A4']", "shock.numerics.modes=['two_scale']")
+
+
+@pytest.fixture(scope="module")
+def identical_run(first_run, tmp_path_factory) -> Path:
+    """The shortened case with one fine joint, run again with identical ones."""
+    folder = shutil.copytree(first_run[0], tmp_path_factory.mktemp("identical") / "small")
+    result = reflowshock("run", folder, settings=SETTINGS)
+    assert result.returncode == 0, result.stdout + result.stderr
+    return folder
+
+
+def test_the_package_stands_flat_on_spheres_of_the_solders_volume(identical_run):
+    height = identical_sphere(read_case(SMALL_CASE)).height
+    mesh = meshio.read(identical_run / "solder_mesh/identical_assembly.msh")
+    under = np.concatenate(
+        [b.data[c].ravel() for b, c in zip(mesh.cells, mesh.cell_sets["package_side"], strict=True) if len(c)]
+    )
+    assert mesh.points[under, 2] == pytest.approx(height + 4e-5, abs=1e-15)
+    assert json.loads((identical_run / "summary.json").read_text())["metrics"]["identical_joint_standoff"][
+        "value"
+    ] == pytest.approx(height)
+
+
+def test_what_the_shapes_change_is_told(identical_run):
+    summary = json.loads((identical_run / "summary.json").read_text())
+    metrics = {name: metric["value"] for name, metric in summary["metrics"].items()}
+    peaks = {}
+    for run in ("two_scale", "identical"):
+        with np.load(identical_run / f"shock/{run}/history.npz") as history:
+            stress = np.maximum(history["von_mises_board"], history["von_mises_package"]).max(axis=0)
+            peaks[run] = dict(zip(history["joints"].tolist(), stress.tolist(), strict=True))
+    critical = metrics["critical_joint"]
+    change = peaks["two_scale"][critical] / peaks["identical"][critical] - 1.0
+    assert metrics["shape_effect_on_peak_stress"] == pytest.approx(change)
+    assert 0.001 < abs(change) < 0.2
+    assert metrics["identical_critical_joint"] in peaks["identical"]
+    assert summary["effects"]["identical_joints"]["on"]
+    assert summary["health"]["identical_energy_balance_error"]["ok"]
+    assert "identical truncated spheres" in (identical_run / "report.html").read_text()
+
+
+def test_spheres_that_would_touch_are_refused():
+    with pytest.raises(CaseError, match=r"shock.identical_joints = true: needs truncated spheres apart"):
+        read_case(SMALL_CASE, ["shock.identical_joints=true", "solder.volume=0.6 mm^3", "package.standoff=0.9 mm"])

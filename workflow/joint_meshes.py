@@ -1,0 +1,85 @@
+"""Meshes of all joints of an array: of the real ones, and of identical ones to compare them with."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from workflow.board_drop_case import BoardDropCase, PackageCase
+from workflow.fine_joints import needs_coarse_joints
+from workflow.identical_joints import PREFIX, identical_sphere
+from workflow.products import write_json
+from workflow.stage_runner import Run
+
+if TYPE_CHECKING:
+    from meshing.package_side import PackageSide
+    from meshing.pads import PadSite
+    from meshing.surface import ClosedSurface
+
+
+def mesh_real_joints(run: Run[PackageCase], folder: Path) -> dict[str, dict]:
+    """Put the package where the solder froze and mesh the joints there; return what ``mesh_array`` does."""
+    from meshing.displaced_assembly import write_displaced_assembly
+    from meshing.displacement import prescribed, read_computed
+    from meshing.pads import read_pads
+    from meshing.surface import read_surface
+
+    case, structure = run.case, run.folder / "reflow/structure.npz"
+    displacement = read_computed(structure) if structure.exists() else prescribed(case.package, case.warpage)
+    side = write_displaced_assembly(run.folder / "geometry/assembly.msh", displacement, folder / "assembly.msh")
+    sites = read_pads(run.folder / "reflow/pads.json")
+    bodies = [(read_surface(run.folder / f"surface/{site.name}.vtu"), site) for site in sites]
+    return mesh_array(bodies, side, case, folder)
+
+
+def mesh_identical_joints(run: Run[PackageCase], folder: Path) -> dict[str, dict]:
+    """Mesh truncated spheres of the solder's volume, on which nothing weighs, under a flat package at their height."""
+    from meshing.displaced_assembly import write_displaced_assembly
+    from meshing.displacement import raised
+    from meshing.pads import read_pads
+    from meshing.sphere_surface import sphere_surface
+
+    case = run.case
+    sphere = identical_sphere(case)
+    displacement = raised(sphere.height - case.package.standoff)
+    flat, path = run.folder / "geometry/assembly.msh", folder / f"{PREFIX}assembly.msh"
+    side = write_displaced_assembly(flat, displacement, path)
+    drawn = read_pads(run.folder / "geometry/pads.json")
+    surface = sphere_surface(sphere)
+    bodies = [(surface, replace(site, gap=sphere.height)) for site in drawn]
+    return mesh_array(bodies, side, case, folder, PREFIX)
+
+
+def mesh_array(
+    bodies: "Sequence[tuple[ClosedSurface, PadSite]]",
+    side: "PackageSide",
+    case: PackageCase,
+    folder: Path,
+    prefix: str = "",
+) -> dict[str, dict]:
+    """Mesh joints, once more with few hexahedra where the shock needs coarse joints.
+
+    Args:
+        bodies: closed surface and place of each joint.
+        side: the package's underside.
+        case: package, materials, shock.
+        folder: where the products go.
+        prefix: begins their names.
+
+    Returns:
+        Kind of joint mesh, which begins the names of its metrics -> joint -> quality.
+    """
+    from meshing.joints_file import write_joints
+    from meshing.solder_mesh import JointMesh, joint_quality, mesh_coarse_joint, mesh_joint
+    from workflow.forecast import with_critical_step
+
+    kinds: dict[str, Callable[..., JointMesh]] = {prefix: mesh_joint}
+    if isinstance(case, BoardDropCase) and needs_coarse_joints(case.shock.coupling):
+        kinds[f"{prefix}coarse_"] = mesh_coarse_joint
+    qualities = {}
+    for kind, mesh_of in kinds.items():
+        meshes = [mesh_of(surface, site, case.package, side) for surface, site in bodies]
+        write_joints(meshes, folder / f"{kind}joints.msh")
+        qualities[kind] = {mesh.name: with_critical_step(joint_quality(mesh), case.materials) for mesh in meshes}
+        write_json(folder / f"{kind}quality.json", qualities[kind])
+    return qualities
