@@ -7,7 +7,9 @@ import pytest
 
 from fem.materials.library import FR4
 from fem.materials.parameters import Isotropic
+from fem.mesh import append, select
 from fem.thermal.rigid import RigidMotions
+from tests.support.fem_models import grid, mesh_of, on
 from tests.support.thermal_models import (
     LIFT,
     REFERENCE,
@@ -126,3 +128,24 @@ def test_thin_layers_do_not_lock_under_the_moments_of_pads(tmp_path, aspect):
     bent = np.polyfit(x[near], height[near], 2)[0] * 2.0
     inertia = 0.5 * cell * sum(thickness) ** 3 / 12.0
     assert bent == pytest.approx(moment / (SOFT.young_modulus * inertia), rel=2e-3)
+
+
+def test_a_board_sags_between_its_holes_as_a_beam(tmp_path):
+    layers = Layers(20e-3, 0.5e-3, (0.4e-3, 0.4e-3), (1, 1, 1, 1))
+    package = layers.mesh()
+    x = np.linspace(0.0, 10e-3, 21)
+    sides = {
+        "symmetry_x": on(0, 0.0),
+        "symmetry_y": on(1, 0.0),
+        "board_side": on(2, 0.0),
+        "mounting_holes": on(0, 10e-3),
+    }
+    board = mesh_of(*grid(x, [0.0, 0.25e-3], [-0.2e-3, -0.1e-3, 0.0]), "board", sides)
+    mesh = append([board, select(package, lambda name: name != "board")[0]])
+    structure = structure_of(mesh, tmp_path, pads_at([(1e-3, 0.12e-3)], 0.1e-3), {"board": SOFT}, gravity=9.81)
+    points, height = structure.points, heated(structure, 0.0).displacement[:, 2]
+    top = ~structure.package & (np.abs(points[:, 2]) < 1e-9) & (np.abs(points[:, 1]) < 1e-9)
+    order = np.flatnonzero(top)[np.argsort(points[top, 0])]
+    sag = height[order[-1]] - height[order[0]]
+    load, rigidity = 9.81 * SOFT.density * 0.2e-3, SOFT.young_modulus * 0.2e-3**3 / 12.0
+    assert sag == pytest.approx(5.0 / 384.0 * load * 20e-3**4 / rigidity, rel=0.002)
