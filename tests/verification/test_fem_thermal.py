@@ -4,12 +4,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from mpi4py import MPI
 
 from fem.materials.library import FR4
 from fem.materials.parameters import Isotropic
+from fem.materials.roles import Materials
 from fem.mesh import append, select
+from fem.thermal.parameters import Thermal
 from fem.thermal.rigid import RigidMotions
-from tests.support.fem_models import grid, mesh_of, on
+from fem.thermal.state import Assembly
+from fem.thermal.structure import ThermalStructure
+from tests.support.fem_models import grid, mesh_of, on, write_msh
 from tests.support.thermal_models import (
     LIFT,
     REFERENCE,
@@ -142,7 +147,10 @@ def test_a_board_sags_between_its_holes_as_a_beam(tmp_path):
     }
     board = mesh_of(*grid(x, [0.0, 0.25e-3], [-0.2e-3, -0.1e-3, 0.0]), "board", sides)
     mesh = append([board, select(package, lambda name: name != "board")[0]])
-    structure = structure_of(mesh, tmp_path, pads_at([(1e-3, 0.12e-3)], 0.1e-3), {"board": SOFT}, gravity=9.81)
+    write_msh(mesh, tmp_path / "assembly.msh")
+    pads = pads_at([(1e-3, 0.12e-3)], 0.1e-3)
+    assembly = Assembly(tmp_path / "assembly.msh", pads, Materials(board=SOFT), Thermal(), gravity=9.81)
+    structure = ThermalStructure.build(MPI.COMM_SELF, assembly)
     points, height = structure.points, heated(structure, 0.0).displacement[:, 2]
     top = ~structure.package & (np.abs(points[:, 2]) < 1e-9) & (np.abs(points[:, 1]) < 1e-9)
     order = np.flatnonzero(top)[np.argsort(points[top, 0])]
