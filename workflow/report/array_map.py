@@ -57,11 +57,11 @@ def _draw_map(axis: Axes, joints: Sequence[Mapping[str, Any]], entry: tuple[str,
     width = MAP_POINTS / (count + 0.3)  # points between two joints
     rims = ["white" if joint.get("verdict", "ok") in ("ok", "given") else NOT_OK for joint in joints]
     marks = axis.scatter(x, y, c=values, s=(MARK_SHARE * width) ** 2, cmap="viridis", edgecolors=rims, linewidths=1.2)
-    size = min(6.5, 0.19 * width)
+    size = min(8.5, 0.19 * width)
     if size >= SMALLEST_TEXT:
         _write_names(axis, joints, (x, y, values), size)
     margin = 0.65 * pitch_of(joints) / MILLI
-    axis.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal")
+    axis.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal", axisbelow=True)
     axis.set(xlim=(x.min() - margin, x.max() + margin), ylim=(y.min() - margin, y.max() + margin))
     axis.figure.colorbar(marks, ax=axis, label=label)
 

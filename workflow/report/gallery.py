@@ -16,6 +16,7 @@ DEVIATION = "deviation [um]"
 LINES, LINE = 5, 31  # of text beneath a joint; pixels of one
 BAR = 100  # pixels beneath all rows
 MAXIMUM_NAMES = 4
+TILT = 0.14  # of the view, from above
 
 
 def render_gallery(run_folder: Path, joints: Sequence[Mapping[str, Any]], picture: Path) -> None:
@@ -40,7 +41,8 @@ def render_gallery(run_folder: Path, joints: Sequence[Mapping[str, Any]], pictur
         row, column = divmod(index, columns)
         place = np.array([column * pitch, 0.0, -row * step])
         _add_joint(plotter, surface, place, limit)
-        _add_text(plotter, caption(names, group[0], surface), place - np.array([0.0, 0.0, text]))
+        rim = TILT * group[0]["wetted_radius_board"] / MILLI  # that is seen below the disc's centre
+        _add_text(plotter, caption(names, group[0], surface), place - np.array([0.0, 0.0, rim + 0.4 * text]))
     _add_bar(plotter)
     _look(plotter, (pitch, step), (rows, columns))
     save(plotter, picture)
@@ -144,6 +146,6 @@ def _look(plotter: pyvista.Plotter, cell: tuple[float, float], counts: tuple[int
     middle = (0.5 * plotter.window_size[1] - BAR) * pixel  # of the picture, over the lowest row's texts
     bottom = -(rows - 1) * step - LINES * LINE * pixel
     centre = np.array([0.5 * (columns - 1) * pitch, 0.0, bottom + middle])
-    plotter.camera_position = [tuple(centre + np.array([0.0, -100.0, 14.0])), tuple(centre), (0.0, 0.0, 1.0)]
+    plotter.camera_position = [tuple(centre + np.array([0.0, -100.0, 100.0 * TILT])), tuple(centre), (0.0, 0.0, 1.0)]
     plotter.enable_parallel_projection()
     plotter.camera.parallel_scale = 0.5 * pixel * plotter.window_size[1]

@@ -131,6 +131,6 @@ def _draw_joints(axis: Axes, interface: Arrays, row: int, top: float) -> PolyCol
         x, low, high = corners[..., 0].mean(), corners[..., 1].min(), corners[..., 1].max()
         axis.annotate(joint, (x, low - 0.08 * (high - low)), ha="center", va="top", fontsize=6, color="#5f6c7b")
     axis.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal")
-    axis.margins(0.05)
+    axis.margins(x=0.06, y=0.1)
     axis.autoscale_view()
     return faces

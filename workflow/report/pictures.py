@@ -34,6 +34,23 @@ def render_joints(series: list[Path], history: dict, parts: list[str], picture: 
     row, column = np.unravel_index(np.argmax(stress), stress.shape)
     critical = str(history["joints"][column])
     grid, time = _fields_near(series, float(history["time"][row]))
+    draw_joints(grid, parts, critical, float(stress.max()), picture)
+    return (
+        f"Von Mises stress in the joints at {1e3 * time:.3f} ms, seen from the package's corner; the package is drawn "
+        f"as an outline. The scale ends at {critical}'s average at its worse pad; single elements reach more."
+    )
+
+
+def draw_joints(grid: pyvista.UnstructuredGrid, parts: list[str], marked: str, top: float, picture: Path) -> None:
+    """Draw all joints of a grid under the outline of their package, coloured by von Mises stress.
+
+    Args:
+        grid: whole model [m], with its parts and stresses [Pa].
+        parts: names of the parts, in the order of the field ``part``.
+        marked: joint whose name is written.
+        top: where the colours end [Pa].
+        picture: PNG file to write.
+    """
     grid.points = grid.points / MILLI
     grid["von Mises [MPa]"] = grid.cell_data["von_mises"] / MEGA
     plotter = new_plotter((1800, 1000))
@@ -41,7 +58,7 @@ def render_joints(series: list[Path], history: dict, parts: list[str], picture: 
         _of_role(grid, parts, "solder"),
         scalars="von Mises [MPa]",
         cmap="turbo",
-        clim=(0.0, float(1.0e-6 * stress.max())),
+        clim=(0.0, top / MEGA),
         scalar_bar_args=SCALAR_BAR | {"fmt": "%.3g"},
         show_edges=True,
         edge_color="#3a4048",
@@ -53,25 +70,11 @@ def render_joints(series: list[Path], history: dict, parts: list[str], picture: 
     for role, colour in (("substrate", "#c9a227"), ("die", "#5b6770")):
         outline = _of_role(grid, parts, role).extract_surface(algorithm="dataset_surface").extract_feature_edges(60)
         _add_part(plotter, outline, color=colour, line_width=3)
-    mark = _of_role(grid, parts, f"solder@{critical}")
-    plotter.add_point_labels(
-        [(mark.center[0], mark.center[1], mark.bounds[5] + 0.05)],
-        [critical],
-        font_size=26,
-        text_color="#b3261e",
-        justification_horizontal="center",
-        shape=None,
-        show_points=False,
-        always_visible=True,
-    )
+    _add_name(plotter, _of_role(grid, parts, f"solder@{marked}"), marked)
     plotter.camera_position = [(1.5, 1.15, 0.75), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)]
     plotter.reset_camera()
     plotter.camera.zoom(1.4)
     save(plotter, picture)
-    return (
-        f"Von Mises stress in the joints at {1e3 * time:.3f} ms, seen from the package's corner; the package is drawn "
-        f"as an outline. The scale ends at {critical}'s average at its worse pad; single elements reach more."
-    )
 
 
 def render_board(series: list[Path], history: dict, parts: list[str], picture: Path) -> str:
@@ -110,6 +113,20 @@ def _of_role(grid: pyvista.UnstructuredGrid, parts: list[str], role: str) -> pyv
     """Cells of the parts whose names start with ``role``."""
     chosen = [number for number, name in enumerate(parts) if name.startswith(role)]
     return grid.extract_cells(np.isin(grid.cell_data["part"].astype(int), chosen))
+
+
+def _add_name(plotter: pyvista.Plotter, solder: pyvista.DataSet, name: str) -> None:
+    """Write the name of a joint above it."""
+    plotter.add_point_labels(
+        [(solder.center[0], solder.center[1], solder.bounds[5] + 0.05)],
+        [name],
+        font_size=26,
+        text_color="#b3261e",
+        justification_horizontal="center",
+        shape=None,
+        show_points=False,
+        always_visible=True,
+    )
 
 
 def _add_part(plotter: pyvista.Plotter, part: pyvista.DataSet, **style) -> None:

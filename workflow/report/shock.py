@@ -10,6 +10,7 @@ from workflow.board_drop_case import BoardDropCase
 from workflow.report import joint_tables, tables
 from workflow.report.histories import MODES, late_peak, read_modes
 from workflow.report.joint_records import joint_records
+from workflow.report.residual import add_residual
 
 
 def add_shock(run_folder: Path, case: BoardDropCase, context: dict, summary: dict) -> None:
@@ -42,8 +43,9 @@ def add_shock(run_folder: Path, case: BoardDropCase, context: dict, summary: dic
     )
     context["published_source"] = cost.PAPER
     _add_ranks(histories, results, joints, context)
-    _add_shape_effect(shock, histories[main], joints, context)
+    _add_shape_effect(shock, histories[main], (joints, metrics), context)
     _add_interface(shock, context)
+    add_residual(shock, results[main]["parts"], context)
     _add_two_scales(run_folder, case, context, results)
     _add_pictures(shock / main, histories[main], results[main], context)
 
@@ -91,14 +93,18 @@ def _add_ranks(histories: dict, results: dict, joints: list[dict], context: dict
     )
 
 
-def _add_shape_effect(shock: Path, history: dict, joints: list[dict], context: dict) -> None:
+def _add_shape_effect(shock: Path, history: dict, told: tuple[list[dict], dict], context: dict) -> None:
+    """Add the shock of identical joints, where it was run; ``told`` of the real ones: records, and metrics of all."""
     from workflow.report import shape_effect
 
     histories, _ = read_modes(shock, ("identical",))
     if not histories:
         return
-    identical = histories["identical"]
+    (joints, metrics), identical = told, histories["identical"]
     context["shape_effect"] = shape_effect.in_words(history, identical)
+    if "identical_joint_standoff" in metrics:
+        heights = [tables.quantity(metrics[f"{name}_joint_standoff"]) for name in ("critical", "identical")]
+        context["shape_effect"] += f" Its standoff is {heights[0]}, that of identical joints {heights[1]}."
     context["curves"]["shape_effect"] = shape_effect.curves(history, identical)
     context["tables"]["shape_effect"] = shape_effect.table(history, identical, joints)
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.support.chain_products import BOW, MICRO, MILLI, bowed_structure, interface
-from workflow.report import cost, mesh_tables, shape_effect, shock, warpage
+from workflow.report import cost, mesh_tables, residual, shape_effect, shock, warpage
 from workflow.report import interface as section
 from workflow.report.array_map import array_map
 from workflow.report.joint_records import joint_records
@@ -178,3 +178,18 @@ def test_costs_stand_beside_the_published_ones():
     assert rows["steps"][:2] == ["800", "100, 800"]
     assert "memory" not in rows
     assert cost.table({"two_scale": ours}, {}) is None
+
+
+def test_residual_stress_is_ranked_by_the_worse_pad():
+    joints = {"joints": ["A3", "A4"], "von_mises_board": [20e6, 10e6], "von_mises_package": [15e6, 30e6],
+              "von_mises_max": [40e6, 50e6], "plastic_strain_max": [1e-3, 2e-3]}  # fmt: skip
+    table = residual.table(joints)
+    assert table["rows"] == [["A4", "10.0", "30.0", "50.0", "0.2 %"], ["A3", "20.0", "15.0", "40.0", "0.1 %"]]
+    assert len(residual.table({key: joints[key] for key in list(joints)[:4]})["head"]) == 4
+    metrics = {
+        "solidified_warpage": {"value": 8e-5, "unit": "m"},
+        "room_temperature_warpage": {"value": 2e-5, "unit": "m"},
+        "residual_stress_joint": {"value": "A4", "unit": ""},
+        "residual_stress_largest": {"value": 30e6, "unit": "Pa"},
+    }
+    assert "from 0.08 mm to 0.02 mm and leaves 30 MPa at the pads of A4" in residual.in_words(metrics)
