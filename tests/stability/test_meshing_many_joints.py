@@ -1,0 +1,54 @@
+"""Every fifth of two hundred joints (all: benchmarks/remeshing.py): meshed within the bars, or refused by reason."""
+
+import numpy as np
+import pytest
+
+from meshing.pad_planes import PadPlanes
+from meshing.solder_mesh import JointMeshError, mesh_joint
+from tests.support.many_joints import COUNTS, Underside, barrel, mesh, outcome, samples, sites_of
+from tests.support.meshing_models import package
+
+LARGEST_ERROR, SMALLEST_JACOBIAN = 3.0e-3, 0.2
+
+
+@pytest.fixture(scope="module")
+def outcomes():
+    return [outcome(sample) for sample in samples(every=5)]
+
+
+def test_there_are_two_hundred_of_all_kinds(outcomes):
+    assert sum(COUNTS.values()) == 200
+    assert {one["kind"] for one in outcomes} == set(COUNTS)
+
+
+def test_none_passes_that_misses_its_bars(outcomes):
+    for one in outcomes:
+        if one["method"] == "refused":
+            assert one["reason"].startswith("joint A1")
+            continue
+        assert max(one[name] for name in ("volume_error", "standoff_error", "contact_area_error")) <= LARGEST_ERROR, one
+        assert one["scaled_jacobian"] >= SMALLEST_JACOBIAN, one
+
+
+def test_what_can_be_swept_is_swept_and_the_rest_is_filled(outcomes):
+    method = {one["kind"]: one["method"] for one in outcomes}
+    swept = {"barrel", "hourglass", "shifted", "tilted", "overflow", "lobed"}
+    assert method == {kind: "swept" if kind in swept else "free-form" for kind in COUNTS}
+
+
+def test_ends_of_tilted_joints_lie_exactly_in_both_planes():
+    for sample in (sample for sample in samples(every=5) if sample.kind == "tilted"):
+        made, (site,) = mesh(sample), sample.sites
+        planes = PadPlanes.fit(sample.surface.points, sample.surface.triangles[sample.surface.boundary == 2])
+        head, foot = (made.points[made.facets[f"pad_{side}@{site.name}"]] for side in ("package", "board"))
+        assert foot[..., 2] == pytest.approx(site.z_board, abs=1e-15)
+        assert head[..., 2] - site.z_board == pytest.approx(planes.height(head[..., 0], head[..., 1]), rel=1e-9)
+
+
+def test_a_joint_between_other_planes_than_its_own_is_refused():
+    surface = barrel(np.random.default_rng(0), 0)
+    (site,) = sites_of(surface, pair=False)
+    planes = PadPlanes(1.1 * site.gap, np.zeros(2), np.zeros(2))
+    side = Underside(planes, 0.0, 0.0, site.z_board + package().copper.thickness)
+    with pytest.raises(JointMeshError, match=r"joint A1: the package is .* m above its upper face, allowed"):
+        mesh_joint(surface, site, package(), side)
