@@ -1,0 +1,83 @@
+"""Columns of split tetrahedra bend, vibrate and take steps as hexahedra have to: compared with swept ones."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from fem.elements.cell_shape import TENSOR_ORDER
+from fem.elements.element import critical_steps, element_geometry
+from fem.estimate import box_critical_step
+from fem.materials.library import LIBRARY
+from meshing.free_form import free_form_solder
+from meshing.hexahedra import quad_areas, shortest_lengths
+from meshing.parameters import JointNumerics
+from meshing.solder import Solder
+from meshing.swept import swept_solder
+from meshing.tetrahedra import fill_with_tetrahedra
+from tests.support.fem_elements import KINDS, elements_of, frequencies, solve
+from tests.support.joint_surfaces import barrel
+from tests.support.meshing_models import MM
+
+SOLDER = LIBRARY["SAC405"]
+COLUMN = barrel(0.45 * MM, 0.03 * MM)
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """Deflection of the head under a side load [m], first frequency [Hz], critical step, exact and estimated [s]."""
+
+    deflection: float
+    frequency: float
+    step: float
+    estimate: float
+
+
+def answer(solder: Solder) -> Answer:
+    """A column of solder that is clamped at its foot."""
+    elements = elements_of(
+        KINDS["incompatible_modes"], solder.points, solder.cells[:, TENSOR_ORDER].astype(np.int32), [SOLDER]
+    )
+    held, load = np.zeros((2, *solder.points.shape))
+    held[np.unique(solder.faces[0].quads)] = 1.0
+    quads = solder.faces[1].quads
+    areas = quad_areas(solder.points, quads)
+    np.add.at(load[:, 0], quads, (0.25 * areas / areas.sum())[:, None])
+    moved = solve(elements, np.zeros_like(load), held.astype(bool), load)
+    volumes = element_geometry(elements.points, elements.cells).nodal_volume
+    shortest = float(shortest_lengths(solder.points, solder.cells).min())
+    return Answer(
+        float((load * moved).sum()),
+        float(frequencies(elements, held.astype(bool), 1)[0]),
+        float(critical_steps(elements, volumes).min()),
+        box_critical_step(SOLDER, np.full(3, shortest)),
+    )
+
+
+def swept(core: int, rings: int, layers: int) -> Answer:
+    return answer(swept_solder(COLUMN, JointNumerics(core=core, rings=rings, layers=layers), np.asarray))
+
+
+@pytest.fixture(scope="module")
+def answers() -> dict[str, Answer]:
+    """By the wanted resolution of a joint, swept and split, and by fine swept hexahedra."""
+    split = free_form_solder(COLUMN, fill_with_tetrahedra(COLUMN, 0.16 * MM, False), np.asarray)
+    return {"split": answer(split), "swept": swept(2, 1, 6), "exact": swept(4, 2, 14)}
+
+
+def test_it_bends_and_vibrates_as_fine_swept_hexahedra_do(answers):
+    split, exact = answers["split"], answers["exact"]
+    assert split.deflection == pytest.approx(exact.deflection, rel=0.02)
+    assert split.frequency == pytest.approx(exact.frequency, rel=0.01)
+
+
+def test_it_is_no_worse_than_swept_hexahedra_of_its_size(answers):
+    split, swept, exact = (answers[name] for name in ("split", "swept", "exact"))
+    assert abs(split.deflection / exact.deflection - 1.0) < abs(swept.deflection / exact.deflection - 1.0)
+    assert abs(split.frequency / exact.frequency - 1.0) < abs(swept.frequency / exact.frequency - 1.0)
+
+
+def test_its_critical_step_is_smaller_and_not_overestimated(answers):
+    split, swept = answers["split"], answers["swept"]
+    assert 0.05 * swept.step < split.step < swept.step
+    assert 0.3 * split.step < split.estimate < split.step
