@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from fem.estimate import largest_implicit_step
 from fem.factor_cost import box_factor
@@ -29,6 +29,9 @@ SOLVE_RATE = 6.0e8  # entries of the factor per second of a solution
 ASSEMBLY_SECONDS = 2.0e-5  # [s] an equation
 EXPLICIT_OVERHEAD, IMPLICIT_OVERHEAD = 2.5e-5, 4.0e-4  # [s] a step, interpreter
 IMPLICIT_UPDATE = 3.0e-7  # [s] a step and node: forces, vectors, ledger
+# Cooling of joints that yield: a few Newton steps, each with some ten products.
+COOLING_TANGENTS, COOLING_SOLUTIONS = 10, 120
+TANGENT_RATE = 1.0e4  # elements that yield a second
 PLATE_LAYERS = 4  # of the plate that stands for a package on its board: those of the board
 ENTRY_MEMORY, EQUATION_MEMORY = 11.0, 3.0e3  # [B] factor; matrix while it is assembled
 ELEMENT_MEMORY, NODE_MEMORY = 300.0, 500.0  # [B] explicit
@@ -106,6 +109,13 @@ def implicit_cost(nodes: tuple[int, int, int], steps: int) -> SolverCost:
     step = factor.entries / SOLVE_RATE + IMPLICIT_UPDATE * math.prod(nodes) + IMPLICIT_OVERHEAD
     seconds = setup + steps * step
     return SolverCost(steps, seconds, setup, ENTRY_MEMORY * factor.entries + EQUATION_MEMORY * equations)
+
+
+def cooling_cost(elements: int, yielding: int) -> SolverCost:
+    """Predict the cost of residual stress: one factor of so many hexahedra, of which some yield, and its solutions."""
+    solutions = COOLING_SOLUTIONS if yielding else 1
+    cost = implicit_cost(plate_nodes(elements), solutions)
+    return replace(cost, seconds=cost.seconds + COOLING_TANGENTS * yielding / TANGENT_RATE)
 
 
 def plate_nodes(elements: int) -> tuple[int, int, int]:

@@ -88,13 +88,14 @@ class BoardDropCase(PackageCase):
         """Find parameters that make no possible package, joint, board or shock together."""
         from fem import shock_checks
         from meshing import checks as meshing_checks
-        from workflow import fine_joints, identical_joints
+        from workflow import fine_joints, identical_joints, shock_cooling
 
         found = super().problems()
         if meshing_checks.problems(self.package, self.board, self.warpage):
             return found
         found += self.in_words(shock_checks.problems(self.shock)) + list(fine_joints.problems(self))
         found += identical_joints.problems(self)
+        found += shock_cooling.problems(self)
         return (found + self._flow_problems() + self._coupling_problems()) or self._impossible_steps()
 
     def _impossible_steps(self) -> list[Problem]:

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from fem.materials.roles import Materials
+from workflow import shock_cooling
 from workflow.board_deflection import kinematics_effect
 from workflow.board_drop_case import BoardDropCase, PackageCase
 from workflow.case import available_cores
@@ -75,6 +76,7 @@ def _with_shock(of_reflow: Forecast, case: BoardDropCase) -> Forecast:
     shock = forecast_shock(case, parts)
     numerics = case.shock.numerics
     dns = shock.implicit if numerics.dns_solver == "implicit" else shock.dns
+    cooling, seconds = shock_cooling.forecast(case, parts)
     modes = {"two_scale": shock.search + shock.two_scale, "dns": dns}
     again = shock.two_scale if "two_scale" in numerics.modes else dns
     identical = again if case.shock.identical_joints else 0.0
@@ -85,10 +87,11 @@ def _with_shock(of_reflow: Forecast, case: BoardDropCase) -> Forecast:
         | material_effects(case.materials.by_role)
         | failure_effect(case.shock.failure)
         | coarse_joints_effect(case.shock.coupling)
-        | identical_joints_effect(case),
+        | identical_joints_effect(case)
+        | cooling,
         parts=two_scale_parts(case) if "two_scale" in numerics.modes else parts,
         shock=shock,
-        seconds=of_reflow.seconds | {"shock": identical + sum(modes[mode] for mode in numerics.modes)},
+        seconds=of_reflow.seconds | {"shock": identical + sum(modes[mode] for mode in numerics.modes) + seconds},
     )
 
 

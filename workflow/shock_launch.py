@@ -1,15 +1,13 @@
-"""One run of the package fem: input file, MPI run, result; and the modes of the board's shock as such runs."""
+"""The modes of the board's shock as runs of the package fem."""
 
 import json
-import sys
-from collections.abc import Callable
 from pathlib import Path
 
 from fem.parameters import JointCoupling
 from workflow.board_drop_case import BoardDropCase
+from workflow.fem_launch import run_fem
 from workflow.fine_joints import FineJoints, most_stressed, named_joints, needs_coarse_joints, write_fine_joints
-from workflow.launch import launch, mpi_command
-from workflow.progress import progress_bar
+from workflow.shock_cooling import begun
 from workflow.stage_runner import Run
 
 MODES = {"two_scale": "two-scale", "dns": "DNS"}
@@ -52,6 +50,7 @@ def run_mode(run: Run[BoardDropCase], folder: Path, mode: str, fine: FineJoints,
     if mode == "two_scale" and needs_coarse_joints(coupling):
         request["coarse_joints"] = _mesh(run, f"{prefix}coarse_joints")
     request["checkpoints"] = str(run.checkpoints("shock").resolve() / folder.name)
+    request = begun(run, folder.parent, request, prefix)
     run_fem(run, folder, request, f"shock, {MODES[mode]}" + (f", {IDENTICAL_TITLE}" if prefix else ""))
 
 
@@ -70,33 +69,6 @@ def _request(run: Run[BoardDropCase], mode: str, meshes: tuple[str, ...], coupli
     }
 
 
-def run_fem(run: Run, folder: Path, request: dict, title: str) -> None:
-    """Run the package fem on the MPI ranks of the case, showing its progress.
-
-    Args:
-        run: case, cores.
-        folder: where its products go; made here.
-        request: what it reads as input, but for ``output``.
-        title: what the user sees.
-
-    Raises:
-        LaunchError: the run failed; the message has its last words.
-    """
-    folder.mkdir()
-    path = folder / "input.json"
-    path.write_text(json.dumps(request | {"output": str(folder.resolve())}, indent=1) + "\n")
-    ranks = run.case.ranks
-    command = mpi_command(ranks, [sys.executable, "-m", "fem", str(path)], run.oversubscribe)
-    with progress_bar(f"{title} on {ranks} rank{'s' if ranks > 1 else ''}") as progress:
-        launch(command, lambda line: _pass_on(line, progress), folder / "log.txt")
-
-
 def read_results(folder: Path) -> dict[str, dict]:
     """Return ``result.json`` of each mode that ran, two-scale first."""
     return {mode: json.loads((folder / mode / "result.json").read_text()) for mode in MODES if (folder / mode).is_dir()}
-
-
-def _pass_on(line: str, progress: Callable[[float], None]) -> None:
-    """Show how far a run is, if a line of its output says so."""
-    if line.startswith('{"progress"'):
-        progress(json.loads(line)["progress"])

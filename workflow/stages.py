@@ -96,13 +96,14 @@ def solder_mesh(run: Run[PackageCase], folder: Path) -> Findings:
 
 def shock(run: Run[BoardDropCase], folder: Path) -> Findings:
     """Drop the board: each mode is one MPI run of the package fem; two modes are compared, and identical joints."""
+    from workflow.shock_cooling import with_cooling
     from workflow.shock_launch import find_fine_joints, read_results, run_mode
 
     fine = find_fine_joints(run, folder)
     for mode in run.case.shock.numerics.modes:
         run_mode(run, folder / mode, mode, fine)
     results = read_results(folder)
-    found = findings.of_shock(results, folder, run.case.board.thickness)
+    found = with_cooling(findings.of_shock(results, folder, run.case.board.thickness), run.case, folder)
     if not run.case.shock.identical_joints:
         return found
     main = next(iter(results))

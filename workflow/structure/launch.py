@@ -3,7 +3,7 @@
 import json
 from pathlib import Path
 
-from workflow.shock_launch import run_fem
+from workflow.fem_launch import run_fem
 from workflow.stage_runner import Run
 from workflow.structure.case import StructureCase
 

@@ -1,0 +1,58 @@
+"""The shock of the shortened case from the stress of cooling on: products, metrics, what it changes, bad input."""
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.support.workflow_command import SMALL_CASE
+from workflow.case import read_case
+from workflow.problems import CaseError
+from workflow.stage_runner import Findings, Run
+from workflow.stages import shock
+
+COOLED = ("thermal.effects.residual_stress=on", "thermal.effects.flexible=off", "materials.solder=SAC405")
+
+
+def shock_of(run_folder: Path, *settings: str) -> tuple[Path, Findings]:
+    """Run the shock alone, on the joint meshes that are there."""
+    case = read_case(SMALL_CASE, [*COOLED, *settings])
+    folder = run_folder / "shock"
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir()
+    return folder, shock(Run(run_folder, case, 2), folder)
+
+
+def test_both_modes_begin_with_one_cooling(run_folder):
+    folder, found = shock_of(run_folder)
+    assert all(check["ok"] for check in found.health.values())
+    assert {"cooling_force_residual", "cooling_unbalanced_force"} <= found.health.keys()
+    assert found.effects["residual_stress"]["on"]
+    assert "192 K" in found.effects["residual_stress"]["why"]
+    value = {name: metric["value"] for name, metric in found.metrics.items()}
+    assert value["residual_stress_critical_joint"] > 20e6
+    assert value["room_temperature_warpage"] != value["solidified_warpage"]
+    assert value["cooling_iterations"] > 3
+    assert (folder / "residual/residual.vtu").exists()
+    assert not (folder / "residual_two_scale").exists()
+    joints = json.loads((folder / "residual/result.json").read_text())["joints"]
+    for mode in ("two_scale", "dns"):
+        with np.load(folder / mode / "history.npz") as history:
+            assert history["von_mises_board"][0] == pytest.approx(joints["von_mises_board"], rel=1e-6)
+            assert history["plastic_strain_max"][0] == pytest.approx(joints["plastic_strain_max"], rel=1e-9)
+    assert found.metrics["critical_joint_stress_error"]["value"] < 0.05
+
+
+@pytest.mark.parametrize(
+    "setting, key",
+    [
+        ("shock.coupling.direction=one_way", "shock.coupling.direction"),
+        ("shock.numerics.dns_solver=implicit", "shock.numerics.dns_solver"),
+    ],
+)
+def test_what_cannot_begin_so_is_refused(setting, key):
+    with pytest.raises(CaseError) as caught:
+        read_case(SMALL_CASE, [*COOLED, setting])
+    assert any(problem.key.startswith(key) for problem in caught.value.problems)
