@@ -82,7 +82,7 @@ class Thermal(Parameters):
         return value
 
     def corner(self, temperature: float) -> float:
-        """Return the displacement of the die's corner [m] at a temperature [K]: in proportion, held past the peak."""
+        """Return the displacement of the die's corner [m] at a temperature [K], in proportion to it on both ways."""
         if self.corner_displacement is None:
             return 0.0
         if self.peak == self.reference:

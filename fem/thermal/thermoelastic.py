@@ -17,6 +17,7 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from fem.agreement import agreed
 from fem.body import Body, make_body, make_pieces
 from fem.factorisation import FactorCost, Factorisation
 from fem.global_matrix import Equations
@@ -89,9 +90,10 @@ class Thermoelastic:
         """Distribute the mesh of rank 0 and factor; collective.
 
         Raises:
-            AgreedError: The matrix is not positive definite, or memory ran out; on every rank.
+            AgreedError: A rank without elements, a matrix that is not positive definite, or no memory; on every rank.
         """
-        pieces = make_pieces(distribute(comm, mesh), tables, materials)
+        local = distribute(comm, mesh)
+        pieces = agreed(comm, lambda: make_pieces(local, tables, materials))
         self.body = make_body(comm, pieces, tables, np.ones(len(pieces.steps)), None)
         self.space = RigidSpace.of(comm, self.body, tables)
         _, assigned = materials_of_parts(tables.part_names, materials)
