@@ -42,7 +42,7 @@ def measure(world: MPI.Comm, request: RunInput) -> dict:
     plan = place(world, divided, request)
     comms = Communicators(world, plan.placement)
     models, steps = build_models(comms, divided, request, plan.cells)
-    crew, channels, _ = make_crew(comms, models, (steps.plan, divided.scheme), request.shock)
+    crew, channels, _ = make_crew(comms, models, (steps, divided.scheme), request.shock)
     sums = {role: model.body.shared.clock for role, model in models.items()}
     records = np.empty((WINDOWS, 4))
     for record in records:

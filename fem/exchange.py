@@ -101,6 +101,11 @@ class SharedNodes:
             sum_in_rank_order(self._nodes, self._pointer, self._source, self._received, values)
             self.clock.count(begin, packed, arrived)
 
+    @property
+    def exchanged(self) -> bool:
+        """Return whether another rank holds any of the nodes."""
+        return bool(self._requests)
+
     def free(self) -> None:
         """Free the persistent requests."""
         for request in self._requests:

@@ -28,6 +28,7 @@ from fem.materials.roles import Materials
 from fem.mesh import MeshData
 from fem.residual.initial_state import Cooling, InitialState
 from fem.scene import JointTables, Tables, TablesT_co, joined, model_inputs
+from fem.shock_loads import check_shaken
 from fem.steps import Steps, agreed_minimum, assembled_step, steps_of_division, undivided
 from fem.supports import HELD, SYMMETRY
 
@@ -108,6 +109,7 @@ def divided_on_one_rank(request: RunInput) -> Divided[JointTables]:
     else:
         check_division(whole, found, division, rules)
         inputs = model_inputs(whole, division, held)
+    check_shaken([item.tables for item in inputs.values()], shock)
     first = next(iter(inputs.values()))
     return Divided(
         meshes={role: item.mesh for role, item in inputs.items()},

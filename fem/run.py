@@ -59,7 +59,7 @@ def run(world: MPI.Comm, request: RunInput) -> None:
     with Communicators(world, ranks.placement) as comms:
         models, steps = build_models(comms, divided, request, ranks.cells)
         steps = planned(steps, request, pulse)
-        crew, channels, checked = make_crew(comms, models, (steps.plan, divided.scheme), request.shock)
+        crew, channels, checked = make_crew(comms, models, (steps, divided.scheme), request.shock)
         stopwatch = Stopwatch({role: model.body.shared.clock for role, model in models.items()}, channels)
         history = make_history(comms, models, steps, pulse, request)
         numerics, fields = request.shock.numerics, make_fields(comms, models, request)
@@ -107,14 +107,13 @@ def place(world: MPI.Comm, divided: Divided, request: RunInput) -> Plan:
     return plan_ranks(world, loads, request.shock.ranks, request.checkpoints, divided.scheme)
 
 
-def make_crew(
-    comms: Communicators, models: dict[Role, Model], chosen: tuple[WindowPlan, SchemeName], shock: Shock
-) -> Crew:
+def make_crew(comms: Communicators, models: dict[Role, Model], chosen: tuple[Steps, SchemeName], shock: Shock) -> Crew:
     """Return the participants of this rank, from the steps of the run and its scheme; collective."""
-    plan, name = chosen
+    steps, name = chosen
+    plan, mass = steps.plan, steps.model_mass + steps.added_mass
     bodies = {role: model.body for role, model in models.items()}
     loads = {
-        role: shock_loads(comms.models[role], role, model.body, model.tables, shock) for role, model in models.items()
+        role: shock_loads(comms.models[role], mass, model.body, model.tables, shock) for role, model in models.items()
     }
     if "dns" not in bodies:
         return couple(comms, bodies, loads, plan, scheme_of(name, shock.coupling.direction))

@@ -1,5 +1,6 @@
 """Loads of a drop shock: from its parameters to the objects that act on each model."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -7,9 +8,10 @@ import numpy as np
 from mpi4py import MPI
 
 from fem.body import Body
-from fem.communicators import Role
 from fem.damping import RayleighDamping
-from fem.loads import DOWN, BodyAcceleration, LargeMass, Load
+from fem.errors import LoadError
+from fem.large_mass import LargeMass
+from fem.loads import DOWN, BodyAcceleration, Load
 from fem.parameters import Shock
 from fem.pulse import STANDARD_GRAVITY, Constant, HalfSine, Pulse, Tabulated, service_condition
 from fem.pulse_table import read_pulse
@@ -60,12 +62,24 @@ def input_pulse(shock: Shock) -> tuple[HalfSine | Tabulated, str]:
     return HalfSine(shock.peak_acceleration, shock.pulse_duration), "half sine"
 
 
-def shock_loads(comm: MPI.Comm, role: Role, body: Body, tables: JointTables, shock: Shock) -> list[Load]:
+def check_shaken(tables: Iterable[JointTables], shock: Shock) -> None:
+    """Find out before anything is distributed whether a large mass has nodes to act on.
+
+    Raises:
+        LoadError: No model has any.
+    """
+    if shock.method == "large_mass" and not any(len(item.shaken) for item in tables):
+        raise LoadError("shock.method = large_mass needs mounting holes: the facet set mounting_holes is empty")
+
+
+def shock_loads(comm: MPI.Comm, mass: float, body: Body, tables: JointTables, shock: Shock) -> list[Load]:
     """Return the loads and the damping of one model on this rank; collective over the model.
+
+    A model without holes for a large mass to act on only tells its results from that frame.
 
     Args:
         comm: Communicator of the model.
-        role: A meso model without holes for a large mass to act on only tells its results from that frame.
+        mass: Of all models, which a large mass is to move [kg].
         body: The model.
         tables: Its support nodes.
         shock: Pulse, method, gravity, damping.
@@ -74,10 +88,10 @@ def shock_loads(comm: MPI.Comm, role: Role, body: Body, tables: JointTables, sho
     made: list[Load] = [BodyAcceleration(DOWN, Constant(STANDARD_GRAVITY))] if chosen.gravity else []
     if shock.method == "direct":
         made.append(BodyAcceleration(DOWN, chosen.pulse))
-    elif role == "meso" and not len(tables.shaken):
+    elif not len(tables.shaken):
         made.append(LargeMass(np.empty(0, np.int32), np.empty(0), DOWN, chosen.pulse))
     else:
-        made.append(LargeMass.build(comm, body, tables.shaken, DOWN, chosen.pulse))
+        made.append(LargeMass.build(comm, body, tables.shaken, (DOWN, chosen.pulse), mass))
     if any(shock.damping.coefficients):
         made.append(RayleighDamping.build(body, shock.damping.coefficients))
     return made

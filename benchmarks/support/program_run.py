@@ -33,7 +33,7 @@ class ProgramRun:
         pulse = shock_pulse(request.shock).pulse
         steps = planned(steps, request, pulse)
         self.plan = steps.plan
-        self.crew = make_crew(comms, models, (steps.plan, divided.scheme), request.shock).participants
+        self.crew = make_crew(comms, models, (steps, divided.scheme), request.shock).participants
         self.elements = {role: len(model.body.local.cells) for role, model in models.items()}
         self.setup = process_time() - begin
         self.history = make_history(comms, models, steps, pulse, request)

@@ -5,6 +5,8 @@ A level has its state in ``(3, n, 3)``: displacement [m], force [N], weighted su
 
 from numba import njit
 
+from fem.kernels.force import add_block_force
+
 
 @njit(cache=True)
 def begin_substeps(rows, values, state):
@@ -60,3 +62,27 @@ def end_substeps(rows, foreign, state, values):
         values[row, 1] += y
         values[row, 2] += z
         total[i, 0] = total[i, 1] = total[i, 2] = 0.0
+
+
+@njit(cache=True)
+def run_levels(levels, first, values, force):
+    """Take all substeps of a level, and in each of them those of the levels inside it: add their mean force.
+
+    One call where each level has one assembled matrix and no node of another rank. The operations are those of the
+    kernels above, in the same order.
+
+    Args:
+        levels: Of each level, outermost first: rows, foreign, ``(p, 3)`` coefficients, inverse, change, state, see
+            above; pointer, columns and blocks of ``kernels.force.add_block_force``.
+        first: Which of them.
+        values: ``(>= n, 3)`` [m], displacements of the level around.
+        force: ``(>= n, 3)`` [N], forces there.
+    """
+    rows, foreign, coefficients, inverse, change, state, pointer, columns, blocks = levels[first]
+    begin_substeps(rows, values, state)
+    for k in range(len(coefficients)):
+        add_block_force(pointer, columns, blocks, state[0], state[1])
+        if first + 1 < len(levels):
+            run_levels(levels, first + 1, state[0], state[1])
+        take_substep((coefficients[k, 0], coefficients[k, 1], coefficients[k, 2]), inverse, change, state)
+    end_substeps(rows, foreign, state, force)

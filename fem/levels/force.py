@@ -24,7 +24,8 @@ from fem.energy import Energy, InternalForce, linear_energy
 from fem.errors import LevelError
 from fem.exchange import SharedNodes
 from fem.force import ForceTerm, Kinematics, linear_terms
-from fem.kernels.levels import begin_substeps, end_substeps, take_substep
+from fem.force_assembled import AssembledElements
+from fem.kernels.levels import begin_substeps, end_substeps, run_levels, take_substep
 from fem.levels.chebyshev import Substeps
 from fem.levels.tied_elements import tied_terms
 from fem.local_mesh import positions
@@ -69,6 +70,8 @@ class LocalSteps:
         foreign: Those of its free nodes whose force another rank gives: the lowest that holds them.
         change: ``(nf, 3)`` [m] of the latest substep.
         state: ``(3, n, 3)``: displacement [m], force [N] there, weighted sum of forces [N]; only ``add`` reads it.
+        at_once: Where all substeps can be one call: it and the levels inside it as ``kernels.levels.run_levels`` takes
+            them, with the same arrays; else empty.
         plain: Terms of its elements without levels, where they have hourglass control: for its share of the energy.
         history: Empty: the force follows from the displacement.
     """
@@ -82,6 +85,7 @@ class LocalSteps:
     foreign: NDArray[np.int32]
     change: NDArray[np.float64]
     state: NDArray[np.float64]
+    at_once: tuple[tuple[NDArray, ...], ...] = ()
     plain: Sequence[ForceTerm] = ()
     history: dict[str, NDArray] = field(default_factory=dict)
 
@@ -100,6 +104,9 @@ class LocalSteps:
 
     def add(self, displacement: NDArray[np.float64], force: NDArray[np.float64]) -> None:
         """Subtract K_eff u from the force; collective."""
+        if self.at_once:
+            run_levels(self.at_once, 0, displacement, force)
+            return
         steps, place, pull = self.substeps, self.state[0], self.state[1]
         begin_substeps(self.rows, displacement, self.state)
         for coefficients in zip(steps.memory, steps.rate, steps.weight, strict=True):
@@ -193,7 +200,7 @@ def build_level(comm: MPI.Comm, body: "Body", levels: Levels, number: int, aroun
         terms.append(build_level(comm, body, inner, number + 1, nodes))
     shared = SharedNodes(comm, body.local.nodes[nodes[:free]], body.shared.clock)
     mass = np.where(body.mass > 0.0, body.mass, np.inf)[nodes[:free], None]
-    return LocalSteps(
+    made = LocalSteps(
         rows=positions(around, nodes),
         terms=terms,
         substeps=substeps,
@@ -204,6 +211,20 @@ def build_level(comm: MPI.Comm, body: "Body", levels: Levels, number: int, aroun
         change=np.zeros((free, 3)),
         state=np.zeros((3, len(nodes), 3)),
     )
+    return replace(made, at_once=arrays_at_once(made))
+
+
+def arrays_at_once(level: LocalSteps) -> tuple[tuple[NDArray, ...], ...]:
+    """Return what ``LocalSteps.at_once`` is for a level: Python between substeps costs as much as small levels do."""
+    inner = levels_of(level.terms)
+    own = [term for term in level.terms if term not in inner]
+    matrix = own[0] if len(own) == 1 else None
+    if not isinstance(matrix, AssembledElements) or level.shared.exchanged or (inner and not inner[0].at_once):
+        return ()
+    steps = level.substeps
+    coefficients = np.column_stack([steps.memory, steps.rate, steps.weight])
+    arrays = (level.rows, level.foreign, coefficients, level.inverse, level.change, level.state)
+    return ((*arrays, matrix.pointer, matrix.columns, matrix.blocks), *(inner[0].at_once if inner else ()))
 
 
 def level_nodes(body: "Body", level: NDArray[np.int32], number: int) -> tuple[NDArray[np.int32], int]:

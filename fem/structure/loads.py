@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from fem.body import Body
 from fem.damping import RayleighDamping
 from fem.follower_pressure import FollowerPressure
-from fem.loads import BodyAcceleration, LargeMass, Load, NodalForces, PrescribedMotion
+from fem.large_mass import LargeMass
+from fem.loads import BodyAcceleration, Load, NodalForces, PrescribedMotion
 from fem.parameters import Damping
 from fem.pulse import Pulse
 from fem.structure.parameters import AXES, Gravity, InputG, Pressure, StructureScene
@@ -31,7 +32,7 @@ def structure_loads(
         elif isinstance(load, InputG) and load.method == "large_mass":
             shaken = [tables.nodes_of[scene.supports[support].on] for support in shaken_supports(scene)]
             nodes = np.unique(np.concatenate(shaken))
-            made.append(LargeMass.build(comm, body, nodes, -unit(load.direction), pulse))
+            made.append(LargeMass.build(comm, body, nodes, (-unit(load.direction), pulse)))
         elif isinstance(load, InputG | Gravity):
             push = -1.0 if isinstance(load, InputG) else 1.0  # seen from the supports, the body is pushed the other way
             made.append(BodyAcceleration(push * unit(load.direction), pulse))

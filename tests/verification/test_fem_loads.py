@@ -8,7 +8,8 @@ from fem.body import Body
 from fem.damping import RayleighDamping
 from fem.estimate import damped_critical_step
 from fem.facet_areas import outward_areas
-from fem.loads import BodyAcceleration, LargeMass, Load, NodalForces, PrescribedMotion
+from fem.large_mass import LargeMass
+from fem.loads import BodyAcceleration, Load, NodalForces, PrescribedMotion
 from fem.materials.parameters import Isotropic
 from fem.mesh import MeshData
 from fem.motion import Motion
@@ -63,7 +64,7 @@ def loads_of(kind: str, body: Body, mesh: MeshData, stiffness: float) -> list[Lo
         return [PrescribedMotion(low_nodes(body, mesh), 0, Constant(1.0)), BodyAcceleration(ALONG, pulse)]
     if kind == "large_mass":
         low = mesh.facet_nodes("low")
-        return [LargeMass.build(MPI.COMM_SELF, body, low, ALONG, pulse), BodyAcceleration(ALONG, Constant(9.81))]
+        return [LargeMass.build(MPI.COMM_SELF, body, low, (ALONG, pulse)), BodyAcceleration(ALONG, Constant(9.81))]
     return [BodyAcceleration(ALONG, pulse), RayleighDamping(2e4, stiffness, body.terms)]
 
 
@@ -134,7 +135,7 @@ def test_large_mass_is_direct_acceleration():
         body, critical = dns_body(mesh, STEEL)
         low = mesh.facet_nodes("low")
         load = BodyAcceleration(ALONG, pulse) if method == "direct" else None
-        motion = motion_of(body, 0.9 * critical, [load or LargeMass.build(MPI.COMM_SELF, body, low, ALONG, pulse)])
+        motion = motion_of(body, 0.9 * critical, [load or LargeMass.build(MPI.COMM_SELF, body, low, (ALONG, pulse))])
         tip = body.local.locate(mesh.facet_nodes("high"))
         rows = []
         for _ in range(300):

@@ -8,7 +8,8 @@ from mpi4py import MPI
 
 from fem.damping import RayleighDamping
 from fem.facet_areas import outward_areas
-from fem.loads import BodyAcceleration, LargeMass, Load, NodalForces, PrescribedMotion
+from fem.large_mass import LargeMass
+from fem.loads import BodyAcceleration, Load, NodalForces, PrescribedMotion
 from fem.materials.parameters import Isotropic
 from fem.materials.roles import Materials
 from fem.mesh import MeshData
@@ -72,7 +73,7 @@ def loads_of(kind: str, body, mesh: MeshData, duration: float) -> list[Load]:
     if kind == "direct":
         return [BodyAcceleration(ALONG, pulse)]
     if kind == "large_mass":
-        return [LargeMass.build(MPI.COMM_SELF, body, low, ALONG, pulse)]
+        return [LargeMass.build(MPI.COMM_SELF, body, low, (ALONG, pulse))]
     if kind == "pressure":
         nodes, areas = outward_areas(mesh, "high")
         return [NodalForces.build(body, nodes, -areas, smooth_pulse(1e6, 0.6 * duration))]

@@ -8,8 +8,9 @@ from pydantic import ValidationError
 from fem import shock_checks
 from fem.body import Body
 from fem.errors import EnergyError, LoadError
+from fem.large_mass import LargeMass
 from fem.ledger import SUMS, Ledger
-from fem.loads import BodyAcceleration, LargeMass, PrescribedMotion
+from fem.loads import BodyAcceleration, PrescribedMotion
 from fem.mesh import MeshData
 from fem.parameters import Damping, Shock
 from fem.pulse import Constant
@@ -85,9 +86,9 @@ def test_large_mass_needs_nodes_that_are_free():
     mesh, body = box(held=True)
     up = np.array([0.0, 0.0, 1.0])
     with pytest.raises(LoadError, match="support nodes that are free to move: there are none"):
-        LargeMass.build(MPI.COMM_SELF, body, np.empty(0, int), up, Constant(1.0))
+        LargeMass.build(MPI.COMM_SELF, body, np.empty(0, int), (up, Constant(1.0)))
     with pytest.raises(LoadError, match="4 of their components are held"):
-        LargeMass.build(MPI.COMM_SELF, body, mesh.facet_nodes("low"), up, Constant(1.0))
+        LargeMass.build(MPI.COMM_SELF, body, mesh.facet_nodes("low"), (up, Constant(1.0)))
 
 
 def test_motion_of_a_held_component_is_refused():
@@ -103,7 +104,7 @@ def test_weight_of_the_large_mass_does_not_move_the_base():
     motion = motion_of(
         body,
         1e-8,
-        [LargeMass.build(MPI.COMM_SELF, body, low, along, Constant(1e3)), BodyAcceleration(along, Constant(G))],
+        [LargeMass.build(MPI.COMM_SELF, body, low, (along, Constant(1e3))), BodyAcceleration(along, Constant(G))],
     )
     for _ in range(50):
         motion.advance()

@@ -1,0 +1,60 @@
+"""Substeps of levels in one compiled call: the same operations as one by one."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fem.levels.force import LocalSteps, levels_of
+from fem.materials.roles import Materials
+from fem.mesh import MeshData
+from tests.support.fem_levels import joint_on_board, levelled
+
+
+def barrel() -> MeshData:
+    """Return a joint on a board with a waist that bulges: none of its elements is a box."""
+    mesh = joint_on_board()
+    joint = np.unique(mesh.cells[mesh.in_parts(lambda name: "@" in name)])
+    height, axis = mesh.points[joint, 2], np.array([0.5e-3, 0.5e-3])
+    bulge = 1.0 + 0.2 * np.sin(np.pi * height / height.max())
+    mesh.points[joint, :2] = axis + bulge[:, None] * (mesh.points[joint, :2] - axis)
+    return mesh
+
+
+def one_by_one(level: LocalSteps) -> LocalSteps:
+    """Return a level whose substeps, and those of the levels inside it, are calls of their own."""
+    terms = [one_by_one(term) if isinstance(term, LocalSteps) else term for term in level.terms]
+    return replace(level, terms=terms, at_once=())
+
+
+def nested(level: LocalSteps) -> list[LocalSteps]:
+    """Return a level and those inside it."""
+    return [level, *(inner for term in levels_of(level.terms) for inner in nested(term))]
+
+
+@pytest.mark.parametrize(
+    ("ratios", "calls"), [((12,), [1]), ((7, 3), [2, 1]), ((4, 3, 3), [0, 2, 1])], ids=["one", "two", "boxes outside"]
+)
+def test_all_substeps_at_once_are_those_one_by_one(ratios, calls):
+    body = levelled(barrel(), Materials(), ratios).body
+    (level,) = levels_of(body.terms)
+    assert [len(item.at_once) for item in nested(level)] == calls
+    displacement = 1e-6 * np.sin(np.arange(body.mass.size * 3.0)).reshape(-1, 3)
+    body.tie.spread(displacement)
+    at_once, apart = np.zeros_like(displacement), np.zeros_like(displacement)
+    for _ in range(2):  # what is left of a call must not matter to the next one
+        level.add(displacement, at_once)
+        one_by_one(level).add(displacement, apart)
+    assert np.abs(apart).max() > 0.0
+    assert np.abs(at_once - apart).max() <= 1e-14 * np.abs(apart).max()
+    assert not level.state[1:].any()
+
+
+def test_levels_follow_the_motion_in_either_way():
+    """Held nodes of a motion are held in the arrays of the compiled call, too."""
+    (level,) = levels_of(levelled(barrel(), Materials(), (7, 3)).body.terms)
+    before = level.at_once[0][3].copy()
+    level.follow(np.full((int(level.rows.max()) + 1, 3), 2.0))
+    assert level.at_once[0][3] is level.inverse
+    assert not np.array_equal(before, level.at_once[0][3])
+    assert level.at_once[1][3] is levels_of(level.terms)[0].inverse
