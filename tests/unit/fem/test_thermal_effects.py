@@ -10,10 +10,16 @@ from mpi4py import MPI
 from fem.materials.library import FR4, SILICON
 from fem.materials.roles import Materials
 from fem.thermal.effects import NEGLIGIBLE, PackageSizes, decide, solder_force_number, warpage_number
+from fem.thermal.pads import Pads
 from fem.thermal.parameters import Thermal
 from fem.thermal.plates import RigidPlates
+from fem.thermal.state import Assembly
 from fem.thermal.structure import ThermalStructure
+from meshing.heated_assembly import write_heated_assembly
+from meshing.pads import pad_table
+from meshing.parameters import Warpage
 from tests.support.fem_models import GAP
+from tests.support.meshing_models import MM, board, package
 from tests.support.thermal_models import REFERENCE, Layers, pads_at, small_structure, structure_of
 
 SIZES = PackageSizes(
@@ -121,3 +127,24 @@ def test_a_whole_package_is_held_level_by_four_corners(tmp_path):
     corners = np.array([(4e-3, 3e-3), (4e-3, 0.0), (0.0, 3e-3), (0.0, 0.0)])
     assert force.sum() == pytest.approx(-4e-3)
     assert force @ corners == pytest.approx(-load[:, 1, 2] @ pads.centres[:, 1, :2])
+
+
+def test_warpage_of_a_package_with_a_ring_of_substrate_around_its_die(tmp_path):
+    parts = package(
+        rows=10,
+        columns=10,
+        substrate={"length": 11.0 * MM, "width": 11.0 * MM, "thickness": 0.4 * MM},
+        die={"length": 8.0 * MM, "width": 8.0 * MM, "thickness": 0.4 * MM},
+    )
+    plate = board(length=60.0 * MM, width=50.0 * MM)
+    write_heated_assembly(parts, plate, tmp_path / "heated.msh")
+    lower = np.array([(site.x, site.y, site.z_board) for site in pad_table(parts, plate, Warpage())])
+    centres = np.stack([lower, lower + [0.0, 0.0, parts.standoff]], axis=1)
+    pads = Pads([str(number) for number in range(len(lower))], centres, np.full((len(lower), 2), 0.24 * MM))
+    sizes = replace(SIZES, die_reach=np.hypot(4.0, 4.0) * MM, reach=np.hypot(4.5, 4.5) * MM, standoff=parts.standoff)
+    structure = ThermalStructure.build(
+        MPI.COMM_SELF, Assembly(tmp_path / "heated.msh", pads, Materials(), Thermal(), gravity=9.81)
+    )
+    change = gaps(structure, Thermal().peak) - gaps(structure, REFERENCE)
+    number = warpage_number(Thermal(), Materials().by_role, sizes)
+    assert 0.75 * number < np.ptp(change[:, 2]) / parts.standoff < number
