@@ -38,7 +38,7 @@ def headline(joints: Sequence[Mapping[str, Any]]) -> list[dict]:
     standoffs = [1e6 * joint["standoff"] for joint in joints]
     shapes = len({joint["shape"] for joint in joints})
     return [
-        {"value": f"{min(standoffs):.0f} to {max(standoffs):.0f} µm", "label": "standoff over the array"},
+        {"value": f"{min(standoffs):.0f}–{max(standoffs):.0f} µm", "label": "standoff over the array"},
         {"value": f"{len(joints)} / {shapes}", "label": "joints / distinct shapes"},
     ]
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from workflow.report.curves import MILLI, STYLE, svg
 from workflow.report.histories import joint_stress, peaks
-from workflow.report.tables import mega, percent
+from workflow.report.tables import mega, number, percent
 
 Arrays = Mapping[str, NDArray]
 
@@ -30,8 +30,8 @@ def in_words(real: Arrays, identical: Arrays) -> str:
     word = "raise" if effect >= 0.0 else "lower"
     same = "it is the critical one in both" if critical == other else f"there {other} would be the critical one"
     return (
-        f"The real shapes {word} the peak stress of {critical} by {percent(abs(effect))}: {mega(found[critical])} MPa"
-        f" instead of {mega(flat[critical])} MPa under a flat package on identical truncated spheres; {same}."
+        f"The real shapes {word} the peak stress of {critical} by {percent(abs(effect))}: {number(found[critical] / MEGA)} MPa"
+        f" instead of {number(flat[critical] / MEGA)} MPa under a flat package on identical truncated spheres; {same}."
     )
 
 

@@ -26,7 +26,8 @@ def add_shock(run_folder: Path, case: BoardDropCase, context: dict, summary: dic
     metrics = summary["metrics"]
     joints = joint_records(run_folder)
     critical = metrics["critical_joint"]["value"]
-    context["headline"] = tables.headline(metrics) + margins(results[main]) + context["headline"]
+    figures = tables.headline(metrics)  # the critical joint and its stress come first
+    context["headline"] = figures[:2] + margins(results[main]) + figures[2:] + context["headline"]
     context["late_peak"] = late_peak(histories[main])
     context["kinematics"] = kinematics_note(metrics, case.shock.numerics.kinematics)
     context["curves"] |= {

@@ -10,7 +10,7 @@ SHAPE_EFFECT = "shape_effect_on_peak_stress"
 HEADLINE = (
     ("critical_joint", "critical joint"),
     ("peak_von_mises", "peak von Mises at its pads"),
-    (SHAPE_EFFECT, "of it from the joints' real shapes, against identical ones"),
+    (SHAPE_EFFECT, "change of that by the joints' real shapes, against identical ones"),
     ("peak_board_strain", "peak board strain under the package"),
     ("critical_joint_stress_error", "stress history, two-scale against DNS"),
     ("two_scale_dns_time_ratio", "wall time, two-scale over DNS"),
