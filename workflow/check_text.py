@@ -2,7 +2,10 @@
 
 import re
 
-UNITS = {r".*peel_stress": "Pa", r".*plastic_work_density": "J/m^3", r"(\w+_)?frequency_\d+_(low|high)": "Hz"}
+UNITS = {
+    r".*peel_stress": "Pa", r".*plastic_work_density": "J/m^3", r"(\w+_)?frequency_\d+_(low|high)": "Hz",
+    r"standoff_spread_.*": "m",
+}  # fmt: skip
 
 
 def against_limit(name: str, check: dict) -> tuple[str, str]:

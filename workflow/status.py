@@ -13,14 +13,16 @@ SHOWN_UNITS = {"m": "mm", "m^3": "mm^3", "Pa": "MPa", "J": "mJ", "kg": "mg", "s"
 FIGURES = {
     "geometry": ("joint_count", "elements_board", "elements_board_patch", "elements"),
     "reflow": (
-        "distinct_shapes", "joint_width_min", "joint_width_max", "joint_width_error_max",
+        "distinct_shapes", "load_steps", "coupling_residual_max", "standoff_min", "standoff_max",
+        "joint_width_min", "joint_width_max", "joint_width_error_max",
         "height", "max_width", "waist", "contact_angle", "height_error", "max_width_error", "verdict",
     ),
     "surface": ("surface_volume_error_max",),
     "solder_mesh": ("joint_volume_error_max", "joint_scaled_jacobian_min", "joint_critical_time_step"),
     "shock": (
-        "critical_joint", "peak_von_mises", "peak_board_strain", "step_ratio", "critical_joint_stress_error",
-        "two_scale_dns_time_ratio", "first_frequency", "steps", "energy_balance_error",
+        "critical_joint", "peak_von_mises", "shape_effect_on_peak_stress", "residual_stress_largest",
+        "peak_board_strain", "deflection_over_thickness", "step_ratio", "critical_joint_stress_error",
+        "die_displacement_error", "two_scale_dns_time_ratio", "first_frequency", "steps", "energy_balance_error",
     ),
     "comparison": (
         "displacement_difference", "strain_difference", "wave_speed_error", "transmitted_velocity_error",

@@ -29,9 +29,10 @@ def in_words(real: Arrays, identical: Arrays) -> str:
     effect = change(found[critical], flat[critical])
     word = "raise" if effect >= 0.0 else "lower"
     same = "it is the critical one in both" if critical == other else f"there {other} would be the critical one"
+    real_text, flat_text = (f"{number(stress[critical] / MEGA)} MPa" for stress in (found, flat))
     return (
-        f"The real shapes {word} the peak stress of {critical} by {percent(abs(effect))}: {number(found[critical] / MEGA)} MPa"
-        f" instead of {number(flat[critical] / MEGA)} MPa under a flat package on identical truncated spheres; {same}."
+        f"The real shapes {word} the peak stress of {critical} by {percent(abs(effect))}: {real_text} instead of"
+        f" {flat_text} under a flat package on identical truncated spheres; {same}."
     )
 
 

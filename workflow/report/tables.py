@@ -172,7 +172,7 @@ def mode_name(mode: str) -> str:
 def named_quantity(metrics: dict, name: str) -> str:
     """Text of a metric: errors as per cent, strains in microstrain, others as ``quantity``."""
     if name == SHAPE_EFFECT:
-        return f"{100.0 * metrics[name]['value']:+.2f} %"
+        return f"{100.0 * metrics[name]['value']:+.3g} %"
     if "_error" in name:
         return percent(metrics[name]["value"])
     if name.endswith("_strain"):
