@@ -5,6 +5,7 @@ from dataclasses import replace
 from math import degrees, hypot
 
 from particles.checkpoint import Checkpoint
+from particles.flow import LiquidFlow
 from particles.geometry import JointGeometry
 from particles.parameters import Solder
 from particles.plate import joint_plates, placed_geometry
@@ -72,12 +73,16 @@ def follow_path(
     Raises: as `solve_joint`.
     """
     flow, rule = start_joint(geometry, solder)
-    speed = SPACINGS_IN_A_STEP * flow.body.cloud.spacing / flow.time_step.largest
     for number, place in enumerate((geometry, *path)):
-        travel = Travel(1, joint_plates(place)[1], speed, lever=place.radius_package)
-        flow.physics = replace(flow.physics, motions=(travel,))
+        flow.physics = replace(flow.physics, motions=(travel(place, flow),))
         checkpoint = checkpoints(number) if checkpoints else None
         run = run_to_rest(flow, replace(rule, max_steps=flow.steps + rule.max_steps), checkpoint=checkpoint)
         yield joint_shape(place, solder, flow, run)
         if run.ruptured:
             return
+
+
+def travel(place: JointGeometry, flow: LiquidFlow) -> Travel:
+    """Motion of a package to a place, quasi-static: a fifth of a spacing in the longest time step."""
+    speed = SPACINGS_IN_A_STEP * flow.body.cloud.spacing / flow.time_step.largest
+    return Travel(1, joint_plates(place)[1], speed, lever=place.radius_package)

@@ -71,10 +71,10 @@ def solve_joint(
     if len(flow.body.cloud.rings) == 1:
         return _open_shape(geometry, solder, flow, run)
     shape = joint_shape(geometry, solder, flow, run)
-    return _parted(geometry, solder, flow, shape) if run.ruptured else shape
+    return parted(geometry, solder, flow, shape) if run.ruptured else shape
 
 
-def _parted(geometry: JointGeometry, solder: Solder, flow: LiquidFlow, shape: JointShape) -> JointShape:
+def parted(geometry: JointGeometry, solder: Solder, flow: LiquidFlow, shape: JointShape) -> JointShape:
     """The shape of a joint whose neck has collapsed: a drop at rest on each pad; where that cannot be, as it is."""
     effects = switched(decide_effects(geometry, solder)) | {"inertia": False, "viscosity": False}
 

@@ -1,17 +1,13 @@
 """Reflow of many joints: those that are alike once, several at a time, each in a process of its own."""
 
 import logging
-import multiprocessing
-import os
-import queue
-import threading
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from particles.parameters import Solder
+from workflow.reflow.pool import JointPool, ReflowError
 
 if TYPE_CHECKING:
     from meshing.pads import PadSite
@@ -23,23 +19,15 @@ if TYPE_CHECKING:
 logger = logging.getLogger(__name__)
 
 ALIKE = 1e-9  # of joints that count as equal: differences of gap, radii, offset, and tilt times radius [m]
-POLL = 0.2  # seconds between two looks at the progress
-
-_progress: Any = None  # the queue of a worker process: a pool has no other place for it
 
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """One reflow: name of the joint, gap and radii, solder, and the file from which it continues if it is there."""
+    """One reflow: geometry, solder, and the file from which it continues if it is there."""
 
-    name: str
     geometry: "JointGeometry"
     solder: Solder
     checkpoint: Path
-
-
-class ReflowError(RuntimeError):
-    """The reflow of a joint failed; the message names the joint."""
 
 
 def joint_geometries(pads: "Sequence[PadSite]") -> "dict[str, JointGeometry]":
@@ -198,69 +186,17 @@ def solve_joints(
     Raises:
         ReflowError: names the first joint that failed, and how.
     """
-    context = multiprocessing.get_context("spawn")
-    reports = context.Queue()
-    workers = min(cores, len(geometries))
-    with ProcessPoolExecutor(workers, context, _start_worker, (reports, cores // workers)) as pool:
-        jobs = {
-            pool.submit(_solve, Job(name, geometry, solder, checkpoints / name)): name
-            for name, geometry in geometries.items()
-        }
-        try:
-            _wait_for(jobs, reports, progress)
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            for process in multiprocessing.active_children():
-                process.terminate()
-            raise
-    results = {name: job.result() for job, name in jobs.items()}
+    jobs = {name: Job(geometry, solder, checkpoints / name) for name, geometry in geometries.items()}
+    with JointPool(cores, len(jobs)) as pool:
+        results = pool.run(_solve, jobs, lambda done: progress(sum(done.values()) / len(done)))
     return {name: shape for name, (shape, _) in results.items()}, sum(continued for _, continued in results.values())
 
 
-def _wait_for(jobs: "Mapping[Future, str]", reports: Any, progress: Callable[[float], None]) -> None:
-    """Wait for all jobs, passing on how far they are; raise as soon as one fails."""
-    done = dict.fromkeys(jobs.values(), 0.0)
-    pending: Sequence[Future] | set[Future] = set(jobs)
-    while pending:
-        finished, pending = wait(pending, POLL, FIRST_COMPLETED)
-        while True:
-            try:
-                name, fraction = reports.get_nowait()
-            except queue.Empty:
-                break
-            done[name] = max(done[name], fraction)
-        for job in finished:
-            error = job.exception()
-            if error is not None:
-                raise ReflowError(f"joint {jobs[job]}: {type(error).__name__}: {error}") from error
-            done[jobs[job]] = 1.0
-        progress(sum(done.values()) / len(done))
-
-
-def _start_worker(reports: Any, threads: int) -> None:
-    global _progress
-    os.environ["NUMBA_NUM_THREADS"] = str(threads)  # numba, which is loaded after this, would take all cores
-    _progress = reports
-    threading.Thread(target=_end_with_parent, daemon=True).start()
-
-
-def _end_with_parent() -> None:
-    """End this process when its parent was killed: it would compete with the workers of the run that continues."""
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)
-
-
-def _solve(job: Job) -> "tuple[JointShape, bool]":
+def _solve(job: Job, progress: Callable[[float], None]) -> "tuple[JointShape, bool]":
     """Return the shape, and whether it continued from a checkpoint."""
     from particles.checkpoint import Checkpoint
     from particles.reflow import solve_joint
 
     checkpoint = Checkpoint(job.checkpoint, (job.geometry, job.solder))
-
-    def report(fraction: float) -> None:
-        _progress.put((job.name, fraction))
-
-    shape = solve_joint(job.geometry, job.solder, progress=report, checkpoint=checkpoint)
+    shape = solve_joint(job.geometry, job.solder, progress=progress, checkpoint=checkpoint)
     return shape, checkpoint.continued

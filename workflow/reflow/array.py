@@ -1,0 +1,126 @@
+"""The joints of an array in exchanges with a structure: those that are alike once, each kept in a file of its own."""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from particles.parameters import Solder
+from workflow.reflow.pool import JointPool, Shares
+from workflow.reflow_pool import Alike, distinct_joints
+
+if TYPE_CHECKING:
+    from particles.carried_joint import Carried
+    from particles.checkpoint import Checkpoint
+    from particles.geometry import JointGeometry
+    from particles.shape import JointShape
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """What a file of a joint belongs to: the first of the joints that are alike, the exchange, the place."""
+
+    name: str
+    number: int
+    place: "JointGeometry"
+
+
+@dataclass(frozen=True, slots=True)
+class Left:
+    """Joints that are alike, where an exchange has left them: who, the file of now, and that of their first reflow."""
+
+    group: Alike
+    now: Source
+    first: Source
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """A joint that is carried on: from which file to which; the first reflow has none to begin from."""
+
+    files: Path
+    solder: Solder
+    before: Source | None
+    now: Source
+
+    def checkpoint(self, source: Source) -> "Checkpoint":
+        """Return the file of a joint."""
+        from particles.checkpoint import Checkpoint
+
+        return Checkpoint(self.files / f"{source.name}@{source.number}", (source, self.solder))
+
+
+class JointArray:
+    """The joints, `coupling.Joints`. Those that are alike stay one as long as their places are.
+
+    Attributes:
+        left: where the last exchange has left them; a run that continues sets it to what it kept.
+    """
+
+    def __init__(self, solder: Solder, files: Path, pool: JointPool, progress: Callable[[Shares], None]) -> None:
+        """Begin without any joint.
+
+        Args:
+            solder: of one joint.
+            files: folder of the joints' files.
+            pool: processes that compute.
+            progress: called with name -> fraction done, of the first joint of those that are alike.
+        """
+        self._solder, self._files, self._pool, self._progress = solder, files, pool, progress
+        self.left: list[Left] = []
+
+    def exchange(self, number: int, places: "Mapping[str, JointGeometry]") -> dict[str, Floats]:
+        """Bring all joints to rest in their places; see `coupling.Joints`."""
+        jobs, left = {}, []
+        for before, group in self._parted(places):
+            now = Source(group.name, number, group.geometry)
+            jobs[group.name] = Job(self._files, self._solder, before and before.now, now)
+            left.append(Left(group, now, before.first if before else now))
+        found: dict[str, Carried] = self._pool.run(carry, jobs, self._progress)
+        self.left = left
+        self._tidy(number)
+        return {
+            name: lies.wrenches(found[one.group.name].wrenches)
+            for one in left
+            for name, lies in one.group.members.items()
+        }
+
+    def _parted(self, places: "Mapping[str, JointGeometry]") -> "Iterator[tuple[Left | None, Alike]]":
+        """Yield all joints that are alike, and where they were left: groups part, but never join."""
+        if not self.left:
+            yield from ((None, group) for group in distinct_joints(places))
+        for before in self.left:
+            for group in distinct_joints({name: places[name] for name in before.group.members}):
+                yield before, group
+
+    def _tidy(self, number: int) -> None:
+        """Remove the files that no run will read again; first reflows are kept for their history."""
+        for path in self._files.glob("*@*"):
+            if 0 < int(path.name.partition("@")[2].partition(".")[0]) < number - 1:
+                path.unlink()
+
+    def shapes(self) -> "dict[str, JointShape]":
+        """Return the shapes in their last places and canonical orientation, by the first of the joints alike."""
+        jobs = {one.group.name: Job(self._files, self._solder, one.first, one.now) for one in self.left}
+        return self._pool.run(finish, jobs, self._progress)
+
+
+def carry(job: Job, progress: Callable[[float], None]) -> "Carried":
+    """Carry one joint on, in a process of the pool."""
+    from particles.carried_joint import carry_joint
+
+    before = None if job.before is None else job.checkpoint(job.before)
+    return carry_joint(job.now.place, job.solder, before, job.checkpoint(job.now), progress)
+
+
+def finish(job: Job, _progress: Callable[[float], None]) -> "JointShape":
+    """Return the shape of one joint, in a process of the pool; what it begins from is its first reflow."""
+    from particles.carried_joint import carried_shape
+
+    assert job.before is not None
+    return carried_shape(job.now.place, job.solder, job.checkpoint(job.before), job.checkpoint(job.now))
