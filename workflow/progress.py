@@ -1,21 +1,29 @@
 """Progress bars."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Protocol
 
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from workflow.terminal import console
 
 
+class ProgressBar(Protocol):
+    """What is told how far something is."""
+
+    def __call__(self, share: float, text: str = "") -> None:
+        """Take the share that is done, 0 to 1, and what is going on, which stands in place of the description."""
+
+
 @contextmanager
-def progress_bar(description: str) -> Iterator[Callable[[float], None]]:
+def progress_bar(description: str) -> Iterator[ProgressBar]:
     """Show a bar with share, time spent and time left while something runs; it vanishes in the end.
 
     Where there is no terminal, only the description is printed.
 
     Yields:
-        A function to call with the share that is done, 0 to 1.
+        What is to be told.
     """
     columns = (
         TextColumn("  {task.description}"),
@@ -28,4 +36,4 @@ def progress_bar(description: str) -> Iterator[Callable[[float], None]]:
         console.print(f"       {description} …")
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task(description, total=1.0)
-        yield lambda share: bar.update(task, completed=share)
+        yield lambda share, text="": bar.update(task, completed=share, description=text or description)

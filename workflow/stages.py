@@ -8,13 +8,12 @@ Each reads products of earlier stages from ``run.folder``, writes its own into `
 Packages are imported inside the functions, so that a stage loads only what it uses.
 """
 
-from dataclasses import replace
 from pathlib import Path
 
 from workflow import findings, identical_joints
 from workflow.board_drop_case import BoardDropCase, PackageCase
 from workflow.products import read_json, write_json
-from workflow.progress import progress_bar
+from workflow.reflow.stage import reflow
 from workflow.scene_stages import REFLOW_SCENES
 from workflow.stage_runner import Findings, Run, StageFunction
 from workflow.structure.case import StructureCase
@@ -34,30 +33,6 @@ def geometry(run: Run[PackageCase], folder: Path) -> Findings:
     counts = write_assembly(case.package, case.board, folder / "assembly.msh")
     write_preview([folder / "assembly.msh"], folder / "preview.png")
     return findings.of_geometry(len(pads), counts)
-
-
-def reflow(run: Run[PackageCase], folder: Path) -> Findings:
-    """Melt the solder of each distinct joint between its pads."""
-    from meshing.pads import lifted, read_pads, write_pads
-    from particles.effects import decide_effects
-    from particles.products import write_shapes
-    from workflow import reflow_pool as pool
-
-    case, solder = run.case, run.case.solder
-    pads = lifted(read_pads(run.folder / "geometry/pads.json"), case.package, case.warpage)
-    geometries = pool.joint_geometries(pads)
-    groups = pool.distinct_joints(geometries)
-    distinct = {group.name: group.geometry for group in groups}
-    with progress_bar(f"reflow of {len(distinct)} distinct joints") as progress:
-        shapes, continued = pool.solve_joints(distinct, solder, run.cores, progress, run.checkpoints("reflow"))
-    joints = pool.joint_records(groups, geometries, shapes)
-    touching = pool.mark_bridges(joints, pads, mirrored=case.board.symmetry == "quarter")
-    write_shapes(folder / "shapes.h5", shapes | pool.bridge_shapes(touching, geometries, solder))
-    write_json(folder / "joints.json", joints)
-    write_pads(folder / "pads.json", pads)
-    highest = max(distinct.values(), key=lambda geometry: geometry.gap)
-    found = findings.of_reflow(joints, decide_effects(highest, solder))
-    return replace(found, continued=f"{continued} of {len(distinct)} joints" if continued else "")
 
 
 def surface(run: Run[PackageCase], folder: Path) -> Findings:

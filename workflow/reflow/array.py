@@ -79,7 +79,7 @@ class JointArray:
         jobs, left = {}, []
         for before, group in self._parted(places):
             now = Source(group.name, number, group.geometry)
-            jobs[group.name] = Job(self._files, self._solder, before and before.now, now)
+            jobs[group.name] = Job(self._files, self._solder, before.now if before else None, now)
             left.append(Left(group, now, before.first if before else now))
         found: dict[str, Carried] = self._pool.run(carry, jobs, self._progress)
         self.left = left

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from particles.parameters import Solder
 from workflow.reflow.coupling import Coupled, Scale
@@ -55,8 +54,9 @@ def floating_height(geometry: "JointGeometry", solder: Solder, load: float) -> f
 
     A higher joint must bear less, or the height does not last.
     """
-    from particles.joint_stiffness import axial_force
     from scipy.optimize import brentq
+
+    from particles.joint_stiffness import axial_force
 
     def excess(gap: float) -> float:
         return axial_force(geometry, solder, gap) - load

@@ -1,0 +1,230 @@
+"""Reflow of an array coupled with board and package that warm up, float or are moved."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fem.thermal.parameters import KELVIN, Thermal
+from workflow.board_drop_case import BoardDropCase
+from workflow.findings import at_most, metric
+from workflow.progress import ProgressBar, progress_bar
+from workflow.reflow.array import JointArray
+from workflow.reflow.between import flexible_effect, open_structure, solder_force_effect
+from workflow.reflow.coupling import Coupled, Coupling, Exchange, placed
+from workflow.reflow.load_steps import LoadStep, load_steps
+from workflow.reflow.pool import JointPool, Shares
+from workflow.reflow.start import scale_of, start
+from workflow.reflow_pool import joint_geometries
+from workflow.stage_runner import Run
+
+if TYPE_CHECKING:
+    from fem.thermal.state import Structure
+    from meshing.pads import PadSite
+    from particles.geometry import JointGeometry
+    from particles.shape import JointShape
+    from workflow.reflow_pool import Alike
+
+SPREAD_CHANGE = 2e-6  # that the solder's forces may make of the spread of the standoffs [m]
+
+
+@dataclass(frozen=True, slots=True)
+class Heated:
+    """What a coupled reflow found.
+
+    Attributes:
+        geometries: joint name -> where its shape froze.
+        groups: joints that are alike.
+        shapes: name of the first of them -> its shape.
+        coupled: how it came about.
+        steps: the load steps.
+        structure: products of board and package, by name in `structure.npz`.
+        effects: what was decided of temperature and plates.
+        metrics, health: of the coupling, as in `summary.json`.
+        continued: from which exchange a run continued, in words.
+    """
+
+    geometries: "dict[str, JointGeometry]"
+    groups: "list[Alike]"
+    shapes: "dict[str, JointShape]"
+    coupled: Coupled
+    steps: list[LoadStep]
+    structure: dict[str, np.ndarray]
+    effects: dict
+    metrics: dict
+    health: dict
+    continued: str
+
+
+def reflow_heated(run: Run[BoardDropCase], thermal: Thermal, pads: "list[PadSite]") -> Heated:
+    """Take the solder through all load steps.
+
+    Args:
+        run: the run, with the products of the geometry.
+        thermal: course of temperatures.
+        pads: as drawn, with a prescribed warpage where the plates are rigid.
+
+    Raises:
+        NotInBalance: a load step did not come into balance.
+        ReflowError: the reflow of a joint failed; it is named.
+    """
+    case, drawn, steps = run.case, joint_geometries(pads), load_steps(thermal)
+    flexible = flexible_effect(thermal)
+    with (
+        open_structure(case, thermal, run.folder / "geometry/assembly.msh", pads, flexible["on"]) as structure,
+        JointPool(run.cores, len(pads)) as pool,
+        progress_bar(f"reflow of {len(pads)} joints in {len(steps)} load steps") as bar,
+    ):
+        telling = Telling(bar, steps)
+        joints = JointArray(case.solder, run.checkpoints("reflow"), pool, telling.joints)
+        scale = scale_of(list(drawn.values()), case.solder, structure.rigid_modes, thermal.tolerance)
+        force = solder_force_effect(thermal, structure, flexible["on"], list(drawn.values()), scale.pull)
+        saved = Saved(run.checkpoints("reflow"), (case.package, case.board, case.warpage, case.solder, thermal, pads))
+        coupled = saved.read(joints) or _start(structure, drawn, case, steps[0])
+        begun = len(coupled.exchanges)
+        coupling = Coupling(
+            structure, joints, drawn, scale, force["on"], lambda state: saved.write(state, joints), telling.exchange
+        )
+        coupling.run(coupled, steps)
+        metrics, health = _judge(coupling, coupled, steps, thermal)
+        assert coupled.state is not None
+        return Heated(
+            geometries=placed(drawn, coupled.state.pad_motion),
+            groups=[one.group for one in joints.left],
+            shapes=joints.shapes(),
+            coupled=coupled,
+            steps=steps,
+            structure=_structure(structure, coupled, steps, list(drawn)),
+            effects={"thermal": _thermal_effect(thermal, steps), "flexible": flexible, "solder_force": force},
+            metrics=metrics | {"distinct_joints_computed": metric(len(joints.left))},
+            health=health,
+            continued=f"exchange {begun + 1}" if begun else "",
+        )
+
+
+def _start(structure: "Structure", drawn: "dict[str, JointGeometry]", case: BoardDropCase, first: LoadStep) -> Coupled:
+    """Begin with pads where the structure has them without solder."""
+    modes = structure.rigid_modes
+    alone = structure.solve(first.temperature, first.corner, *_nothing(structure))
+    return start(list(placed(drawn, alone.pad_motion).values()), case.solder, modes)
+
+
+def _nothing(structure: "Structure") -> tuple[np.ndarray, np.ndarray]:
+    """No wrenches, no rigid motions."""
+    motion = structure.rigid_modes.pad_motion
+    return np.zeros(motion.shape[1:]), np.zeros(len(motion))
+
+
+class Saved:
+    """The file of the coupling: a run that continues takes up the exchange that was going on."""
+
+    def __init__(self, folder: Path, inputs: tuple) -> None:
+        """Name the file and all that it depends on."""
+        from particles.checkpoint import Checkpoint
+
+        self._file = Checkpoint(folder / "coupling", inputs)
+
+    def read(self, joints: JointArray) -> Coupled | None:
+        """Return where the coupling was, and set the joints to that; None where nothing was saved."""
+        known = self._file.read()
+        if known is None:
+            return None
+        coupled, joints.left = known
+        return coupled
+
+    def write(self, coupled: Coupled, joints: JointArray) -> None:
+        """Save where coupling and joints are."""
+        self._file.write((coupled, joints.left))
+
+
+class Telling:
+    """What the terminal is told: load step, temperature, exchange, residual, and which joints are under way."""
+
+    def __init__(self, bar: ProgressBar, steps: list[LoadStep]) -> None:
+        """Begin at the first load step."""
+        self._bar, self._steps, self._done, self._number = bar, steps, 0, 0
+        self._residual = ""
+
+    def joints(self, shares: Shares) -> None:
+        """Show how far the joints of an exchange are."""
+        step = self._steps[min(self._done, len(self._steps) - 1)]
+        finished = sum(share >= 1.0 for share in shares.values())
+        busy = [f"{name} {share:.0%}" for name, share in shares.items() if 0.0 < share < 1.0]
+        self._bar(
+            self._done / len(self._steps),
+            f"load step {self._done + 1} of {len(self._steps)}, {step.temperature - KELVIN:.0f} degC, "
+            f"exchange {self._number + 1}{self._residual}: {finished} of {len(shares)} joints {' '.join(busy)}",
+        )
+
+    def exchange(self, exchange: Exchange) -> None:
+        """Note what an exchange left."""
+        if exchange.load_step != self._done:
+            self._done, self._number = exchange.load_step, 0
+        self._number += 1
+        self._residual = f", residual {exchange.residual:.1e}"
+
+
+def _thermal_effect(thermal: Thermal, steps: list[LoadStep]) -> dict:
+    low, high = (extreme(step.temperature for step in steps) for extreme in (min, max))
+    why = f"solder is liquid in {len(steps)} load steps from {low - 273.15:.4g} to {high - 273.15:.4g} degC"
+    return {
+        "on": high > low or high != thermal.reference,
+        "why": f"{why}, flat at {thermal.reference - 273.15:.4g} degC",
+    }
+
+
+def _judge(coupling: Coupling, coupled: Coupled, steps: list[LoadStep], thermal: Thermal) -> tuple[dict, dict]:
+    """Metrics and checks: residuals of all load steps, standoffs with and without the solder's forces."""
+    assert coupled.state is not None
+    structure, drawn = coupling.structure, coupling.drawn
+    last = final_exchanges(coupled)
+    residual = max(exchange.residual for exchange in last)
+    without, _ = _nothing(structure)
+    alone = structure.solve(steps[-1].temperature, steps[-1].corner, without, coupled.rigid)
+    spreads = [
+        float(np.ptp([joint.gap for joint in placed(drawn, state.pad_motion).values()]))
+        for state in (coupled.state, alone)
+    ]
+    gaps = [joint.gap for joint in placed(drawn, coupled.state.pad_motion).values()]
+    change = abs(spreads[0] - spreads[1])
+    metrics = {
+        "load_steps": metric(len(steps)),
+        "exchanges": metric(len(coupled.exchanges)),
+        "coupling_residual_max": metric(residual),
+        "standoff_min": metric(min(gaps), "m"),
+        "standoff_max": metric(max(gaps), "m"),
+        "standoff_spread": metric(spreads[0], "m"),
+        "standoff_spread_without_solder": metric(spreads[1], "m"),
+    }
+    health = {
+        "coupling_residual_max": at_most(residual, thermal.tolerance),
+        "standoff_spread_by_solder": at_most(change, SPREAD_CHANGE),
+    }
+    return metrics, health
+
+
+def final_exchanges(coupled: Coupled) -> list[Exchange]:
+    """The last exchange of each load step."""
+    return list({exchange.load_step: exchange for exchange in coupled.exchanges}.values())
+
+
+def _structure(
+    structure: "Structure", coupled: Coupled, steps: list[LoadStep], names: list[str]
+) -> dict[str, np.ndarray]:
+    """Collect what `structure.npz` holds."""
+    assert coupled.state is not None
+    last = final_exchanges(coupled)
+    counts = np.bincount([exchange.load_step for exchange in coupled.exchanges], minlength=len(steps))
+    return {
+        "points": structure.points,
+        "displacement": coupled.state.displacement,
+        "package": structure.package,
+        "joints": np.array(names),
+        "temperature": np.array([step.temperature for step in steps]),
+        "corner_displacement": np.array([step.corner for step in steps]),
+        "iterations": counts,
+        "force_residual": np.array([exchange.force_residual for exchange in last]),
+        "rigid_residual": np.array([exchange.rigid_residual for exchange in last]),
+        "pad_motion": np.array(coupled.pad_motion),
+    }

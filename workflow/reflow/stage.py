@@ -1,0 +1,105 @@
+"""The stage `reflow`: joints between rigid plates, or coupled with board and package that warm up."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from workflow import findings
+from workflow import reflow_pool as pool
+from workflow.board_drop_case import BoardDropCase
+from workflow.products import write_json
+from workflow.progress import progress_bar
+from workflow.reflow.heated import reflow_heated
+from workflow.stage_runner import Findings, Run
+
+if TYPE_CHECKING:
+    from meshing.pads import PadSite
+    from particles.geometry import JointGeometry
+    from particles.shape import JointShape
+
+
+@dataclass(frozen=True, slots=True)
+class Reflowed:
+    """Joints at rest.
+
+    Attributes:
+        pads: the table as solidified.
+        geometries: joint name -> geometry.
+        groups: joints that are alike.
+        shapes: name of the first of them -> its shape.
+        found: what is to be told of them besides their shapes.
+        structure: what `structure.npz` holds; nothing between rigid plates at rest.
+    """
+
+    pads: "list[PadSite]"
+    geometries: "Mapping[str, JointGeometry]"
+    groups: list[pool.Alike]
+    shapes: "dict[str, JointShape]"
+    found: Findings
+    structure: dict[str, np.ndarray] = field(default_factory=dict)
+
+
+def reflow(run: Run[BoardDropCase], folder: Path) -> Findings:
+    """Melt the solder of the array; write shapes, records of joints, pads as solidified."""
+    from meshing.pads import lifted, read_pads, write_pads
+    from particles.effects import decide_effects
+    from particles.products import write_shapes
+
+    case, solder = run.case, run.case.solder
+    drawn = read_pads(run.folder / "geometry/pads.json")
+    lying = lifted(drawn, case.package, case.warpage)
+    result = _between_plates(run, lying) if case.thermal is None else _heated(run, lying)
+    joints = pool.joint_records(result.groups, result.geometries, result.shapes)
+    touching = pool.mark_bridges(joints, result.pads, mirrored=case.board.symmetry == "quarter")
+    write_shapes(folder / "shapes.h5", result.shapes | pool.bridge_shapes(touching, result.geometries, solder))
+    write_json(folder / "joints.json", joints)
+    write_pads(folder / "pads.json", result.pads)
+    if result.structure:
+        _write_structure(run.folder / "geometry/assembly.msh", folder, result.structure)
+    highest = max(result.geometries.values(), key=lambda geometry: geometry.gap)
+    found = findings.of_reflow(joints, decide_effects(highest, solder))
+    return Findings(
+        found.metrics | result.found.metrics,
+        found.health | result.found.health,
+        found.effects | result.found.effects,
+        result.found.continued,
+    )
+
+
+def _between_plates(run: Run[BoardDropCase], pads: "list[PadSite]") -> Reflowed:
+    """Each distinct joint once, between plates that are where the pad table has them."""
+    geometries = pool.joint_geometries(pads)
+    groups = pool.distinct_joints(geometries)
+    distinct = {group.name: group.geometry for group in groups}
+    with progress_bar(f"reflow of {len(distinct)} distinct joints") as progress:
+        shapes, continued = pool.solve_joints(distinct, run.case.solder, run.cores, progress, run.checkpoints("reflow"))
+    found = Findings(continued=f"{continued} of {len(distinct)} joints" if continued else "")
+    return Reflowed(pads, geometries, groups, shapes, found)
+
+
+def _heated(run: Run[BoardDropCase], pads: "list[PadSite]") -> Reflowed:
+    """All joints through the load steps of temperature, with board and package."""
+    assert run.case.thermal is not None
+    heated = reflow_heated(run, run.case.thermal, pads)
+    solid = [
+        replace(pad, gap=place.gap, offset=place.offset, tilt=place.tilt)
+        for pad, place in zip(pads, heated.geometries.values(), strict=True)
+    ]
+    found = Findings(heated.metrics, heated.health, heated.effects, heated.continued)
+    return Reflowed(solid, heated.geometries, heated.groups, heated.shapes, found, heated.structure)
+
+
+def _write_structure(mesh: Path, folder: Path, structure: Mapping[str, np.ndarray]) -> None:
+    """Write displacements of board and package: `structure.npz`, and `structure.vtu` for ParaView."""
+    import meshio
+    from scipy.spatial import cKDTree
+
+    np.savez_compressed(folder / "structure.npz", **structure)
+    drawn = meshio.read(mesh)
+    cells = [block for block in drawn.cells if block.type == "hexahedron"]
+    node = cKDTree(structure["points"]).query(drawn.points)[1]
+    data = {"displacement": structure["displacement"][node], "package": structure["package"][node].astype(np.uint8)}
+    meshio.Mesh(drawn.points, cells, point_data=data).write(folder / "structure.vtu")
