@@ -92,7 +92,6 @@ class Coupled:
         pending: whether the joints have not answered to this state yet.
         exchanges: all that are done.
         pad_motion: `(joints, 2, 6)` of each load step that is in balance.
-        joints: what the joints keep besides their own files.
     """
 
     wrenches: Floats
@@ -103,7 +102,6 @@ class Coupled:
     pending: bool = False
     exchanges: list[Exchange] = field(default_factory=list)
     pad_motion: list[Floats] = field(default_factory=list)
-    joints: object = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,5 +1,6 @@
 """Reflow of an array coupled with board and package that warm up, float or are moved."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,7 +12,7 @@ from workflow.board_drop_case import BoardDropCase
 from workflow.findings import at_most, metric
 from workflow.progress import ProgressBar, progress_bar
 from workflow.reflow.array import JointArray
-from workflow.reflow.between import flexible_effect, open_structure, solder_force_effect
+from workflow.reflow.between import frozen_displacement, open_structure, thermal_effects
 from workflow.reflow.coupling import Coupled, Coupling, Exchange, placed
 from workflow.reflow.load_steps import LoadStep, load_steps
 from workflow.reflow.pool import JointPool, Shares
@@ -70,21 +71,29 @@ def reflow_heated(run: Run[BoardDropCase], thermal: Thermal, pads: "list[PadSite
         ReflowError: the reflow of a joint failed; it is named.
     """
     case, drawn, steps = run.case, joint_geometries(pads), load_steps(thermal)
-    flexible = flexible_effect(thermal)
+    effects = thermal_effects(case, thermal)
+    flexible, bends = (effects[name]["on"] for name in ("flexible", "solder_force"))
     with (
-        open_structure(case, thermal, run.folder / "geometry/assembly.msh", pads, flexible["on"]) as structure,
+        open_structure(
+            case, thermal, run.folder / "geometry/assembly.msh", pads, effects["flexible"]["on"]
+        ) as structure,
         JointPool(run.cores, len(pads)) as pool,
         progress_bar(f"reflow of {len(pads)} joints in {len(steps)} load steps") as bar,
     ):
         telling = Telling(bar, steps)
         joints = JointArray(case.solder, run.checkpoints("reflow"), pool, telling.joints)
         scale = scale_of(list(drawn.values()), case.solder, structure.rigid_modes, thermal.tolerance)
-        force = solder_force_effect(thermal, structure, flexible["on"], list(drawn.values()), scale.pull)
         saved = Saved(run.checkpoints("reflow"), (case.package, case.board, case.warpage, case.solder, thermal, pads))
         coupled = saved.read(joints) or _start(structure, drawn, case, steps[0])
         begun = len(coupled.exchanges)
         coupling = Coupling(
-            structure, joints, drawn, scale, force["on"], lambda state: saved.write(state, joints), telling.exchange
+            structure,
+            joints,
+            drawn,
+            scale,
+            effects["solder_force"]["on"],
+            lambda state: saved.write(state, joints),
+            telling.exchange,
         )
         coupling.run(coupled, steps)
         metrics, health = _judge(coupling, coupled, steps, thermal)
@@ -95,8 +104,13 @@ def reflow_heated(run: Run[BoardDropCase], thermal: Thermal, pads: "list[PadSite
             shapes=joints.shapes(),
             coupled=coupled,
             steps=steps,
-            structure=_structure(structure, coupled, steps, list(drawn)),
-            effects={"thermal": _thermal_effect(thermal, steps), "flexible": flexible, "solder_force": force},
+            structure=_structure(coupled, steps, list(drawn))
+            | {
+                "points": structure.points,
+                "displacement": frozen_displacement(case, structure, coupled.state.displacement),
+                "package": structure.package,
+            },
+            effects={"thermal": _thermal_effect(thermal, steps), **effects},
             metrics=metrics | {"distinct_joints_computed": metric(len(joints.left))},
             health=health,
             continued=f"exchange {begun + 1}" if begun else "",
@@ -133,9 +147,9 @@ class Saved:
         coupled, joints.left = known
         return coupled
 
-    def write(self, coupled: Coupled, joints: JointArray) -> None:
-        """Save where coupling and joints are."""
-        self._file.write((coupled, joints.left))
+    def writer(self, joints: JointArray) -> Callable[[Coupled], None]:
+        """Return what saves where coupling and joints are."""
+        return lambda coupled: self._file.write((coupled, joints.left))
 
 
 class Telling:
@@ -209,17 +223,11 @@ def final_exchanges(coupled: Coupled) -> list[Exchange]:
     return list({exchange.load_step: exchange for exchange in coupled.exchanges}.values())
 
 
-def _structure(
-    structure: "Structure", coupled: Coupled, steps: list[LoadStep], names: list[str]
-) -> dict[str, np.ndarray]:
-    """Collect what `structure.npz` holds."""
-    assert coupled.state is not None
+def _structure(coupled: Coupled, steps: list[LoadStep], names: list[str]) -> dict[str, np.ndarray]:
+    """Collect what `structure.npz` holds of the load steps."""
     last = final_exchanges(coupled)
     counts = np.bincount([exchange.load_step for exchange in coupled.exchanges], minlength=len(steps))
     return {
-        "points": structure.points,
-        "displacement": coupled.state.displacement,
-        "package": structure.package,
         "joints": np.array(names),
         "temperature": np.array([step.temperature for step in steps]),
         "corner_displacement": np.array([step.corner for step in steps]),
