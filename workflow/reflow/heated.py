@@ -74,9 +74,7 @@ def reflow_heated(run: Run[BoardDropCase], thermal: Thermal, pads: "list[PadSite
     effects = thermal_effects(case, thermal)
     flexible, bends = (effects[name]["on"] for name in ("flexible", "solder_force"))
     with (
-        open_structure(
-            case, thermal, run.folder / "geometry/assembly.msh", pads, effects["flexible"]["on"]
-        ) as structure,
+        open_structure(case, thermal, run.folder / "geometry/assembly.msh", pads, flexible) as structure,
         JointPool(run.cores, len(pads)) as pool,
         progress_bar(f"reflow of {len(pads)} joints in {len(steps)} load steps") as bar,
     ):
@@ -86,15 +84,7 @@ def reflow_heated(run: Run[BoardDropCase], thermal: Thermal, pads: "list[PadSite
         saved = Saved(run.checkpoints("reflow"), (case.package, case.board, case.warpage, case.solder, thermal, pads))
         coupled = saved.read(joints) or _start(structure, drawn, case, steps[0])
         begun = len(coupled.exchanges)
-        coupling = Coupling(
-            structure,
-            joints,
-            drawn,
-            scale,
-            effects["solder_force"]["on"],
-            lambda state: saved.write(state, joints),
-            telling.exchange,
-        )
+        coupling = Coupling(structure, joints, drawn, scale, bends, saved.writer(joints), telling.exchange)
         coupling.run(coupled, steps)
         metrics, health = _judge(coupling, coupled, steps, thermal)
         assert coupled.state is not None
