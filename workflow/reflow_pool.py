@@ -34,7 +34,10 @@ def joint_geometries(pads: "Sequence[PadSite]") -> "dict[str, JointGeometry]":
     """Return the geometry of each joint of a pad table, by name."""
     from particles.geometry import JointGeometry
 
-    return {pad.name: JointGeometry(pad.gap, pad.wetted_radius_board, pad.wetted_radius_package) for pad in pads}
+    return {
+        pad.name: JointGeometry(pad.gap, pad.wetted_radius_board, pad.wetted_radius_package, pad.offset, pad.tilt)
+        for pad in pads
+    }
 
 
 @dataclass(frozen=True, slots=True)
