@@ -61,7 +61,7 @@ def canonical(geometry: JointGeometry) -> tuple[JointGeometry, Orientation]:
     uphill = -turn_y / steepness, turn_x / steepness
     along, across = x * uphill[0] + y * uphill[1], y * uphill[0] - x * uphill[1]
     across = 0.0 if abs(across) < NOTHING else across
-    orientation = Orientation(atan2(uphill[1], uphill[0]), across < 0.0)
+    orientation = Orientation(atan2(uphill[1], uphill[0]), bool(across < 0.0))
     return replace(geometry, offset=(along, abs(across)), tilt=(0.0, -steepness)), orientation
 
 

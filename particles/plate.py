@@ -94,9 +94,9 @@ def joint_plates(geometry: JointGeometry) -> tuple[Plate, Plate]:
 def placed_geometry(geometry: JointGeometry, plates: Sequence[Plate]) -> JointGeometry:
     """The geometry of a joint whose plates have moved, seen from the board's plate."""
     board, package = plates
-    x, y, gap = board.local(package.origin[None])[0]
+    x, y, gap = map(float, board.local(package.origin[None])[0])
     turn = Rotation.from_matrix(board.frame @ package.frame.T).as_rotvec()
-    return replace(geometry, gap=gap, offset=(x, y), tilt=(turn[0], turn[1]))
+    return replace(geometry, gap=gap, offset=(x, y), tilt=(float(turn[0]), float(turn[1])))
 
 
 def slide(plates: Sequence[Plate], wall: NDArray[np.int8], field: Floats) -> Floats:

@@ -21,7 +21,7 @@ SQUARE = np.array([(x, y, 0.0) for x in (-1e-3, 1e-3) for y in (-1e-3, 1e-3)])
 PULL = np.pi * RADIUS * GAMMA
 
 
-def coupled(folder, structure, steps=(300.0,), rigid=0.0, bends=True, fail=None, solder=SOLDER):
+def coupled(folder, structure, steps=(300.0,), *, rigid=0.0, bends=True, fail=None, solder=SOLDER):  # noqa: PLR0913
     centres, modes = structure.centres, structure.rigid_modes
     drawn = {f"J{number}": JointGeometry(GAP, RADIUS, RADIUS) for number in range(len(centres))}
     geometries = list(drawn.values())

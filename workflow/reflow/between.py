@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fem.thermal.parameters import Thermal
-from workflow.board_drop_case import BoardDropCase
+from workflow.board_drop_case import PackageCase
 
 if TYPE_CHECKING:
     from fem.thermal.state import Structure
     from meshing.pads import PadSite
 
 
-def thermal_effects(case: BoardDropCase, thermal: Thermal) -> dict:
+def thermal_effects(case: PackageCase, thermal: Thermal) -> dict:
     """Decide which effects act between solder and structure; see `fem.thermal.effects.decide`."""
     from fem.thermal.effects import PackageSizes, decide
     from meshing.pads import corner_axis
@@ -31,11 +31,12 @@ def thermal_effects(case: BoardDropCase, thermal: Thermal) -> dict:
         pad_radius=package.package_pad.wetted_radius,
         standoff=package.standoff,
     )
-    return decide(thermal, case.materials.by_role, sizes, case.solder.surface_tension)
+    found = decide(thermal, case.materials.by_role, sizes, case.solder.surface_tension)
+    return {name: {"on": bool(effect["on"]), "why": effect["why"]} for name, effect in found.items()}
 
 
 def open_structure(
-    case: BoardDropCase, thermal: Thermal, mesh: Path, pads: "list[PadSite]", flexible: bool
+    case: PackageCase, thermal: Thermal, mesh: Path, pads: "list[PadSite]", flexible: bool
 ) -> "AbstractContextManager[Structure]":
     """Return board and package as a structure, in a process of its own where it bends; a context that ends it.
 
@@ -59,7 +60,7 @@ def open_structure(
     return StructureProcess(assembly) if flexible else nullcontext(RigidPlates(assembly))
 
 
-def frozen_displacement(case: BoardDropCase, structure: "Structure", displacement: np.ndarray) -> np.ndarray:
+def frozen_displacement(case: PackageCase, structure: "Structure", displacement: np.ndarray) -> np.ndarray:
     """Return the displacement `(n, 3)` with the lift of a prescribed warpage: rigid plates have it from the start."""
     from meshing.pads import lift
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fem.thermal.parameters import KELVIN, Thermal
-from workflow.board_drop_case import BoardDropCase
+from workflow.board_drop_case import PackageCase
 from workflow.findings import at_most, metric
 from workflow.progress import ProgressBar, progress_bar
 from workflow.reflow.array import JointArray
@@ -58,13 +58,14 @@ class Heated:
     continued: str
 
 
-def reflow_heated(run: Run[BoardDropCase], thermal: Thermal, pads: "list[PadSite]") -> Heated:
+def reflow_heated(run: Run[PackageCase], thermal: Thermal, pads: "list[PadSite]", mesh: Path) -> Heated:
     """Take the solder through all load steps.
 
     Args:
         run: the run, with the products of the geometry.
         thermal: course of temperatures.
         pads: as drawn, with a prescribed warpage where the plates are rigid.
+        mesh: of board and package, flat.
 
     Raises:
         NotInBalance: a load step did not come into balance.
@@ -74,7 +75,7 @@ def reflow_heated(run: Run[BoardDropCase], thermal: Thermal, pads: "list[PadSite
     effects = thermal_effects(case, thermal)
     flexible, bends = (effects[name]["on"] for name in ("flexible", "solder_force"))
     with (
-        open_structure(case, thermal, run.folder / "geometry/assembly.msh", pads, flexible) as structure,
+        open_structure(case, thermal, mesh, pads, flexible) as structure,
         JointPool(run.cores, len(pads)) as pool,
         progress_bar(f"reflow of {len(pads)} joints in {len(steps)} load steps") as bar,
     ):
@@ -107,7 +108,7 @@ def reflow_heated(run: Run[BoardDropCase], thermal: Thermal, pads: "list[PadSite
         )
 
 
-def _start(structure: "Structure", drawn: "dict[str, JointGeometry]", case: BoardDropCase, first: LoadStep) -> Coupled:
+def _start(structure: "Structure", drawn: "dict[str, JointGeometry]", case: PackageCase, first: LoadStep) -> Coupled:
     """Begin with pads where the structure has them without solder."""
     modes = structure.rigid_modes
     alone = structure.solve(first.temperature, first.corner, *_nothing(structure))

@@ -9,7 +9,7 @@ import numpy as np
 
 from workflow import findings
 from workflow import reflow_pool as pool
-from workflow.board_drop_case import BoardDropCase
+from workflow.board_drop_case import PackageCase
 from workflow.products import write_json
 from workflow.progress import progress_bar
 from workflow.reflow.heated import reflow_heated
@@ -42,7 +42,7 @@ class Reflowed:
     structure: dict[str, np.ndarray] = field(default_factory=dict)
 
 
-def reflow(run: Run[BoardDropCase], folder: Path) -> Findings:
+def reflow(run: Run[PackageCase], folder: Path) -> Findings:
     """Melt the solder of the array; write shapes, records of joints, pads as solidified."""
     from meshing.pads import lifted, read_pads, write_pads
     from particles.effects import decide_effects
@@ -51,14 +51,14 @@ def reflow(run: Run[BoardDropCase], folder: Path) -> Findings:
     case, solder = run.case, run.case.solder
     drawn = read_pads(run.folder / "geometry/pads.json")
     lying = lifted(drawn, case.package, case.warpage)
-    result = _between_plates(run, lying) if case.thermal is None else _heated(run, lying)
+    result = _between_plates(run, lying) if case.thermal is None else _heated(run, lying, folder / "heated.msh")
     joints = pool.joint_records(result.groups, result.geometries, result.shapes)
     touching = pool.mark_bridges(joints, result.pads, mirrored=case.board.symmetry == "quarter")
     write_shapes(folder / "shapes.h5", result.shapes | pool.bridge_shapes(touching, result.geometries, solder))
     write_json(folder / "joints.json", joints)
     write_pads(folder / "pads.json", result.pads)
     if result.structure:
-        _write_structure(run.folder / "geometry/assembly.msh", folder, result.structure)
+        _write_structure(folder, result.structure)
     highest = max(result.geometries.values(), key=lambda geometry: geometry.gap)
     found = findings.of_reflow(joints, decide_effects(highest, solder))
     return Findings(
@@ -69,7 +69,7 @@ def reflow(run: Run[BoardDropCase], folder: Path) -> Findings:
     )
 
 
-def _between_plates(run: Run[BoardDropCase], pads: "list[PadSite]") -> Reflowed:
+def _between_plates(run: Run[PackageCase], pads: "list[PadSite]") -> Reflowed:
     """Each distinct joint once, between plates that are where the pad table has them."""
     geometries = pool.joint_geometries(pads)
     groups = pool.distinct_joints(geometries)
@@ -80,10 +80,13 @@ def _between_plates(run: Run[BoardDropCase], pads: "list[PadSite]") -> Reflowed:
     return Reflowed(pads, geometries, groups, shapes, found)
 
 
-def _heated(run: Run[BoardDropCase], pads: "list[PadSite]") -> Reflowed:
-    """All joints through the load steps of temperature, with board and package."""
+def _heated(run: Run[PackageCase], pads: "list[PadSite]", mesh: Path) -> Reflowed:
+    """All joints through the load steps of temperature, with board and package, which are meshed for it."""
+    from meshing.heated_assembly import write_heated_assembly
+
     assert run.case.thermal is not None
-    heated = reflow_heated(run, run.case.thermal, pads)
+    write_heated_assembly(run.case.package, run.case.board, mesh)
+    heated = reflow_heated(run, run.case.thermal, pads, mesh)
     solid = [
         replace(pad, gap=place.gap, offset=place.offset, tilt=place.tilt)
         for pad, place in zip(pads, heated.geometries.values(), strict=True)
@@ -92,13 +95,13 @@ def _heated(run: Run[BoardDropCase], pads: "list[PadSite]") -> Reflowed:
     return Reflowed(solid, heated.geometries, heated.groups, heated.shapes, found, heated.structure)
 
 
-def _write_structure(mesh: Path, folder: Path, structure: Mapping[str, np.ndarray]) -> None:
+def _write_structure(folder: Path, structure: Mapping[str, np.ndarray]) -> None:
     """Write displacements of board and package: `structure.npz`, and `structure.vtu` for ParaView."""
     import meshio
     from scipy.spatial import cKDTree
 
     np.savez_compressed(folder / "structure.npz", **structure)
-    drawn = meshio.read(mesh)
+    drawn = meshio.read(folder / "heated.msh")
     cells = [block for block in drawn.cells if block.type == "hexahedron"]
     node = cKDTree(structure["points"]).query(drawn.points)[1]
     data = {"displacement": structure["displacement"][node], "package": structure["package"][node].astype(np.uint8)}
