@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from fem.materials.roles import Materials
+from fem.thermal.parameters import Thermal
 from workflow import shock_cooling
 from workflow.board_deflection import kinematics_effect
 from workflow.board_drop_case import BoardDropCase, PackageCase
@@ -12,6 +13,7 @@ from workflow.case import available_cores
 from workflow.fine_joints import coarse_joints_effect
 from workflow.identical_joints import identical_joints_effect
 from workflow.problems import Problem
+from workflow.reflow.forecast import forecast_heated
 from workflow.reflow_pool import distinct_joints, joint_geometries
 from workflow.shock_forecast import (
     PartForecast,
@@ -36,6 +38,7 @@ class Forecast:
         parts: part of the mesh -> its size and step in the shock; those of the two-scale run where there is one.
         shock: time steps and wall time; None without a shock.
         seconds: stage -> predicted wall time [s], where there is a prediction.
+        load_steps: of a reflow with temperatures, those with liquid solder; else 0.
     """
 
     effects: dict
@@ -45,6 +48,7 @@ class Forecast:
     parts: dict[str, PartForecast]
     shock: ShockForecast | None
     seconds: dict[str, float]
+    load_steps: int = 0
 
 
 def forecast(case: PackageCase) -> Forecast:
@@ -66,7 +70,21 @@ def forecast(case: PackageCase) -> Forecast:
         shock=None,
         seconds={"reflow": sum(reflow_seconds(case.solder, geometry) for geometry in distinct) / workers},
     )
+    of_reflow = of_reflow if case.thermal is None else _heated(of_reflow, case, case.thermal)
     return _with_shock(of_reflow, case) if isinstance(case, BoardDropCase) else of_reflow
+
+
+def _heated(of_reflow: Forecast, case: PackageCase, thermal: Thermal) -> Forecast:
+    """Foresee a reflow in load steps: how many joints the structure makes distinct is not known, all may be."""
+    heated = forecast_heated(case, thermal)
+    share = of_reflow.joints / of_reflow.distinct
+    return replace(
+        of_reflow,
+        effects=of_reflow.effects | heated.effects,
+        distinct=of_reflow.joints,
+        load_steps=len(heated.steps),
+        seconds={"reflow": of_reflow.seconds["reflow"] * share * heated.exchanges},
+    )
 
 
 def _with_shock(of_reflow: Forecast, case: BoardDropCase) -> Forecast:

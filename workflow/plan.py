@@ -138,7 +138,9 @@ def _sizes(outlook: Forecast) -> Table:
 def _joints(outlook: Forecast) -> str:
     smallest, largest = outlook.particles
     particles = f"{smallest}" if smallest == largest else f"{smallest} to {largest}"
-    return f"{outlook.joints} joints, {outlook.distinct} of them distinct, {particles} particles each"
+    distinct = f"up to {outlook.distinct}" if outlook.load_steps else f"{outlook.distinct}"
+    heated = f", {outlook.load_steps} load steps with liquid solder" if outlook.load_steps else ""
+    return f"{outlook.joints} joints, {distinct} of them distinct, {particles} particles each{heated}"
 
 
 def _shock(case: BoardDropCase, shock: ShockForecast) -> Table:

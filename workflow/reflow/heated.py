@@ -14,6 +14,7 @@ from workflow.progress import ProgressBar, progress_bar
 from workflow.reflow.array import JointArray
 from workflow.reflow.between import frozen_displacement, open_structure, thermal_effects
 from workflow.reflow.coupling import Coupled, Coupling, Exchange, placed
+from workflow.reflow.forecast import thermal_effect
 from workflow.reflow.load_steps import LoadStep, load_steps
 from workflow.reflow.pool import JointPool, Shares
 from workflow.reflow.start import scale_of, start
@@ -101,7 +102,7 @@ def reflow_heated(run: Run[PackageCase], thermal: Thermal, pads: "list[PadSite]"
                 "displacement": frozen_displacement(case, structure, coupled.state.displacement),
                 "package": structure.package,
             },
-            effects={"thermal": _thermal_effect(thermal, steps), **effects},
+            effects={"thermal": thermal_effect(thermal, steps), **effects},
             metrics=metrics | {"distinct_joints_computed": metric(len(joints.left))},
             health=health,
             continued=f"exchange {begun + 1}" if begun else "",
@@ -168,15 +169,6 @@ class Telling:
             self._done, self._number = exchange.load_step, 0
         self._number += 1
         self._residual = f", residual {exchange.residual:.1e}"
-
-
-def _thermal_effect(thermal: Thermal, steps: list[LoadStep]) -> dict:
-    low, high = (extreme(step.temperature for step in steps) for extreme in (min, max))
-    why = f"solder is liquid in {len(steps)} load steps from {low - 273.15:.4g} to {high - 273.15:.4g} degC"
-    return {
-        "on": high > low or high != thermal.reference,
-        "why": f"{why}, flat at {thermal.reference - 273.15:.4g} degC",
-    }
 
 
 def _judge(coupling: Coupling, coupled: Coupled, steps: list[LoadStep], thermal: Thermal) -> tuple[dict, dict]:
