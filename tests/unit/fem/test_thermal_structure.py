@@ -156,6 +156,21 @@ def test_heights_count_from_the_boards_pads(floating):
     assert np.ptp(state.pad_motion[:, 0, 2]) > 0.0  # the board sags between its holes
 
 
+@pytest.mark.parametrize("name", ["floating", "moved"])
+def test_a_board_does_not_give_way_as_a_whole(name, request):
+    structure = request.getfixturevalue(name)
+    push = np.zeros((4, 2, 6))
+    push[:, 0, 2] = -1e-3
+    rest, pushed = (at_reference(structure, load).pad_motion for load in (0.0 * push, push))
+    assert np.abs(pushed - rest).max() < 1e-15
+    pull = np.zeros((4, 2, 6))
+    pull[0, 0, 2] = 1e-3
+    lifted = at_reference(structure, pull).pad_motion - rest
+    assert lifted[:, 0, 2].mean() == pytest.approx(0.0, abs=1e-16)
+    assert 1e-10 < lifted[0, 0, 2] < 1e-7
+    assert np.abs(lifted[:, 1]).max() < 1e-15
+
+
 def test_force_of_solder_may_be_left_out(tmp_path):
     assembly = small_structure(tmp_path, effects={"solder_force": "off"})
     structure = ThermalStructure.build(MPI.COMM_SELF, assembly)
