@@ -12,6 +12,7 @@ from fem.tie import net_load
 ENERGIES = ("kinetic", "internal", "plastic", "hourglass", "damping", "external", "interface")
 SUMS = len(ENERGIES) + 1 + 16
 JUDGED = 1e-6  # of the largest energy: a step energy below it is round-off
+ROUND_OFF = 1e-10  # of the energy stored at time zero: less than that is no motion
 OVERDRAWN = 1.01  # energy taken by damping over energy given: more is possible only above the damped critical step
 EXPLANATION = "most likely the time step is too large for this mesh and material, or a load acts on what nothing holds"
 
@@ -114,6 +115,7 @@ class Ledger:
             raise EnergyError(f"energies are not numbers {self._when(time)}: {self._cause(found)}")
         if time == 0.0:
             self.initial, self.stored = present, {name: found[name] for name in ("internal", "hourglass")}
+            self.trivial = max(self.trivial, ROUND_OFF * sum(abs(energy) for energy in self.stored.values()))
         balance = present - self.initial
         self.largest = max(self.largest, *(abs(found[name] - self.stored.get(name, 0.0)) for name in ENERGIES[:6]))
         self._judge_step(found, float(sums[len(ENERGIES)]), time)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from workflow.board_drop_case import BoardDropCase
 from workflow.fem_launch import run_fem
+from workflow.kernel_cache import digest
 from workflow.plan_table import duration
 from workflow.problems import Problem
 from workflow.shock_forecast import PartForecast, role_of
@@ -72,7 +73,7 @@ def _cool(run: Run[BoardDropCase], folder: Path, request: dict) -> None:
     files = digest_of_files(
         *(Path(name) for name in (*request["meshes"], *filter(None, [request.get("coarse_joints")])))
     )
-    identity = hashlib.sha256(f"{json.dumps(cooling, sort_keys=True)} {files}".encode()).hexdigest()
+    identity = hashlib.sha256(f"{json.dumps(cooling, sort_keys=True)} {files} {digest()}".encode()).hexdigest()
     written = folder / IDENTITY
     if written.exists() and written.read_text() == identity:
         return

@@ -10,6 +10,7 @@ import pytest
 from tests.support.workflow_command import SMALL_CASE
 from workflow.case import read_case
 from workflow.problems import CaseError
+from workflow.shock_cooling import begun
 from workflow.stage_runner import Findings, Run
 from workflow.stages import shock
 
@@ -43,6 +44,18 @@ def test_both_modes_begin_with_one_cooling(run_folder):
             assert history["von_mises_board"][0] == pytest.approx(joints["von_mises_board"], rel=1e-6)
             assert history["plastic_strain_max"][0] == pytest.approx(joints["plastic_strain_max"], rel=1e-9)
     assert found.metrics["critical_joint_stress_error"]["value"] < 0.05
+    continues_from_the_same_cooling(run_folder)
+
+
+def continues_from_the_same_cooling(run_folder: Path) -> None:
+    """A stage that was killed during its shock finds what cooling found, to the same bits."""
+    kept = run_folder / ".shock.checkpoints/residual/cooling.npz"
+    written, request = kept.stat().st_mtime_ns, json.loads((run_folder / "shock/dns/input.json").read_text())
+    again = run_folder / "again"
+    again.mkdir()
+    request = begun(Run(run_folder, read_case(SMALL_CASE, COOLED), 2), again, request)
+    assert Path(request["cooling"]).read_bytes() == kept.read_bytes()
+    assert kept.stat().st_mtime_ns == written
 
 
 @pytest.mark.parametrize(
