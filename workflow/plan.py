@@ -155,6 +155,9 @@ def _shock(case: BoardDropCase, shock: ShockForecast) -> Table:
     if shock.search:
         table.add_row("coarse run", f"about {duration(shock.search)}", "all joints coarse: it finds the critical ones")
     table.add_row("two-scale", f"about {duration(shock.two_scale)}", _placement(case) + _absent("two_scale", case))
+    if case.shock.identical_joints:
+        again = shock.two_scale if "two_scale" in case.shock.numerics.modes else shock.dns
+        table.add_row("identical joints", f"about {duration(again)}", "the first mode again: what shapes change")
     part = f"; the first {short(shock.dns_share * case.shock.duration)}" if shock.dns_share < 1.0 else ""
     dns = f"all {every} ranks on one model{part}" + _absent("dns", case)
     table.add_row("DNS", f"about {duration(shock.dns)}", dns)
