@@ -14,7 +14,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.own_job import own_environment
+from fem.own_job import end_with_parent, own_environment
 from fem.thermal.state import Assembly, RigidModes, State
 
 GRACE = 5.0  # seconds that the process has to end when it is told to
@@ -100,7 +100,7 @@ class StructureProcess:
 
 def _serve(pipe: Connection, assembly: Assembly) -> None:
     """Build the structure and answer until the other end closes the pipe; errors are answered as text."""
-    threading.Thread(target=_end_with_parent, daemon=True).start()
+    threading.Thread(target=end_with_parent, daemon=True).start()
     own = own_environment(os.environ)
     os.environ.clear()
     os.environ.update(own)
@@ -121,11 +121,3 @@ def _serve(pipe: Connection, assembly: Assembly) -> None:
                 pipe.send(structure.solve(*loads))
             except ValueError as error:
                 pipe.send(str(error))
-
-
-def _end_with_parent() -> None:
-    """End this process when its parent was killed."""
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)

@@ -8,6 +8,8 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from typing import Any, TypeVar
 
+from fem.own_job import end_with_parent
+
 Job = TypeVar("Job")
 Result = TypeVar("Result")
 Report = Callable[[float], None]
@@ -96,15 +98,7 @@ def _start_worker(reports: Any, threads: int) -> None:
     global _progress
     os.environ["NUMBA_NUM_THREADS"] = str(threads)  # numba, which is loaded after this, would take all cores
     _progress = reports
-    threading.Thread(target=_end_with_parent, daemon=True).start()
-
-
-def _end_with_parent() -> None:
-    """End this process when its parent was killed: it would compete with the workers of the run that continues."""
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)
+    threading.Thread(target=end_with_parent, daemon=True).start()
 
 
 def _work(work: Callable[[Any, Report], Result], name: str, job: Any) -> Result:
