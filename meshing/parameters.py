@@ -67,6 +67,7 @@ class JointNumerics(Parameters):
 class Package(Parameters):
     """A ball grid array package: the array of joints, substrate and die.
 
+    ``surfaces`` are files (STL, PLY, VTU; lengths in ``surface_unit``) of joints whose shape is given, by their names.
     ``coarse_joint_numerics`` is for joints of a shock that are not fine: solder alone, also in place of their copper.
     """
 
@@ -83,6 +84,8 @@ class Package(Parameters):
     numerics: PackageNumerics = PackageNumerics()
     joint_numerics: JointNumerics = JointNumerics()
     coarse_joint_numerics: JointNumerics = JointNumerics(core=2, rings=0, layers=2)
+    surfaces: dict[str, str] = Field(default_factory=dict)
+    surface_unit: Literal["um", "mm", "m"] = "mm"
 
 
 class Holes(Parameters):

@@ -13,7 +13,7 @@ from meshing.joint_place import JointPlace
 from meshing.package_side import PackageSide
 from meshing.pads import PadSite
 from meshing.parameters import Package
-from meshing.surface import PACKAGE_PAD, ClosedSurface, pad_planes
+from meshing.surface import BOARD_PAD, PACKAGE_PAD, ClosedSurface, pad_planes
 from meshing.swept import swept_solder
 
 __all__ = ["JointMesh", "JointMeshError", "joint_quality", "mesh_bridge", "mesh_coarse_joint", "mesh_joint"]
@@ -50,6 +50,7 @@ def mesh_bridge(surface: ClosedSurface, sites: Sequence[PadSite], package: Packa
     Raises: as ``mesh_joint``.
     """
     first, second = sites
+    _check_distance(surface, first, second)
     turn = math.atan2(second.y - first.y, second.x - first.x)
     cosine, sine = math.cos(turn), math.sin(turn)
     turned = surface.points @ np.array([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]])
@@ -88,6 +89,16 @@ def _mesh(
     _check_place(surface, place)
     ways = attempts(surface, package.joint_numerics, place)
     return first_good(surface, ways, site.name, partial(build_joint, sites=sites, copper=copper, place=place))
+
+
+def _check_distance(surface: ClosedSurface, first: PadSite, second: PadSite) -> None:
+    """Raise JointMeshError where the body lies across a plane of symmetry: its second joint is then an image."""
+    lower = surface.points[np.unique(surface.triangles[surface.boundary == BOARD_PAD])]
+    between, distance = float(np.ptp(lower[:, 0])), math.dist((first.x, first.y), (second.x, second.y))
+    widest = distance + 4.0 * max(first.pad_radius_board, second.pad_radius_board)
+    if not distance < between < widest:
+        told = f"its pads span {between:.4g} m, allowed {distance:.4g} to {widest:.4g} m"
+        raise JointMeshError(f"joints {first.name} and {second.name}: {told}; an image of one may be meant")
 
 
 def _check_place(surface: ClosedSurface, place: JointPlace) -> None:

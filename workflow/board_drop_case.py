@@ -9,7 +9,7 @@ from fem.parameters import Shock
 from fem.thermal.parameters import Thermal
 from meshing.parameters import Board, Package, Warpage
 from particles.parameters import Solder
-from workflow import fields
+from workflow import fields, given_surfaces
 from workflow.case_kind import Case, of_particles
 from workflow.problems import Problem
 from workflow.stage_table import Pipeline, package_pipeline
@@ -32,6 +32,16 @@ class PackageCase(Case):
         """The stages: with temperatures, the reflow needs the mesh of board and package."""
         return package_pipeline(heated=self.thermal is not None, dropped=False)
 
+    @classmethod
+    def located(cls, table: dict, folder: Path) -> dict:
+        """Take files of surfaces as relative to the folder of the case file."""
+        return given_surfaces.located(table, folder)
+
+    @property
+    def files(self) -> dict[str, Path]:
+        """Surfaces of joints."""
+        return given_surfaces.files(self.package)
+
     def problems(self) -> list[Problem]:
         """Find parameters that make no possible package, joint or board together."""
         from fem.thermal import checks as thermal_checks
@@ -48,7 +58,8 @@ class PackageCase(Case):
         )
         geometries = joint_geometries(pad_table(self.package, self.board, self.warpage))
         of_solder = of_particles(particles_checks.problems(self.solder, geometries, self.package.pitch))
-        return self.in_words(heated) + of_solder
+        given = given_surfaces.problems(self.package, geometries)
+        return self.in_words(heated) + of_solder + list(given)
 
     def in_words(self, found: Iterable[Any]) -> list[Problem]:
         """Say what checks of meshing or fem found in the words of a case file, values in the user's units."""
@@ -73,16 +84,17 @@ class BoardDropCase(PackageCase):
 
     @classmethod
     def located(cls, table: dict, folder: Path) -> dict:
-        """Take the shock's table as relative to the folder of the case file."""
+        """Take surfaces and the shock's table as relative to the folder of the case file."""
         shock = table.get("shock")
         if isinstance(shock, dict) and isinstance(shock.get("table"), str):
             shock["table"] = str((folder / shock["table"]).resolve())
-        return table
+        return super().located(table, folder)
 
     @property
     def files(self) -> dict[str, Path]:
-        """The shock's table."""
-        return {"shock.table": Path(self.shock.table)} if self.shock.table is not None else {}
+        """Surfaces of joints, and the shock's table."""
+        table = {"shock.table": Path(self.shock.table)} if self.shock.table is not None else {}
+        return super().files | table
 
     def problems(self) -> list[Problem]:
         """Find parameters that make no possible package, joint, board or shock together."""

@@ -157,7 +157,10 @@ def leaves(parameters: BaseModel, prefix: str = "") -> Iterator[tuple[str, objec
             yield from leaves(value, f"{prefix}{name}.")
         elif holds_named_tables(field):
             for own_name, table in value.items():
-                yield from leaves(table, f"{prefix}{name}.{own_name}.")
+                if isinstance(table, BaseModel):
+                    yield from leaves(table, f"{prefix}{name}.{own_name}.")
+                else:
+                    yield f"{prefix}{name}.{own_name}", table, FieldInfo.from_annotation(type(table))
         else:
             yield prefix + name, value, field
 

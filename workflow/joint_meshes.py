@@ -6,12 +6,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from workflow.board_drop_case import BoardDropCase, PackageCase
+from workflow.bridged_joints import mesh_bridges
 from workflow.fine_joints import needs_coarse_joints
 from workflow.identical_joints import PREFIX, identical_sphere
 from workflow.products import write_json
 from workflow.stage_runner import Run
 
 if TYPE_CHECKING:
+    from meshing.joint_mesh import JointMesh
     from meshing.package_side import PackageSide
     from meshing.pads import PadSite
     from meshing.surface import ClosedSurface
@@ -27,9 +29,13 @@ def mesh_real_joints(run: Run[PackageCase], folder: Path) -> dict[str, dict]:
     case, structure = run.case, run.folder / "reflow/structure.npz"
     displacement = read_computed(structure) if structure.exists() else prescribed(case.package, case.warpage)
     side = write_displaced_assembly(run.folder / "geometry/assembly.msh", displacement, folder / "assembly.msh")
-    sites = read_pads(run.folder / "reflow/pads.json")
-    bodies = [(read_surface(run.folder / f"surface/{site.name}.vtu"), site) for site in sites]
-    return mesh_array(bodies, side, case, folder)
+    sites = {site.name: site for site in read_pads(run.folder / "reflow/pads.json")}
+    surfaces = {path.stem: read_surface(path) for path in sorted((run.folder / "surface").glob("*.vtu"))}
+    bodies = [(surfaces[name], site) for name, site in sites.items() if name in surfaces]
+    bridged = mesh_bridges(surfaces, sites, case, side)
+    found = mesh_array(bodies, side, case, folder)
+    found |= {"bridged_": _write(bridged, "bridged_", case, folder)} if bridged else {}
+    return {kind: quality for kind, quality in found.items() if quality}
 
 
 def mesh_identical_joints(run: Run[PackageCase], folder: Path) -> dict[str, dict]:
@@ -69,17 +75,28 @@ def mesh_array(
     Returns:
         Kind of joint mesh, which begins the names of its metrics -> joint -> quality.
     """
-    from meshing.joints_file import write_joints
-    from meshing.solder_mesh import JointMesh, joint_quality, mesh_coarse_joint, mesh_joint
-    from workflow.forecast import with_critical_step
+    from meshing.solder_mesh import mesh_coarse_joint, mesh_joint
 
     kinds: dict[str, Callable[..., JointMesh]] = {prefix: mesh_joint}
     if isinstance(case, BoardDropCase) and needs_coarse_joints(case.shock.coupling):
         kinds[f"{prefix}coarse_"] = mesh_coarse_joint
-    qualities = {}
-    for kind, mesh_of in kinds.items():
-        meshes = [mesh_of(surface, site, case.package, side) for surface, site in bodies]
-        write_joints(meshes, folder / f"{kind}joints.msh")
-        qualities[kind] = {mesh.name: with_critical_step(joint_quality(mesh), case.materials) for mesh in meshes}
-        write_json(folder / f"{kind}quality.json", qualities[kind])
-    return qualities
+    return {
+        kind: _write([mesh_of(surface, site, case.package, side) for surface, site in bodies], kind, case, folder)
+        for kind, mesh_of in kinds.items()
+    }
+
+
+def _write(meshes: "Sequence[JointMesh]", kind: str, case: PackageCase, folder: Path) -> dict[str, dict]:
+    """Write meshes, the tetrahedra of those that are free-form, and their quality; return this by joint."""
+    from meshing.joints_file import write_joints
+    from meshing.quadratic_tetrahedra import write_tetrahedra
+    from meshing.solder_mesh import joint_quality
+    from workflow.forecast import with_critical_step
+
+    write_joints(list(meshes), folder / f"{kind}joints.msh")
+    for mesh in meshes:
+        if mesh.tetrahedra is not None:
+            write_tetrahedra(folder / f"free_form_{mesh.name}.msh", mesh.name, mesh.tetrahedra)
+    quality = {mesh.name: with_critical_step(joint_quality(mesh), case.materials) for mesh in meshes}
+    write_json(folder / f"{kind}quality.json", quality)
+    return quality

@@ -159,9 +159,9 @@ def bridge_shapes(
     return bridges
 
 
-def refuse_joints_without_mesh(records: Mapping[str, dict]) -> None:
+def refuse_joints_without_mesh(records: Mapping[str, dict], verdicts: Sequence[str] = ("bridged", "open")) -> None:
     """Raise ReflowError where joints are bridged or open: they have no shape of their own between their pads."""
-    for verdict in ("bridged", "open"):
+    for verdict in verdicts:
         names = [name for name, record in records.items() if record["verdict"] == verdict]
         if names:
             raise ReflowError(f"{', '.join(names)} {verdict}: there is no such joint to mesh, see reflow/joints.json")

@@ -107,7 +107,7 @@ def package_pipeline(heated: bool, dropped: bool) -> Pipeline:
         ("geometry", "surface"),
         ("solder_mesh/assembly.msh", "solder_mesh/joints.msh", "solder_mesh/quality.json"),
     )
-    surface = Stage("surface", (), ("reflow",), ("surface/surfaces.json",))
+    surface = Stage("surface", ("package.surfaces", "package.surface_unit"), ("reflow",), ("surface/surfaces.json",))
     shock = Stage("shock", ("shock", "materials", *COOLED), ("solder_mesh",), ())
     stages = (geometry, reflow, surface, solder_mesh, *((shock,) if dropped else ()))
     follows = tuple(stage.name for stage in stages)

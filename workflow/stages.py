@@ -36,21 +36,10 @@ def geometry(run: Run[PackageCase], folder: Path) -> Findings:
 
 
 def surface(run: Run[PackageCase], folder: Path) -> Findings:
-    """Close the surface of each joint, in its own orientation, and measure it."""
-    from meshing.surface import close_surface, measure, write_surface
-    from particles.orientation import Orientation, oriented
-    from particles.products import read_shapes
-    from workflow.reflow_pool import refuse_joints_without_mesh
+    """Close the surface of each joint, or take the one that the user gives, and measure it."""
+    from workflow.joint_surfaces import write_surfaces
 
-    joints = read_json(run.folder / "reflow/joints.json")
-    refuse_joints_without_mesh(joints)
-    shapes, surfaces = read_shapes(run.folder / "reflow/shapes.h5"), {}
-    for name, joint in joints.items():
-        shape = oriented(shapes[joint["shape"]], Orientation(joint["turn"], joint["mirror"]))
-        closed = close_surface(shape.surface_points, shape.triangles, shape.ring_board, shape.ring_package)
-        write_surface(folder / f"{name}.vtu", closed)
-        measures = measure(closed)
-        surfaces[name] = {**measures, "volume_error": measures["volume"] / shape.metrics["volume"][0] - 1.0}
+    surfaces = write_surfaces(run, folder)
     write_json(folder / "surfaces.json", surfaces)
     return findings.of_surface(surfaces)
 
@@ -71,9 +60,11 @@ def solder_mesh(run: Run[PackageCase], folder: Path) -> Findings:
 
 def shock(run: Run[BoardDropCase], folder: Path) -> Findings:
     """Drop the board: each mode is one MPI run of the package fem; two modes are compared, and identical joints."""
+    from workflow.reflow_pool import refuse_joints_without_mesh
     from workflow.shock_cooling import with_cooling
     from workflow.shock_launch import find_fine_joints, read_results, run_mode
 
+    refuse_joints_without_mesh(read_json(run.folder / "reflow/joints.json"))
     fine = find_fine_joints(run, folder)
     for mode in run.case.shock.numerics.modes:
         run_mode(run, folder / mode, mode, fine)

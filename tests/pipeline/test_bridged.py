@@ -1,4 +1,4 @@
-"""An overfilled array: joints that touch are reported, flowed into one, and never meshed."""
+"""An overfilled array: joints that touch are reported, flowed into one, meshed as it, and never shocked."""
 
 import json
 
@@ -19,6 +19,9 @@ def test_bridged_joints_are_told_and_end_the_run(tmp_path):
     (bridge,) = [shape for name, shape in read_shapes(tmp_path / "reflow/shapes.h5").items() if "+" in name]
     assert bridge.verdict == "bridged"
     assert abs(bridge.metrics["volume_drift"][0]) < 1e-3
+    meshes = json.loads((tmp_path / "solder_mesh/bridged_quality.json").read_text())
+    assert len(meshes) == 1 and (tmp_path / "solder_mesh/bridged_joints.msh").exists()
+    assert all(mesh["volume_error"] < 3e-3 and mesh["minimum_scaled_jacobian"] > 0.2 for mesh in meshes.values())
     assert reflowshock("report", tmp_path, settings=OVERFILLED).returncode == 0
     assert "as one body" in (tmp_path / "report.html").read_text()
     assert json.loads((tmp_path / "summary.json").read_text())["health"]["joints_bridged"]["value"] == 4

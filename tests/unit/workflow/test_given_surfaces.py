@@ -1,0 +1,136 @@
+"""Joints whose surfaces the user gives: refused by key before anything runs, taken instead of what was reflowed."""
+
+import re
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import meshio
+import numpy as np
+import pytest
+
+from meshing.assembly import write_assembly
+from meshing.outlines import outlines
+from meshing.pads import pad_table, write_pads
+from meshing.parameters import Warpage
+from meshing.surface import enclosed_volume, read_surface
+from particles.products import write_shapes
+from particles.shape import JointShape, Snapshot
+from tests.support.free_form_surfaces import bridged_pair
+from tests.support.joint_surfaces import barrel, revolve
+from tests.support.meshing_models import MM
+from tests.support.workflow_command import SMALL_CASE
+from workflow import findings
+from workflow.case import display_values, read_case
+from workflow.inputs import stage_inputs
+from workflow.joint_meshes import mesh_real_joints
+from workflow.joint_surfaces import write_surfaces
+from workflow.problems import CaseError
+from workflow.products import write_json
+from workflow.stage_runner import Run
+
+
+@pytest.fixture
+def case_file(tmp_path) -> Path:
+    """A case beside a surface of A4, another 10 % wider than the reflowed ones."""
+    shutil.copy(SMALL_CASE, tmp_path / "case.toml")
+    given = barrel(0.35 * MM, 0.06 * MM)
+    meshio.write(tmp_path / "a4.stl", meshio.Mesh(given.points / MM, [("triangle", given.triangles)]))
+    return tmp_path / "case.toml"
+
+
+def read(case_file: Path, **surfaces: str):
+    settings = [f'package.surfaces.{name}="{path}"' for name, path in surfaces.items()]
+    return read_case(case_file, ["warpage.corner=0.08 mm", *settings])
+
+
+def test_files_are_beside_the_case_and_count_by_what_they_hold(case_file):
+    case = read(case_file, A4="a4.stl")
+    assert case.files["package.surfaces.A4"] == case_file.parent / "a4.stl"
+    assert display_values(case)["package.surfaces.A4"] == str(case_file.parent / "a4.stl")
+    before = stage_inputs(case, case.pipeline["surface"])
+    with (case_file.parent / "a4.stl").open("ab") as file:
+        file.write(b" ")
+    assert stage_inputs(case, case.pipeline["surface"]) != before
+
+
+@pytest.mark.parametrize(
+    ("name", "path", "told"),
+    [
+        ("A44", "a4.stl", r"package\.surfaces\.A44.*no joint.*A4"),
+        ("A4", "a4.obj", r"package\.surfaces\.A4.*no format.*\.stl, \.ply, \.vtu"),
+        ("A4", "a5.stl", r"package\.surfaces\.A4.*no such file"),
+    ],
+)
+def test_what_does_not_fit_is_refused_by_key(case_file, name, path, told):
+    with pytest.raises(CaseError) as caught:
+        read(case_file, **{name: path})
+    assert any(re.search(told, f"{p.key} {p.message} {p.allowed} {p.hint}") for p in caught.value.problems)
+
+
+def shape_of(surface, arrays) -> JointShape:
+    points, triangles, lower, upper = arrays
+    nothing = np.zeros((len(points), 3))
+    metrics = {"volume": (enclosed_volume(surface), "m^3")}
+    return JointShape(
+        points,
+        nothing,
+        nothing[:, 0],
+        points,
+        triangles,
+        (lower, upper),
+        {"step": np.zeros(1)},
+        [Snapshot(0.0, points, triangles)],
+        metrics,
+        "ok",
+    )
+
+
+@pytest.fixture
+def run(case_file) -> Run:
+    """A run folder whose reflow ended with barrels, and with A3 and B3 bridged."""
+    case = read_case(case_file, ["warpage.corner=0 mm", 'package.surfaces.A4="a4.stl"', "package.standoff=0.35 mm"])
+    folder = case_file.parent / "run"
+    for name in ("geometry", "reflow", "surface", "solder_mesh"):
+        (folder / name).mkdir(parents=True)
+    write_assembly(case.package, case.board, folder / "geometry/assembly.msh")
+    sites = pad_table(case.package, case.board, Warpage())
+    write_pads(folder / "reflow/pads.json", sites)
+    arrays = revolve(np.full(9, 0.24 * MM), 0.35 * MM)
+    pair = bridged_pair(0.35 * MM, 1.0 * MM, 0.34 * MM, 0.1 * MM)
+    free = pair.triangles[pair.boundary == 0]
+    rings = [line.astype(np.int32) for line in outlines(free)]
+    single = shape_of(barrel(0.35 * MM, 0.0), arrays)
+    both = replace(
+        single,
+        surface_points=pair.points,
+        triangles=free,
+        rings=tuple(rings),
+        verdict="bridged",
+        points=pair.points,
+        velocity=np.zeros_like(pair.points),
+        pressure=np.zeros(len(pair.points)),
+        metrics={"volume": (enclosed_volume(pair), "m^3")},
+    )
+    write_shapes(folder / "reflow/shapes.h5", {"A3": single, "A3+B3": both})
+    verdicts = {"A3": "bridged", "A4": "ok", "B3": "bridged", "B4": "ok"}
+    records = {
+        name: {"shape": "A3", "verdict": verdict, "turn": 0.0, "mirror": False} for name, verdict in verdicts.items()
+    }
+    write_json(folder / "reflow/joints.json", records)
+    return Run(folder, case, 1)
+
+
+def test_given_reflowed_and_bridged_surfaces_are_written_and_meshed(run):
+    measures = write_surfaces(run, run.folder / "surface")
+    assert set(measures) == {"A4", "B4", "A3+B3"}
+    assert measures["A4"]["max_width"] == pytest.approx(0.6 * MM, rel=0.02)
+    assert measures["B4"]["max_width"] == pytest.approx(0.48 * MM, rel=0.02)
+    assert findings.of_surface(measures).health["surface_volume_error_max"]["ok"]
+    given = read_surface(run.folder / "surface/A4.vtu")
+    assert enclosed_volume(given) == pytest.approx(measures["A4"]["volume"])
+    qualities = mesh_real_joints(run, run.folder / "solder_mesh")
+    assert set(qualities[""]) == {"A4", "B4"} and set(qualities["bridged_"]) == {"A3+B3"}
+    assert (run.folder / "solder_mesh/free_form_A3+B3.msh").exists()
+    found = findings.of_solder_mesh(qualities, {})
+    assert all(check["ok"] for check in found.health.values())

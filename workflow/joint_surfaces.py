@@ -1,0 +1,54 @@
+"""Closed surfaces of all joints of an array: as they froze, as the user gives them, of two that are bridged."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from workflow.board_drop_case import PackageCase
+from workflow.bridged_joints import BETWEEN
+from workflow.products import read_json
+from workflow.reflow_pool import refuse_joints_without_mesh
+from workflow.stage_runner import Run
+
+if TYPE_CHECKING:
+    from particles.shape import JointShape
+
+
+def write_surfaces(run: Run[PackageCase], folder: Path) -> dict[str, dict]:
+    """Write the surface of each joint, in its own orientation, and of bridged ones in common; return their measures.
+
+    Raises:
+        ReflowError: joints are open: they have no surface between their pads.
+    """
+    from meshing.pads import read_pads
+    from meshing.surface import measure, write_surface
+    from meshing.user_surface import load_surface
+    from particles.orientation import Orientation, oriented
+    from particles.products import read_shapes
+
+    package, joints = run.case.package, read_json(run.folder / "reflow/joints.json")
+    sites = {site.name: site for site in read_pads(run.folder / "reflow/pads.json")}
+    flowed = {name: joint for name, joint in joints.items() if name not in package.surfaces}
+    refuse_joints_without_mesh(flowed, ("open",))
+    shapes = read_shapes(run.folder / "reflow/shapes.h5")
+    bodies = {name: shape for name, shape in shapes.items() if BETWEEN in name}
+    for name, joint in flowed.items():
+        if joint["verdict"] != "bridged":
+            bodies[name] = oriented(shapes[joint["shape"]], Orientation(joint["turn"], joint["mirror"]))
+    measures = {}
+    for name, shape in bodies.items():
+        closed = _closed(shape)
+        write_surface(folder / f"{name}.vtu", closed)
+        own = measure(closed)
+        measures[name] = {**own, "volume_error": own["volume"] / shape.metrics["volume"][0] - 1.0}
+    for name, path in package.surfaces.items():
+        closed = load_surface(Path(path), package.surface_unit, sites[name])
+        write_surface(folder / f"{name}.vtu", closed)
+        measures[name] = {**measure(closed), "given": path}
+    return measures
+
+
+def _closed(shape: "JointShape"):
+    """Close the free surface of a shape on all its pads."""
+    from meshing.surface import close_rings
+
+    return close_rings(shape.surface_points, shape.triangles, shape.rings)
