@@ -1,12 +1,19 @@
 """Where a joint goes: from its own frame to its pad on the board, its head laid on the package's underside."""
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
-from meshing.package_side import PackageSide
 from meshing.pads import PadSite
 from meshing.surface import PACKAGE_PAD, ClosedSurface
+
+
+class Underside(Protocol):
+    """The underside of a package."""
+
+    def height(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """Return the height (k,) over the board's top face at points (k,), (k,) [m]; ValueError beyond the package."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,12 +29,12 @@ class JointPlace:
     """
 
     site: PadSite
-    side: PackageSide
+    side: Underside
     copper: float
     head: tuple[float, float, float]
 
     @classmethod
-    def of(cls, surface: ClosedSurface, site: PadSite, side: PackageSide, copper: float) -> "JointPlace":
+    def of(cls, surface: ClosedSurface, site: PadSite, side: Underside, copper: float) -> "JointPlace":
         """Take the upper face from the joint's closed surface (least squares)."""
         face = surface.points[np.unique(surface.triangles[surface.boundary == PACKAGE_PAD])]
         columns = np.column_stack([np.ones(len(face)), face[:, :2] - face[:, :2].mean(axis=0)])

@@ -9,8 +9,7 @@ import numpy as np
 
 from meshing.attempts import attempts, first_good
 from meshing.joint_mesh import JointMesh, JointMeshError, build_joint, joint_quality
-from meshing.joint_place import JointPlace
-from meshing.package_side import PackageSide
+from meshing.joint_place import JointPlace, Underside
 from meshing.pads import PadSite
 from meshing.parameters import Package
 from meshing.surface import BOARD_PAD, PACKAGE_PAD, ClosedSurface, pad_planes
@@ -22,7 +21,7 @@ GAP_TOLERANCE = 1.0e-3
 HEAD_TOLERANCE = 0.03  # of the gap: mean distance of the solder's upper face from the package's pad
 
 
-def mesh_joint(surface: ClosedSurface, site: PadSite, package: Package, side: PackageSide) -> JointMesh:
+def mesh_joint(surface: ClosedSurface, site: PadSite, package: Package, side: Underside) -> JointMesh:
     """Mesh a joint and put it in its place.
 
     Args:
@@ -38,7 +37,7 @@ def mesh_joint(surface: ClosedSurface, site: PadSite, package: Package, side: Pa
     return _mesh(surface, site, [site], (package, side))
 
 
-def mesh_bridge(surface: ClosedSurface, sites: Sequence[PadSite], package: Package, side: PackageSide) -> JointMesh:
+def mesh_bridge(surface: ClosedSurface, sites: Sequence[PadSite], package: Package, side: Underside) -> JointMesh:
     """Mesh two joints that are one body.
 
     Args:
@@ -64,7 +63,7 @@ def mesh_bridge(surface: ClosedSurface, sites: Sequence[PadSite], package: Packa
     return _mesh(replace(surface, points=turned), middle, sites, (package, side))
 
 
-def mesh_coarse_joint(surface: ClosedSurface, site: PadSite, package: Package, side: PackageSide) -> JointMesh:
+def mesh_coarse_joint(surface: ClosedSurface, site: PadSite, package: Package, side: Underside) -> JointMesh:
     """Mesh a joint by few hexahedra of solder alone, which also fill the place of the copper on its wetted discs.
 
     Args and errors as ``mesh_joint``.
@@ -80,7 +79,7 @@ def mesh_coarse_joint(surface: ClosedSurface, site: PadSite, package: Package, s
 
 
 def _mesh(
-    surface: ClosedSurface, site: PadSite, sites: Sequence[PadSite], above: tuple[Package, PackageSide]
+    surface: ClosedSurface, site: PadSite, sites: Sequence[PadSite], above: tuple[Package, Underside]
 ) -> JointMesh:
     """Mesh a body whose own frame is at a site, on the pads of its sites."""
     package, side = above

@@ -17,9 +17,9 @@ def located(table: dict, folder: Path) -> dict:
     """Take files of surfaces in the table of a case as relative to the folder of the case file."""
     package = table.get("package")
     surfaces = package.get("surfaces") if isinstance(package, dict) else None
-    for name, path in surfaces.items() if isinstance(surfaces, dict) else ():
-        if isinstance(path, str):
-            surfaces[name] = str((folder / path).resolve())
+    if isinstance(surfaces, dict):
+        for name, path in surfaces.items():
+            surfaces[name] = str((folder / path).resolve()) if isinstance(path, str) else path
     return table
 
 

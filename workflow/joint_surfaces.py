@@ -34,7 +34,7 @@ def write_surfaces(run: Run[PackageCase], folder: Path) -> dict[str, dict]:
     for name, joint in flowed.items():
         if joint["verdict"] != "bridged":
             bodies[name] = oriented(shapes[joint["shape"]], Orientation(joint["turn"], joint["mirror"]))
-    measures = {}
+    measures: dict[str, dict] = {}
     for name, shape in bodies.items():
         closed = _closed(shape)
         write_surface(folder / f"{name}.vtu", closed)
