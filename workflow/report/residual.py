@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from workflow.products import read_json
-from workflow.report.tables import mega, number, quantity
+from workflow.report.tables import mega, micro, number, quantity
 
 FOLDERS = ("residual_two_scale", "residual_dns", "residual")  # of modes with fine joints of their own, or of all modes
 SIDES = ("von_mises_board", "von_mises_package")
@@ -34,7 +34,8 @@ def add_residual(shock: Path, parts: list[str], context: dict) -> None:
 
 def in_words(metrics: Mapping[str, Any]) -> str:
     """Say what stress cooling leaves in the joints, and how the package's warpage changes."""
-    warped, cold = (quantity(metrics[name]) for name in ("solidified_warpage", "room_temperature_warpage"))
+    lifts = (metrics[name]["value"] for name in ("solidified_warpage", "room_temperature_warpage"))
+    warped, cold = (f"{micro(lift)} µm" for lift in lifts)
     told = f"Cooling from solidification changes the warpage of the package from {warped} to {cold}"
     if "residual_stress_joint" in metrics:
         joint, stress = metrics["residual_stress_joint"]["value"], quantity(metrics["residual_stress_largest"])

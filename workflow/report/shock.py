@@ -104,8 +104,8 @@ def _add_shape_effect(shock: Path, history: dict, told: tuple[list[dict], dict],
     (joints, metrics), identical = told, histories["identical"]
     context["shape_effect"] = shape_effect.in_words(history, identical)
     if "identical_joint_standoff" in metrics:
-        heights = [tables.quantity(metrics[f"{name}_joint_standoff"]) for name in ("critical", "identical")]
-        context["shape_effect"] += f" Its standoff is {heights[0]}, that of identical joints {heights[1]}."
+        real, flat = (tables.micro(metrics[f"{name}_joint_standoff"]["value"]) for name in ("critical", "identical"))
+        context["shape_effect"] += f" Its standoff is {real} µm, that of identical joints {flat} µm."
     context["curves"]["shape_effect"] = shape_effect.curves(history, identical)
     context["tables"]["shape_effect"] = shape_effect.table(history, identical, joints)
 

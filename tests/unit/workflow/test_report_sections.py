@@ -192,4 +192,4 @@ def test_residual_stress_is_ranked_by_the_worse_pad():
         "residual_stress_joint": {"value": "A4", "unit": ""},
         "residual_stress_largest": {"value": 30e6, "unit": "Pa"},
     }
-    assert "from 0.08 mm to 0.02 mm and leaves 30 MPa at the pads of A4" in residual.in_words(metrics)
+    assert "from 80.0 µm to 20.0 µm and leaves 30 MPa at the pads of A4" in residual.in_words(metrics)
