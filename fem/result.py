@@ -1,6 +1,7 @@
 """``history.npz`` and ``result.json``: what a run leaves besides its fields."""
 
 import json
+import resource
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -136,7 +137,13 @@ def model_summary(comms: Communicators, request: RunInput, models: dict[Role, Mo
         "windows": plan.windows,
         "added_mass": steps.added_mass,
         "model_mass": steps.model_mass,
+        "memory": comms.world.allreduce(peak_memory()),
     }
+
+
+def peak_memory() -> int:
+    """Return the largest memory [B] that this process has had so far."""
+    return 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 
 
 def updates_a_window(summary: dict[str, Any], coupling: dict[str, Any]) -> int:
@@ -154,6 +161,7 @@ def cost_metrics(summary: dict[str, Any], updates: int, timings: Timings) -> dic
         "element_updates_per_second": quantity(windows * updates / timings.windows, "1/s"),
         "step_ratio": quantity(substeps),
         "added_mass": quantity(summary["added_mass"], "kg"),
+        "peak_memory": quantity(summary["memory"], "B"),
     }
 
 

@@ -21,6 +21,8 @@ def add_block_force(pointer, columns, blocks, displacement, force):
         force: ``(>= n, 3)`` [N], added to.
     """
     for row in range(len(pointer) - 1):
+        if pointer[row] == pointer[row + 1]:  # most nodes, where few elements of a model are assembled
+            continue
         vx, vy, vz = displacement[row, 0], displacement[row, 1], displacement[row, 2]
         x = y = z = 0.0
         for k in range(np.uintp(pointer[row]), np.uintp(pointer[row + 1])):
