@@ -225,7 +225,7 @@ def width_change_bound(geometry: JointGeometry) -> float:
     """Bound on the relative change of a joint's width, at equal gap, by the package's offset and tilt.
 
     By symmetry the change is of second order. The factors bound barrels and hourglasses of equal discs, 1.2 to 2.1
-    radii apart, to 0.3 radii and 5 deg (test_particles_oriented.py); in line with Surface Evolver.
+    radii apart, to 0.3 radii and 5 deg; widths of Surface Evolver keep to them (test_particles_leaning_joints.py).
     """
     radius = min(geometry.radius_board, geometry.radius_package)
     lean = float(np.hypot(*geometry.offset)) / radius + TILT_LEVER * float(np.hypot(*geometry.tilt))
