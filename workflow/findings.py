@@ -7,7 +7,7 @@ from typing import Any
 
 from workflow.stage_runner import Findings
 
-WIDTH_ERROR = 0.05  # of a joint's width, against the Young-Laplace shape of its volume, pads and gap
+WIDTH_ERROR = 0.01  # of a joint's width, against the Young-Laplace shape of its volume, pads and gap
 WIDTH_REFERENCE_ERROR = 2.0e-3  # of that shape, which is coaxial: what offset and tilt may change of the width
 VOLUME_DRIFT = 1.0e-3  # of a joint's volume during its reflow
 SURFACE_VOLUME_ERROR = 1.0e-3  # of a closed surface, against the particles' own volume

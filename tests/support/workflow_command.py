@@ -33,14 +33,14 @@ def wait_until(condition: Callable[[], bool], seconds: float = 60.0) -> None:
         time.sleep(0.05)
 
 
-def break_off(line: list[str], folder: Path, end: signal.Signals, whom: str) -> None:
-    """Start a run and, as soon as its reflow has a checkpoint, send a signal to the "command" or to its "stage".
+def break_off(line: list[str], folder: Path, end: signal.Signals, whom: str, *, pattern: str = "*") -> None:
+    """Start a run and, as soon as its reflow has such a checkpoint, send a signal to the "command" or to its "stage".
 
     Nothing that it started may be left, and the command fails.
     """
     checkpoints = folder / ".reflow.checkpoints"
     process = subprocess.Popen(line, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
-    wait_until(lambda: checkpoints.exists() and any(path.suffix == "" for path in checkpoints.iterdir()))
+    wait_until(lambda: checkpoints.exists() and any(path.suffix == "" for path in checkpoints.glob(pattern)))
     children = psutil.Process(process.pid).children(recursive=True)
     for victim in [process] if whom == "command" else [child for child in children if "stage" in child.cmdline()]:
         victim.send_signal(end)
