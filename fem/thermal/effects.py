@@ -12,7 +12,7 @@ from fem.materials.parameters import Material
 from fem.thermal.parameters import Switch, Thermal
 
 NEGLIGIBLE = 1e-3  # of the gap, or of the pad's radius across it: below it an effect is left out
-MARGIN = 1.25  # on the bow: the ring of substrate around the die, held back by it, adds 5 % in bga_drop
+MARGIN = 1.25  # on the bow: a ring of substrate around the die, which the die holds back, bends it by up to that much
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,13 +75,12 @@ def rigidity(lower: Layer, upper: Layer) -> float:
 def warpage_number(thermal: Thermal, materials: Mapping[str, Material], sizes: PackageSizes) -> float:
     """Return by how much heating changes gaps over the standoff, or shifts pads over their radius; the larger one.
 
-    Between centre and outermost joint: bow under the die and the slope from there on, and expansion of package (its
-    layers held together) against that of the board.
+    Between centre and outermost joint: bow as if the die covered the package, and expansion of the package (its layers
+    held together) against that of the board.
     """
     rise = thermal.peak - thermal.reference
     lower, upper = Layer.of(materials["substrate"], sizes.substrate), Layer.of(materials["die"], sizes.die)
-    bent = min(sizes.die_reach, sizes.reach)
-    bow = MARGIN * abs(curvature(lower, upper)) * rise * bent * (sizes.reach - 0.5 * bent)
+    bow = MARGIN * abs(curvature(lower, upper)) * rise * sizes.reach**2 / 2.0
     forces = [layer.both_ways * layer.thickness for layer in (lower, upper)]
     together = sum(force * layer.expansion for force, layer in zip(forces, (lower, upper), strict=True)) / sum(forces)
     grown = (together, lower.expansion)

@@ -129,22 +129,23 @@ def test_a_whole_package_is_held_level_by_four_corners(tmp_path):
     assert force @ corners == pytest.approx(-load[:, 1, 2] @ pads.centres[:, 1, :2])
 
 
-def test_warpage_of_a_package_with_a_ring_of_substrate_around_its_die(tmp_path):
+@pytest.mark.parametrize(("side", "thickness"), [(8.0, 0.4), (6.0, 0.775), (4.0, 0.4)])
+def test_warpage_of_a_package_with_a_ring_of_substrate_around_its_die(tmp_path, side, thickness):
     parts = package(
         rows=10,
         columns=10,
         substrate={"length": 11.0 * MM, "width": 11.0 * MM, "thickness": 0.4 * MM},
-        die={"length": 8.0 * MM, "width": 8.0 * MM, "thickness": 0.4 * MM},
+        die={"length": side * MM, "width": side * MM, "thickness": thickness * MM},
     )
     plate = board(length=60.0 * MM, width=50.0 * MM)
     write_heated_assembly(parts, plate, tmp_path / "heated.msh")
     lower = np.array([(site.x, site.y, site.z_board) for site in pad_table(parts, plate, Warpage())])
     centres = np.stack([lower, lower + [0.0, 0.0, parts.standoff]], axis=1)
     pads = Pads([str(number) for number in range(len(lower))], centres, np.full((len(lower), 2), 0.24 * MM))
-    sizes = replace(SIZES, die_reach=np.hypot(4.0, 4.0) * MM, reach=np.hypot(4.5, 4.5) * MM, standoff=parts.standoff)
+    sizes = replace(SIZES, die=thickness * MM, reach=np.hypot(4.5, 4.5) * MM, standoff=parts.standoff)
     structure = ThermalStructure.build(
         MPI.COMM_SELF, Assembly(tmp_path / "heated.msh", pads, Materials(), Thermal(), gravity=9.81)
     )
     change = gaps(structure, Thermal().peak) - gaps(structure, REFERENCE)
     number = warpage_number(Thermal(), Materials().by_role, sizes)
-    assert 0.75 * number < np.ptp(change[:, 2]) / parts.standoff < number
+    assert 0.4 * number < np.ptp(change[:, 2]) / parts.standoff < number
