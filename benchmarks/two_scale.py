@@ -41,9 +41,10 @@ BARS = {"local_steps": ALL_FINE, "one_joint_fine": CRITICAL_FINE}
 REDUCED = ("package.joint_numerics.core=2", "package.joint_numerics.rings=1", "package.joint_numerics.layers=6")
 FULL = (
     "package.joint_numerics.core=6",
-    "package.joint_numerics.rings=2",
+    "package.joint_numerics.rings=3",
     "package.joint_numerics.layers=14",
     "board.numerics.coarse_size='0.5 mm'",
+    "board.numerics.layers=6",
 )
 # A board on which bending reaches the joints soon; the package is the same.
 SHORT = (*REDUCED, "board.length='60 mm'", "board.width='40 mm'")
