@@ -73,6 +73,8 @@ def _add_table(blocks: list[str], key: str, parameters: BaseModel) -> None:
         value = getattr(parameters, name)
         if isinstance(value, BaseModel):
             tables.append((f"{key}.{name}".lstrip("."), value))
+        elif holds_named_tables(field) and not models_of(field):
+            lines.append(f"{name} = {{ {', '.join(f'{own} = {as_toml(item)}' for own, item in value.items())} }}")
         elif holds_named_tables(field):
             tables += [(f"{key}.{name}.{own_name}".lstrip("."), table) for own_name, table in value.items()]
         elif value is None and models_of(field):

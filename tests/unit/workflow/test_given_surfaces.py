@@ -2,6 +2,7 @@
 
 import re
 import shutil
+import tomllib
 from dataclasses import replace
 from pathlib import Path
 
@@ -22,6 +23,7 @@ from tests.support.meshing_models import MM
 from tests.support.workflow_command import SMALL_CASE
 from workflow import findings
 from workflow.case import display_values, read_case
+from workflow.case_text import case_text
 from workflow.inputs import stage_inputs
 from workflow.joint_meshes import mesh_real_joints
 from workflow.joint_surfaces import write_surfaces
@@ -52,6 +54,12 @@ def test_files_are_beside_the_case_and_count_by_what_they_hold(case_file):
     with (case_file.parent / "a4.stl").open("ab") as file:
         file.write(b" ")
     assert stage_inputs(case, case.pipeline["surface"]) != before
+
+
+def test_a_case_with_them_can_be_written_as_a_template(case_file):
+    case = read(case_file, A4="a4.stl")
+    table = tomllib.loads(case_text(case, "small"))
+    assert table["package"]["surfaces"] == {"A4": str(case_file.parent / "a4.stl")}
 
 
 @pytest.mark.parametrize(
