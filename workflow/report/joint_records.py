@@ -15,7 +15,8 @@ Column = tuple[str, str, Callable[[Any], str]]  # head, key of the record, text 
 def joint_records(run_folder: Path) -> list[dict]:
     """Join pad table, reflow metrics, measures of the surface and mesh quality: one flat record a joint, SI units.
 
-    A joint whose surface was given has no reflow; stages that have not run contribute nothing.
+    Of a joint whose surface was given that counts, not its reflow; angles are in degrees. Stages that have not run
+    contribute nothing.
     """
     found = (
         read_json(run_folder / "reflow/joints.json"),
@@ -27,11 +28,12 @@ def joint_records(run_folder: Path) -> list[dict]:
 
 def _record(pad: Mapping, reflow: Mapping, surfaces: Mapping, quality: Mapping) -> dict:
     name = pad["name"]
-    joint = reflow.get(name, {})
-    shape = joint.get("shape", name)
+    surface = surfaces.get(name, {})
+    joint = {} if "given" in surface else reflow.get(name, {})
     metrics = {key: metric["value"] for key, metric in joint.get("metrics", {}).items()}
-    record = surfaces.get(name, surfaces.get(shape, {})) | pad | {"shape": shape} | metrics
-    record |= {"verdict": joint.get("verdict", "given")} | quality.get(name, {})
+    surface = {key: np.degrees(value) if "angle" in key else value for key, value in surface.items()}
+    told = {"shape": joint.get("shape", name), "verdict": joint.get("verdict", "given")}
+    record: dict[str, Any] = {**surface, **pad, **told, **metrics, **quality.get(name, {})}
     angles = (record.get("contact_angle_board"), record.get("contact_angle_package"))
     if None not in angles:
         record["angles"] = f"{angles[0]:.1f} / {angles[1]:.1f}"
@@ -46,6 +48,12 @@ def by_shape(joints: Sequence[Record]) -> list[tuple[list[str], list[Record]]]:
         groups.setdefault(joint["shape"], []).append(joint)
     ordered = sorted(groups.values(), key=lambda group: group[0]["standoff"])
     return [([joint["name"] for joint in group], group) for group in ordered]
+
+
+def bridge_records(run_folder: Path) -> list[dict]:
+    """Return name and mesh quality of joints that became one body."""
+    quality = _optional(run_folder / "solder_mesh/bridged_quality.json")
+    return [{"name": name, "shape": name, "standoff": 0.0} | found for name, found in quality.items()]
 
 
 def _optional(path: Path) -> dict:

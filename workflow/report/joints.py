@@ -6,7 +6,7 @@ from typing import Any
 
 from workflow.products import read_json
 from workflow.report import joint_tables, mesh_tables
-from workflow.report.joint_records import joint_records
+from workflow.report.joint_records import bridge_records, joint_records
 
 BRIDGE_CAPTION = "as one body: particles and free surface, right by pressure above ambient."
 
@@ -20,12 +20,13 @@ def add_joints(run_folder: Path, context: dict) -> None:
     from workflow.report.pictures import embedded
 
     joints = joint_records(run_folder)
+    meshed = joints + bridge_records(run_folder)
     context["headline"] += headline(joints)
     context["tables"] |= {
         "verdicts": joint_tables.verdicts(run_folder),
         "shapes": joint_tables.shapes(joints),
-        "meshes": mesh_tables.meshes(joints),
-        "missed_tries": mesh_tables.missed_tries(joints),
+        "meshes": mesh_tables.meshes(meshed),
+        "missed_tries": mesh_tables.missed_tries(meshed),
     }
     context["curves"]["map"] = array_map(joints)
     context["pictures"]["gallery"], _ = embedded(lambda path: render_gallery(run_folder, joints, path))

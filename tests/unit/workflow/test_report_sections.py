@@ -125,14 +125,15 @@ def test_records_are_complete_for_what_has_run(tmp_path):
     pads = [{"name": name, "x": 0.0, "y": 0.0, "tilt": [3e-3, 4e-3]} for name in ("A4", "B4")]
     metrics = {"standoff": {"value": 3e-4, "unit": "m"}}
     (tmp_path / "reflow/pads.json").write_text(json.dumps(pads))
-    (tmp_path / "reflow/joints.json").write_text(
-        json.dumps({"A4": {"shape": "A4", "verdict": "ok", "metrics": metrics}})
-    )
+    joint = {"shape": "A4", "verdict": "ok", "metrics": metrics}
+    (tmp_path / "reflow/joints.json").write_text(json.dumps({"A4": joint, "B4": joint}))
+    by_ct = {"standoff": 2e-4, "contact_angle_board": 2.0, "contact_angle_package": 2.5, "given": "b4.stl"}
     (tmp_path / "surface").mkdir()
-    (tmp_path / "surface/surfaces.json").write_text(json.dumps({"A4": {"standoff": 1.0}, "B4": {"standoff": 2e-4}}))
+    (tmp_path / "surface/surfaces.json").write_text(json.dumps({"A4": {"standoff": 1.0}, "B4": by_ct}))
     reflowed, given = joint_records(tmp_path)
     assert (reflowed["standoff"], reflowed["verdict"], reflowed["tilted"]) == (3e-4, "ok", pytest.approx(5e-3))
     assert (given["standoff"], given["verdict"], given["shape"]) == (2e-4, "given", "B4")
+    assert given["angles"] == "114.6 / 143.2"
 
 
 def test_maps_show_what_the_joints_have():
