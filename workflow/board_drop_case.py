@@ -48,6 +48,7 @@ class PackageCase(Case):
         from meshing import checks as meshing_checks
         from meshing.pads import pad_table
         from particles import checks as particles_checks
+        from workflow.reflow import forecast as reflow_forecast
         from workflow.reflow_pool import joint_geometries
 
         contradictions = meshing_checks.problems(self.package, self.board, self.warpage)
@@ -58,6 +59,7 @@ class PackageCase(Case):
         )
         geometries = joint_geometries(pad_table(self.package, self.board, self.warpage))
         of_solder = of_particles(particles_checks.problems(self.solder, geometries, self.package.pitch))
+        of_solder += reflow_forecast.problems(self.solder, geometries) if self.thermal else []
         given = given_surfaces.problems(self.package, geometries)
         return self.in_words(heated) + of_solder + list(given)
 

@@ -11,6 +11,9 @@ from particles.joint_stiffness import stiffness_estimate
 from particles.parameters import Solder, SolderNumerics
 from particles.young_laplace import joint_meridian
 from tests.support.reflow_structures import NAMES, Bow, joints_here, rigid_modes
+from tests.support.workflow_command import SMALL_CASE
+from workflow.case import read_case
+from workflow.problems import CaseError
 from workflow.reflow.coupling import Coupling, NotInBalance, placed
 from workflow.reflow.load_steps import LoadStep, load_steps
 from workflow.reflow.start import floating_height, scale_of, start
@@ -138,3 +141,12 @@ def test_load_steps_are_those_with_liquid_solder():
     steps = load_steps(lead_free)
     assert [step.temperature - KELVIN for step in steps] == pytest.approx([217, 223, 245, 223, 217])
     assert steps[2].corner == pytest.approx(-1e-4) and steps[0].corner == pytest.approx(-1e-4 * 192 / 220)
+
+
+def test_a_process_too_short_for_rest_is_refused():
+    with pytest.raises(CaseError, match=r"solder\.process_time.*load steps of \[thermal\] are at rest"):
+        read_case(
+            SMALL_CASE,
+            ['warpage.corner="0 mm"', "thermal.steps=2", 'solder.process_time="5 ms"'],
+            oversubscribe=True,
+        )

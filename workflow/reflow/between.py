@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fem.thermal.parameters import Thermal
-from workflow.board_drop_case import PackageCase
 
 if TYPE_CHECKING:
     from fem.thermal.state import Structure
     from meshing.pads import PadSite
+    from workflow.board_drop_case import PackageCase
 
 
-def thermal_effects(case: PackageCase, thermal: Thermal) -> dict:
+def thermal_effects(case: "PackageCase", thermal: Thermal) -> dict:
     """Decide which effects act between solder and structure; see `fem.thermal.effects.decide`."""
     from fem.thermal.effects import PackageSizes, decide
     from meshing.pads import corner_axis
@@ -36,7 +36,7 @@ def thermal_effects(case: PackageCase, thermal: Thermal) -> dict:
 
 
 def open_structure(
-    case: PackageCase, thermal: Thermal, mesh: Path, pads: "list[PadSite]", flexible: bool
+    case: "PackageCase", thermal: Thermal, mesh: Path, pads: "list[PadSite]", flexible: bool
 ) -> "AbstractContextManager[Structure]":
     """Return board and package as a structure, in a process of its own where it bends; a context that ends it.
 
@@ -60,7 +60,7 @@ def open_structure(
     return StructureProcess(assembly) if flexible else nullcontext(RigidPlates(assembly))
 
 
-def frozen_displacement(case: PackageCase, structure: "Structure", displacement: np.ndarray) -> np.ndarray:
+def frozen_displacement(case: "PackageCase", structure: "Structure", displacement: np.ndarray) -> np.ndarray:
     """Return the displacement `(n, 3)` with the lift of a prescribed warpage: rigid plates have it from the start."""
     from meshing.pads import lift
 

@@ -1,11 +1,18 @@
 """What a reflow that is coupled with board and package would be like, before it runs."""
 
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from fem.thermal.parameters import KELVIN, Thermal
-from workflow.board_drop_case import PackageCase
+from particles.parameters import Solder
+from workflow.problems import Problem
 from workflow.reflow.between import thermal_effects
 from workflow.reflow.load_steps import LoadStep, load_steps
+
+if TYPE_CHECKING:
+    from particles.geometry import JointGeometry
+    from workflow.board_drop_case import PackageCase
 
 # Measured with the structures of tests/verification/test_workflow_coupling.py: a package that floats is sought by
 # three or four exchanges a load step, forces that bend need two, and one way none beyond the first.
@@ -27,7 +34,7 @@ class HeatedForecast:
     exchanges: int
 
 
-def forecast_heated(case: PackageCase, thermal: Thermal) -> HeatedForecast:
+def forecast_heated(case: "PackageCase", thermal: Thermal) -> HeatedForecast:
     """Foresee load steps, exchanges and effects."""
     steps, effects = load_steps(thermal), thermal_effects(case, thermal)
     each = EXCHANGES_TO_BEND if effects["solder_force"]["on"] else EXCHANGES_ONE_WAY
@@ -41,3 +48,17 @@ def thermal_effect(thermal: Thermal, steps: list[LoadStep]) -> dict:
     reference = thermal.reference - KELVIN
     why = f"solder is liquid in {len(steps)} load steps from {low - KELVIN:.4g} to {high - KELVIN:.4g} degC"
     return {"on": bool(high > low or high != thermal.reference), "why": f"{why}, all is flat at {reference:.4g} degC"}
+
+
+def problems(solder: Solder, geometries: "Mapping[str, JointGeometry]") -> Iterator[Problem]:
+    """Find a motion that matters where load steps have no time: each is the solder at rest."""
+    from particles.effects import decide_effects
+
+    for geometry in list(geometries.values())[:1]:
+        for name in ("inertia", "viscosity"):
+            effect = decide_effects(geometry, solder)[name]
+            if effect["on"]:
+                key = "solder.process_time" if getattr(solder.effects, name) == "auto" else f"solder.effects.{name}"
+                yield Problem(
+                    key, f"load steps of [thermal] are at rest, but {effect['why']}", None, "a slower process"
+                )
