@@ -83,7 +83,7 @@ def reflow_heated(run: Run[PackageCase], thermal: Thermal, pads: "list[PadSite]"
         telling = Telling(bar, steps)
         joints = JointArray(case.solder, run.checkpoints("reflow"), pool, telling.joints)
         scale = scale_of(list(drawn.values()), case.solder, structure.rigid_modes, thermal.tolerance)
-        saved = Saved(run.checkpoints("reflow"), (case.package, case.board, case.warpage, case.solder, thermal, pads))
+        saved = Saved(run.checkpoints("reflow"), all_inputs(case, pads))
         coupled = saved.read(joints) or _start(structure, drawn, case, steps[0])
         begun = len(coupled.exchanges)
         coupling = Coupling(structure, joints, drawn, scale, bends, saved.writer(joints), telling.exchange)
@@ -120,6 +120,11 @@ def _nothing(structure: "Structure") -> tuple[np.ndarray, np.ndarray]:
     """No wrenches, no rigid motions."""
     motion = structure.rigid_modes.pad_motion
     return np.zeros(motion.shape[1:]), np.zeros(len(motion))
+
+
+def all_inputs(case: PackageCase, pads: "list[PadSite]") -> tuple:
+    """All that a coupled reflow depends on."""
+    return case.package, case.board, case.warpage, case.solder, case.materials, case.thermal, pads
 
 
 class Saved:

@@ -1,0 +1,28 @@
+"""What a coupled reflow was before it was killed is taken up by the same case only."""
+
+from types import SimpleNamespace
+
+from meshing.pads import pad_table
+from tests.support.workflow_command import SMALL_CASE
+from workflow.case import read_case
+from workflow.reflow.heated import Saved, all_inputs
+
+HEATED = ["warpage.corner=0 mm", "thermal.peak=245 degC"]
+
+
+def test_a_file_of_a_case_that_has_changed_is_not_taken_up(tmp_path):
+    def saved(*settings):
+        case = read_case(SMALL_CASE, [*HEATED, *settings])
+        return Saved(tmp_path, all_inputs(case, pad_table(case.package, case.board, case.warpage)))
+
+    joints = SimpleNamespace(left=["where they are"])
+    saved().writer(joints)("coupled")
+    assert saved().read(joints) == "coupled"
+    changes = (
+        "materials.die={density='2330 kg/m^3', young_modulus='131 GPa', poisson_ratio=0.28, thermal_expansion='9 ppm/K'}",
+        "thermal.peak=240 degC",
+        "board.thickness=1.2 mm",
+        "solder.pad_contact_angle=20 deg",
+    )
+    for change in changes:
+        assert saved(change).read(joints) is None, change
