@@ -19,7 +19,7 @@ def test_a_file_of_a_case_that_has_changed_is_not_taken_up(tmp_path):
     saved().writer(joints)("coupled")
     assert saved().read(joints) == "coupled"
     changes = (
-        "materials.die={density='2330 kg/m^3', young_modulus='131 GPa', poisson_ratio=0.28, thermal_expansion='9 ppm/K'}",
+        "materials.die=FR4",
         "thermal.peak=240 degC",
         "board.thickness=1.2 mm",
         "solder.pad_contact_angle=20 deg",
