@@ -48,8 +48,8 @@ def test_the_summary_has_what_scripts_read(first_run):
     summary = json.loads((first_run[0] / "summary.json").read_text())
     metrics = {name: metric["value"] for name, metric in summary["metrics"].items()}
     assert metrics["joint_count"] == 4
-    assert metrics["joint_volume_error_max"] <= 0.005
-    assert metrics["joint_width_error_max"] <= 0.05
+    assert metrics["joint_volume_error_max"] <= 0.003
+    assert metrics["joint_width_error_max"] <= 0.01
     assert metrics["energy_balance_error"] <= 0.02
     assert metrics["interface_force_residual"] <= 1e-10
     assert metrics["critical_joint"] in {"A3", "A4", "B3", "B4"}

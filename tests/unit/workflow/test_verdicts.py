@@ -39,6 +39,16 @@ def test_health_counts_them(records):
     assert health["joint_width_error_max"]["ok"]
 
 
+def test_widths_are_judged_to_one_per_cent_and_counted(records):
+    """A joint that leans has no reference, and is not counted as one that keeps to it."""
+    assert findings.of_reflow(records, {}).metrics["joints_compared_in_width"]["value"] == 3
+    records["A1"]["metrics"]["width_error"]["value"] = 0.011
+    assert not findings.of_reflow(records, {}).health["joint_width_error_max"]["ok"]
+    records["A1"]["metrics"]["width_reference_error"] = {"value": 3e-3, "unit": ""}
+    found = findings.of_reflow(records, {})
+    assert found.metrics["joints_compared_in_width"]["value"] == 2 and found.health["joint_width_error_max"]["ok"]
+
+
 def test_a_joint_that_failed_says_how():
     assert findings.of_joint({}, "overflow", {}).health["joint_overflow"] == {"value": 1, "limit": 0, "ok": False}
     assert findings.of_joint({}, "ok", {}).health["joints_not_ok"]["ok"]
