@@ -13,7 +13,7 @@ from workflow.report.pictures import MILLI, new_plotter, save
 
 FREE, WIDTH = 0, 1800
 DEVIATION = "deviation [um]"
-LINES, LINE = 5, 31  # of text beneath a joint; pixels of one
+LINES, LINE = 6, 31  # of text beneath a joint; pixels of one
 BAR = 100  # pixels beneath all rows
 MAXIMUM_NAMES = 4
 TILT = 0.14  # of the view, from above
@@ -83,12 +83,12 @@ def caption(names: Sequence[str], joint: Mapping[str, Any], surface: pyvista.Dat
     """Name the joints of a shape, and say how high, wide, tilted and how far from the truncated sphere they are."""
     more = f" +{len(names) - MAXIMUM_NAMES}" if len(names) > MAXIMUM_NAMES else ""
     deviation = free_of(surface)[DEVIATION]
-    tilt = f", tilt {1e3 * joint['tilted']:.1f} mrad" if "tilted" in joint else ""
     lines = [
         " ".join(names[:MAXIMUM_NAMES]) + more,
         f"{1e6 * joint['standoff']:.1f} x {1e6 * joint['max_width']:.1f} um",
         f"{joint['angles']} deg" if "angles" in joint else "",
-        f"{deviation.min():+.1f} to {deviation.max():+.1f} um{tilt}",
+        f"{deviation.min():+.1f} to {deviation.max():+.1f} um",
+        f"tilt {1e3 * joint['tilted']:.1f} mrad" if "tilted" in joint else "",
     ]
     return "\n".join(line for line in lines if line)
 

@@ -4,9 +4,10 @@ import json
 
 import numpy as np
 import pytest
+import pyvista
 
 from tests.support.chain_products import BOW, MICRO, MILLI, bowed_structure, interface
-from workflow.report import cost, mesh_tables, residual, shape_effect, shock, warpage
+from workflow.report import cost, gallery, mesh_tables, residual, shape_effect, shock, warpage
 from workflow.report import interface as section
 from workflow.report.array_map import array_map
 from workflow.report.joint_records import joint_records
@@ -45,6 +46,16 @@ def test_warpage_is_drawn(structure):
     joints = [{"x": x, "y": y} for x, y in zip(X, Y, strict=True)]
     for drawing in (warpage.warpage_maps(structure, joints), warpage.profiles(structure)):
         assert drawing.startswith("<svg")
+
+
+def test_captions_of_the_gallery_are_narrower_than_a_joint():
+    surface = pyvista.Plane()
+    surface.cell_data["boundary"] = np.zeros(surface.n_cells)
+    surface[gallery.DEVIATION] = np.linspace(-12.3, 24.6, surface.n_points)
+    joint = {"standoff": 278.2e-6, "max_width": 615.1e-6, "angles": "142.9 / 142.7", "tilted": 8.6e-3}
+    lines = gallery.caption(["A10"], joint, surface).split("\n")
+    assert lines[-2:] == ["-12.3 to +24.6 um", "tilt 8.6 mrad"]
+    assert max(map(len, lines)) <= len("142.9 / 142.7 deg") and len(lines) < gallery.LINES
 
 
 def test_no_structure_no_section(tmp_path):
