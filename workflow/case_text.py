@@ -78,7 +78,7 @@ def _add_table(blocks: list[str], key: str, parameters: BaseModel) -> None:
         elif holds_named_tables(field):
             tables += [(f"{key}.{name}.{own_name}".lstrip("."), table) for own_name, table in value.items()]
         elif value is None and models_of(field):
-            absent.append(_absent_table(f"{key}.{name}", models_of(field)[0]))
+            absent.append(_absent_table(f"{key}.{name}".lstrip("."), models_of(field)[0]))
         else:
             lines.append(_line(name, value, field))
     header = [*_describe(type(parameters)), *([f"[{key}]"] if lines else [])] if key else []
@@ -92,12 +92,15 @@ def _add_table(blocks: list[str], key: str, parameters: BaseModel) -> None:
 
 def _absent_table(key: str, model: type[BaseModel]) -> str:
     """Describe a table that is not given, commented out."""
-    lines = [
-        _line(name, None if field.is_required() else field.get_default(), field)
-        for name, field in model.model_fields.items()
-    ]
+    lines, tables = [], []
+    for name, field in model.model_fields.items():
+        value = None if field.is_required() else field.get_default()
+        if isinstance(value, BaseModel):
+            tables.append(_absent_table(f"{key}.{name}", type(value)))
+        else:
+            lines.append(_line(name, value, field))
     commented = [line if line.startswith("#") else f"# {line}" for line in (f"[{key}]", *lines)]
-    return "\n".join([*_describe(model, "Not given: "), *commented, ""])
+    return "\n".join([*_describe(model, "Not given: "), *commented, "", *tables])
 
 
 def _line(name: str, value: object, field: FieldInfo) -> str:

@@ -1,10 +1,13 @@
 """The reflow's temperatures in a case file, how materials expand, and what is said about impossible values."""
 
+import tomllib
+
 import pytest
 
 from fem.materials.library import FR4, LIBRARY
 from tests.support.workflow_command import SMALL_CASE
 from workflow.case import display_values, read_case
+from workflow.case_text import case_text
 from workflow.problems import CaseError
 
 PAPER = ['thermal.peak="200 degC"', 'thermal.melting="25 degC"', 'thermal.solidification="200 degC"']
@@ -18,6 +21,16 @@ def read(*settings: str):
 
 def test_without_the_table_nothing_warms_up():
     assert read_case(SMALL_CASE, oversubscribe=True).thermal is None
+
+
+def test_a_new_case_shows_the_table_as_it_would_be_written():
+    text = case_text(read_case(SMALL_CASE, oversubscribe=True), "small").split("# [thermal]")[1].split("\n[case]")[0]
+    lines = [
+        line[2:] for line in text.splitlines() if line.startswith(("# [", "# ")) and ("[" in line or " = " in line)
+    ]
+    written = tomllib.loads("\n".join(["[thermal]", *(line for line in lines if "= ..." not in line)]))
+    assert written["thermal"]["peak"] == "245 degC"
+    assert written["thermal"]["effects"] == {"flexible": "auto", "solder_force": "auto", "residual_stress": "off"}
 
 
 def test_the_papers_course_of_temperatures():
