@@ -59,7 +59,8 @@ class PackageCase(Case):
         )
         geometries = joint_geometries(pad_table(self.package, self.board, self.warpage))
         of_solder = of_particles(particles_checks.problems(self.solder, geometries, self.package.pitch))
-        of_solder += reflow_forecast.problems(self.solder, geometries) if self.thermal else []
+        if self.thermal:
+            of_solder += reflow_forecast.problems(self.solder, geometries, self.thermal, self.package.pitch)
         given = given_surfaces.problems(self.package, geometries)
         return self.in_words(heated) + of_solder + list(given)
 

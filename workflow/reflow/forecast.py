@@ -50,8 +50,35 @@ def thermal_effect(thermal: Thermal, steps: list[LoadStep]) -> dict:
     return {"on": bool(high > low or high != thermal.reference), "why": f"{why}, all is flat at {reference:.4g} degC"}
 
 
-def problems(solder: Solder, geometries: "Mapping[str, JointGeometry]") -> Iterator[Problem]:
-    """Find a motion that matters where load steps have no time: each is the solder at rest."""
+def problems(
+    solder: Solder, geometries: "Mapping[str, JointGeometry]", thermal: Thermal, pitch: float
+) -> Iterator[Problem]:
+    """Find what load steps cannot take: flow that matters, since each is the solder at rest, and no room for it.
+
+    Args:
+        solder: the solder.
+        geometries: joint name to geometry as drawn.
+        thermal: the course of temperatures.
+        pitch: distance of neighbouring joints [m].
+    """
+    yield from _no_time(solder, geometries)
+    yield from _no_room(solder, min(geometry.gap for geometry in geometries.values()), thermal, pitch)
+
+
+def _no_room(solder: Solder, gap: float, thermal: Thermal, pitch: float) -> Iterator[Problem]:
+    """Find a package that is moved so far down that the solder has no room between the plates, pitch by pitch."""
+    lowest = min(step.corner for step in load_steps(thermal))
+    needed = solder.volume / pitch**2
+    if thermal.corner_displacement is None or lowest >= 0.0 or gap + lowest > needed:
+        return
+    limit = (needed - gap) * thermal.corner_displacement / lowest
+    message = f"leaves {1e3 * (gap + lowest):.4g} mm of the gap of {1e3 * gap:.4g} mm, too little for the solder"
+    value = f"{1e3 * thermal.corner_displacement:.4g} mm"
+    yield Problem("thermal.corner_displacement", message, value, f"> {1e3 * limit:.4g} mm")
+
+
+def _no_time(solder: Solder, geometries: "Mapping[str, JointGeometry]") -> Iterator[Problem]:
+    """Find a motion that matters where load steps have no time."""
     from particles.effects import decide_effects
 
     for geometry in list(geometries.values())[:1]:

@@ -63,6 +63,10 @@ FAULTS = {
     "floats and is moved": (MOVED[1:], ["thermal.corner_displacement", "does not go with package = floating"]),
     "moved nowhere": (MOVED[:1], ["thermal.corner_displacement: is missing"]),
     "name": (["thermal.corner_displacment=1"], ["did you mean thermal.corner_displacement?"]),
+    "crushed": (
+        [*PAPER, MOVED[0], 'thermal.corner_displacement="-0.25 mm"'],
+        ['thermal.corner_displacement = "-0.25 mm"', "leaves 0.06 mm of the gap of 0.31 mm", "> -0.2376 mm"],
+    ),
     "switch": (["thermal.effects.flexible=yes"], ["one of auto, on, off"]),
     "steps": (["thermal.steps=0"], [">= 1 and <= 200"]),
     "warped twice": (
