@@ -101,8 +101,12 @@ def _check_distance(surface: ClosedSurface, first: PadSite, second: PadSite) -> 
 
 
 def _check_place(surface: ClosedSurface, place: JointPlace) -> None:
-    """Raise JointMeshError unless the surface spans its gap and ends where the package is."""
-    site, gap = place.site, pad_planes(surface).gap
+    """Raise JointMeshError unless the surface spans its gap and ends where the package is.
+
+    The gap is measured at the package pad's centre: solder that overflows goes off it, up or down a tilted plane.
+    """
+    site, planes = place.site, pad_planes(surface)
+    gap = float(planes.height(*np.array(site.offset)))
     bottom = float(surface.points[:, 2].min())
     if max(abs(bottom), abs(gap - site.gap)) > GAP_TOLERANCE * site.gap:
         span = f"z = {bottom:.6g} to {gap:.6g} m, allowed 0 to its gap of {site.gap:.6g} m"

@@ -111,7 +111,7 @@ def _between_pads(points: np.ndarray, triangles: np.ndarray, site: PadSite) -> C
     points[np.unique(triangles[lower.rows]), 2] = 0.0
     top = np.unique(triangles[upper.rows])
     points[top, 2] = planes.height(points[top, 0], points[top, 1])
-    target = PadPlanes(site.gap, planes.offset, site_slope(site))
+    target = PadPlanes(site.gap, np.array(site.offset), site_slope(site))
     stretch = target.height(points[:, 0], points[:, 1]) / planes.height(points[:, 0], points[:, 1])
     points[:, 2] *= stretch
     surface = ClosedSurface(points, triangles.astype(np.int32), boundary)

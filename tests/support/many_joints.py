@@ -68,7 +68,8 @@ def sites_of(surface: ClosedSurface, pair: bool) -> tuple[PadSite, ...]:
     planes = pad_planes(surface)
     lower = surface.points[np.unique(surface.triangles[surface.boundary == 1])]
     wetted = float(np.linalg.norm(lower[:, :2], axis=1).max())
-    site = PadSite("A1", 0, 0, 0.0, 0.0, planes.gap, *([0.24 * MM] * 2), *([max(0.29 * MM, wetted)] * 2), 0.02 * MM)
+    radii = *([0.24 * MM] * 2), *([max(0.29 * MM, wetted)] * 2)
+    site = PadSite("A1", 0, 0, 0.0, 0.0, planes.gap, *radii, 0.02 * MM, tuple(planes.offset))
     return (replace(site, x=-0.5 * MM), replace(site, name="A2", x=0.5 * MM)) if pair else (site,)
 
 
