@@ -15,7 +15,15 @@ from meshing.parameters import Package
 from meshing.surface import BOARD_PAD, PACKAGE_PAD, ClosedSurface, pad_planes
 from meshing.swept import swept_solder
 
-__all__ = ["JointMesh", "JointMeshError", "joint_quality", "mesh_bridge", "mesh_coarse_joint", "mesh_joint"]
+__all__ = [
+    "JointMesh",
+    "JointMeshError",
+    "joint_quality",
+    "mesh_bridge",
+    "mesh_coarse_joint",
+    "mesh_coarse_or_fine",
+    "mesh_joint",
+]
 
 GAP_TOLERANCE = 1.0e-3
 HEAD_TOLERANCE = 0.03  # of the gap: mean distance of the solder's upper face from the package's pad
@@ -76,6 +84,24 @@ def mesh_coarse_joint(surface: ClosedSurface, site: PadSite, package: Package, s
         return build_joint(solder, [site], None, place)
     except ValueError as error:
         raise JointMeshError(f"joint {site.name}: {error}") from error
+
+
+def mesh_coarse_or_fine(
+    surface: ClosedSurface, fine: JointMesh, at: tuple[Package, PadSite], side: Underside
+) -> JointMesh:
+    """Mesh a joint by few hexahedra; where they cannot follow its shape, its fine mesh stands for them and says why.
+
+    Args:
+        surface: closed surface in the joint's own frame.
+        fine: its fine mesh.
+        at: the package and where the joint sits.
+        side: the package's underside.
+    """
+    package, site = at
+    try:
+        return mesh_coarse_joint(surface, site, package, side)
+    except JointMeshError as error:
+        return replace(fine, tetrahedra=None, record=fine.record | {"fine_instead": str(error)})
 
 
 def _mesh(

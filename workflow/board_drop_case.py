@@ -14,6 +14,9 @@ from workflow.case_kind import Case, of_particles
 from workflow.problems import Problem
 from workflow.stage_table import Pipeline, package_pipeline
 
+# Where solder overflows a sixth of the steps: tests/verification/test_particles_large_steps.py
+LARGE_STEPS = 100.0
+
 
 class PackageCase(Case):
     """A package on a board, whose joints are reflowed and meshed."""
@@ -31,6 +34,17 @@ class PackageCase(Case):
     def pipeline(self) -> Pipeline:
         """The stages: with temperatures, the reflow needs the mesh of board and package."""
         return package_pipeline(heated=self.thermal is not None, dropped=False)
+
+    @classmethod
+    def completed(cls, table: dict) -> dict:
+        """With temperatures take large time steps: load steps are at rest, only the shape there counts."""
+        solder = table.get("solder")
+        if "thermal" not in table or not isinstance(solder, dict):
+            return table
+        numerics = solder.get("numerics", {})
+        if isinstance(numerics, dict):
+            numerics = {"time_step_limit": LARGE_STEPS} | numerics
+        return table | {"solder": solder | {"numerics": numerics}}
 
     @classmethod
     def located(cls, table: dict, folder: Path) -> dict:

@@ -63,7 +63,7 @@ def read_case(path: Path, overrides: Sequence[str] = (), oversubscribe: bool = F
         kind = kind_of(table)
     except CaseError as error:
         raise CaseError(str(path), error.problems + problems, origins) from None
-    values = kind.located(fields.to_si_table(kind, table, "", problems), path.parent)
+    values = kind.located(fields.to_si_table(kind, kind.completed(table), "", problems), path.parent)
     case = None
     try:
         case = kind.model_validate(values, strict=True)

@@ -66,6 +66,11 @@ class Case(BaseModel):
         return 1
 
     @classmethod
+    def completed(cls, table: dict) -> dict:
+        """Return the table of a case file with the defaults that depend on which tables it has."""
+        return table
+
+    @classmethod
     def located(cls, table: dict, folder: Path) -> dict:
         """Take names of files in a table of SI values as relative to the folder of the case file."""
         return table

@@ -1,6 +1,6 @@
 """Meshes of all joints of an array: of the real ones, and of identical ones to compare them with."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -75,15 +75,16 @@ def mesh_array(
     Returns:
         Kind of joint mesh, which begins the names of its metrics -> joint -> quality.
     """
-    from meshing.solder_mesh import mesh_coarse_joint, mesh_joint
+    from meshing.solder_mesh import mesh_coarse_or_fine, mesh_joint
 
-    kinds: dict[str, Callable[..., JointMesh]] = {prefix: mesh_joint}
+    fine = [mesh_joint(surface, site, case.package, side) for surface, site in bodies]
+    kinds = {prefix: fine}
     if isinstance(case, BoardDropCase) and needs_coarse_joints(case.shock.coupling):
-        kinds[f"{prefix}coarse_"] = mesh_coarse_joint
-    return {
-        kind: _write([mesh_of(surface, site, case.package, side) for surface, site in bodies], kind, case, folder)
-        for kind, mesh_of in kinds.items()
-    }
+        kinds[f"{prefix}coarse_"] = [
+            mesh_coarse_or_fine(surface, mesh, (case.package, site), side)
+            for (surface, site), mesh in zip(bodies, fine, strict=True)
+        ]
+    return {kind: _write(meshes, kind, case, folder) for kind, meshes in kinds.items()}
 
 
 def _write(meshes: "Sequence[JointMesh]", kind: str, case: PackageCase, folder: Path) -> dict[str, dict]:

@@ -14,7 +14,7 @@ from fem.mesh_file import read_mesh, read_meshes
 from fem.names import nearest
 from fem.watch_table import joint_names
 
-COPY = "solder_coarse@"
+COPY = "_coarse@"
 KEY = "shock.coupling.fine_joints"
 
 
@@ -79,7 +79,7 @@ def copies(coarse: MeshData, fine: Collection[str]) -> MeshData:
     if missing:
         raise MeshError(f"{missing[0]} has no coarse mesh, as shock.coupling.direction = one_way needs")
     chosen, _ = select(coarse, lambda part: joint_of(part) in fine)
-    names = tuple(name.replace("solder@", COPY) for name in chosen.part_names)
+    names = tuple(name.replace("@", COPY) for name in chosen.part_names)
     return replace(
         chosen, part_names=names, facets={k: v for k, v in chosen.facets.items() if not k.startswith("pad_")}
     )
@@ -87,8 +87,8 @@ def copies(coarse: MeshData, fine: Collection[str]) -> MeshData:
 
 def copied_joints(mesh: MeshData) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Return the cells ``(ne,)`` of fine joints that have a coarse copy beside them, and of these copies."""
-    copied = {joint_of(name) for name in mesh.part_names if name.startswith(COPY)}
-    copy = mesh.in_parts(lambda name: name.startswith(COPY))
+    copy = mesh.in_parts(lambda name: COPY in name)
+    copied = {joint_of(mesh.part_names[part]) for part in np.unique(mesh.part[copy])}
     return mesh.in_parts(lambda name: joint_of(name) in copied) & ~copy, copy
 
 

@@ -27,6 +27,7 @@ def add_joints(run_folder: Path, context: dict) -> None:
         "shapes": joint_tables.shapes(joints),
         "meshes": mesh_tables.meshes(meshed),
         "missed_tries": mesh_tables.missed_tries(meshed),
+        "fine_instead": mesh_tables.fine_instead(run_folder),
     }
     context["curves"]["map"] = array_map(joints)
     context["pictures"]["gallery"], _ = embedded(lambda path: render_gallery(run_folder, joints, path))

@@ -1,8 +1,10 @@
 """Tables of joint meshes: what they keep of the surfaces, their quality, and what earlier tries missed."""
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
+from workflow.products import read_json
 from workflow.report.joint_records import Column, Record, by_shape, record_table
 from workflow.report.tables import micro, nano, number, percent
 
@@ -32,6 +34,14 @@ def missed_tries(joints: Sequence[Record]) -> dict | None:
     """What tries to mesh a joint have missed before one succeeded; None where none has."""
     rows = [[joint["name"], way["method"], way["missed"]] for joint in joints for way in joint.get("tries", ())]
     return {"head": ["joint", "method", "missed"], "rows": rows, "prose": True} if rows else None
+
+
+def fine_instead(run_folder: Path) -> dict | None:
+    """Why joints of which few hexahedra cannot follow the shape are as fine where they were to be coarse."""
+    path = run_folder / "solder_mesh/coarse_quality.json"
+    coarse = read_json(path) if path.exists() else {}
+    rows = [[name, joint["fine_instead"]] for name, joint in coarse.items() if "fine_instead" in joint]
+    return {"head": ["joint", "why"], "rows": rows, "prose": True} if rows else None
 
 
 def _counted(joint: Record) -> dict[str, Any]:

@@ -1,0 +1,30 @@
+"""Load steps at rest are computed in large time steps, unless the case says how large."""
+
+import pytest
+
+from particles.parameters import SolderNumerics
+from tests.support.workflow_command import SMALL_CASE
+from workflow.board_drop_case import LARGE_STEPS
+from workflow.case import read_case
+
+HEATED = ('warpage.corner="0 mm"', 'thermal.peak="245 degC"')
+
+
+@pytest.mark.parametrize(
+    ("settings", "expected"),
+    [
+        ((), SolderNumerics().time_step_limit),
+        (HEATED, LARGE_STEPS),
+        ((*HEATED, "solder.numerics.time_step_limit=30"), 30.0),
+    ],
+)
+def test_steps_of_a_case(settings, expected):
+    case = read_case(SMALL_CASE, settings, oversubscribe=True)
+    assert case.solder.numerics.time_step_limit == expected
+    again = type(case).model_validate(case.model_dump(mode="json"))
+    assert again.solder.numerics == case.solder.numerics
+
+
+def test_a_table_that_is_none_is_refused_as_ever():
+    with pytest.raises(ValueError, match="solder"):
+        read_case(SMALL_CASE, (*HEATED, "solder=3"), oversubscribe=True)
