@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 SCENE = ("meshes", "coarse_joints", "shock", "materials")  # of a request: what cooling depends on, too
 RESULT, IDENTITY = "result.json", "identity.txt"
+FIRST = {"residual_two_scale": 0, "residual": 1}  # folders of coolings: the first that is there has the figures told
 
 
 def is_wanted(case: BoardDropCase) -> bool:
@@ -84,15 +85,14 @@ def _cool(run: Run[BoardDropCase], folder: Path, request: dict) -> None:
 
 
 def with_cooling(found: Findings, case: BoardDropCase, folder: Path) -> Findings:
-    """Add what cooling of the first mode found to what the shocks found."""
-    effects = {**found.effects, **effect(case)}
-    results = [folder / name / RESULT for name in ("residual_two_scale", "residual") if (folder / name).exists()]
-    if not results:
-        return replace(found, effects=effects)
-    result = json.loads(results[0].read_text())
-    return replace(
-        found, metrics=result["metrics"] | found.metrics, health=found.health | result["health"], effects=effects
-    )
+    """Add to what the shocks found what the cooling of the first mode found, and the checks of all others."""
+    paths = sorted(folder.glob(f"*residual*/{RESULT}"), key=lambda path: FIRST.get(path.parent.name, len(FIRST)))
+    metrics, health = dict(found.metrics), dict(found.health)
+    for number, path in enumerate(paths):
+        result, prefix = json.loads(path.read_text()), f"{path.parent.name}_" if number else ""
+        metrics = metrics if number else result["metrics"] | metrics
+        health |= {f"{prefix}{check}": value for check, value in result["health"].items()}
+    return replace(found, metrics=metrics, health=health, effects={**found.effects, **effect(case)})
 
 
 def effect(case: BoardDropCase) -> dict:

@@ -70,12 +70,12 @@ def shock(run: Run[BoardDropCase], folder: Path) -> Findings:
     for mode in run.case.shock.numerics.modes:
         run_mode(run, folder / mode, mode, fine)
     results = read_results(folder)
-    found = with_cooling(findings.of_shock(results, folder, run.case.board.thickness), run.case, folder)
-    if not run.case.shock.identical_joints:
-        return found
-    main = next(iter(results))
-    run_mode(run, folder / identical_joints.FOLDER, main, fine, identical_joints.PREFIX)
-    return identical_joints.compared(found, run, folder, main)
+    found = findings.of_shock(results, folder, run.case.board.thickness)
+    if run.case.shock.identical_joints:
+        main = next(iter(results))
+        run_mode(run, folder / identical_joints.FOLDER, main, fine, identical_joints.PREFIX)
+        found = identical_joints.compared(found, run, folder, main)
+    return with_cooling(found, run.case, folder)
 
 
 def report(run: Run, folder: Path) -> Findings:
