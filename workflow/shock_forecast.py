@@ -174,9 +174,11 @@ def forecast_shock(case: "BoardDropCase", parts: Parts) -> ShockForecast:
 
 
 def implicit_seconds(case: "BoardDropCase") -> float | None:
-    """Predict the wall time of a DNS in implicit steps on one rank; None where something is not linear."""
+    """Predict the wall time of the whole shock in implicit steps on one rank; None where something is not linear."""
     parts = forecast_parts(case)
-    return forecast_shock(case, parts).implicit if is_linear(parts) else None
+    numerics = case.shock.numerics.model_copy(update={"dns_duration": None})
+    whole = case.model_copy(update={"shock": case.shock.model_copy(update={"numerics": numerics})})
+    return forecast_shock(whole, parts).implicit if is_linear(parts) else None
 
 
 def is_linear(parts: Parts) -> bool:

@@ -82,10 +82,16 @@ def kinematics_note(metrics: dict, kinematics: str) -> str:
     )
 
 
-def _add_ranks(histories: dict, results: dict, joints: list[dict], context: dict) -> None:
-    """Rank the joints by the mode in which all of them are fine."""
+def ranking_mode(histories: dict, results: dict) -> str:
+    """Return the mode in which all joints are fine, unless that ended early."""
     main = next(iter(histories))
-    ranked = "dns" if "dns" in results and findings.fine_joints_of(results[main]) else main
+    is_whole = "dns" in results and len(histories["dns"]["time"]) == len(histories[main]["time"])
+    return "dns" if is_whole and findings.fine_joints_of(results[main]) else main
+
+
+def _add_ranks(histories: dict, results: dict, joints: list[dict], context: dict) -> None:
+    """Rank the joints by ``ranking_mode``."""
+    main, ranked = next(iter(histories)), ranking_mode(histories, results)
     whose = f"of the {tables.mode_name(ranked)}, whose joints are all fine"
     context["ranked_by"] = whose if ranked != main else ""
     result = results[ranked]

@@ -13,6 +13,7 @@ from workflow.report.array_map import array_map
 from workflow.report.curves import energy_curves, history_curves
 from workflow.report.histories import late_peak
 from workflow.report.pictures import exaggeration
+from workflow.report.shock import ranking_mode
 from workflow.summary import collect_summary, inputs_digest, write_summary
 
 JOINT = {"standoff": 3.2e-4, "max_width": 5.5e-4}
@@ -44,6 +45,13 @@ def test_joints_are_ranked_by_their_worse_pad(history):
     assert [row[0] for row in table["rows"]] == ["A10", "A9"]
     assert table["rows"][0][1:6] == ["100.0", "board", "0.500", "9.0", "150.0"]
     assert table["rows"][1][2] == "package"
+
+
+def test_a_dns_that_ended_early_ranks_no_joints(history):
+    results = {"two_scale": {"coupling": {"fine_joints": ["A10"]}}, "dns": {}}
+    early = {"time": history["time"][:10]}
+    assert ranking_mode({"two_scale": history, "dns": history}, results) == "dns"
+    assert ranking_mode({"two_scale": history, "dns": early}, results) == "two_scale"
 
 
 def test_joints_that_fail_say_by_what(history):
