@@ -68,8 +68,10 @@ def of_geometry(joints: int, elements: Mapping[str, int]) -> Findings:
 def of_reflow(joints: Records, effects: Mapping[str, Any]) -> Findings:
     """Judge the joints' shapes by volume, by the Young-Laplace shape and by their verdicts.
 
-    An open joint has no shape to compare with, nor has one that leans too much for a coaxial reference.
+    An open joint has no shape to compare with, nor has one that leans too much for a coaxial reference. Of joints whose
+    surface is given only widths count, and that they touch others.
     """
+    flowed = [joint for joint in joints.values() if "given" not in joint]
 
     def values(name: str) -> list[float]:
         return [joint["metrics"][name]["value"] for joint in joints.values()]
@@ -77,12 +79,12 @@ def of_reflow(joints: Records, effects: Mapping[str, Any]) -> Findings:
     def count(verdict: str) -> int:
         return sum(joint["verdict"] == verdict for joint in joints.values())
 
-    closed = [joint for joint in joints.values() if joint["verdict"] != "open" and _has_reference(joint["metrics"])]
+    closed = [joint for joint in flowed if joint["verdict"] != "open" and _has_reference(joint["metrics"])]
     width_error = worst(joint["metrics"]["width_error"]["value"] for joint in closed)
-    drift = worst(values("volume_drift"))
+    drift = worst(joint["metrics"]["volume_drift"]["value"] for joint in flowed)
     return Findings(
         metrics={
-            "distinct_shapes": metric(len({joint["shape"] for joint in joints.values()})),
+            "distinct_shapes": metric(len({joint["shape"] for joint in flowed})),
             "joint_width_min": metric(min(values("max_width")), "m"),
             "joint_width_max": metric(max(values("max_width")), "m"),
             "joint_width_error_max": metric(width_error),
@@ -94,7 +96,7 @@ def of_reflow(joints: Records, effects: Mapping[str, Any]) -> Findings:
             "joint_volume_drift_max": at_most(drift, VOLUME_DRIFT),
             "joints_bridged": at_most(count("bridged"), 0),
             "joints_open": at_most(count("open"), 0),
-            "joints_not_ok": at_most(len(joints) - count("ok"), 0),
+            "joints_not_ok": at_most(len(joints) - count("ok") - count("given"), 0),
         },
         effects=dict(effects),
     )

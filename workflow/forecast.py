@@ -58,14 +58,16 @@ def forecast(case: PackageCase) -> Forecast:
     from particles.estimate import particle_count, reflow_seconds
 
     geometries = joint_geometries(pad_table(case.package, case.board, case.warpage))
-    distinct = [group.geometry for group in distinct_joints(geometries)]
+    given = () if case.thermal else case.package.surfaces
+    flowing = {name: geometry for name, geometry in geometries.items() if name not in given}
+    distinct = [group.geometry for group in distinct_joints(flowing)]
     counts = [particle_count(case.solder, geometry) for geometry in distinct]
-    workers = min(available_cores(), len(distinct))
+    workers = max(1, min(available_cores(), len(distinct)))
     of_reflow = Forecast(
-        effects=decide_effects(max(distinct, key=lambda geometry: geometry.gap), case.solder),
+        effects=decide_effects(max(geometries.values(), key=lambda geometry: geometry.gap), case.solder),
         joints=len(geometries),
         distinct=len(distinct),
-        particles=(min(counts), max(counts)),
+        particles=(min(counts, default=0), max(counts, default=0)),
         parts={},
         shock=None,
         seconds={"reflow": sum(reflow_seconds(case.solder, geometry) for geometry in distinct) / workers},

@@ -1,6 +1,7 @@
 """Joints whose surfaces the user gives, as files: where these are, and what does not fit."""
 
-from collections.abc import Iterable, Iterator
+import math
+from collections.abc import Container, Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -8,6 +9,7 @@ from fem.names import nearest
 from workflow.problems import Problem
 
 if TYPE_CHECKING:
+    from meshing.pads import PadSite
     from meshing.parameters import Package
 
 KEY = "package.surfaces"
@@ -42,3 +44,40 @@ def problems(package: "Package", joints: Iterable[str]) -> Iterator[Problem]:
             yield Problem(f"{KEY}.{name}", "has no format that is read", text, ", ".join(SUFFIXES))
         elif not path.is_file():
             yield Problem(f"{KEY}.{name}", "there is no such file", text)
+
+
+def given_records(package: "Package", pads: "Iterable[PadSite]", reflowed: Container[str]) -> dict[str, dict]:
+    """Measure the given surfaces in their places.
+
+    Args:
+        package: names their files.
+        pads: the pad table.
+        reflowed: joints that have a record already.
+
+    Returns:
+        Joint name -> ``given`` (its file), ``place``, ``verdict`` "given", ``metrics`` as those of a reflow.
+
+    Raises:
+        SurfaceError: a surface that does not fit.
+    """
+    from meshing.surface import measure
+    from meshing.user_surface import load_surface
+
+    records = {}
+    for pad in (pad for pad in pads if pad.name in package.surfaces and pad.name not in reflowed):
+        path = package.surfaces[pad.name]
+        found = measure(load_surface(Path(path), package.surface_unit, pad))
+        records[pad.name] = {
+            "given": path,
+            "place": {"gap": pad.gap, "offset": pad.offset, "tilt": pad.tilt},
+            "verdict": "given",
+            "metrics": {name: _metric(name, value) for name, value in found.items()},
+        }
+    return records
+
+
+def _metric(name: str, value: float) -> dict:
+    """Return a measure of a surface in the unit that the reflow tells it in."""
+    if "angle" in name:
+        return {"value": math.degrees(value), "unit": "deg"}
+    return {"value": value, "unit": "m^3" if name == "volume" else "m"}

@@ -139,7 +139,7 @@ def bridge_shapes(
 
     Args:
         found: the pairs that touch, the largest overlap first.
-        geometries: joint name -> geometry.
+        geometries: joint name -> geometry, of those that were reflowed.
         solder: of one joint.
     """
     from particles.bridge import solve_bridge
@@ -148,7 +148,8 @@ def bridge_shapes(
     from particles.rest import NoRest
 
     bridges = {}
-    for pair in found[:1]:
+    reflowed = [pair for pair in found if pair.first in geometries and pair.second in geometries]
+    for pair in reflowed[:1]:
         ends = [replace(geometries[end], offset=(0.0, 0.0), tilt=(0.0, 0.0)) for end in (pair.first, pair.second)]
         name = f"{pair.first}+{pair.second}"
         try:

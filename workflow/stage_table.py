@@ -13,6 +13,7 @@ DRAWN = (
     "board.symmetry",
 )
 PADS = (*DRAWN, "warpage")
+GIVEN = ("package.surfaces", "package.surface_unit")
 JOINT_MESHES = (
     "package.joint_numerics",
     "package.coarse_joint_numerics",
@@ -101,14 +102,14 @@ def package_pipeline(heated: bool, dropped: bool) -> Pipeline:
         parameters = (*PADS, *HEATED, *STRUCTURE_ROLES, "solder", *last)
         reflow = Stage("reflow", parameters, ("geometry",), (*solid, "reflow/structure.npz"))
     else:
-        reflow = Stage("reflow", (*PADS, "thermal", "solder"), (), solid, pads=True)
+        reflow = Stage("reflow", (*PADS, "thermal", "solder", *GIVEN), (), solid, pads=True)
     solder_mesh = Stage(
         "solder_mesh",
         ("warpage", "solder.volume", *JOINT_MESHES, "materials.copper", "materials.solder"),
         ("geometry", "surface"),
         ("solder_mesh/assembly.msh", "solder_mesh/joints.msh", "solder_mesh/quality.json"),
     )
-    surface = Stage("surface", ("package.surfaces", "package.surface_unit"), ("reflow",), ("surface/surfaces.json",))
+    surface = Stage("surface", GIVEN, ("reflow",), ("surface/surfaces.json",))
     shock = Stage("shock", ("shock", "materials", *COOLED), ("solder_mesh",), ())
     stages = (geometry, reflow, surface, solder_mesh, *((shock,) if dropped else ()))
     follows = tuple(stage.name for stage in stages)

@@ -10,6 +10,7 @@ import numpy as np
 from workflow import findings
 from workflow import reflow_pool as pool
 from workflow.board_drop_case import PackageCase
+from workflow.given_surfaces import given_records
 from workflow.products import write_json
 from workflow.progress import progress_bar
 from workflow.reflow.heated import reflow_heated
@@ -52,9 +53,11 @@ def reflow(run: Run[PackageCase], folder: Path) -> Findings:
     drawn = read_pads(run.folder / "geometry/pads.json")
     lying = lifted(drawn, case.package, case.warpage)
     result = _between_plates(run, lying) if case.thermal is None else _heated(run, lying, folder / "heated.msh")
-    joints = pool.joint_records(result.groups, result.geometries, result.shapes)
+    flowed = {name: result.geometries[name] for group in result.groups for name in group.members}
+    joints = pool.joint_records(result.groups, flowed, result.shapes) | given_records(case.package, result.pads, flowed)
+    joints = {pad.name: joints[pad.name] for pad in result.pads}
     touching = pool.mark_bridges(joints, result.pads, mirrored=case.board.symmetry == "quarter")
-    write_shapes(folder / "shapes.h5", result.shapes | pool.bridge_shapes(touching, result.geometries, solder))
+    write_shapes(folder / "shapes.h5", result.shapes | pool.bridge_shapes(touching, flowed, solder))
     write_json(folder / "joints.json", joints)
     write_pads(folder / "pads.json", result.pads)
     if result.structure:
@@ -70,9 +73,10 @@ def reflow(run: Run[PackageCase], folder: Path) -> Findings:
 
 
 def _between_plates(run: Run[PackageCase], pads: "list[PadSite]") -> Reflowed:
-    """Each distinct joint once, between plates that are where the pad table has them."""
+    """Each distinct joint once, between plates that are where the pad table has them; none whose surface is given."""
     geometries = pool.joint_geometries(pads)
-    groups = pool.distinct_joints(geometries)
+    given = run.case.package.surfaces
+    groups = pool.distinct_joints({name: geometries[name] for name in geometries if name not in given})
     distinct = {group.name: group.geometry for group in groups}
     with progress_bar(f"reflow of {len(distinct)} distinct joints") as progress:
         shapes, continued = pool.solve_joints(distinct, run.case.solder, run.cores, progress, run.checkpoints("reflow"))

@@ -33,6 +33,7 @@ def _record(pad: Mapping, reflow: Mapping, surfaces: Mapping, quality: Mapping) 
     metrics = {key: metric["value"] for key, metric in joint.get("metrics", {}).items()}
     surface = {key: np.degrees(value) if "angle" in key else value for key, value in surface.items()}
     told = {"shape": joint.get("shape", name), "verdict": joint.get("verdict", "given")}
+    told |= {"given": joint["given"]} if "given" in joint else {}
     record: dict[str, Any] = {**surface, **pad, **told, **metrics, **quality.get(name, {})}
     angles = (record.get("contact_angle_board"), record.get("contact_angle_package"))
     if None not in angles:

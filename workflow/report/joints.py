@@ -30,7 +30,9 @@ def add_joints(run_folder: Path, context: dict) -> None:
         "fine_instead": mesh_tables.fine_instead(run_folder),
     }
     context["curves"]["map"] = array_map(joints)
-    context["pictures"]["gallery"], _ = embedded(lambda path: render_gallery(run_folder, joints, path))
+    drawn = [joint for joint in joints if "given" not in joint or (run_folder / "surface").exists()]
+    if drawn:
+        context["pictures"]["gallery"], _ = embedded(lambda path: render_gallery(run_folder, drawn, path))
     _add_bridge(run_folder, context)
     _add_warpage(run_folder, joints, context)
 
