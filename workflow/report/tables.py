@@ -20,7 +20,7 @@ HEADLINE = (
 )
 COMPARISON = (
     ("compared_duration", "time that both have; the DNS ends before the shock"),
-    ("critical_joint", "critical joint of the DNS"),
+    ("critical_joint", "critical joint, of the DNS where that lasts as long"),
     ("critical_joint_stress_error", "its von Mises history, relative L2"),
     ("worst_joint_stress_error", "the same of the worst joint that is fine in both"),
     ("die_displacement_error", "die centre displacement, relative L2"),
