@@ -36,6 +36,15 @@ class SolderNumerics(FlowNumerics):
     spacing: Annotated[float, "mm"] = Field(4.0e-5, gt=0)
 
 
+class Reflow(Parameters):
+    """Who computes the joints of an array: as many MPI ranks, or, without a number, processes on the cores given.
+
+    The joints are the same to the last bit. Ranks may be on several machines that see the run folder.
+    """
+
+    ranks: int | None = Field(None, ge=1)
+
+
 class FlowEffects(Parameters):
     """Effects of a reflow but gravity: decided from dimensionless numbers (auto), or by the user."""
 

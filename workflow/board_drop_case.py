@@ -8,7 +8,7 @@ from fem.materials.roles import Materials
 from fem.parameters import Shock
 from fem.thermal.parameters import Thermal
 from meshing.parameters import Board, Package, Warpage
-from particles.parameters import Solder
+from particles.parameters import Reflow, Solder
 from workflow import fields, given_surfaces
 from workflow.case_kind import Case, of_particles
 from workflow.problems import Problem
@@ -28,6 +28,7 @@ class PackageCase(Case):
     warpage: Warpage = Warpage()
     thermal: Thermal | None = None
     solder: Solder
+    reflow: Reflow = Reflow()
     materials: Materials = Materials()
 
     @property
@@ -50,6 +51,12 @@ class PackageCase(Case):
     def located(cls, table: dict, folder: Path) -> dict:
         """Take files of surfaces as relative to the folder of the case file."""
         return given_surfaces.located(table, folder)
+
+    @property
+    def ranks_by_key(self) -> dict[str, int]:
+        """MPI ranks of the reflow, too, if it has any."""
+        of_reflow = {"reflow.ranks": self.reflow.ranks} if self.reflow.ranks is not None else {}
+        return super().ranks_by_key | of_reflow
 
     @property
     def files(self) -> dict[str, Path]:

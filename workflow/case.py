@@ -83,11 +83,17 @@ def display_values(case: Case) -> dict[str, str]:
 
 def too_many_ranks(case: Case, oversubscribe: bool) -> list[Problem]:
     """Find out whether a case asks for more MPI ranks than there are cores."""
-    ranks, cores = case.ranks, available_cores()
-    if oversubscribe or ranks <= cores:
-        return []
-    message = f"asks for {ranks} MPI ranks, this machine offers {cores} cores"
-    return [Problem(case.ranks_key, message, ranks, f"<= {cores} in all, or more with --oversubscribe")]
+    cores = available_cores()
+    return [
+        Problem(
+            key,
+            f"asks for {ranks} MPI ranks, this machine offers {cores} cores",
+            ranks,
+            f"<= {cores} in all, or more with --oversubscribe",
+        )
+        for key, ranks in case.ranks_by_key.items()
+        if ranks > cores and not oversubscribe
+    ]
 
 
 def available_cores() -> int:

@@ -32,7 +32,7 @@ class Case(BaseModel):
     Attributes:
         kind: the table that makes a file a case of this kind.
         stages: of all cases of this kind.
-        ranks_key: key of the MPI ranks that it asks for.
+        ranks_key: key of `ranks`.
         case: its name.
         scale: "full", or the name of the table of ``[scales]`` whose values replace those of the file.
     """
@@ -62,8 +62,13 @@ class Case(BaseModel):
 
     @property
     def ranks(self) -> int:
-        """MPI ranks that it asks for."""
+        """MPI ranks of the package fem."""
         return 1
+
+    @property
+    def ranks_by_key(self) -> dict[str, int]:
+        """MPI ranks that it asks for, one stage after the other, by the key that does."""
+        return {self.ranks_key: self.ranks} if self.ranks_key else {}
 
     @classmethod
     def completed(cls, table: dict) -> dict:

@@ -1,4 +1,4 @@
-"""Reflow of many joints: those that are alike once, several at a time, each in a process of its own."""
+"""Reflow of many joints: those that are alike once, several at a time."""
 
 import logging
 from collections.abc import Callable, Mapping, Sequence
@@ -171,7 +171,7 @@ def refuse_joints_without_mesh(records: Mapping[str, dict], verdicts: Sequence[s
 def solve_joints(
     geometries: "Mapping[str, JointGeometry]",
     solder: Solder,
-    cores: int,
+    pool: JointPool,
     progress: Callable[[float], None],
     checkpoints: Path,
 ) -> "tuple[dict[str, JointShape], int]":
@@ -180,7 +180,7 @@ def solve_joints(
     Args:
         geometries: name of a joint -> geometry.
         solder: volume, fluid and process.
-        cores: number of processes.
+        pool: what computes.
         progress: called with the share of the whole that is done, 0 to 1.
         checkpoints: folder of the checkpoints.
 
@@ -191,8 +191,7 @@ def solve_joints(
         ReflowError: names the first joint that failed, and how.
     """
     jobs = {name: Job(geometry, solder, checkpoints / name) for name, geometry in geometries.items()}
-    with JointPool(cores, len(jobs)) as pool:
-        results = pool.run(_solve, jobs, lambda done: progress(sum(done.values()) / len(done)))
+    results = pool.run(_solve, jobs, lambda done: progress(sum(done.values()) / len(done)))
     return {name: shape for name, (shape, _) in results.items()}, sum(continued for _, continued in results.values())
 
 

@@ -68,7 +68,7 @@ class JointArray:
         Args:
             solder: of one joint.
             files: folder of the joints' files.
-            pool: processes that compute.
+            pool: what computes.
             progress: called with name -> fraction done, of the first joint of those that are alike.
         """
         self._solder, self._files, self._pool, self._progress = solder, files, pool, progress

@@ -16,7 +16,8 @@ from workflow.reflow.between import frozen_displacement, open_structure, thermal
 from workflow.reflow.coupling import Coupled, Coupling, Exchange, placed
 from workflow.reflow.forecast import thermal_effect
 from workflow.reflow.load_steps import LoadStep, load_steps
-from workflow.reflow.pool import JointPool, Shares
+from workflow.reflow.open_pool import open_pool
+from workflow.reflow.pool import Shares
 from workflow.reflow.start import scale_of, start
 from workflow.reflow_pool import joint_geometries
 from workflow.stage_runner import Run
@@ -77,7 +78,7 @@ def reflow_heated(run: Run[PackageCase], thermal: Thermal, pads: "list[PadSite]"
     flexible, bends = (effects[name]["on"] for name in ("flexible", "solder_force"))
     with (
         open_structure(case, thermal, mesh, pads, flexible) as structure,
-        JointPool(run.cores, len(pads)) as pool,
+        open_pool(run, len(pads)) as pool,
         progress_bar(f"reflow of {len(pads)} joints in {len(steps)} load steps") as bar,
     ):
         telling = Telling(bar, steps)

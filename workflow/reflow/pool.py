@@ -1,54 +1,27 @@
-"""Processes that bring joints to rest, several joints at a time."""
+"""What brings the joints of an array to rest, several at a time: processes of this machine, or MPI ranks anywhere."""
 
-import multiprocessing
-import os
-import queue
-import threading
-from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from typing import Any, TypeVar
-
-from fem.own_job import end_with_parent
+from collections.abc import Callable, Mapping
+from types import TracebackType
+from typing import Protocol, Self, TypeVar
 
 Job = TypeVar("Job")
 Result = TypeVar("Result")
 Report = Callable[[float], None]
 Shares = Mapping[str, float]
 
-POLL = 0.2  # seconds between two looks at the progress
-
-_progress: Any = None  # the queue of a worker process: a pool has no other place for it
-
 
 class ReflowError(RuntimeError):
     """The reflow of a joint failed; the message names the joint."""
 
 
-class JointPool:
-    """Processes that live as long as the pool is entered."""
+class JointPool(Protocol):
+    """A context whose end leaves nothing running."""
 
-    def __init__(self, cores: int, joints: int) -> None:
-        """Prepare the processes.
+    def __enter__(self) -> Self: ...
 
-        Args:
-            cores: how many processes at most; with fewer joints each has several threads.
-            joints: how many there are to compute at a time.
-        """
-        context = multiprocessing.get_context("spawn")
-        workers = max(1, min(cores, joints))
-        self._reports = context.Queue()
-        start = (self._reports, max(1, cores // workers))
-        self._pool = ProcessPoolExecutor(workers, context, _start_worker, start)
-
-    def __enter__(self) -> "JointPool":
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        """Wait for the processes; where something failed, end them."""
-        self._pool.shutdown(wait=kind is None, cancel_futures=True)
-        if kind is not None:
-            for process in multiprocessing.active_children():
-                process.terminate()
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None, /
+    ) -> None: ...
 
     def run(
         self, work: Callable[[Job, Report], Result], jobs: Mapping[str, Job], progress: Callable[[Shares], None]
@@ -66,40 +39,3 @@ class JointPool:
         Raises:
             ReflowError: names the first joint that failed, and how.
         """
-        futures = {self._pool.submit(_work, work, name, job): name for name, job in jobs.items()}
-        self._wait(futures, progress)
-        return {name: future.result() for future, name in futures.items()}
-
-    def _wait(self, futures: Mapping[Future, str], progress: Callable[[Shares], None]) -> None:
-        """Wait for all jobs, passing on how far they are; raise as soon as one fails."""
-        done = dict.fromkeys(futures.values(), 0.0)
-        pending: Sequence[Future] | set[Future] = set(futures)
-        while pending:
-            finished, pending = wait(pending, POLL, FIRST_COMPLETED)
-            self._take_reports(done)
-            for future in finished:
-                error = future.exception()
-                if error is not None:
-                    raise ReflowError(f"joint {futures[future]}: {type(error).__name__}: {error}") from error
-                done[futures[future]] = 1.0
-            progress(done)
-
-    def _take_reports(self, done: dict[str, float]) -> None:
-        while True:
-            try:
-                name, fraction = self._reports.get_nowait()
-            except queue.Empty:
-                return
-            if name in done:  # else a late word of an exchange before
-                done[name] = max(done[name], fraction)
-
-
-def _start_worker(reports: Any, threads: int) -> None:
-    global _progress
-    os.environ["NUMBA_NUM_THREADS"] = str(threads)  # numba, which is loaded after this, would take all cores
-    _progress = reports
-    threading.Thread(target=end_with_parent, daemon=True).start()
-
-
-def _work(work: Callable[[Any, Report], Result], name: str, job: Any) -> Result:
-    return work(job, lambda fraction: _progress.put((name, fraction)))

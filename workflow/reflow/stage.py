@@ -14,6 +14,7 @@ from workflow.given_surfaces import given_records
 from workflow.products import write_json
 from workflow.progress import progress_bar
 from workflow.reflow.heated import reflow_heated
+from workflow.reflow.open_pool import open_pool
 from workflow.stage_runner import Findings, Run
 
 if TYPE_CHECKING:
@@ -78,8 +79,11 @@ def _between_plates(run: Run[PackageCase], pads: "list[PadSite]") -> Reflowed:
     given = run.case.package.surfaces
     groups = pool.distinct_joints({name: geometries[name] for name in geometries if name not in given})
     distinct = {group.name: group.geometry for group in groups}
-    with progress_bar(f"reflow of {len(distinct)} distinct joints") as progress:
-        shapes, continued = pool.solve_joints(distinct, run.case.solder, run.cores, progress, run.checkpoints("reflow"))
+    with (
+        open_pool(run, len(distinct)) as workers,
+        progress_bar(f"reflow of {len(distinct)} distinct joints") as progress,
+    ):
+        shapes, continued = pool.solve_joints(distinct, run.case.solder, workers, progress, run.checkpoints("reflow"))
     found = Findings(continued=f"{continued} of {len(distinct)} joints" if continued else "")
     return Reflowed(pads, geometries, groups, shapes, found)
 

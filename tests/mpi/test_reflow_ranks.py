@@ -1,0 +1,57 @@
+"""Joints that MPI ranks reflow are those of processes; what fails or dies is named, and the next run continues."""
+
+import time
+
+import numpy as np
+import psutil
+import pytest
+
+from particles.geometry import JointGeometry
+from particles.parameters import Solder, SolderNumerics
+from tests.support import rank_work
+from workflow.reflow.pool import ReflowError
+from workflow.reflow.processes import Processes
+from workflow.reflow.ranks import Ranks
+from workflow.reflow_pool import Job
+
+SOLDER = Solder(volume=7.2e-11, numerics=SolderNumerics(spacing=1.2e-4))
+PLACES = {
+    "A1": JointGeometry(3.0e-4, 2.4e-4, 2.4e-4),
+    "B1": JointGeometry(3.1e-4, 2.4e-4, 2.4e-4, (1e-5, 0.0), (0.01, 0.02)),
+}
+
+
+@pytest.fixture
+def ranks(tmp_path):
+    with Ranks(2, True, tmp_path / "ranks.jobs") as found:
+        yield found
+    assert not found.folder.exists()
+
+
+def jobs(folder) -> dict[str, Job]:
+    return {name: Job(place, SOLDER, folder / name) for name, place in PLACES.items()}
+
+
+def test_what_fails_is_named_and_all_end(ranks):
+    begin = time.monotonic()
+    with pytest.raises(ReflowError, match=r"^joint A2: ValueError: no rest after 3 steps$"):
+        ranks.run(rank_work.fail, {"A1": "sleeps", "A2": "fails"}, lambda _: None)
+    assert time.monotonic() - begin < 60.0
+    assert not [one for one in psutil.Process().children(recursive=True) if "workflow.reflow" in one.cmdline()]
+
+
+def test_a_rank_that_is_killed_ends_the_run_and_the_next_one_gives_what_processes_give(ranks, tmp_path):
+    with pytest.raises(ReflowError, match=r"mpirun was killed.*joints under way: B1"):
+        ranks.run(rank_work.be_killed, jobs(tmp_path), lambda _: None)
+    assert not psutil.pid_exists(int((tmp_path / "B1.pid").read_text()))
+    told = []
+    by_ranks = ranks.run(rank_work.solve, jobs(tmp_path), lambda shares: told.append(dict(shares)))
+    with Processes(1, 1) as processes:
+        by_processes = processes.run(rank_work.solve, jobs(tmp_path / "processes"), lambda _: None)
+    assert list(by_ranks) == list(by_processes) == list(PLACES)
+    assert [continued for _, continued in by_ranks.values()] == [True, False]
+    assert told[-1] == dict.fromkeys(PLACES, 1.0)
+    for name, (shape, _) in by_ranks.items():
+        other = by_processes[name][0]
+        for array in ("points", "velocity", "pressure", "surface_points", "triangles"):
+            np.testing.assert_array_equal(getattr(shape, array), getattr(other, array))

@@ -1,0 +1,37 @@
+"""Pieces of work for MPI ranks that reflow joints: by name, so that any process can do them."""
+
+import os
+import signal
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from workflow import reflow_pool
+from workflow.reflow_pool import Job
+
+Report = Callable[[float], None]
+
+
+def solve(job: Job, progress: Report):
+    """Return the shape of a joint, and whether it continued."""
+    return reflow_pool._solve(job, progress)
+
+
+def fail(job: str, progress: Report) -> str:
+    """Fail at one joint; the other goes on for longer than anyone waits."""
+    if job == "fails":
+        raise ValueError("no rest after 3 steps")
+    progress(0.5)
+    time.sleep(600)
+    return job
+
+
+def be_killed(job: Job, progress: Report):
+    """Reflow one joint; where there is no solder to reflow, be killed as soon as the other has left its checkpoint."""
+    if job.checkpoint.name != "B1":
+        return reflow_pool._solve(job, progress)
+    while not (job.checkpoint.parent / "A1").exists():
+        time.sleep(0.02)
+    Path(job.checkpoint.parent / "B1.pid").write_text(str(os.getpid()))
+    os.kill(os.getpid(), signal.SIGKILL)
+    return None

@@ -1,0 +1,20 @@
+"""Who brings the joints of a case to rest."""
+
+from workflow.board_drop_case import PackageCase
+from workflow.reflow.pool import JointPool
+from workflow.reflow.processes import Processes
+from workflow.reflow.ranks import Ranks
+from workflow.stage_runner import Run
+
+
+def open_pool(run: Run[PackageCase], joints: int) -> JointPool:
+    """Return MPI ranks where the case asks for them, else processes on the cores of this machine.
+
+    Args:
+        run: case, cores, where checkpoints are.
+        joints: how many there are to compute at a time.
+    """
+    ranks = run.case.reflow.ranks
+    if ranks is None:
+        return Processes(run.cores, joints)
+    return Ranks(ranks, run.oversubscribe, run.checkpoints("reflow") / "ranks.jobs")
