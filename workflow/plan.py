@@ -35,7 +35,7 @@ def show_plan(case: Case, run_folder: Path, console: Console) -> None:
     if isinstance(case, PackageCase):
         outlook = forecast(case)
         _show(case, run_folder, outlook, console, "reflow" if outlook.shock is None else "reflow and shock")
-        console.print(_sizes(outlook) if outlook.parts else f"\n{_joints(outlook)}")
+        console.print(_sizes(case, outlook) if outlook.parts else f"\n{_joints(case, outlook)}")
         if not isinstance(case, BoardDropCase) or outlook.shock is None:
             console.print("\n[dim]Costs assume the reflow speed in particles/estimate.py, as benchmarks/ measured it.")
             return
@@ -120,7 +120,7 @@ def _effects(effects: Mapping[str, Any], of_what: str) -> Table:
     return table
 
 
-def _sizes(outlook: Forecast) -> Table:
+def _sizes(case: PackageCase, outlook: Forecast) -> Table:
     table = new_table("\nSizes and critical time steps", "part", "hexahedra", "critical step", "time step")
     step = {name: level for level in (outlook.shock.levels if outlook.shock else ()) for name in level.parts}
     for name, part in outlook.parts.items():
@@ -130,17 +130,18 @@ def _sizes(outlook: Forecast) -> Table:
         table.add_row(name, f"{part.elements}", short(part.critical_step), remark)
     total = sum(part.elements for part in outlook.parts.values())
     table.add_row("all", f"{total}", "", "", style="bold")
-    table.caption = _joints(outlook)
+    table.caption = _joints(case, outlook)
     table.caption_justify = "left"
     return table
 
 
-def _joints(outlook: Forecast) -> str:
+def _joints(case: PackageCase, outlook: Forecast) -> str:
     smallest, largest = outlook.particles
     particles = f"{smallest}" if smallest == largest else f"{smallest} to {largest}"
     distinct = f"up to {outlook.distinct}" if outlook.load_steps else f"{outlook.distinct}"
     heated = f", {outlook.load_steps} load steps with liquid solder" if outlook.load_steps else ""
-    return f"{outlook.joints} joints, {distinct} of them distinct, {particles} particles each{heated}"
+    ranks = f", on {case.reflow.ranks} MPI ranks" if case.reflow.ranks is not None else ""
+    return f"{outlook.joints} joints, {distinct} of them distinct, {particles} particles each{heated}{ranks}"
 
 
 def _shock(case: BoardDropCase, shock: ShockForecast) -> Table:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.support.workflow_command import SMALL_CASE
+from tests.support.workflow_command import SMALL_CASE, WHO_COMPUTES
 from workflow.case import read_case
 from workflow.inputs import compare, examine, read_case_of_run, stage_inputs, write_inputs
 from workflow.stage_table import BOARD_DROP
@@ -56,7 +56,8 @@ def test_every_parameter_belongs_to_a_stage(case):
     used = {key for stage in BOARD_DROP.stages for key in stage_inputs(case, stage)}
     from workflow.fields import leaves
 
-    assert {key for key, _, _ in leaves(case)} == used
+    assert {key for key, _, _ in leaves(case)} == used | WHO_COMPUTES
+    assert not used & WHO_COMPUTES
 
 
 def test_nothing_was_run(tmp_path, case):
