@@ -40,6 +40,10 @@ def test_what_fails_is_named_and_all_end(ranks):
     assert not [one for one in psutil.Process().children(recursive=True) if "workflow.reflow" in one.cmdline()]
 
 
+def test_nothing_to_do_needs_no_rank(ranks):
+    assert ranks.run(rank_work.fail, {}, lambda _: None) == {}
+
+
 def test_a_rank_that_is_killed_ends_the_run_and_the_next_one_gives_what_processes_give(ranks, tmp_path):
     with pytest.raises(ReflowError, match=r"mpirun was killed.*joints under way: B1"):
         ranks.run(rank_work.be_killed, jobs(tmp_path), lambda _: None)

@@ -44,6 +44,8 @@ class Ranks:
         self, work: Callable[[Job, Report], Result], jobs: Mapping[str, Job], progress: Callable[[Shares], None]
     ) -> dict[str, Result]:
         """Do a piece of work for each joint; see `pool.JointPool`."""
+        if not jobs:
+            return {}
         shutil.rmtree(self.folder, ignore_errors=True)
         self.folder.mkdir(parents=True)
         for name, job in jobs.items():
