@@ -10,7 +10,16 @@ import numpy as np
 from meshing.outlines import pieces
 from meshing.pad_planes import PadPlanes
 from meshing.pads import PadSite
-from meshing.surface import BOARD_PAD, FREE, PACKAGE_PAD, ClosedSurface, SurfaceError, area_vectors, check_surface
+from meshing.surface import (
+    BOARD_PAD,
+    FREE,
+    PACKAGE_PAD,
+    ClosedSurface,
+    SurfaceError,
+    area_vectors,
+    check_surface,
+    volume_of,
+)
 from meshing.surface_faults import check_triangulation
 
 Unit = Literal["um", "mm", "m"]
@@ -54,6 +63,11 @@ def load_surface(path: Path, unit: Unit, site: PadSite) -> ClosedSurface:
         return _between_pads(points, triangles, site)
     except SurfaceError as error:
         raise SurfaceError(f"surface of joint {site.name}, {path}: {error}") from error
+
+
+def file_volume(path: Path, unit: Unit) -> float:
+    """Return the volume [m^3] that a file that ``load_surface`` took encloses before its heights are stretched."""
+    return volume_of(*_welded(*_read(path, UNITS[unit])))
 
 
 def _read(path: Path, scale: float) -> tuple[np.ndarray, np.ndarray]:

@@ -160,10 +160,12 @@ def _at_rest(metrics: Numbers, limits: Mapping[str, float]) -> dict:
 
 
 def of_surface(surfaces: Records) -> Findings:
-    """Judge the closed surfaces by the volume that the reflow ended with."""
+    """Judge the closed surfaces by the volume that the reflow ended with; tell how those given were stretched."""
     error = worst(surface["volume_error"] for surface in surfaces.values() if "given" not in surface)
+    given = [surface["volume_change"] for surface in surfaces.values() if "given" in surface]
+    stretched = {"given_surface_volume_change_max": metric(worst(given))} if given else {}
     return Findings(
-        metrics={"surface_volume_error_max": metric(error)},
+        metrics={"surface_volume_error_max": metric(error)} | stretched,
         health={"surface_volume_error_max": at_most(error, SURFACE_VOLUME_ERROR)},
     )
 

@@ -21,7 +21,7 @@ def write_surfaces(run: Run[PackageCase], folder: Path) -> dict[str, dict]:
     """
     from meshing.pads import read_pads
     from meshing.surface import measure, write_surface
-    from meshing.user_surface import load_surface
+    from meshing.user_surface import file_volume, load_surface
     from particles.orientation import Orientation, oriented
     from particles.products import read_shapes
 
@@ -43,7 +43,9 @@ def write_surfaces(run: Run[PackageCase], folder: Path) -> dict[str, dict]:
     for name, path in package.surfaces.items():
         closed = load_surface(Path(path), package.surface_unit, sites[name])
         write_surface(folder / f"{name}.vtu", closed)
-        measures[name] = {**measure(closed), "given": path}
+        own = measure(closed)
+        change = own["volume"] / file_volume(Path(path), package.surface_unit) - 1.0
+        measures[name] = {**own, "given": path, "volume_change": change}
     return measures
 
 

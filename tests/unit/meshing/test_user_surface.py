@@ -8,7 +8,7 @@ from meshing.pads import pad_table
 from meshing.parameters import Warpage
 from meshing.solder_mesh import joint_quality, mesh_joint
 from meshing.surface import SurfaceError, enclosed_volume, measure
-from meshing.user_surface import load_surface
+from meshing.user_surface import file_volume, load_surface
 from tests.support.free_form_surfaces import of_level_set, sphere, with_void
 from tests.support.joint_surfaces import barrel
 from tests.support.meshing_models import MM, board, package, side_of
@@ -64,7 +64,10 @@ def test_heights_are_stretched_to_the_gap_and_tilt_of_the_site(tmp_path):
     from dataclasses import replace
 
     site = replace(SITE, gap=1.05 * SITE.gap, tilt=(0.04, -0.03))
-    surface = load_surface(write(tmp_path, SHAPE.points, SHAPE.triangles), "mm", site)
+    path = write(tmp_path, SHAPE.points, SHAPE.triangles)
+    surface = load_surface(path, "mm", site)
+    assert file_volume(path, "mm") == pytest.approx(enclosed_volume(SHAPE), rel=1e-5)
+    assert enclosed_volume(surface) == pytest.approx(1.05 * enclosed_volume(SHAPE), rel=1e-3)
     upper = surface.points[np.unique(surface.triangles[surface.boundary == 2])]
     slope = np.tan(0.05) / 0.05 * np.array([0.03, 0.04])
     assert upper[:, 2] == pytest.approx(site.gap + upper[:, :2] @ slope, rel=1e-5)

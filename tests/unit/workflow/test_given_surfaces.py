@@ -134,7 +134,11 @@ def test_given_reflowed_and_bridged_surfaces_are_written_and_meshed(run):
     assert set(measures) == {"A4", "B4", "A3+B3"}
     assert measures["A4"]["max_width"] == pytest.approx(0.6 * MM, rel=0.02)
     assert measures["B4"]["max_width"] == pytest.approx(0.48 * MM, rel=0.02)
-    assert findings.of_surface(measures).health["surface_volume_error_max"]["ok"]
+    found = findings.of_surface(measures)
+    assert found.health["surface_volume_error_max"]["ok"]
+    assert found.metrics["given_surface_volume_change_max"]["value"] < 1e-5  # the gap is the surface's own
+    measures["A4"]["volume_change"] = -0.07
+    assert findings.of_surface(measures).metrics["given_surface_volume_change_max"]["value"] == 0.07
     given = read_surface(run.folder / "surface/A4.vtu")
     assert enclosed_volume(given) == pytest.approx(measures["A4"]["volume"])
     qualities = mesh_real_joints(run, run.folder / "solder_mesh")
