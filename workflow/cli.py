@@ -153,6 +153,8 @@ def main() -> None:
     """Run the command line; exit codes: 0 done and healthy, 1 failed, 2 bad input."""
     signal.signal(signal.SIGTERM, _interrupt)
     keep_kernels_by_source()
+    # PETSc would end a command whose reader has gone, or a stage whose structure was killed, before it can say so.
+    os.environ.setdefault("PETSC_OPTIONS", "-no_signal_handler")
     if "DISPLAY" not in os.environ:
         # VTK would look for an X server first, and complain.
         os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")

@@ -1,12 +1,14 @@
 """Commands that run nothing, and exit codes."""
 
 import json
+import subprocess
 import tomllib
 from pathlib import Path
 
 import jsonschema
 import pytest
 
+from tests.support.workflow_command import command_line
 from workflow import cli
 from workflow.case import display_values, read_case
 from workflow.pipeline import locked
@@ -54,6 +56,15 @@ def test_a_new_case_passes_plan(call):
     assert code == 0
     for words in ("no product yet", "Bond number", "hexahedra", "step ratio m", "two-scale / DNS", "25 joints"):
         assert words in output
+
+
+def test_a_reader_that_has_gone_is_no_error_of_petsc(tmp_path):
+    process = subprocess.Popen(command_line("plan", tmp_path), stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    process.stdout.readline()
+    process.stdout.close()
+    errors = process.stderr.read()
+    assert process.wait(timeout=60) == 1
+    assert b"PETSC" not in errors and b"MPI_ABORT" not in errors
 
 
 def test_a_new_case_overwrites_nothing(call):
