@@ -68,7 +68,7 @@ class RigidPlates:
             displacement[self.package, 2] += corner
         load = self._held_weight + np.tensordot(self._held_motion, wrenches, 3)
         return State(
-            displacement, self._motion(displacement), self.rigid_modes.imbalance(wrenches), -load @ self._shares
+            displacement, self._motion(displacement), self.rigid_modes.imbalance(wrenches), -self._shares @ load
         )
 
     def _motion(self, displacement: NDArray[np.float64]) -> NDArray[np.float64]:

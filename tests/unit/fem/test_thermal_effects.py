@@ -118,15 +118,18 @@ def test_a_whole_package_is_held_level_by_four_corners(tmp_path):
     pads = pads_at([(1e-3, 1e-3), (3e-3, 2e-3)], 0.3e-3)
     thermal = {"package": "moved", "corner_displacement": 1e-4}
     elastic = structure_of(mesh, tmp_path, pads, {}, thermal)
-    rigid = RigidPlates(replace(small_structure(tmp_path / "small"), mesh=tmp_path / "assembly.msh", pads=pads))
+    whole = {"mesh": tmp_path / "assembly.msh", "pads": pads}
+    rigid = RigidPlates(replace(small_structure(tmp_path / "small"), **whole))
+    held = RigidPlates(replace(small_structure(tmp_path / "small", 0.0, **thermal), **whole))
     assert rigid.rigid_modes.names == ("x", "y", "z", "turn_x", "turn_y", "turn_z")
     assert elastic.rigid_modes.names == ("x", "y", "turn_z")
     load = np.zeros((2, 2, 6))
     load[:, 1, 2] = 1e-3, 3e-3
-    force = elastic.solve(REFERENCE, 1e-4, load, np.zeros(3)).corner_force
     corners = np.array([(4e-3, 3e-3), (4e-3, 0.0), (0.0, 3e-3), (0.0, 0.0)])
-    assert force.sum() == pytest.approx(-4e-3)
-    assert force @ corners == pytest.approx(-load[:, 1, 2] @ pads.centres[:, 1, :2])
+    for structure in (elastic, held):
+        force = structure.solve(REFERENCE, 1e-4, load, np.zeros(3)).corner_force
+        assert force.sum() == pytest.approx(-4e-3)
+        assert force @ corners == pytest.approx(-load[:, 1, 2] @ pads.centres[:, 1, :2])
 
 
 @pytest.mark.parametrize(("side", "thickness"), [(8.0, 0.4), (6.0, 0.775), (4.0, 0.4)])
