@@ -53,7 +53,7 @@ class Ranks:
         done = dict.fromkeys(jobs, 0.0)
 
         def take(line: str) -> None:
-            with suppress(ValueError):  # not of a rank, or torn where many speak at once
+            with suppress(ValueError, TypeError):  # not of a rank, or torn where many speak at once
                 said = json.loads(line)
                 done.update({name: float(said[name]) for name in said if name in done})
                 progress(done)

@@ -17,6 +17,7 @@ Arrays = Mapping[str, NDArray]
 MEGA = 1e6
 ROWS_DRAWN = 3  # times that are drawn; the table has all of them
 PANEL = 4.4  # inches
+SAME_TIME = 1e-6  # s: modes write a time at the end of their own window that is next to it
 
 
 def read_interfaces(shock: Path, modes: Sequence[str]) -> dict[str, dict[str, NDArray]]:
@@ -47,11 +48,20 @@ def times_of(interfaces: Mapping[str, Arrays]) -> NDArray[np.float64]:
     return max((interface["times"] for interface in interfaces.values()), key=len)
 
 
-def difference(ours: Arrays, reference: Arrays, joints: Sequence[str], row: int) -> float:
-    """Return the relative L2 difference of two stress fields over the faces of joints, at a time that both have."""
+def row_at(interface: Arrays, time: float) -> int | None:
+    """Return the row of the time next to ``time`` [s]; None where a mode that ends early has none."""
+    away = np.abs(interface["times"] - time)
+    return int(away.argmin()) if away.min(initial=np.inf) <= SAME_TIME else None
+
+
+def difference(ours: Arrays, reference: Arrays, joints: Sequence[str], time: float) -> float | None:
+    """Return the relative L2 difference of two stress fields over the faces of joints; None unless both have it."""
+    row, row_of_reference = row_at(ours, time), row_at(reference, time)
+    if row is None or row_of_reference is None:
+        return None
     squares = np.zeros(2)
     for joint in joints:
-        exact = reference[f"von_mises@{joint}"][row]
+        exact = reference[f"von_mises@{joint}"][row_of_reference]
         weight = areas(reference, joint)
         squares += weight @ (ours[f"von_mises@{joint}"][row] - exact) ** 2, weight @ exact**2
     return float(np.sqrt(squares[0] / squares[1])) if squares[1] > 0.0 else float(np.sqrt(squares[0]))
@@ -70,15 +80,14 @@ def table(interfaces: Mapping[str, Arrays]) -> dict:
     """Largest and mean stress of both modes at each time, the joint that has the largest, and how far they differ."""
     shared = comparable(interfaces)
     rows = []
-    for row, time in enumerate(times_of(interfaces)):
-        here = [row < len(interface["times"]) for interface in interfaces.values()]
-        extremes = [
-            _extremes(one, row) if has else 3 * ("–",) for one, has in zip(interfaces.values(), here, strict=True)
-        ]
+    for time in times_of(interfaces):
+        here = [(interface, row_at(interface, time)) for interface in interfaces.values()]
+        extremes = [_extremes(one, row) if row is not None else 3 * ("–",) for one, row in here]
         cells = [cell for cells_of_mode in extremes for cell in cells_of_mode]
         if shared:
             first, second = interfaces.values()
-            cells.append(percent(difference(first, second, shared, row)) if all(here) else "–")
+            differs = difference(first, second, shared, time)
+            cells.append("–" if differs is None else percent(differs))
         rows.append([f"{time / MILLI:.4g}", *cells])
     heads = [head for mode in interfaces for head in (f"{mode_name(mode)}: largest [MPa]", "in joint", "mean [MPa]")]
     last = [f"relative L2 difference of {len(shared)} joints"] if shared else []
@@ -92,12 +101,13 @@ def interface_maps(interfaces: Mapping[str, Arrays]) -> str:
         size = (PANEL * len(interfaces) + 0.8, (PANEL - 0.2) * len(times))
         figure, axes = pyplot.subplots(len(times), len(interfaces), figsize=size, layout="constrained", squeeze=False)
         for row, time in enumerate(times):
-            here = {mode: interface for mode, interface in interfaces.items() if row < len(interface["times"])}
-            top = max(_largest(interface, row) for interface in here.values()) / MEGA
+            found = {mode: row_at(interface, time) for mode, interface in interfaces.items()}
+            here = {mode: own for mode, own in found.items() if own is not None}
+            top = max(_largest(interfaces[mode], own) for mode, own in here.items()) / MEGA
             for axis in axes[row][len(here) :]:
                 axis.set_visible(False)
-            for axis, (mode, interface) in zip(axes[row], here.items(), strict=False):
-                drawn = _draw_joints(axis, interface, row, top)
+            for axis, (mode, own) in zip(axes[row], here.items(), strict=False):
+                drawn = _draw_joints(axis, interfaces[mode], own, top)
                 axis.set_title(f"{mode_name(mode)}, {time / MILLI:.4g} ms", fontsize=9)
             figure.colorbar(drawn, ax=axes[row][: len(here)].tolist(), label="von Mises [MPa]", shrink=0.85)
         return svg(figure)

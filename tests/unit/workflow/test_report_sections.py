@@ -67,7 +67,7 @@ def test_stresses_of_both_modes_differ_by_their_factor():
     reference, ours = interface(NAMES, X, Y, times), interface(NAMES, X, Y, times, 1.01)
     both = {"two_scale": ours, "dns": reference}
     assert section.comparable(both) == NAMES
-    assert section.difference(ours, reference, NAMES, 1) == pytest.approx(0.01)
+    assert section.difference(ours, reference, NAMES, times[1]) == pytest.approx(0.01)
     assert section.areas(ours, "A3").sum() == pytest.approx((0.34 * MILLI) ** 2)
     table = section.table(both)
     assert [row[0] for row in table["rows"]] == ["0.5", "1"]
@@ -82,6 +82,14 @@ def test_a_dns_that_ends_early_is_compared_as_far_as_it_goes():
     rows = section.table(both)["rows"]
     assert rows[0][-1] == "75 %" and rows[1][-4:] == ["–", "–", "–", "–"]
     assert section.interface_maps(both).startswith("<svg")
+
+
+def test_times_are_compared_by_time_and_not_by_place_in_the_file():
+    reference = interface(NAMES, X, Y, np.array([0.5e-3, 0.50004e-3, 1.0e-3]))
+    ours = interface(NAMES, X, Y, np.array([0.50002e-3, 1.00002e-3]))
+    rows = section.table({"two_scale": ours, "dns": reference})["rows"]
+    assert rows[2][1] == rows[2][4] == "6.5"  # both at 1 ms
+    assert section.row_at(ours, 0.7e-3) is None
 
 
 def test_joints_with_other_faces_are_not_compared():
