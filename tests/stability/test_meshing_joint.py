@@ -3,14 +3,14 @@
 import dataclasses
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from meshing.assembly import write_assembly
 from meshing.checks import problems
 from meshing.estimate import count_elements
 from meshing.joints_file import write_joints
-from meshing.pads import pad_table
+from meshing.pads import lift, pad_table
 from meshing.parameters import Warpage
 from meshing.solder_mesh import joint_quality, mesh_joint
 from tests.support.joint_surfaces import barrel
@@ -27,9 +27,12 @@ HARD = {
 
 
 def quality_of(warpage=None, **shape):
-    """Mesh the corner joint of the small package in a shape of its own."""
+    """Mesh the corner joint of the small package in a shape of its own, as high as the package is over its head."""
     warpage = warpage or Warpage()
     site = {site.name: site for site in pad_table(package(), board(), warpage)}["A4"]
+    offset = shape.get("offset", 0.0)
+    gap = site.gap + float(lift(package(), warpage, site.x + offset, site.y) - lift(package(), warpage, site.x, site.y))
+    site = dataclasses.replace(site, offset=(offset, 0.0), gap=gap)
     lower, upper = shape.get("lower", 0.24 * MM), shape.get("upper", 0.24 * MM)
     wetted = {"wetted_radius_board": lower, "wetted_radius_package": upper}
     site = dataclasses.replace(site, **wetted, pad_radius_board=lower, pad_radius_package=0.32 * MM)
@@ -63,6 +66,7 @@ SHAPES = st.fixed_dictionaries(
 
 @settings(max_examples=40, deadline=None)
 @given(SHAPES, st.floats(-0.1 * MM, 0.1 * MM))
+@example({"bulge": 0.0, "lower": 0.284 * MM, "upper": 0.296 * MM, "offset": 0.069 * MM}, -0.0823 * MM)
 def test_random_joints(shape, corner):
     quality = quality_of(Warpage(corner=corner), **shape)
     assert quality["volume_error"] < 1e-12
