@@ -11,7 +11,7 @@ from particles.contact_line import ContactLine
 from particles.contact_line_hysteresis import HystereticLine
 from particles.effects import Decision, acting_weight, decide_drop, switched
 from particles.flow import LiquidFlow
-from particles.metrics import Metrics, body_metrics, reference_drop
+from particles.metrics import Metrics, body_metrics, reference_drop, with_shape_error
 from particles.parameters import Solder
 from particles.reflow import collect_shape, contact_line, start_flow, stop_rule
 from particles.rest import Run, run_to_rest
@@ -55,7 +55,8 @@ def drop_to_rest(
     is_known = drop.is_free or effects["wall_adhesion"]["on"]
     reference = _reference(drop, solder, acting_weight(solder, effects)) if is_known else None
     metrics = body_metrics(solder, reference, flow, run)
-    return DropAtRest(collect_shape(solder, flow, run, metrics | _excess(drop, metrics)), effects, reference)
+    shape = collect_shape(solder, flow, run, metrics | _excess(drop, metrics))
+    return DropAtRest(with_shape_error(shape, solder, reference), effects, reference)
 
 
 def flow_to_rest(

@@ -9,7 +9,7 @@ from scipy.optimize import brentq
 from particles.checkpoint import Checkpoint
 from particles.effects import Decision, acting_weight, decide_effects
 from particles.geometry import JointGeometry
-from particles.metrics import Metrics, reference_meridian
+from particles.metrics import Metrics, reference_meridian, with_shape_error
 from particles.moving_joint import follow_path, settle_joint
 from particles.parameters import Solder
 from particles.plate_motion import LIFT, SHIFT, TURN, Floating
@@ -67,15 +67,17 @@ def joint_to_rest(
         places = [_record(*place) for place in zip(geometries, shapes, references, strict=True)]
         states = [shape.snapshots[-1] for shape in shapes[:-1]] or shapes[0].snapshots
         shape = replace(shapes[-1], snapshots=states, metrics=shapes[-1].metrics | _worst(shapes))
-        return JointAtRest(shape, effects, references[-1], places)
+        return JointAtRest(with_shape_error(shape, solder, references[-1]), effects, references[-1], places)
     if joint.package is None:
         shape = solve_joint(joint.geometry, solder, progress, checkpoint=checkpoints(0))
-        return JointAtRest(shape, effects, reference_meridian(joint.geometry, solder, weight), [])
+        reference = reference_meridian(joint.geometry, solder, weight)
+        return JointAtRest(with_shape_error(shape, solder, reference), effects, reference, [])
     shape = settle_joint(joint.geometry, solder, (floating(joint.package),), progress, checkpoints(0))
     balance = _balance(joint, solder, weight, shape)
     end = joint.place(shape.metrics["standoff"][0], 0.0, 0.0)
     reference = reference_meridian(end, solder, weight) if "collapse_height_error" in balance else None
-    return JointAtRest(replace(shape, metrics=shape.metrics | balance), effects, reference, [])
+    shape = replace(shape, metrics=shape.metrics | balance)
+    return JointAtRest(with_shape_error(shape, solder, reference), effects, reference, [])
 
 
 def floating(package: FloatingPackage) -> Floating:

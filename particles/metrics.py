@@ -16,6 +16,8 @@ from particles.parameters import Solder
 from particles.physics import Force
 from particles.plate_force import plate_wrench
 from particles.rest import Run
+from particles.shape import JointShape
+from particles.shape_error import shape_error
 from particles.surface_measure import ring_area
 from particles.symmetry import whole_points
 from particles.time_step import capillary_limit
@@ -65,6 +67,14 @@ def body_metrics(solder: Solder, reference: Meridian | None, flow: LiquidFlow, r
     if flow.physics.lines:
         shape |= _contact(solder, flow, reference)
     return _volume(solder, flow) | shape | _pressure(solder, flow, run, reference) | _cost_and_rest(solder, flow, run)
+
+
+def with_shape_error(shape: JointShape, solder: Solder, reference: Meridian | None) -> JointShape:
+    """Add the error of the whole free surface, over the cube root of the volume, where there is an exact one."""
+    if reference is None or shape.verdict in ("open", "bridged"):
+        return shape
+    error = shape_error(shape.points, shape.triangles, reference) / float(np.cbrt(solder.volume))
+    return replace(shape, metrics=shape.metrics | {"shape_error": (error, "")})
 
 
 def _contact(solder: Solder, flow: LiquidFlow, reference: Meridian | None) -> Metrics:

@@ -1,6 +1,7 @@
 """Running one stage: a fresh partial folder, a record of what was used and found, a rename when all is there."""
 
 import json
+import resource
 import shutil
 import time
 import traceback
@@ -67,15 +68,16 @@ def run_stage(name: str, function: StageFunction, run: Run) -> dict:
         run: what the stage works with.
 
     Returns:
-        The record written to ``stage.json``: seconds, metrics, health, effects, continued, inputs.
+        The record written to ``stage.json``: seconds, core_seconds, metrics, health, effects, continued, inputs.
     """
     folder, partial = run.folder / name, run.folder / f".{name}.partial"
     _remove(partial)
     partial.mkdir(parents=True)
-    start = time.perf_counter()
+    start, used = time.perf_counter(), core_seconds()
     findings = function(run, partial)
     record = {
         "seconds": round(time.perf_counter() - start, 3),
+        "core_seconds": round(core_seconds() - used, 3),
         "metrics": findings.metrics,
         "health": findings.health,
         "effects": findings.effects,
@@ -87,6 +89,15 @@ def run_stage(name: str, function: StageFunction, run: Run) -> dict:
     partial.rename(folder)
     _remove(run.checkpoints(name))
     return record
+
+
+def core_seconds() -> float:
+    """Processor time [s] of this process and of all that it started on this machine and that have ended.
+
+    Those are workers of a pool and, through the launcher that waits for them, MPI ranks; not ranks elsewhere.
+    """
+    used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    return sum(one.ru_utime + one.ru_stime for one in used)
 
 
 def execute(name: str, function: StageFunction, run: Run) -> bool:

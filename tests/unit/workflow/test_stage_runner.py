@@ -1,6 +1,8 @@
 """A stage's folder appears complete, or not at all; a run folder has one user at a time."""
 
 import json
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -38,6 +40,16 @@ def test_a_stage_leaves_products_and_a_record(run):
     assert written["metrics"]["volume"] == {"value": 1.0, "unit": "m^3"}
     assert written["seconds"] >= 0.0
     assert sorted(path.name for path in run.folder.iterdir()) == ["surface"]
+
+
+def test_processor_time_of_programs_that_a_stage_starts_is_counted(run):
+    busy = "import time\nwhile time.process_time() < 0.2: pass"
+
+    def start(_run: Run, _folder: Path) -> Findings:
+        subprocess.run([sys.executable, "-c", busy], check=True)
+        return Findings()
+
+    assert run_stage("surface", start, run)["core_seconds"] >= 0.2
 
 
 def test_a_failed_stage_leaves_no_product(run):

@@ -1,0 +1,1 @@
+"""What accuracy costs: ladders of settings, their errors and costs, and what to choose."""
