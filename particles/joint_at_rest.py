@@ -45,8 +45,8 @@ class JointAtRest:
 def joint_to_rest(
     joint: Joint,
     solder: Solder,
-    progress: Callable[[float], None],
-    checkpoints: Callable[[int], Checkpoint],
+    progress: Callable[[float], None] | None = None,
+    checkpoints: Callable[[int], Checkpoint] | None = None,
 ) -> JointAtRest:
     """Let the solder of a joint flow until it, and a package that floats, is at rest.
 
@@ -68,11 +68,12 @@ def joint_to_rest(
         states = [shape.snapshots[-1] for shape in shapes[:-1]] or shapes[0].snapshots
         shape = replace(shapes[-1], snapshots=states, metrics=shapes[-1].metrics | _worst(shapes))
         return JointAtRest(with_shape_error(shape, solder, references[-1]), effects, references[-1], places)
+    first = None if checkpoints is None else checkpoints(0)
     if joint.package is None:
-        shape = solve_joint(joint.geometry, solder, progress, checkpoint=checkpoints(0))
+        shape = solve_joint(joint.geometry, solder, progress, checkpoint=first)
         reference = reference_meridian(joint.geometry, solder, weight)
         return JointAtRest(with_shape_error(shape, solder, reference), effects, reference, [])
-    shape = settle_joint(joint.geometry, solder, (floating(joint.package),), progress, checkpoints(0))
+    shape = settle_joint(joint.geometry, solder, (floating(joint.package),), progress, first)
     balance = _balance(joint, solder, weight, shape)
     end = joint.place(shape.metrics["standoff"][0], 0.0, 0.0)
     reference = reference_meridian(end, solder, weight) if "collapse_height_error" in balance else None
@@ -87,13 +88,17 @@ def floating(package: FloatingPackage) -> Floating:
 
 
 def _along(
-    joint: Joint, solder: Solder, progress: Callable[[float], None], checkpoints: Callable[[int], Checkpoint]
+    joint: Joint,
+    solder: Solder,
+    progress: Callable[[float], None] | None,
+    checkpoints: Callable[[int], Checkpoint] | None,
 ) -> list[JointShape]:
     """The joint at rest at the start and in each place of the path, as far as the neck holds."""
     shapes = []
     for shape in follow_path(joint.geometry, solder, joint.places, checkpoints):
         shapes.append(shape)
-        progress(len(shapes) / (1 + len(joint.places)))
+        if progress is not None:
+            progress(len(shapes) / (1 + len(joint.places)))
     return shapes
 
 

@@ -1,4 +1,4 @@
-"""Command line: new, plan, run, status, report, clean, schema."""
+"""Command line: new, plan, run, status, report, clean, stress-test, schema."""
 
 import json
 import os
@@ -123,6 +123,21 @@ def clean(case: CasePath, settings: Settings = None, out: Out = None) -> None:
     with locked(folder):
         shutil.rmtree(folder)
     console.print(f"removed {folder}")
+
+
+@app.command()
+def stress_test(
+    cases: Annotated[list[Path] | None, typer.Argument(metavar="CASES", help="hard cases [default: all]")] = None,
+    family: Annotated[
+        list[str] | None, typer.Option(metavar="FAMILY", help="reflow, elements, coupling or remesh [default: all]")
+    ] = None,
+    cores: Annotated[int | None, typer.Option("-j", "--cores", min=1, help="cases at a time [default: cores]")] = None,
+    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="results")] = Path("runs/stress-test"),
+) -> None:
+    """Try the hard cases: does each survive within its bounds?"""
+    from workflow.stress_test.command import stress_test as try_cases
+
+    raise typer.Exit(0 if try_cases(cases or [], family or [], cores or available_cores(), out) else 1)
 
 
 @app.command()

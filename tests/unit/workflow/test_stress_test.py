@@ -1,0 +1,138 @@
+"""Hard cases: what is read of a file, refused, tried and judged; a hang or a crash is a miss, and the rest goes on."""
+
+import math
+import os
+import time
+from typing import Annotated
+
+import pytest
+from pydantic import Field
+
+from particles.parameters import Parameters
+from workflow.problems import CaseError
+from workflow.stress_test import families, hard_case
+from workflow.stress_test.bound import read_bound
+from workflow.stress_test.hard_case import hard_cases, read_hard_cases
+from workflow.stress_test.pool import Pool
+from workflow.stress_test.trial import Measured, Trial
+from workflow.stress_test.verdict import attempt
+from workflow.units import UnitError
+
+
+class Rod(Parameters):
+    """A rod that is stretched."""
+
+    length: Annotated[float, "mm"] = Field(gt=0)
+    fate: str = "holds"
+
+
+def stretch(rod: Rod) -> dict[str, Measured]:
+    """Do what the rod's fate is."""
+    if rod.fate == "hangs":
+        time.sleep(60.0)
+    if rod.fate == "dies":
+        os._exit(3)
+    if rod.fate == "raises":
+        raise ArithmeticError("the rod broke")
+    error = math.nan if rod.fate == "is lost" else -2e-3
+    return {"error": Measured(100.0 * error, "%"), "width": Measured(1e3 * rod.length, "mm")}
+
+
+ROD = Trial(Rod, stretch, {"error": "", "width": "mm"})
+
+
+@pytest.fixture(autouse=True)
+def rods(monkeypatch):
+    monkeypatch.setattr(hard_case, "trials", lambda: {"rod": ROD})
+
+
+def cases(**changes):
+    table = {
+        "family": "elements",
+        "title": "a rod",
+        "why": "rods break",
+        "trial": "rod",
+        "parameters": {"length": "3 mm"},
+        "bounds": {"error": "0.5 %", "width": "> 2 mm"},
+    }
+    return hard_cases("elements_rod", table | changes, "elements_rod.toml", None)
+
+
+def refused(**changes):
+    with pytest.raises(CaseError) as caught:
+        cases(**changes)
+    return str(caught.value)
+
+
+def test_margins_are_factors_to_the_bound():
+    (case,) = cases()
+    verdict = attempt(case)
+    assert verdict.ok
+    assert [check.margin for check in verdict.checks] == pytest.approx([2.5, 1.5])
+    assert [str(check) for check in verdict.checks] == ["error -0.2 % <= 0.5 %", "width 3 mm >= 2 mm"]
+
+
+@pytest.mark.parametrize("bounds", [{"error": "0.1 %"}, {"width": ["> 2 mm", "< 2.5 mm"]}])
+def test_a_value_beyond_its_bound_is_a_miss(bounds):
+    (case,) = cases(bounds=bounds)
+    assert not attempt(case).ok
+
+
+def test_every_combination_of_varied_values_is_a_case():
+    found = cases(vary={"length": ["1 mm", "2 mm"], "fate": ["holds", "raises"]})
+    assert [case.tried for case in found][:2] == ["length 1 mm, fate holds", "length 1 mm, fate raises"]
+    assert [case.parameters.length for case in found] == [1e-3, 1e-3, 2e-3, 2e-3]
+
+
+@pytest.mark.parametrize("fate", ["raises", "is lost"])
+def test_errors_and_nan_are_misses(fate):
+    (case,) = cases(parameters={"length": "3 mm", "fate": fate})
+    assert not attempt(case).ok
+
+
+def test_an_expected_error_is_no_miss_and_its_absence_is():
+    fates = {"vary": {"fate": ["raises", "holds"]}, "expect": "the rod broke"}
+    assert [attempt(case).ok for case in cases(**fates)] == [True, False]
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({"trial": "rot"}, "did you mean rod?"),
+        ({"family": "reflov"}, "did you mean reflow?"),
+        ({"bound": {}}, "did you mean bounds?"),
+        ({"bounds": {"eror": "1 %"}}, "did you mean error?"),
+        ({"bounds": {"width": "1 kg"}}, "is a mass"),
+        ({"bounds": {"error": "1 mm"}}, "is not a pure number"),
+        ({"bounds": {"error": 0}}, "must be positive"),
+        ({"bounds": {}}, "nothing is judged"),
+        ({"parameters": {"lenght": "3 mm"}}, "did you mean length?"),
+        ({"parameters": {"length": "-3 mm"}}, 'parameters.length = "-3 mm": is out of range; allowed: > 0 mm'),
+        ({"parameters": {"length": 3}}, "needs a unit"),
+        ({"vary": {"length": "3 mm"}}, "must be a list"),
+    ],
+)
+def test_what_is_wrong_in_a_file_is_told(changes, told):
+    assert told in refused(**changes)
+
+
+def test_a_measure_that_only_the_run_knows_is_compared_by_its_dimension():
+    with pytest.raises(UnitError, match="standoff is in m"):
+        read_bound("standoff", "1 kg", None).margin(Measured(1.0, "m"))
+
+
+def test_hangs_and_deaths_are_misses_and_the_rest_goes_on():
+    found = cases(vary={"fate": ["hangs", "dies", "holds"]}, deadline="4 s")
+    with Pool(2) as pool:
+        verdicts = {verdict.tried: verdict for verdict in pool.attempt(found)}
+    assert verdicts["fate hangs"].message == "no answer in 4 s: taken to hang"
+    assert verdicts["fate dies"].message == "the process ended with code 3"
+    assert verdicts["fate holds"].ok
+
+
+def test_all_cases_of_the_program_can_be_read(monkeypatch):
+    monkeypatch.setattr(hard_case, "trials", families.trials)
+    from workflow.stress_test.command import HARD
+
+    found = [case for path in sorted(HARD.glob("*.toml")) for case in read_hard_cases(path)]
+    assert all(case.name.split("_")[0] == case.family for case in found)

@@ -1,0 +1,1 @@
+"""Hard cases as data: what breaks solvers like these, tried within bounds, and random ones."""

@@ -1,0 +1,126 @@
+"""Processes that try hard cases, several at a time; one that does not answer in time is ended, and the rest goes on."""
+
+import contextlib
+import multiprocessing
+import os
+import signal
+import threading
+import time
+from collections import deque
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from multiprocessing.connection import Connection, wait
+from typing import Any
+
+from fem.own_job import end_with_parent
+from workflow.stress_test.hard_case import HardCase
+from workflow.stress_test.verdict import Verdict, attempt, judged
+
+
+@dataclass(slots=True)
+class _Worker:
+    """A process, the end of its pipe, and what it works on since when [s]."""
+
+    process: Any
+    pipe: Connection
+    case: HardCase | None = None
+    since: float = 0.0
+
+    @property
+    def left(self) -> float:
+        """Seconds until its case is taken to hang."""
+        return self.since + self.case.deadline - time.monotonic() if self.case else float("inf")
+
+    def give(self, case: HardCase) -> None:
+        """Let it try a case."""
+        self.case, self.since = case, time.monotonic()
+        self.pipe.send(case)
+
+    def end(self) -> None:
+        """End the process and all that it started, at once."""
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(self.process.pid, signal.SIGKILL)
+        self.process.kill()  # it may not lead a group yet
+        self.process.join()
+        self.pipe.close()
+
+
+class Pool:
+    """Processes of this machine, of one thread each; they live as long as it is entered."""
+
+    def __init__(self, processes: int) -> None:
+        """Prepare as many processes; they start when they have work."""
+        self._processes = processes
+        self._context = multiprocessing.get_context("spawn")
+        self._workers: list[_Worker] = []
+
+    def __enter__(self) -> "Pool":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """End all processes, whatever they do."""
+        for worker in self._workers:
+            worker.end()
+        self._workers.clear()
+
+    def attempt(self, cases: Iterable[HardCase]) -> Iterator[Verdict]:
+        """Try cases and yield their verdicts as they come."""
+        waiting = deque(cases)
+        while waiting or any(worker.case for worker in self._workers):
+            while waiting and (worker := self._idle()) is not None:
+                worker.give(waiting.popleft())
+            yield from self._answers()
+
+    def _idle(self) -> _Worker | None:
+        """A process without work, a new one where more may be started."""
+        idle = next((worker for worker in self._workers if worker.case is None), None)
+        if idle is None and len(self._workers) < self._processes:
+            idle = self._start()
+            self._workers.append(idle)
+        return idle
+
+    def _start(self) -> _Worker:
+        ours, theirs = self._context.Pipe()
+        process = self._context.Process(target=_work, args=(theirs,), daemon=True)
+        process.start()
+        theirs.close()
+        return _Worker(process, ours)
+
+    def _answers(self) -> Iterator[Verdict]:
+        """Wait until a process answers, ends or is overdue, and yield the verdicts."""
+        busy = {worker.pipe: worker for worker in self._workers if worker.case}
+        ready = wait(list(busy), max(0.0, min(worker.left for worker in busy.values())))
+        for pipe, worker in busy.items():
+            if pipe in ready or worker.left <= 0.0:
+                yield self._answer(worker, pipe in ready)
+
+    def _answer(self, worker: _Worker, is_ready: bool) -> Verdict:
+        """The verdict on what a process worked on; one that died, or is overdue, is replaced."""
+        case, seconds = worker.case, time.monotonic() - worker.since
+        assert case is not None
+        worker.case = None
+        if is_ready:
+            try:
+                return worker.pipe.recv()
+            except (EOFError, ConnectionResetError):
+                worker.process.join()
+                message = f"the process ended with code {worker.process.exitcode}"
+        else:
+            message = f"no answer in {case.deadline:g} s: taken to hang"
+        self._workers.remove(worker)
+        worker.end()
+        return judged(case, message, seconds)
+
+
+def _work(pipe: Connection) -> None:
+    """Try what comes through a pipe until it is closed; what solvers print is left out."""
+    os.setsid()  # its parent ends it with all that it starts; Ctrl-C is for the parent
+    threading.Thread(target=end_with_parent, daemon=True).start()
+    os.environ["NUMBA_NUM_THREADS"] = os.environ["OMP_NUM_THREADS"] = "1"
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+    while True:
+        try:
+            case = pipe.recv()
+        except EOFError:
+            return
+        pipe.send(attempt(case))

@@ -1,0 +1,177 @@
+"""Trials of the reflow: drops, joints, pairs of drops and swings, judged by volume, energy, forces and exact shapes."""
+
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from pydantic import Field
+
+from particles.parameters import Parameters, Solder, Switch
+from particles.scene_drops import Drops
+from particles.scene_oscillation import Oscillation
+from particles.scenes import Drop, Fluid, Joint, Liquid
+from workflow.case_kind import of_particles
+from workflow.stress_test.trial import Measured, Trial
+
+if TYPE_CHECKING:
+    from particles.shape import JointShape
+
+SHAPE = {"volume_drift": "", "energy_rise": "", "energy_over_start": "", "steps": ""}
+ERRORS_OF_DROP = {
+    "height_error": "",
+    "max_width_error": "",
+    "contact_angle_error": "deg",
+    "contact_angle_excess": "deg",
+}
+ERRORS_OF_JOINT = {
+    "width_error": "",
+    "waist_error": "",
+    "axial_force_error": "",
+    "force_balance_error": "",
+    "collapse_height_error": "",
+    "places": "",
+}
+
+
+class BadScene(ValueError):
+    """A scene that the program refuses before anything is computed."""
+
+
+class MoltenScene(Parameters):
+    """Solder alone; a Bond number rho g V^(2/3) / gamma takes the place of gravity's acceleration.
+
+    It must come to rest, unless ``rest`` is false: its process ends before.
+    """
+
+    gravity: Switch = "auto"
+    solder: Fluid = Fluid()
+    bond: float | None = Field(None, ge=0, le=100)
+    rest: bool = True
+
+    def molten(self, scene: Drop | Joint | Drops) -> Solder:
+        """The solder as the solvers take it."""
+        solder = self.solder.resolve(scene, self.gravity)
+        if self.bond is None:
+            return solder
+        gravity = self.bond * solder.surface_tension / (solder.density * solder.volume ** (2.0 / 3.0))
+        return solder.model_copy(update={"gravity": gravity})
+
+    def measured(self, shape: "JointShape") -> dict[str, Measured]:
+        """All that a shape tells, with the energy of its history.
+
+        Raises:
+            ArithmeticError: it is not at rest, though it must be.
+        """
+        if self.rest and not shape.metrics["at_rest"][0] and shape.verdict != "open":
+            raise ArithmeticError(f"not at rest after {shape.metrics['steps'][0]:.0f} steps")
+        told = {name: Measured(value, unit) for name, (value, unit) in shape.metrics.items()}
+        return told | _energy(shape.history["energy"])
+
+
+class DropTrial(MoltenScene):
+    """A drop on a wall or pad, or free."""
+
+    drop: Drop
+
+
+class JointTrial(MoltenScene):
+    """A joint between two pads, and what must become of it."""
+
+    joint: Joint
+    verdict: Literal["ok", "overflow", "open", "dewetted"] | None = None
+
+
+class PairTrial(MoltenScene):
+    """Two drops, and what must become of them."""
+
+    drops: Drops
+
+
+class SwingTrial(Parameters):
+    """A free drop that swings."""
+
+    oscillation: Oscillation
+    solder: Liquid = Liquid()
+
+
+def drop(parameters: DropTrial) -> dict[str, Measured]:
+    """Bring a drop to rest."""
+    from particles.drop_at_rest import drop_to_rest
+    from particles.scene_checks import drop_problems
+
+    solder = parameters.molten(parameters.drop)
+    _refuse(drop_problems(parameters.drop, solder))
+    return parameters.measured(drop_to_rest(parameters.drop, solder).shape)
+
+
+def joint(parameters: JointTrial) -> dict[str, Measured]:
+    """Bring a joint to rest, along its path if it has one."""
+    from particles.joint_at_rest import joint_to_rest
+    from particles.scene_checks import joint_problems
+
+    solder = parameters.molten(parameters.joint)
+    _refuse(joint_problems(parameters.joint, solder))
+    shape = joint_to_rest(parameters.joint, solder).shape
+    if parameters.verdict not in (None, shape.verdict):
+        raise ArithmeticError(f'the joint ended "{shape.verdict}", must end "{parameters.verdict}"')
+    return parameters.measured(shape)
+
+
+def pair(parameters: PairTrial) -> dict[str, Measured]:
+    """Let two drops flow until they, or the one that they became, are at rest."""
+    from particles.drop_pair import pair_to_rest
+    from particles.scene_checks import pair_problems
+
+    solder = parameters.molten(parameters.drops)
+    _refuse(pair_problems(parameters.drops, solder))
+    shape = pair_to_rest(parameters.drops, solder).shape
+    wanted = "merged" if parameters.drops.merge else "apart"
+    if shape.verdict != wanted:
+        raise ArithmeticError(f"the drops are {shape.verdict}, must be {wanted}")
+    return parameters.measured(shape)
+
+
+def swing(parameters: SwingTrial) -> dict[str, Measured]:
+    """Let a free drop swing; its momentum is over that of its mass at the greatest speed of the swing."""
+    from particles.free_drop import solve_free_drop
+    from particles.scene_checks import oscillation_problems
+
+    scene = parameters.oscillation
+    solder = scene.resolve(parameters.solder)
+    _refuse(oscillation_problems(scene, solder))
+    found = solve_free_drop(solder, scene.amplitude, scene.periods, scene.steps_per_period)
+    energy, mass = found.history["energy"], solder.density * solder.volume
+    fastest = np.sqrt(2.0 * found.history["kinetic_energy"].max() / mass)
+    own = {
+        "momentum": Measured(float(found.history["momentum"].max() / (mass * fastest))),
+        **_energy(energy),
+    }
+    return {name: Measured(*found.metrics[name]) for name in MEASURES_OF_SWING if name in found.metrics} | own
+
+
+def _refuse(problems: list) -> None:
+    if problems:
+        raise BadScene("; ".join(str(problem) for problem in of_particles(problems)))
+
+
+def _energy(energy: np.ndarray) -> dict[str, Measured]:
+    """Largest rise of the energy in a step, and above the start, over the energy at the start."""
+    scale = abs(float(energy[0]))
+    rise = max(0.0, float(np.diff(energy).max(initial=0.0)))
+    over = max(0.0, float(energy.max() - energy[0]))
+    return {"energy_rise": Measured(rise / scale), "energy_over_start": Measured(over / scale)}
+
+
+MEASURES_OF_SWING = {
+    "volume_drift": "",
+    "period_error": "",
+    "decay_rate_error": "",
+    "momentum": "",
+    "energy_rise": "",
+    "energy_over_start": "",
+}
+TRIALS = {
+    "drop": Trial(DropTrial, drop, SHAPE | ERRORS_OF_DROP),
+    "joint": Trial(JointTrial, joint, SHAPE | ERRORS_OF_JOINT),
+    "drops": Trial(PairTrial, pair, SHAPE | ERRORS_OF_DROP | {"radius_error": "", "drops_left": ""}),
+    "swing": Trial(SwingTrial, swing, MEASURES_OF_SWING),
+}

@@ -1,0 +1,90 @@
+"""Trying a hard case and judging it: what was measured against each bound, or why there is no measure."""
+
+import math
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from workflow.stress_test.bound import Bound
+from workflow.stress_test.hard_case import HardCase
+from workflow.stress_test.trial import Measured
+from workflow.units import UnitError
+
+
+@dataclass(frozen=True, slots=True)
+class Check:
+    """A measure against its bound: both in words, and the factor by which it keeps it (1: at the bound)."""
+
+    measure: str
+    found: str
+    bound: str
+    margin: float
+
+    @property
+    def holds(self) -> bool:
+        """Whether the bound is kept; nan keeps none."""
+        return self.margin >= 1.0
+
+    def __str__(self) -> str:
+        return f"{self.measure.replace('_', ' ')} {self.found} {self.bound}"
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """How a case ended.
+
+    Attributes:
+        name, tried, family, title: of the case.
+        checks: one a bound; none where it was refused or broke.
+        message: an error, in words; "" where all was measured.
+        is_expected: whether the message is what the case expects.
+        seconds: wall time of the trial [s].
+    """
+
+    name: str
+    tried: str
+    family: str
+    title: str
+    checks: tuple[Check, ...]
+    message: str
+    is_expected: bool
+    seconds: float
+
+    @property
+    def ok(self) -> bool:
+        """Whether the case survived within all its bounds, or was refused as it must be."""
+        return self.is_expected or (not self.message and all(check.holds for check in self.checks))
+
+    @property
+    def closest(self) -> Check | None:
+        """The check that was kept by the smallest factor, or missed by the largest; one without a number first."""
+        return min(self.checks, key=lambda check: -1.0 if math.isnan(check.margin) else check.margin, default=None)
+
+
+def attempt(case: HardCase) -> Verdict:
+    """Try a case in this process; any error of it becomes part of the verdict."""
+    start = time.perf_counter()
+    try:
+        found = case.trial.run(case.parameters)
+        checks, message = tuple(_check(bound, found) for bound in case.bounds), ""
+    except Exception as error:  # whatever breaks a solver is what is looked for
+        checks, message = (), f"{type(error).__name__}: {error}"
+    seconds = time.perf_counter() - start
+    if case.expect and not message:
+        return judged(case, f'was not refused; expected: "{case.expect}"', seconds)
+    return judged(case, message, seconds, checks)
+
+
+def judged(case: HardCase, message: str, seconds: float, checks: tuple[Check, ...] = ()) -> Verdict:
+    """Return the verdict of a case."""
+    is_expected = bool(case.expect) and case.expect in message and "was not refused" not in message
+    return Verdict(case.name, case.tried, case.family, case.title, checks, message, is_expected, seconds)
+
+
+def _check(bound: Bound, found: Mapping[str, Measured]) -> Check:
+    measured = found.get(bound.measure)
+    if measured is None:
+        known = ", ".join(found)
+        raise UnitError(f"bounds.{bound.measure}: nothing of that name was measured; measured: {known}")
+    margin = bound.margin(measured)
+    return Check(bound.measure, bound.shown(measured), f"{bound.sign} {bound.text}", margin)
