@@ -38,8 +38,8 @@ from fem.mesh import MeshData, boundary_facets
 from fem.modal import natural_modes
 from fem.motion import Motion
 from fem.scene import prepare
-from tests.support.fem_elements import KINDS, box
-from tests.support.fem_models import CYCLIC
+from fem.trials.boxes import KINDS, box
+from fem.trials.grids import CYCLIC
 
 RESULTS = Path(__file__).parent / "results" / "element_accuracy.json"
 README = Path(__file__).parents[1] / "cases" / "cantilever" / "README.md"

@@ -35,7 +35,7 @@ from fem import dolfinx_api
 from fem.elements.element import CHUNK, Elements, element_stiffness
 from fem.force import ForceTerm, Kinematics, force_terms
 from fem.mesh import MeshData
-from tests.support.fem_bodies import dns_body, motion_of
+from fem.trials.bodies import dns_body, motion_of
 
 KINDS = ("incompatible_modes", "one_point")
 PLASTIC = [f"{name}_{kind}_small" for name in ("below_yield", "yielding") for kind in KINDS]

@@ -36,10 +36,10 @@ from fem.structure.crew import make_participant
 from fem.structure.model import build_structure
 from fem.structure.pulses import pulse_durations, pulses_of
 from fem.structure.run import make_history
+from fem.trials.bodies import dns_body
+from fem.trials.grids import grid, mesh_of
 from meshing.box import write_box
 from meshing.box_plan import Box, BoxHoles, BoxLayer
-from tests.support.fem_bodies import dns_body
-from tests.support.fem_models import grid, mesh_of
 
 RESULTS = Path(__file__).parent / "results" / "jedec_oracle.json"
 LENGTH, WIDTH, THICKNESS, SPACING, HOLE = 132e-3, 77e-3, 1e-3, (105e-3, 71e-3), 3e-3

@@ -24,7 +24,7 @@ from benchmarks.support.cube import STEEL, cube, elements_of
 from fem.force_assembled import AssembledElements
 from fem.force_congruent import CongruentElements
 from fem.mesh import MeshData
-from tests.support.fem_bodies import dns_body, motion_of
+from fem.trials.bodies import dns_body, motion_of
 
 FOLDER = Path(__file__).parents[1] / "build" / "peers"
 PYTHON = FOLDER / "venv" / "bin" / "python"

@@ -31,7 +31,7 @@ from fem.materials.roles import Materials
 from fem.motion import Motion
 from fem.own_job import own_environment
 from fem.scene import prepare
-from tests.support.fem_bodies import motion_of
+from fem.trials.bodies import motion_of
 from workflow.launch import mpi_command
 
 ROUNDS, CALLS = 40, 10

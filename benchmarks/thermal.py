@@ -36,10 +36,10 @@ from fem.thermal.scene import thermal_tables
 from fem.thermal.state import Assembly
 from fem.thermal.structure import ThermalStructure
 from fem.thermal.thermoelastic import Thermoelastic
+from fem.trials.grids import grid, mesh_of, on
 from meshing.assembly import write_assembly
 from meshing.heated_assembly import write_heated_assembly
 from meshing.pads import pad_table
-from tests.support.fem_models import grid, mesh_of, on
 from workflow.case import read_case
 
 RESULTS = Path(__file__).parent / "results" / "thermal.json"

@@ -10,7 +10,7 @@ from fem.materials.library import COPPER, SAC405, SILICON
 from fem.materials.parameters import Isotropic
 from fem.materials.roles import Materials
 from fem.mesh import MeshData, boundary_facets, without_unused_nodes
-from tests.support.fem_models import CYCLIC, grid, mesh_of, on
+from fem.trials.grids import CYCLIC, grid, mesh_of, on
 
 # Peers take isotropic materials in this comparison: a board of the in-plane stiffness of FR4.
 BOARD = Isotropic(density=1910.0, young_modulus=27.9e9, poisson_ratio=0.11)

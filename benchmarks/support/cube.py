@@ -6,9 +6,9 @@ from fem.box_step import diagonal_tetrahedra
 from fem.elements.element import Elements
 from fem.materials.parameters import Isotropic, JohnsonCook, Material
 from fem.mesh import MeshData
-from tests.support.fem_elements import KINDS, with_middles
-from tests.support.fem_elements import elements_of as material_elements
-from tests.support.fem_models import grid, mesh_of
+from fem.trials.boxes import KINDS, with_middles
+from fem.trials.boxes import elements_of as material_elements
+from fem.trials.grids import grid, mesh_of
 
 EDGE = 40
 LENGTH = 0.04  # [m]

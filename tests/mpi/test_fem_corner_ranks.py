@@ -19,7 +19,7 @@ from fem.mesh import append
 from fem.parameters import Coupling
 from fem.scene import model_inputs
 from tests.stability.test_fem_division import board, joint
-from tests.support.fem_division import checked, surveyed
+from fem.trials.divided import checked, surveyed
 
 world = MPI.COMM_WORLD
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.support.fem_elements import KINDS
+from fem.trials.boxes import KINDS
 from tests.support.fem_program import run_script
 
 SCRIPT = """
@@ -20,7 +20,7 @@ from fem.materials.roles import Materials
 from fem.mesh import MeshData
 from fem.motion import Motion
 from fem.scene import prepare
-from tests.support.fem_elements import KINDS, box
+from fem.trials.boxes import KINDS, box
 
 comm, result = MPI.COMM_WORLD, {}
 for name, kind in KINDS.items():

@@ -14,9 +14,9 @@ from fem.exchange import CutChannels
 from fem.materials.roles import Materials
 from fem.mesh import MeshData, append
 from fem.parameters import Coupling
-from tests.support.fem_coupled import Coupled, models_of
-from tests.support.fem_division import surveyed
-from tests.support.fem_models import grid, joint_mesh, mesh_of, on
+from fem.trials.coupled import Coupled, models_of
+from fem.trials.divided import surveyed
+from fem.trials.grids import grid, joint_mesh, mesh_of, on
 
 SIZE, LAYER = 0.5e-3, 0.25e-3
 

@@ -8,8 +8,8 @@ from fem.materials.library import SAC405
 from fem.materials.roles import Materials
 from fem.parameters import Coupling
 from fem.tie import net_load
-from tests.support.fem_coupled import Coupled, models_of
-from tests.support.fem_pairs import FRACTION, SIZE, Pair
+from fem.trials.coupled import Coupled, models_of
+from fem.trials.pairs import FRACTION, SIZE, Pair
 
 KICK = np.array([0.3, 0.1, 1.0])  # [m/s]
 LINK = Coupling(scheme="gravouil_combescure")

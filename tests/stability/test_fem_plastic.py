@@ -9,9 +9,9 @@ from fem.materials.library import FR4
 from fem.materials.parameters import Isotropic, JohnsonCook
 from fem.mesh import MeshData
 from fem.motion import Motion
-from tests.support.fem_bodies import motion_of
-from tests.support.fem_models import grid, mesh_of, on
-from tests.support.fem_nonlinear import SOLDER, nonlinear_body
+from fem.trials.bodies import motion_of, nonlinear_body
+from fem.trials.grids import grid, mesh_of, on
+from tests.support.fem_nonlinear import SOLDER
 
 both_formulations = pytest.mark.parametrize("formulation", ["one_point", "incompatible_modes"])
 

@@ -17,8 +17,8 @@ from fem.motion import Motion
 from fem.participant import Alone, uncut_motion
 from fem.power_iteration import highest_frequency
 from fem.pulse import HalfSine
-from tests.support.fem_bodies import dns_body
-from tests.support.fem_models import grid, mesh_of, on
+from fem.trials.bodies import dns_body
+from fem.trials.grids import grid, mesh_of, on
 
 SOFT = Isotropic(density=1200.0, young_modulus=1e9, poisson_ratio=0.45)
 PUSH = np.array([0.6, 0.0, 0.8])

@@ -13,8 +13,9 @@ from fem.materials.library import SAC405, SILICON
 from fem.materials.parameters import Isotropic
 from fem.materials.roles import Materials
 from fem.mesh import MeshData, append, merge_nodes
-from tests.support.fem_division import by_patch, naive, surveyed
-from tests.support.fem_models import grid, joint_mesh, mesh_of, on
+from fem.trials.divided import surveyed
+from fem.trials.grids import grid, joint_mesh, mesh_of, on
+from tests.support.fem_division import by_patch, naive
 from tests.support.fem_window import Window
 
 SOFT = Isotropic(density=1200.0, young_modulus=1e9, poisson_ratio=0.45)

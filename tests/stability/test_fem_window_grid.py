@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from fem.parameters import Coupling
-from tests.support.fem_pairs import SCHEMES, SIZE, Pair
+from fem.trials.pairs import SCHEMES, SIZE, Pair
 
 GROWTH = 1e-8
 PUSH = np.array([0.3, 0.1, 1.0])  # [m/s]

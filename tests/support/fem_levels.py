@@ -13,7 +13,7 @@ from fem.local_mesh import distribute
 from fem.materials.roles import Materials
 from fem.mesh import MeshData, append
 from fem.scene import prepare
-from tests.support.fem_models import grid, joint_mesh, mesh_of, on
+from fem.trials.grids import grid, joint_mesh, mesh_of, on
 
 EDGE = 1.5e-3
 FRACTION = 0.9

@@ -1,44 +1,17 @@
 """Small meshes for the shock tests: bars, boards, and a package of box joints that match nothing."""
 
-from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import gmsh
 import numpy as np
 
 from fem.elements.cell_shape import TENSOR_ORDER
-from fem.mesh import MeshData, append, boundary_facets, without_unused_nodes
+from fem.mesh import MeshData, append, without_unused_nodes
+from fem.trials.grids import COPPER, GAP, grid, joint_mesh, mesh_of, on
 
-CYCLIC = [0, 1, 3, 2]
 # Of cells and facets with so many nodes: Gmsh's type, and its order of our nodes.
 GMSH_TYPES = {8: 5, 4: 4, 10: 11}, {4: 3, 3: 2, 6: 9}
 GMSH_ORDER = {8: np.argsort(TENSOR_ORDER), 4: np.arange(4), 10: np.array([0, 1, 2, 3, 9, 6, 8, 7, 4, 5])}
-FACET_SETS = Callable[[np.ndarray], np.ndarray]
-
-
-def grid(x: Sequence[float], y: Sequence[float], z: Sequence[float]) -> tuple[np.ndarray, np.ndarray]:
-    """Return points (n, 3) and hexahedra (ne, 8) in tensor order of a structured box."""
-    zz, yy, xx = np.meshgrid(np.asarray(z, float), np.asarray(y, float), np.asarray(x, float), indexing="ij")
-    points = np.column_stack([xx.ravel(), yy.ravel(), zz.ravel()])
-    number = np.arange(len(points), dtype=np.int32).reshape(zz.shape)
-    shift = [slice(None, -1), slice(1, None)]
-    cells = np.stack([number[shift[a >> 2], shift[a >> 1 & 1], shift[a & 1]].ravel() for a in range(8)], axis=1)
-    return points, cells
-
-
-def mesh_of(points: np.ndarray, cells: np.ndarray, part: str | np.ndarray, facets: dict[str, FACET_SETS]) -> MeshData:
-    """Return a mesh; ``facets`` maps a name to a test of boundary facet centres (nf, 3) -> (nf,)."""
-    names = np.full(len(cells), part) if isinstance(part, str) else part
-    part_names, number = np.unique(names, return_inverse=True)
-    outside = boundary_facets(cells)[:, CYCLIC if cells.shape[1] == 8 else slice(None)]
-    centres = points[outside].mean(axis=1)
-    sets = {name: outside[test(centres)] for name, test in facets.items()}
-    return MeshData(points, cells, number.astype(np.int32), tuple(str(name) for name in part_names), sets)
-
-
-def on(axis: int, value: float, tolerance: float = 1e-9) -> FACET_SETS:
-    """Return the test of facets on a plane."""
-    return lambda centres: np.abs(centres[:, axis] - value) < tolerance
 
 
 def bar(length: float, elements: int, width: float, part: str = "board") -> MeshData:
@@ -48,7 +21,7 @@ def bar(length: float, elements: int, width: float, part: str = "board") -> Mesh
 
 
 BOARD_X, BOARD_Y, BOARD_Z = 12e-3, 8e-3, 1e-3
-PATCH, PACKAGE, GAP, COPPER = 3.5e-3, 2.5e-3, 0.3e-3, 2e-5
+PATCH, PACKAGE = 3.5e-3, 2.5e-3
 
 
 def board_mesh(size: float = 0.5e-3, layers: int = 4, patch_layers: int = 2) -> MeshData:
@@ -79,23 +52,6 @@ def package_mesh(size: float = 0.5e-3) -> MeshData:
     facets = {"symmetry_x": on(0, 0.0), "symmetry_y": on(1, 0.0), "package_side": on(2, low)}
     mesh = mesh_of(points, cells[kept], np.where(die, "die", "substrate")[kept], facets)
     return without_unused_nodes(mesh)[0]
-
-
-def joint_mesh(name: str, x: float, y: float, layers: int = 4, edges: int = 3) -> MeshData:
-    """Return a box joint of solder between two copper pads, centred on (x, y)."""
-    side = np.linspace(-0.2e-3, 0.2e-3, edges + 1)
-    height = np.concatenate([[0.0], COPPER + np.linspace(0, GAP, layers + 1), [GAP + 2 * COPPER]])
-    points, cells = grid(x + side, y + side, height)
-    level = np.repeat(np.arange(layers + 2), edges**2)
-    part = np.array(["solder"] * (layers + 2), dtype=object)
-    part[0], part[-1] = "copper_board", "copper_package"
-    ends = {f"foot@{name}": on(2, 0.0), f"head@{name}": on(2, height[-1])}
-    mesh = mesh_of(points, cells, np.array([f"{part[k]}@{name}" for k in level]), ends)
-    solder = cells[np.isin(level, np.arange(1, layers + 1))]
-    inner = boundary_facets(solder)[:, CYCLIC]
-    for end, z in (("board", COPPER), ("package", COPPER + GAP)):
-        mesh.facets[f"pad_{end}@{name}"] = inner[on(2, z)(points[inner].mean(axis=1))]
-    return mesh
 
 
 SITES = {"B2": (0.5e-3, 0.5e-3), "B3": (1.5e-3, 0.5e-3), "A2": (0.5e-3, 1.5e-3), "A3": (1.5e-3, 1.5e-3)}

@@ -1,19 +1,12 @@
 """Nonlinear elements for tests, and their plain NumPy twins: one element and one point at a time, no lanes."""
 
 import numpy as np
-from mpi4py import MPI
 from scipy.linalg import polar
 
-from fem.body import Body, Response, make_body, make_pieces
-from fem.elements.element import Elements
-from fem.force_nonlinear import NonlinearElements
 from fem.kernels.hexahedron import GAUSS, shape_derivatives
 from fem.kernels.nonlinear import Path
 from fem.kernels.plasticity import plastic_constants, plastic_increment
-from fem.local_mesh import distribute
 from fem.materials.parameters import Isotropic, JohnsonCook, Material
-from fem.mesh import MeshData
-from fem.scene import prepare
 from fem.strain import strain_matrix
 from fem.stress import symmetric, voigt
 
@@ -27,29 +20,6 @@ LINEAR_HARDENING = Isotropic(
     density=7400.0, young_modulus=50e9, poisson_ratio=0.36, plasticity=JohnsonCook(A=40e6, B=500e6, n=1.0)
 )
 SHEAR_TWICE = np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0])
-
-
-def nonlinear(elements: Elements, material: Material, finite: bool, step: float = np.inf) -> NonlinearElements:
-    """Return the nonlinear term of elements of one material."""
-    plastic = np.array([plastic_constants(material)])
-    return NonlinearElements.build(elements, np.arange(len(elements.cells)), plastic, Path(finite, step))
-
-
-def force_of(term: NonlinearElements, displacement: np.ndarray) -> np.ndarray:
-    """Return the internal force (n, 3) [N] of the next step of the path."""
-    force = np.zeros_like(displacement)
-    term.add(displacement, force)
-    return -force
-
-
-def nonlinear_body(
-    mesh: MeshData, material: Material, response: Response, formulation: str = "one_point"
-) -> tuple[Body, float]:
-    """Return a body of one material, and its smallest element critical step [s]."""
-    item = prepare(mesh, "dns")["dns"]
-    materials = dict.fromkeys(item.tables.part_names, material)
-    pieces = make_pieces(distribute(MPI.COMM_SELF, item.mesh), item.tables, materials, formulation)
-    return make_body(MPI.COMM_SELF, pieces, item.tables, np.ones(len(pieces.steps)), response), pieces.steps.min()
 
 
 class PointTwin:

@@ -16,7 +16,7 @@ from fem.residual.initial_state import begun
 from fem.scene import joined, model_inputs
 from fem.stress_recovery import StressRecovery
 from fem.supports import SYMMETRY
-from tests.support.fem_models import grid, mesh_of, on
+from fem.trials.grids import grid, mesh_of, on
 
 SMALL = Response()
 

@@ -7,7 +7,8 @@ import numpy as np
 
 from fem.inputs import INPUT, StructureInput
 from fem.mesh import MeshData
-from tests.support.fem_models import grid, mesh_of, on, write_msh
+from fem.trials.grids import grid, mesh_of, on
+from tests.support.fem_models import write_msh
 
 LENGTH, WIDTH, THICKNESS = 20e-3, 8e-3, 1e-3
 STEEL = {"kind": "isotropic", "density": 8000.0, "young_modulus": 200e9, "poisson_ratio": 0.3}

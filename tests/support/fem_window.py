@@ -2,12 +2,13 @@
 
 from collections.abc import Sequence
 
+from fem.coupling.divide import divide
 from fem.coupling.held_velocity import HeldVelocity
 from fem.loads import Load
 from fem.materials.roles import Materials
 from fem.mesh import MeshData
-from tests.support.fem_coupled import Coupled, models_of
-from tests.support.fem_division import HELD, Divide, divide
+from fem.trials.coupled import Coupled, models_of
+from fem.trials.divided import HELD, Divide
 
 
 class Window(Coupled):

@@ -14,7 +14,8 @@ from fem.thermal.pads import Pads
 from fem.thermal.parameters import Thermal
 from fem.thermal.state import Assembly
 from fem.thermal.structure import ThermalStructure
-from tests.support.fem_models import COPPER, GAP, SITES, grid, mesh_of, on, write_msh, write_small_assembly
+from fem.trials.grids import COPPER, GAP, grid, mesh_of, on
+from tests.support.fem_models import SITES, write_msh, write_small_assembly
 
 LIFT = 1e-3  # height of the layers' lower face
 REFERENCE = 298.15

@@ -9,8 +9,10 @@ from fem.materials.elasticity import elasticity_matrix
 from fem.materials.library import FR4, SAC405
 from fem.materials.parameters import Isotropic
 from fem.stress import element_stress
-from tests.support.fem_bodies import dense_stiffness, dns_body
-from tests.support.fem_models import bar, grid, mesh_of, on
+from fem.trials.bodies import dns_body
+from fem.trials.grids import grid, mesh_of, on
+from tests.support.fem_bodies import dense_stiffness
+from tests.support.fem_models import bar
 
 RANDOM = np.random.default_rng(3)
 

@@ -9,8 +9,8 @@ from fem.materials.library import FR4
 from fem.materials.parameters import Isotropic, Material
 from fem.mesh import boundary_facets
 from fem.mesh_quality import scaled_jacobians
-from tests.support.fem_elements import KINDS, box, elements_of, frequencies, solve
-from tests.support.fem_models import CYCLIC
+from fem.trials.boxes import KINDS, box, elements_of, frequencies, solve
+from fem.trials.grids import CYCLIC
 
 HEXAHEDRA = ["incompatible_modes", "one_point"]
 NOT_LOCKING = pytest.mark.parametrize("name", [*HEXAHEDRA, "tetrahedron_quadratic"])

@@ -10,7 +10,7 @@ from mpi4py import MPI
 from fem import dolfinx_api
 from fem.materials.elasticity import elasticity_matrix
 from fem.materials.library import FR4
-from tests.support.fem_elements import KINDS, box, elements_of, stiffness_matrix
+from fem.trials.boxes import KINDS, box, elements_of, stiffness_matrix
 
 RANDOM = np.random.default_rng(0)
 

@@ -8,7 +8,7 @@ from fem.elements.one_point import ONE_POINT, hourglass_control
 from fem.force import force_terms
 from fem.materials.elasticity import elasticity_matrix
 from fem.materials.library import FR4
-from tests.support.fem_models import grid
+from fem.trials.grids import grid
 
 RANDOM = np.random.default_rng(5)
 

@@ -13,8 +13,8 @@ from fem.materials.parameters import Isotropic
 from fem.mesh import boundary_facets
 from fem.mesh_quality import scaled_jacobians
 from fem.stress import element_stress, mean_strain
-from tests.support.fem_elements import KINDS, box, elements_of, mass_of, solve, stiffness_matrix
-from tests.support.fem_models import CYCLIC
+from fem.trials.boxes import KINDS, box, elements_of, mass_of, solve, stiffness_matrix
+from fem.trials.grids import CYCLIC
 
 RANDOM = np.random.default_rng(3)
 LINE = np.linspace(0, 1, 4)

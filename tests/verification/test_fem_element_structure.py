@@ -8,8 +8,8 @@ import pytest
 from mpi4py import MPI
 
 from fem.structure.run import run_structure
-from tests.support.fem_elements import KINDS, box
-from tests.support.fem_models import mesh_of, on
+from fem.trials.boxes import KINDS, box
+from fem.trials.grids import mesh_of, on
 from tests.support.fem_structures import LENGTH, THICKNESS, WIDTH, structure_input, structure_tables_of
 
 CELLS = (16, 4, 2)

@@ -9,8 +9,9 @@ from fem.loads import NodalForces
 from fem.mesh import MeshData
 from fem.motion import Motion
 from fem.pulse import Constant
-from tests.support.fem_bodies import STEEL, dns_body, motion_of
-from tests.support.fem_models import grid, mesh_of, on
+from fem.trials.bodies import dns_body, motion_of
+from fem.trials.grids import grid, mesh_of, on
+from tests.support.fem_bodies import STEEL
 
 PRESSURE = 1e6
 SIDES = {f"{'xyz'[axis]}_{end}": on(axis, place) for axis in range(3) for end, place in (("min", 0.0), ("max", 1e-3))}

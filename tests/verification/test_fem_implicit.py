@@ -12,8 +12,10 @@ from fem.implicit import ImplicitMotion
 from fem.loads import half_sine_drop
 from fem.materials.roles import Materials
 from fem.mesh import append
-from tests.support.fem_bodies import STEEL, dns_body, motion_of
-from tests.support.fem_models import board_mesh, grid, mesh_of, small_assembly
+from fem.trials.bodies import dns_body, motion_of
+from fem.trials.grids import grid, mesh_of
+from tests.support.fem_bodies import STEEL
+from tests.support.fem_models import board_mesh, small_assembly
 
 PEAK = 1e4
 

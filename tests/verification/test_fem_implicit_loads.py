@@ -14,7 +14,8 @@ from fem.mesh import MeshData
 from fem.modal import natural_modes
 from fem.moving import Moving
 from fem.parameters import Damping
-from tests.support.fem_bodies import STEEL, dns_body, motion_of
+from fem.trials.bodies import dns_body, motion_of
+from tests.support.fem_bodies import STEEL
 from tests.verification.test_fem_loads import bar, largest_imbalance, loads_of
 
 KINDS = ["pressure", "motion", "large_mass", "damped"]

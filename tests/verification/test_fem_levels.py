@@ -15,8 +15,9 @@ from fem.materials.roles import Materials
 from fem.motion import Motion
 from fem.scene import joined, model_inputs
 from fem.tie import net_load
-from tests.support.fem_bodies import dense_stiffness, motion_of
-from tests.support.fem_coupled import Coupled, Models, pieces_of
+from fem.trials.bodies import motion_of
+from fem.trials.coupled import Coupled, Models, pieces_of
+from tests.support.fem_bodies import dense_stiffness
 from tests.support.fem_levels import Levelled, joint_on_board, levelled
 
 MESH = joint_on_board(solder=4)

@@ -15,8 +15,9 @@ from fem.mesh import MeshData
 from fem.motion import Motion
 from fem.parameters import Damping
 from fem.pulse import Constant, HalfSine
-from tests.support.fem_bodies import STEEL, dns_body, motion_of
-from tests.support.fem_models import grid, mesh_of, on
+from fem.trials.bodies import dns_body, motion_of
+from fem.trials.grids import grid, mesh_of, on
+from tests.support.fem_bodies import STEEL
 
 LENGTH, WIDTH = 0.02, 2e-3
 SPEED = np.sqrt(STEEL.young_modulus / STEEL.density)

@@ -9,8 +9,10 @@ from fem.body import Body
 from fem.global_matrix import Equations
 from fem.materials.library import FR4
 from fem.modal import natural_modes
-from tests.support.fem_bodies import STEEL, dns_body
-from tests.support.fem_models import bar, grid, mesh_of
+from fem.trials.bodies import dns_body
+from fem.trials.grids import grid, mesh_of
+from tests.support.fem_bodies import STEEL
+from tests.support.fem_models import bar
 
 SPEED = np.sqrt(STEEL.young_modulus / STEEL.density)  # of bar waves; nu = 0
 WIDTH = 0.1

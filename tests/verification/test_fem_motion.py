@@ -5,8 +5,10 @@ import pytest
 
 from fem.loads import half_sine_drop
 from fem.mesh import MeshData
-from tests.support.fem_bodies import STEEL, dns_body, motion_of
-from tests.support.fem_models import bar, grid, mesh_of, on
+from fem.trials.bodies import dns_body, motion_of
+from fem.trials.grids import grid, mesh_of, on
+from tests.support.fem_bodies import STEEL
+from tests.support.fem_models import bar
 
 SPEED = np.sqrt(STEEL.young_modulus / STEEL.density)  # of bar waves; nu = 0
 LENGTH = 0.1

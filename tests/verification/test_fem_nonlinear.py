@@ -11,8 +11,9 @@ from fem.force_nonlinear import NonlinearElements
 from fem.materials.library import FR4
 from fem.materials.parameters import Isotropic, JohnsonCook, Material
 from fem.stress import symmetric
-from tests.support.fem_elements import KINDS, box, elements_of, mass_of
-from tests.support.fem_nonlinear import LINEAR_HARDENING, SOLDER, force_of, nonlinear
+from fem.trials.bodies import force_of, nonlinear
+from fem.trials.boxes import KINDS, box, elements_of, mass_of
+from tests.support.fem_nonlinear import LINEAR_HARDENING, SOLDER
 
 LINE = np.linspace(0.0, 1.0, 4)
 ELASTIC = Isotropic(density=1.0, young_modulus=1.0, poisson_ratio=0.3)

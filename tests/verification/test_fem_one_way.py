@@ -13,10 +13,10 @@ from fem.materials.library import SAC405
 from fem.materials.roles import Materials
 from fem.parameters import Coupling
 from fem.scene import Tables, model_inputs
-from tests.support.fem_bodies import motion_of
-from tests.support.fem_coupled import Coupled, Models, models_of, pieces_of
-from tests.support.fem_division import surveyed
-from tests.support.fem_pairs import FRACTION, Pair
+from fem.trials.bodies import motion_of
+from fem.trials.coupled import Coupled, Models, models_of, pieces_of
+from fem.trials.divided import surveyed
+from fem.trials.pairs import FRACTION, Pair
 
 LOADS = [half_sine_drop(peak=1.5e4, duration=1e-5)]
 WINDOWS = 200

@@ -10,7 +10,7 @@ from mpi4py import MPI
 from fem.compare_structures import solver_differences
 from fem.mesh import MeshData
 from fem.structure.run import run_structure
-from tests.support.fem_models import grid, mesh_of, on
+from fem.trials.grids import grid, mesh_of, on
 from tests.support.fem_structures import structure_input
 
 X, Y, Z = 66e-3, 38.5e-3, 1e-3

@@ -6,9 +6,9 @@ import pytest
 from fem.errors import EnergyError
 from fem.ledger import Ledger
 from fem.portable import values
-from tests.support.fem_bodies import dns_body, motion_of
-from tests.support.fem_coupled import Coupled
-from tests.support.fem_pairs import SCHEMES, Pair
+from fem.trials.bodies import dns_body, motion_of
+from fem.trials.coupled import Coupled
+from fem.trials.pairs import SCHEMES, Pair
 
 PUSH = np.array([0.3, 0.1, 1.0])  # [m/s]
 OF_TWO_STEPS = [name for name, coupling in SCHEMES.items() if coupling.scheme != "local_steps"]

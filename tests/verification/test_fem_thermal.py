@@ -14,7 +14,8 @@ from fem.thermal.parameters import Thermal
 from fem.thermal.rigid import RigidMotions
 from fem.thermal.state import Assembly
 from fem.thermal.structure import ThermalStructure
-from tests.support.fem_models import grid, mesh_of, on, write_msh
+from fem.trials.grids import grid, mesh_of, on
+from tests.support.fem_models import write_msh
 from tests.support.thermal_models import (
     LIFT,
     REFERENCE,

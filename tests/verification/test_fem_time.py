@@ -14,8 +14,9 @@ from fem.materials.parameters import Isotropic
 from fem.materials.roles import Materials
 from fem.mesh import MeshData
 from fem.pulse import HalfSine, Tabulated
-from tests.support.fem_bodies import STEEL, dns_body, motion_of
-from tests.support.fem_models import grid, mesh_of, on
+from fem.trials.bodies import dns_body, motion_of
+from fem.trials.grids import grid, mesh_of, on
+from tests.support.fem_bodies import STEEL
 
 SPEED = np.sqrt(STEEL.young_modulus / STEEL.density)
 ALONG = np.array([1.0, 0.0, 0.0])

@@ -8,7 +8,7 @@ from fem.loads import half_sine_drop
 from fem.materials.library import SAC405
 from fem.materials.roles import Materials
 from fem.mesh import MeshData, append
-from tests.support.fem_bodies import dns_body, motion_of
+from fem.trials.bodies import dns_body, motion_of
 from tests.support.fem_division import by_patch
 from tests.support.fem_models import board_mesh, small_assembly
 from tests.support.fem_window import Window

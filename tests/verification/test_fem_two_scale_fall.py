@@ -10,7 +10,7 @@ from fem.loads import half_sine_drop
 from fem.materials.roles import Materials
 from fem.mesh import append
 from fem.parameters import Coupling
-from tests.support.fem_coupled import Coupled, models_of
+from fem.trials.coupled import Coupled, models_of
 from tests.support.fem_models import small_assembly
 
 PULSE = half_sine_drop(peak=1.5e4, duration=2e-5)

@@ -9,13 +9,13 @@ from fem.elements.cell_shape import TENSOR_ORDER
 from fem.elements.element import critical_steps, element_geometry
 from fem.estimate import box_critical_step
 from fem.materials.library import LIBRARY
+from fem.trials.boxes import KINDS, elements_of, frequencies, solve
 from meshing.free_form import free_form_solder
 from meshing.hexahedra import quad_areas, shortest_lengths
 from meshing.parameters import JointNumerics
 from meshing.solder import Solder
 from meshing.swept import swept_solder
 from meshing.tetrahedra import fill_with_tetrahedra
-from tests.support.fem_elements import KINDS, elements_of, frequencies, solve
 from tests.support.joint_surfaces import barrel
 from tests.support.meshing_models import MM
 

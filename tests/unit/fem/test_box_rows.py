@@ -9,7 +9,7 @@ from fem.force_congruent import CongruentElements
 from fem.kernels.box_rows import LONGEST
 from fem.materials.elasticity import elasticity_matrix
 from fem.materials.library import FR4, SAC405
-from tests.support.fem_models import grid
+from fem.trials.grids import grid
 
 MATERIALS = np.array([elasticity_matrix(FR4), elasticity_matrix(SAC405)])
 

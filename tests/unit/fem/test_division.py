@@ -16,7 +16,7 @@ from fem.mesh import append
 from fem.parameters import Coupling
 from fem.scene import model_inputs
 from fem.steps import steps_of_division
-from tests.support.fem_division import surveyed
+from fem.trials.divided import surveyed
 from tests.support.fem_models import small_assembly
 
 ELASTIC, YIELDING = Materials(), Materials(solder=SAC305)

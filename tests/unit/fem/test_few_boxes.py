@@ -7,9 +7,9 @@ from fem.elements.kind import ElementKind
 from fem.force import linear_terms
 from fem.force_assembled import AssembledElements
 from fem.force_congruent import FEW
+from fem.trials.boxes import KINDS, elements_of
+from fem.trials.grids import grid
 from tests.support.fem_bodies import STEEL
-from tests.support.fem_elements import KINDS, elements_of
-from tests.support.fem_models import grid
 
 KIND: ElementKind = KINDS["incompatible_modes"]
 

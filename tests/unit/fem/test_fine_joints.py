@@ -8,8 +8,9 @@ from fem.coupling.fine_joints import read_coarse, with_coarse_joints
 from fem.errors import MeshError
 from fem.mesh import append
 from fem.scene import joined
+from fem.trials.grids import joint_mesh
 from fem.watch_table import joint_names, whole_watch
-from tests.support.fem_models import SITES, joint_mesh, small_assembly
+from tests.support.fem_models import SITES, small_assembly
 
 
 def coarse_joints(names=tuple(SITES)):

@@ -9,7 +9,8 @@ from fem.factorisation import Factorisation
 from fem.global_matrix import Equations
 from fem.materials.roles import Materials
 from fem.mesh import append
-from tests.support.fem_bodies import STEEL, dense_stiffness, dns_body
+from fem.trials.bodies import dns_body
+from tests.support.fem_bodies import STEEL, dense_stiffness
 from tests.support.fem_models import bar, small_assembly
 
 

@@ -13,7 +13,7 @@ from fem.materials.library import FR4, SAC405
 from fem.materials.parameters import Isotropic, JohnsonCook
 from fem.residual.hencky import HenckyElements
 from fem.stress import symmetric, voigt
-from tests.support.fem_nonlinear import force_of, nonlinear
+from fem.trials.bodies import force_of, nonlinear
 
 IDEAL = SAC405.model_copy(update={"plasticity": JohnsonCook(A=30e6)})
 SHEAR_TWICE = np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0])

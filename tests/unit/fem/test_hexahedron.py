@@ -11,7 +11,7 @@ from fem.force_congruent import CongruentElements, is_box, parity_blocks
 from fem.kernels.hexahedron import GAUSS, SIDES, shape_derivatives
 from fem.materials.elasticity import elasticity_matrix
 from fem.materials.library import COPPER, FR4, SAC405, SILICON
-from tests.support.fem_models import grid
+from fem.trials.grids import grid
 
 RANDOM = np.random.default_rng(7)
 

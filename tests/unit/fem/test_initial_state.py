@@ -14,7 +14,7 @@ from fem.motion import Motion
 from fem.residual.pins import pins, rigid_motions
 from fem.residual.pretension import Pretension
 from fem.stress_recovery import StressRecovery
-from tests.support.fem_bodies import motion_of
+from fem.trials.bodies import motion_of
 from tests.support.fem_residual import Cooled, cooled, layered
 
 CHANGE = -192.0

@@ -17,8 +17,9 @@ from fem.parameters import Shock
 from fem.run import run
 from fem.scene import joined
 from fem.shock_checks import problems
+from fem.trials.grids import COPPER, GAP
 from fem.watch_table import whole_watch
-from tests.support.fem_models import COPPER, GAP, SITES, small_assembly, write_small_assembly
+from tests.support.fem_models import SITES, small_assembly, write_small_assembly
 
 TIMES = 4e-6, 1e-5
 NUMERICS = {"mass_scaled": ["copper"], "history_samples": 20, "field_samples": 2}

@@ -10,8 +10,9 @@ from fem.errors import CutError, MeshError
 from fem.mesh import MeshData, append, boundary_facets, cells_of_facets, merge_nodes, select
 from fem.mesh_file import read_mesh
 from fem.scene import prepare
-from tests.support.fem_division import surveyed
-from tests.support.fem_models import board_mesh, grid, mesh_of, small_assembly, write_msh
+from fem.trials.divided import surveyed
+from fem.trials.grids import grid, mesh_of
+from tests.support.fem_models import board_mesh, small_assembly, write_msh
 
 
 def test_file_comes_back_as_it_was_written(tmp_path):

@@ -15,8 +15,9 @@ from fem.kernels.plasticity import yield_stress
 from fem.materials.library import FR4
 from fem.nonlinear_blocks import TEN_NODES, elastic_constants
 from fem.stress import von_mises
-from tests.support.fem_elements import KINDS, box, elements_of
-from tests.support.fem_nonlinear import SOLDER, HexahedronTwin, PointTwin, force_of, nonlinear
+from fem.trials.bodies import force_of, nonlinear
+from fem.trials.boxes import KINDS, box, elements_of
+from tests.support.fem_nonlinear import SOLDER, HexahedronTwin, PointTwin
 
 LINE = np.linspace(0.0, 1.0, 4)
 every_kind = pytest.mark.parametrize("name", KINDS)

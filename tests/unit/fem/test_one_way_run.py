@@ -13,7 +13,8 @@ from fem.inputs import RunInput
 from fem.mesh import append
 from fem.run import run
 from fem.shock_checks import problems
-from tests.support.fem_models import SITES, joint_mesh, write_msh, write_small_assembly
+from fem.trials.grids import joint_mesh
+from tests.support.fem_models import SITES, write_msh, write_small_assembly
 
 SHOCK = {
     "peak_acceleration": 14709.975,

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fem.partition import partition
-from tests.support.fem_models import grid, mesh_of
+from fem.trials.grids import grid, mesh_of
 
 
 def plate(count: int = 24):

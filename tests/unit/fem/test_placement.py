@@ -15,7 +15,7 @@ from fem.coupling.speeds import Kind, StepCost, families, line_through, sample_t
 from fem.estimate import WindowPlan, predict_seconds
 from fem.materials.library import LIBRARY
 from fem.parameters import Ranks
-from tests.support.fem_models import grid, joint_mesh, mesh_of
+from fem.trials.grids import grid, joint_mesh, mesh_of
 
 EVEN = WindowCost(ModelCost(1e-3, 0.0, 1), ModelCost(1e-3, 0.0, 8), 1e-5)
 KIND = Kind([LIBRARY["FR4"], LIBRARY["copper"]], "incompatible_modes", "small", 1e-8)

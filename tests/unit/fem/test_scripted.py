@@ -13,7 +13,7 @@ from fem.errors import RecordingError
 from fem.exchange import CutChannels
 from fem.loads import half_sine_drop
 from fem.participant import uncut_motion
-from tests.support.fem_pairs import SCHEMES, Pair
+from fem.trials.pairs import SCHEMES, Pair
 
 WINDOWS = 20
 

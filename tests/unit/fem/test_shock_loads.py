@@ -15,8 +15,9 @@ from fem.mesh import MeshData
 from fem.parameters import Damping, Shock
 from fem.pulse import Constant
 from fem.shock_loads import shock_pulse
-from tests.support.fem_bodies import STEEL, dns_body, motion_of
-from tests.support.fem_models import grid, mesh_of, on
+from fem.trials.bodies import dns_body, motion_of
+from fem.trials.grids import grid, mesh_of, on
+from tests.support.fem_bodies import STEEL
 
 G = 9.80665
 

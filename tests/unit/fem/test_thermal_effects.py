@@ -15,10 +15,10 @@ from fem.thermal.parameters import Thermal
 from fem.thermal.plates import RigidPlates
 from fem.thermal.state import Assembly
 from fem.thermal.structure import ThermalStructure
+from fem.trials.grids import GAP
 from meshing.heated_assembly import write_heated_assembly
 from meshing.pads import pad_table
 from meshing.parameters import Warpage
-from tests.support.fem_models import GAP
 from tests.support.meshing_models import MM, board, package
 from tests.support.thermal_models import REFERENCE, Layers, pads_at, small_structure, structure_of
 

@@ -6,7 +6,8 @@ import pytest
 from fem.errors import TieError
 from fem.mesh import MeshData, append
 from fem.tie import Tie, check_tie, closest_facets, net_load, project, tie_joints
-from tests.support.fem_models import joint_mesh, package_mesh, small_assembly
+from fem.trials.grids import joint_mesh
+from tests.support.fem_models import package_mesh, small_assembly
 
 SQUARE = np.array([[[0.0, 0, 0], [2, 0, 0], [2, 1, 0], [0, 1, 0]]])
 

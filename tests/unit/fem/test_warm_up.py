@@ -8,7 +8,7 @@ from fem.elements.element import Elements
 from fem.force import force_terms
 from fem.materials.elasticity import elasticity_matrix
 from fem.materials.library import SAC305
-from tests.support.fem_models import grid
+from fem.trials.grids import grid
 
 
 @pytest.mark.parametrize(("kinematics", "rounding"), [("small", 0.0), ("finite", 1e-4)])

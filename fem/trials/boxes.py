@@ -12,7 +12,7 @@ from fem.elements.kind import ElementKind
 from fem.elements.tetrahedron import EDGES
 from fem.materials.elasticity import elasticity_matrix
 from fem.materials.parameters import Material
-from tests.support.fem_models import grid
+from fem.trials.grids import Line, grid
 
 KINDS = {
     "incompatible_modes": element_kind(8),
@@ -29,7 +29,7 @@ def with_middles(points: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.
     return np.vstack([points, points[edges].mean(axis=1)]), np.hstack([cells, middles]).astype(np.int32)
 
 
-def box(kind: ElementKind, *lines: Sequence[float], move: Callable = lambda x: x) -> tuple[np.ndarray, np.ndarray]:
+def box(kind: ElementKind, *lines: Line, move: Callable = lambda x: x) -> tuple[np.ndarray, np.ndarray]:
     """Return points and cells of a box between the lines of a grid, vertices moved before middles are placed."""
     points, cells = grid(*lines)
     points = move(points)

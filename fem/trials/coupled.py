@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import NamedTuple, Protocol, cast
 
 import numpy as np
 from mpi4py import MPI
@@ -21,10 +21,12 @@ from fem.loads import Load
 from fem.local_mesh import distribute
 from fem.materials.roles import Materials
 from fem.mesh import MeshData
+from fem.motion import Motion
 from fem.parameters import Coupling
+from fem.participant import Participant
 from fem.scene import ModelInput, Tables, model_inputs
 from fem.tie import net_load
-from tests.support.fem_division import Divide, checked, surveyed
+from fem.trials.divided import Divide, checked, surveyed
 
 MANY = 1e5  # elements that each of a mesh stands for where costs are weighed, so that levels are worth while
 
@@ -36,6 +38,7 @@ class Models(NamedTuple):
     division: Division
 
     def bodies(self) -> dict[Role, Body]:
+        """Return both models on this rank, new each time: terms may have a path."""
         step = self.division.meso_step
         return {
             role: make_body(MPI.COMM_SELF, *part, np.ones(len(part[0].steps)), Response(step=step))
@@ -54,7 +57,16 @@ def models_of(
 
 
 def pieces_of(item: ModelInput, materials: Materials) -> tuple[Pieces, Tables]:
+    """Return the elements and tables of one model on this rank."""
     return make_pieces(distribute(MPI.COMM_SELF, item.mesh), item.tables, materials), item.tables
+
+
+class Turn(Participant, Protocol):
+    """A participant that moves by central differences."""
+
+    @property
+    def motion(self) -> Motion:
+        """Return its state."""
 
 
 class Coupled:
@@ -63,17 +75,19 @@ class Coupled:
     def __init__(
         self, bodies: Mapping[Role, Body], plan: WindowPlan, scheme: Scheme, loads: Sequence[Load] = ()
     ) -> None:
+        """Make both participants of a scheme, as a rank that carries both models does."""
         self.plan, self._scheme = plan, scheme
         channels = CutChannels.open(MPI.COMM_SELF, bodies["macro"].cut, bodies["meso"].cut, receiver_waits=False)
         make = {"macro": scheme.macro, "meso": scheme.meso}
         made = {role: make[role](bodies[role], list(loads), plan, channels) for role in scheme.order}
-        self.macro, self.meso = made["macro"], made["meso"]
+        self.macro, self.meso = cast(Turn, made["macro"]), cast(Turn, made["meso"])
         self.parts = (self.macro, self.meso)
         self._linked = isinstance(scheme, GravouilCombescure)
         self._free = [part.motion.mobility > 0.0 for part in self.parts]
         self._impedance = float(bodies["macro"].mass.mean()) / plan.window  # a unit of the link's impulse
 
     def run(self) -> None:
+        """Take a window."""
         for part in self.parts:
             part.begin_window()
         for part in self.parts:
@@ -126,6 +140,7 @@ class Coupled:
 
     @property
     def size(self) -> int:
+        """Return the number of values of a state."""
         cut = 3 * len(self.macro.motion.body.cut) if self._linked else 0
         return 2 * sum(int(free.sum()) for free in self._free) + cut
 
@@ -175,4 +190,5 @@ class Coupled:
         return np.column_stack([self.apply(unit) for unit in np.eye(self.size)])
 
     def spectral_radius(self) -> float:
+        """Return the largest magnitude of an eigenvalue of the amplification matrix: more than 1 grows."""
         return float(np.abs(np.linalg.eigvals(self.matrix())).max())

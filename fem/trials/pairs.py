@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fem.body import Body
 from fem.coupling.held_velocity import Answered, HeldVelocity, Macro
@@ -18,9 +19,9 @@ from fem.materials.roles import Materials
 from fem.mesh import MeshData, append
 from fem.motion import Motion
 from fem.parameters import Coupling
-from tests.support.fem_coupled import Coupled, Models, models_of
-from tests.support.fem_division import surveyed
-from tests.support.fem_models import grid, mesh_of, on
+from fem.trials.coupled import Coupled, Models, models_of
+from fem.trials.divided import surveyed
+from fem.trials.grids import grid, mesh_of, on
 
 SIZE, THICKNESS = 0.5e-3, 0.25e-3  # of a board element [m]
 FRACTION = 0.9  # of the critical step of elements, the program's default
@@ -54,6 +55,7 @@ class Pair:
     thinnest: float = 1.0
 
     def mesh(self) -> MeshData:
+        """Return board and block, which share no node."""
         ticks = np.arange(self.columns + 1) * SIZE
         board = mesh_of(
             *grid(ticks, ticks, -THICKNESS * np.arange(self.layers, -1.0, -1.0)),
@@ -103,7 +105,8 @@ SCHEMES = {
 }
 
 
-def board_cells(mesh: MeshData) -> np.ndarray:
+def board_cells(mesh: MeshData) -> NDArray[np.bool_]:
+    """Return which cells (ne,) are the board's."""
     return mesh.in_parts("board".__eq__)
 
 
@@ -127,11 +130,15 @@ class Printed(HeldVelocity):
     """The paper's scheme as printed: the block alone is meso, only its internal force goes to the board, no mass."""
 
     def macro(self, body: Body, loads: list[Load], plan: WindowPlan, channels: CutChannels) -> Macro:
+        """Return the macro model's participant, which is told the interface mass and leaves it out."""
         return PrintedMacro(body, loads, plan, channels)
 
 
 class PrintedMacro(Macro):
+    """A board that answers for no mass of the block at its interface."""
+
     def __init__(self, body: Body, loads: list[Load], plan: WindowPlan, channels: CutChannels) -> None:
+        """Start at rest; a ``Meso`` must have sent the interface mass."""
         channels.forces.receive(np.zeros((len(body.mass), 3)))
         motion = Motion(body, loads, plan.window, np.empty(0, np.int32), np.zeros(len(body.mass)))
         Answered.__init__(self, motion, plan, channels)

@@ -1,0 +1,57 @@
+"""Bodies on one rank from meshes in memory, through the program's own chain."""
+
+import numpy as np
+from mpi4py import MPI
+
+from fem.body import Body, Pieces, Response, make_body, make_pieces
+from fem.elements.element import Elements
+from fem.force_nonlinear import NonlinearElements
+from fem.kernels.nonlinear import Path
+from fem.kernels.plasticity import plastic_constants
+from fem.local_mesh import distribute
+from fem.materials.library import FR4
+from fem.materials.parameters import Material
+from fem.materials.roles import Materials
+from fem.mesh import MeshData
+from fem.motion import Motion
+from fem.scene import Tables, prepare
+
+
+def dns_pieces(mesh: MeshData, materials: Materials) -> tuple[Pieces, Tables]:
+    """Return the elements of all parts on one rank."""
+    item = prepare(mesh, "dns")["dns"]
+    return make_pieces(distribute(MPI.COMM_SELF, item.mesh), item.tables, materials), item.tables
+
+
+def dns_body(mesh: MeshData, board=FR4, materials: Materials | None = None) -> tuple[Body, float]:
+    """Return a body of all parts, and its smallest element critical step [s]; ``materials`` go before ``board``."""
+    pieces, tables = dns_pieces(mesh, materials or Materials(board=board))
+    return make_body(MPI.COMM_SELF, pieces, tables, np.ones(len(pieces.steps))), float(pieces.steps.min())
+
+
+def motion_of(body: Body, step: float, loads=(), held=()) -> Motion:
+    """Return the motion of a body from rest."""
+    return Motion(body, loads, step, np.array(held, np.int32), np.zeros(len(body.mass)))
+
+
+def nonlinear(elements: Elements, material: Material, finite: bool, step: float = np.inf) -> NonlinearElements:
+    """Return the nonlinear term of elements of one material."""
+    plastic = np.array([plastic_constants(material)])
+    return NonlinearElements.build(elements, np.arange(len(elements.cells)), plastic, Path(finite, step))
+
+
+def force_of(term: NonlinearElements, displacement: np.ndarray) -> np.ndarray:
+    """Return the internal force (n, 3) [N] of the next step of the path."""
+    force = np.zeros_like(displacement)
+    term.add(displacement, force)
+    return -force
+
+
+def nonlinear_body(
+    mesh: MeshData, material: Material, response: Response, formulation: str = "one_point"
+) -> tuple[Body, float]:
+    """Return a body of one material, and its smallest element critical step [s]."""
+    item = prepare(mesh, "dns")["dns"]
+    materials = dict.fromkeys(item.tables.part_names, material)
+    pieces = make_pieces(distribute(MPI.COMM_SELF, item.mesh), item.tables, materials, formulation)
+    return make_body(MPI.COMM_SELF, pieces, item.tables, np.ones(len(pieces.steps)), response), pieces.steps.min()

@@ -1,0 +1,38 @@
+"""The program's own division of a mesh in memory, its checks included."""
+
+from collections.abc import Callable
+
+from fem.coupling.checks import check_division
+from fem.coupling.divide import divide
+from fem.coupling.division import Division
+from fem.coupling.rules import Rules
+from fem.coupling.whole import Survey, Treatment, Whole, survey
+from fem.materials.elasticity import role_of_part
+from fem.materials.parameters import Material
+from fem.materials.roles import Materials
+from fem.mesh import MeshData
+from fem.parameters import Coupling
+from fem.scene import joined
+
+Divide = Callable[[Whole, Survey, Rules], Division]
+DEFAULTS, HELD = Materials(), Coupling(scheme="held_velocity")
+DURATION = 1e-2  # [s] so long that a whole number of windows shortens none
+
+
+def surveyed(
+    mesh: MeshData,
+    materials: Materials | dict[str, Material] = DEFAULTS,
+    fraction: float = 0.9,
+    coupling: Coupling = HELD,
+) -> tuple[Whole, Survey, Rules]:
+    """Return a mesh, its survey, and the rules of its division, in which boards are coarse."""
+    whole = joined(mesh)
+    coarse = whole.mesh.in_parts(lambda name: role_of_part(name) == "board")
+    return whole, survey(whole.mesh, materials, Treatment()), Rules(coupling, coarse, fraction, 0.0, DURATION, 1)
+
+
+def checked(whole: Whole, found: Survey, rules: Rules) -> Division:
+    """Divide as the program does, its checks included."""
+    division = divide(whole, found, rules)
+    check_division(whole, found, division, rules)
+    return division
