@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Generic, Literal, TypeVar
+from typing import Any, Generic, Literal, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,6 +48,31 @@ class Tables:
     nodes: int
     level: NDArray[np.int32]
     ratios: tuple[int, ...]
+
+    @classmethod
+    def undivided(cls, whole: Whole, held: NDArray[np.bool_], **own: Any) -> Self:
+        """Return the tables of a whole mesh as one model with one step.
+
+        Args:
+            whole: Mesh and ties.
+            held: ``(n, 3)`` held components.
+            own: Fields that a subclass adds.
+        """
+        held_nodes = np.flatnonzero(held.any(axis=1))
+        return cls(
+            part=whole.mesh.part,
+            part_names=whole.mesh.part_names,
+            tie=whole.tie,
+            master_points=whole.mesh.points[whole.tie.master],
+            moved=whole.moved,
+            held_nodes=held_nodes,
+            held=held[held_nodes],
+            cut=np.empty(0, np.int32),
+            nodes=len(whole.mesh.points),
+            level=np.zeros(len(whole.mesh.cells), np.int32),
+            ratios=(),
+            **own,
+        )
 
 
 @dataclass(frozen=True, slots=True)

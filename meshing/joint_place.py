@@ -5,8 +5,9 @@ from typing import Protocol
 
 import numpy as np
 
+from meshing.pad_planes import PadPlanes
 from meshing.pads import PadSite
-from meshing.surface import PACKAGE_PAD, ClosedSurface
+from meshing.surface import ClosedSurface, pad_planes
 
 
 class Underside(Protocol):
@@ -25,34 +26,26 @@ class JointPlace:
         side: the package's underside.
         copper: thickness of the copper between the solder and that underside, but for a plate's, which is part of
             the package [m].
-        head: z and the slopes along x and y of the solder's upper face, a plane through the z axis of its own frame.
+        head: the solder's upper face in its own frame.
     """
 
     site: PadSite
     side: Underside
     copper: float
-    head: tuple[float, float, float]
+    head: PadPlanes
 
     @classmethod
     def of(cls, surface: ClosedSurface, site: PadSite, side: Underside, copper: float) -> "JointPlace":
-        """Take the upper face from the joint's closed surface (least squares)."""
-        face = surface.points[np.unique(surface.triangles[surface.boundary == PACKAGE_PAD])]
-        columns = np.column_stack([np.ones(len(face)), face[:, :2] - face[:, :2].mean(axis=0)])
-        middle, slope_x, slope_y = np.linalg.lstsq(columns, face[:, 2], rcond=None)[0]
-        axis = middle - face[:, :2].mean(axis=0) @ [slope_x, slope_y]
-        return cls(site, side, copper, (float(axis), float(slope_x), float(slope_y)))
+        """Take the upper face from the joint's closed surface."""
+        return cls(site, side, copper, pad_planes(surface))
 
     def __call__(self, points: np.ndarray) -> np.ndarray:
         """Move points (n, 3) [m] to the site; shear them in z so that the upper face gets where the package is."""
-        share = np.clip(points[:, 2] / self._upper_face(points), 0.0, 1.0)
+        share = np.clip(points[:, 2] / self.head.height(*points[:, :2].T), 0.0, 1.0)
         x, y = points[:, 0] + self.site.x, points[:, 1] + self.site.y
         return np.column_stack([x, y, self.site.z_board + points[:, 2] + share * self.rise(points)])
 
     def rise(self, points: np.ndarray) -> np.ndarray:
         """Return how far the upper face lies below its place at the x and y of points (n, 3) [m]: (n,)."""
         height = self.side.height(points[:, 0] + self.site.x, points[:, 1] + self.site.y)
-        return height - self.copper - self.site.z_board - self._upper_face(points)
-
-    def _upper_face(self, points: np.ndarray) -> np.ndarray:
-        z, slope_x, slope_y = self.head
-        return z + slope_x * points[:, 0] + slope_y * points[:, 1]
+        return height - self.copper - self.site.z_board - self.head.height(*points[:, :2].T)

@@ -12,7 +12,7 @@ from meshing.joint_mesh import JointMesh, JointMeshError, build_joint, joint_qua
 from meshing.joint_place import JointPlace, Underside
 from meshing.pads import PadSite
 from meshing.parameters import Package
-from meshing.surface import BOARD_PAD, PACKAGE_PAD, ClosedSurface, pad_planes
+from meshing.surface import BOARD_PAD, PACKAGE_PAD, ClosedSurface
 from meshing.swept import swept_solder
 
 __all__ = [
@@ -131,8 +131,8 @@ def _check_place(surface: ClosedSurface, place: JointPlace) -> None:
 
     The gap is measured at the package pad's centre: solder that overflows goes off it, up or down a tilted plane.
     """
-    site, planes = place.site, pad_planes(surface)
-    gap = float(planes.height(*np.array(site.offset)))
+    site = place.site
+    gap = float(place.head.height(*np.array(site.offset)))
     bottom = float(surface.points[:, 2].min())
     if max(abs(bottom), abs(gap - site.gap)) > GAP_TOLERANCE * site.gap:
         span = f"z = {bottom:.6g} to {gap:.6g} m, allowed 0 to its gap of {site.gap:.6g} m"

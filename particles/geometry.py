@@ -3,6 +3,9 @@
 from dataclasses import dataclass
 from math import ceil, pi, sqrt
 
+# What offset and tilt may change of a joint's width: above it the coaxial joint is no reference to judge it to 1 %.
+LARGEST_WIDTH_CHANGE = 2e-3
+
 
 @dataclass(frozen=True, slots=True)
 class JointGeometry:

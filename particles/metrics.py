@@ -11,7 +11,7 @@ from particles.contact_line import ON_MASK, ON_PAD, ContactLine
 from particles.flow import LiquidFlow
 from particles.force_gravity import Gravity
 from particles.force_wetting import Wetting
-from particles.geometry import JointGeometry
+from particles.geometry import LARGEST_WIDTH_CHANGE, JointGeometry
 from particles.parameters import Solder
 from particles.physics import Force
 from particles.plate_force import plate_wrench
@@ -26,7 +26,6 @@ from particles.young_laplace import Meridian, NoMeridian, joint_meridian, pad_me
 Floats = NDArray[np.float64]
 Metrics = dict[str, tuple[float, str]]
 WIDTH_CHANGE, TILT_LEVER = 0.1, 2.0
-LARGEST_WIDTH_CHANGE = 2e-3  # above, a coaxial joint is no reference of a width that is to be judged to 1 %
 JOINT_NAMES = {
     "height": "drop_height",
     "height_error": "drop_height_error",

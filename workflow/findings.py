@@ -5,10 +5,10 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+from particles.geometry import LARGEST_WIDTH_CHANGE
 from workflow.stage_runner import Findings
 
 WIDTH_ERROR = 0.01  # of a joint's width, against the Young-Laplace shape of its volume, pads and gap
-WIDTH_REFERENCE_ERROR = 2.0e-3  # of that shape, which is coaxial: what offset and tilt may change of the width
 VOLUME_DRIFT = 1.0e-3  # of a joint's volume during its reflow
 SURFACE_VOLUME_ERROR = 1.0e-3  # of a closed surface, against the particles' own volume
 VOLUME_ERROR = 0.003  # of a joint's hexahedra, against its closed surface
@@ -104,7 +104,7 @@ def of_reflow(joints: Records, effects: Mapping[str, Any]) -> Findings:
 
 def _has_reference(metrics: Mapping[str, dict]) -> bool:
     """Whether a joint leans so little that the coaxial joint of its gap is a reference for its width."""
-    return metrics.get("width_reference_error", {"value": 0.0})["value"] <= WIDTH_REFERENCE_ERROR
+    return metrics.get("width_reference_error", {"value": 0.0})["value"] <= LARGEST_WIDTH_CHANGE
 
 
 def of_drop(metrics: Numbers, verdict: str, effects: Mapping[str, Any]) -> Findings:

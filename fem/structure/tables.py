@@ -64,22 +64,12 @@ def structure_tables(whole: Whole, scene: StructureScene) -> StructureTables:
     check_motions(scene, nodes_of, held)
     check_shaken(scene, nodes_of, held)
     points = {name: point.at for name, point in scene.watch.items()}
-    held_nodes = np.flatnonzero(held.any(axis=1))
     supports = {
         name: (nodes_of[support.on], np.isin(list(AXES), support.hold)) for name, support in scene.supports.items()
     }
-    return StructureTables(
-        part=mesh.part,
-        part_names=mesh.part_names,
-        tie=tie,
-        master_points=mesh.points[tie.master],
-        moved=whole.moved,
-        held_nodes=held_nodes,
-        held=held[held_nodes],
-        cut=np.empty(0, np.int32),
-        nodes=len(mesh.points),
-        level=np.zeros(len(mesh.cells), np.int32),
-        ratios=(),
+    return StructureTables.undivided(
+        whole,
+        held,
         nodes_of=nodes_of,
         areas={name: outward_areas(mesh, name) for name in sorted(pressed)},
         pressed={name: outward_facets(mesh, name) for name in sorted(pressed)},

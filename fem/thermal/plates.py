@@ -67,9 +67,7 @@ class RigidPlates:
         if self._moved:
             displacement[self.package, 2] += corner
         load = self._held_weight + np.tensordot(self._held_motion, wrenches, 3)
-        return State(
-            displacement, self._motion(displacement), self.rigid_modes.imbalance(wrenches), -self._shares @ load
-        )
+        return State(displacement, self._motion(displacement), -self._shares @ load)
 
     def _motion(self, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
         return (self._pads @ displacement.ravel()).reshape(-1, 2, 6)

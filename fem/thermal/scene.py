@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from fem.coupling.whole import Whole
 from fem.cut import find_cut
 from fem.errors import MeshError
 from fem.materials.elasticity import role_of_part
@@ -60,22 +61,8 @@ def thermal_tables(mesh: MeshData, centre: NDArray[np.float64]) -> ThermalTables
         node, component = free.pins(points)
         held[nodes[node], component] = True
         motions.append(free)
-    held_nodes = np.flatnonzero(held.any(axis=1))
-    return ThermalTables(
-        part=mesh.part,
-        part_names=mesh.part_names,
-        tie=Tie.none(),
-        master_points=np.empty((0, 4, 3)),
-        moved=0.0,
-        held_nodes=held_nodes,
-        held=held[held_nodes],
-        cut=np.empty(0, np.int32),
-        nodes=len(mesh.points),
-        level=np.zeros(len(mesh.cells), np.int32),
-        ratios=(),
-        package=package,
-        motions=(motions[0], motions[1]),
-    )
+    whole = Whole(mesh, Tie.none(), moved=0.0)
+    return ThermalTables.undivided(whole, held, package=package, motions=(motions[0], motions[1]))
 
 
 def package_nodes(mesh: MeshData) -> NDArray[np.bool_]:

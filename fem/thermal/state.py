@@ -57,13 +57,11 @@ class State:
     Attributes:
         displacement: ``(n, 3)`` [m] at the nodes.
         pad_motion: ``(joints, 2, 6)`` displacement [m] and rotation vector [rad] of the pads, board and package.
-        reaction: ``(k,)`` [N, N m] what is out of balance along the package's free rigid motions.
         corner_force: ``(c,)`` [N] forces, upwards, that move the corners of the die; none where the package floats.
     """
 
     displacement: NDArray[np.float64]
     pad_motion: NDArray[np.float64]
-    reaction: NDArray[np.float64]
     corner_force: NDArray[np.float64]
 
 

@@ -112,12 +112,7 @@ class ThermalStructure:
             load = load + self._load(force)
         displacement, corner_force = self._corners.move(displacement, corner, load)
         displacement += np.tensordot(rigid, self._free, 1)
-        return State(
-            self._gathered(displacement),
-            self._motion(displacement),
-            self.rigid_modes.imbalance(wrenches),
-            corner_force,
-        )
+        return State(self._gathered(displacement), self._motion(displacement), corner_force)
 
     def _on_level(self, force: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the displacement under forces, heights from the mean height of the board's pads; collective."""

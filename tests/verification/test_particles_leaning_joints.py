@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from particles.geometry import JointGeometry
-from particles.metrics import LARGEST_WIDTH_CHANGE, width_change_bound
+from particles.geometry import LARGEST_WIDTH_CHANGE, JointGeometry
+from particles.metrics import width_change_bound
 from particles.parameters import Solder, SolderNumerics
 from particles.reflow import solve_joint
 from particles.young_laplace import joint_meridian

@@ -11,13 +11,13 @@ from matplotlib.axes import Axes
 from matplotlib.tri import LinearTriInterpolator, Triangulation
 from numpy.typing import NDArray
 
+from fem.thermal.parameters import KELVIN
 from workflow.report.curves import MICRO, MILLI, STYLE, svg
 from workflow.report.tables import number
 
 Floats = NDArray[np.float64]
 
 SAME_HEIGHT = 1e-8  # m; nodes of a flat face lie within it
-KELVIN = 273.15
 SAMPLES = 121  # of the profile
 LEVELS = 12  # of a map
 PACKAGE, BOARD = "#0b5fa5", "#e09f3e"
