@@ -126,7 +126,7 @@ def plate_nodes(elements: int) -> tuple[int, int, int]:
 
 def node_counts(scene: StructureScene) -> tuple[int, int, int]:
     """Return the nodes along each side of the box; those that rings around holes add are left out."""
-    structure = scene.structure
+    structure = scene.structure.refined
     layers = sum(layer.cells for layer in structure.layers.values())
     order = 2 if structure.element == "tetrahedron_quadratic" else 1
     return order * structure.cells[0] + 1, order * structure.cells[1] + 1, order * layers + 1

@@ -130,7 +130,7 @@ JOINT = _one_body("joint")
 DROPS = _one_body("drops")
 OSCILLATION = _one_body("oscillation")
 
-MESHED = ("length", "width", "cells", "symmetry", "element", "layers", "holes")
+MESHED = ("length", "width", "cells", "refine", "symmetry", "element", "layers", "holes")
 STRUCTURE = Pipeline(
     (
         Stage(

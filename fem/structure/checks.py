@@ -248,7 +248,7 @@ def _numerics(scene: StructureScene) -> Iterator[Problem]:
     if step is not None and step > longest:
         message = "is too long to see the motion: above the duration, or half a pulse"
         yield Problem("dynamics.numerics.implicit_step", f"{step:g} s", message, f"<= {longest:g} s")
-    if numerics.mass_scaled and dynamics.solver != "explicit":
+    if numerics.mass_scaled and "implicit" in dynamics.solvers:
         message = f"serves explicit steps, the solver is {dynamics.solver}"
         yield Problem("dynamics.numerics.mass_scaled", list(numerics.mass_scaled), message, "none")
     if scene.structure.layers and set(numerics.mass_scaled) >= set(scene.structure.layers):

@@ -12,6 +12,9 @@ def coupling_problems(scene: StructureScene) -> Iterator[Problem]:
     """Find what does not go with two models; nothing where there is one."""
     coupling = scene.dynamics.coupling
     if coupling is None:
+        if scene.dynamics.solver == "dns":
+            message = "is one model instead of two that are coupled"
+            yield Problem("dynamics.solver", "dns", message, f"explicit, implicit, both, or a table {KEY}")
         return
     yield from _fine(coupling, scene)
     yield from _scheme(coupling, scene)
@@ -58,7 +61,11 @@ def _one_model(scene: StructureScene) -> Iterator[Problem]:
     dynamics = scene.dynamics
     if dynamics.solver == "implicit":
         yield Problem("dynamics.solver", "implicit", "couples nothing", "explicit or both, or no dynamics.coupling")
-    if dynamics.modes and dynamics.solver != "both" and not (dynamics.coupling and dynamics.coupling.compare):
+    if (
+        dynamics.modes
+        and dynamics.solver not in ("both", "dns")
+        and not (dynamics.coupling and dynamics.coupling.compare)
+    ):
         yield Problem("dynamics.modes", dynamics.modes, "are those of one model", f"0, or {KEY}.compare = true")
     if dynamics.numerics.explicit_step is not None:
         message = "is the step of one model, two have a window and smaller steps"

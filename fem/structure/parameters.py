@@ -4,6 +4,7 @@ All values are SI floats; see ``meshing.parameters`` for what the unit strings m
 each of its items. Tables of named members are dictionaries, so that one value of one member can be set.
 """
 
+import math
 from collections.abc import Mapping
 from typing import Annotated, Literal
 
@@ -45,17 +46,33 @@ class Structure(Parameters):
     """A box of layers, z = 0 at its bottom, centred on x = y = 0.
 
     With a plane of symmetry in x only x >= 0 is meshed: ``x_min`` is then that plane, and what crosses it is held.
-    ``length`` and ``width`` are those of the whole body. ``cells`` are counted over the meshed part.
+    ``length`` and ``width`` are those of the whole body. ``cells`` are counted over the meshed part. ``refine``
+    multiplies all numbers of elements, along and across the layers, each rounded and at least one.
     """
 
     length: Annotated[float, "mm"] = Field(gt=0)
     width: Annotated[float, "mm"] = Field(gt=0)
     cells: tuple[Cells, Cells]
+    refine: float = Field(1.0, gt=0, le=100)
     layers: dict[str, Layer]
     symmetry: tuple[Literal["x", "y"], ...] = ()
     element: Literal["hexahedron", "tetrahedron", "tetrahedron_quadratic"] = "hexahedron"
     formulation: Literal["incompatible_modes", "one_point"] = "incompatible_modes"
     holes: Holes | None = None
+
+    @property
+    def refined(self) -> "Structure":
+        """Return the same structure with all numbers of elements multiplied by ``refine``."""
+        layers = {
+            name: layer.model_copy(
+                update={
+                    "cells": _times(self.refine, layer.cells),
+                    "in_plane": layer.in_plane and _each(self.refine, layer.in_plane),
+                }
+            )
+            for name, layer in self.layers.items()
+        }
+        return self.model_copy(update={"cells": _each(self.refine, self.cells), "layers": layers, "refine": 1.0})
 
     @property
     def thickness(self) -> float:
@@ -74,6 +91,15 @@ class Structure(Parameters):
         """Return the names that supports and loads may refer to."""
         sides = ("x_min", "x_max", "y_min", "y_max", "z_min", "z_max")
         return sides if self.holes is None else (*sides, "mounting_holes")
+
+
+def _each(factor: float, counts: tuple[int, int]) -> tuple[int, int]:
+    return _times(factor, counts[0]), _times(factor, counts[1])
+
+
+def _times(factor: float, count: int) -> int:
+    """Multiply a number of elements; halves go up, so that meshes of like proportions stay so."""
+    return max(1, math.floor(factor * count + 0.5))
 
 
 class Support(Parameters):
@@ -178,10 +204,13 @@ class DynamicsNumerics(Parameters):
 
 
 class Dynamics(Parameters):
-    """What of the motion is wanted; ``modes`` is how many natural frequencies, the lowest ones."""
+    """What of the motion is wanted; ``modes`` is how many natural frequencies, the lowest ones.
+
+    ``dns`` is, where there is a coupling, one model at the smallest step instead of two.
+    """
 
     duration: Annotated[float, "ms"] = Field(gt=0)
-    solver: Literal["explicit", "implicit", "both"] = "explicit"
+    solver: Literal["explicit", "implicit", "both", "dns"] = "explicit"
     kinematics: Literal["small", "finite"] = "small"
     initial_velocity: Annotated[tuple[float, float, float], "m/s"] = (0.0, 0.0, 0.0)
     damping: Damping = Damping()
@@ -194,7 +223,8 @@ class Dynamics(Parameters):
     def solvers(self) -> tuple[SolverName, ...]:
         """Return the solvers to run, each on its own; the explicit one is the coupled one where there is a coupling."""
         chosen: tuple[SolverName, ...] = ("explicit", "implicit") if self.solver == "both" else (self.solver,)
-        return (*chosen, "dns") if self.coupling and self.coupling.compare else chosen
+        compared = self.coupling is not None and self.coupling.compare and self.solver != "dns"
+        return (*chosen, "dns") if compared else chosen
 
 
 class StructureScene(Parameters):

@@ -45,7 +45,7 @@ class StructureCase(StructureScene, Case):
     @property
     def box(self) -> Box:
         """The body as the mesher takes it."""
-        body = self.structure
+        body = self.structure.refined
         layers = tuple(
             BoxLayer(name, layer.thickness, layer.cells, layer.in_plane) for name, layer in body.layers.items()
         )

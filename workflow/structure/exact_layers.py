@@ -126,8 +126,7 @@ def measure(
         history: ``time`` (s,) [s], and velocities (s,) [m/s] at the points.
 
     Returns:
-        wave_speed [m/s], transmitted and reflected velocity, exact values, errors; wave_error, the relative L2 norm of
-        the velocities' difference from the exact ones.
+        wave_speed [m/s], transmitted and reflected velocity, exact values, errors; and the ``wave_error``.
     """
     time = history["time"]
     exact = {name: layers.velocity(height, time, pulse.value) for name, height in heights.items()}
@@ -143,8 +142,23 @@ def measure(
         here = (time >= start) & (time <= start + pulse.duration)
         found, right = (_largest(values[point][here]) / incident for values in (history, exact))
         result |= {name: found, f"{name}_exact": right, f"{name}_error": found - right}
-    together = [np.concatenate([values[name] for name in heights]) for values in (history, exact)]
-    return result | {"wave_error": float(np.linalg.norm(together[0] - together[1]) / np.linalg.norm(together[1]))}
+    return result | {"wave_error": wave_error(layers, pulse, heights, history)}
+
+
+def wave_error(
+    layers: Layers, pulse: Pulse, heights: Mapping[str, float], history: Mapping[str, NDArray[np.float64]]
+) -> float:
+    """Return the relative L2 norm, over time and points, of the velocities' difference from the exact ones.
+
+    Args:
+        layers: the bar.
+        pulse: the pressure.
+        heights: of points by name [m].
+        history: ``time`` (s,) [s], and velocities (s,) [m/s] at the points.
+    """
+    exact = np.stack([layers.velocity(height, history["time"], pulse.value) for height in heights.values()])
+    found = np.stack([history[name] for name in heights])
+    return float(np.linalg.norm(found - exact) / np.linalg.norm(exact))
 
 
 def passes(layers: Layers, heights: Mapping[str, float]) -> dict[str, tuple[str, float]]:

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -56,7 +57,8 @@ def of_comparison(case: StructureCase, folders: Mapping[str, Path]) -> Findings:
     health: dict = {}
     for solver, folder in folders.items():
         prefix = "" if solver == next(iter(folders)) else f"{solver}_"
-        found, checks = compared_with_references(case, read_modes(folder), histories[solver])
+        motion = Motion(read_modes(folder), histories[solver], read_places(folder))
+        found, checks = compared_with_references(case, motion)
         metrics |= {prefix + name: value for name, value in found.items()}
         health |= {prefix + name: value for name, value in checks.items()}
     first = next(iter(histories.values()))
@@ -64,7 +66,7 @@ def of_comparison(case: StructureCase, folders: Mapping[str, Path]) -> Findings:
         differences = solver_differences(first, histories["implicit"])
         metrics |= {name: metric(value) for name, value in differences.items()}
         health |= {name: at_most(differences[name], SOLVER_DIFFERENCE) for name in JUDGED if name in differences}
-    if "dns" in folders:
+    if "dns" in folders and len(folders) > 1:
         errors = two_scale_errors(solver_differences(first, histories["dns"]))
         metrics |= {name: metric(value) for name, value in errors.items()} | cost_ratio(folders)
         health |= {name: at_most(errors[name], TWO_SCALE_ERROR) for name in ERRORS_JUDGED if name in errors}
@@ -95,22 +97,44 @@ def read_modes(folder: Path) -> list[dict]:
     return json.loads(path.read_text()) if path.exists() else []
 
 
-def compared_with_references(case: StructureCase, modes: list[dict], history: Arrays) -> tuple[dict, dict]:
+def read_places(folder: Path) -> dict[str, tuple[float, float, float]]:
+    """Read where the motion of each watch point is recorded [m]: at the node that is nearest to it."""
+    watch = json.loads((folder / "result.json").read_text())["model"]["watch"]
+    return {name: point["node_at"] for name, point in watch.items()}
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """What a solver found.
+
+    Attributes:
+        modes: natural modes, lowest first.
+        history: arrays of its ``history.npz``.
+        places: watch point -> where its motion is recorded [m].
+    """
+
+    modes: list[dict]
+    history: Arrays
+    places: Mapping[str, tuple[float, float, float]]
+
+
+def compared_with_references(case: StructureCase, motion: Motion) -> tuple[dict, dict]:
     """Return metrics and health checks of all references of a case, for one solver."""
     metrics: dict = {}
     health: dict = {}
     for reference in case.references.values():
         if isinstance(reference, BarWave | LayeredBar):
-            found = _waves(case, reference, history)
+            found = _waves(case, reference, motion)
             limits = {"wave_speed_error": reference.speed_limit} | dict.fromkeys(
                 ("transmitted_velocity_error", "reflected_velocity_error"), reference.amplitude_limit
             )
         elif isinstance(reference, Cantilever):
-            tip = history[f"displacement@{reference.tip}"][:, 2]
-            found = exact_cantilever.measure(strip_of(case, reference), history["time"], tip)
+            tip = motion.history[f"displacement@{reference.tip}"][:, 2]
+            found = exact_cantilever.measure(strip_of(case, reference), motion.history["time"], tip)
             limits = dict.fromkeys(("tip_deflection_error", "swing_frequency_error"), reference.limit)
         else:
-            health |= _in_range(reference, modes) if isinstance(reference, FrequencyRange) and modes else {}
+            in_range = isinstance(reference, FrequencyRange) and motion.modes
+            health |= _in_range(reference, motion.modes) if in_range else {}
             continue
         metrics |= {name: metric(value, UNITS.get(name.removesuffix("_exact"), "")) for name, value in found.items()}
         health |= {name: at_most(abs(found[name]), limit) for name, limit in limits.items()}
@@ -162,16 +186,17 @@ def strip_of(case: StructureCase, reference: Cantilever) -> exact_cantilever.Str
     return exact_cantilever.Strip(body.length, body.thickness, elasticity_matrix(material), material.density, pressure)
 
 
-def _waves(case: StructureCase, reference: BarWave | LayeredBar, history: Arrays) -> dict[str, float]:
-    points = [*reference.incident, reference.transmitted]
+def _waves(case: StructureCase, reference: BarWave | LayeredBar, motion: Motion) -> dict[str, float]:
+    points, history = [*reference.incident, reference.transmitted], motion.history
     velocities = [history[f"velocity@{name}"][:, 2] for name in points]
-    heights = [case.watch[name].at[2] for name in points]
-    if isinstance(reference, BarWave):
-        return exact_bar.measure(bars_of(case, reference), history["time"], velocities, heights)
+    heights = [motion.places[name][2] for name in points]
     roles = ("near", "far", "beyond")
     found = dict(zip(roles, velocities, strict=True)) | {"time": history["time"]}
-    pulse = _pulse_of(case, reference.load)
-    return exact_layers.measure(layers_of(case), pulse, dict(zip(roles, heights, strict=True)), found)
+    at, pulse = dict(zip(roles, heights, strict=True)), _pulse_of(case, reference.load)
+    if isinstance(reference, LayeredBar):
+        return exact_layers.measure(layers_of(case), pulse, at, found)
+    curves = exact_layers.wave_error(layers_of(case), pulse, at, found)
+    return exact_bar.measure(bars_of(case, reference), history["time"], velocities, heights) | {"wave_error": curves}
 
 
 def _pulse_of(case: StructureCase, name: str) -> exact_layers.Pulse:
