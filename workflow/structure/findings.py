@@ -133,8 +133,8 @@ def compared_with_references(case: StructureCase, motion: Motion) -> tuple[dict,
             found = exact_cantilever.measure(strip_of(case, reference), motion.history["time"], tip)
             limits = dict.fromkeys(("tip_deflection_error", "swing_frequency_error"), reference.limit)
         else:
-            in_range = isinstance(reference, FrequencyRange) and motion.modes
-            health |= _in_range(reference, motion.modes) if in_range else {}
+            if isinstance(reference, FrequencyRange) and motion.modes:
+                health |= _in_range(reference, motion.modes)
             continue
         metrics |= {name: metric(value, UNITS.get(name.removesuffix("_exact"), "")) for name, value in found.items()}
         health |= {name: at_most(abs(found[name]), limit) for name, limit in limits.items()}
