@@ -154,14 +154,18 @@ def stage(
     folder: Path,
     cores: Annotated[int, typer.Option("--cores")] = 1,
     oversubscribe: Oversubscribe = False,
+    product: Annotated[Path | None, typer.Option(help="where its product goes, and the run folder is removed")] = None,
 ) -> None:
     """Run one stage; Snakemake calls this."""
+    from workflow.points.store import publish
     from workflow.stage_runner import Run, execute
     from workflow.stages import STAGE_FUNCTIONS
 
     run = Run(folder, read_case_of_run(folder), cores, oversubscribe)
     if not execute(name, STAGE_FUNCTIONS[run.case.kind][name], run):
         raise typer.Exit(1)
+    if product is not None:
+        publish(folder, name, product)
 
 
 def main() -> None:

@@ -4,8 +4,8 @@ import fcntl
 import os
 import subprocess
 import sys
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from workflow.check_text import against_limit
@@ -64,17 +64,46 @@ def drive(run_folder: Path, until: Stage, cores: int, oversubscribe: bool, lock:
         Whether all went well; a stage that failed has said why.
     """
     run_folder = run_folder.resolve()
+    wanted = ("--config", f"run={run_folder}", f"oversubscribe={int(oversubscribe)}", "--", run_folder / until.record)
+    return snakemake(SNAKEFILE, run_folder, cores, map(str, wanted), lock)
+
+
+def snakemake(
+    snakefile: Path,
+    folder: Path,
+    cores: int,
+    arguments: Iterable[str],
+    lock: int,
+    each_second: Callable[[], None] | None = None,
+) -> bool:
+    """Run Snakemake to its end; it dies with this process.
+
+    Args:
+        snakefile: its rules.
+        folder: where it works.
+        cores: number of cores that may be used.
+        arguments: further ones.
+        lock: what ``locked`` yields; Snakemake holds it, too.
+        each_second: called while it runs, and once more in the end.
+
+    Returns:
+        Whether all went well.
+    """
     command = [
-        *DIE_WITH_PARENT, sys.executable, "-m", "snakemake", "--snakefile", str(SNAKEFILE),
-        "--directory", str(run_folder), "--cores", str(cores), "--rerun-triggers", "mtime", "--rerun-incomplete",
-        "--nolock", "--quiet", "all",
-        "--config", f"run={run_folder}", f"oversubscribe={int(oversubscribe)}",
-        "--", str(run_folder / until.record),
+        *DIE_WITH_PARENT, sys.executable, "-m", "snakemake", "--snakefile", str(snakefile),
+        "--directory", str(folder), "--cores", str(cores), "--rerun-triggers", "mtime", "--rerun-incomplete",
+        "--nolock", "--quiet", "all", *arguments,
     ]  # fmt: skip
     environment = os.environ | {"OMP_NUM_THREADS": "1"}
     process = subprocess.Popen(command, env=environment, start_new_session=True, pass_fds=(lock,))
+    tell = each_second or (lambda: None)
     try:
-        return process.wait() == 0
+        while True:
+            with suppress(subprocess.TimeoutExpired):
+                process.wait(1.0 if each_second else None)
+            tell()
+            if process.returncode is not None:
+                return process.returncode == 0
     except BaseException:
         end_group(process)
         raise

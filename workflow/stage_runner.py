@@ -15,6 +15,7 @@ from workflow.inputs import stage_inputs
 from workflow.launch import LaunchError
 from workflow.terminal import health_line, print_error
 
+MESSAGE = "message.txt"  # in the partial folder of a stage that failed: why
 AnyCase = TypeVar("AnyCase", bound=Case)
 
 
@@ -104,7 +105,7 @@ def execute(name: str, function: StageFunction, run: Run) -> bool:
     """Run a stage and tell the user how it ended.
 
     Returns:
-        Whether it completed. If not, the traceback is in ``.<stage>.partial/error.txt`` of the run folder.
+        Whether it completed. If not, ``.<stage>.partial`` of the run folder has the traceback and the message.
     """
     try:
         record = run_stage(name, function, run)
@@ -114,6 +115,7 @@ def execute(name: str, function: StageFunction, run: Run) -> bool:
         log = run.folder / f".{name}.partial" / "error.txt"
         log.write_text(traceback.format_exc())
         told = str(error) if isinstance(error, LaunchError) else f"{type(error).__name__}: {error}"
+        log.with_name(MESSAGE).write_text(told)
         print_error(f"stage {name} failed: {told}\ntraceback: {log}")
         return False
     health_line(name, record["seconds"], record["health"], record["continued"])

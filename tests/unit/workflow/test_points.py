@@ -1,0 +1,93 @@
+"""Points: what their products depend on, which are missing, what is said of those that cannot be."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from tests.support.workflow_command import SMALL_CASE
+from workflow.inputs import examine
+from workflow.points.batch import missing, why
+from workflow.points.point import PointsError, read_points
+from workflow.points.store import Store, publish
+
+HEATED = {"warpage.corner": "0 mm", "thermal.steps": "2"}
+
+
+def digests(settings: dict[str, str]) -> dict[str, str]:
+    return dict(read_points(SMALL_CASE, [settings])[0].digests)
+
+
+@pytest.mark.parametrize(
+    ("settings", "changed"),
+    [
+        ({"case.name": "other"}, {"report"}),
+        ({"shock.peak_acceleration": "1000 G"}, {"shock", "report"}),
+        ({"shock.identical_joints": "true"}, {"solder_mesh", "shock", "report"}),
+        ({"board.thickness": "1.1 mm"}, {"geometry", "solder_mesh", "shock", "report"}),
+        ({"solder.volume": "0.07 mm^3"}, {"reflow", "surface", "solder_mesh", "shock", "report"}),
+        ({"package.pitch": "0.9 mm"}, {"geometry", "reflow", "surface", "solder_mesh", "shock", "report"}),
+        ({"shock.peak_acceleration": "1.5 kG"}, set()),
+    ],
+)
+def test_a_digest_changes_with_what_a_product_depends_on(settings, changed):
+    before, after = digests({}), digests(settings)
+    assert {stage for stage in before if before[stage] != after[stage]} == changed
+
+
+def test_where_the_solder_freezes_changes_the_reflow_and_what_cools_from_there_only_the_shock():
+    before, after = digests(HEATED), digests(HEATED | {"thermal.final": "0 degC"})
+    assert {stage for stage in before if before[stage] != after[stage]} == {"shock", "report"}
+    after = digests(HEATED | {"board.thickness": "1.1 mm"})
+    assert before["reflow"] != after["reflow"]
+
+
+def test_another_version_makes_other_products(monkeypatch):
+    before = digests({})
+    monkeypatch.setattr("workflow.points.point.__version__", "0")
+    assert not set(before.values()) & set(digests({}).values())
+
+
+def test_a_shared_product_is_missing_once(tmp_path):
+    store = Store(tmp_path)
+    points = read_points(SMALL_CASE, [{}, {"shock.peak_acceleration": "1000 G"}, {"solder.volume": "0.07 mm^3"}])
+    jobs = missing(store, points, "report")
+    count = {stage: sum(job.stage == stage for job in jobs) for stage in points[0].case.pipeline.names}
+    assert count == {"geometry": 1, "reflow": 2, "surface": 2, "solder_mesh": 2, "shock": 3, "report": 3}
+    for job in jobs[:2]:
+        folder = store.stage_folder(job.point.case, job.stage)
+        folder.mkdir(parents=True)
+        (folder / "stage.json").write_text("{}")
+    assert [job.stage for job in missing(store, points[:2], "solder_mesh")] == ["surface", "solder_mesh"]
+    assert missing(store, points[:1], "surface")[0].needs == ()
+    assert not store.is_complete(points[0], "surface")
+    assert store.is_complete(points[0], "reflow")
+
+
+def test_a_point_has_a_run_folder_as_any_other(tmp_path):
+    store, point = Store(tmp_path), read_points(SMALL_CASE, [{}])[0]
+    store.prepare(point)
+    store.prepare_work(point, "geometry")
+    made = store.work_folder(point, "geometry") / "geometry"
+    made.mkdir()
+    for product in point.case.pipeline["geometry"].products:
+        (made.parent / product).write_text("made")
+    record = {"inputs": json.loads((store.run_folder(point) / "inputs/geometry.json").read_text())}
+    (made / "stage.json").write_text(json.dumps(record))
+    publish(made.parent, "geometry", store.stage_folder(point.case, "geometry"))
+    assert not made.parent.exists()
+    verdicts = examine(store.run_folder(point), point.case)
+    assert not verdicts["geometry"].stale
+    assert verdicts["reflow"].missing
+    assert "stage reflow: ended without a word" in why(store, point, "report")
+
+
+def test_all_that_is_wrong_with_points_is_told_with_their_settings():
+    settings = [{}, {"package.pitch": "0.1 mm"}, {"package.pitsch": "1 mm", "solder.volume": "1 mm"}]
+    with pytest.raises(PointsError) as caught:
+        read_points(Path(SMALL_CASE), settings)
+    lines = caught.value.lines()
+    assert set(caught.value.impossible) == {1, 2}
+    assert lines[0].startswith("point 2 (package.pitch = 0.1 mm): ")
+    assert any(line.startswith("point 3 (package.pitsch = 1 mm, ") and "package.pitch" in line for line in lines)
+    assert any("solder.volume" in line for line in lines)

@@ -1,0 +1,114 @@
+"""A point: a case file with settings, known by what all its stages depend on."""
+
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from workflow import __version__
+from workflow.case import read_case
+from workflow.case_kind import Case
+from workflow.inputs import stage_inputs
+from workflow.problems import CaseError
+
+DIGITS = 12  # hexadecimal: two of a million products are alike with a probability of 0.2 %
+
+
+@dataclass(frozen=True, slots=True)
+class Point:
+    """A case with settings.
+
+    Attributes:
+        settings: dotted key -> value, as text for ``--set``.
+        case: the resolved case.
+        digests: stage -> digest of all that its product depends on.
+    """
+
+    settings: Mapping[str, str]
+    case: Case
+    digests: Mapping[str, str] = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "digests", digests(self.case))
+
+    @property
+    def key(self) -> str:
+        """The digest of its last stage, the report, which follows all others."""
+        return self.digests[self.case.pipeline.names[-1]]
+
+
+class PointsError(CaseError):
+    """Points that must not run, each with everything that is wrong with it."""
+
+    def __init__(self, source: str, impossible: Mapping[int, CaseError], settings: Sequence[Mapping[str, str]]) -> None:
+        """Take the case file, what is wrong with a point, by its place in the list, and the settings of all."""
+        self.impossible = impossible
+        self.settings = settings
+        super().__init__(source, [problem for error in impossible.values() for problem in error.problems])
+
+    def lines(self) -> list[str]:
+        """One line a problem, each beginning with the point."""
+        return [
+            f"point {place + 1} ({told(self.settings[place])}): {line}"
+            for place, error in self.impossible.items()
+            for line in error.lines()
+        ]
+
+
+def digests(case: Case) -> dict[str, str]:
+    """Return for each stage a digest of its own parameters, of those of all stages that it follows, and of the version.
+
+    Stages with equal digests have equal products. Names of case and scale enter the report's only.
+    """
+    found: dict[str, str] = {}
+    for stage in case.pipeline.stages:
+        content = {
+            "version": __version__,
+            "stage": f"{case.kind} {stage.name}",
+            "inputs": stage_inputs(case, stage),
+            "follows": [found[name] for name in stage.follows],
+        }
+        found[stage.name] = hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:DIGITS]
+    return found
+
+
+def read_points(case: Path, settings: Sequence[Mapping[str, str]], oversubscribe: bool = False) -> list[Point]:
+    """Read and check a case with several settings.
+
+    Args:
+        case: TOML file.
+        settings: of each point, dotted key -> value, as text for ``--set``.
+        oversubscribe: whether more MPI ranks than cores are welcome.
+
+    Raises:
+        PointsError: with all problems of all points.
+    """
+    points, impossible = read_possible_points(case, settings, oversubscribe)
+    if impossible:
+        raise PointsError(str(case), impossible, settings)
+    return points
+
+
+def read_possible_points(
+    case: Path, settings: Sequence[Mapping[str, str]], oversubscribe: bool = False
+) -> tuple[list[Point], dict[int, CaseError]]:
+    """Return the points that can be, and what is wrong with the others, by place in the list."""
+    points: list[Point] = []
+    impossible: dict[int, CaseError] = {}
+    for place, chosen in enumerate(settings):
+        try:
+            points.append(Point(chosen, read_case(case, overrides(chosen), oversubscribe)))
+        except CaseError as error:
+            impossible[place] = error
+    return points, impossible
+
+
+def overrides(settings: Mapping[str, str]) -> list[str]:
+    """Write settings as ``--set`` takes them."""
+    return [f"{key}={value}" for key, value in settings.items()]
+
+
+def told(settings: Mapping[str, str]) -> str:
+    """Write settings for a reader."""
+    return ", ".join(f"{key} = {value}" for key, value in settings.items()) or "the case as it is"
