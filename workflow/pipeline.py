@@ -4,7 +4,7 @@ import fcntl
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -65,24 +65,22 @@ def drive(run_folder: Path, until: Stage, cores: int, oversubscribe: bool, lock:
     """
     run_folder = run_folder.resolve()
     wanted = ("--config", f"run={run_folder}", f"oversubscribe={int(oversubscribe)}", "--", run_folder / until.record)
-    return snakemake(SNAKEFILE, run_folder, cores, map(str, wanted), lock)
+    return snakemake(run_folder, cores, ["--snakefile", str(SNAKEFILE), *map(str, wanted)], lock)
 
 
 def snakemake(
-    snakefile: Path,
     folder: Path,
     cores: int,
-    arguments: Iterable[str],
+    arguments: Sequence[str],
     lock: int,
     each_second: Callable[[], None] | None = None,
 ) -> bool:
     """Run Snakemake to its end; it dies with this process.
 
     Args:
-        snakefile: its rules.
         folder: where it works.
         cores: number of cores that may be used.
-        arguments: further ones.
+        arguments: further ones, its rules among them.
         lock: what ``locked`` yields; Snakemake holds it, too.
         each_second: called while it runs, and once more in the end.
 
@@ -90,7 +88,7 @@ def snakemake(
         Whether all went well.
     """
     command = [
-        *DIE_WITH_PARENT, sys.executable, "-m", "snakemake", "--snakefile", str(snakefile),
+        *DIE_WITH_PARENT, sys.executable, "-m", "snakemake",
         "--directory", str(folder), "--cores", str(cores), "--rerun-triggers", "mtime", "--rerun-incomplete",
         "--nolock", "--quiet", "all", *arguments,
     ]  # fmt: skip

@@ -15,6 +15,21 @@ UNTOLD = "ended without a word, as when it is killed; see {log}"
 
 
 @dataclass(frozen=True, slots=True)
+class Machine:
+    """What points are computed with.
+
+    Attributes:
+        cores: number of cores that may be used.
+        exclusive: one stage at a time, with all cores, for measurements that must not disturb each other.
+        oversubscribe: whether MPI may have more ranks than cores.
+    """
+
+    cores: int
+    exclusive: bool = False
+    oversubscribe: bool = False
+
+
+@dataclass(frozen=True, slots=True)
 class Job:
     """A product that is missing.
 
@@ -73,10 +88,7 @@ def run_points(
     store: Store,
     points: Sequence[Point],
     until: str,
-    cores: int,
-    *,
-    exclusive: bool = False,
-    oversubscribe: bool = False,
+    machine: Machine,
     each_second: Callable[[], None] | None = None,
 ) -> dict[str, str]:
     """Compute what is missing of points; what is there is never computed again.
@@ -87,9 +99,7 @@ def run_points(
         store: where products are.
         points: what is wanted.
         until: the last stage.
-        cores: number of cores that may be used.
-        exclusive: one stage at a time, with all cores, for measurements that must not disturb each other.
-        oversubscribe: whether MPI may have more ranks than cores.
+        machine: what they are computed with.
         each_second: called while points are computed, and once more in the end.
 
     Returns:
@@ -106,9 +116,10 @@ def run_points(
         if jobs:
             for job in jobs:
                 store.prepare_work(job.point, job.stage)
-            _write(store, jobs, 1 if exclusive else cores, cores)
-            arguments = ("--keep-going", "--scheduler", "greedy", "--config", f"oversubscribe={int(oversubscribe)}")
-            snakemake(SNAKEFILE, store.folder.resolve(), cores, arguments, lock, each_second)
+            _write(store, jobs, machine)
+            options = ("--snakefile", str(SNAKEFILE), "--keep-going", "--scheduler", "greedy")
+            config = ("--config", f"oversubscribe={int(machine.oversubscribe)}")
+            snakemake(store.folder.resolve(), machine.cores, [*options, *config], lock, each_second)
     return {point.key: why(store, point, until) for point in points if not store.is_complete(point, until)}
 
 
@@ -119,7 +130,7 @@ def why(store: Store, point: Point, until: str) -> str:
     return f"stage {stage}: {store.message(point, stage) or UNTOLD.format(log=log)}"
 
 
-def _write(store: Store, jobs: Sequence[Job], at_once: int, cores: int) -> None:
+def _write(store: Store, jobs: Sequence[Job], machine: Machine) -> None:
     """Write the jobs for the Snakefile; later stages first, so that points are complete one after the other."""
     tasks = {}
     for job in jobs:
@@ -132,19 +143,19 @@ def _write(store: Store, jobs: Sequence[Job], at_once: int, cores: int) -> None:
             product=product,
             pattern=product.replace(job.point.digests[job.stage], "{digest}"),
             moves=folder.parent != work,
-            threads=_threads(job, jobs, at_once, cores),
+            threads=_threads(job, jobs, machine),
             priority=job.point.case.pipeline.names.index(job.stage),
         )
     written = {name: asdict(task) for name, task in tasks.items()}
     (store.folder / JOBS).write_text(json.dumps(written, indent=1) + "\n")
 
 
-def _threads(job: Job, jobs: Sequence[Job], at_once: int, cores: int) -> int:
+def _threads(job: Job, jobs: Sequence[Job], machine: Machine) -> int:
     """Return the cores of a job: a shock's are its ranks, a reflow has its share, other stages are serial."""
-    if at_once == 1:
-        return cores
+    if machine.exclusive:
+        return machine.cores
     if job.stage == "shock":
-        return min(cores, job.point.case.ranks)
+        return min(machine.cores, job.point.case.ranks)
     if job.stage == "reflow":
-        return max(1, cores // min(at_once, sum(other.stage == job.stage for other in jobs)))
+        return max(1, machine.cores // sum(other.stage == job.stage for other in jobs))
     return 1

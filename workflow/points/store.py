@@ -16,9 +16,9 @@ from workflow.stage_runner import MESSAGE
 class Store:
     """A folder with the products of points.
 
-    ``stages/<stage>-<digest>`` are the products. ``points/<key>`` is a run folder as any other, whose stages are links to
-    them; the last stage, the report, is in it. ``work/<stage>-<digest>`` is the run folder in which a product is being
-    made: it becomes one at once and complete; checkpoints of a stage that was killed stay there.
+    ``stages/<stage>-<digest>`` are the products. ``points/<key>`` is a run folder as any other, whose stages are links
+    to them; the last stage, the report, is in it. ``work/<stage>-<digest>`` is the run folder in which a product is
+    being made: it becomes one at once and complete; checkpoints of a stage that was killed stay there.
     """
 
     folder: Path
