@@ -89,7 +89,9 @@ def divided_on_one_rank(request: RunInput) -> Divided[JointTables]:
     shock, numerics = request.shock, request.shock.numerics
     whole = joined(read_scene(request))
     found = survey(
-        whole.mesh, request.materials, Treatment(numerics.formulation, numerics.kinematics, numerics.mass_scaled)
+        whole.mesh,
+        request.materials,
+        Treatment(numerics.formulation, numerics.decided_kinematics, numerics.mass_scaled),
     )
     rules = Rules(
         coupling=shock.coupling,
@@ -146,7 +148,7 @@ def build_models(
         found = assembled_step(comms.models["dns"], (pieces["dns"], divided.tables["dns"]), factor)
         alone = agreed_minimum(world, [pieces["dns"].steps * np.sqrt(factor)])
         steps = undivided(steps, max(found, alone), divided.rules)
-    bodies = assembled(comms, replace(divided, steps=steps), pieces, numerics.kinematics)
+    bodies = assembled(comms, replace(divided, steps=steps), pieces, numerics.decided_kinematics)
     return {role: Model(divided.tables[role], body) for role, body in bodies.items()}, steps
 
 

@@ -109,6 +109,7 @@ class ShockNumerics(Parameters):
 
     ``kinematics`` and ``formulation`` of hexahedra as for a structure. Elastic hexahedra are the same in both
     formulations; those that yield are seven to eight times cheaper with one point, a few per cent stronger in bending.
+    Kinematics that are ``auto`` are finite where the board's deflection calls for it.
     ``dns_duration`` ends the DNS before the shock does: the modes are compared over the time that both have.
     """
 
@@ -117,7 +118,7 @@ class ShockNumerics(Parameters):
     dns_duration: Annotated[float | None, "ms"] = Field(None, gt=0)
     step_fraction: float = Field(0.9, gt=0, le=0.95)
     critical_step: Literal["element", "power_iteration"] = "element"
-    kinematics: Literal["small", "finite"] = "small"
+    kinematics: Literal["auto", "small", "finite"] = "small"
     formulation: Literal["incompatible_modes", "one_point"] = "incompatible_modes"
     mass_scaled: tuple[Literal["board", "substrate", "die", "copper", "solder"], ...] = ()
     history_samples: int = Field(600, ge=2)
@@ -135,6 +136,13 @@ class ShockNumerics(Parameters):
                 "inadmissible", "is not for implicit steps, which are linear", {"allowed": allowed}
             )
         return value
+
+    @property
+    def decided_kinematics(self) -> Literal["small", "finite"]:
+        """Return the kinematics of a run, which only a case decides that are ``auto``; ValueError until it has."""
+        if self.kinematics == "auto":
+            raise ValueError("shock.numerics.kinematics = auto is decided by the case, before a run")
+        return self.kinematics
 
 
 class Failure(Parameters):

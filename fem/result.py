@@ -11,6 +11,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from fem.communicators import Communicators, Role
+from fem.effects import ADDED_MASS_LIMIT
 from fem.elements.hexahedron import HEXAHEDRON
 from fem.history import History
 from fem.inputs import RunInput
@@ -23,7 +24,6 @@ from fem.steps import Steps
 from fem.watch_joints import FLOW_LAYERS, LAYERS
 
 FORCE_RESIDUAL_LIMIT = 1e-10
-ADDED_MASS_LIMIT = 0.05
 # Above it hourglass stiffness carries a part of the load, or incompatible modes are out of balance; 10 % is the usual
 # bound (Belytschko, Liu, Moran & Elkhodary, Nonlinear Finite Elements, 2nd ed., 8.7).
 HOURGLASS_LIMIT = 0.1
@@ -242,7 +242,7 @@ def checked(checks: Mapping[str, tuple[float, float]]) -> dict[str, Any]:
 
 def effects(request: RunInput, summary: dict[str, Any], neglected_strain: float) -> dict[str, Any]:
     """Return which effects the run simulated, and why."""
-    finite, why = finite_rotation("shock.numerics", request.shock.numerics.kinematics, neglected_strain)
+    finite, why = finite_rotation("shock.numerics", request.shock.numerics.decided_kinematics, neglected_strain)
     scaled, tied = request.shock.numerics.mass_scaled, summary["tied_nodes"]
     ratio = f"step ratio m = {summary['substeps']}"
     pulse, damping = shock_pulse(request.shock), request.shock.damping.coefficients
@@ -258,7 +258,7 @@ def effects(request: RunInput, summary: dict[str, Any], neglected_strain: float)
             "why": f"{pulse.source}, {METHODS[request.shock.method]}; package facing down: the board is pushed along +z"
             " of the table's frame",
         },
-        "gravity": {"on": pulse.gravity, "why": pulse.why},
+        "gravity": pulse.gravity,
         "damping": {
             "on": any(damping),
             "why": f"Rayleigh damping, alpha = {damping[0]:.4g} 1/s, beta = {damping[1]:.4g} s",

@@ -102,7 +102,7 @@ def planned(steps: Steps, request: RunInput, pulse: Pulse) -> Steps:
 def place(world: MPI.Comm, divided: Divided, request: RunInput) -> Plan:
     """Choose which ranks carry which model and which cells, and say so; collective."""
     numerics = request.shock.numerics
-    treatment = Treatment(numerics.formulation, numerics.kinematics)
+    treatment = Treatment(numerics.formulation, numerics.decided_kinematics)
     loads = loads_of(divided, request.materials, treatment)
     return plan_ranks(world, loads, request.shock.ranks, request.checkpoints, divided.scheme)
 

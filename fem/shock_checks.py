@@ -64,7 +64,7 @@ def _large_mass(shock: Shock) -> Iterator[Problem]:
 
 
 def _finite(shock: Shock) -> Iterator[Problem]:
-    """Stiffness-proportional damping takes the elastic stiffness as it lies, and would brake what turns."""
+    """Find what is linear: stiffness-proportional damping, which would brake what turns, and implicit steps."""
     if shock.numerics.kinematics == "finite" and shock.damping.coefficients[1]:
         yield Problem(
             "shock.numerics.kinematics",
@@ -72,6 +72,9 @@ def _finite(shock: Shock) -> Iterator[Problem]:
             "does not go with stiffness-proportional damping, whose stiffness does not turn",
             "small, or mass-proportional damping",
         )
+    if shock.numerics.kinematics == "finite" and shock.numerics.dns_solver == "implicit":
+        what = "is not for implicit steps, which are linear"
+        yield Problem("shock.numerics.kinematics", "finite", what, "small, or dns_solver = explicit")
 
 
 def _coupling(coupling: JointCoupling) -> Iterator[Problem]:

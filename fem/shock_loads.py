@@ -9,6 +9,7 @@ from mpi4py import MPI
 
 from fem.body import Body
 from fem.damping import RayleighDamping
+from fem.effects import Effect, weight
 from fem.errors import LoadError
 from fem.large_mass import LargeMass
 from fem.loads import DOWN, BodyAcceleration, Load
@@ -16,8 +17,6 @@ from fem.parameters import Shock
 from fem.pulse import STANDARD_GRAVITY, Constant, HalfSine, Pulse, Tabulated, service_condition
 from fem.pulse_table import read_pulse
 from fem.scene import JointTables
-
-NEGLIGIBLE = 1e-3  # of the peak: weight below it is left out
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,13 +26,12 @@ class ShockPulse:
     Attributes:
         pulse: Upward acceleration of the table [m/s^2].
         source: Where it comes from, in words.
-        gravity: Whether weight acts, and ``why``.
+        gravity: Whether weight acts, and why, as an effect.
     """
 
     pulse: Pulse
     source: str
-    gravity: bool
-    why: str
+    gravity: Effect
 
 
 def shock_pulse(shock: Shock) -> ShockPulse:
@@ -44,11 +42,7 @@ def shock_pulse(shock: Shock) -> ShockPulse:
     """
     pulse, source = input_pulse(shock)
     peak = float(np.abs(pulse.values).max()) if isinstance(pulse, Tabulated) else pulse.peak
-    ratio = STANDARD_GRAVITY / peak if peak > 0.0 else np.inf
-    if shock.gravity == "auto":
-        reason = f"1 G is {ratio:.2g} of the peak acceleration, {'at least' if ratio >= NEGLIGIBLE else 'below'}"
-        return ShockPulse(pulse, source, ratio >= NEGLIGIBLE, f"{reason} {NEGLIGIBLE:g}")
-    return ShockPulse(pulse, source, shock.gravity == "on", f"shock.gravity = {shock.gravity}")
+    return ShockPulse(pulse, source, weight(shock.gravity, peak, STANDARD_GRAVITY))
 
 
 def input_pulse(shock: Shock) -> tuple[HalfSine | Tabulated, str]:
@@ -85,7 +79,7 @@ def shock_loads(comm: MPI.Comm, mass: float, body: Body, tables: JointTables, sh
         shock: Pulse, method, gravity, damping.
     """
     chosen = shock_pulse(shock)
-    made: list[Load] = [BodyAcceleration(DOWN, Constant(STANDARD_GRAVITY))] if chosen.gravity else []
+    made: list[Load] = [BodyAcceleration(DOWN, Constant(STANDARD_GRAVITY))] if chosen.gravity["on"] else []
     if shock.method == "direct":
         made.append(BodyAcceleration(DOWN, chosen.pulse))
     elif not len(tables.shaken):

@@ -2,8 +2,8 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from math import pi, sqrt
-from typing import TypedDict
+from math import exp, pi, sqrt
+from typing import NotRequired, TypedDict
 
 from particles.geometry import JointGeometry
 from particles.parameters import Solder
@@ -18,10 +18,11 @@ LARGEST_BOND = 100.0
 
 
 class Decision(TypedDict):
-    """Whether an effect acts, and why."""
+    """Whether an effect acts, why, and how much of the answer it is expected to change (or would)."""
 
     on: bool
     why: str
+    influence: NotRequired[float]
 
 
 NO_WALL: dict[str, Decision] = {
@@ -82,7 +83,8 @@ def acting_weight(solder: Solder, effects: Mapping[str, Decision]) -> float:
 def _by_switch(switch: str, auto: Decision) -> Decision:
     if switch == "auto":
         return auto
-    return {"on": switch == "on", "why": f"set to {switch} by the user ({auto['why']})"}
+    set_by_user: Decision = {"on": switch == "on", "why": f"set to {switch} by the user ({auto['why']})"}
+    return auto | set_by_user
 
 
 def decide_effects(geometry: JointGeometry, solder: Solder) -> dict[str, Decision]:
@@ -118,21 +120,30 @@ def decide(numbers: Numbers, solder: Solder) -> dict[str, Decision]:
     ratio = solder.process_time / slowest
     transient = ratio < PROCESS_TIME_RATIO
     times = f"process time {solder.process_time:.3g} s is {ratio:.3g} times the slowest time {slowest:.3g} s"
+    moving = exp(-ratio)
+    shaped = 1.0 / sqrt(1.0 + rival)  # of the size, where gravity makes a puddle as deep as the capillary length
     rest = f"{times}: " + ("the motion matters" if transient else "quasi-static, only the shape at rest matters")
     auto: dict[str, Decision] = {
         "gravity": {
             "on": change > NEGLIGIBLE_SHAPE_CHANGE,
             "why": f"Bond number {numbers.bond:.3g}: changes the shape by about {100 * change:.2g} %",
+            "influence": min(change, 1.0),
         },
-        "inertia": {"on": transient, "why": rest},
-        "viscosity": {"on": transient, "why": f"Ohnesorge number {numbers.ohnesorge:.2g}; {rest}"},
+        "inertia": {"on": transient, "why": rest, "influence": moving},
+        "viscosity": {
+            "on": transient,
+            "why": f"Ohnesorge number {numbers.ohnesorge:.2g}; {rest}",
+            "influence": moving,
+        },
         "surface_tension": {
             "on": rival < LARGEST_BOND,
             "why": f"Bond number {rival:.3g} (off above {LARGEST_BOND:g})" if rival > 0.0 else "no gravity rivals it",
+            "influence": shaped,
         },
         "wall_adhesion": {
             "on": rival < LARGEST_BOND,
             "why": "contact angles of pad and mask hold or move the contact lines wherever surface tension acts",
+            "influence": shaped,
         },
     }
     switches = solder.effects.model_dump()

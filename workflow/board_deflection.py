@@ -2,9 +2,11 @@
 
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
+
+from fem.effects import STIFFENING_OF_BOARD, called_for, effect, stiffened
 
 if TYPE_CHECKING:
     from workflow.board_drop_case import BoardDropCase
@@ -13,8 +15,16 @@ SHARE = 4.0 / math.pi  # of the base's acceleration in the first mode of a pinne
 SAMPLES, SAMPLES_A_PERIOD = 1000, 100
 
 
-def expected_deflection(case: "BoardDropCase") -> tuple[float, float]:
-    """Return the largest deflection of the board's middle [m], and of its slope.
+class Deflection(NamedTuple):
+    """Largest deflection of a board's middle [m], of its slope, and the angular frequency of the mode [rad/s]."""
+
+    largest: float
+    slope: float
+    omega: float
+
+
+def expected_deflection(case: "BoardDropCase") -> Deflection:
+    """Return how far the board deflects at small rotations; PulseError where a table of its pulse cannot be read.
 
     The board is a beam between its holes that swings in its first mode, q'' + omega^2 q = 4/pi a(t): w = q sin(pi x/L).
     Width, package and later modes are left out.
@@ -28,7 +38,7 @@ def expected_deflection(case: "BoardDropCase") -> tuple[float, float]:
     stiffness = young * board.thickness**2 / 12.0 / case.materials.board.density
     omega = (math.pi / length) ** 2 * math.sqrt(stiffness)
     deflection = first_mode_peak(omega, shock_pulse(case.shock).pulse.integral, case.shock.duration)
-    return deflection, math.pi / length * deflection
+    return Deflection(deflection, math.pi / length * deflection, omega)
 
 
 def first_mode_peak(omega: float, velocity: Callable[[float], float], duration: float) -> float:
@@ -48,13 +58,23 @@ def first_mode_peak(omega: float, velocity: Callable[[float], float], duration: 
     return float(np.abs(swing).max()) / omega
 
 
+def decide_kinematics(case: "BoardDropCase") -> tuple[Literal["small", "finite"], str]:
+    """Return the kinematics that the deflection of the board calls for, and why; errors as ``expected_deflection``."""
+    return called_for(expected_deflection(case).largest / case.board.thickness)
+
+
 def kinematics_effect(case: "BoardDropCase") -> dict:
-    """Return whether rotations are finite, and why, as an effect of a plan."""
+    """Return whether rotations are finite, why, and what small ones would leave out, as an effect of a plan."""
     from fem.kinematics import finite_rotation
 
-    deflection, slope = expected_deflection(case)
-    finite, why = finite_rotation("shock.numerics", case.shock.numerics.kinematics, 0.5 * slope**2)
-    if not finite:
-        ratio = deflection / case.board.thickness
-        why = f"the board is expected to deflect by about {ratio:.2g} times its thickness; {why}"
-    return {"finite_rotation": {"on": finite, "why": why}}
+    expected, kinematics = expected_deflection(case), case.shock.numerics.kinematics
+    ratio = expected.largest / case.board.thickness
+    wanted, reason = called_for(ratio)
+    decided = wanted if kinematics == "auto" else kinematics
+    finite, why = finite_rotation("shock.numerics", decided, 0.5 * expected.slope**2)
+    if kinematics == "auto":
+        why = f"shock.numerics.kinematics = auto: {reason}"
+    elif not finite:
+        why += "" if wanted == "small" else "; auto would take it"
+    why = f"the board is expected to deflect by about {ratio:.2g} times its thickness; {why}"
+    return {"finite_rotation": effect(finite, why, stiffened(ratio, STIFFENING_OF_BOARD))}

@@ -130,9 +130,37 @@ class BoardDropCase(PackageCase):
         if meshing_checks.problems(self.package, self.board, self.warpage):
             return found
         found += self.in_words(shock_checks.problems(self.shock)) + list(fine_joints.problems(self))
+        if self.shock.numerics.kinematics == "auto" and not found:
+            found += self._decided_problems()
+        if found:
+            return found
         found += identical_joints.problems(self)
         found += shock_cooling.problems(self)
         return (found + self._flow_problems() + self._coupling_problems()) or self._impossible_steps()
+
+    @property
+    def decided(self) -> "BoardDropCase":
+        """The case with kinematics that are small or finite, as its board's deflection calls for.
+
+        Raises:
+            PulseError: the table of the pulse cannot be read.
+        """
+        if self.shock.numerics.kinematics != "auto":
+            return self
+        from workflow.board_deflection import decide_kinematics
+
+        numerics = self.shock.numerics.model_copy(update={"kinematics": decide_kinematics(self)[0]})
+        return self.model_copy(update={"shock": self.shock.model_copy(update={"numerics": numerics})})
+
+    def _decided_problems(self) -> list[Problem]:
+        """Find what does not go with the kinematics that ``auto`` decides on."""
+        from fem import shock_checks
+        from fem.errors import PulseError
+
+        try:
+            return self.in_words(shock_checks.problems(self.decided.shock))
+        except PulseError as error:
+            return [Problem("shock.table", str(error), self.shock.table)]
 
     def _impossible_steps(self) -> list[Problem]:
         from workflow.forecast import step_problems
@@ -158,7 +186,7 @@ class BoardDropCase(PackageCase):
         if self.shock.coupling.scheme != "local_steps" or "two_scale" not in self.shock.numerics.modes:
             return []
         yielding = [role for role, material in self.materials.by_role.items() if material.plasticity is not None]
-        if not yielding and self.shock.numerics.kinematics == "small":
+        if not yielding and self.decided.shock.numerics.kinematics == "small":
             return []
         why = f"{' and '.join(yielding)} yields" if yielding else "shock.numerics.kinematics is finite"
         message = f"needs elastic materials at small strains, {why}"

@@ -1,4 +1,4 @@
-"""Command line: new, plan, run, status, report, clean, stress-test, schema."""
+"""Command line: new, plan, run, status, report, clean, effects, stress-test, schema."""
 
 import json
 import os
@@ -138,6 +138,20 @@ def stress_test(
     from workflow.stress_test.command import stress_test as try_cases
 
     raise typer.Exit(0 if try_cases(cases or [], family or [], cores or available_cores(), out) else 1)
+
+
+@app.command()
+def effects(
+    case: Annotated[Path | None, typer.Argument(metavar="[CASE]", help="case file: its effects only")] = None,
+    settings: Settings = None,
+) -> None:
+    """Show the effects of the program, or those of a case: on or off and why, expected influence, share of the cost."""
+    from workflow.effect_registry.page import show_effects, show_registry
+
+    if case is None:
+        show_registry(console)
+    else:
+        show_effects(read_case(case, settings or [], True), console)
 
 
 @app.command()

@@ -7,14 +7,12 @@ from dataclasses import dataclass, replace
 from fem.materials.roles import Materials
 from fem.thermal.parameters import Thermal
 from workflow import shock_cooling
-from workflow.board_deflection import kinematics_effect
 from workflow.board_drop_case import BoardDropCase, PackageCase
 from workflow.case import available_cores
-from workflow.fine_joints import coarse_joints_effect
-from workflow.identical_joints import identical_joints_effect
 from workflow.problems import Problem
 from workflow.reflow.forecast import forecast_heated
 from workflow.reflow_pool import distinct_joints, joint_geometries
+from workflow.shock_effects import shock_effects
 from workflow.shock_forecast import (
     PartForecast,
     ShockForecast,
@@ -90,8 +88,7 @@ def _heated(of_reflow: Forecast, case: PackageCase, thermal: Thermal) -> Forecas
 
 
 def _with_shock(of_reflow: Forecast, case: BoardDropCase) -> Forecast:
-    from fem.materials.effects import failure_effect, material_effects
-
+    told, case = shock_effects(case), case.decided
     parts = forecast_parts(case)
     shock = forecast_shock(case, parts)
     numerics = case.shock.numerics
@@ -102,13 +99,7 @@ def _with_shock(of_reflow: Forecast, case: BoardDropCase) -> Forecast:
     identical = again if case.shock.identical_joints else 0.0
     return replace(
         of_reflow,
-        effects=of_reflow.effects
-        | kinematics_effect(case)
-        | material_effects(case.materials.by_role)
-        | failure_effect(case.shock.failure)
-        | coarse_joints_effect(case.shock.coupling)
-        | identical_joints_effect(case)
-        | cooling,
+        effects=of_reflow.effects | told | cooling,
         parts=two_scale_parts(case) if "two_scale" in numerics.modes else parts,
         shock=shock,
         seconds=of_reflow.seconds | {"shock": identical + sum(modes[mode] for mode in numerics.modes) + seconds},
@@ -120,6 +111,8 @@ def step_problems(case: BoardDropCase) -> Iterator[Problem]:
     import numpy as np
 
     from fem.estimate import damped_critical_step
+
+    case = case.decided
 
     with np.errstate(all="ignore"):
         steps = [part.critical_step for part in forecast_parts(case).values() if not part.mass_scaled]

@@ -1,8 +1,6 @@
 """What a run would do, and what it would cost. Nothing is run, nothing is written."""
 
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 from rich.console import Console
 from rich.table import Table
@@ -10,6 +8,7 @@ from rich.table import Table
 from workflow.board_drop_case import BoardDropCase, PackageCase
 from workflow.case import available_cores
 from workflow.case_kind import FULL, Case
+from workflow.effect_registry.page import effects_table
 from workflow.fields import display, leaves
 from workflow.forecast import Forecast, forecast
 from workflow.inputs import Change, Verdict, examine
@@ -59,7 +58,7 @@ def _show(
     case: Case, run_folder: Path, outlook: Forecast | SceneForecast | StructureForecast, console: Console, what: str
 ) -> None:
     console.print(_stages(case, run_folder, outlook.seconds))
-    console.print(_effects(outlook.effects, what))
+    console.print(effects_table(case, outlook.effects, what))
 
 
 def _particles(outlook: SceneForecast) -> Table:
@@ -109,14 +108,6 @@ def _stages(case: Case, run_folder: Path, predicted: dict[str, float]) -> Table:
         seconds = predicted.get(name)
         cost = f"about {duration(seconds)}" if verdict.stale and seconds is not None else ""
         table.add_row(name, mark, cost, reason(verdict, case))
-    return table
-
-
-def _effects(effects: Mapping[str, Any], of_what: str) -> Table:
-    table = new_table(f"\nEffects of the {of_what}", "effect", "", "why")
-    for name, decision in effects.items():
-        mark = "[green]on[/]" if decision["on"] else "[dim]off[/]"
-        table.add_row(name.replace("_", " "), mark, decision["why"])
     return table
 
 

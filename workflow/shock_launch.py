@@ -60,7 +60,7 @@ def _mesh(run: Run[BoardDropCase], name: str) -> str:
 
 def _request(run: Run[BoardDropCase], mode: str, meshes: tuple[str, ...], coupling: JointCoupling) -> dict:
     """Return what the package fem reads as input of a run, but for its folders."""
-    shock = run.case.shock.model_copy(update={"coupling": coupling})
+    shock = run.case.decided.shock.model_copy(update={"coupling": coupling})
     return {
         "mode": mode,
         "meshes": [_mesh(run, name) for name in meshes],

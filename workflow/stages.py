@@ -8,6 +8,7 @@ Each reads products of earlier stages from ``run.folder``, writes its own into `
 Packages are imported inside the functions, so that a stage loads only what it uses.
 """
 
+from dataclasses import replace
 from pathlib import Path
 
 from workflow import findings, identical_joints
@@ -62,6 +63,7 @@ def shock(run: Run[BoardDropCase], folder: Path) -> Findings:
     """Drop the board: each mode is one MPI run of the package fem; two modes are compared, and identical joints."""
     from workflow.reflow_pool import refuse_joints_without_mesh
     from workflow.shock_cooling import with_cooling
+    from workflow.shock_effects import with_influence
     from workflow.shock_launch import find_fine_joints, read_results, run_mode
 
     joints = read_json(run.folder / "reflow/joints.json")
@@ -71,6 +73,7 @@ def shock(run: Run[BoardDropCase], folder: Path) -> Findings:
         run_mode(run, folder / mode, mode, fine)
     results = read_results(folder)
     found = findings.of_shock(results, folder, run.case.board.thickness)
+    found = replace(found, effects=with_influence(found.effects, run.case))
     if run.case.shock.identical_joints:
         main = next(iter(results))
         run_mode(run, folder / identical_joints.FOLDER, main, fine, identical_joints.PREFIX)

@@ -1,10 +1,13 @@
 """Which effects the materials of a run call for, and why. Plain Python, for ``plan`` and for the run itself."""
 
 from collections.abc import Mapping
+from math import log
 from typing import Any
 
 from fem.materials.parameters import Isotropic, JohnsonCook, Material
 from fem.parameters import Failure
+
+RATE_OF_DROPS = 100.0  # [1/s] of solder: cases/bga_drop finds up to 50
 
 
 def material_effects(materials: Mapping[str, Material]) -> dict[str, dict[str, Any]]:
@@ -20,6 +23,7 @@ def material_effects(materials: Mapping[str, Material]) -> dict[str, dict[str, A
     if not laws:
         why = "all materials are elastic"
         return {name: {"on": False, "why": why} for name in ("plasticity", "strain_rate", "thermal_softening")}
+    raised = max((law.C * log(RATE_OF_DROPS / law.reference_rate) for law in laws.values()), default=0.0)
     fast = {name: law for name, law in laws.items() if law.C > 0.0}
     soft = {
         name: item.softening for name, item in materials.items() if isinstance(item, Isotropic) and item.softening < 1.0
@@ -33,11 +37,13 @@ def material_effects(materials: Mapping[str, Material]) -> dict[str, dict[str, A
                 for name, law in fast.items()
             )
             or "C = 0: no dependence given",
+            "influence": max(raised, 0.0),
         },
         "thermal_softening": {
             "on": bool(soft),
             "why": "; ".join(f"{name}: yield stress times {factor:.3g}" for name, factor in soft.items())
             or "at the temperature at which A and B are measured",
+            "influence": 1.0 - min(soft.values(), default=1.0),
         },
     }
 

@@ -132,12 +132,12 @@ def decide(
         (warped, f"heating changes gaps or places of pads by {warped:.2g} of their size"), (forced, force["why"])
     )
     flexible = _switched(thermal.effects.flexible, larger, why)
-    if not flexible["on"]:
-        force = {"on": False, "why": "board and package are rigid"}
+    flexible["influence"] = larger
     residual = thermal.effects.residual_stress
+    rigid = {"on": False, "why": "board and package are rigid"}
     return {
         "flexible": flexible,
-        "solder_force": force,
+        "solder_force": force | {"influence": forced} if flexible["on"] else rigid,
         "residual_stress": {"on": residual == "on", "why": f"thermal.effects.residual_stress = {residual}"},
     }
 

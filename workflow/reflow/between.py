@@ -32,7 +32,7 @@ def thermal_effects(case: "PackageCase", thermal: Thermal) -> dict:
         standoff=package.standoff,
     )
     found = decide(thermal, case.materials.by_role, sizes, case.solder.surface_tension)
-    return {name: {"on": bool(effect["on"]), "why": effect["why"]} for name, effect in found.items()}
+    return {name: {**effect, "on": bool(effect["on"])} for name, effect in found.items()}
 
 
 def open_structure(

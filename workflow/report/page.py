@@ -53,7 +53,7 @@ def _context(run_folder: Path, case, summary: dict) -> dict:
         "health": tables.health_rows(summary["health"]),
         "tables": {
             "parameters": tables.parameters(case),
-            "effects": tables.effects(summary["effects"]),
+            "effects": tables.effects(case, summary["effects"]),
             "versions": tables.versions(),
         },
         "preview_caption": "Mesh of board and package, coloured by part. Joints are meshed after reflow.",

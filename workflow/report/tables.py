@@ -80,12 +80,15 @@ def parameters(case) -> dict:
     return {"head": ["key", "value"], "rows": [[key, value] for key, value in display_values(case).items()]}
 
 
-def effects(records: dict) -> dict:
-    """Which effects were simulated, and why: in prose."""
-    rows = [
-        [name.replace("_", " "), "on" if record["on"] else "off", record["why"]] for name, record in records.items()
+def effects(case, records: dict) -> dict:
+    """Which effects were simulated, their expected influence and predicted cost, and why: in prose."""
+    from workflow.effect_registry.table import CAPTION, rows
+
+    told = [
+        [name, "on" if acts else "off", influence, cost, why]
+        for name, acts, influence, cost, why in rows(case, records)
     ]
-    return {"head": ["effect", "state", "why"], "rows": rows, "prose": True}
+    return {"head": ["effect", "state", "influence", "cost", "why"], "rows": told, "prose": True, "caption": CAPTION}
 
 
 def versions() -> dict:

@@ -48,8 +48,9 @@ def test_tabulated_shock(tmp_path):
 )
 def test_gravity_is_left_out_where_it_is_negligible(changes, on):
     found = shock_pulse(shock(**changes))
-    assert found.gravity is on
-    assert found.why
+    assert found.gravity["on"] is on
+    assert found.gravity["why"]
+    assert found.gravity["influence"] == pytest.approx(G / changes.get("peak_acceleration", 1500 * G))
 
 
 PROBLEMS = {
