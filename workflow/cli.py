@@ -131,13 +131,20 @@ def stress_test(
     family: Annotated[
         list[str] | None, typer.Option(metavar="FAMILY", help="reflow, elements, coupling or remesh [default: all]")
     ] = None,
+    random: Annotated[
+        int | None, typer.Option(min=0, metavar="N", help="random cases [default: 200, none beside given CASES]")
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="of the random cases")] = 1,
     cores: Annotated[int | None, typer.Option("-j", "--cores", min=1, help="cases at a time [default: cores]")] = None,
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="results")] = Path("runs/stress-test"),
 ) -> None:
-    """Try the hard cases: does each survive within its bounds?"""
+    """Try the hard cases, and random ones: does each survive within its bounds?"""
+    from workflow.stress_test.command import RANDOM_COUNT, Request
     from workflow.stress_test.command import stress_test as try_cases
 
-    raise typer.Exit(0 if try_cases(cases or [], family or [], cores or available_cores(), out) else 1)
+    count = random if random is not None else 0 if cases else RANDOM_COUNT
+    request = Request(cases or [], family or [], count, seed, cores or available_cores(), out)
+    raise typer.Exit(0 if try_cases(request) else 1)
 
 
 @app.command()

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 TRIALS_OF = {
     "reflow": "workflow.stress_test.trials_reflow",
 }
-RANDOM_OF: dict[str, str] = {}
+RANDOM_OF: dict[str, str] = {"reflow": "workflow.stress_test.random_reflow"}
 OF_ALL_FAMILIES = "workflow.stress_test.trials_run"
 FAMILIES = ("reflow", "elements", "coupling", "remesh")
 

@@ -59,6 +59,7 @@ class HardCase:
         bounds: that its measures must keep.
         expect: part of the error with which it must be refused, or "".
         deadline: after which it is taken to hang [s].
+        may_be_refused: whether it is no miss if the trial refuses it in words.
     """
 
     name: str
@@ -71,6 +72,7 @@ class HardCase:
     bounds: tuple[Bound, ...]
     expect: str
     deadline: float
+    may_be_refused: bool = False
 
 
 def read_hard_cases(path: Path) -> list[HardCase]:

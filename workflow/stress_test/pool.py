@@ -1,6 +1,7 @@
 """Processes that try hard cases, several at a time; one that does not answer in time is ended, and the rest goes on."""
 
 import contextlib
+import math
 import multiprocessing
 import os
 import signal
@@ -14,27 +15,32 @@ from typing import Any
 
 from fem.own_job import end_with_parent
 from workflow.stress_test.hard_case import HardCase
-from workflow.stress_test.verdict import Verdict, attempt, judged
+from workflow.stress_test.verdict import Verdict, attempt
 
 
 @dataclass(slots=True)
 class _Worker:
-    """A process, the end of its pipe, and what it works on since when [s]."""
+    """A process, the end of its pipe, and what it works on since when [s]; it says once that it has started."""
 
     process: Any
     pipe: Connection
     case: HardCase | None = None
-    since: float = 0.0
+    since: float = math.inf
+    has_started: bool = False
 
     @property
     def left(self) -> float:
         """Seconds until its case is taken to hang."""
-        return self.since + self.case.deadline - time.monotonic() if self.case else float("inf")
+        return self.since + self.case.deadline - time.monotonic() if self.case else math.inf
 
     def give(self, case: HardCase) -> None:
         """Let it try a case."""
-        self.case, self.since = case, time.monotonic()
+        self.case, self.since = case, time.monotonic() if self.has_started else math.inf
         self.pipe.send(case)
+
+    def start(self) -> None:
+        """Take note that it has started, and with what it was given."""
+        self.has_started, self.since = True, time.monotonic()
 
     def end(self) -> None:
         """End the process and all that it started, at once."""
@@ -89,27 +95,35 @@ class Pool:
     def _answers(self) -> Iterator[Verdict]:
         """Wait until a process answers, ends or is overdue, and yield the verdicts."""
         busy = {worker.pipe: worker for worker in self._workers if worker.case}
-        ready = wait(list(busy), max(0.0, min(worker.left for worker in busy.values())))
+        left = min(worker.left for worker in busy.values())
+        ready = wait(list(busy), None if left == math.inf else max(0.0, left))
         for pipe, worker in busy.items():
-            if pipe in ready or worker.left <= 0.0:
-                yield self._answer(worker, pipe in ready)
+            case = worker.case
+            if pipe in ready and (verdict := self._answer(worker)) is not None:
+                yield verdict
+            elif case is not None and worker.left <= 0.0:
+                yield self._given_up(worker, f"no answer in {case.deadline:g} s: taken to hang")
 
-    def _answer(self, worker: _Worker, is_ready: bool) -> Verdict:
-        """The verdict on what a process worked on; one that died, or is overdue, is replaced."""
+    def _answer(self, worker: _Worker) -> Verdict | None:
+        """Take what a process says: its verdict, or none where it has started."""
+        try:
+            said = worker.pipe.recv()
+        except (EOFError, ConnectionResetError):
+            worker.process.join()
+            return self._given_up(worker, f"the process ended with code {worker.process.exitcode}")
+        if said is None:
+            worker.start()
+        else:
+            worker.case = None
+        return said
+
+    def _given_up(self, worker: _Worker, message: str) -> Verdict:
+        """The verdict on a case without an answer; its process is ended, another takes its place."""
         case, seconds = worker.case, time.monotonic() - worker.since
         assert case is not None
-        worker.case = None
-        if is_ready:
-            try:
-                return worker.pipe.recv()
-            except (EOFError, ConnectionResetError):
-                worker.process.join()
-                message = f"the process ended with code {worker.process.exitcode}"
-        else:
-            message = f"no answer in {case.deadline:g} s: taken to hang"
         self._workers.remove(worker)
         worker.end()
-        return judged(case, message, seconds)
+        return Verdict(case, (), message, seconds=seconds)
 
 
 def _work(pipe: Connection) -> None:
@@ -118,6 +132,7 @@ def _work(pipe: Connection) -> None:
     threading.Thread(target=end_with_parent, daemon=True).start()
     os.environ["NUMBA_NUM_THREADS"] = os.environ["OMP_NUM_THREADS"] = "1"
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+    pipe.send(None)
     while True:
         try:
             case = pipe.recv()

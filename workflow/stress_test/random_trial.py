@@ -19,6 +19,7 @@ class RandomTrial:
         tables: draws tables ``[parameters]`` as a file has them, quantities as text with units.
         bounds: as a file has them.
         share: how many of these for one of another random trial of the family.
+        most_refused: largest share of cases that may be refused in words instead of tried.
     """
 
     name: str
@@ -28,6 +29,7 @@ class RandomTrial:
     tables: st.SearchStrategy[dict[str, Any]]
     bounds: Mapping[str, Any]
     share: int = 1
+    most_refused: float = 0.2
 
 
 def quantities(low: float, high: float, unit: str) -> st.SearchStrategy[str]:

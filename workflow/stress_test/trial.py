@@ -16,6 +16,10 @@ class Measured:
     unit: str = ""
 
 
+class Refused(ValueError):
+    """What the program refuses in words, before or instead of a result: no miss of a random case, else of any."""
+
+
 def as_given(table: dict, folder: Path) -> dict:
     """Leave a table of SI values as it is: it names no files."""
     return table

@@ -10,7 +10,7 @@ from particles.scene_drops import Drops
 from particles.scene_oscillation import Oscillation
 from particles.scenes import Drop, Fluid, Joint, Liquid
 from workflow.case_kind import of_particles
-from workflow.stress_test.trial import Measured, Trial
+from workflow.stress_test.trial import Measured, Refused, Trial
 
 if TYPE_CHECKING:
     from particles.shape import JointShape
@@ -30,10 +30,6 @@ ERRORS_OF_JOINT = {
     "collapse_height_error": "",
     "places": "",
 }
-
-
-class BadScene(ValueError):
-    """A scene that the program refuses before anything is computed."""
 
 
 class MoltenScene(Parameters):
@@ -150,7 +146,7 @@ def swing(parameters: SwingTrial) -> dict[str, Measured]:
 
 def _refuse(problems: list) -> None:
     if problems:
-        raise BadScene("; ".join(str(problem) for problem in of_particles(problems)))
+        raise Refused("; ".join(str(problem) for problem in of_particles(problems)))
 
 
 def _energy(energy: np.ndarray) -> dict[str, Measured]:

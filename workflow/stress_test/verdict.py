@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from workflow.stress_test.bound import Bound
 from workflow.stress_test.hard_case import HardCase
-from workflow.stress_test.trial import Measured
+from workflow.stress_test.trial import Measured, Refused
 from workflow.units import UnitError
 
 
@@ -25,6 +25,11 @@ class Check:
         """Whether the bound is kept; nan keeps none."""
         return self.margin >= 1.0
 
+    @property
+    def rank(self) -> float:
+        """The margin, but -1 where it is no number: the worst of all."""
+        return -1.0 if math.isnan(self.margin) else self.margin
+
     def __str__(self) -> str:
         return f"{self.measure.replace('_', ' ')} {self.found} {self.bound}"
 
@@ -34,51 +39,44 @@ class Verdict:
     """How a case ended.
 
     Attributes:
-        name, tried, family, title: of the case.
+        case: what was tried.
         checks: one a bound; none where it was refused or broke.
         message: an error, in words; "" where all was measured.
-        is_expected: whether the message is what the case expects.
+        is_refused: whether the message is a refusal that the case expects or may have.
         seconds: wall time of the trial [s].
     """
 
-    name: str
-    tried: str
-    family: str
-    title: str
+    case: HardCase
     checks: tuple[Check, ...]
-    message: str
-    is_expected: bool
-    seconds: float
+    message: str = ""
+    is_refused: bool = False
+    seconds: float = 0.0
 
     @property
     def ok(self) -> bool:
         """Whether the case survived within all its bounds, or was refused as it must be."""
-        return self.is_expected or (not self.message and all(check.holds for check in self.checks))
+        return self.is_refused or (not self.message and all(check.holds for check in self.checks))
 
     @property
     def closest(self) -> Check | None:
-        """The check that was kept by the smallest factor, or missed by the largest; one without a number first."""
-        return min(self.checks, key=lambda check: -1.0 if math.isnan(check.margin) else check.margin, default=None)
+        """The check that was kept by the smallest factor, or missed by the largest."""
+        return min(self.checks, key=lambda check: check.rank, default=None)
 
 
 def attempt(case: HardCase) -> Verdict:
     """Try a case in this process; any error of it becomes part of the verdict."""
-    start = time.perf_counter()
+    start, is_refused = time.perf_counter(), False
     try:
         found = case.trial.run(case.parameters)
         checks, message = tuple(_check(bound, found) for bound in case.bounds), ""
     except Exception as error:  # whatever breaks a solver is what is looked for
         checks, message = (), f"{type(error).__name__}: {error}"
+        is_refused = case.may_be_refused and isinstance(error, Refused)
     seconds = time.perf_counter() - start
-    if case.expect and not message:
-        return judged(case, f'was not refused; expected: "{case.expect}"', seconds)
-    return judged(case, message, seconds, checks)
-
-
-def judged(case: HardCase, message: str, seconds: float, checks: tuple[Check, ...] = ()) -> Verdict:
-    """Return the verdict of a case."""
-    is_expected = bool(case.expect) and case.expect in message and "was not refused" not in message
-    return Verdict(case.name, case.tried, case.family, case.title, checks, message, is_expected, seconds)
+    if case.expect:
+        is_refused = case.expect in message
+        message = message or f'was not refused; expected: "{case.expect}"'
+    return Verdict(case, checks, message, is_refused, seconds)
 
 
 def _check(bound: Bound, found: Mapping[str, Measured]) -> Check:

@@ -6,6 +6,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from workflow.stress_test.families import FAMILIES
+from workflow.stress_test.sample import Sample
 from workflow.stress_test.verdict import Check, Verdict
 from workflow.terminal import console
 
@@ -20,13 +21,13 @@ def show_verdict(verdict: Verdict) -> None:
 
 def named(verdict: Verdict) -> str:
     """Name a case with the values that were varied."""
-    return verdict.name + (f" ({verdict.tried})" if verdict.tried else "")
+    return verdict.case.name + (f" ({verdict.case.tried})" if verdict.case.tried else "")
 
 
 def said(verdict: Verdict) -> str:
     """Say how a case ended: the closest of its checks, or why there is none; where it missed, all that it missed."""
     if verdict.message:
-        return ("refused as it must be: " if verdict.is_expected else "") + verdict.message
+        return ("refused: " if verdict.is_refused else "") + verdict.message
     missed = [check for check in verdict.checks if not check.holds]
     closest = verdict.closest
     assert closest is not None
@@ -38,17 +39,41 @@ def margin_text(check: Check) -> str:
     return f"> {LARGEST_SHOWN:g}" if check.margin > LARGEST_SHOWN else f"{check.margin:.3g}"
 
 
-def show_table(verdicts: Sequence[Verdict]) -> None:
+def show_sample(sample: Sample) -> None:
+    """Print how the random cases of a trial ended, and what was missed."""
+    mark = "[green]ok  [/]" if sample.ok else "[bold red]MISS[/]"
+    seconds = sum(verdict.seconds for verdict in sample.verdicts)
+    console.print(f"{mark} {escape(sample.trial.name)}  {escape(sample_said(sample))}  {seconds:.1f} s", soft_wrap=True)
+    for verdict in sample.missed:
+        console.print(f"     {escape(named(verdict))}  {escape(said(verdict))}", soft_wrap=True)
+
+
+def sample_said(sample: Sample) -> str:
+    """Say how the random cases of a trial ended."""
+    counts = f"{len(sample.verdicts)} tried, {sample.refused} refused, {len(sample.missed)} missed"
+    if sample.too_many_refused:
+        counts += f"; allowed to be refused: {sample.trial.most_refused:.0%}"
+    return counts + (f"; closest: {sample.closest}, margin {margin_text(sample.closest)}" if sample.closest else "")
+
+
+def show_table(verdicts: Sequence[Verdict], samples: Sequence[Sample]) -> None:
     """Print how many of each family were tried and missed, and the closest of each."""
     table = Table(box=None, header_style="bold")
-    for column in ("family", "tried", "missed", "smallest margin", "of"):
+    for column in ("family", "fixed", "random", "missed", "smallest margin", "of"):
         table.add_column(column, justify="left" if column in ("family", "of") else "right")
     for family in FAMILIES:
-        own = [verdict for verdict in verdicts if verdict.family == family]
-        checked = [verdict for verdict in own if verdict.closest is not None]
-        if own:
-            least = min(checked, key=lambda verdict: verdict.closest.margin, default=None)  # type: ignore[union-attr]
+        fixed = [verdict for verdict in verdicts if verdict.case.family == family]
+        drawn = [verdict for sample in samples if sample.family == family for verdict in sample.verdicts]
+        if own := [*fixed, *drawn]:
             missed = sum(not verdict.ok for verdict in own)
-            margin = margin_text(least.closest) if least and least.closest else ""
-            table.add_row(family, str(len(own)), str(missed), margin, escape(named(least)) if least else "")
+            table.add_row(family, str(len(fixed)), str(len(drawn)), str(missed), *_least(own))
     console.print(table)
+
+
+def _least(verdicts: Sequence[Verdict]) -> tuple[str, str]:
+    """The smallest margin of all, and whose it is."""
+    found = [(verdict.closest, verdict) for verdict in verdicts if verdict.closest is not None]
+    if not found:
+        return "", ""
+    check, verdict = min(found, key=lambda pair: pair[0].rank)
+    return margin_text(check), escape(named(verdict))

@@ -1,20 +1,27 @@
 """Hard cases: what is read of a file, refused, tried and judged; a hang or a crash is a miss, and the rest goes on."""
 
+import dataclasses
+import json
 import math
 import os
 import time
 from typing import Annotated
 
 import pytest
+from hypothesis import strategies as st
 from pydantic import Field
 
 from particles.parameters import Parameters
 from workflow.problems import CaseError
-from workflow.stress_test import families, hard_case
+from workflow.stress_test import families, hard_case, sample
 from workflow.stress_test.bound import read_bound
 from workflow.stress_test.hard_case import hard_cases, read_hard_cases
 from workflow.stress_test.pool import Pool
-from workflow.stress_test.trial import Measured, Trial
+from workflow.stress_test.random_cases import drawn
+from workflow.stress_test.random_trial import RandomTrial, quantities
+from workflow.stress_test.results import write_results
+from workflow.stress_test.sample import try_sample
+from workflow.stress_test.trial import Measured, Refused, Trial
 from workflow.stress_test.verdict import attempt
 from workflow.units import UnitError
 
@@ -124,10 +131,52 @@ def test_a_measure_that_only_the_run_knows_is_compared_by_its_dimension():
 def test_hangs_and_deaths_are_misses_and_the_rest_goes_on():
     found = cases(vary={"fate": ["hangs", "dies", "holds"]}, deadline="4 s")
     with Pool(2) as pool:
-        verdicts = {verdict.tried: verdict for verdict in pool.attempt(found)}
+        verdicts = {verdict.case.tried: verdict for verdict in pool.attempt(found)}
     assert verdicts["fate hangs"].message == "no answer in 4 s: taken to hang"
     assert verdicts["fate dies"].message == "the process ended with code 3"
     assert verdicts["fate holds"].ok
+
+
+@pytest.fixture
+def rods_of_any_length(monkeypatch):
+    """A random trial whose rods miss when they are longer than 7 mm."""
+    tables = st.fixed_dictionaries({"length": quantities(1.0, 10.0, "mm")})
+    trial = RandomTrial("elements_random", "rods", "none grows", "rod", tables, {"width": "< 7 mm"})
+    monkeypatch.setattr(sample, "random_trials", lambda family: [trial])
+    return trial
+
+
+class PoolHere:
+    """Tries in this process."""
+
+    def attempt(self, cases):
+        return map(attempt, cases)
+
+
+def test_the_same_seed_draws_the_same_cases(rods_of_any_length):
+    assert drawn(rods_of_any_length, 20, 3) == drawn(rods_of_any_length, 20, 3) != drawn(rods_of_any_length, 20, 4)
+
+
+def test_a_random_case_that_misses_is_made_simple_and_is_a_hard_case(rods_of_any_length, tmp_path, monkeypatch):
+    (found,) = try_sample("elements", 30, 1, PoolHere())
+    assert len(found.verdicts) == 30
+    assert 0 < len(found.missed) < 30
+    write_results(tmp_path, [attempt(case) for case in cases()], [found], 1)
+    (case,) = read_hard_cases(tmp_path / "counterexamples/elements_random.toml")
+    assert 7e-3 < case.parameters.length <= 8e-3
+    assert not attempt(case).ok
+    told = json.loads((tmp_path / "stress_test.json").read_text())
+    assert [len(told["fixed"]), told["random"][0]["tried"]] == [1, 30]
+    assert "30 random ones (seed 1)" in (tmp_path / "stress_test.html").read_text()
+
+
+def test_refusals_in_words_are_counted_and_too_many_are_a_miss(rods_of_any_length, monkeypatch):
+    def refuse(rod):
+        raise Refused("no such rod")
+
+    monkeypatch.setattr(hard_case, "trials", lambda: {"rod": dataclasses.replace(ROD, run=refuse)})
+    (found,) = try_sample("elements", 5, 1, PoolHere())
+    assert (found.refused, found.missed, found.ok) == (5, [], False)
 
 
 def test_all_cases_of_the_program_can_be_read(monkeypatch):
