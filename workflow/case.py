@@ -132,10 +132,11 @@ def _setting(override: str, problems: list[Problem]) -> tuple[str, object]:
     if not equals or not all(key.split(".")):
         problems.append(Problem(key, "is no setting", override, "--set dotted.key=value"))
         return "", None
-    return key, _override_value(text.strip())
+    return key, override_value(text.strip())
 
 
-def _override_value(text: str) -> object:
+def override_value(text: str) -> object:
+    """Return the value that a setting's text stands for: TOML, quotes may be left out."""
     try:
         return tomllib.loads(f"value = {text}")["value"]
     except tomllib.TOMLDecodeError:

@@ -1,10 +1,11 @@
-"""Command line: new, plan, run, status, report, clean, effects, stress-test, schema."""
+"""Command line: new, plan, run, accuracy, status, report, clean, effects, stress-test, schema."""
 
 import json
 import os
 import shutil
 import signal
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -89,6 +90,31 @@ def run(
     if until == pipeline.names[-1]:
         console.print(f"report: {folder / 'report.html'}")
     raise typer.Exit(1 if failures else 0)
+
+
+@app.command()
+def accuracy(
+    case: CasePath,
+    tolerance: Annotated[
+        str | None,
+        typer.Option(metavar="SHARE", help='error that is allowed, e.g. "2%" [default: 2% without a budget]'),
+    ] = None,
+    budget: Annotated[
+        str | None,
+        typer.Option(metavar="TIME", help='wall time of all runs together, e.g. "10min" [default: no limit]'),
+    ] = None,
+    settings: Settings = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="DIR", help="folder [default: runs/<case name>-accuracy]")
+    ] = None,
+    oversubscribe: Oversubscribe = False,
+) -> None:
+    """Measure what accuracy costs: a ladder of settings, their errors and times; recommend some and run them."""
+    from workflow.accuracy.command import read_wish, show
+
+    wish = replace(read_wish(case, settings or [], tolerance, budget), oversubscribe=oversubscribe)
+    if not show(wish, out, console):
+        raise typer.Exit(1)
 
 
 @app.command()

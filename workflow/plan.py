@@ -57,7 +57,7 @@ def show_plan(case: Case, run_folder: Path, console: Console) -> None:
 def _show(
     case: Case, run_folder: Path, outlook: Forecast | SceneForecast | StructureForecast, console: Console, what: str
 ) -> None:
-    console.print(_stages(case, run_folder, outlook.seconds))
+    console.print(_stages(case, run_folder, foreseen_costs(case, outlook.seconds)))
     console.print(effects_table(case, outlook.effects, what))
 
 
@@ -101,12 +101,24 @@ def reason(verdict: Verdict, case: Case) -> str:
     return "\n".join(changes)
 
 
-def _stages(case: Case, run_folder: Path, predicted: dict[str, float]) -> Table:
+def foreseen_costs(case: Case, seconds: Mapping[str, float]) -> dict[str, str]:
+    """Write the predicted wall time of stages; corrected by what the command accuracy measured here."""
+    from workflow.accuracy.calibration import calibration_of
+
+    known, texts = calibration_of(case), {}
+    for stage, foreseen in seconds.items():
+        measured = known is not None and known.knows(stage)
+        cost = known.seconds(stage, foreseen) if known is not None else foreseen
+        source = f" (measured: accuracy, {known.points} points)" if known is not None and measured else ""
+        texts[stage] = f"about {duration(cost)}{source}"
+    return texts
+
+
+def _stages(case: Case, run_folder: Path, costs: Mapping[str, str]) -> Table:
     table = new_table(f"Stages, in {run_folder}", "stage", "", "cost", "why")
     for name, verdict in examine(run_folder, case).items():
         mark = "[yellow]run[/]" if verdict.stale else "[green]skip[/]"
-        seconds = predicted.get(name)
-        cost = f"about {duration(seconds)}" if verdict.stale and seconds is not None else ""
+        cost = costs.get(name, "") if verdict.stale else ""
         table.add_row(name, mark, cost, reason(verdict, case))
     return table
 

@@ -26,21 +26,21 @@ def write_report(run_folder: Path, case) -> dict:
     """
     summary = collect_summary(run_folder, case.case.name)
     write_summary(run_folder, summary)
-    page = _render(_context(run_folder, case, summary))
-    partial = run_folder / ".report.html.partial"
-    partial.write_text(page)
-    partial.rename(run_folder / "report.html")
+    write_page(run_folder / "report.html", "report.html.j2", _context(run_folder, case, summary))
     return summary
 
 
-def _render(context: dict) -> str:
+def write_page(path: Path, template: str, context: dict) -> None:
+    """Write a page from one of the templates, under a temporary name, then rename it."""
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(TEMPLATES),
         autoescape=jinja2.select_autoescape(["html", "j2"]),
         undefined=jinja2.ChainableUndefined,
         trim_blocks=True,
     )
-    return environment.get_template("report.html.j2").render(context)
+    partial = path.with_name(f".{path.name}.partial")
+    partial.write_text(environment.get_template(template).render(context))
+    partial.rename(path)
 
 
 def _context(run_folder: Path, case, summary: dict) -> dict:
@@ -68,6 +68,9 @@ def _context(run_folder: Path, case, summary: dict) -> dict:
     if preview.exists():
         context["pictures"]["preview"] = base64.b64encode(preview.read_bytes()).decode()
     _add_sections(run_folder, case, context, summary)
+    from workflow.accuracy.page import section_for
+
+    context["accuracy"] = section_for(run_folder, case)
     return context
 
 

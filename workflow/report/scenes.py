@@ -9,18 +9,12 @@ def add_scene(run_folder: Path, kind: str, context: dict, summary: dict) -> None
     if not (run_folder / "reflow" / "shape.h5").exists():
         return
     from particles.products import read_body
-    from workflow import work_precision
     from workflow.report import body as report_body
-    from workflow.report.curves import svg
     from workflow.report.pictures import embedded
 
     shape, meridian = read_body(run_folder / "reflow")
     context["headline"] = report_body.headline(summary["metrics"])
     context["tables"]["body"] = report_body.metric_table(summary["metrics"], summary["health"])
-    measured = work_precision.stored() if kind == "drop" else None
-    if measured is not None:
-        context["tables"]["work_precision"] = work_precision.table(measured)
-        context["curves"]["work_precision"] = svg(work_precision.figure(measured))
     if kind == "oscillation":
         context["curves"]["swing"] = report_body.swing_curve(shape.history, summary["metrics"])
     else:

@@ -1,0 +1,168 @@
+"""Climbing a ladder: its points are computed where they are missing, timed, compared; cheap ones several times."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from time import perf_counter
+
+from workflow.accuracy.calibration import calibration
+from workflow.accuracy.errors import Error, Quantity, errors_of
+from workflow.accuracy.ladder import Ladder, Rung
+from workflow.accuracy.measured import Measurement, StageCost
+from workflow.inputs import read_record
+from workflow.points.point import Point, read_possible_points
+from workflow.points.store import Store
+from workflow.stage_forecast import stage_seconds
+
+AGAIN = 2  # times that a cheap point is run once more: load of the machine and first compilation are then not counted
+CHEAP = 8.0  # up to these core-seconds [s]
+SECONDS_TO_SCHEDULE = 4.0  # of a call that computes points, until the first stage runs
+
+Compute = Callable[[Store, Sequence[Point]], Mapping[str, str]]
+
+
+@dataclass(slots=True)
+class Climb:
+    """Points of a ladder, and what is known of them.
+
+    Attributes:
+        ladder: its rungs.
+        case: the case file.
+        settings: dotted key -> value that hold for all rungs.
+        folder: of the store.
+        compute: computes points in a store up to the ladder's last stage; returns the key of each that failed and why.
+        budget: wall time that may be spent [s]; infinite without a limit.
+        oversubscribe: whether MPI may have more ranks than cores.
+        failed: key of a point -> why it failed, also of earlier calls.
+        points: name of rung -> its point.
+        impossible: name of rung -> what is wrong with its settings.
+        left_out: name of rung -> wall time [s] that was foreseen and did not fit.
+    """
+
+    ladder: Ladder
+    case: Path
+    settings: Mapping[str, str]
+    folder: Path
+    compute: Compute
+    budget: float = float("inf")
+    oversubscribe: bool = False
+    failed: dict[str, str] = field(default_factory=dict)
+    points: dict[str, Point] = field(default_factory=dict)
+    impossible: dict[str, str] = field(default_factory=dict)
+    left_out: dict[str, float] = field(default_factory=dict)
+    _start: float = field(default_factory=perf_counter)
+    _forecasts: dict[str, dict[str, float]] = field(default_factory=dict)
+
+    @property
+    def left(self) -> float:
+        """Wall time that is left of the budget [s]."""
+        return self.budget - (perf_counter() - self._start)
+
+    @property
+    def stores(self) -> list[Store]:
+        """The store, and those of runs that are only for their times."""
+        return [Store(self.folder), *(Store(self.folder / f"again-{number}") for number in range(1, AGAIN + 1))]
+
+    def climb(self, rungs: Sequence[Rung]) -> None:
+        """Compute the points of rungs that are missing, the cheapest first; then cheap ones again."""
+        self._read(rungs)
+        ready = sorted((rung for rung in rungs if rung.name in self.points), key=self.foreseen)
+        for batch in [ready] if self.budget == float("inf") else [[rung] for rung in ready]:
+            self._run(self.stores[0], batch)
+        for store in self.stores[1:]:
+            again = [rung for rung in ready if self._is_done(rung) and self._wants_repetition(rung)]
+            self._run(store, again)
+
+    def measured(self, rungs: Sequence[Rung]) -> dict[str, Measurement]:
+        """Return what is known of rungs: their costs, their errors against each other; failures."""
+        done = [rung for rung in rungs if rung.name in self.points and self._is_done(rung)]
+        answers = {rung.name: self._answers(rung) for rung in done}
+        main = self.ladder.knobs[0]
+        errors = errors_of(answers, rungs, main.rungs, main.order)
+        found = {rung.name: self._measurement(rung, errors.get(rung.name, {})) for rung in rungs}
+        return {name: one for name, one in found.items() if one.stages or one.failed}
+
+    def foreseen(self, rung: Rung) -> float:
+        """Wall time of all stages of a rung that are missing [s]: the forecast, corrected by what others took."""
+        point, known = self.points[rung.name], calibration(self._costs(self.points[one]) for one in self._known())
+        seconds = self._forecast(point)
+        return sum(known.seconds(stage, seconds[stage]) for stage in self._missing(point) if stage in seconds)
+
+    def _known(self) -> list[str]:
+        return [name for name, point in self.points.items() if self.stores[0].is_complete(point, self.ladder.until)]
+
+    def _forecast(self, point: Point) -> dict[str, float]:
+        if point.key not in self._forecasts:
+            self._forecasts[point.key] = stage_seconds(point.case)
+        return self._forecasts[point.key]
+
+    def _missing(self, point: Point) -> list[str]:
+        stages = point.case.pipeline.upstream(self.ladder.until)
+        return [stage.name for stage in stages if not self.stores[0].has(point, stage.name)]
+
+    def _read(self, rungs: Sequence[Rung]) -> None:
+        """Read the cases of rungs; one that cannot be is noted."""
+        for rung in rungs:
+            points, wrong = read_possible_points(self.case, [dict(self.settings) | dict(rung.settings)], self.oversubscribe)
+            if wrong:
+                self.impossible[rung.name] = "; ".join(str(problem) for problem in wrong[0].problems)
+            else:
+                self.points[rung.name] = points[0]
+
+    def _run(self, store: Store, rungs: Sequence[Rung]) -> None:
+        """Compute what is missing and fits into the budget."""
+        until, wanted = self.ladder.until, []
+        for rung in rungs:
+            point = self.points[rung.name]
+            if store.is_complete(point, until) or point.key in self.failed:
+                continue
+            expected = self.foreseen(rung) + SECONDS_TO_SCHEDULE
+            if expected > self.left:
+                self.left_out[rung.name] = expected
+            else:
+                wanted.append(point)
+        if wanted:
+            self.failed |= self.compute(store, wanted)
+
+    def _is_done(self, rung: Rung) -> bool:
+        return self.stores[0].is_complete(self.points[rung.name], self.ladder.until)
+
+    def _wants_repetition(self, rung: Rung) -> bool:
+        """Whether a point is cheap, by measurement or forecast, or its time is not that of the whole run."""
+        point, store = self.points[rung.name], self.stores[0]
+        stages = [stage.name for stage in point.case.pipeline.upstream(self.ladder.until)]
+        records = [record for stage in stages if (record := _record(store, point, stage)) is not None]
+        taken = sum(record["core_seconds"] for record in records)
+        foreseen = sum(seconds for stage, seconds in self._forecast(point).items() if stage in stages)
+        return min(taken, foreseen or taken) < CHEAP or any(record["continued"] for record in records)
+
+    def _answers(self, rung: Rung) -> Mapping[str, Quantity]:
+        point = self.points[rung.name]
+        return self.ladder.measure(point.case, self.stores[0].run_folder(point))
+
+    def _measurement(self, rung: Rung, errors: Mapping[str, Error]) -> Measurement:
+        """Return what is known of a rung; neither costs nor a failure where it was not run."""
+        point = self.points.get(rung.name)
+        costs = self._costs(point) if point is not None and self._is_done(rung) else {}
+        why = self.impossible.get(rung.name, "") if point is None else self.failed.get(point.key, "")
+        key = "" if point is None else point.key
+        return Measurement(rung.name, rung.knob, rung.value, rung.settings, key, costs, errors, "" if costs else why)
+
+    def _costs(self, point: Point) -> dict[str, StageCost]:
+        """Return the smallest times of the stages that count, of all runs that were not broken off."""
+        foreseen, costs = self._forecast(point), {}
+        for stage in self.ladder.timed:
+            records = [record for store in self.stores if (record := _record(store, point, stage)) is not None]
+            whole = [record for record in records if not record["continued"]] or records
+            times = {name: min(record[name] for record in whole) for name in ("seconds", "core_seconds")}
+            costs[stage] = StageCost(**times, forecast=foreseen.get(stage))
+        return costs
+
+
+def _record(store: Store, point: Point, stage: str) -> dict | None:
+    """Return what a stage of a point said of itself; None where it was not run in this store."""
+    if not store.has(point, stage):
+        return None
+    if not store.run_folder(point).exists():
+        store.prepare(point)  # another point has made all its products
+    return read_record(store.run_folder(point), point.case.pipeline[stage])

@@ -1,0 +1,244 @@
+"""The command accuracy: climb the ladder of a case, tell what it costs, recommend, and run the recommendation."""
+
+import shlex
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+
+from workflow.accuracy import tables
+from workflow.accuracy.calibration import calibration, default_folder
+from workflow.accuracy.climb import Climb, Compute
+from workflow.accuracy.ladder import Ladder
+from workflow.accuracy.ladders import ladder_of
+from workflow.accuracy.machine import this_machine
+from workflow.accuracy.measured import FILE, Accuracy, Recommended, fits_of, read_accuracy, write_accuracy
+from workflow.accuracy.page import PAGE, PICTURE, write_pages
+from workflow.accuracy.recommend import Goal, recommend
+from workflow.case import available_cores, read_case
+from workflow.case_kind import Case
+from workflow.plan_table import duration
+from workflow.points.batch import run_points
+from workflow.problems import CaseError, Problem
+from workflow.stage_forecast import stage_seconds
+from workflow.units import UnitError, to_si
+
+TOLERANCE = 0.02  # where neither a tolerance nor a budget is given
+
+
+@dataclass(frozen=True, slots=True)
+class Wish:
+    """What a user asks for.
+
+    Attributes:
+        case: the case file.
+        settings: dotted key -> value.
+        tolerance: of the judged error; None: the most accurate within the budget.
+        budget: wall time that all runs together may take [s]; infinite without a limit.
+        command: how it was asked for.
+        oversubscribe: whether MPI may have more ranks than cores.
+    """
+
+    case: Path
+    settings: Mapping[str, str]
+    tolerance: float | None
+    budget: float
+    command: str
+    oversubscribe: bool = False
+
+    @property
+    def overrides(self) -> list[str]:
+        """The settings as options have them."""
+        return [f"{key}={value}" for key, value in self.settings.items()]
+
+
+def read_wish(case: Path, settings: Sequence[str], tolerance: str | None, budget: str | None) -> Wish:
+    """Read what the command line asks for.
+
+    Raises:
+        CaseError: a tolerance or a budget that is none.
+    """
+    given = [("--tolerance", tolerance), ("--budget", budget)]
+    options = [item for name, text in given if text is not None for item in (name, text)]
+    options += [item for setting in settings for item in ("--set", setting)]
+    share = None if tolerance is None else _share(tolerance)
+    limit = float("inf") if budget is None else _seconds(budget)
+    return Wish(
+        case,
+        dict(_pair(setting) for setting in settings),
+        TOLERANCE if tolerance is None and budget is None else share,
+        limit,
+        shlex.join(["reflowshock", "accuracy", str(case), *options]),
+    )
+
+
+def _pair(setting: str) -> tuple[str, str]:
+    """Return key and value of a setting; what is none is refused with the case."""
+    key, equals, text = setting.partition("=")
+    return (key.strip(), text.strip()) if equals else ("", setting)
+
+
+def _share(text: str) -> float:
+    """Read a share, such as "2%" or "0.02"."""
+    number, percent, rest = text.strip().partition("%")
+    try:
+        share = float(number) * (0.01 if percent else 1.0)
+    except ValueError:
+        share = 0.0
+    if rest or not 0.0 < share < 1.0:
+        message = "is no share of the answer"
+        raise CaseError("command line", [Problem("--tolerance", message, text, '"0.0001%" to "99%", e.g. "2%"')])
+    return share
+
+
+def _seconds(text: str) -> float:
+    """Read a time, such as "10min"."""
+    try:
+        seconds = to_si(text, "s")
+    except UnitError as error:
+        raise CaseError("command line", [Problem("--budget", str(error), text, 'a time, e.g. "10min"')]) from error
+    if not seconds > 0.0:
+        raise CaseError("command line", [Problem("--budget", "is no time to spend", text, "> 0 s")])
+    return seconds
+
+
+def measure(wish: Wish, folder: Path, compute: Compute, ladder: Ladder | None = None) -> tuple[Accuracy, Climb]:
+    """Measure what is missing of a case's ladder, choose settings, run them, and write all of it.
+
+    Args:
+        wish: what is asked for.
+        folder: of the store and of what is written.
+        compute: computes points.
+        ladder: in place of that of the case's kind.
+
+    Returns:
+        What was measured, and how.
+    """
+    case = read_case(wish.case, wish.overrides, wish.oversubscribe)
+    ladder = ladder or ladder_of(case)
+    climb = Climb(ladder, wish.case, wish.settings, folder, compute, wish.budget, wish.oversubscribe)
+    climb.failed |= _failed_before(folder)
+    climb.climb(ladder.rungs)
+    measured = climb.measured(ladder.rungs)
+    fits = fits_of(ladder, measured)
+    goal = Goal(wish.tolerance, climb.left)
+    chosen = recommend(ladder, measured, fits, goal)
+    accuracy = Accuracy(
+        case.case.name, case.kind, wish.command, this_machine(), ladder.errors, tuple(measured.values()), fits,
+        wish.tolerance, None if chosen is None else _run(chosen, climb),
+    )  # fmt: skip
+    write_accuracy(folder, accuracy)
+    return accuracy, climb
+
+
+def _failed_before(folder: Path) -> dict[str, str]:
+    """Return key and message of points that failed before: their inputs are the same, so they would again."""
+    before = read_accuracy(folder / FILE)
+    return {} if before is None else {one.key: one.failed for one in before.measurements if one.failed and one.key}
+
+
+def _run(chosen: Recommended, climb: Climb) -> Recommended:
+    """Run what was chosen, if it was not measured, and say what was found."""
+    rungs = [*(rung for rung in climb.ladder.rungs if rung.name != chosen.rung.name), chosen.rung]
+    climb.climb([chosen.rung])
+    return replace(chosen, found=climb.measured(rungs).get(chosen.rung.name))
+
+
+def show(wish: Wish, out: Path | None, console: Console) -> bool:
+    """Run the command and tell what was found.
+
+    Args:
+        wish: what is asked for.
+        out: folder; None: the default one.
+        console: where it is told.
+
+    Returns:
+        Whether the recommendation was run and keeps its promise: the tolerance, where there is one.
+    """
+    case = read_case(wish.case, wish.overrides, wish.oversubscribe)
+    folder = out or default_folder(case)
+    compute = partial(_compute, oversubscribe=wish.oversubscribe, until=ladder_of(case).until)
+    accuracy, climb = measure(wish, folder, compute)
+    remarks = (*_left_out(climb), *_impossible(climb), *_own_size(wish, accuracy))
+    write_pages(folder, accuracy, remarks)
+    console.print(table(tables.runs(accuracy), f"Errors and costs, {accuracy.machine}"))
+    console.print(table(tables.orders(accuracy), "Orders in h, the value of a knob; core-seconds t0 + D h^-q"))
+    for remark in remarks:
+        console.print(f"\n{remark}", soft_wrap=True)
+    _show_choice(accuracy, console)
+    console.print(f"\n{folder / PAGE}, {folder / PICTURE}, {folder / FILE}", soft_wrap=True)
+    return keeps_promise(accuracy)
+
+
+def keeps_promise(accuracy: Accuracy) -> bool:
+    """Whether what was recommended was found to be within the tolerance."""
+    chosen = accuracy.recommended
+    if chosen is None or chosen.found is None or accuracy.judged not in chosen.found.errors:
+        return False
+    return accuracy.tolerance is None or chosen.found.errors[accuracy.judged].value <= accuracy.tolerance
+
+
+def _compute(store, points, *, until: str, oversubscribe: bool) -> Mapping[str, str]:
+    """Compute points one stage at a time, so that measurements do not disturb each other."""
+    return run_points(store, points, until, available_cores(), exclusive=True, oversubscribe=oversubscribe)
+
+
+def _left_out(climb: Climb) -> list[str]:
+    if not climb.left_out:
+        return []
+    texts = [f"{name} (about {duration(seconds)})" for name, seconds in climb.left_out.items()]
+    return [f"Not run, since they did not fit into what was left of the budget: {', '.join(texts)}."]
+
+
+def _impossible(climb: Climb) -> list[str]:
+    return [f"Not possible for this case: {name}: {why}" for name, why in climb.impossible.items()]
+
+
+def _own_size(wish: Wish, accuracy: Accuracy) -> list[str]:
+    """Say what the case costs at its own size, as it is and with the recommended settings."""
+    own = {key: value for key, value in wish.settings.items() if key != "scale"}
+    known, chosen = calibration(one.stages for one in accuracy.measurements), accuracy.recommended
+    told = [f"{duration(total(known, _case(wish.case, own)))} as it is"]
+    if chosen is not None:
+        told.append(f"{duration(total(known, _case(wish.case, own | dict(chosen.rung.settings))))} as recommended")
+    how = f"forecast, times what {known.points} points took over what was foreseen of them"
+    return [f"Wall time of the case at its own size: about {', '.join(told)} ({how})."]
+
+
+def _case(path: Path, settings: Mapping[str, str]) -> Case:
+    return read_case(path, [f"{key}={value}" for key, value in settings.items()], oversubscribe=True)
+
+
+def total(known, case: Case) -> float:
+    """Wall time [s] of all stages that have a forecast, corrected by what was measured."""
+    return sum(known.seconds(stage, seconds) for stage, seconds in stage_seconds(case).items())
+
+
+def _show_choice(accuracy: Accuracy, console: Console) -> None:
+    chosen = accuracy.recommended
+    if chosen is None:
+        console.print("\n[bold]Nothing to recommend[/]: no run has a known error within the budget.")
+        return
+    console.print(f"\n[bold]Recommended: {chosen.rung.name}[/], {chosen.why}. In the case file:\n")
+    for line in tables.as_lines(chosen.rung.settings):
+        console.print(f"    {line}", markup=False)
+    console.print(f"\nor {tables.as_options(chosen.rung.settings)}", markup=False, soft_wrap=True)
+    told = tables.prediction(accuracy)
+    if told is not None:
+        console.print(table(told, ""))
+
+
+def table(texts: dict, title: str) -> Table:
+    """Lay out head and rows of text; the last column takes what room is left."""
+    shown = Table(
+        title=f"\n{title}" if title else None, title_justify="left", title_style="bold", show_edge=False, pad_edge=False
+    )
+    for place, name in enumerate(texts["head"]):
+        last = place == len(texts["head"]) - 1
+        shown.add_column(name, no_wrap=not last, justify="left" if last or place == 0 else "right")
+    for row in texts["rows"]:
+        shown.add_row(*row)
+    return shown

@@ -1,0 +1,29 @@
+"""Which kinds of case have a ladder."""
+
+from collections.abc import Callable
+from typing import Any
+
+from workflow.accuracy.ladder import Ladder
+from workflow.accuracy.solder import drop_ladder, drops_ladder, joint_ladder, oscillation_ladder
+from workflow.case_kind import Case
+from workflow.problems import CaseError, Problem
+from workflow.scene_cases import DropCase, DropsCase, JointCase, OscillationCase
+
+LADDERS: dict[str, Callable[[Any], Ladder]] = {
+    DropCase.kind: drop_ladder,
+    JointCase.kind: joint_ladder,
+    DropsCase.kind: drops_ladder,
+    OscillationCase.kind: oscillation_ladder,
+}
+
+
+def ladder_of(case: Case) -> Ladder:
+    """Return the ladder of a case.
+
+    Raises:
+        CaseError: its kind has none.
+    """
+    if case.kind not in LADDERS:
+        known = "one of " + ", ".join(f"[{kind}]" for kind in LADDERS)
+        raise CaseError("case", [Problem(case.kind, "has no ladder of accuracy", None, known)])
+    return LADDERS[case.kind](case)
