@@ -1,5 +1,6 @@
 """What a run would do, and what it would cost. Nothing is run, nothing is written."""
 
+from collections.abc import Mapping
 from pathlib import Path
 
 from rich.console import Console

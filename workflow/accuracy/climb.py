@@ -103,7 +103,9 @@ class Climb:
     def _read(self, rungs: Sequence[Rung]) -> None:
         """Read the cases of rungs; one that cannot be is noted."""
         for rung in rungs:
-            points, wrong = read_possible_points(self.case, [dict(self.settings) | dict(rung.settings)], self.oversubscribe)
+            points, wrong = read_possible_points(
+                self.case, [dict(self.settings) | dict(rung.settings)], self.oversubscribe
+            )
             if wrong:
                 self.impossible[rung.name] = "; ".join(str(problem) for problem in wrong[0].problems)
             else:

@@ -21,8 +21,11 @@ from workflow.accuracy.recommend import Goal, recommend
 from workflow.case import available_cores, read_case
 from workflow.case_kind import Case
 from workflow.plan_table import duration
-from workflow.points.batch import run_points
+from workflow.points import batch
+from workflow.points.point import Point
+from workflow.points.store import Store
 from workflow.problems import CaseError, Problem
+from workflow.progress import progress_bar
 from workflow.stage_forecast import stage_seconds
 from workflow.units import UnitError, to_si
 
@@ -181,9 +184,21 @@ def keeps_promise(accuracy: Accuracy) -> bool:
     return accuracy.tolerance is None or chosen.found.errors[accuracy.judged].value <= accuracy.tolerance
 
 
-def _compute(store, points, *, until: str, oversubscribe: bool) -> Mapping[str, str]:
-    """Compute points one stage at a time, so that measurements do not disturb each other."""
-    return run_points(store, points, until, available_cores(), exclusive=True, oversubscribe=oversubscribe)
+def _compute(
+    store: Store,
+    points: Sequence[Point],
+    *,
+    until: str,
+    oversubscribe: bool,
+) -> Mapping[str, str]:
+    """Compute points one stage at a time, so that measurements do not disturb each other; show how far it is."""
+    again = " once more, for their times" if store.folder.name.startswith("again") else ""
+    with progress_bar(f"{len(points)} points{again}") as progress:
+
+        def count() -> None:
+            progress(sum(store.is_complete(point, until) for point in points) / len(points))
+
+        return batch.run_points(store, points, until, batch.Machine(available_cores(), True, oversubscribe), count)
 
 
 def _left_out(climb: Climb) -> list[str]:

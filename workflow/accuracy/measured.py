@@ -146,6 +146,7 @@ def _fit(rungs: tuple[Rung, ...], order: float | None, ladder: Ladder, measureme
 
 def write_accuracy(folder: Path, accuracy: Accuracy) -> None:
     """Write ``accuracy.json``."""
+    folder.mkdir(parents=True, exist_ok=True)
     partial = folder / f".{FILE}.partial"
     partial.write_text(json.dumps(asdict(accuracy), indent=1) + "\n")
     partial.rename(folder / FILE)

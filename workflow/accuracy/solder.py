@@ -59,10 +59,8 @@ def of_metrics(exact: str, errors: Mapping[str, str], stage: str, case: Case, ru
 def drop_ladder(case: DropCase) -> Ladder:
     """Particles along the edge of the cube that a drop starts as; half of them left out by symmetry; time steps."""
     drop, errors = case.drop, {"shape_error": SHAPE["shape_error"], "height_error": "height", **SHAPE}
-    knobs = [_spacing_of_drop("particle spacing", "", {}, PER_EDGE, case)]
-    if drop.symmetry == "none" and not drop.is_free:
-        quarter = {"drop.symmetry": "quarter"}
-        knobs.append(_spacing_of_drop("particle spacing of a quarter", ", quarter", quarter, OF_A_QUARTER, case))
+    divisible = drop.symmetry == "none" and not drop.is_free
+    knobs = (_spacing_of_drop(case), _spacing_of_quarter(case)) if divisible else (_spacing_of_drop(case),)
     base = _per_edge(case, WHERE)
     steps = [
         Rung(f"steps {limit:g} x", "time step", base | {"solder.numerics.time_step_limit": f"{limit:g}"})
@@ -76,19 +74,34 @@ def drop_ladder(case: DropCase) -> Ladder:
     ]
     exact = "sphere" if drop.is_free else "Young-Laplace"
     choices = (*steps, *(seeds if not drop.is_free else ()))
-    return Ladder("reflow", ("reflow",), errors, partial(of_metrics, exact, errors, "reflow"), tuple(knobs), choices)
+    return Ladder("reflow", ("reflow",), errors, partial(of_metrics, exact, errors, "reflow"), knobs, choices)
 
 
-def _spacing_of_drop(
-    name: str, suffix: str, settings: Mapping[str, str], counts: tuple[int, ...], case: DropCase
-) -> Knob:
+def _spacing_of_drop(case: DropCase) -> Knob:
     """The spacing over the edge of the cube."""
 
     def at(value: float) -> Rung:
-        count = min(LARGEST_COUNT, max(SMALLEST_COUNT, ceil(1.0 / value - ROUNDING) + 1))
-        return Rung(f"{count} per edge{suffix}", name, _per_edge(case, count) | settings, 1.0 / (count - 1))
+        count = _count(value, 1)
+        return Rung(f"{count} per edge", "particle spacing", _per_edge(case, count), 1.0 / (count - 1))
 
-    return Knob(name, tuple(1.0 / (count - 1) for count in counts), at, SECOND)
+    return Knob("particle spacing", tuple(1.0 / (count - 1) for count in PER_EDGE), at, SECOND)
+
+
+def _spacing_of_quarter(case: DropCase) -> Knob:
+    """The same of a quarter of the drop, in whose planes particles lie if there is an odd number along an edge."""
+
+    def at(value: float) -> Rung:
+        count = _count(value, 2)
+        settings = _per_edge(case, count) | {"drop.symmetry": "quarter"}
+        return Rung(f"{count} per edge, quarter", "particle spacing of a quarter", settings, 1.0 / (count - 1))
+
+    return Knob("particle spacing of a quarter", tuple(1.0 / (count - 1) for count in OF_A_QUARTER), at, SECOND)
+
+
+def _count(value: float, multiple: int) -> int:
+    """Particles along an edge for a spacing over the edge, or a smaller one; spacings in an edge are a multiple."""
+    spacings = multiple * ceil(1.0 / value / multiple - ROUNDING)
+    return 1 + min((LARGEST_COUNT - 1) // multiple * multiple, max(SMALLEST_COUNT - 1, spacings))
 
 
 def _per_edge(case: DropCase, count: int) -> dict[str, str]:
@@ -111,18 +124,18 @@ def drops_ladder(case: DropsCase) -> Ladder:
     """Particle spacing of two drops, about the one that the case has."""
     errors = {"max_width_error": "largest width", "height_error": "height"}
     exact = "sphere" if case.drops.is_free else "Young-Laplace"
-    knob = _spacing("drops.spacing", case.drops.spacing)
+    knob = _spacing("drops.spacing", case.drops.spacing, FINENESS[1:])
     return Ladder("reflow", ("reflow",), errors, partial(of_metrics, exact, errors, "reflow"), (knob,))
 
 
-def _spacing(key: str, own: float) -> Knob:
+def _spacing(key: str, own: float, fineness: tuple[float, ...] = FINENESS) -> Knob:
     """A spacing that the case gives [m], and others about it; values are relative to it."""
 
     def at(value: float) -> Rung:
         text = from_si(value * own, "mm", digits=3)
         return Rung(f"spacing {text}", "particle spacing", {key: text}, value)
 
-    return Knob("particle spacing", tuple(1.0 / fineness for fineness in FINENESS), at, SECOND)
+    return Knob("particle spacing", tuple(1.0 / one for one in fineness), at, SECOND)
 
 
 def oscillation_ladder(_case: OscillationCase) -> Ladder:

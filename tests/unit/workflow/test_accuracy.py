@@ -1,0 +1,217 @@
+"""The command accuracy on a ladder whose runs are made up: error h^2, cost 2 s + h^-4 / 1000."""
+
+import json
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import pytest
+
+from workflow.accuracy.calibration import calibration, calibration_of, default_folder
+from workflow.accuracy.climb import AGAIN
+from workflow.accuracy.command import Wish, keeps_promise, measure, read_wish
+from workflow.accuracy.ladders import ladder_of
+from workflow.accuracy.measured import StageCost, read_accuracy
+from workflow.accuracy.page import section, section_for, write_pages
+from workflow.accuracy.tables import as_lines, as_options, on_front, runs
+from workflow.case import read_case
+from workflow.plan import foreseen_costs
+from workflow.problems import CaseError
+
+CASE = Path(__file__).resolve().parents[3] / "cases/sessile_drop/case.toml"
+BROKEN = "the flow is unstable"
+
+
+@dataclass
+class Fake:
+    """Computes points at once, and writes down which."""
+
+    slow: float = 1.0
+    computed: list[tuple[str, str]] = field(default_factory=list)
+
+    def __call__(self, store, points):
+        failed = {}
+        for point in points:
+            self.computed.append((store.folder.name, point.key))
+            if point.case.solder.numerics.scheme == "gripc":
+                failed[point.key] = BROKEN
+                continue
+            store.prepare(point)
+            folder = store.stage_folder(point.case, "reflow")
+            folder.mkdir(parents=True)
+            for product in ("shape.h5", "particles.vtu"):
+                (folder / product).touch()
+            (folder / "stage.json").write_text(json.dumps(self.record(point.case.drop)))
+        return failed
+
+    def record(self, drop) -> dict:
+        spacing = 1.0 / (drop.count - 1)
+        seconds = self.slow * (2.0 + (0.3 if drop.symmetry == "quarter" else 1.0) * spacing**-4 / 1000.0)
+        metrics = {"shape_error": {"value": spacing**2, "unit": ""}, "height_error": {"value": -spacing, "unit": ""}}
+        return {"seconds": 1.1 * seconds, "core_seconds": seconds, "metrics": metrics, "continued": "", "inputs": {}}
+
+
+def wish(tolerance: float | None = 0.02, budget: float = float("inf"), **settings: str) -> Wish:
+    return Wish(CASE, settings, tolerance, budget, "reflowshock accuracy")
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("runs") / "sessile_drop-accuracy"
+    compute = Fake()
+    accuracy, climb = measure(wish(0.002), folder, compute)
+    return accuracy, climb, compute, folder
+
+
+def test_orders_and_costs_are_found(done):
+    accuracy = done[0]
+    spacing = accuracy.fits["particle spacing"]
+    assert spacing.errors["shape_error"].order == pytest.approx(2.0)
+    assert spacing.errors["height_error"].order == pytest.approx(1.0)
+    assert (spacing.cost.start, spacing.cost.exponent) == pytest.approx((2.0, 4.0), rel=0.01)
+
+
+def test_what_is_recommended_lies_between_measured_points_and_was_run(done):
+    accuracy = done[0]
+    chosen = accuracy.recommended
+    assert chosen.rung.settings == {"drop.particles_per_edge": "25", "drop.symmetry": "quarter"}
+    assert 24**-2 < 0.002 < 22**-2
+    assert chosen.found.errors["shape_error"].value == pytest.approx(chosen.error)
+    assert chosen.found.core_seconds == pytest.approx(chosen.core_seconds, rel=0.02)
+    assert keeps_promise(accuracy)
+
+
+def test_a_second_call_computes_nothing_and_another_tolerance_only_what_is_new(done):
+    accuracy, _, compute, folder = done
+    before = len(compute.computed)
+    again, _ = measure(wish(0.002), folder, compute)
+    assert len(compute.computed) == before and again == accuracy
+    other, _ = measure(wish(0.004), folder, compute)
+    fresh = [key for store, key in compute.computed[before:] if store == folder.name]
+    assert fresh == [other.recommended.found.key]
+    measure(wish(0.002), folder, compute)
+
+
+def test_cheap_points_are_run_again_and_the_smallest_time_counts(done):
+    _, climb, compute, folder = done
+    often = [key for store, key in compute.computed if store != folder.name]
+    assert often.count(climb.points["6 per edge"].key) == AGAIN
+    assert climb.points["27 per edge"].key not in often
+
+
+def test_a_failed_run_is_a_row_with_its_message(done):
+    accuracy = done[0]
+    rows = {row[0]: row for row in runs(accuracy)["rows"]}
+    assert rows["gripc, linear"][-1] == f"failed: {BROKEN}"
+    assert rows["21 per edge"][-1] == "exact: Young-Laplace"
+    assert rows["21 per edge"][1:3] == ["0.25 %", "5 %"]
+
+
+def test_the_front_has_the_cheapest_and_the_most_accurate(done):
+    best = on_front(done[0])
+    assert "6 per edge" in best and "27 per edge, quarter" in best and "27 per edge" not in best
+
+
+def test_the_page_tells_all_of_it(done, tmp_path):
+    accuracy = done[0]
+    write_pages(tmp_path, accuracy, ("It rained.",))
+    page = (tmp_path / "accuracy.html").read_text()
+    for text in ("<svg", "particles_per_edge = 25", "25 per edge, quarter", BROKEN, "It rained.", "Pareto front"):
+        assert text in page
+    assert (tmp_path / "accuracy.png").stat().st_size > 10_000
+    assert "| 21 per edge |" in (tmp_path / "accuracy.md").read_text()
+
+
+def test_a_report_shows_what_was_measured_beside_its_run_folder(done):
+    folder = done[3]
+    case = read_case(CASE)
+    own = section_for(folder.parent / "sessile_drop", case)
+    assert own["case"] == "sessile_drop" and not own["elsewhere"]
+    assert own["runs"] == section(read_accuracy(folder / "accuracy.json"))["runs"]
+
+
+def test_within_a_budget_nothing_is_started_that_does_not_fit(tmp_path):
+    compute = Fake()
+    accuracy, climb = measure(wish(None, 30.0), tmp_path, compute)
+    assert {one.rung for one in accuracy.measurements if one.stages}.isdisjoint(climb.left_out)
+    assert "27 per edge" in climb.left_out and "6 per edge" not in climb.left_out
+    assert accuracy.recommended.core_seconds <= 30.0 and "within the budget" in accuracy.recommended.why
+    nothing, _ = measure(wish(0.02, 0.1), tmp_path / "short", compute)
+    assert not nothing.measurements and nothing.recommended is None and not keeps_promise(nothing)
+
+
+def test_a_broken_off_run_is_timed_again(tmp_path):
+    compute = Fake()
+
+    def broken_off(store, points):
+        failed = compute(store, points)
+        if store.folder == tmp_path:
+            for point in points:
+                path = store.stage_folder(point.case, "reflow") / "stage.json"
+                if path.exists():
+                    path.write_text(
+                        json.dumps(json.loads(path.read_text()) | {"continued": "the drop", "core_seconds": 9.9})
+                    )
+        return failed
+
+    accuracy, _ = measure(wish(), tmp_path, broken_off)
+    costs = {one.rung: one.core_seconds for one in accuracy.measurements}
+    assert costs["27 per edge"] == pytest.approx(2.0 + 26**4 / 1000.0)
+
+
+def test_forecasts_are_corrected_by_the_nearest_measured_run():
+    pairs = [{"reflow": StageCost(4.0, 4.0, 2.0)}, {"reflow": StageCost(100.0, 100.0, 20.0)}, {}]
+    known = calibration(pairs)
+    assert known.points == 2
+    assert [known.seconds("reflow", foreseen) for foreseen in (3.0, 15.0)] == pytest.approx([6.0, 75.0])
+    assert known.seconds("shock", 3.0) == 3.0 and not known.knows("shock")
+
+
+def test_the_plan_says_that_a_cost_was_measured(done, monkeypatch):
+    case = read_case(CASE)
+    monkeypatch.chdir(done[3].parents[1])
+    assert foreseen_costs(case, {"reflow": 3.0}) == {"reflow": "about 3 s"}
+    default_folder(case).parent.mkdir(exist_ok=True)
+    default_folder(case).symlink_to(done[3])
+    known = calibration_of(case)
+    expected = known.seconds("reflow", 3.0)
+    assert expected != 3.0
+    assert foreseen_costs(case, {"reflow": 3.0})["reflow"].endswith(f"s (measured: accuracy, {known.points} points)")
+
+
+def test_settings_can_be_pasted():
+    settings = {"drop.particles_per_edge": "24", "solder.numerics.time_step_limit": "20", "drop.volume": "1 mm^3"}
+    assert as_lines(settings) == [
+        "[drop]", "particles_per_edge = 24", 'volume = "1 mm^3"', "[solder.numerics]", "time_step_limit = 20",
+    ]  # fmt: skip
+    assert "--set 'drop.volume=1 mm^3'" in as_options(settings)
+
+
+@pytest.mark.parametrize(
+    ("tolerance", "budget", "key"),
+    [("two", None, "--tolerance"), ("120%", None, "--tolerance"), ("2% or so", None, "--tolerance"),
+     (None, "10 mm", "--budget"), (None, "10", "--budget"), (None, "-3 s", "--budget")],
+)  # fmt: skip
+def test_what_is_no_tolerance_or_budget_is_refused(tolerance, budget, key):
+    with pytest.raises(CaseError, match=key):
+        read_wish(CASE, [], tolerance, budget)
+
+
+def test_a_wish_is_read():
+    read = read_wish(CASE, ["gravity=on"], "2%", "10min")
+    assert (read.tolerance, read.budget, read.settings) == (0.02, 600.0, {"gravity": "on"})
+    assert "--tolerance 2% --budget 10min --set gravity=on" in read.command
+    assert read_wish(CASE, [], None, None).tolerance == 0.02
+    assert read_wish(CASE, [], None, "1 h").tolerance is None
+
+
+@pytest.mark.parametrize(
+    "name", ["sessile_drop", "bga_ball", "laplace_drop", "solder_joint", "coalescence", "oscillating_drop"]
+)
+def test_every_rung_of_solder_alone_is_a_case(name):
+    path = CASE.parents[1] / name / "case.toml"
+    ladder = ladder_of(read_case(path))
+    for rung in ladder.rungs:
+        read_case(path, [f"{key}={value}" for key, value in rung.settings.items()])
+    for knob in ladder.knobs:
+        sizes = [rung.value for rung in knob.rungs]
+        assert sizes == sorted(sizes, reverse=True) and knob.at(0.97 * sizes[1]).value <= 0.97 * sizes[1] * (1 + 1e-6)
