@@ -186,8 +186,31 @@ def strip_of(case: StructureCase, reference: Cantilever) -> exact_cantilever.Str
     return exact_cantilever.Strip(body.length, body.thickness, elasticity_matrix(material), material.density, pressure)
 
 
+def wave_points(reference: BarWave | LayeredBar) -> list[str]:
+    """Return the watch points of a bar, upwards."""
+    return [*reference.incident, reference.transmitted]
+
+
+def exact_velocities(
+    case: StructureCase,
+    reference: BarWave | LayeredBar,
+    places: Mapping[str, tuple[float, float, float]],
+    times: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Return the exact velocities (points x times,) [m/s] along a bar, one of ``wave_points`` after the other.
+
+    Args:
+        case: the case.
+        reference: the bar.
+        places: watch point -> where its motion is recorded [m].
+        times: (times,) [s].
+    """
+    layers, pulse = layers_of(case), _pulse_of(case, reference.load)
+    return np.concatenate([layers.velocity(places[name][2], times, pulse.value) for name in wave_points(reference)])
+
+
 def _waves(case: StructureCase, reference: BarWave | LayeredBar, motion: Motion) -> dict[str, float]:
-    points, history = [*reference.incident, reference.transmitted], motion.history
+    points, history = wave_points(reference), motion.history
     velocities = [history[f"velocity@{name}"][:, 2] for name in points]
     heights = [motion.places[name][2] for name in points]
     roles = ("near", "far", "beyond")

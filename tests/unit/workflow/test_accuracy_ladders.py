@@ -1,0 +1,143 @@
+"""Ladders of structures and packages: rungs that can be run, and answers read from their products."""
+
+import json
+
+import numpy as np
+import pytest
+
+from workflow.accuracy.errors import errors_of
+from workflow.accuracy.histories import at_same_times
+from workflow.accuracy.packages import SAME_MESH, package_ladder
+from workflow.accuracy.structures import structure_ladder
+from workflow.case import read_case
+from workflow.case_text import CASES
+from workflow.structure.findings import exact_velocities, wave_points
+
+
+def case_of(name, *settings):
+    return read_case(CASES / name / "case.toml", settings)
+
+
+@pytest.fixture(scope="module")
+def bar():
+    return case_of("two_scale_bar")
+
+
+@pytest.fixture(scope="module")
+def package():
+    return case_of("bga_drop", "scale=quick")
+
+
+def test_histories_of_other_steps_are_compared_at_the_same_times():
+    fine, coarse = (np.linspace(0.0, 1.0, count) for count in (101, 41))
+    histories = [{"time": t, "a": np.sin(6.0 * t), "b": np.stack([t, t**2], axis=1)} for t in (fine, coarse)]
+    first, second = (at_same_times(history, ("a", "b"), 1.0, 11) for history in histories)
+    assert first.shape == (33,)
+    assert first == pytest.approx(second, abs=1e-5)
+
+
+@pytest.mark.parametrize("name", ["two_scale_bar", "cantilever"])
+def test_rungs_of_a_structure_can_be_run(name):
+    ladder = structure_ladder(case_of(name))
+    for rung in ladder.rungs:
+        case = case_of(name, *(f"{key}={value}" for key, value in rung.settings.items()))
+        assert len(case.dynamics.solvers) == 1
+    names = {rung.name for rung in ladder.rungs}
+    assert {rung.against for rung in ladder.rungs if rung.against} <= names
+    assert len(ladder.knobs[0].values) >= 8
+
+
+def test_elements_between_the_measured_ones_are_chosen_the_finer_way(bar):
+    knob = structure_ladder(bar).knobs[0]
+    rung = knob.at(1.0 / 0.72)
+    assert rung.settings["structure.refine"] == "0.75"
+    assert rung.value == pytest.approx(1.0 / 0.75)
+    assert knob.at(knob.values[0]).name == knob.rungs[0].name
+
+
+def test_one_model_is_on_the_ladder_of_two_and_implicit_steps_on_that_of_one(bar):
+    assert "element size, one model" in [knob.name for knob in structure_ladder(bar).knobs]
+    assert "element size, implicit" in [knob.name for knob in structure_ladder(case_of("cantilever")).knobs]
+    yielding = structure_ladder(case_of("jedec_board", "dynamics.kinematics=finite", "dynamics.solver=explicit"))
+    assert not any("implicit" in knob.name for knob in yielding.knobs)
+
+
+def wave_run(folder, bar, shift):
+    """Write the exact waves, moved by a time [s], as a run would leave them."""
+    reference, own = bar.references["wave"], folder / "shock" / "explicit"
+    own.mkdir(parents=True)
+    places = {point: (0.0, 0.0, bar.watch[point].at[2]) for point in bar.watch}
+    time = np.linspace(0.0, bar.dynamics.duration, 401)
+    points = wave_points(reference)
+    axial = exact_velocities(bar, reference, places, np.maximum(time - shift, 0.0)).reshape(len(points), -1)
+    history = {f"velocity@{point}": np.outer(values, (0, 0, 1)) for point, values in zip(points, axial, strict=True)}
+    np.savez(own / "history.npz", time=time, **history)
+    watch = {point: {"node_at": place} for point, place in places.items()}
+    (own / "result.json").write_text(json.dumps({"model": {"watch": watch}}))
+    return folder
+
+
+def test_exact_waves_have_no_error_and_late_ones_as_much_as_they_are_late(bar, tmp_path):
+    ladder = structure_ladder(bar)
+    rungs = ladder.knobs[0].rungs[:3]
+    shifts = (8e-8, 4e-8, 0.0)
+    answers = {
+        rung.name: ladder.measure(bar, wave_run(tmp_path / str(k), bar, shift))
+        for k, (rung, shift) in enumerate(zip(rungs, shifts, strict=True))
+    }
+    errors = [found["wave_error"].value for found in errors_of(answers, rungs, rungs, 2.0).values()]
+    assert errors[2] < 1e-3
+    assert errors[0] == pytest.approx(2.0 * errors[1], rel=0.02)
+
+
+def test_rungs_of_a_package_can_be_run(package):
+    ladder = package_ladder(package)
+    names = {rung.name for rung in ladder.rungs}
+    assert SAME_MESH in names
+    assert {rung.against for rung in ladder.rungs if rung.against} == {SAME_MESH}
+    for rung in ladder.rungs:
+        settings = [f"{key}={value}" for key, value in rung.settings.items()]
+        assert len(case_of("bga_drop", "scale=quick", *settings).shock.numerics.modes) == 1
+
+
+def test_elements_of_a_package_follow_their_size(package):
+    (half,) = (rung for rung in package_ladder(package).rungs if rung.name == "all x 0.5")
+    assert half.settings["board.numerics.element_size"] == "0.25 mm"
+    assert half.settings["package.joint_numerics.core"] == "6"
+    assert half.settings["package.joint_numerics.layers"] == "12"
+
+
+def test_solder_that_yields_has_no_implicit_steps_nor_local_ones():
+    rungs = package_ladder(case_of("bga_drop", "scale=quick", "materials.solder=SAC405")).rungs
+    assert not any(rung.settings.get("shock.numerics.dns_solver") == "implicit" for rung in rungs)
+    assert not any(rung.settings.get("shock.coupling.scheme") == "local_steps" for rung in rungs)
+
+
+def test_a_package_is_judged_by_its_critical_joint(package, tmp_path):
+    own = tmp_path / "shock" / "two_scale"
+    own.mkdir(parents=True)
+    time = np.linspace(0.0, package.shock.duration, 101)
+    ramp = time / package.shock.duration
+    stress = {"von_mises_board": np.outer(ramp, (1e6, 3e6)), "von_mises_package": np.outer(ramp, (2e6, 1e6))}
+    moved = dict.fromkeys(("board_centre", "die_centre"), np.outer(ramp, (0, 0, 1e-3)))
+    np.savez(own / "history.npz", time=time, joints=np.array(["A1", "A2"]), **stress, **moved)
+    (own / "result.json").write_text(json.dumps({"metrics": {"critical_joint": {"value": "A2", "unit": ""}}}))
+    found = package_ladder(package).measure(package, tmp_path)
+    assert found["peak_stress"].value == pytest.approx(3e6)
+    assert found["stress_history"].value.max() == pytest.approx(3e6)
+    assert len(found["stress_history"].value) == 2 * (package.shock.numerics.history_samples + 1)
+
+
+def test_a_package_without_a_shock_has_its_particles(tmp_path):
+    text = (CASES / "bga_drop/case.toml").read_text()
+    kept, skip = [], False
+    for line in text.splitlines():
+        if line.startswith("["):
+            skip = line.startswith(("[shock", "[scales"))
+        if not skip:
+            kept.append(line)
+    path = tmp_path / "case.toml"
+    path.write_text("\n".join(kept))
+    ladder = package_ladder(read_case(path, []))
+    assert ladder.until == "reflow"
+    assert [knob.name for knob in ladder.knobs] == ["particle spacing"]
