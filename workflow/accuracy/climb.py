@@ -148,7 +148,10 @@ class Climb:
         costs = self._costs(point) if point is not None and self._is_done(rung) else {}
         why = self.impossible.get(rung.name, "") if point is None else self.failed.get(point.key, "")
         key = "" if point is None else point.key
-        return Measurement(rung.name, rung.knob, rung.value, rung.settings, key, costs, errors, "" if costs else why)
+        failed = "" if costs else why
+        return Measurement(
+            rung.name, rung.knob, rung.value, rung.settings, key, costs, errors, failed, against=rung.against
+        )
 
     def _costs(self, point: Point) -> dict[str, StageCost]:
         """Return the smallest times of the stages that count, of all runs that were not broken off."""

@@ -4,16 +4,22 @@ from collections.abc import Callable
 from typing import Any
 
 from workflow.accuracy.ladder import Ladder
+from workflow.accuracy.packages import package_ladder
 from workflow.accuracy.solder import drop_ladder, drops_ladder, joint_ladder, oscillation_ladder
+from workflow.accuracy.structures import structure_ladder
+from workflow.board_drop_case import PackageCase
 from workflow.case_kind import Case
 from workflow.problems import CaseError, Problem
 from workflow.scene_cases import DropCase, DropsCase, JointCase, OscillationCase
+from workflow.structure.case import StructureCase
 
 LADDERS: dict[str, Callable[[Any], Ladder]] = {
     DropCase.kind: drop_ladder,
     JointCase.kind: joint_ladder,
     DropsCase.kind: drops_ladder,
     OscillationCase.kind: oscillation_ladder,
+    StructureCase.kind: structure_ladder,
+    PackageCase.kind: package_ladder,
 }
 
 

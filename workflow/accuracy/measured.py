@@ -41,6 +41,7 @@ class Measurement:
         stages: cost of the stages that count; empty where it failed.
         errors: quantity -> error; one that others are compared with has none.
         failed: message of the stage that failed; empty where none did.
+        against: rung that its errors are from, where they are not those of the whole answer.
     """
 
     rung: str
@@ -51,6 +52,7 @@ class Measurement:
     stages: Mapping[str, StageCost]
     errors: Mapping[str, Error]
     failed: str = ""
+    against: str = ""
 
     @property
     def seconds(self) -> float:

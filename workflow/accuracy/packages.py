@@ -1,8 +1,9 @@
 """Ladder of a package that is dropped: its mesh, joints, particles, and how joints and board are coupled."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from math import floor
 from pathlib import Path
+from typing import Any
 
 from meshing.pads import pad_table
 from workflow.accuracy.errors import Quantity
@@ -34,7 +35,7 @@ DEFLECTIONS = ("board_centre", "die_centre")
 
 TRUE_MASS = {"shock.numerics.mass_scaled": "[]"}  # of copper, whose step two models can do with
 
-Settings = Mapping[str, str]
+Settings = dict[str, str]
 
 
 def package_ladder(case: PackageCase) -> Ladder:
@@ -52,13 +53,13 @@ def _dropped(case: BoardDropCase) -> Ladder:
     return Ladder("shock", ("shock",), ERRORS, _motion, knobs, tuple(_couplings(case)))
 
 
-def _widths(case: PackageCase, run_folder: Path) -> dict[str, Quantity]:
+def _widths(case: Any, run_folder: Path) -> dict[str, Quantity]:
     record = read_record(run_folder, case.pipeline["reflow"]) or {"metrics": {}}
     name = "joint_width_error_max"
     return {name: Quantity(record["metrics"][name]["value"], 0.0, 1.0, "Young-Laplace")}
 
 
-def _motion(case: BoardDropCase, run_folder: Path) -> dict[str, Quantity]:
+def _motion(case: Any, run_folder: Path) -> dict[str, Quantity]:
     """Histories of the joint whose stress is the largest, and of the board's and the die's centre."""
     import numpy as np
 

@@ -95,7 +95,12 @@ def _between(
         if not wanted >= smallest:
             continue
         rung = knob.at(min(wanted, largest))
-        if rung.value is not None and smallest <= rung.value <= largest and rung.name not in measurements:
+        if (
+            not rung.against
+            and rung.value is not None
+            and smallest <= rung.value <= largest
+            and rung.name not in measurements
+        ):
             expected = error.at(rung.value)
             yield Candidate(rung, expected, expected * error.scatter, cost.at(rung.value), False)
 

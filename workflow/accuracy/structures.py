@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from math import ceil
 from pathlib import Path
+from typing import Any
 
 from workflow.accuracy.errors import Quantity
 from workflow.accuracy.histories import at_same_times, common_times
@@ -38,7 +39,7 @@ WAVE = {"wave_error": "velocities at the watch points, L2 over time"}
 SWING = {"tip_deflection_error": "static deflection of the tip", "swing_frequency_error": "first frequency"}
 CURVES = {"displacement": "displacements of the watch points, L2 over time", "strain": "their strains, L2 over time"}
 
-Settings = Mapping[str, str]
+Settings = dict[str, str]
 
 
 def structure_ladder(case: StructureCase) -> Ladder:
@@ -51,7 +52,7 @@ def structure_ladder(case: StructureCase) -> Ladder:
     return Ladder("comparison", ("shock",), errors, measure, knobs, choices)
 
 
-Measure = Callable[[StructureCase, Path], Mapping[str, Quantity]]
+Measure = Callable[[Any, Path], Mapping[str, Quantity]]
 
 
 def _answers(case: StructureCase) -> tuple[Mapping[str, str], Measure]:
@@ -189,7 +190,7 @@ def _schemes(case: StructureCase, own: Settings) -> list[Rung]:
     mesh, key = _refine(case, SCHEMES_AT), "dynamics.coupling"
     usual = "local_steps" if _is_linear(case) else "held_velocity"
     chosen = case.dynamics.coupling.scheme
-    ways = {"own scheme": {}} | {
+    ways: dict[str, Settings] = {"own scheme": {}} | {
         name.replace("_", " "): {f"{key}.scheme": name}
         for name in SCHEMES
         if name != (usual if chosen == "auto" else chosen) and (_is_linear(case) or name != "local_steps")

@@ -22,8 +22,8 @@ def every_run(accuracy: Accuracy) -> list[Measurement]:
 
 
 def compared(accuracy: Accuracy) -> list[Measurement]:
-    """Return the runs whose judged error is known."""
-    return [one for one in every_run(accuracy) if accuracy.judged in one.errors]
+    """Return the runs whose judged error is known, and is that of the whole answer."""
+    return [one for one in every_run(accuracy) if accuracy.judged in one.errors and not one.against]
 
 
 def on_front(accuracy: Accuracy) -> set[str]:
@@ -38,7 +38,7 @@ def runs(accuracy: Accuracy) -> dict:
     best = on_front(accuracy)
     head = ["setting", *accuracy.errors, "wall s", "core s", "front", "compared with"]
     rows = []
-    for one in sorted(every_run(accuracy), key=lambda one: (bool(one.failed), one.core_seconds)):
+    for one in sorted(every_run(accuracy), key=lambda one: (bool(one.failed), bool(one.against), one.core_seconds)):
         errors = [percent(one.errors[name].value) if name in one.errors else "" for name in accuracy.errors]
         cost = ["", ""] if one.failed else [f"{one.seconds:.1f}", f"{one.core_seconds:.1f}"]
         rows.append([one.rung, *errors, *cost, ON_FRONT if one.rung in best else "", _remark(one, accuracy)])

@@ -5,9 +5,12 @@ import json
 import numpy as np
 import pytest
 
-from workflow.accuracy.errors import errors_of
+from workflow.accuracy.errors import Error, errors_of
 from workflow.accuracy.histories import at_same_times
+from workflow.accuracy.ladder import Knob, Ladder, Rung
+from workflow.accuracy.measured import Measurement, StageCost, fits_of
 from workflow.accuracy.packages import SAME_MESH, package_ladder
+from workflow.accuracy.recommend import Goal, recommend
 from workflow.accuracy.structures import structure_ladder
 from workflow.case import read_case
 from workflow.case_text import CASES
@@ -141,3 +144,24 @@ def test_a_package_without_a_shock_has_its_particles(tmp_path):
     ladder = package_ladder(read_case(path, []))
     assert ladder.until == "reflow"
     assert [knob.name for knob in ladder.knobs] == ["particle spacing"]
+
+
+def test_a_part_of_an_error_is_no_recommendation():
+    """A knob whose errors are from a run on the same mesh leaves out what the mesh errs."""
+
+    def at(value: float) -> Rung:
+        return Rung(f"step {value}", "step", {}, value, "mesh")
+
+    ladder = Ladder(
+        "shock", ("shock",), {"wave": "wave"}, lambda case, folder: {}, (Knob("step", (4.0, 2.0, 1.0), at),)
+    )
+    found = {
+        rung.name: Measurement(
+            rung.name, "step", rung.value, {}, "", {"shock": StageCost(1.0, 1.0 + 1.0 / rung.value, None)},
+            {"wave": Error(1e-4 * rung.value**2, "mesh")}, against=rung.against,
+        )
+        for rung in ladder.rungs
+    }  # fmt: skip
+    fits = fits_of(ladder, found)
+    assert fits["step"].errors["wave"].order == pytest.approx(2.0)
+    assert recommend(ladder, found, fits, Goal(0.01)) is None

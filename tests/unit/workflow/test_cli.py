@@ -38,7 +38,7 @@ def test_a_new_case_is_complete_and_equal_to_its_template(call, tmp_path):
     path = tmp_path / "mine.toml"
     mine, template = display_values(read_case(path)), display_values(read_case(CASE))
     assert mine == template | {"case.name": "mine"}
-    given = dict(flat(tomllib.loads(path.read_text())))
+    given = [key for key, _ in flat(tomllib.loads(path.read_text())) if not key.startswith("scales.")]
     assert set(given) == set(mine)
 
 
