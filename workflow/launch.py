@@ -1,6 +1,7 @@
 """Launching MPI programs: command line, lines of output, and a clean end whatever happens."""
 
 import os
+import shlex
 import shutil
 import signal
 import subprocess
@@ -13,6 +14,8 @@ from fem.own_job import own_environment
 GRACE = 5.0  # seconds that a program has to end by itself after SIGTERM
 TOLD = "error: "  # begins what a program says of an error that it knows
 LAST_LINES = 15
+LAUNCHER = "REFLOWSHOCK_MPI_LAUNCHER"  # variable: what starts MPI ranks, e.g. "srun --mpi=pmix" within a job of Slurm
+MPIRUN = "mpirun"
 
 # In front of a command: the system sends the signal when the process that starts it ends, however that happens.
 END_WITH_PARENT = ("setpriv", "--pdeathsig", "TERM")
@@ -24,14 +27,17 @@ class LaunchError(RuntimeError):
 
 
 def mpi_command(ranks: int, program: Sequence[str], oversubscribe: bool) -> list[str]:
-    """Return the command that starts a program on a number of MPI ranks.
+    """Return the command that starts a program on a number of MPI ranks: by Open MPI, or by what ``LAUNCHER`` says.
 
     Args:
         ranks: number of MPI ranks.
         program: program and arguments.
         oversubscribe: whether there may be more ranks than cores.
     """
-    command = ["mpirun", "--quiet", "-n", str(ranks)]
+    launcher = shlex.split(os.environ.get(LAUNCHER, "")) or [MPIRUN]
+    if Path(launcher[0]).name != MPIRUN:
+        return [*launcher, "-n", str(ranks), *program]
+    command = [*launcher, "--quiet", "-n", str(ranks)]
     if os.geteuid() == 0:
         command.append("--allow-run-as-root")
     if oversubscribe:

@@ -1,0 +1,81 @@
+"""The profile of a cluster: a folder with the options of Snakemake that its users set once."""
+
+import shlex
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from fem.names import nearest
+from workflow.problems import CaseError, Problem
+
+OWN = Path("profiles/slurm")  # of the user, below the working directory
+SHIPPED = Path(__file__).parents[1] / "profiles/slurm"
+FILE = "config.yaml"
+KEYS = ("launcher", "walltime_factor")
+
+
+@dataclass(frozen=True, slots=True)
+class Profile:
+    """What the program takes from a profile; Snakemake reads the rest of its file.
+
+    Attributes:
+        folder: of the file.
+        partition: where jobs go; empty: the cluster's default.
+        launcher: what starts MPI ranks within a job, as a command line.
+        walltime_factor: by which the time that jobs ask for is longer.
+    """
+
+    folder: Path
+    partition: str = ""
+    launcher: str = "mpirun"
+    walltime_factor: float = 1.0
+
+
+def read_profile(folder: Path | None) -> Profile:
+    """Read a profile.
+
+    Args:
+        folder: of the profile; None for ``profiles/slurm`` where the user has one, else that of the program.
+
+    Raises:
+        CaseError: there is no such file, it cannot be read, or a value in it is not possible.
+    """
+    folder = folder or (OWN if (OWN / FILE).is_file() else SHIPPED)
+    path = folder / FILE
+    try:
+        table = yaml.safe_load(path.read_text(encoding="utf-8")) or {}
+    except FileNotFoundError as error:
+        raise _wrong(path, Problem("--profile", "is no profile", str(folder), f"a folder with {FILE}")) from error
+    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        raise _wrong(path, Problem("", f"cannot be read: {error}")) from error
+    config = _table(path, table, "config")
+    resources = _table(path, table, "default-resources")
+    for key in config:
+        if key not in KEYS:
+            message = Problem(f"config.{key}", "unknown key", config[key], ", ".join(KEYS), nearest(key, KEYS))
+            raise _wrong(path, message)
+    launcher = str(config.get("launcher", "mpirun"))
+    if not shlex.split(launcher):
+        raise _wrong(path, Problem("config.launcher", "is no command", launcher, "mpirun, srun --mpi=pmix, …"))
+    partition = str(resources.get("slurm_partition", "")).strip("'\"")
+    return Profile(folder, partition, launcher, _factor(path, config.get("walltime_factor", 1.0)))
+
+
+def _factor(path: Path, value: object) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not 0.1 <= value <= 1000.0:
+        raise _wrong(path, Problem("config.walltime_factor", "is no factor", value, "0.1 to 1000"))
+    return float(value)
+
+
+def _table(path: Path, table: object, key: str) -> Mapping[str, Any]:
+    found = table.get(key, {}) if isinstance(table, dict) else None
+    if not isinstance(found, dict):
+        raise _wrong(path, Problem(key, "must be a table of keys and values", None, "lines KEY: VALUE"))
+    return found
+
+
+def _wrong(path: Path, problem: Problem) -> CaseError:
+    return CaseError(str(path), [problem])
