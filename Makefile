@@ -14,6 +14,7 @@ demo: setup  ## run the default case from case file to report
 	$(PYTHON) -m workflow run $(CASE)
 
 test: setup  ## run every check and test, on all cores
+	@.ci/setup-slurm
 	$(PYTHON) -m pytest --numprocesses=logical --maxprocesses=8 --dist=loadfile
 
 test-mpi: setup  ## run the tests that start several MPI ranks

@@ -14,6 +14,7 @@ import typer
 from workflow import __version__
 from workflow.case import available_cores, read_case
 from workflow.case_kind import Case
+from workflow.cluster.executor import JOBS, ExecutorName, executor_for
 from workflow.inputs import CASE, examine, read_case_of_run, write_inputs
 from workflow.kernel_cache import keep_kernels_by_source
 from workflow.pipeline import RunFolderBusy, drive, failed_checks, locked
@@ -36,6 +37,17 @@ Out = Annotated[
     Path | None, typer.Option("--out", metavar="DIR", help="run folder [default: runs/<case name>, with its scale]")
 ]
 Oversubscribe = Annotated[bool, typer.Option("--oversubscribe", help="allow more MPI ranks than cores")]
+AtOnce = Annotated[
+    int | None,
+    typer.Option("-j", "--cores", min=1, help=f"cores to use [default: all]; of a cluster: jobs at a time [{JOBS}]"),
+]
+ExecutorOption = Annotated[
+    ExecutorName, typer.Option("--executor", help="where stages run; slurm: as jobs of a cluster")
+]
+ProfileOption = Annotated[
+    Path | None,
+    typer.Option("--profile", metavar="DIR", help="of the cluster [default: profiles/slurm, if there; else built in]"),
+]
 
 
 @app.command()
@@ -64,22 +76,25 @@ def run(
     case: CasePath,
     settings: Settings = None,
     until: Annotated[str, typer.Option(metavar="STAGE", help="last stage, of those that plan lists")] = "report",
-    cores: Annotated[int | None, typer.Option("-j", "--cores", min=1, help="cores to use [default: all]")] = None,
+    cores: AtOnce = None,
     out: Out = None,
     oversubscribe: Oversubscribe = False,
+    executor: ExecutorOption = ExecutorName.LOCAL,
+    profile: ProfileOption = None,
 ) -> None:
     """Run what is stale."""
-    resolved, folder = _load(case, settings, out, oversubscribe)
+    resolved, folder = _load(case, settings, out, oversubscribe or executor != ExecutorName.LOCAL)
     pipeline = resolved.pipeline
     if until not in pipeline.names:
         allowed = ", ".join(pipeline.names)
         raise typer.BadParameter(f"'{until}' is no stage of this case; allowed: {allowed}", param_hint="--until")
+    where = executor_for(executor, profile, cores, oversubscribe, [resolved])
     try:
         with locked(folder) as lock:
             write_inputs(folder, resolved)
             if not _has_work(folder, resolved, until):
                 console.print(f"nothing to do: {folder} is up to date")
-            elif not drive(folder, pipeline[until], cores or available_cores(), oversubscribe, lock):
+            elif not drive(folder, resolved, until, where, lock):
                 raise typer.Exit(1)
     except KeyboardInterrupt as error:
         print_error("interrupted; complete stages and checkpoints are kept: the same command continues")

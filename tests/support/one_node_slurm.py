@@ -150,7 +150,9 @@ def _wait(ready, daemon: subprocess.Popen, folder: Path, name: str, seconds: flo
     deadline = time.monotonic() + seconds
     while not ready():
         if daemon.poll() is not None or time.monotonic() > deadline:
-            said = "".join(path.read_text() for path in (folder / f"{name}.said", folder / f"{name}.log") if path.exists())
+            said = "".join(
+                path.read_text() for path in (folder / f"{name}.said", folder / f"{name}.log") if path.exists()
+            )
             raise NoSlurm(f"{name} does not start: {said.strip()[-500:] or 'it says nothing'}")
         time.sleep(0.1)
 

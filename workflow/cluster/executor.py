@@ -1,30 +1,47 @@
-"""Where stages run: on this machine, or as jobs of a cluster; how Snakemake is told so, watched and ended."""
+"""Where stages run: on this machine, or as jobs of a cluster; how Snakemake is told so, and ended."""
 
 import signal
 import subprocess
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from enum import StrEnum
 from pathlib import Path
 from typing import Any, Protocol
 
+from workflow.case import available_cores
 from workflow.case_kind import Case
 from workflow.cluster.checks import check_slurm
-from workflow.cluster.profile import Profile
+from workflow.cluster.profile import Profile, read_profile
 from workflow.cluster.queue import NoAnswer, cancel, jobs_in
-from workflow.cluster.resources import stage_resources
+from workflow.cluster.resources import MOST_CORES, stage_resources
 from workflow.launch import DIE_WITH_PARENT, LAUNCHER, end_group
+from workflow.problems import CaseError, Problem
 
 SAID = "logs/snakemake.txt"  # what Snakemake says of its jobs, below its working folder
 LONGEST_END = 70.0  # seconds that Snakemake has to cancel its jobs
+JOBS = 20  # that may be queued or at work at a time, unless the user says how many
+
+Jobs = dict[str, dict[str, Any]]  # stage -> resources of its job, as Snakemake knows them
+
+
+class ExecutorName(StrEnum):
+    """Where stages run."""
+
+    LOCAL = "local"
+    SLURM = "slurm"
 
 
 class Executor(Protocol):
     """Where stages run, one of `Local`, `Slurm`."""
 
     @property
-    def arguments(self) -> Sequence[str]:
+    def oversubscribe(self) -> bool:
+        """Whether MPI may have more ranks than cores."""
+
+    @property
+    def options(self) -> Sequence[str]:
         """Options of Snakemake."""
 
     @property
@@ -32,15 +49,11 @@ class Executor(Protocol):
         """What stands before Snakemake, and ends it should this process be killed."""
 
     @property
-    def environment(self) -> Mapping[str, str]:
+    def environment(self) -> dict[str, str]:
         """Variables that stages see."""
 
-    def resources(self, cases: Sequence[Case]) -> list[dict[str, dict[str, Any]]]:
-        """Check that the cases can be run, and return what the job of each stage asks for; nothing where it is no job.
-
-        Raises:
-            CaseError: they cannot; nothing was started.
-        """
+    def jobs(self, case: Case) -> Jobs:
+        """Return what the job of each stage asks for; nothing where stages are no jobs."""
 
     def output(self, folder: Path) -> Path | None:
         """Return the file that takes what Snakemake says; None: the terminal."""
@@ -54,21 +67,26 @@ class Executor(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Local:
-    """Stages run on this machine, as processes that end with the command; ``cores`` that they may use."""
+    """Stages are processes of this machine and end with the command.
+
+    Attributes:
+        cores: that they may use.
+        oversubscribe: whether MPI may have more ranks than cores.
+    """
 
     cores: int
+    oversubscribe: bool = False
+    guard: Sequence[str] = DIE_WITH_PARENT
+    environment: dict[str, str] = field(default_factory=dict)
 
     @property
-    def arguments(self) -> Sequence[str]:
+    def options(self) -> Sequence[str]:
         """All that stages say goes to the terminal; Snakemake says nothing."""
         return ("--cores", str(self.cores), "--quiet", "all")
 
-    guard = DIE_WITH_PARENT
-    environment: Mapping[str, str] = {}
-
-    def resources(self, cases: Sequence[Case]) -> list[dict[str, dict[str, Any]]]:
+    def jobs(self, case: Case) -> Jobs:
         """No stage is a job."""
-        return [{} for _ in cases]
+        return {}
 
     def output(self, folder: Path) -> Path | None:
         """To the terminal."""
@@ -89,37 +107,34 @@ class Slurm:
 
     Attributes:
         profile: of the cluster.
-        jobs: how many may be queued or at work at a time.
+        at_once: how many jobs may be queued or at work at a time.
+        largest: cores of the largest machine.
+        oversubscribe: whether MPI may have more ranks than cores.
     """
 
     profile: Profile
-    jobs: int
+    at_once: int = JOBS
+    largest: int = MOST_CORES
+    oversubscribe: bool = False
+    # Interrupted, Snakemake cancels its jobs; in the background of a script it would ignore that.
+    guard: Sequence[str] = ("setpriv", "--pdeathsig", "INT", "env", "--default-signal=INT")
 
     @property
-    def arguments(self) -> Sequence[str]:
-        """What Snakemake says is kept: it knows of jobs that Slurm ended."""
-        profile = str(self.profile.folder.resolve())
-        jobs = ("--executor", "slurm", "--jobs", str(self.jobs), "--workflow-profile", profile)
-        return (*jobs, "--nocolor", "--quiet", "progress", "host")
-
-    @property
-    def guard(self) -> Sequence[str]:
-        """Interrupted, Snakemake cancels its jobs; it must hear that also in a script's background, where it is ignored."""
-        return ("setpriv", "--pdeathsig", "INT", "env", "--default-signal=INT")
-
-    @property
-    def environment(self) -> Mapping[str, str]:
+    def environment(self) -> dict[str, str]:
         """What starts MPI ranks in the jobs."""
         return {LAUNCHER: self.profile.launcher}
 
-    def resources(self, cases: Sequence[Case]) -> list[dict[str, dict[str, Any]]]:
+    @property
+    def options(self) -> Sequence[str]:
+        """What Snakemake says is kept: it knows of jobs that Slurm ended."""
+        profile = str(self.profile.folder.resolve())
+        jobs = ("--executor", "slurm", "--jobs", str(self.at_once), "--workflow-profile", profile)
+        return (*jobs, "--nocolor", "--quiet", "progress", "host")
+
+    def jobs(self, case: Case) -> Jobs:
         """What ``plan`` foresees, with a margin."""
-        cores = check_slurm(self.profile, cases).largest
-        factor, launcher = self.profile.walltime_factor, self.profile.launcher
-        return [
-            {stage: wanted.of_rule(launcher) for stage, wanted in stage_resources(case, factor, cores).items()}
-            for case in cases
-        ]
+        wanted = stage_resources(case, self.profile.walltime_factor, self.largest)
+        return {stage: resources.of_rule(self.profile.launcher) for stage, resources in wanted.items()}
 
     def output(self, folder: Path) -> Path | None:
         """To a file."""
@@ -136,6 +151,29 @@ class Slurm:
         process.send_signal(signal.SIGINT)
         deadline = time.monotonic() + LONGEST_END
         while process.poll() is None and time.monotonic() < deadline and self.left_over(folder):
-            time.sleep(1.0)
+            time.sleep(0.5)
         end_group(process)
         cancel(self.left_over(folder))
+
+
+def executor_for(
+    name: ExecutorName, profile: Path | None, at_once: int | None, oversubscribe: bool, cases: Sequence[Case]
+) -> Executor:
+    """Return where stages run, when it is known that they can.
+
+    Args:
+        name: where.
+        profile: folder of the cluster's profile; None for the default one.
+        at_once: cores of this machine, or jobs, that may be used at a time; None for all cores, ``JOBS`` jobs.
+        oversubscribe: whether MPI may have more ranks than cores.
+        cases: that are to be run.
+
+    Raises:
+        CaseError: jobs cannot be submitted here, or a case asks for more than there is.
+    """
+    if name == ExecutorName.SLURM:
+        chosen = read_profile(profile)
+        return Slurm(chosen, at_once or JOBS, check_slurm(chosen, cases).largest, oversubscribe)
+    if profile is not None:
+        raise CaseError("run", [Problem("--profile", "is of a cluster", str(profile), "with --executor slurm")])
+    return Local(at_once or available_cores(), oversubscribe)

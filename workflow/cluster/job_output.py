@@ -6,9 +6,14 @@ from pathlib import Path
 
 from workflow.terminal import console, errors
 
+# Options of env: Open MPI would take a stage that is a step of Slurm for one of the ranks that srun starts.
+OWN_STEP = "-u SLURM_STEPID -u SLURM_STEP_ID"
 ERROR = "error "  # begins what a stage says when it fails
-FAILED = re.compile(r"^Error in rule (?P<rule>\S+):\n(?:    [^\n]*\n)*?    message: (?P<why>[^\n]*)", re.MULTILINE)
-ADVICE = "For further error details"
+# How Snakemake says that a job failed; its message ends where the command, advice or the next entry begins.
+FAILED = re.compile(
+    r"^Error in rule (?P<rule>\S+):\n\s+message: (?P<why>.*?)\s*(?:sbatch call:|For further error details|\n    jobid:)",
+    re.MULTILINE | re.DOTALL,
+)
 
 
 def log_of(stage: str) -> str:
@@ -52,5 +57,5 @@ class JobOutput:
             said: file with its output.
         """
         text = said.read_text(errors="replace") if said.is_file() else ""
-        found = {match["rule"]: match["why"].partition(ADVICE)[0].strip() for match in FAILED.finditer(text)}
+        found = {match["rule"]: match["why"] for match in FAILED.finditer(text)}
         return [f"stage {stage} failed: {why}" for stage, why in found.items() if stage not in self._failed]

@@ -1,4 +1,4 @@
-"""What the job of each stage asks a cluster for: ranks, cores, memory, time; from the forecast of `plan`, with a margin."""
+"""What the job of each stage asks a cluster for: ranks, cores, memory, time; as `plan` foresees, with a margin."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

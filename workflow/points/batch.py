@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+from workflow.cluster.executor import Local
 from workflow.pipeline import locked, snakemake
 from workflow.points.point import Point
 from workflow.points.store import Store
@@ -119,7 +120,7 @@ def run_points(
             _write(store, jobs, machine)
             options = ("--snakefile", str(SNAKEFILE), "--keep-going", "--scheduler", "greedy")
             config = ("--config", f"oversubscribe={int(machine.oversubscribe)}")
-            snakemake(store.folder.resolve(), machine.cores, [*options, *config], lock, each_second)
+            snakemake(store.folder.resolve(), Local(machine.cores), [*options, *config], lock, each_second)
     return {point.key: why(store, point, until) for point in points if not store.is_complete(point, until)}
 
 
