@@ -11,7 +11,8 @@ OWN_STEP = "-u SLURM_STEPID -u SLURM_STEP_ID"
 ERROR = "error "  # begins what a stage says when it fails
 # How Snakemake says that a job failed; its message ends where the command, advice or the next entry begins.
 FAILED = re.compile(
-    r"^Error in rule (?P<rule>\S+):\n\s+message: (?P<why>.*?)\s*(?:sbatch call:|For further error details|\n    jobid:)",
+    r"^Error in rule (?P<rule>\S+):\n\s+message: (?P<why>.*?)"
+    r"\s*(?:sbatch call:|For further error details|\n    jobid:)",
     re.MULTILINE | re.DOTALL,
 )
 
