@@ -8,9 +8,9 @@ ENTRIES: tuple[dict[str, Any], ...] = (
     {
         "name": "gravity",
         "adds": "f = -rho g z dV/dx on the free surface",
-        "number": f"Bo = rho g L H / gamma; {SHAPE_CHANGE_BY_BOND:g} Bo of the height",
+        "number": f"{SHAPE_CHANGE_BY_BOND:g} Bo, Bo = rho g L H / gamma",
         "threshold": NEGLIGIBLE_SHAPE_CHANGE,
-        "influence": f"{SHAPE_CHANGE_BY_BOND:g} Bo of the shape",
+        "influence": f"{SHAPE_CHANGE_BY_BOND:g} Bo of the shape, up to (large contact angles)",
         "place": "particles.force_gravity.Gravity",
         "switch": "solder.effects.gravity (of a scene: gravity) = auto, on, off",
         "source": "Bashforth & Adams 1883, heights of sessile drops",

@@ -8,8 +8,9 @@ from typing import NotRequired, TypedDict
 from particles.geometry import JointGeometry
 from particles.parameters import Solder
 
-# Height of a drop changes by about 0.08 Bo (Bashforth-Adams table); an effect below 0.1 % of the shape is left out.
-SHAPE_CHANGE_BY_BOND = 0.08
+# Height of a drop changes by 0.08, 0.13, 0.19 Bo at contact angles of 60, 120, 148 deg (Bashforth-Adams table); what
+# changes less than 0.1 % of the shape is left out.
+SHAPE_CHANGE_BY_BOND = 0.2
 NEGLIGIBLE_SHAPE_CHANGE = 1e-3
 # A motion has died out when the process is so many times longer than its slowest time.
 PROCESS_TIME_RATIO = 20.0

@@ -1,0 +1,368 @@
+"""Every effect of the registry: off it costs nothing, and on where it does not matter it changes next to nothing."""
+
+import ast
+from collections.abc import Callable
+from dataclasses import replace
+from importlib import import_module
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from fem.coupling.one_way import OneWay
+from fem.coupling.scheme import scheme_of
+from fem.effects import NEGLIGIBLE_STIFFENING, NEGLIGIBLE_WEIGHT, called_for, damping, weight
+from fem.force import force_terms
+from fem.force_nonlinear import NonlinearElements
+from fem.kernels.plasticity import plastic_constants
+from fem.materials.failure import failure_criteria, judge
+from fem.materials.library import FR4, SAC305, SILICON
+from fem.parameters import Damping, Failure, JointCoupling
+from fem.residual.pretension import Pretension
+from fem.steps import mass_factor
+from fem.supports import held_components
+from fem.thermal.parameters import Thermal
+from fem.thermal.plates import RigidPlates
+from fem.thermal.structure import ThermalStructure
+from fem.trials.grids import grid, mesh_of
+from particles.effects import NEGLIGIBLE_SHAPE_CHANGE, decide, decide_drop, drop_numbers
+from particles.parameters import SolderEffects
+from tests.support import effect_switches as scene
+from tests.support.drops import solve_drop
+from tests.support.fem_residual import cooled, layered
+from tests.support.thermal_models import small_structure
+from workflow.effect_registry.registry import registry
+from workflow.fine_joints import needs_coarse_joints
+from workflow.reflow.between import open_structure
+from workflow.reflow.load_steps import load_steps
+
+ROOT = Path(__file__).parents[2]
+G, STEPS = scene.G, 40
+Check = Callable[..., None]
+OFF: dict[str, Check] = {}
+ON: dict[str, Check] = {}
+# What needs a whole run is tested where there is one.
+ELSEWHERE_OFF = {"identical_joints": "tests/pipeline/test_pipeline.py::test_the_whole_path"}
+ELSEWHERE_ON = {
+    "flexible": "tests/unit/fem/test_thermal_effects.py::test_warpage_stays_below_its_number",
+    "solder_force": "tests/unit/fem/test_thermal_effects.py::test_bending_by_the_solder_stays_below_its_number",
+    "one_way": "tests/unit/fem/test_one_way_run.py::test_driven_joint_is_stressed_as_a_coupled_one",
+    "coarse_joints": "tests/pipeline/test_fine_joints.py::test_the_fine_joint_agrees_with_the_dns",
+    "identical_joints": "tests/pipeline/test_identical_joints.py::test_what_the_shapes_change_is_told",
+    "large_mass": "tests/mpi/test_fem_shock_methods.py::test_large_mass_at_the_holes_is_direct_acceleration",
+    "symmetry": "tests/verification/test_fem_thermal_symmetry.py::test_a_quarter_stands_for_the_whole",
+}
+
+
+def off(*names: str) -> Callable[[Check], Check]:
+    return lambda check: [OFF.__setitem__(name, check) for name in names] and check
+
+
+def on(*names: str) -> Callable[[Check], Check]:
+    return lambda check: [ON.__setitem__(name, check) for name in names] and check
+
+
+@pytest.mark.parametrize("name", registry())
+def test_off_costs_nothing(name, tmp_path):
+    found = ELSEWHERE_OFF.get(name)
+    exists(found) if found else OFF[name](registry()[name], tmp_path)
+
+
+@pytest.mark.parametrize("name", registry())
+def test_on_where_it_does_not_matter_changes_nothing(name, tmp_path):
+    found = ELSEWHERE_ON.get(name)
+    exists(found) if found else ON[name](registry()[name], tmp_path)
+
+
+@pytest.mark.parametrize("name", registry())
+def test_the_object_lives_where_the_registry_says(name):
+    module, _, attribute = registry()[name].place.rpartition(".")
+    assert hasattr(import_module(module), attribute)
+
+
+def exists(test: str) -> None:
+    """Assert that a test is there, by its file and name."""
+    path, _, name = test.partition("::")
+    defined = ast.walk(ast.parse((ROOT / path).read_text()))
+    assert any(isinstance(item, ast.FunctionDef) and item.name == name for item in defined), test
+
+
+def steps_of(motion) -> dict:
+    """Return what some steps of a motion call, once all is compiled."""
+    scene.step_of(motion)
+    return scene.calls(lambda: [scene.step_of(motion) for _ in range(STEPS)])
+
+
+# The reflow: an effect is an object in the lists of `Physics`.
+
+
+@off("gravity", "surface_tension", "wall_adhesion", "inertia", "viscosity")
+def _(effect, _folder):
+    """A step takes as many calls as with lists from which the object was taken, and enters nothing of it."""
+    module, _, kind = effect.place.rpartition(".")
+    # Wetting pins by all other forces, so that their lists cannot be compared.
+    others = scene.RESTING | ({"wall_adhesion": False} if effect.name in ("gravity", "surface_tension") else {})
+    acting, taken, left_out = (scene.flow_with(others | {effect.name: on}) for on in (True, False, False))
+    taken.physics = scene.without(acting.physics, getattr(import_module(module), kind))
+    for acts in (True, False):
+        scene.flow_with(others | {effect.name: acts}).step()  # compiled before it is counted
+    counts = [scene.calls(flow.step) for flow in (taken, left_out, acting)]
+    assert counts[0] == counts[1]
+    assert not scene.enters(counts[1], effect.place)
+    assert scene.enters(counts[2], effect.place)
+
+
+@on("gravity")
+def _(_effect, _folder):
+    light = scene.SOLDER.model_copy(update={"gravity": 0.25})
+    told = decide_drop(light, is_free=False)["gravity"]
+    assert not told["on"]
+    switched = light.model_copy(update={"effects": SolderEffects(gravity="on")})
+    heights = [solve_drop(solder, 6)[1].history(1.0)["height"][-1] for solder in (light, switched)]
+    assert 0.0 < 1.0 - heights[1] / heights[0] < NEGLIGIBLE_SHAPE_CHANGE
+
+
+@on("inertia", "viscosity")
+def _(effect, _folder):
+    """A drop of 90 deg, whose process is long enough to be called quasi-static: less changes than by resolution."""
+    thick = scene.SOLDER.model_copy(update={"pad_contact_angle": 0.5 * np.pi, "viscosity": 0.5, "gravity": 0.0})
+    numbers = drop_numbers(thick)
+    slowest = max(numbers.capillary_time, numbers.viscous_time)
+    long = thick.model_copy(update={"process_time": 21.0 * slowest})
+    assert not decide(numbers, long)[effect.name]["on"]
+    both = long.model_copy(update={"effects": SolderEffects(inertia="on", viscosity="on")})
+    heights = [solve_drop(solder, 5)[1].history(1.0)["height"][-1] for solder in (long, both)]
+    exact = (1.5 * thick.volume / np.pi) ** (1.0 / 3.0)
+    assert abs(heights[1] - heights[0]) < 0.2 * min(abs(height - exact) for height in heights)
+
+
+@on("surface_tension", "wall_adhesion")
+def _(effect, _folder):
+    """Where the Bond number calls for neither, weight pushes more than a hundred times harder."""
+    heavy = scene.SOLDER.model_copy(update={"gravity": 6.0e3})
+    assert not decide_drop(heavy, is_free=False)[effect.name]["on"]
+    flow = scene.flow_with(scene.RESTING, solder=heavy)
+    pushes = {type(force).__name__: np.linalg.norm(force.force(flow.body)) for force in flow.physics.forces}
+    kind = effect.place.rpartition(".")[2]
+    assert pushes[kind] < 0.1 * pushes["Gravity"]
+
+
+# Temperatures of the reflow.
+
+
+@off("thermal")
+def _(effect, _folder):
+    """Without a rise all load steps are one, flat at the reference."""
+    flat = Thermal.model_validate(dict.fromkeys(("reference", "peak", "melting", "solidification", "final"), 298.15))
+    assert {step.temperature for step in load_steps(flat)} == {298.15}
+    assert effect.threshold is None
+
+
+@on("thermal")
+def _(_effect, folder):
+    structure = ThermalStructure.build(MPI.COMM_SELF, small_structure(folder, gravity=0.0))
+    state = structure.solve(Thermal().reference, 0.0, np.zeros((4, 2, 6)), np.zeros(len(structure.rigid_modes.names)))
+    assert np.abs(state.displacement).max() < 1e-15
+
+
+@off("flexible")
+def _(effect, folder):
+    """Rigid plates: no structure is built, none is asked."""
+    assembly = small_structure(folder)
+    rigid = RigidPlates(assembly)
+    called = scene.calls(lambda: rigid.solve(473.15, 0.0, np.zeros((4, 2, 6)), np.zeros(1)))
+    assert not scene.enters(called, effect.place)
+    assert open_structure.__module__ == "workflow.reflow.between"
+
+
+@off("solder_force")
+def _(_effect, folder):
+    """Wrenches that do not bend anything cost what no wrenches cost."""
+    counts = []
+    for switch, force in (("off", 1e-3), ("on", 0.0)):
+        structure = ThermalStructure.build(MPI.COMM_SELF, small_structure(folder, effects={"solder_force": switch}))
+        wrenches, rigid = np.full((4, 2, 6), force), np.zeros(len(structure.rigid_modes.names))
+        called = scene.calls(lambda s=structure, w=wrenches, r=rigid: s.solve(473.15, 0.0, w, r))
+        counts.append({key: count for key, count in called.items() if key[0].startswith("fem")})
+    assert counts[0] == counts[1]
+
+
+@off("residual_stress")
+def _(_effect, _folder):
+    body, step = scene.strip()
+    assert not [term for term in body.terms if isinstance(term, Pretension)]
+    called = steps_of(scene.motion_of(body, step))
+    assert not [key for key in called if key[0].startswith("fem.residual")]
+
+
+@on("residual_stress")
+def _(_effect, _folder):
+    mesh = layered(np.linspace(0, 1e-3, 3), np.linspace(0, 7e-4, 3), {"board": [1e-4], "die": [2e-4]})
+    hot, same = (cooled(mesh, {"board": FR4, "die": SILICON}, change) for change in (-192.0, -1e-9))
+    assert np.abs(same.stress).max() < 1e-10 * np.abs(hot.stress).max()
+
+
+# Materials.
+
+
+def terms(material, kinematics="small") -> list:
+    elements = scene.strip()[0].elements
+    return force_terms(elements, [material], kinematics, 1e-8)
+
+
+@off("plasticity", "strain_rate", "thermal_softening")
+def _(_effect, _folder):
+    """Solder that does not yield is computed by the terms of elastic elements, without an array of history."""
+    elastic = terms(SAC305.elastic)
+    assert not any(isinstance(term, NonlinearElements) or term.history for term in elastic)
+    assert [type(term) for term in elastic] == [type(term) for term in terms(FR4)]
+    assert any(term.history for term in terms(SAC305))
+
+
+@on("plasticity")
+def _(_effect, _folder):
+    """Far below the yield stress the force is that of elastic elements, to rounding."""
+    body = scene.strip()[0]
+    small = 1e-7 * np.random.default_rng(0).normal(size=body.local.points.shape)
+    forces = []
+    for material in (SAC305, SAC305.elastic):
+        forces.append(np.zeros_like(small))
+        body = scene.strip(material=material)[0]
+        for term in body.terms:
+            term.add(small * 1e-3, forces[-1])
+    assert forces[0] == pytest.approx(forces[1], rel=1e-9, abs=1e-9 * np.abs(forces[1]).max())
+
+
+@on("strain_rate")
+def _(_effect, _folder):
+    """Flow below the reference rate is flow without a rate, whatever C."""
+    law = SAC305.plasticity.model_copy(update={"reference_rate": 1e12})
+    laws = [law, law.model_copy(update={"C": 0.0})]
+    forces = []
+    for item in laws:
+        found = terms(SAC305.model_copy(update={"plasticity": item}))[0]
+        stretch = 2e-3 * scene.strip()[0].local.points[:, :1] * [1.0, 0.0, 0.0]
+        forces.append(np.zeros_like(stretch))
+        found.add(stretch, forces[-1])
+    assert np.array_equal(*forces)
+
+
+@on("thermal_softening")
+def _(_effect, _folder):
+    cold = SAC305.model_copy(update={"temperature": SAC305.plasticity.room_temperature})
+    law = SAC305.plasticity.model_copy(update={"m": 0.1})
+    assert np.array_equal(plastic_constants(cold), plastic_constants(cold.model_copy(update={"plasticity": law})))
+
+
+# The shock.
+
+
+@off("gravity_in_the_shock", "damping", "large_mass")
+def _(effect, _folder):
+    """The list of loads of a plain drop is the pulse alone; a step calls what it calls with that list by hand."""
+    body, step = scene.strip()
+    plain = scene.loads_of(body, scene.shock())
+    switched = {
+        "gravity_in_the_shock": {"gravity": "on"},
+        "damping": {"damping": Damping(mass_coefficient=1.0)},
+        "large_mass": {"method": "large_mass"},
+    }[effect.name]
+    acting = scene.loads_of(body, scene.shock(**switched))
+    by_hand = [scene.BodyAcceleration(scene.DOWN, scene.HalfSine(1500 * G, 5e-4))]
+    counts = [steps_of(scene.motion_of(body, step, loads)) for loads in (plain, by_hand, acting)]
+    assert [type(load) for load in plain] == [type(load) for load in by_hand]
+    assert counts[0] == counts[1] != counts[2]
+
+
+@on("gravity_in_the_shock")
+def _(_effect, _folder):
+    body, step = scene.strip()
+    left_out = weight("auto", 1500 * G, G)
+    assert not left_out["on"] and left_out["influence"] < NEGLIGIBLE_WEIGHT
+    both = [scene.moved(body, step, scene.loads_of(body, scene.shock(gravity=g)), 3e-4)[1] for g in ("off", "on")]
+    assert 0.0 < both[1] / both[0] - 1.0 < 1.2 * left_out["influence"]
+
+
+@on("damping")
+def _(_effect, _folder):
+    body, step = scene.strip()
+    duration, rate = 3e-4, 1.0
+    foreseen = damping((rate, 0.0), 1.5e4, duration)["influence"]
+    given = scene.shock(damping=Damping(mass_coefficient=rate))
+    both = [scene.moved(body, step, scene.loads_of(body, item), duration)[1] for item in (scene.shock(), given)]
+    assert abs(both[1] / both[0] - 1.0) < foreseen < 1e-3
+
+
+@off("finite_rotation")
+def _(_effect, _folder):
+    body, _ = scene.strip()
+    assert not any(isinstance(term, NonlinearElements) or term.history for term in body.terms)
+    called = steps_of(scene.motion_of(body, 1e-9))
+    assert not [key for key in called if "nonlinear" in key[0]]
+
+
+@on("finite_rotation")
+def _(_effect, _folder):
+    """Between held ends, at the deflection up to which kinematics are small, and at one thickness."""
+    changes = {}
+    for peak in (30.0 * G, 3000.0 * G):
+        drop = scene.shock(peak_acceleration=peak)
+        deflections = []
+        for kinematics in ("small", "finite"):
+            body, step = scene.strip(kinematics)
+            deflections.append(scene.moved(body, step, scene.loads_of(body, drop), 4e-4)[1])
+        changes[called_for(deflections[0] / scene.THICKNESS)[0]] = abs(deflections[1] / deflections[0] - 1.0)
+    assert changes["small"] < NEGLIGIBLE_STIFFENING < changes["finite"]
+
+
+@off("one_way")
+def _(_effect, _folder):
+    for name in ("held_velocity", "local_steps", "impulse", "gravouil_combescure"):
+        assert not isinstance(scheme_of(name), OneWay)
+    assert isinstance(scheme_of("held_velocity", "one_way"), OneWay)
+
+
+@off("coarse_joints")
+def _(_effect, _folder):
+    assert not needs_coarse_joints(JointCoupling())
+    assert needs_coarse_joints(JointCoupling(fine_joints="critical"))
+
+
+@off("mass_scaling")
+def _(_effect, _folder):
+    pieces = SimpleNamespace(roles=np.array(["copper", "solder"]), steps=np.array([1e-9, 4e-9]))
+    assert np.array_equal(mass_factor(pieces, (), 4e-9), [1.0, 1.0])
+    assert np.array_equal(mass_factor(pieces, ("copper",), 4e-9), [16.0, 1.0])
+
+
+@on("mass_scaling")
+def _(_effect, _folder):
+    """A thousandth of mass added everywhere changes a free vibration by half of it in frequency."""
+    body, step = scene.strip()
+    heavier = replace(body, mass=1.001 * body.mass)
+    both = [scene.moved(item, step, scene.loads_of(item, scene.shock()), 3e-4)[1] for item in (body, heavier)]
+    assert abs(both[1] / both[0] - 1.0) < 2e-3
+
+
+@off("symmetry")
+def _(_effect, _folder):
+    mesh = mesh_of(*grid([0.0, 1.0], [0.0, 1.0], [0.0, 1.0]), "board", {})
+    assert not held_components(mesh).any()
+
+
+@off("failure")
+def _(_effect, _folder):
+    assert failure_criteria(Failure()) == []
+
+
+@on("failure")
+def _(_effect, _folder):
+    """Judging changes no history."""
+    rng = np.random.default_rng(0)
+    arrays = {name: rng.random((5, 2)) for name in ("peel_board", "peel_package")} | {"joints": np.array(["A1", "B1"])}
+    arrays["time"] = np.arange(5.0)
+    before = {name: value.copy() for name, value in arrays.items()}
+    assert judge(failure_criteria(Failure(peel_stress=1e9)), arrays)
+    assert all(np.array_equal(arrays[name], before[name]) for name in arrays)
