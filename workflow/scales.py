@@ -35,7 +35,7 @@ def take_scales(table: dict, problems: list[Problem]) -> dict[str, dict[str, obj
         elif not isinstance(values, dict):
             problems.append(Problem(f"scales.{name}", "must be a table", values, KEYS))
         else:
-            scales[name] = dict(_dotted(values))
+            scales[name] = dict(dotted(values))
     return scales
 
 
@@ -55,9 +55,10 @@ def scales_text(scales: dict[str, dict[str, object]]) -> Iterator[str]:
         yield "\n".join([f'# What differs by --set scale="{name}".', f"[scales.{name}]", *lines, ""])
 
 
-def _dotted(values: dict, prefix: str = "") -> Iterator[tuple[str, object]]:
+def dotted(values: dict, prefix: str = "") -> Iterator[tuple[str, object]]:
+    """Yield dotted key and value of a table of tables."""
     for key, value in values.items():
         if isinstance(value, dict):
-            yield from _dotted(value, f"{prefix}{key}.")
+            yield from dotted(value, f"{prefix}{key}.")
         else:
             yield prefix + key, value

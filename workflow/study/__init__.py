@@ -1,0 +1,1 @@
+"""Parametric studies: one case at many settings."""

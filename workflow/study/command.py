@@ -1,0 +1,140 @@
+"""The command study: reads the study, checks every point, computes what is missing, writes the results."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from rich.table import Table
+
+from workflow.plan_table import duration, new_table
+from workflow.points.batch import Machine, missing, run_points
+from workflow.points.point import Point, PointsError, read_possible_points
+from workflow.points.store import Store
+from workflow.problems import CaseError
+from workflow.progress import progress_bar
+from workflow.study import tables
+from workflow.study.outlook import outlook
+from workflow.study.progress import teller
+from workflow.study.results import HEALTHY, IMPOSSIBLE, Row, row_of
+from workflow.study.study_file import Study, read_study
+from workflow.terminal import console, print_error
+
+LAST = "report"
+SHOWN = 10  # points of the ranking in the terminal
+
+
+@dataclass(frozen=True, slots=True)
+class Points:
+    """The points of a study.
+
+    Attributes:
+        study: the study.
+        settings: of each point.
+        possible: place in the study -> point.
+        impossible: place in the study -> what is wrong with its case.
+    """
+
+    study: Study
+    settings: list[dict[str, str]]
+    possible: dict[int, Point]
+    impossible: dict[int, CaseError]
+
+
+def read_points_of(path: Path, oversubscribe: bool = False) -> Points:
+    """Read a study and all its points.
+
+    Raises:
+        CaseError: the study is wrong, or points of it cannot be and are not to be skipped.
+    """
+    study = read_study(path)
+    settings = study.points
+    points, impossible = read_possible_points(study.case, settings, oversubscribe)
+    if impossible and not (study.about.skip_impossible and points):
+        raise PointsError(str(study.case), impossible, settings)
+    places = [place for place in range(len(settings)) if place not in impossible]
+    return Points(study, settings, dict(zip(places, points, strict=True)), impossible)
+
+
+def show_outlook(points: Points, store: Store) -> None:
+    """Print what would be computed, and its foreseen cost."""
+    every = list(points.possible.values())
+    stages = outlook(every, missing(store, every, LAST))
+    table = new_table(
+        f"{points.study.about.name}: {len(every)} points, in {store.folder}",
+        "stage",
+        "products",
+        "there",
+        "to do",
+        "cost",
+    )
+    for own in stages:
+        cost = "" if own.seconds is None else f"about {duration(own.seconds)} on one core after the other"
+        table.add_row(own.stage, f"{own.products}", f"{own.products - own.missing}", f"{own.missing}", cost)
+    total = sum(own.seconds or 0.0 for own in stages)
+    count = sum(own.missing for own in stages)
+    table.add_row(
+        "all",
+        f"{sum(own.products for own in stages)}",
+        "",
+        f"{count}",
+        f"about {duration(total)}" if total else "",
+        style="bold",
+    )
+    console.print(table)
+    if points.impossible:
+        console.print(f"{len(points.impossible)} points cannot be and are skipped")
+
+
+def run_study(points: Points, store: Store, machine: Machine) -> bool:
+    """Compute what is missing of a study and write its results.
+
+    Returns:
+        Whether every point that can be is complete and healthy.
+    """
+    every = list(points.possible.values())
+    jobs = missing(store, every, LAST)
+    if jobs:
+        with progress_bar(f"{points.study.about.name}: {len(jobs)} products to compute") as bar:
+            failed = run_points(store, every, LAST, machine, teller(store, every, jobs, bar))
+    else:
+        console.print(f"nothing to compute: {store.folder} has all {len(every)} points")
+        failed = {}
+    rows = results(points, store, failed)
+    from workflow.study.page import write_results
+
+    write_results(store.folder, points.study, rows)
+    show_results(points.study, rows, store.folder)
+    return all(row.verdict in (HEALTHY, IMPOSSIBLE) for row in rows)
+
+
+def results(points: Points, store: Store, failed: dict[str, str]) -> list[Row]:
+    """Return a row for each point, in the order of the study."""
+    keys = points.study.design.keys
+    rows = [row_of(place + 1, store, point, keys, failed.get(point.key)) for place, point in points.possible.items()]
+    rows += [
+        Row(place + 1, "", {key: points.settings[place][key] for key in keys}, IMPOSSIBLE, "; ".join(error.lines()))
+        for place, error in points.impossible.items()
+    ]
+    return sorted(rows, key=lambda row: row.number)
+
+
+def show_results(study: Study, rows: Sequence[Row], folder: Path) -> None:
+    """Print the best points, the effects, and what went wrong."""
+    ranking = tables.ranking(study, rows)
+    if ranking["rows"]:
+        count = min(SHOWN, len(ranking["rows"]))
+        console.print(_printed(f"{count} of {len(rows)} points by {study.about.rank_by}", ranking, count))
+        console.print(_printed("\nMain effects", tables.effect_table(tables.effects(study, rows))))
+    for row in rows:
+        if row.verdict != HEALTHY:
+            print_error(f"point {row.number} {row.key} {row.verdict}: {row.message}")
+    console.print(f"results: {folder}/study.html, results.csv, results.parquet, main_effects.png")
+
+
+def _printed(title: str, table: dict, count: int | None = None) -> Table:
+    shown = Table(title=title, title_justify="left", title_style="bold", show_edge=False, pad_edge=False)
+    for place, head in enumerate(table["head"]):
+        shown.add_column(head, justify="left" if place == 0 else "right")
+    for row in table["rows"][:count]:
+        shown.add_row(*row)
+    return shown

@@ -1,0 +1,127 @@
+"""Designs: which settings the points of a study have. A factor is what is varied as one, of one key or several."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+
+from workflow.problems import Problem
+from workflow.study.hypercube import Hypercube
+from workflow.study.setting_text import as_text, between
+
+VALUES = 'a list of values; of several keys ("a, b") each one value for all, or a list of one for each'
+RANGE = 'a range of two values in the same unit, e.g. ["0.8 mm", "1 mm"]'
+
+
+@dataclass(frozen=True, slots=True)
+class Factor:
+    """What is varied as one.
+
+    Attributes:
+        keys: dotted keys that change together; the first one names it.
+        continuous: whether its values are samples of a range; else there are a few.
+    """
+
+    keys: tuple[str, ...]
+    continuous: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Design:
+    """Factors, and the settings of each point, dotted key -> text."""
+
+    factors: tuple[Factor, ...] = ()
+    points: tuple[Mapping[str, str], ...] = ({},)
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """All keys that vary."""
+        return tuple(key for factor in self.factors for key in factor.keys)
+
+    def __mul__(self, other: "Design") -> "Design":
+        """Each point of one with each of the other."""
+        points = tuple({**one, **two} for one, two in product(self.points, other.points))
+        return Design(self.factors + other.factors, points)
+
+    @classmethod
+    def of(cls, *axes: "Design") -> "Design":
+        """Every combination of designs; of none the one point without settings."""
+        design = cls()
+        for axis in axes:
+            design = design * axis
+        return design
+
+
+def grid_axes(table: Mapping[str, object], problems: list[Problem]) -> Iterator[Design]:
+    """Yield a design for each line of ``[grid]``: ``"keys" = values``."""
+    for text, values in table.items():
+        keys = _keys(text)
+        if not isinstance(values, list) or not values:
+            problems.append(Problem(f"grid.{text}", "must be a list with at least one value", values, VALUES))
+            continue
+        points = [_level(keys, value) for value in values]
+        if None in points:
+            problems.append(
+                Problem(f"grid.{text}", f"has values that are not one for each of {len(keys)} keys", values, VALUES)
+            )
+        yield Design((Factor(keys),), tuple(point for point in points if point is not None))
+
+
+def list_axis(rows: Sequence[Mapping[str, object]], problems: list[Problem]) -> Design:
+    """Return the design of ``[[list]]``; a factor is what is not the same in all rows."""
+    points = tuple({key: as_text(value) for key, value in row.items()} for row in rows)
+    for place, point in enumerate(points):
+        if missing := [key for key in points[0] if key not in point] + [key for key in point if key not in points[0]]:
+            problems.append(
+                Problem(
+                    f"list.{missing[0]}", f"is not in all rows (see row {place + 1})", None, "the same keys in each"
+                )
+            )
+    varied = [key for key in points[0] if len({point.get(key) for point in points}) > 1]
+    return Design(tuple(Factor((key,)) for key in varied or points[0]), points)
+
+
+def sampled(table: Mapping[str, object], cube: Hypercube, problems: list[Problem]) -> Design:
+    """Return the design of ``[latin_hypercube]``: ``"keys" = [low, high]``, one dimension each."""
+    factors = [Factor(_keys(text), continuous=True) for text in table]
+    ranges = []
+    for factor, (text, ends) in zip(factors, table.items(), strict=True):
+        found = _range(factor.keys, ends)
+        if found is None:
+            problems.append(Problem(f"latin_hypercube.ranges.{text}", "is no range", ends, RANGE))
+        else:
+            ranges.append(found)
+    if not table:
+        problems.append(Problem("latin_hypercube.ranges", "is empty", None, RANGE))
+    if not table or len(ranges) < len(factors):
+        return Design()
+    points = tuple(
+        {
+            key: str(between(*ends, share))
+            for range_, share in zip(ranges, row, strict=True)
+            for key, ends in range_.items()
+        }
+        for row in cube.shares(len(factors))
+    )
+    return Design(tuple(factors), points)
+
+
+def _keys(text: str) -> tuple[str, ...]:
+    return tuple(key.strip() for key in text.split(","))
+
+
+def _level(keys: Sequence[str], value: object) -> dict[str, str] | None:
+    """Return the settings of one value: of several keys a list with one for each, or one for all."""
+    if len(keys) == 1 or not isinstance(value, list):
+        return dict.fromkeys(keys, as_text(value))
+    return {key: as_text(own) for key, own in zip(keys, value, strict=True)} if len(value) == len(keys) else None
+
+
+def _range(keys: Sequence[str], ends: object) -> dict[str, tuple[object, object]] | None:
+    """Return the range of each key; None where it is none."""
+    if not isinstance(ends, list) or len(ends) != 2:
+        return None
+    own = [end if isinstance(end, list) and len(keys) > 1 else [end] * len(keys) for end in ends]
+    if any(len(values) != len(keys) for values in own):
+        return None
+    found = {key: (own[0][place], own[1][place]) for place, key in enumerate(keys)}
+    return found if all(between(*range_, 0.0) is not None for range_ in found.values()) else None

@@ -1,0 +1,67 @@
+"""Pictures of a study: a panel for each metric and factor."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from workflow.report.curves import STYLE, pyplot
+from workflow.report.tables import SHOWN
+from workflow.study.main_effects import Effect
+
+BLUE, RED, GREY = "#0b5fa5", "#d1495b", "#9aa5b1"
+
+
+def main_effects(effects: Sequence[tuple[str, str, Sequence[Effect]]]) -> Figure:
+    """Draw main effects: means at each value of a factor with least and largest, or samples with their trend.
+
+    Args:
+        effects: metric, its unit, its effects: a row of panels each.
+    """
+    columns = max(len(row) for _, _, row in effects)
+    with pyplot.rc_context(STYLE):
+        figure, axes = pyplot.subplots(
+            len(effects), columns, squeeze=False, sharey="row", layout="constrained",
+            figsize=(max(2.5 * columns, 4.0), 2.5 * len(effects)),
+        )  # fmt: skip
+        for row, (metric, unit, own) in zip(axes, effects, strict=True):
+            factor, shown = SHOWN.get(unit, (1.0, unit))
+            row[0].set_ylabel(f"{metric.replace('_', ' ')} [{shown}]" if shown else metric.replace("_", " "))
+            for axis, effect in zip(row, own, strict=False):
+                (_samples if effect.factor.continuous and effect.is_ordered else _means)(axis, effect, factor)
+                axis.set_xlabel(axis_title(effect))
+        return figure
+
+
+def axis_title(effect: Effect) -> str:
+    """Name a factor in two lines that fit a panel, with its unit."""
+    table, _, name = effect.factor.keys[0].rpartition(".")
+    return f"{table}\n{name} [{effect.unit}]" if effect.unit else f"{table}\n{name}"
+
+
+def _means(axis: Axes, effect: Effect, factor: float) -> None:
+    levels = effect.levels
+    places = np.arange(len(levels))
+    mean, low, high = (
+        factor * np.array([getattr(level, name) for level in levels]) for name in ("mean", "low", "high")
+    )
+    at = [[level.value for level in levels].index(_name(value)) for value in effect.values]
+    axis.plot(at, factor * effect.metrics, ".", color=GREY, markersize=4)
+    axis.errorbar(places, mean, [mean - low, high - mean], color=BLUE, marker="o", capsize=3, linewidth=1.4)
+    axis.set_xticks(places, [level.value for level in levels])
+    axis.margins(x=0.15)
+
+
+def _samples(axis: Axes, effect: Effect, factor: float) -> None:
+    values = np.array(effect.values, dtype=float)
+    axis.plot(values, factor * effect.metrics, ".", color=BLUE, markersize=6)
+    if len(set(effect.values)) > 1:
+        ends = np.array([values.min(), values.max()])
+        axis.plot(ends, np.polyval(np.polyfit(values, factor * effect.metrics, 1), ends), "-", color=RED, linewidth=1.2)
+    if effect.rank_correlation is not None:
+        axis.set_title(f"rank correlation {effect.rank_correlation:+.2f}", fontsize=8)
+
+
+def _name(value: float | str) -> str:
+    return f"{value:g}" if isinstance(value, float) else value

@@ -1,0 +1,61 @@
+"""What a study will compute: products that are there, that are missing, and what these are foreseen to cost."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from workflow.board_drop_case import PackageCase
+from workflow.case_kind import Case
+from workflow.points.batch import Job
+from workflow.points.point import Point
+from workflow.structure.case import StructureCase
+
+
+@dataclass(frozen=True, slots=True)
+class StageOutlook:
+    """Products of one stage.
+
+    Attributes:
+        stage: its name.
+        points: number of points that need one.
+        products: number of distinct ones.
+        missing: number of those that will be computed.
+        seconds: wall time [s] foreseen for these, one after the other; None where there is no forecast.
+    """
+
+    stage: str
+    points: int
+    products: int
+    missing: int
+    seconds: float | None
+
+
+def outlook(points: Sequence[Point], jobs: Sequence[Job]) -> list[StageOutlook]:
+    """Foresee what a study will compute.
+
+    Args:
+        points: all of them.
+        jobs: the products that are missing.
+    """
+    found = []
+    for stage in dict.fromkeys(name for point in points for name in point.case.pipeline.names):
+        wanted = [point.digests[stage] for point in points if stage in point.digests]
+        own = [job for job in jobs if job.stage == stage]
+        seconds = [foreseen_seconds(job.point.case).get(stage) for job in own]
+        known = [value for value in seconds if value is not None]
+        found.append(StageOutlook(stage, len(wanted), len(set(wanted)), len(own), sum(known) if known else None))
+    return found
+
+
+def foreseen_seconds(case: Case) -> dict[str, float]:
+    """Return the wall time [s] that `plan` foresees, by stage; stages without a forecast are left out."""
+    if isinstance(case, PackageCase):
+        from workflow.forecast import forecast
+
+        return forecast(case).seconds
+    if isinstance(case, StructureCase):
+        from workflow.structure.forecast import forecast_structure
+
+        return forecast_structure(case).seconds
+    from workflow.scene_forecast import forecast_scene
+
+    return forecast_scene(case).seconds

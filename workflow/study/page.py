@@ -1,0 +1,53 @@
+"""study.html, main_effects.png, results.csv and results.parquet of a study."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from workflow import __version__
+from workflow.report.page import write_page
+from workflow.study import tables
+from workflow.study.results import HEALTHY, Row, columns, write_csv, write_parquet
+from workflow.study.study_file import Study
+
+
+def write_results(folder: Path, study: Study, rows: Sequence[Row]) -> None:
+    """Write all results of a study.
+
+    Args:
+        folder: where they go.
+        study: what was varied.
+        rows: one a point.
+    """
+    table = columns(rows, study)
+    write_csv(folder / "results.csv", table)
+    write_parquet(folder / "results.parquet", table)
+    found = tables.effects(study, rows)
+    write_page(folder / "study.html", "study.html.j2", _context(study, rows, found) | _picture(folder, found))
+
+
+def _context(study: Study, rows: Sequence[Row], found: list) -> dict:
+    healthy = sum(row.verdict == HEALTHY for row in rows)
+    return {
+        "version": __version__,
+        "study": study.about,
+        "fixed": {"head": ["setting of all points", "value"], "rows": [list(item) for item in study.settings.items()]},
+        "count": len(rows),
+        "healthy": healthy,
+        "ranking": tables.ranking(study, rows),
+        "effects": tables.effect_table(found),
+        "troubles": tables.troubles(rows),
+        "continuous": any(factor.continuous for factor in study.design.factors),
+        "rank_by": study.about.rank_by.replace("_", " "),
+    }
+
+
+def _picture(folder: Path, found: list) -> dict:
+    """Draw main effects into a PNG; return them as SVG. Nothing where no point has a metric."""
+    if not found:
+        return {"picture": ""}
+    from workflow.report.curves import svg
+    from workflow.study.figures import main_effects
+
+    figure = main_effects(found)
+    figure.savefig(folder / "main_effects.png", dpi=150)
+    return {"picture": svg(figure)}

@@ -1,0 +1,50 @@
+"""How far a study is: points done, points failed, time left."""
+
+import time
+from collections.abc import Callable, Sequence
+
+from workflow.inputs import read_record
+from workflow.plan_table import duration
+from workflow.points.batch import Job
+from workflow.points.point import Point
+from workflow.points.store import Store
+from workflow.progress import ProgressBar
+
+
+def teller(store: Store, points: Sequence[Point], jobs: Sequence[Job], bar: ProgressBar) -> Callable[[], None]:
+    """Return what tells a progress bar, when called, how far a study is.
+
+    Time left: each missing product takes as long as the mean of those of its stage that were made since the start, and
+    as many are made at a time as so far.
+    """
+    begin = time.monotonic()
+    waiting, seconds = list(jobs), dict[str, list[float]]()
+
+    def tell() -> None:
+        for job in [job for job in waiting if store.has(job.point, job.stage)]:
+            record = read_record(store.run_folder(job.point), job.point.case.pipeline[job.stage])
+            seconds.setdefault(job.stage, []).append(record["seconds"] if record else 0.0)
+            waiting.remove(job)
+        failed = sum(any(store.message(point, job.stage) for job in waiting if job.point is point) for point in points)
+        done = sum(store.is_complete(point, point.case.pipeline.names[-1]) for point in points)
+        left = seconds_left([job.stage for job in waiting], seconds, time.monotonic() - begin)
+        words = f"{done} of {len(points)} points done, {failed} failed"
+        bar(1.0 - len(waiting) / len(jobs), words if left is None else f"{words}, about {duration(left)} left")
+
+    return tell
+
+
+def seconds_left(waiting: Sequence[str], done: dict[str, list[float]], elapsed: float) -> float | None:
+    """Return the wall time [s] that the rest will take; None before anything is done.
+
+    Args:
+        waiting: stages of the products that are missing.
+        done: stage -> wall times [s] of its products made so far.
+        elapsed: wall time [s] in which they were made.
+    """
+    every = [value for own in done.values() for value in own]
+    if not every:
+        return None
+    mean = sum(every) / len(every)
+    rest = sum(sum(own) / len(own) if (own := done.get(stage)) else mean for stage in waiting)
+    return rest * elapsed / max(sum(every), 1e-9)

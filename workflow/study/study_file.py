@@ -1,0 +1,123 @@
+"""A study file: which case, at which settings, ranked by what."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from workflow.case import read_toml
+from workflow.case_kind import NAME
+from workflow.problems import CaseError, Problem
+from workflow.scales import dotted
+from workflow.study.designs import Design, grid_axes, list_axis, sampled
+from workflow.study.hypercube import Hypercube
+from workflow.study.setting_text import as_text
+from workflow.validation import translate
+
+DESIGNS = "at least one of [grid], [[list]], [latin_hypercube]"
+
+
+class StudyTable(BaseModel):
+    """What the table ``[study]`` says: the case, relative to the file, and what is made of the results."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    name: Annotated[str, Field(pattern=NAME)]
+    title: str = ""
+    case: str
+    scale: str | None = None
+    rank_by: str
+    goal: Literal["minimise", "maximise"] = "minimise"
+    metrics: tuple[str, ...] = ()
+    skip_impossible: bool = False
+
+
+class LatinHypercubeTable(BaseModel):
+    """A Latin hypercube: each parameter once in each of ``samples`` equal parts of its range."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    samples: int = Field(ge=1, le=10000)
+    seed: int = Field(0, ge=0)
+    ranges: dict[str, Any]
+
+
+class StudyFile(BaseModel):
+    """The tables of a study file."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    study: StudyTable
+    settings: dict[str, Any] = {}
+    grid: dict[str, Any] = {}
+    list: tuple[dict[str, Any], ...] = ()
+    latin_hypercube: LatinHypercubeTable | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Study:
+    """A study.
+
+    Attributes:
+        about: name, title, metrics.
+        case: the case file.
+        settings: of all points, dotted key -> text.
+        design: what varies.
+    """
+
+    about: StudyTable
+    case: Path
+    settings: Mapping[str, str]
+    design: Design
+
+    @property
+    def metrics(self) -> tuple[str, ...]:
+        """The metrics that are plotted: first the one that points are ranked by."""
+        return tuple(dict.fromkeys((self.about.rank_by, *self.about.metrics)))
+
+    @property
+    def points(self) -> list[dict[str, str]]:
+        """Settings of every point."""
+        return [{**self.settings, **chosen} for chosen in self.design.points]
+
+
+def read_study(path: Path) -> Study:
+    """Read and check a study file; its case is read with its points.
+
+    Raises:
+        CaseError: with all problems found.
+    """
+    table = read_toml(path)
+    values = table | ({"list": tuple(table["list"])} if isinstance(table.get("list"), list) else {})
+    if isinstance(given := table.get("study"), dict) and isinstance(given.get("metrics"), list):
+        values["study"] = given | {"metrics": tuple(given["metrics"])}
+    try:
+        file = StudyFile.model_validate(values, strict=True)
+    except ValidationError as error:
+        raise CaseError(str(path), translate(StudyFile, error, table, set())) from None
+    problems: list[Problem] = []
+    design = _design(file, problems)
+    settings = {key: as_text(value) for key, value in dotted(file.settings)}
+    settings |= {"scale": file.study.scale} if file.study.scale else {}
+    problems += [
+        Problem(key, "is fixed and varied at once", settings[key], "either [settings] or a design")
+        for key in sorted(settings.keys() & set(design.keys))
+    ]
+    if problems:
+        raise CaseError(str(path), problems)
+    return Study(file.study, path.parent / file.study.case, settings, design)
+
+
+def _design(file: StudyFile, problems: list[Problem]) -> Design:
+    """Every combination of the grid with every row of the list and every sample."""
+    design = Design.of(*grid_axes(dict(dotted(file.grid)), problems))
+    if file.list:
+        design = design * list_axis([dict(dotted(row)) for row in file.list], problems)
+    if file.latin_hypercube is not None:
+        cube = file.latin_hypercube
+        design = design * sampled(dict(dotted(cube.ranges)), Hypercube(cube.samples, cube.seed), problems)
+    if not design.factors and not problems:
+        problems.append(Problem("", "varies nothing", None, DESIGNS))
+    return design

@@ -1,0 +1,76 @@
+"""Tables of a study: points by rank, factors by size of their effect, points that have no result."""
+
+from collections.abc import Iterable, Sequence
+
+from workflow.report.tables import number, quantity
+from workflow.study.main_effects import Effect, effect_of, measured, ranked
+from workflow.study.results import HEALTHY, Row
+from workflow.study.study_file import Study
+
+
+def ranking(study: Study, rows: Sequence[Row]) -> dict:
+    """Return the table of healthy points, best first."""
+    metrics = study.metrics
+    head = ["rank", "point", *_short(study.design.keys), *(name.replace("_", " ") for name in metrics), "time"]
+    return {
+        "head": head,
+        "rows": [
+            [
+                str(place),
+                row.key,
+                *row.settings.values(),
+                *(quantity(row.metrics[name]) if name in row.metrics else "–" for name in metrics),
+                f"{number(row.seconds)} s",
+            ]
+            for place, row in enumerate(ranked(rows, study.about.rank_by, study.about.goal), start=1)
+        ],
+    }
+
+
+def effects(study: Study, rows: Sequence[Row]) -> list[tuple[str, str, list[Effect]]]:
+    """Return metric, unit and effect of every factor, for each metric that points have."""
+    return [
+        (name, found[0].metrics[name]["unit"], [effect_of(factor, found, name) for factor in study.design.factors])
+        for name in study.metrics
+        if (found := measured(rows, name))
+    ]
+
+
+def effect_table(found: Sequence[tuple[str, str, Sequence[Effect]]]) -> dict:
+    """Return the table of factors, for each metric the largest effect first."""
+    return {
+        "head": ["factor", "metric", "effect", "rank correlation", "chance alone"],
+        "rows": [
+            [
+                ", ".join(effect.factor.keys),
+                metric.replace("_", " "),
+                quantity({"value": effect.size, "unit": unit}),
+                "–" if effect.rank_correlation is None else f"{effect.rank_correlation:+.2f}",
+                "–" if effect.probability is None else f"{effect.probability:.2g}",
+            ]
+            for metric, unit, own in found
+            for effect in sorted(own, key=lambda effect: -effect.size)
+        ],
+    }
+
+
+def troubles(rows: Sequence[Row]) -> dict:
+    """Return the table of points that failed, cannot be, or broke a check."""
+    return {
+        "head": ["point", "settings", "verdict", "why"],
+        "prose": True,
+        "rows": [
+            [row.key or f"number {row.number}", _told(row), row.verdict, row.message]
+            for row in rows
+            if row.verdict != HEALTHY
+        ],
+    }
+
+
+def _told(row: Row) -> str:
+    return ", ".join(f"{name} {value}" for name, value in zip(_short(row.settings), row.settings.values(), strict=True))
+
+
+def _short(keys: Iterable[str]) -> list[str]:
+    """Shorten dotted keys to their last two names, in words."""
+    return [" ".join(key.split(".")[-2:]).replace("_", " ") for key in keys]
