@@ -1,4 +1,4 @@
-"""Points of a small drop, computed through Snakemake: killed in the middle, one that fails, the same as a run."""
+"""A study of a small drop, through Snakemake: killed in the middle, one point fails, the others are as by a run."""
 
 import json
 import signal
@@ -11,51 +11,54 @@ import psutil
 from tests.support.workflow_command import wait_until
 from workflow.inputs import read_record
 from workflow.points.batch import Machine, missing, run_points
-from workflow.points.point import read_points
 from workflow.points.store import Store
 from workflow.stage_runner import Run, run_stage
 from workflow.stages import STAGE_FUNCTIONS
+from workflow.study.command import read_points_of, run_study
 
 CASE = Path(__file__).resolve().parents[2] / "cases" / "sessile_drop" / "case.toml"
-COARSE = {"drop.particles_per_edge": "5"}
-SETTINGS = [COARSE, COARSE | {"case.title": "shared"}, COARSE | {"solder.numerics.max_steps": "1"}]
-TIMES = {"seconds", "particle_steps_per_second"}
-PROGRAM = f"""
-from pathlib import Path
-from workflow.points.batch import Machine, run_points
-from workflow.points.point import read_points
-from workflow.points.store import Store
-run_points(Store(Path("store")), read_points(Path({str(CASE)!r}), {SETTINGS!r}), "report", Machine(cores=2))
+STUDY = f"""
+study = {{ name = "drops", case = "{CASE}", rank_by = "height" }}
+settings.drop.particles_per_edge = 5
+grid."solder.numerics.max_steps" = [20000, 1]
 """
+TIMES = {"seconds", "particle_steps_per_second"}
 
 
-def test_points_are_computed_once_and_survive_a_kill(tmp_path):
-    store, points = Store(tmp_path / "store"), read_points(CASE, SETTINGS)
-    assert len(missing(store, points, "report")) == 5
-    process = subprocess.Popen([sys.executable, "-c", PROGRAM], cwd=tmp_path)
-    reflow = store.stage_folder(points[0].case, "reflow") / "stage.json"
+def untimed(record: dict) -> dict:
+    return {name: value for name, value in record["metrics"].items() if name not in TIMES}
+
+
+def test_a_study_is_computed_once_and_survives_a_kill(tmp_path):
+    path, store = tmp_path / "study.toml", Store(tmp_path / "store")
+    path.write_text(STUDY)
+    study = read_points_of(path)
+    good, bad = study.possible.values()
+    process = subprocess.Popen([sys.executable, "-m", "workflow", "study", str(path), "--out", str(store.folder)])
+    reflow = store.stage_folder(good.case, "reflow") / "stage.json"
     wait_until(reflow.exists)
     children = psutil.Process(process.pid).children(recursive=True)
     process.send_signal(signal.SIGKILL)
-    assert psutil.wait_procs([psutil.Process(process.pid), *children], timeout=15)[1] == []
+    assert psutil.wait_procs([process, *children], timeout=15)[1] == []
+
     kept = reflow.stat().st_mtime_ns
-    failed = run_points(store, points, "report", Machine(cores=2))
+    assert not run_study(study, store, Machine(cores=2))
     assert reflow.stat().st_mtime_ns == kept
-    assert set(failed) == {points[2].key}
-    assert failed[points[2].key].startswith("stage reflow: NoRest: ")
-    assert missing(store, points[:2], "report") == []
-    assert len(list((store.folder / "stages").iterdir())) == 1
+    lines = (store.folder / "results.csv").read_text().splitlines()
+    assert "healthy" in lines[1]
+    assert "failed,stage reflow: NoRest: " in lines[2].replace('"', "")
+    assert [job.stage for job in missing(store, [good, bad], "report")] == ["reflow", "report"]
 
-    summary = json.loads((store.run_folder(points[1]) / "summary.json").read_text())
-    run = Run(tmp_path / "run", points[0].case, cores=1)
-    record = run_stage("reflow", STAGE_FUNCTIONS["drop"]["reflow"], run)
-    found, expected = (
-        {name: value for name, value in each["metrics"].items() if name not in TIMES} for each in (summary, record)
-    )
-    assert found == expected
-    assert read_record(store.run_folder(points[1]), points[1].case.pipeline["reflow"])["health"] == record["health"]
+    summary = json.loads((store.run_folder(good) / "summary.json").read_text())
+    record = run_stage("reflow", STAGE_FUNCTIONS["drop"]["reflow"], Run(tmp_path / "run", good.case, cores=1))
+    assert untimed(summary) == untimed(record)
+    found = read_record(store.run_folder(good), good.case.pipeline["reflow"])
+    assert found is not None
+    assert found["health"] == record["health"]
 
-    report = store.run_folder(points[1]) / "report.html"
-    written = report.stat().st_mtime_ns
-    assert run_points(store, points[:2], "report", Machine(cores=2)) == {}
-    assert report.stat().st_mtime_ns == written
+    written = (store.run_folder(good) / "report.html").stat().st_mtime_ns
+    assert run_points(store, [good], "report", Machine(cores=2)) == {}
+    assert (store.run_folder(good) / "report.html").stat().st_mtime_ns == written
+    path.write_text(STUDY.replace("20000, ", "20000, 10000, "))
+    more = list(read_points_of(path).possible.values())
+    assert [job.point.settings for job in missing(store, more[:2], "report")] == 2 * [more[1].settings]

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from rich.table import Table
 
+from fem.names import nearest
 from workflow.plan_table import duration, new_table
 from workflow.points.batch import Machine, missing, run_points
 from workflow.points.point import Point, PointsError, read_possible_points
@@ -13,6 +14,7 @@ from workflow.points.store import Store
 from workflow.problems import CaseError
 from workflow.progress import progress_bar
 from workflow.study import tables
+from workflow.study.main_effects import is_number
 from workflow.study.outlook import outlook
 from workflow.study.progress import teller
 from workflow.study.results import HEALTHY, IMPOSSIBLE, Row, row_of
@@ -68,7 +70,7 @@ def show_outlook(points: Points, store: Store) -> None:
         "cost",
     )
     for own in stages:
-        cost = "" if own.seconds is None else f"about {duration(own.seconds)} on one core after the other"
+        cost = "" if own.seconds is None else f"about {duration(own.seconds)}"
         table.add_row(own.stage, f"{own.products}", f"{own.products - own.missing}", f"{own.missing}", cost)
     total = sum(own.seconds or 0.0 for own in stages)
     count = sum(own.missing for own in stages)
@@ -104,7 +106,7 @@ def run_study(points: Points, store: Store, machine: Machine) -> bool:
 
     write_results(store.folder, points.study, rows)
     show_results(points.study, rows, store.folder)
-    return all(row.verdict in (HEALTHY, IMPOSSIBLE) for row in rows)
+    return has_metrics(points.study, rows) and all(row.verdict in (HEALTHY, IMPOSSIBLE) for row in rows)
 
 
 def results(points: Points, store: Store, failed: dict[str, str]) -> list[Row]:
@@ -116,6 +118,16 @@ def results(points: Points, store: Store, failed: dict[str, str]) -> list[Row]:
         for place, error in points.impossible.items()
     ]
     return sorted(rows, key=lambda row: row.number)
+
+
+def has_metrics(study: Study, rows: Sequence[Row]) -> bool:
+    """Whether the metrics of a study are numbers that its points have; tells those that are not."""
+    known = {name for row in rows for name, metric in row.metrics.items() if is_number(metric["value"])}
+    missing_ones = [name for name in study.metrics if known and name not in known]
+    for name in missing_ones:
+        hint = nearest(name, sorted(known))
+        print_error(f"no point has a number {name}" + (f"; did you mean {hint}?" if hint else ""))
+    return not missing_ones
 
 
 def show_results(study: Study, rows: Sequence[Row], folder: Path) -> None:

@@ -25,10 +25,12 @@ def teller(store: Store, points: Sequence[Point], jobs: Sequence[Job], bar: Prog
             record = read_record(store.run_folder(job.point), job.point.case.pipeline[job.stage])
             seconds.setdefault(job.stage, []).append(record["seconds"] if record else 0.0)
             waiting.remove(job)
-        failed = sum(any(store.message(point, job.stage) for job in waiting if job.point is point) for point in points)
-        done = sum(store.is_complete(point, point.case.pipeline.names[-1]) for point in points)
+        done = [point for point in points if store.is_complete(point, point.case.pipeline.names[-1])]
+        failed = sum(
+            any(store.message(point, stage) for stage in point.digests) for point in points if point not in done
+        )
         left = seconds_left([job.stage for job in waiting], seconds, time.monotonic() - begin)
-        words = f"{done} of {len(points)} points done, {failed} failed"
+        words = f"{len(done)} of {len(points)} points done, {failed} failed"
         bar(1.0 - len(waiting) / len(jobs), words if left is None else f"{words}, about {duration(left)} left")
 
     return tell

@@ -1,0 +1,197 @@
+"""Studies: designs, results as tables, what is told of effects; nothing is computed."""
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.support.workflow_command import SMALL_CASE
+from workflow.points.batch import Machine, missing
+from workflow.points.point import PointsError
+from workflow.points.store import Store
+from workflow.problems import CaseError
+from workflow.study import tables
+from workflow.study.command import read_points_of, results, run_study
+from workflow.study.designs import Factor
+from workflow.study.hypercube import Hypercube
+from workflow.study.main_effects import effect_of, ranked
+from workflow.study.outlook import foreseen_seconds, outlook
+from workflow.study.progress import seconds_left
+from workflow.study.results import HEALTHY, IMPOSSIBLE, UNHEALTHY, Row, columns, write_csv, write_parquet
+from workflow.study.setting_text import as_text, between
+from workflow.study.study_file import read_study
+
+HEAD = f'[study]\nname = "mine"\ncase = "{SMALL_CASE}"\nrank_by = "stress"\n'
+GRID = '[grid]\n"package.pitch" = ["0.9 mm", "1 mm"]\n"solder.volume" = ["0.07 mm^3", "0.0724 mm^3"]\n'
+
+
+@pytest.fixture
+def write(tmp_path):
+    def study(text: str, head: str = HEAD) -> Path:
+        path = tmp_path / "study.toml"
+        path.write_text(head + text)
+        return path
+
+    return study
+
+
+def test_a_grid_is_every_combination_and_keys_may_change_together(write):
+    study = read_study(write('[grid]\n"a.b" = [1, 2]\n"c, d.e" = ["x", ["y", true]]\n[settings]\nf.g = "1 mm"\n'))
+    assert study.points == [
+        {"f.g": "1 mm", "a.b": a, "c": c, "d.e": e} for a in ("1", "2") for c, e in (("x", "x"), ("y", "true"))
+    ]
+    assert [factor.keys for factor in study.design.factors] == [("a.b",), ("c", "d.e")]
+
+
+def test_rows_of_a_list_are_combined_with_the_grid(write):
+    study = read_study(write('[[list]]\na = 1\nb = "k"\n[[list]]\na = 2\nb = "k"\n[grid]\nc = [0.5]\n'))
+    assert study.points == [{"c": "0.5", "a": "1", "b": "k"}, {"c": "0.5", "a": "2", "b": "k"}]
+    assert [factor.keys for factor in study.design.factors] == [("c",), ("a",)]
+
+
+@pytest.mark.parametrize("samples", [1, 6, 7, 24])
+def test_each_part_of_a_range_has_one_sample(samples):
+    found = Hypercube(samples, seed=3).shares(4)
+    for column in found.T:
+        assert sorted((samples * column).astype(int)) == list(range(samples))
+
+
+def test_twice_as_many_samples_keep_the_earlier_ones():
+    small, large = Hypercube(6, 1).shares(3), Hypercube(24, 1).shares(3)
+    assert np.array_equal(small, large[:6])
+    assert not np.array_equal(Hypercube(6, 2).shares(3), small)
+
+
+def test_samples_are_quantities_in_the_unit_of_their_range(write):
+    text = '[latin_hypercube]\nsamples = 4\nseed = 1\n[latin_hypercube.ranges]\n"a" = ["2 mm", "6 mm"]\n"n" = [1, 4]\n'
+    points = read_study(write(text)).points
+    values = sorted(float(point["a"].removesuffix(" mm")) for point in points)
+    assert all(2.0 + k <= value <= 3.0 + k for k, value in enumerate(values))
+    assert sorted(point["n"] for point in points) == ["1", "2", "3", "4"]
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [("1 mm", "1 mm"), ("B", "B"), ("2", '"2"'), (2, "2"), (True, "true"), (["a", "b"], '["a", "b"]'), (0.5, "0.5")],
+)
+def test_values_are_written_as_set_takes_them(value, text):
+    assert as_text(value) == text
+
+
+def test_ends_of_a_range_must_be_alike():
+    assert between("1 mm", "2 mm", 0.25) == "1.25 mm"
+    assert between(1.0, 2, 0.5) == "1.5"
+    assert between("1 mm", "2 m", 0.5) is None
+    assert between("on", "off", 0.5) is None
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", ["varies nothing", "[latin_hypercube]"]),
+        ("[gird]\na = [1]\n", ["gird", "unknown key", "did you mean grid?"]),
+        ("[grid]\na = 1\n", ["grid.a = 1", "a list"]),
+        ('[grid]\n"a, b" = [[1, 2, 3]]\n', ["one for each of 2 keys"]),
+        ("[grid]\na = [1]\n[settings]\na = 2\n", ["fixed and varied at once"]),
+        ("[[list]]\na = 1\n[[list]]\nb = 1\n", ["is not in all rows"]),
+        ('[latin_hypercube]\nsamples = 2\nranges.a = ["1 mm", "1 s"]\n', ["ranges.a", "same unit"]),
+        ("[latin_hypercube]\nsamples = 0\nranges.a = [1, 2]\n", ["samples = 0", ">= 1"]),
+    ],
+)
+def test_a_study_that_is_wrong_is_told(write, text, words):
+    with pytest.raises(CaseError) as caught:
+        read_study(write(text))
+    assert all(word in str(caught.value) for word in words)
+
+
+def test_points_that_cannot_be_are_told_or_skipped(write):
+    text = '[grid]\n"package.pitch" = ["0.1 mm", "1 mm"]\n'
+    with pytest.raises(PointsError, match=r"point 1 \(package.pitch = 0.1 mm\)"):
+        read_points_of(write(text))
+    points = read_points_of(write(text, HEAD + "skip_impossible = true\n"))
+    assert list(points.possible) == [1]
+    rows = results(points, Store(Path("nowhere")), {points.possible[1].key: "stage reflow: no"})
+    assert [row.verdict for row in rows] == [IMPOSSIBLE, "failed"]
+    assert "package.pitch" in rows[0].message
+
+
+def test_what_is_shared_is_foreseen_once(write, tmp_path):
+    points = list(read_points_of(write(GRID)).possible.values())
+    found = {own.stage: own for own in outlook(points, missing(Store(tmp_path / "store"), points, "report"))}
+    assert (found["geometry"].products, found["reflow"].products, found["geometry"].points) == (2, 4, 4)
+    expected = sum(foreseen_seconds(point.case)["reflow"] for point in points)
+    assert found["reflow"].seconds == pytest.approx(expected)
+
+
+def test_time_left_is_that_of_stages_like_those_that_are_done():
+    assert seconds_left(["a"], {}, 1.0) is None
+    assert seconds_left(["a", "a", "b", "c"], {"a": [2.0], "b": [4.0, 6.0]}, 6.0) == pytest.approx(
+        (4.0 + 5.0 + 4.0) / 2
+    )
+
+
+def row(number: int, pitch: float, pad: float, stress: float | str | None, verdict: str = HEALTHY) -> Row:
+    metrics = {} if stress is None else {"stress": {"value": stress, "unit": "Pa"}}
+    settings = {"package.pitch": f"{pitch:g} mm", "solder.volume": f"{pad:g} mm^3"}
+    return Row(number, f"key{number}", settings, verdict, seconds=1.0, metrics=metrics)
+
+
+ROWS = [row(1, 0.9, 0.07, 1.0), row(2, 0.9, 0.0724, 3.0), row(3, 1.0, 0.07, 2.0), row(4, 1.0, 0.0724, 6.0)]
+
+
+def test_main_effects_are_differences_of_means():
+    pitch, volume = (effect_of(Factor((key,)), ROWS, "stress") for key in ("package.pitch", "solder.volume"))
+    assert pitch.size == pytest.approx(2.0)
+    assert volume.size == pytest.approx(3.0)
+    assert [(level.value, level.mean, level.low, level.high) for level in pitch.levels] == [
+        ("0.9", 2.0, 1.0, 3.0), ("1", 4.0, 2.0, 6.0),
+    ]  # fmt: skip
+    assert volume.unit == "mm^3"
+    assert volume.rank_correlation == pytest.approx(4.0 / np.sqrt(20.0))  # ranks 1 3 2 4 against 1.5 3.5 1.5 3.5
+    trend = effect_of(Factor(("package.pitch",), continuous=True), ROWS, "stress")
+    assert trend.size == pytest.approx(2.0)
+
+
+def test_only_healthy_points_are_ranked():
+    rows = [*ROWS, row(5, 1.0, 0.07, 0.5, UNHEALTHY), row(6, 1.0, 0.07, None)]
+    assert [own.number for own in ranked(rows, "stress", "minimise")] == [1, 3, 2, 4]
+    assert [own.number for own in ranked(rows, "stress", "maximise")] == [4, 2, 3, 1]
+
+
+def test_csv_and_parquet_have_the_same_columns_with_units(write, tmp_path):
+    from pyarrow import parquet
+
+    table = columns([*ROWS, row(5, 1.0, 0.08, None, "failed")], read_study(write(GRID)))
+    write_csv(tmp_path / "results.csv", table)
+    write_parquet(tmp_path / "results.parquet", table)
+    with (tmp_path / "results.csv").open() as file:
+        read = list(csv.DictReader(file))
+    stored = parquet.read_table(tmp_path / "results.parquet")
+    assert stored.column_names == list(read[0])
+    assert stored["stress [Pa]"].to_pylist() == [1.0, 3.0, 2.0, 6.0, None]
+    assert stored["package.pitch [mm]"].to_pylist() == [0.9, 0.9, 1.0, 1.0, 1.0]
+    assert read[1]["stress [Pa]"] == "3.0"
+    assert read[4]["stress [Pa]"] == ""
+
+
+def test_the_page_tells_ranks_effects_and_troubles(write, tmp_path):
+    from workflow.study.page import write_results
+
+    rows = [*ROWS, row(5, 1.0, 0.08, None, "failed")]
+    study = read_study(write(GRID))
+    write_results(tmp_path, study, rows)
+    page = (tmp_path / "study.html").read_text()
+    assert "points/key1/report.html" in page
+    assert "1 without a healthy result" in page
+    assert (tmp_path / "main_effects.png").stat().st_size > 10_000
+    assert [line[1] for line in tables.ranking(study, rows)["rows"]] == ["key1", "key3", "key2", "key4"]
+
+
+def test_a_metric_that_there_is_not_is_told(write, tmp_path, monkeypatch, capsys):
+    points = read_points_of(write('[grid]\n"package.pitch" = ["1 mm"]\n', HEAD.replace("stress", "stres")))
+    monkeypatch.setattr("workflow.study.command.missing", lambda *_: [])
+    monkeypatch.setattr("workflow.study.command.row_of", lambda *_: ROWS[0])
+    monkeypatch.setattr("workflow.study.page.write_results", lambda *_: None)
+    assert not run_study(points, Store(tmp_path), Machine(1))
+    assert "did you mean stress?" in capsys.readouterr().err
