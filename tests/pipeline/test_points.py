@@ -1,5 +1,6 @@
 """A study of a small drop, through Snakemake: killed in the middle, one point fails, the others are as by a run."""
 
+import csv
 import json
 import signal
 import subprocess
@@ -7,6 +8,7 @@ import sys
 from pathlib import Path
 
 import psutil
+import pytest
 
 from tests.support.workflow_command import wait_until
 from workflow.inputs import read_record
@@ -44,9 +46,11 @@ def test_a_study_is_computed_once_and_survives_a_kill(tmp_path):
     kept = reflow.stat().st_mtime_ns
     assert not run_study(study, store, Machine(cores=2))
     assert reflow.stat().st_mtime_ns == kept
-    lines = (store.folder / "results.csv").read_text().splitlines()
-    assert "healthy" in lines[1]
-    assert "failed,stage reflow: NoRest: " in lines[2].replace('"', "")
+    with (store.folder / "results.csv").open() as file:
+        lines = list(csv.DictReader(file))
+    assert [line["result"] for line in lines] == ["healthy", "failed"]
+    assert lines[1]["message"].startswith("stage reflow: NoRest: ")
+    assert float(lines[0]["height [m]"]) == pytest.approx(5.8e-4, rel=0.01)
     assert [job.stage for job in missing(store, [good, bad], "report")] == ["reflow", "report"]
 
     summary = json.loads((store.run_folder(good) / "summary.json").read_text())

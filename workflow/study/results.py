@@ -73,16 +73,19 @@ def row_of(number: int, store: Store, point: Point, keys: Sequence[str], failure
 
 
 def columns(rows: Sequence[Row], study: Study) -> dict[str, list[Value]]:
-    """Return the results by column; a unit stands in brackets after the name, metrics and times are in SI units."""
+    """Return the results by column; a unit stands in brackets after the name, metrics are in SI units.
+
+    Our own columns have names that no metric has: a drop's metrics have a ``verdict``, and ``seconds``.
+    """
     metrics = dict.fromkeys((name, metric["unit"]) for row in rows for name, metric in row.metrics.items())
     table: dict[str, list[Value]] = {"number": [row.number for row in rows], "point": [row.key for row in rows]}
     for key in study.design.keys:
         unit, values = numbers([row.settings[key] for row in rows])
         table[_titled(key, unit)] = values
     table |= {
-        "verdict": [row.verdict for row in rows],
+        "result": [row.verdict for row in rows],
         "message": [row.message for row in rows],
-        "seconds [s]": [row.seconds for row in rows],
+        "wall_time [s]": [row.seconds for row in rows],
         "report": [row.report for row in rows],
     }
     for name, unit in metrics:

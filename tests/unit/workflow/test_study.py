@@ -113,7 +113,7 @@ def test_points_that_cannot_be_are_told_or_skipped(write):
     assert list(points.possible) == [1]
     rows = results(points, Store(Path("nowhere")), {points.possible[1].key: "stage reflow: no"})
     assert [row.verdict for row in rows] == [IMPOSSIBLE, "failed"]
-    assert "package.pitch" in rows[0].message
+    assert "pads overlap" in rows[0].message
 
 
 def test_what_is_shared_is_foreseen_once(write, tmp_path):
