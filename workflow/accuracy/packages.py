@@ -16,7 +16,7 @@ from workflow.shock_forecast import implicit_seconds
 from workflow.shock_launch import MODES
 from workflow.units import from_si
 
-REFINED = (1.5, 1.0, 0.75, 0.5)  # sizes of elements over those of the case
+REFINED = (1.5, 1.0, 0.75, 0.5, 0.4)  # sizes of elements over those of the case
 ALONE = (1.5, 1.0, 0.75)  # of board or joints alone
 FINE = (1, 3)  # most stressed joints that are fine
 SAME_MESH = "all x 1"  # one model on the mesh of the case

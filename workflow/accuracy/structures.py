@@ -18,7 +18,7 @@ from workflow.structure.references import BarWave, Cantilever, LayeredBar
 from workflow.units import from_si
 
 SECOND = 2.0  # order of central differences and of trilinear elements (Hughes, The Finite Element Method, 9.2)
-REFINED = (0.3, 0.4, 0.5, 0.6, 0.8, 1.0, 1.2, 1.5, 2.0)  # times the numbers of elements of the case
+REFINED = (0.3, 0.4, 0.5, 0.6, 0.8, 1.0, 1.2, 1.5, 2.0, 2.5)  # times the numbers of elements of the case
 ALONE = (0.3, 0.5, 0.8, 1.2)  # of one model, where the case has two
 IMPLICIT = (0.5, 0.7, 1.0, 1.4)
 LONGEST = 200.0  # that the solvers of the case may be foreseen to take on a mesh [s]
