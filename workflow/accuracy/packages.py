@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from meshing.pads import pad_table
+from workflow.accuracy.apart import apart
 from workflow.accuracy.errors import Quantity
 from workflow.accuracy.histories import at_same_times
 from workflow.accuracy.ladder import Knob, Ladder, Rung
@@ -17,11 +18,11 @@ from workflow.shock_launch import MODES
 from workflow.units import from_si
 
 REFINED = (1.5, 1.0, 0.75, 0.5, 0.4)  # sizes of elements over those of the case
-ALONE = (1.5, 1.0, 0.75)  # of board or joints alone
+ALONE, FINEST = (1.5, 1.0, 0.75), 0.5  # of board or joints alone, against the finest of them
 FINE = (1, 3)  # most stressed joints that are fine
 SAME_MESH = "all x 1"  # one model on the mesh of the case
 GRAIN = 0.05  # of sizes that are chosen between the measured ones
-SPACINGS = (1.5, 1.25, 1.0)  # of particles, over that of the case
+SPACINGS, FINEST_SPACING = (2.0, 1.5, 1.25), 1.0  # of particles, over that of the case
 MESH, BOARD, JOINTS = "element size", "element size of board and package", "element size of joints"
 ROUNDING = 1e-9
 
@@ -43,14 +44,20 @@ def package_ladder(case: PackageCase) -> Ladder:
     if isinstance(case, BoardDropCase):
         return _dropped(case)
     errors = {"joint_width_error_max": "largest width, worst joint"}
-    return Ladder("reflow", ("reflow",), errors, _widths, (_particles(case, {}),))
+    return Ladder("reflow", ("reflow",), errors, _widths, (_particles(case, {}, (*SPACINGS, FINEST_SPACING)),))
 
 
 def _dropped(case: BoardDropCase) -> Ladder:
     """Meshes by one model, in implicit steps where all is linear; then what two models on the case's mesh lose."""
     whole = _one_model(case)
-    knobs = (_mesh(case, whole), _board(case, whole), _joints(case, whole), _particles(case, whole))
-    return Ladder("shock", ("shock",), ERRORS, _motion, knobs, tuple(_couplings(case)))
+    parts = [
+        apart(_board(case, whole), FINEST),
+        apart(_joints(case, whole), FINEST),
+        apart(_particles(case, whole, SPACINGS), FINEST_SPACING),
+    ]
+    knobs = (_mesh(case, whole), *(knob for knob, _ in parts))
+    choices = (*(finest for _, finest in parts), *_couplings(case))
+    return Ladder("shock", ("shock",), ERRORS, _motion, knobs, choices)
 
 
 def _widths(case: Any, run_folder: Path) -> dict[str, Quantity]:
@@ -108,7 +115,7 @@ def _joints(case: BoardDropCase, whole: Settings) -> Knob:
     return _sized(JOINTS, "joints", ALONE, lambda size: whole | _of_joints(case, size))
 
 
-def _particles(case: PackageCase, settings: Settings) -> Knob:
+def _particles(case: PackageCase, settings: Settings, values: tuple[float, ...]) -> Knob:
     """Spacing of the particles of the joints, on which their shape depends."""
     own = case.solder.numerics.spacing
 
@@ -116,7 +123,7 @@ def _particles(case: PackageCase, settings: Settings) -> Knob:
         spacing = from_si(value * own, "mm", digits=3)
         return Rung(f"spacing {spacing}", "particle spacing", settings | {"solder.numerics.spacing": spacing}, value)
 
-    return Knob("particle spacing", SPACINGS, at)
+    return Knob("particle spacing", values, at)
 
 
 def _sized(knob: str, word: str, sizes: tuple[float, ...], settings: Callable[[float], Settings]) -> Knob:

@@ -6,6 +6,7 @@ from math import ceil
 from pathlib import Path
 from typing import Any
 
+from workflow.accuracy.apart import apart
 from workflow.accuracy.errors import Quantity
 from workflow.accuracy.histories import at_same_times, common_times
 from workflow.accuracy.ladder import Knob, Ladder, Rung
@@ -152,17 +153,15 @@ def _is_linear(case: StructureCase) -> bool:
 def _steps(case: StructureCase, own: Settings) -> tuple[Knob, Rung]:
     """The time step by itself, on one mesh, and the much smaller one that it is compared with."""
     implicit = case.dynamics.solver == "implicit"
-    values, least = (LENGTHENED, SHORTENED) if implicit else (FRACTIONS, SMALLEST)
+    values, smallest = (LENGTHENED, SHORTENED) if implicit else (FRACTIONS, SMALLEST)
     setting = _implicit_step(case) if implicit else _step_fraction
     base = own | _refine(case, COARSE)
-    told, settings = setting(least)
-    smallest = Rung(f"step {told}", TIME_STEP, base | settings)
 
     def at(value: float) -> Rung:
         told, settings = setting(value)
-        return Rung(f"step {told}", TIME_STEP, base | settings, value, smallest.name)
+        return Rung(f"step {told}", TIME_STEP, base | settings, value)
 
-    return Knob(TIME_STEP, values, at, SECOND), smallest
+    return apart(Knob(TIME_STEP, values, at, SECOND), smallest)
 
 
 def _step_fraction(value: float) -> tuple[str, Settings]:
