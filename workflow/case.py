@@ -120,7 +120,7 @@ def _override(table: dict, overrides: Sequence[str], path: Path, problems: list[
     chosen = next((value for key, value in reversed(settings) if key == "scale"), chosen)
     of_scale = choose(chosen, scales, problems)
     for key, value in [*of_scale.items(), *settings]:
-        if all(key.split(".")) and not _set(table, key.split("."), value):
+        if all(key.split(".")) and not set_value(table, key.split("."), value):
             problems.append(Problem(key, "lies below a value, not a table", value))
     return dict.fromkeys(of_scale, f"{path} [scales.{chosen}]") | {key: "--set" for key, _ in settings}
 
@@ -143,7 +143,8 @@ def override_value(text: str) -> object:
         return text
 
 
-def _set(table: dict, path: list[str], value: object) -> bool:
+def set_value(table: dict, path: list[str], value: object) -> bool:
+    """Write a value at a path of names; False where the path leads through a value."""
     for name in path[:-1]:
         table = table.setdefault(name, {})
         if not isinstance(table, dict):

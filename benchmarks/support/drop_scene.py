@@ -18,8 +18,8 @@ from meshing.package_side import PackageSide
 from meshing.pads import PadSite, pad_table
 from meshing.solder_mesh import JointMesh, mesh_coarse_joint, mesh_joint
 from meshing.surface import ClosedSurface
+from meshing.trials.surfaces import barrel
 from tests.support.fem_models import write_msh
-from tests.support.joint_surfaces import barrel
 from workflow.board_drop_case import BoardDropCase
 from workflow.case import read_case
 

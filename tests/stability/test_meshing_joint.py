@@ -1,7 +1,5 @@
 """Shapes, arrays and warpages that break a sweep: each keeps its volume, upright elements and its place."""
 
-import dataclasses
-
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
@@ -10,11 +8,12 @@ from meshing.assembly import write_assembly
 from meshing.checks import problems
 from meshing.estimate import count_elements
 from meshing.joints_file import write_joints
-from meshing.pads import lift, pad_table
+from meshing.pads import pad_table
 from meshing.parameters import Warpage
 from meshing.solder_mesh import joint_quality, mesh_joint
-from tests.support.joint_surfaces import barrel
-from tests.support.meshing_models import MM, board, package, side_of
+from meshing.trials.joints import mesh_warped
+from meshing.trials.models import MM, board, package, side_of
+from meshing.trials.surfaces import barrel
 
 HARD = {
     "strongly bulged": {"bulge": 0.20 * MM},
@@ -26,18 +25,10 @@ HARD = {
 }
 
 
-def quality_of(warpage=None, **shape):
+def quality_of(corner=0.0, bulge=0.0, lower=0.24 * MM, upper=0.24 * MM, offset=0.0):
     """Mesh the corner joint of the small package in a shape of its own, as high as the package is over its head."""
-    warpage = warpage or Warpage()
-    site = {site.name: site for site in pad_table(package(), board(), warpage)}["A4"]
-    offset = shape.get("offset", 0.0)
-    gap = site.gap + float(lift(package(), warpage, site.x + offset, site.y) - lift(package(), warpage, site.x, site.y))
-    site = dataclasses.replace(site, offset=(offset, 0.0), gap=gap)
-    lower, upper = shape.get("lower", 0.24 * MM), shape.get("upper", 0.24 * MM)
-    wetted = {"wetted_radius_board": lower, "wetted_radius_package": upper}
-    site = dataclasses.replace(site, **wetted, pad_radius_board=lower, pad_radius_package=0.32 * MM)
-    surface = barrel(site.gap, **({"bulge": 0.0} | shape))
-    return joint_quality(mesh_joint(surface, site, package(), side_of(warpage, package())))
+    made, _ = mesh_warped(corner, bulge, (lower, upper), offset)
+    return joint_quality(made)
 
 
 @pytest.mark.parametrize("shape", HARD.values(), ids=HARD.keys())
@@ -49,7 +40,7 @@ def test_hard_shapes(shape):
 
 @pytest.mark.parametrize("corner", [-0.12 * MM, 0.5 * MM])
 def test_thick_warpage(corner):
-    quality = quality_of(Warpage(corner=corner), bulge=0.05 * MM)
+    quality = quality_of(corner, bulge=0.05 * MM)
     assert quality["volume_error"] < 1e-12
     assert quality["minimum_scaled_jacobian"] > 0.3
 
@@ -68,7 +59,7 @@ SHAPES = st.fixed_dictionaries(
 @given(SHAPES, st.floats(-0.1 * MM, 0.1 * MM))
 @example({"bulge": 0.0, "lower": 0.284 * MM, "upper": 0.296 * MM, "offset": 0.069 * MM}, -0.0823 * MM)
 def test_random_joints(shape, corner):
-    quality = quality_of(Warpage(corner=corner), **shape)
+    quality = quality_of(corner, **shape)
     assert quality["volume_error"] < 1e-12
     assert quality["minimum_scaled_jacobian"] > 0.2
 

@@ -5,8 +5,9 @@ import pytest
 
 from meshing.pad_planes import PadPlanes
 from meshing.solder_mesh import JointMeshError, mesh_joint
-from tests.support.many_joints import COUNTS, Underside, barrel, mesh, outcome, samples, sites_of
-from tests.support.meshing_models import package
+from meshing.trials.joints import Underside, sites_of
+from meshing.trials.models import package
+from tests.support.many_joints import COUNTS, barrel, mesh, outcome, samples
 
 LARGEST_ERROR, SMALLEST_JACOBIAN = 3.0e-3, 0.2
 

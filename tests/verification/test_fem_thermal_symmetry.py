@@ -14,7 +14,7 @@ from fem.thermal.structure import ThermalStructure
 from meshing.heated_assembly import write_heated_assembly
 from meshing.pads import pad_table
 from meshing.parameters import Warpage
-from tests.support.meshing_models import MM, PLATE, board, package
+from meshing.trials.models import MM, PLATE, board, package
 
 MOVED = Thermal(package="moved", corner_displacement=-5e-5)
 

@@ -7,7 +7,7 @@ from meshing.butterfly import butterfly
 from meshing.hexahedra import volumes
 from meshing.levels import layer_cells, solder_levels
 from meshing.surface import close_surface, enclosed_volume, measure
-from tests.support.joint_surfaces import truncated_sphere
+from meshing.trials.surfaces import truncated_sphere
 
 RADIUS, HALF_GAP = 0.3e-3, 0.15e-3
 

@@ -16,8 +16,8 @@ from meshing.parameters import JointNumerics
 from meshing.solder import Solder
 from meshing.swept import swept_solder
 from meshing.tetrahedra import fill_with_tetrahedra
-from tests.support.joint_surfaces import barrel
-from tests.support.meshing_models import MM
+from meshing.trials.models import MM
+from meshing.trials.surfaces import barrel
 
 SOLDER = LIBRARY["SAC405"]
 COLUMN = barrel(0.45 * MM, 0.03 * MM)

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 # cases has a list RANDOM of `RandomTrial`; it may load hypothesis.
 TRIALS_OF = {
     "reflow": "workflow.stress_test.trials_reflow",
+    "remesh": "workflow.stress_test.trials_remesh",
 }
 RANDOM_OF: dict[str, str] = {"reflow": "workflow.stress_test.random_reflow"}
 OF_ALL_FAMILIES = "workflow.stress_test.trials_run"

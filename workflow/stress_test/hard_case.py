@@ -11,8 +11,9 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from fem.names import nearest
 from workflow import fields
-from workflow.case import read_toml
+from workflow.case import read_toml, set_value
 from workflow.problems import CaseError, Problem
+from workflow.scales import dotted
 from workflow.stress_test.bound import Bound, read_bound
 from workflow.stress_test.families import FAMILIES, trials
 from workflow.stress_test.trial import Trial
@@ -161,30 +162,20 @@ def _bounds(head: HardCaseFile, trial: Trial, problems: list[Problem]) -> Iterat
 
 def _combinations(head: HardCaseFile, problems: list[Problem]) -> Iterator[tuple[str, dict]]:
     """Yield each combination of the varied values: in words, and the parameters with them."""
-    for key, values in head.vary.items():
+    varied: dict[str, list] = {}
+    for key, values in dotted(head.vary):
         if not isinstance(values, list) or not values:
             problems.append(Problem(f"vary.{key}", "must be a list with at least one value", values))
             return
-    for choice in itertools.product(*head.vary.values()):
+        varied[key] = values
+    for choice in itertools.product(*varied.values()):
         table = deepcopy(head.parameters)
-        for key, value in zip(head.vary, choice, strict=True):
-            if not _set(table, key.split("."), value):
+        for key, value in zip(varied, choice, strict=True):
+            if not set_value(table, key.split("."), value):
                 problems.append(Problem(f"vary.{key}", "lies below a value, not a table", value))
                 return
-        words = (
-            f"{key.split('.')[-1].replace('_', ' ')} {value}" for key, value in zip(head.vary, choice, strict=True)
-        )
+        words = (f"{key.split('.')[-1].replace('_', ' ')} {value}" for key, value in zip(varied, choice, strict=True))
         yield ", ".join(words), table
-
-
-def _set(table: dict, path: list[str], value: object) -> bool:
-    """Write a value at a path of names; False where the path leads through a value."""
-    for name in path[:-1]:
-        table = table.setdefault(name, {})
-        if not isinstance(table, dict):
-            return False
-    table[path[-1]] = value
-    return True
 
 
 def _parameters(trial: Trial, table: dict, folder: Path, problems: list[Problem]) -> BaseModel | None:

@@ -87,7 +87,7 @@ class Pool:
 
     def _start(self) -> _Worker:
         ours, theirs = self._context.Pipe()
-        process = self._context.Process(target=_work, args=(theirs,), daemon=True)
+        process = self._context.Process(target=_work, args=(theirs,))
         process.start()
         theirs.close()
         return _Worker(process, ours)
@@ -119,7 +119,7 @@ class Pool:
 
     def _given_up(self, worker: _Worker, message: str) -> Verdict:
         """The verdict on a case without an answer; its process is ended, another takes its place."""
-        case, seconds = worker.case, time.monotonic() - worker.since
+        case, seconds = worker.case, max(0.0, time.monotonic() - worker.since)
         assert case is not None
         self._workers.remove(worker)
         worker.end()

@@ -15,7 +15,7 @@ from workflow.stress_test.trial import Measured, Refused, Trial
 if TYPE_CHECKING:
     from particles.shape import JointShape
 
-SHAPE = {"volume_drift": "", "energy_rise": "", "energy_over_start": "", "steps": ""}
+SHAPE = {"volume_drift": "", "energy_rise": "", "energy_over_start": "", "capillary_number_at_rest": "", "steps": ""}
 ERRORS_OF_DROP = {
     "height_error": "",
     "max_width_error": "",
@@ -28,6 +28,8 @@ ERRORS_OF_JOINT = {
     "axial_force_error": "",
     "force_balance_error": "",
     "collapse_height_error": "",
+    "offset": "mm",
+    "tilt": "deg",
     "places": "",
 }
 
@@ -57,7 +59,7 @@ class MoltenScene(Parameters):
         Raises:
             ArithmeticError: it is not at rest, though it must be.
         """
-        if self.rest and not shape.metrics["at_rest"][0] and shape.verdict != "open":
+        if self.rest and shape.verdict != "open" and not shape.metrics["at_rest"][0]:
             raise ArithmeticError(f"not at rest after {shape.metrics['steps'][0]:.0f} steps")
         told = {name: Measured(value, unit) for name, (value, unit) in shape.metrics.items()}
         return told | _energy(shape.history["energy"])

@@ -5,13 +5,13 @@ import os
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
 from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from fem.own_job import own_environment
 from workflow.problems import as_toml
+from workflow.scales import dotted
 from workflow.stress_test.trial import Measured, Trial
 
 LAST_LINES = 3
@@ -32,7 +32,7 @@ def run_case(parameters: RunParameters) -> dict[str, Measured]:
     Raises:
         RuntimeError: the run failed or a check did not hold; with its last words.
     """
-    settings = [part for key, value in _dotted(parameters.settings) for part in ("--set", f"{key}={value}")]
+    settings = [part for key, value in dotted(parameters.settings) for part in ("--set", f"{key}={as_toml(value)}")]
     with tempfile.TemporaryDirectory() as folder:
         command = [sys.executable, "-m", "workflow", "run", parameters.case, "--out", folder, "-j", "1", *settings]
         environment = own_environment(os.environ)
@@ -41,15 +41,6 @@ def run_case(parameters: RunParameters) -> dict[str, Measured]:
             raise RuntimeError("; ".join(process.stderr.strip().splitlines()[-LAST_LINES:]))
         metrics = json.loads((Path(folder) / "summary.json").read_text())["metrics"]
     return {name: Measured(entry["value"], entry["unit"]) for name, entry in metrics.items()}
-
-
-def _dotted(table: dict, prefix: str = "") -> Iterator[tuple[str, str]]:
-    """Yield the settings of a table, in which dotted keys may be tables."""
-    for key, value in table.items():
-        if isinstance(value, dict):
-            yield from _dotted(value, f"{prefix}{key}.")
-        else:
-            yield prefix + key, as_toml(value)
 
 
 def _located(table: dict, folder: Path) -> dict:

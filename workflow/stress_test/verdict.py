@@ -84,5 +84,5 @@ def _check(bound: Bound, found: Mapping[str, Measured]) -> Check:
     if measured is None:
         known = ", ".join(found)
         raise UnitError(f"bounds.{bound.measure}: nothing of that name was measured; measured: {known}")
-    margin = bound.margin(measured)
+    margin = float(bound.margin(measured))
     return Check(bound.measure, bound.shown(measured), f"{bound.sign} {bound.text}", margin)

@@ -19,7 +19,7 @@ from fem.trials.grids import GAP
 from meshing.heated_assembly import write_heated_assembly
 from meshing.pads import pad_table
 from meshing.parameters import Warpage
-from tests.support.meshing_models import MM, board, package
+from meshing.trials.models import MM, board, package
 from tests.support.thermal_models import REFERENCE, Layers, pads_at, small_structure, structure_of
 
 SIZES = PackageSizes(

@@ -5,8 +5,8 @@ from meshing.assembly import write_assembly
 from meshing.estimate import count_elements
 from meshing.hexahedra import scaled_jacobian
 from meshing.parameters import Warpage
+from meshing.trials.models import MM, PLATE, board, package
 from tests.support.mesh_file import MeshFile
-from tests.support.meshing_models import MM, PLATE, board, package
 
 
 class Assembly(MeshFile):

@@ -2,7 +2,7 @@ import pytest
 
 from meshing.checks import problems
 from meshing.parameters import Warpage
-from tests.support.meshing_models import MM, board, package
+from meshing.trials.models import MM, board, package
 
 
 def found(the_package, the_board, corner=0.0):

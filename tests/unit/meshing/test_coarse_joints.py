@@ -8,8 +8,8 @@ from meshing.pads import pad_table
 from meshing.parameters import Warpage
 from meshing.solder_mesh import JointMeshError, joint_quality, mesh_coarse_joint, mesh_joint
 from meshing.surface import enclosed_volume
-from tests.support.joint_surfaces import barrel
-from tests.support.meshing_models import MM, PLATE, board, package, side_of
+from meshing.trials.models import MM, PLATE, board, package, side_of
+from meshing.trials.surfaces import barrel
 
 WARPAGE = Warpage(corner=0.03 * MM)
 

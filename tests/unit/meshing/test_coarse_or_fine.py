@@ -13,8 +13,8 @@ from meshing.joints_file import write_joints
 from meshing.pads import pad_table
 from meshing.parameters import Warpage
 from meshing.solder_mesh import joint_quality, mesh_coarse_or_fine, mesh_joint
-from tests.support.joint_surfaces import barrel
-from tests.support.meshing_models import MM, board, package, side_of
+from meshing.trials.models import MM, board, package, side_of
+from meshing.trials.surfaces import barrel
 from workflow.report import mesh_tables
 
 BULGES = {"A4": 0.25 * MM, "B4": 0.04 * MM}  # two layers cannot hold the first

@@ -10,8 +10,8 @@ from meshing.package_side import PackageSide, underside
 from meshing.pads import lift
 from meshing.parameters import Warpage
 from meshing.structured_face import NotStructuredError, StructuredFace
+from meshing.trials.models import MM, PLATE, board, package
 from tests.support.mesh_file import MeshFile
-from tests.support.meshing_models import MM, PLATE, board, package
 
 PACKAGE = ("substrate", "die")
 

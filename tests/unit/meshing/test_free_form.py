@@ -12,9 +12,9 @@ from meshing.parameters import Warpage
 from meshing.quadratic_tetrahedra import write_tetrahedra
 from meshing.solder_mesh import joint_quality, mesh_bridge, mesh_joint
 from meshing.surface import enclosed_volume
-from tests.support.free_form_surfaces import bridged_pair, with_void
-from tests.support.joint_surfaces import barrel
-from tests.support.meshing_models import MM, board, package, side_of
+from meshing.trials.level_sets import bridged_pair, with_void
+from meshing.trials.models import MM, board, package, side_of
+from meshing.trials.surfaces import barrel
 
 FLAT = Warpage()
 

@@ -6,7 +6,7 @@ import pytest
 
 from meshing.assembly import write_assembly
 from meshing.heated_assembly import write_heated_assembly
-from tests.support.meshing_models import MM, PLATE, board, package
+from meshing.trials.models import MM, PLATE, board, package
 
 
 @pytest.mark.parametrize("copper", [{}, PLATE])

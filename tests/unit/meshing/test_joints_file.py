@@ -9,8 +9,8 @@ from meshing.joints_file import write_joints
 from meshing.pads import pad_table
 from meshing.parameters import Warpage
 from meshing.solder_mesh import joint_quality, mesh_joint
-from tests.support.joint_surfaces import barrel
-from tests.support.meshing_models import MM, board, package, side_of
+from meshing.trials.models import MM, board, package, side_of
+from meshing.trials.surfaces import barrel
 
 WARPAGE = Warpage(corner=0.03 * MM)
 

@@ -9,9 +9,10 @@ from meshing.joint_mesh import JointMeshError
 from meshing.pads import PadSite
 from meshing.solder_mesh import mesh_joint
 from meshing.surface import ClosedSurface, pad_planes
-from tests.support.joint_surfaces import barrel, laid_between
-from tests.support.many_joints import Underside, hooked
-from tests.support.meshing_models import MM, package
+from meshing.trials.joints import Underside
+from meshing.trials.models import MM, package
+from meshing.trials.surfaces import barrel, laid_between
+from tests.support.many_joints import hooked
 
 SLOPE, ASIDE, PAD = 0.02, 0.05 * MM, 0.24 * MM
 

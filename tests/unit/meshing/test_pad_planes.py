@@ -5,8 +5,8 @@ from hypothesis import strategies as st
 
 from meshing.pad_planes import PadPlanes
 from meshing.surface import enclosed_volume, measure, pad_planes
-from tests.support.joint_surfaces import barrel, laid_between
-from tests.support.meshing_models import MM
+from meshing.trials.models import MM
+from meshing.trials.surfaces import barrel, laid_between
 
 SMALL = st.floats(-0.08, 0.08)
 

@@ -3,7 +3,7 @@ from scipy.spatial.transform import Rotation
 
 from meshing.pads import has_rim, joint_name, pad_table, read_pads, row_name, write_pads
 from meshing.parameters import Warpage
-from tests.support.meshing_models import MM, board, package
+from meshing.trials.models import MM, board, package
 
 
 @pytest.mark.parametrize(

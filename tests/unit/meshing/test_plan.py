@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from meshing.plan import Interval, board_plan, footprint, package_plan, patch
-from tests.support.meshing_models import MM, board, package
+from meshing.trials.models import MM, board, package
 
 
 def test_graded_lines_keep_their_ratio():

@@ -4,7 +4,7 @@ import pytest
 
 from meshing.assembly import write_assembly
 from meshing.preview import COLOURS, colour, write_preview
-from tests.support.meshing_models import board, package
+from meshing.trials.models import board, package
 
 
 @pytest.mark.parametrize(

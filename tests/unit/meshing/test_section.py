@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from meshing.butterfly import butterfly
 from meshing.section import cut_segments, radius_by_angle, section_area, section_centroid
-from tests.support.joint_surfaces import revolve
+from meshing.trials.surfaces import revolve
 
 
 @pytest.mark.parametrize("height", [0.4e-3, 0.5e-3])  # between vertices, and exactly at a level of them

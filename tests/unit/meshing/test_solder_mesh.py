@@ -10,8 +10,8 @@ from meshing.pads import lift, pad_table
 from meshing.parameters import Warpage
 from meshing.solder_mesh import JointMeshError, joint_quality, mesh_joint
 from meshing.surface import close_surface
-from tests.support.joint_surfaces import barrel, revolve
-from tests.support.meshing_models import MM, PLATE, board, package, side_of
+from meshing.trials.models import MM, PLATE, board, package, side_of
+from meshing.trials.surfaces import barrel, revolve
 
 WARPAGE = Warpage(corner=0.03 * MM)
 

@@ -5,8 +5,8 @@ import pytest
 
 from meshing.sphere_surface import sphere_surface
 from meshing.surface import FREE, enclosed_volume, measure
+from meshing.trials.models import MM
 from meshing.truncated_sphere import TruncatedSphere
-from tests.support.meshing_models import MM
 
 
 @pytest.mark.parametrize(("board", "package", "volume"), [(0.24, 0.24, 0.0724), (0.3, 0.2, 0.09), (0.24, 0.24, 0.03)])

@@ -12,8 +12,8 @@ from meshing.surface import (
     read_surface,
     write_surface,
 )
-from tests.support.joint_surfaces import barrel, truncated_sphere
-from tests.support.meshing_models import MM
+from meshing.trials.models import MM
+from meshing.trials.surfaces import barrel, truncated_sphere
 
 
 @pytest.fixture

@@ -8,10 +8,11 @@ from meshing.pads import pad_table
 from meshing.parameters import Warpage
 from meshing.solder_mesh import joint_quality, mesh_joint
 from meshing.surface import SurfaceError, enclosed_volume, measure
+from meshing.trials import faults
+from meshing.trials.level_sets import of_level_set, with_void
+from meshing.trials.models import MM, board, package, side_of
+from meshing.trials.surfaces import barrel
 from meshing.user_surface import file_volume, load_surface
-from tests.support.free_form_surfaces import of_level_set, sphere, with_void
-from tests.support.joint_surfaces import barrel
-from tests.support.meshing_models import MM, board, package, side_of
 
 SITE = {site.name: site for site in pad_table(package(), board(), Warpage())}["A4"]
 SHAPE = barrel(SITE.gap, 0.04 * MM)
@@ -73,63 +74,18 @@ def test_heights_are_stretched_to_the_gap_and_tilt_of_the_site(tmp_path):
     assert upper[:, 2] == pytest.approx(site.gap + upper[:, :2] @ slope, rel=1e-5)
 
 
-def hole(points, triangles):
-    return points, np.delete(triangles, 700, axis=0)
-
-
-def flipped(points, triangles):
-    triangles = triangles.copy()
-    triangles[700] = triangles[700, ::-1]
-    return points, triangles
-
-
-def inside_out(points, triangles):
-    return points, triangles[:, ::-1]
-
-
-def doubled(points, triangles):
-    return points, np.vstack([triangles, triangles])
-
-
-def two_shells(points, triangles):
-    return np.vstack([points, 0.99 * points]), np.vstack([triangles, triangles + len(points)])
-
-
-def crossing(points, triangles):
-    """A dent on one side that reaches through the other."""
-    points = points.copy()
-    near = np.exp(-(((points - [0.28 * MM, 0.0, 0.5 * SITE.gap]) / (0.06 * MM)) ** 2).sum(axis=1))
-    points[:, 0] -= 0.7 * MM * near
-    return points, triangles
-
-
-def void_outside(points, triangles):
-    more, shell = sphere((1.0 * MM, 0.0, 0.1 * MM), 0.05 * MM)
-    return np.vstack([points, more]), np.vstack([triangles, shell[:, ::-1] + len(points)])
-
-
-def round_top(points, triangles):
-    points = points.copy()
-    points[:, 2] -= 0.2 * (points[:, 0] ** 2 + points[:, 1] ** 2) / (0.3 * MM) * (points[:, 2] / SITE.gap)
-    return points, triangles
-
-
-def far_too_high(points, triangles):
-    return points * [1.0, 1.0, 1.3], triangles
-
-
 @pytest.mark.parametrize(
     ("fault", "told"),
     [
-        (hole, r"open edge: a hole \(3 such edges, allowed 0\), first at \("),
-        (flipped, r"triangle that faces another way than its neighbour"),
-        (inside_out, r"oriented inwards"),
-        (doubled, r"edge of more than two triangles: a double shell"),
-        (two_shells, r"second shell that faces outwards, allowed are voids"),
-        (crossing, r"surface crosses itself at \("),
-        (void_outside, r"void that lies outside the body"),
-        (round_top, r"its upper end, z = .* is flat on a disc of radius"),
-        (far_too_high, r"flat ends are .* m apart, allowed"),
+        (faults.hole, r"open edge: a hole \(3 such edges, allowed 0\), first at \("),
+        (faults.flipped, r"triangle that faces another way than its neighbour"),
+        (faults.inside_out, r"oriented inwards"),
+        (faults.doubled, r"edge of more than two triangles: a double shell"),
+        (faults.two_shells, r"second shell that faces outwards, allowed are voids"),
+        (faults.crossing, r"surface crosses itself at \("),
+        (faults.void_outside, r"void that lies outside the body"),
+        (faults.round_top, r"its upper end, z = .* is flat on a disc of radius"),
+        (faults.far_too_high, r"flat ends are .* m apart, allowed"),
     ],
     ids=lambda value: getattr(value, "__name__", ""),
 )

@@ -8,8 +8,8 @@ import pytest
 
 from meshing.pads import pad_table, write_pads
 from meshing.parameters import Warpage
-from tests.support.joint_surfaces import barrel
-from tests.support.meshing_models import MM
+from meshing.trials.models import MM
+from meshing.trials.surfaces import barrel
 from tests.support.workflow_command import SMALL_CASE
 from workflow import findings
 from workflow.case import read_case

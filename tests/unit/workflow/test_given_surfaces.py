@@ -15,11 +15,11 @@ from meshing.outlines import outlines
 from meshing.pads import pad_table, write_pads
 from meshing.parameters import Warpage
 from meshing.surface import enclosed_volume, read_surface
+from meshing.trials.level_sets import bridged_pair
+from meshing.trials.models import MM
+from meshing.trials.surfaces import barrel, revolve
 from particles.products import write_shapes
 from particles.shape import JointShape, Snapshot
-from tests.support.free_form_surfaces import bridged_pair
-from tests.support.joint_surfaces import barrel, revolve
-from tests.support.meshing_models import MM
 from tests.support.workflow_command import SMALL_CASE
 from workflow import findings
 from workflow.case import display_values, read_case

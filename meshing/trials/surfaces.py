@@ -1,4 +1,4 @@
-"""Synthetic joint surfaces of which everything is known."""
+"""Joint surfaces of which everything is known."""
 
 from dataclasses import replace
 
@@ -62,3 +62,20 @@ def laid_between(surface: ClosedSurface, offset: tuple[float, float], slope: tup
     """A straight joint between a pad at z = 0 and one that is shifted [m] and slopes along x and y."""
     planes = PadPlanes(float(surface.points[:, 2].max()), np.array(offset), np.array(slope))
     return replace(surface, points=planes.restore(surface.points))
+
+
+def overflow(gap: float, angle: float, reach: float, around: int = 48, levels: int = 25) -> ClosedSurface:
+    """Solder on the mask: an arc that meets both plates at an angle above 90 degrees, its discs of a radius `reach`."""
+    radius = 0.5 * gap / np.cos(np.pi - angle)
+    neck = max(0.0, reach - radius * np.sin(angle))
+    height = np.linspace(-0.5 * gap, 0.5 * gap, levels)
+    return close_surface(*revolve(neck + np.sqrt(radius**2 - height**2), gap, around))
+
+
+def lobed(gap: float, radius: float, lobes: int, depth: float, levels: int = 25) -> ClosedSurface:
+    """A cylinder of a radius [m] with lobes at half height, as deep as a share of the radius: star-shaped."""
+    points, triangles, lower, upper = revolve(np.full(levels, radius), gap, 96)
+    angle = np.arctan2(points[:, 1], points[:, 0])
+    wave = np.cos(lobes * angle) * np.sin(np.pi * points[:, 2] / gap)
+    points[:, :2] *= 1.0 + depth * wave[:, None]
+    return close_surface(points, triangles, lower, upper)

@@ -70,3 +70,20 @@ def bridged_pair(gap: float, distance: float, radius: float, bridge: float) -> C
         return np.log(np.exp(sharp * left) + np.exp(sharp * right) + np.exp(sharp * between)) / sharp
 
     return of_level_set(inside, gap, (0.5 * distance + 1.2 * radius, 1.2 * radius))
+
+
+def hooked(gap: float, reach: float) -> ClosedSurface:
+    """A joint of about 0.73 gaps' radius with an arm that reaches out [m] and bends round a bay: not star-shaped."""
+    unit = gap / 0.3
+
+    def inside(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
+        height = z - 0.5 * gap
+        column = 0.22 * unit - np.sqrt(x**2 + y**2)
+        along = np.clip(x, 0.0, reach)
+        arm = 0.08 * unit - np.sqrt((x - along) ** 2 + y**2 + height**2)
+        up = np.clip(y, 0.0, 0.25 * unit)
+        finger = 0.08 * unit - np.sqrt((x - reach) ** 2 + (y - up) ** 2 + height**2)
+        sharp = 60.0 / unit
+        return np.log(sum(np.exp(sharp * part) for part in (column, arm, finger))) / sharp
+
+    return of_level_set(inside, gap, (0.65 * unit, 0.45 * unit), across=14)

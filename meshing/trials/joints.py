@@ -1,0 +1,126 @@
+"""A joint of known shape is meshed in its place, and the mesh measured again, whatever the mesher says of it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from meshing.hexahedra import scaled_jacobian, volumes
+from meshing.joint_mesh import JointMesh, joint_quality
+from meshing.package_side import PackageSide
+from meshing.pad_planes import PadPlanes
+from meshing.pads import PadSite, lift, pad_table
+from meshing.parameters import JointNumerics, Warpage
+from meshing.solder_mesh import mesh_bridge, mesh_joint
+from meshing.surface import ClosedSurface, enclosed_volume, pad_planes
+from meshing.trials.models import MM, board, package, side_of
+from meshing.trials.surfaces import barrel
+
+PAIR = 1.0 * MM  # distance of two joints that are one body
+
+
+@dataclass(frozen=True, slots=True)
+class Underside:
+    """A package's underside that is one plane."""
+
+    planes: PadPlanes
+    x: float
+    y: float
+    level: float
+
+    def height(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """Return the height (k,) over the board's top face at points (k,), (k,) [m]."""
+        return self.level + self.planes.height(x - self.x, y - self.y)
+
+
+def sites_of(surface: ClosedSurface, pair: bool) -> tuple[PadSite, ...]:
+    """The site of a joint, or the two of a pair that is 1 mm apart."""
+    planes = pad_planes(surface)
+    lower = surface.points[np.unique(surface.triangles[surface.boundary == 1])]
+    wetted = float(np.linalg.norm(lower[:, :2], axis=1).max())
+    pad = max(0.29 * MM, wetted)
+    site = PadSite(
+        name="A1",
+        row=0,
+        column=0,
+        x=0.0,
+        y=0.0,
+        gap=planes.gap,
+        wetted_radius_board=0.24 * MM,
+        wetted_radius_package=0.24 * MM,
+        pad_radius_board=pad,
+        pad_radius_package=pad,
+        z_board=0.02 * MM,
+        offset=(float(planes.offset[0]), float(planes.offset[1])),
+    )
+    return (replace(site, x=-0.5 * PAIR), replace(site, name="A2", x=0.5 * PAIR)) if pair else (site,)
+
+
+def mesh_at(surface: ClosedSurface, sites: Sequence[PadSite], numerics: JointNumerics | None = None) -> JointMesh:
+    """Mesh a joint, or two that are one body, under a plane that is where its head is.
+
+    Args:
+        surface: of the body.
+        sites: one or two.
+        numerics: how finely; None for the package's own.
+
+    Raises:
+        JointMeshError: no mesh meets its bars.
+    """
+    first = sites[0]
+    whole = package() if numerics is None else package(joint_numerics=numerics.model_dump())
+    middle = float(np.mean([site.x for site in sites]))
+    side = Underside(pad_planes(surface), middle, first.y, first.z_board + whole.copper.thickness)
+    if len(sites) == 2:
+        return mesh_bridge(surface, sites, whole, side)
+    return mesh_joint(surface, first, whole, side)
+
+
+def mesh_warped(
+    corner: float, bulge: float, discs: tuple[float, float], offset: float, numerics: JointNumerics | None = None
+) -> tuple[JointMesh, ClosedSurface]:
+    """Mesh the corner joint of a small package that is warped, in a shape as high as the package is over its head.
+
+    Args:
+        corner: lift of the package over that joint [m].
+        bulge: of the barrel [m].
+        discs: radii of the wetted discs on board and package [m].
+        offset: of the package's disc along x [m].
+        numerics: how finely; None for the package's own.
+
+    Returns:
+        The mesh and the surface that it fills.
+
+    Raises:
+        JointMeshError: no mesh meets its bars.
+    """
+    warpage, lower, upper = Warpage(corner=corner), *discs
+    whole = package() if numerics is None else package(joint_numerics=numerics.model_dump())
+    site = {site.name: site for site in pad_table(whole, board(), warpage)}["A4"]
+    rise = float(lift(whole, warpage, site.x + offset, site.y) - lift(whole, warpage, site.x, site.y))
+    site = replace(
+        site,
+        offset=(offset, 0.0),
+        gap=site.gap + rise,
+        wetted_radius_board=lower,
+        wetted_radius_package=upper,
+        pad_radius_board=lower,
+        pad_radius_package=0.32 * MM,
+    )
+    surface = barrel(site.gap, bulge, lower, upper, offset)
+    side: PackageSide = side_of(warpage, whole)
+    return mesh_joint(surface, site, whole, side), surface
+
+
+def measured(made: JointMesh, surface: ClosedSurface) -> dict[str, float]:
+    """Measure a mesh: errors against the surface that it fills, smallest scaled Jacobian, hexahedra of solder."""
+    quality = joint_quality(made)
+    (solder,) = (cells for part, cells in made.cells.items() if part.startswith("solder@"))
+    return {
+        "volume_error": abs(float(volumes(made.points, solder).sum()) / enclosed_volume(surface) - 1.0),
+        "standoff_error": quality["standoff_error"],
+        "contact_area_error": quality["contact_area_error"],
+        "shape_deviation": quality["shape_deviation"],
+        "scaled_jacobian": min(float(scaled_jacobian(made.points, cells).min()) for cells in made.cells.values()),
+        "hexahedra": len(solder),
+    }
