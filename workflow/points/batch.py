@@ -12,6 +12,7 @@ from workflow.points.store import Store
 
 SNAKEFILE = Path(__file__).parent / "Snakefile"
 JOBS = "jobs.json"
+UNTRIED = "was not reached"
 UNTOLD = "ended without a word, as when it is killed; see {log}"
 
 
@@ -128,7 +129,8 @@ def why(store: Store, point: Point, until: str) -> str:
     """Say why a point is not complete: the first of its stages without a product, and what it said when it failed."""
     stage = next(stage.name for stage in point.case.pipeline.upstream(until) if not store.has(point, stage.name))
     log = store.folder / "logs" / f"{job_name(point, stage)}.txt"
-    return f"stage {stage}: {store.message(point, stage) or UNTOLD.format(log=log)}"
+    untold = UNTOLD.format(log=log) if log.exists() else UNTRIED
+    return f"stage {stage}: {store.message(point, stage) or untold}"
 
 
 def _write(store: Store, jobs: Sequence[Job], machine: Machine) -> None:

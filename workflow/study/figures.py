@@ -47,8 +47,10 @@ def _means(axis: Axes, effect: Effect, factor: float) -> None:
         factor * np.array([getattr(level, name) for level in levels]) for name in ("mean", "low", "high")
     )
     at = [[level.value for level in levels].index(_name(value)) for value in effect.values]
-    axis.plot(at, factor * effect.metrics, ".", color=GREY, markersize=4)
-    axis.errorbar(places, mean, [mean - low, high - mean], color=BLUE, marker="o", capsize=3, linewidth=1.4)
+    axis.plot(at, factor * effect.metrics, "_", color=GREY, markersize=9, zorder=3)
+    axis.errorbar(
+        places, mean, [mean - low, high - mean], color=BLUE, marker="o", markersize=4, capsize=3, linewidth=1.4
+    )
     axis.set_xticks(places, [level.value for level in levels])
     axis.margins(x=0.15)
 

@@ -9,16 +9,17 @@ from workflow.study.study_file import Study
 
 
 def ranking(study: Study, rows: Sequence[Row]) -> dict:
-    """Return the table of healthy points, best first."""
+    """Return the table of healthy points, best first; of keys that change together only the first."""
     metrics = study.metrics
-    head = ["rank", "point", *_short(study.design.keys), *(name.replace("_", " ") for name in metrics), "time"]
+    keys = [factor.keys[0] for factor in study.design.factors]
+    head = ["rank", "point", *_short(keys), *(name.replace("_", " ") for name in metrics), "time"]
     return {
         "head": head,
         "rows": [
             [
                 str(place),
                 row.key,
-                *row.settings.values(),
+                *(row.settings[key] for key in keys),
                 *(quantity(row.metrics[name]) if name in row.metrics else "–" for name in metrics),
                 f"{number(row.seconds)} s",
             ]
@@ -57,10 +58,10 @@ def effect_table(found: Sequence[tuple[str, str, Sequence[Effect]]]) -> dict:
 def troubles(rows: Sequence[Row]) -> dict:
     """Return the table of points that failed, cannot be, or broke a check."""
     return {
-        "head": ["point", "settings", "verdict", "why"],
+        "head": ["settings", "point", "result", "why"],
         "prose": True,
         "rows": [
-            [row.key or f"number {row.number}", _told(row), row.verdict, row.message]
+            [_told(row), row.key or f"number {row.number}", row.verdict, row.message]
             for row in rows
             if row.verdict != HEALTHY
         ],

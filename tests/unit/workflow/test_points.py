@@ -7,7 +7,7 @@ import pytest
 
 from tests.support.workflow_command import SMALL_CASE
 from workflow.inputs import examine
-from workflow.points.batch import missing, why
+from workflow.points.batch import job_name, missing, why
 from workflow.points.point import PointsError, read_points
 from workflow.points.store import Store, publish
 
@@ -79,6 +79,9 @@ def test_a_point_has_a_run_folder_as_any_other(tmp_path):
     verdicts = examine(store.run_folder(point), point.case)
     assert not verdicts["geometry"].stale
     assert verdicts["reflow"].missing
+    assert why(store, point, "report") == "stage reflow: was not reached"
+    (tmp_path / "logs").mkdir()
+    (tmp_path / "logs" / f"{job_name(point, 'reflow')}.txt").write_text("")
     assert "stage reflow: ended without a word" in why(store, point, "report")
 
 
