@@ -1,4 +1,4 @@
-"""Command line: new, plan, run, accuracy, status, report, clean, effects, stress-test, schema."""
+"""Command line: new, plan, run, accuracy, status, report, clean, study, effects, stress-test, schema."""
 
 import json
 import os

@@ -22,7 +22,6 @@ from workflow.study.study_file import Study, read_study
 from workflow.terminal import console, print_error
 
 LAST = "report"
-WIDEST = 12  # of values that are not broken
 SHOWN = 10  # points of the ranking in the terminal
 
 
@@ -147,8 +146,8 @@ def show_results(study: Study, rows: Sequence[Row], folder: Path) -> None:
 def _printed(title: str, table: dict, count: int | None = None) -> Table:
     shown = Table(title=title, title_justify="left", title_style="bold", show_edge=False, pad_edge=False)
     for place, head in enumerate(table["head"]):
-        widest = max((len(row[place]) for row in table["rows"]), default=0)  # heads may be broken, values not
-        shown.add_column(head, justify="right" if place else "left", min_width=min(widest, WIDEST))
+        lines = head.replace(" ", "\n")  # values are not to be broken
+        shown.add_column(lines, justify="right" if place else "left", no_wrap=True, overflow="fold")
     for row in table["rows"][:count]:
         shown.add_row(*row)
     return shown

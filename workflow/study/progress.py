@@ -9,16 +9,17 @@ from workflow.points.batch import Job
 from workflow.points.point import Point
 from workflow.points.store import Store
 from workflow.progress import ProgressBar
+from workflow.terminal import console
 
 
 def teller(store: Store, points: Sequence[Point], jobs: Sequence[Job], bar: ProgressBar) -> Callable[[], None]:
-    """Return what tells a progress bar, when called, how far a study is.
+    """Return what tells a progress bar, when called, how far a study is; without a terminal a line for each point.
 
     Time left: each missing product takes as long as the mean of those of its stage that were made since the start, and
     as many are made at a time as so far.
     """
     begin = time.monotonic()
-    waiting, seconds = list(jobs), dict[str, list[float]]()
+    waiting, seconds, told = list(jobs), dict[str, list[float]](), [""]
 
     def tell() -> None:
         for job in [job for job in waiting if store.has(job.point, job.stage)]:
@@ -31,7 +32,11 @@ def teller(store: Store, points: Sequence[Point], jobs: Sequence[Job], bar: Prog
         )
         left = seconds_left([job.stage for job in waiting], seconds, time.monotonic() - begin)
         words = f"{len(done)} of {len(points)} points done, {failed} failed"
-        bar(1.0 - len(waiting) / len(jobs), words if left is None else f"{words}, about {duration(left)} left")
+        line = words if left is None else f"{words}, about {duration(left)} left"
+        bar(1.0 - len(waiting) / len(jobs), line)
+        if not console.is_terminal and words != told[0]:
+            console.print(f"       {line}")
+        told[0] = words
 
     return tell
 

@@ -75,7 +75,7 @@ def row_of(number: int, store: Store, point: Point, keys: Sequence[str], failure
 def columns(rows: Sequence[Row], study: Study) -> dict[str, list[Value]]:
     """Return the results by column; a unit stands in brackets after the name, metrics are in SI units.
 
-    Our own columns have names that no metric has: a drop's metrics have a ``verdict``, and ``seconds``.
+    Columns about points have names that no metric has: a drop's metrics have a ``verdict``, and ``seconds``.
     """
     metrics = dict.fromkeys((name, metric["unit"]) for row in rows for name, metric in row.metrics.items())
     table: dict[str, list[Value]] = {"number": [row.number for row in rows], "point": [row.key for row in rows]}

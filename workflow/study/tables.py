@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 
-from workflow.report.tables import number, quantity
+from workflow.report.tables import quantity
 from workflow.study.main_effects import Effect, effect_of, measured, ranked
 from workflow.study.results import HEALTHY, Row
 from workflow.study.study_file import Study
@@ -12,7 +12,7 @@ def ranking(study: Study, rows: Sequence[Row]) -> dict:
     """Return the table of healthy points, best first; of keys that change together only the first."""
     metrics = study.metrics
     keys = [factor.keys[0] for factor in study.design.factors]
-    head = ["rank", "point", *_short(keys), *(name.replace("_", " ") for name in metrics), "time"]
+    head = ["rank", "point", *_short(keys), *(name.replace("_", " ") for name in metrics)]
     return {
         "head": head,
         "rows": [
@@ -21,7 +21,6 @@ def ranking(study: Study, rows: Sequence[Row]) -> dict:
                 row.key,
                 *(row.settings[key] for key in keys),
                 *(quantity(row.metrics[name]) if name in row.metrics else "–" for name in metrics),
-                f"{number(row.seconds)} s",
             ]
             for place, row in enumerate(ranked(rows, study.about.rank_by, study.about.goal), start=1)
         ],
@@ -43,7 +42,7 @@ def effect_table(found: Sequence[tuple[str, str, Sequence[Effect]]]) -> dict:
         "head": ["factor", "metric", "effect", "rank correlation", "chance alone"],
         "rows": [
             [
-                ", ".join(effect.factor.keys),
+                effect.factor.keys[0],
                 metric.replace("_", " "),
                 quantity({"value": effect.size, "unit": unit}),
                 "–" if effect.rank_correlation is None else f"{effect.rank_correlation:+.2f}",
