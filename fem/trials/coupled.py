@@ -163,6 +163,10 @@ class Coupled:
             moved.append(link.ravel() * self.plan.window / self._impedance)
         return np.concatenate(moved)
 
+    def complete(self) -> None:
+        """Let all follow from displacements and velocities that were given to both models, with no link."""
+        self._complete(np.zeros((len(self.meso.motion.body.cut), 3)))
+
     def _complete(self, link: np.ndarray) -> None:
         """Let all that follows from displacements and link follow: slaves, the held cut, forces."""
         macro, meso = self.macro.motion, self.meso.motion

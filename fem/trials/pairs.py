@@ -14,7 +14,7 @@ from fem.estimate import WindowPlan
 from fem.exchange import CutChannels
 from fem.loads import Load
 from fem.materials.library import FR4
-from fem.materials.parameters import Isotropic
+from fem.materials.parameters import Isotropic, Orthotropic
 from fem.materials.roles import Materials
 from fem.mesh import MeshData, append
 from fem.motion import Motion
@@ -25,7 +25,6 @@ from fem.trials.grids import grid, mesh_of, on
 
 SIZE, THICKNESS = 0.5e-3, 0.25e-3  # of a board element [m]
 FRACTION = 0.9  # of the critical step of elements, the program's default
-BOARD_IMPEDANCE = float(np.sqrt(FR4.density * FR4.young_modulus_out_of_plane))
 
 
 @dataclass(frozen=True)
@@ -42,6 +41,7 @@ class Pair:
         columns: Elements of the board in plane, each way.
         height: Layers of the block.
         thinnest: Thickness of the block's top layer over that of the others.
+        board: Its material.
     """
 
     substeps: int = 4
@@ -53,6 +53,7 @@ class Pair:
     columns: int = 3
     height: int = 2
     thinnest: float = 1.0
+    board: Orthotropic = FR4
 
     def mesh(self) -> MeshData:
         """Return board and block, which share no node."""
@@ -72,13 +73,14 @@ class Pair:
 
     def materials(self) -> Materials:
         """Return materials with the impedance of the block whose critical step is a little above 1/m of the board's."""
-        trial = Materials(solder=Isotropic(density=1e3, young_modulus=1e9, poisson_ratio=0.35))
+        trial = Materials(board=self.board, solder=Isotropic(density=1e3, young_modulus=1e9, poisson_ratio=0.35))
         _, found, _ = surveyed(self.mesh(), trial)
         board, block = (found.step[found.role == role].min() for role in ("board", "solder"))
         slowness = 1e-3 * board / block / (self.substeps - 0.02)
-        product = self.impedance * BOARD_IMPEDANCE
+        product = self.impedance * (self.board.density * self.board.young_modulus_out_of_plane) ** 0.5
         return Materials(
-            solder=Isotropic(density=product * slowness, young_modulus=product / slowness, poisson_ratio=0.35)
+            board=self.board,
+            solder=Isotropic(density=product * slowness, young_modulus=product / slowness, poisson_ratio=0.35),
         )
 
     def divided(self, coupling: Coupling, fraction: float = FRACTION) -> Models:

@@ -1,0 +1,119 @@
+"""Trial of a free body that flies with energy in all its modes, at a step close to the critical one or above."""
+
+import numpy as np
+from mpi4py import MPI
+
+from fem.body import Pieces, Response, make_body, make_pieces
+from fem.damping import RayleighDamping
+from fem.estimate import WindowPlan, damped_critical_step
+from fem.ledger import Ledger, ledger_sums
+from fem.loads import Load
+from fem.local_mesh import distribute
+from fem.materials.library import COPPER
+from fem.materials.roles import Materials
+from fem.mesh import MeshData
+from fem.motion import Motion
+from fem.participant import Alone, uncut_motion
+from fem.power_iteration import highest_frequency
+from fem.scene import Tables, prepare
+from fem.steps import mass_factor
+from fem.tie import net_load
+from fem.trials.distortion import YOUNG, distorted, laminate
+from fem.trials.grids import mesh_of
+from fem.trials.parameters import Flight
+
+HEIGHT = 1e-3  # of a box [m]
+SPEED = np.array([1.0, -2.0, 3.0])  # of the body as a whole [m/s]
+LOOKS = 20  # at the ledger
+BALANCE = 0.02  # of the ledger, the program's default
+
+
+def flight(given: Flight) -> dict[str, float]:
+    """Fly; return the error of the energies and momenta, and the step of the assembled body over that of its elements.
+
+    Energies are judged as in a run; momenta are over those of all nodes by magnitude.
+
+    Raises:
+        EnergyError: The step is above the critical one, or energies do not balance.
+    """
+    pieces, tables = pieces_of(given)
+    target = float(pieces.steps[pieces.roles != "copper"].min())
+    factor = mass_factor(pieces, ("copper",) if given.mass_scaled else (), target)
+    element = float((pieces.steps * np.sqrt(factor)).min())
+    linear = make_body(MPI.COMM_SELF, pieces, tables, factor, None)
+    assembled = highest_frequency(MPI.COMM_SELF, linear, linear.terms, linear.mass).critical_step
+    plain = element if given.critical_step == "element" else assembled
+    stiffness = given.stiffness_damping * plain
+    critical = float(damped_critical_step(plain, stiffness))
+    step = given.step_fraction * critical
+    body = make_body(MPI.COMM_SELF, pieces, tables, factor, Response(given.kinematics, step))
+    loads: list[Load] = []
+    if given.mass_damping or stiffness:
+        loads.append(RayleighDamping.build(body, (given.mass_damping / step, stiffness)))
+    motion = uncut_motion(body, loads, step)
+    random_start(motion, given.seed)
+    found = watched(motion, given, Ledger(limit=BALANCE, trivial=0.0, step=step, critical=critical))
+    return found | {"step_gain": assembled / element}
+
+
+def pieces_of(given: Flight) -> tuple[Pieces, Tables]:
+    """Return the elements of a trial on this rank, and what goes with them."""
+    item = prepare(mesh_of_flight(given), "dns")["dns"]
+    soft = laminate(given.poisson_ratio, given.orthotropy, YOUNG / given.contrast)
+    materials = Materials(board=laminate(given.poisson_ratio, given.orthotropy), substrate=soft, copper=COPPER)
+    formulation = given.element if given.element == "one_point" else "incompatible_modes"
+    local = distribute(MPI.COMM_SELF, item.mesh)
+    return make_pieces(local, item.tables, materials, formulation), item.tables
+
+
+def mesh_of_flight(given: Flight) -> MeshData:
+    """Return the body: its parts from below are board, perhaps copper, and substrate."""
+    flat = np.linspace(0.0, HEIGHT * given.aspect * given.cells, given.cells + 1)
+    low = np.linspace(0.0, HEIGHT * given.cells, given.cells + 1)
+    half = HEIGHT * (given.cells // 2)
+    lines = (flat, flat, np.unique(np.concatenate([low[low <= half], low[low >= half] + given.foil])))
+    points, cells = distorted(given.element, lines, given.quality, given.seed)
+    of_box = 1 if cells.shape[1] == 8 else 6
+    middles = 0.5 * (lines[2][1:] + lines[2][:-1])
+    names = np.where(middles < half, "board", np.where(middles < half + given.foil, "copper_board", "substrate"))
+    return mesh_of(points, cells, np.repeat(names, given.cells**2 * of_box), {})
+
+
+def random_start(motion: Motion, seed: int) -> None:
+    """Put energy into all modes alike, on top of a common speed."""
+    noise = np.random.default_rng(seed).normal(size=motion.velocity.shape) * np.sqrt(motion.mobility)
+    mass = motion.body.mass[:, None]
+    scale = np.linalg.norm(SPEED) / np.sqrt(np.sum(mass * noise**2) / mass.sum())
+    motion.velocity[:] = np.where(motion.mobility > 0.0, SPEED + scale * noise, 0.0)
+
+
+def watched(motion: Motion, given: Flight, ledger: Ledger) -> dict[str, float]:
+    """Take the steps with looks at the ledger; return errors; errors as ``flight``."""
+    looks = min(LOOKS, given.steps)
+    participant = Alone(motion, WindowPlan(given.steps // looks * motion.step, given.steps // looks, looks, 1))
+    ledger.judge(ledger_sums(participant, 0.0), 0.0)
+    first, error = momentum(motion, given.kinematics == "finite"), np.zeros(2)
+    scale = momentum_scale(motion)
+    for _ in range(looks):
+        participant.begin_window()
+        ledger.judge(ledger_sums(participant, 0.0), motion.time)
+        change = np.abs(momentum(motion, given.kinematics == "finite") - first).reshape(2, 3).max(axis=1)
+        error = np.maximum(error, change / scale)
+    return {
+        "energy_error": ledger.balance_error,
+        "momentum_error": float(error[0]),
+        "angular_momentum_error": float(error[1]),
+        "energy_left": ledger.latest["kinetic"] / ledger.initial,
+    }
+
+
+def momentum(motion: Motion, moved: bool) -> np.ndarray:
+    """Return linear and angular momentum (6,), about the moved places of nodes where strains are finite."""
+    places = motion.body.local.points + (motion.displacement if moved else 0.0)
+    return net_load(places, motion.body.mass[:, None] * motion.present_velocity())
+
+
+def momentum_scale(motion: Motion) -> np.ndarray:
+    """Return the sums of magnitudes of linear and angular momenta (2,)."""
+    points, amount = motion.body.local.points, motion.body.mass[:, None] * motion.present_velocity()
+    return np.array([np.linalg.norm(amount, axis=1).sum(), np.linalg.norm(np.cross(points, amount), axis=1).sum()])

@@ -1,0 +1,74 @@
+"""Trial of boards with joints that are hard to divide: what the program chooses must be stable and exact."""
+
+import numpy as np
+
+from fem.coupling.scheme import scheme_of
+from fem.materials.roles import Materials
+from fem.mesh import MeshData, append
+from fem.parameters import Coupling
+from fem.trials.coupled import Coupled, models_of
+from fem.trials.grids import grid, joint_mesh, mesh_of, on
+from fem.trials.pairs import FRACTION
+from fem.trials.parameters import Layout
+from fem.trials.windows import through
+
+SIZE, LAYER = 0.5e-3, 0.25e-3  # of an element of board [m]
+
+
+def layout(given: Layout) -> dict[str, float]:
+    """Return the growth of a window, and what tie and cut do to fields, forces and masses.
+
+    Raises:
+        CutError: The layout cannot be divided in this way.
+    """
+    models = models_of(LAYOUTS[given.layout](), Materials(), Coupling(scheme=given.scheme), FRACTION)
+    coupled = Coupled(models.bodies(), models.division.plan, scheme_of(models.division.scheme))
+    found = {"growth": coupled.spectral_radius() - 1.0, "substeps": float(coupled.plan.substeps)}
+    return found | through(models)
+
+
+def board(cells: int = 4, layers: int = 4, copper: float = 0.0, layer: float = LAYER) -> MeshData:
+    """A block of board, held at its far side, under a plate of copper of some thickness that shares its nodes."""
+    ticks, heights = np.arange(cells + 1) * SIZE, layer * np.arange(-layers, 1.0)
+    top = copper if copper else 0.0
+    points, hexahedra = grid(ticks, ticks, np.append(heights, copper) if copper else heights)
+    above = points[hexahedra].mean(axis=1)[:, 2] > 0.0
+    sets = {"mounting_holes": on(0, cells * SIZE), "board_side": on(2, top), "board_bottom": on(2, heights[0])}
+    return mesh_of(points, hexahedra, np.where(above, "copper_board", "board"), sets)
+
+
+def joint(x: float, y: float, z: float = 0.0, held_above: bool = False) -> MeshData:
+    """A joint whose upper end is free, or tied to what is above it."""
+    mesh = joint_mesh("A1", x, y, layers=2)
+    facets = {name: quads for name, quads in mesh.facets.items() if held_above or not name.startswith("head@")}
+    return MeshData(mesh.points + [0.0, 0.0, z], mesh.cells, mesh.part, mesh.part_names, facets)
+
+
+def overhang() -> MeshData:
+    """A joint under a plate of 0.05 mm that hangs over it by more than a millimetre."""
+    low = joint_mesh("A1", 0.0, 0.0, layers=2).points[:, 2].max()
+    ticks = np.arange(4) * SIZE
+    plate = mesh_of(*grid(ticks, ticks, [low, low + 0.05e-3]), "substrate", {"package_side": on(2, low)})
+    return append([board(), joint(0.5 * SIZE, 0.5 * SIZE, held_above=True), plate])
+
+
+def copper_cut() -> MeshData:
+    """A joint on thick copper on board of thin layers: both are at the cut of local steps."""
+    return append([board(4, 2, copper=0.5e-3, layer=0.15e-3), joint(0.7e-3, 0.7e-3, z=0.5e-3)])
+
+
+def corner() -> MeshData:
+    """A joint in a corner of the board, whose meso model touches two faces and an edge."""
+    return append([board(), joint(0.25e-3, 0.25e-3)])
+
+
+def two_regions() -> MeshData:
+    """Two joints in opposite corners of a board: the meso model is in two parts."""
+    apart = joint(3.25e-3, 3.25e-3)
+    names = tuple(name.replace("A1", "B2") for name in apart.part_names)
+    facets = {name.replace("A1", "B2"): quads for name, quads in apart.facets.items()}
+    second = MeshData(apart.points, apart.cells, apart.part, names, facets)
+    return append([board(7, 4), joint(0.25e-3, 0.25e-3), second])
+
+
+LAYOUTS = {"copper_cut": copper_cut, "overhang": overhang, "corner": corner, "two_regions": two_regions}
