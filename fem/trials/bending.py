@@ -27,7 +27,7 @@ def bending(given: Bending) -> dict[str, float]:
     length, width, height = (float(line[-1]) for line in lines)
     found = tip(KINDS[given.element], lines, [laminate(given.poisson_ratio, young=YOUNG)])
     exact = beam(length, width, np.array([height]), np.array([YOUNG]), given.poisson_ratio)
-    return {"deflection_error": found / exact - 1.0}
+    return {"deflection_error": abs(found / exact - 1.0)}
 
 
 def tip(

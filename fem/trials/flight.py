@@ -24,7 +24,7 @@ from fem.trials.parameters import Flight
 
 HEIGHT = 1e-3  # of a box [m]
 SPEED = np.array([1.0, -2.0, 3.0])  # of the body as a whole [m/s]
-LOOKS = 20  # at the ledger
+LOOK = 50  # steps between two looks at the ledger: what doubles in each is then still a number
 BALANCE = 0.02  # of the ledger, the program's default
 
 
@@ -89,8 +89,9 @@ def random_start(motion: Motion, seed: int) -> None:
 
 def watched(motion: Motion, given: Flight, ledger: Ledger) -> dict[str, float]:
     """Take the steps with looks at the ledger; return errors; errors as ``flight``."""
-    looks = min(LOOKS, given.steps)
-    participant = Alone(motion, WindowPlan(given.steps // looks * motion.step, given.steps // looks, looks, 1))
+    steps = min(LOOK, given.steps)
+    looks = given.steps // steps
+    participant = Alone(motion, WindowPlan(steps * motion.step, steps, looks, 1))
     ledger.judge(ledger_sums(participant, 0.0), 0.0)
     first, error = momentum(motion, given.kinematics == "finite"), np.zeros(2)
     scale = momentum_scale(motion)

@@ -15,9 +15,15 @@ if TYPE_CHECKING:
 # cases has a list RANDOM of `RandomTrial`; it may load hypothesis.
 TRIALS_OF = {
     "reflow": "workflow.stress_test.trials_reflow",
+    "elements": "workflow.stress_test.trials_elements",
+    "coupling": "workflow.stress_test.trials_coupling",
     "remesh": "workflow.stress_test.trials_remesh",
 }
-RANDOM_OF: dict[str, str] = {"reflow": "workflow.stress_test.random_reflow"}
+RANDOM_OF: dict[str, str] = {
+    "reflow": "workflow.stress_test.random_reflow",
+    "elements": "workflow.stress_test.random_elements",
+    "coupling": "workflow.stress_test.random_coupling",
+}
 OF_ALL_FAMILIES = "workflow.stress_test.trials_run"
 FAMILIES = ("reflow", "elements", "coupling", "remesh")
 

@@ -19,7 +19,7 @@ class Computed:
     def __call__(self, parameters: BaseModel) -> dict[str, Measured]:
         """Load the module and compute."""
         found: Mapping[str, float] = getattr(import_module(self.module), self.function)(parameters)
-        return {name: Measured(value) for name, value in found.items()}
+        return {name: Measured(float(value)) for name, value in found.items()}
 
 
 def solver_trial(parameters: type[BaseModel], place: str, measures: str) -> Trial:

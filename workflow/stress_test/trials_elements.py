@@ -1,4 +1,4 @@
-"""Trials of elements and of one model that moves; what each measures is described where it is computed, in fem/trials."""
+"""Trials of elements and of one model that moves; what they measure is described in fem/trials."""
 
 from fem.trials import parameters as of
 from workflow.stress_test.solver_trial import solver_trial
