@@ -19,7 +19,8 @@ os.environ["OMP_NUM_THREADS"] = os.environ["NUMBA_NUM_THREADS"] = "1"
 
 from benchmarks.support import turns
 from fem.trials.pairs import SCHEMES, Pair
-from tests.stability.test_fem_window_grid import GROWTH, PUSH, momentum_error
+from fem.trials.windows import PUSH, momentum_error
+from tests.stability.test_fem_window_grid import GROWTH
 
 PRINTED = "as printed"
 RATIOS = (1.0, 1.5, 8 / 3, 4.0, 8.0)

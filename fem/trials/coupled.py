@@ -11,8 +11,8 @@ from fem.body import Body, Pieces, Response, make_body, make_pieces
 from fem.communicators import Role
 from fem.coupling.division import Division
 from fem.coupling.gravouil_combescure import GravouilCombescure
+from fem.coupling.held_velocity import Answered
 from fem.coupling.impulse import Impulse
-from fem.coupling.one_way import OneWay
 from fem.coupling.scheme import Scheme
 from fem.estimate import WindowPlan
 from fem.exchange import CutChannels
@@ -78,6 +78,7 @@ class Coupled:
         """Make both participants of a scheme, as a rank that carries both models does."""
         self.plan, self._scheme = plan, scheme
         channels = CutChannels.open(MPI.COMM_SELF, bodies["macro"].cut, bodies["meso"].cut, receiver_waits=False)
+        self._channels = channels
         make = {"macro": scheme.macro, "meso": scheme.meso}
         made = {role: make[role](bodies[role], list(loads), plan, channels) for role in scheme.order}
         self.macro, self.meso = cast(Turn, made["macro"]), cast(Turn, made["meso"])
@@ -185,8 +186,12 @@ class Coupled:
         elif pushed:
             self.meso.cut_force()[meso.body.cut] = macro.force[macro.body.cut]
             meso.force += self.meso.foreign_force()
-        elif not isinstance(self._scheme, OneWay):
-            self.macro.foreign_force()[macro.body.cut] = meso.force[meso.body.cut]
+        elif isinstance(self.macro, Answered):
+            self._channels.forces.send(meso.force)
+            work = self.macro.interface_work
+            self.macro.take_force()
+            self.macro.interface_work = work  # of a window that was not taken
+            return
         macro.force += self.macro.foreign_force()
 
     def matrix(self) -> np.ndarray:

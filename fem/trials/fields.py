@@ -9,16 +9,13 @@ from scipy.spatial.transform import Rotation
 from fem.elements.element import Elements, element_geometry
 from fem.force import linear_terms
 from fem.force_nonlinear import NonlinearElements
-from fem.materials.parameters import Isotropic, JohnsonCook
 from fem.mesh import boundary_facets
 from fem.stress import element_stress, symmetric
 from fem.trials.bodies import force_of, nonlinear
 from fem.trials.distortion import body_of, laminate
+from fem.trials.metals import LINEAR_HARDENING
 from fem.trials.parameters import Compression, Patch, Tension, Turns
 
-METAL = Isotropic(
-    density=7400.0, young_modulus=50e9, poisson_ratio=0.36, plasticity=JohnsonCook(A=40e6, B=500e6, n=1.0)
-)
 AXIS = np.array([0.48, -0.6, 0.64])
 LARGE = 0.3  # largest component of a displacement gradient of finite strain
 
@@ -98,9 +95,11 @@ def tension(given: Tension) -> dict[str, float]:
     Axial strain s / E + p, lateral -nu s / E - p / 2, s = A + B p; of finite kinematics these are logarithmic, and the
     body turns by 1.4 rad on the way.
     """
-    law, modulus = JohnsonCook(A=40e6, B=500e6, n=1.0), METAL.young_modulus
-    stress, plastic = law.A + law.B * given.plastic_strain, given.plastic_strain
-    strain = np.array([stress / modulus + plastic, *[-METAL.poisson_ratio * stress / modulus - plastic / 2] * 2])
+    metal, law, plastic = LINEAR_HARDENING, LINEAR_HARDENING.plasticity, given.plastic_strain
+    assert law is not None
+    stress = law.A + law.B * plastic
+    elastic = stress / metal.young_modulus
+    strain = np.array([elastic + plastic, *[-metal.poisson_ratio * elastic - plastic / 2] * 2])
     turn = Rotation.from_rotvec([0.3, 1.1, -0.7])
 
     def path(s: float) -> np.ndarray:
@@ -108,7 +107,7 @@ def tension(given: Tension) -> dict[str, float]:
             return np.eye(3) + s * np.diag(strain)
         return (turn**s).as_matrix() @ np.diag(np.exp(s * strain))
 
-    found = follow(nonlinear(body_of(given, METAL), METAL, given.kinematics == "finite"), path, given.steps)
+    found = follow(nonlinear(body_of(given, metal), metal, given.kinematics == "finite"), path, given.steps)
     return judged(found, np.diag([stress, 0.0, 0.0]))
 
 

@@ -6,19 +6,13 @@ import numpy as np
 
 from fem.body import Body, Response
 from fem.force import Kinematics
-from fem.materials.parameters import Isotropic, JohnsonCook, Material
+from fem.materials.parameters import Material
 from fem.mesh import MeshData
 from fem.motion import Motion
 from fem.trials.bodies import motion_of, nonlinear_body
 from fem.trials.grids import grid, mesh_of, on
+from fem.trials.metals import SOLDER
 from fem.trials.parameters import Impact
-
-SOLDER = Isotropic(
-    density=7400.0,
-    young_modulus=50e9,
-    poisson_ratio=0.36,
-    plasticity=JohnsonCook(A=40e6, B=300e6, n=0.7, C=0.05, reference_rate=1.0),
-)
 
 
 def impact(given: Impact) -> dict[str, float]:

@@ -34,7 +34,7 @@ def pulse(given: PulseTrial) -> dict[str, float]:
     exact = np.array([course.integral(motion.time), course.double_integral(motion.time)])
     scale = np.where(exact > 0.0, exact, 1.0)
     errors = [np.abs(found - value).max() for found, value in zip((speed, way), exact, strict=True)] / scale
-    given_energy = max(motion.external_work, np.finfo(float).tiny)
+    given_energy = max(float(motion.external_work), float(np.finfo(float).tiny))
     return {
         "velocity_error": float(errors[0]),
         "displacement_error": float(errors[1]),
@@ -53,4 +53,6 @@ def course_of(given: PulseTrial, duration: float) -> Pulse:
     """Return the pulse of a duration [s]."""
     if given.pulse == "triangle":
         return Tabulated(np.array([0.0, 0.5, 1.0]) * duration, np.array([0.0, given.peak, 0.0]))
-    return {"half_sine": HalfSine, "haversine": Haversine, "constant": Constant}[given.pulse](given.peak, duration)
+    if given.pulse == "constant":
+        return Constant(given.peak, duration)
+    return (HalfSine if given.pulse == "half_sine" else Haversine)(given.peak, duration)

@@ -16,33 +16,7 @@ from fem.mesh import MeshData, append
 from fem.parameters import Coupling
 from fem.trials.coupled import Coupled, models_of
 from fem.trials.divided import surveyed
-from fem.trials.grids import grid, joint_mesh, mesh_of, on
-
-SIZE, LAYER = 0.5e-3, 0.25e-3
-
-
-def board(cells: int = 4, layers: int = 4, copper: float = 0.0, layer: float = LAYER) -> MeshData:
-    """A block of board, held at its far side, under a plate of copper of some thickness that shares its nodes."""
-    ticks, heights = np.arange(cells + 1) * SIZE, layer * np.arange(-layers, 1.0)
-    top = copper if copper else 0.0
-    points, hexahedra = grid(ticks, ticks, np.append(heights, copper) if copper else heights)
-    above = points[hexahedra].mean(axis=1)[:, 2] > 0.0
-    sets = {"mounting_holes": on(0, cells * SIZE), "board_side": on(2, top), "board_bottom": on(2, heights[0])}
-    return mesh_of(points, hexahedra, np.where(above, "copper_board", "board"), sets)
-
-
-def joint(x: float, y: float, z: float = 0.0, held_above: bool = False) -> MeshData:
-    mesh = joint_mesh("A1", x, y, layers=2)
-    facets = {name: quads for name, quads in mesh.facets.items() if held_above or not name.startswith("head@")}
-    return MeshData(mesh.points + [0.0, 0.0, z], mesh.cells, mesh.part, mesh.part_names, facets)
-
-
-def overhang() -> MeshData:
-    """A joint under a plate of 0.05 mm that hangs over it by more than a millimetre."""
-    low = joint_mesh("A1", 0.0, 0.0, layers=2).points[:, 2].max()
-    ticks = np.arange(4) * SIZE
-    plate = mesh_of(*grid(ticks, ticks, [low, low + 0.05e-3]), "substrate", {"package_side": on(2, low)})
-    return append([board(), joint(0.5 * SIZE, 0.5 * SIZE, held_above=True), plate])
+from fem.trials.layouts import board, copper_cut, corner, joint, overhang, two_regions
 
 
 def radius(mesh: MeshData, scheme: str) -> float:
@@ -52,7 +26,7 @@ def radius(mesh: MeshData, scheme: str) -> float:
 
 
 def test_cut_through_copper_and_board_is_stable_in_local_steps():
-    mesh = append([board(4, 2, copper=0.5e-3, layer=0.15e-3), joint(0.7e-3, 0.7e-3, z=0.5e-3)])
+    mesh = copper_cut()
     scene = surveyed(mesh, coupling=Coupling(scheme="local_steps", levels=1))
     division = divide(*scene)
     at_cut = touching(mesh.cells, cut_nodes(mesh.cells, division.meso, len(mesh.points)))
@@ -69,7 +43,7 @@ def test_thin_overhang_is_stable(scheme):
 
 
 def test_meso_model_in_a_corner_touches_two_faces_and_an_edge():
-    scene = surveyed(append([board(), joint(0.25e-3, 0.25e-3)]))
+    scene = surveyed(corner())
     division = divide(*scene)
     check_division(*scene[:2], division, scene[2])
     mesh = scene[0].mesh
@@ -82,11 +56,7 @@ def test_meso_model_in_a_corner_touches_two_faces_and_an_edge():
 
 
 def test_meso_models_may_be_several_regions():
-    apart = joint(4.25e-3, 4.25e-3)
-    names = tuple(name.replace("A1", "B2") for name in apart.part_names)
-    facets = {name.replace("A1", "B2"): quads for name, quads in apart.facets.items()}
-    second = MeshData(apart.points, apart.cells, apart.part, names, facets)
-    scene = surveyed(append([board(9, 4), joint(0.25e-3, 0.25e-3), second]))
+    scene = surveyed(two_regions())
     division = divide(*scene)
     check_division(*scene[:2], division, scene[2])
     assert (division.meso & scene[2].coarse).sum() == 2 * 3 * 3 * 2

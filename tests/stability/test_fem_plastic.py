@@ -3,54 +3,21 @@
 import numpy as np
 import pytest
 
-from fem.body import Body, Response
 from fem.errors import InvertedElementError
 from fem.materials.library import FR4
 from fem.materials.parameters import Isotropic, JohnsonCook
 from fem.mesh import MeshData
-from fem.motion import Motion
-from fem.trials.bodies import motion_of, nonlinear_body
 from fem.trials.grids import grid, mesh_of, on
-from tests.support.fem_nonlinear import SOLDER
+from fem.trials.impact import explicit, imbalance, march, rod
+from fem.trials.metals import SOLDER
 
 both_formulations = pytest.mark.parametrize("formulation", ["one_point", "incompatible_modes"])
-
-
-def rod(length: float, width: float, counts: tuple[int, int], move=lambda x: x) -> MeshData:
-    """Return a rod along x, held at x = 0 in that direction."""
-    across = np.linspace(0, width, counts[1] + 1)
-    points, cells = grid(np.linspace(0, length, counts[0] + 1), across, across)
-    return mesh_of(move(points), cells, "board", {"symmetry_x": on(0, 0.0), "symmetry_y": on(1, 0.0)})
-
-
-def explicit(mesh: MeshData, material, finite: bool, formulation: str, fraction: float) -> tuple[Body, Motion]:
-    response = Response("finite" if finite else "small", np.inf)
-    _, critical = nonlinear_body(mesh, material, response, formulation)
-    response = Response(response.kinematics, fraction * critical)
-    body, _ = nonlinear_body(mesh, material, response, formulation)
-    return body, motion_of(body, fraction * critical)
-
-
-def march(motion: Motion, steps: int) -> np.ndarray:
-    """Take steps; return kinetic, strain, plastic and hourglass energy at each: (steps + 1, 4)."""
-    energies = []
-    for _ in range(steps + 1):
-        held = motion.internal_energy()
-        energies.append([motion.kinetic_energy(), held.strain, held.plastic, held.hourglass])
-        motion.advance()
-        motion.update_force()
-    return np.array(energies)
-
-
-def imbalance(energies: np.ndarray) -> float:
-    total = energies.sum(axis=1)
-    return float(np.abs(total - total[0]).max() / total[0])
 
 
 @both_formulations
 def test_bar_pulled_at_ten_thousand_a_second_balances(formulation):
     """To 10 % of strain with hardening, rate dependence and waves of the initial velocity field."""
-    body, motion = explicit(rod(10e-3, 2e-3, (20, 2)), SOLDER, True, formulation, 0.6)
+    body, motion = explicit(rod(10e-3, 2e-3, (20, 2)), SOLDER, "finite", formulation, 0.6)
     motion.velocity[:, 0] = np.where(body.free[:, 0], 1e4 * body.local.points[:, 0], 0.0)
     energies = march(motion, round(2e-5 / motion.step))
     assert imbalance(energies) < 1e-3
@@ -68,7 +35,9 @@ def test_elastic_plastic_impact_balances(formulation):
         return points + np.outer(points[:, 1], [0.0, 0.0, 0.8])
 
     for finite in (False, True):
-        body, motion = explicit(rod(6e-3, 1e-3, (18, 3), skew), SOLDER, finite, formulation, 0.6)
+        body, motion = explicit(
+            rod(6e-3, 1e-3, (18, 3), skew), SOLDER, "finite" if finite else "small", formulation, 0.6
+        )
         motion.velocity[:, 0] = np.where(body.free[:, 0], -60.0, 0.0)
         energies = march(motion, 400)
         assert imbalance(energies) < 1e-3
@@ -78,7 +47,7 @@ def test_elastic_plastic_impact_balances(formulation):
 def test_hundred_turns_keep_energy_and_momentum():
     """A free brick of FR4 turns a hundred times: central differences keep what it had, no strain piles up."""
     points, cells = grid([0, 1e-3, 2e-3], [0, 1e-3], [0, 1e-3])
-    body, motion = explicit(mesh_of(points, cells, "board", {}), FR4, True, "one_point", 0.9)
+    body, motion = explicit(mesh_of(points, cells, "board", {}), FR4, "finite", "one_point", 0.9)
     rate = 0.02 / motion.step * np.array([0.6, 0.0, 0.8])
     centred = body.local.points - body.mass @ body.local.points / body.mass.sum()
     motion.velocity[:] = np.cross(rate, centred)
@@ -101,7 +70,7 @@ def test_hundred_turns_keep_energy_and_momentum():
 
 
 def test_element_that_turns_inside_out_ends_the_run_with_its_name():
-    body, motion = explicit(rod(4e-3, 1e-3, (4, 1)), SOLDER, True, "one_point", 0.9)
+    body, motion = explicit(rod(4e-3, 1e-3, (4, 1)), SOLDER, "finite", "one_point", 0.9)
     tip = body.local.points[:, 0] > 3.9e-3
     motion.velocity[tip, 0] = -1.2e-3 / motion.step
     with pytest.raises(InvertedElementError, match=r"element \d+, at first near"):
@@ -127,7 +96,7 @@ def test_copper_rod_that_strikes_a_rigid_wall(formulation):
     copper = Isotropic(
         density=8930.0, young_modulus=117e9, poisson_ratio=0.35, plasticity=JohnsonCook(A=400e6, B=100e6, n=1.0)
     )
-    body, motion = explicit(taylor_mesh(3.2e-3, 32.4e-3, 3, 24), copper, True, formulation, 0.25)
+    body, motion = explicit(taylor_mesh(3.2e-3, 32.4e-3, 3, 24), copper, "finite", formulation, 0.25)
     foot = np.abs(body.local.points[:, 2]) < 1e-9
     for node in np.flatnonzero(foot):
         motion.hold(np.array([node]), 2)

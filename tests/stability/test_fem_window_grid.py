@@ -5,14 +5,12 @@ ratios up to 8, flat, distorted and curved interfaces, at the steps that the pro
 measured beside them, and is seen to fail.
 """
 
-import numpy as np
 import pytest
 
-from fem.parameters import Coupling
-from fem.trials.pairs import SCHEMES, SIZE, Pair
+from fem.trials.pairs import SCHEMES, Pair
+from fem.trials.windows import PUSH, momentum_error
 
 GROWTH = 1e-8
-PUSH = np.array([0.3, 0.1, 1.0])  # [m/s]
 SAMPLES = {
     "nearly equal": Pair(2, 1.0, 1),
     "stiff": Pair(3, 10.0, 1.5),
@@ -63,17 +61,3 @@ def test_momentum_of_a_free_pair(scheme):
     else:
         assert 1e-10 < errors[0] < 5e-3
         assert errors[1] < 0.5 * errors[0]
-
-
-def momentum_error(coupling: Coupling, fraction: float) -> float:
-    """Return the largest change of linear and angular momentum over that of all nodes by magnitude."""
-    coupled = Pair(4, 3.0, 2, free=True).coupled(coupling, fraction)
-    coupled.swing(PUSH)
-    start = coupled.momentum()
-    mass = sum(part.motion.ledger_mass.sum() for part in coupled.parts)
-    scale = mass * np.linalg.norm(PUSH) * np.array([1.0] * 3 + [3 * SIZE] * 3)
-    largest = 0.0
-    for _ in range(round(180 / fraction)):
-        coupled.run()
-        largest = max(largest, float(np.abs((coupled.momentum() - start) / scale).max()))
-    return largest

@@ -6,19 +6,10 @@ from scipy.linalg import polar
 from fem.kernels.hexahedron import GAUSS, shape_derivatives
 from fem.kernels.nonlinear import Path
 from fem.kernels.plasticity import plastic_constants, plastic_increment
-from fem.materials.parameters import Isotropic, JohnsonCook, Material
+from fem.materials.parameters import Material
 from fem.strain import strain_matrix
 from fem.stress import symmetric, voigt
 
-SOLDER = Isotropic(
-    density=7400.0,
-    young_modulus=50e9,
-    poisson_ratio=0.36,
-    plasticity=JohnsonCook(A=40e6, B=300e6, n=0.7, C=0.05, reference_rate=1.0),
-)
-LINEAR_HARDENING = Isotropic(
-    density=7400.0, young_modulus=50e9, poisson_ratio=0.36, plasticity=JohnsonCook(A=40e6, B=500e6, n=1.0)
-)
 SHEAR_TWICE = np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0])
 
 

@@ -3,14 +3,11 @@
 import numpy as np
 import pytest
 
-from fem.elements.kind import ElementKind
-from fem.facet import area_vectors
 from fem.materials.library import FR4
 from fem.materials.parameters import Isotropic, Material
-from fem.mesh import boundary_facets
 from fem.mesh_quality import scaled_jacobians
-from fem.trials.boxes import KINDS, box, elements_of, frequencies, solve
-from fem.trials.grids import CYCLIC
+from fem.trials.bending import beam, tip
+from fem.trials.boxes import KINDS, box, elements_of, frequencies
 
 HEXAHEDRA = ["incompatible_modes", "one_point"]
 NOT_LOCKING = pytest.mark.parametrize("name", [*HEXAHEDRA, "tetrahedron_quadratic"])
@@ -19,47 +16,6 @@ MILLIMETRE = 1e-3
 
 def isotropic(young: float, poisson: float = 0.0) -> Material:
     return Isotropic(density=2000.0, young_modulus=young, poisson_ratio=poisson)
-
-
-def tip(kind: ElementKind, lines: list[np.ndarray], materials=None, layers=None, move=lambda points: points) -> float:
-    """Mean deflection of the end x = L under a unit load that is spread over it.
-
-    The root x = 0 keeps its plane but may contract in it, as a beam's does.
-
-    Args:
-        kind: Of element.
-        lines: Of the grid; there are nodes half way up.
-        materials: Of the layers.
-        layers: Layer of elements by the height of their centre, (ne,) -> (ne,).
-        move: Of the points.
-    """
-    points, cells = box(kind, *lines, move=move)
-    length, width, height = (line[-1] for line in lines)
-    x, y, z = points.T
-    number = layers(points[cells[:, : 8 if kind.nodes == 8 else 4]].mean(axis=1)[:, 2]) if layers else 0
-    elements = elements_of(kind, points, cells, materials, number)
-    held, root = np.zeros(points.shape, dtype=bool), x < 1e-9 * length
-    held[root, 0] = True
-    held[root & (np.abs(z - lines[2][len(lines[2]) // 2]) < 1e-9 * height), 2] = True
-    held[root & (y < 1e-9 * width), 1] = True
-    end = x > (1 - 1e-9) * length
-    facets = boundary_facets(cells)[:, CYCLIC if kind.nodes == 8 else slice(None)]
-    facets = facets[end[facets].all(axis=1)]
-    load = np.zeros(points.shape)
-    np.add.at(load[:, 2], facets, np.abs(area_vectors(points[facets])[:, :, 0]) / (width * height))
-    return solve(elements, np.zeros(points.shape), held, load)[end, 2].mean()
-
-
-def beam(length: float, width: float, heights: np.ndarray, young: np.ndarray, poisson: float = 0.0) -> float:
-    """Timoshenko's tip deflection of a layered beam under a unit load, shear energy of the exact shear stress."""
-    z = np.concatenate([[0.0], np.cumsum(heights)])
-    axis = (young @ np.diff(z**2)) / (2 * young @ heights)
-    rigidity = width * young @ np.diff((z - axis) ** 3) / 3
-    fine = np.linspace(0, z[-1], 20001)
-    modulus = young[np.clip(np.searchsorted(z, fine, side="right") - 1, 0, len(young) - 1)]
-    shear = np.cumsum(modulus * (fine - axis)) * fine[1] * width / rigidity
-    flexibility = np.trapz(shear**2 * 2 * (1 + poisson) / modulus, fine) / width
-    return length**3 / (3 * rigidity) + length * flexibility
 
 
 def strip(length: float, width: float, height: float, counts: tuple[int, int, int]) -> list[np.ndarray]:

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from fem.elements.element import critical_steps, element_geometry
 from fem.force_nonlinear import NonlinearElements
 from fem.materials.library import FR4
-from fem.materials.parameters import Isotropic, JohnsonCook, Material
+from fem.materials.parameters import Isotropic, Material
 from fem.stress import symmetric
+from fem.trials.bending import bent_moment
 from fem.trials.bodies import force_of, nonlinear
-from fem.trials.boxes import KINDS, box, elements_of, mass_of
-from tests.support.fem_nonlinear import LINEAR_HARDENING, SOLDER
+from fem.trials.boxes import KINDS, box, elements_of
+from fem.trials.metals import LINEAR_HARDENING, SOLDER
 
 LINE = np.linspace(0.0, 1.0, 4)
 ELASTIC = Isotropic(density=1.0, young_modulus=1.0, poisson_ratio=0.3)
@@ -146,31 +146,6 @@ def test_work_of_the_force_is_the_energy(name):
     assert energy.plastic > 0.005 * energy.total
     assert errors[1] < 3e-3
     assert errors[0] / errors[1] > (2.5 if name == "incompatible_modes" else 3.0)
-
-
-def bent_moment(name: str, layers: int) -> float:
-    """Bend a beam to six times its yield curvature; return its moment over that of beam theory.
-
-    The end planes keep their plane and turn slowly; everything else finds its rest, damped.
-    """
-    length, curvature, steps = 3.0, 6.0, 4000
-    law = JohnsonCook(A=50e6, B=0.0, n=1.0)
-    material = Isotropic(density=1000.0, young_modulus=50e9, poisson_ratio=0.3, plasticity=law)
-    points, cells = box(KINDS[name], np.linspace(0, length, 7), [0, 1], np.linspace(-0.5, 0.5, layers + 1))
-    elements = elements_of(KINDS[name], points, cells, [material])
-    term, mass = nonlinear(elements, material, finite=False), mass_of(elements)[:, None]
-    step = 0.8 * critical_steps(elements, element_geometry(points, cells).nodal_volume).min()
-    x, y, z = points.T
-    end, free = x > length - 1e-9, np.ones(points.shape, dtype=bool)
-    free[(x < 1e-9) | end, 0], free[y < 1e-9, 1], free[(x < 1e-9) & (z < -0.5 + 1e-9), 2] = False, False, False
-    displacement, velocity = np.zeros_like(points), np.zeros_like(points)
-    for k in range(1, steps + 1):
-        force = force_of(term, displacement)
-        velocity = np.where(free, 0.985 * (velocity - step * force / mass), 0.0)
-        displacement += step * velocity
-        displacement[end, 0] = -k / steps * curvature * 2 * law.A / material.young_modulus * length * z[end]
-    exact = law.A / 4 * (1 - 1 / (3 * curvature**2))
-    return abs(float(force[end, 0] @ z[end])) / exact
 
 
 @pytest.mark.parametrize("layers", [1, 2, 4])

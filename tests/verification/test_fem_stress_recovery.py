@@ -12,7 +12,7 @@ from fem.stress import symmetric
 from fem.stress_recovery import StressRecovery
 from fem.trials.bodies import motion_of, nonlinear_body
 from fem.trials.grids import grid, mesh_of
-from tests.support.fem_nonlinear import LINEAR_HARDENING
+from fem.trials.metals import LINEAR_HARDENING
 
 ELASTIC = Isotropic(density=1.0, young_modulus=1e9, poisson_ratio=0.3)
 both_formulations = pytest.mark.parametrize("formulation", ["one_point", "incompatible_modes"])

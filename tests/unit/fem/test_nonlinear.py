@@ -17,7 +17,8 @@ from fem.nonlinear_blocks import TEN_NODES, elastic_constants
 from fem.stress import von_mises
 from fem.trials.bodies import force_of, nonlinear
 from fem.trials.boxes import KINDS, box, elements_of
-from tests.support.fem_nonlinear import SOLDER, HexahedronTwin, PointTwin
+from fem.trials.metals import SOLDER
+from tests.support.fem_nonlinear import HexahedronTwin, PointTwin
 
 LINE = np.linspace(0.0, 1.0, 4)
 every_kind = pytest.mark.parametrize("name", KINDS)

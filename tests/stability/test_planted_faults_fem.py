@@ -1,0 +1,73 @@
+"""Faults planted in elements, steps and coupling are missed by none: hard cases keep their bounds only without them."""
+
+from pathlib import Path
+
+import pytest
+
+from fem.coupling import held_velocity, whole
+from fem.force_assembled import AssembledElements
+from fem.force_nonlinear import NonlinearElements
+from fem.trials import flight
+from workflow.case_text import CASES
+from workflow.stress_test.hard_case import HardCase, read_hard_cases
+from workflow.stress_test.verdict import attempt
+
+HARD = sorted(path for family in ("elements", "coupling") for path in (CASES / "hard").glob(f"{family}_*.toml"))
+
+
+def hard_case(name: str, tried: str) -> HardCase:
+    return next(case for case in read_hard_cases(CASES / "hard" / f"{name}.toml") if case.tried.startswith(tried))
+
+
+@pytest.mark.parametrize("path", HARD, ids=lambda path: path.stem)
+def test_first_case_of_each_file_holds(path: Path):
+    verdict = attempt(read_hard_cases(path)[0])
+    assert verdict.ok, verdict
+
+
+def flipped(add):
+    """Return a force term's method with the other sign."""
+
+    def wrong(self, displacement, force):
+        own = 0.0 * force
+        add(self, displacement, own)
+        force -= own
+
+    return wrong
+
+
+def caught(case: HardCase) -> bool:
+    return not attempt(case).ok
+
+
+def test_flipped_force_of_tetrahedra_is_caught(monkeypatch):
+    case = hard_case("elements_free_flight", "element tetrahedron, critical step element")
+    monkeypatch.setattr(AssembledElements, "add", flipped(AssembledElements.add))
+    assert caught(case)
+
+
+def test_flipped_force_of_elements_that_yield_is_caught(monkeypatch):
+    case = hard_case("elements_impact", "element one_point, kinematics finite, speed 60 m/s")
+    monkeypatch.setattr(NonlinearElements, "add", flipped(NonlinearElements.add))
+    assert caught(case)
+
+
+def test_doubled_step_is_caught(monkeypatch):
+    case = hard_case("elements_free_flight", "element incompatible_modes, critical step element")
+    right = flight.damped_critical_step
+    monkeypatch.setattr(flight, "damped_critical_step", lambda *values: 2.0 * right(*values))
+    assert caught(case)
+
+
+def test_doubled_window_is_caught(monkeypatch):
+    case = hard_case("coupling_growth", "scheme held_velocity, substeps 2")
+    right = whole.critical_steps
+    monkeypatch.setattr(whole, "critical_steps", lambda *values: 2.0 * right(*values))
+    assert caught(case)
+
+
+@pytest.mark.parametrize("name", ["coupling_growth", "coupling_reflection", "coupling_free_fall"])
+def test_flipped_force_of_the_coupling_is_caught(monkeypatch, name):
+    right = held_velocity.add_rows
+    monkeypatch.setattr(held_velocity, "add_rows", lambda rows, values, target: right(rows, -values, target))
+    assert caught(hard_case(name, "scheme held_velocity"))
