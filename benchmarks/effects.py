@@ -1,0 +1,124 @@
+"""What effects cost: a step with each on against one with it off, in turns; the ratios are what plans tell as shares.
+
+Writes benchmarks/results/effects.json, and the table of the registry, workflow/effect_registry/costs.json.
+"""
+
+import json
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from benchmarks.support import turns
+from fem.damping import RayleighDamping
+from fem.force import Kinematics, force_terms
+from fem.loads import DOWN, BodyAcceleration, Load
+from fem.materials.library import FR4, SAC305
+from fem.materials.parameters import Material
+from fem.pulse import STANDARD_GRAVITY, Constant, HalfSine
+from fem.trials.bodies import dns_body, motion_of
+from fem.trials.grids import grid, mesh_of, on
+from particles.cloud import box_cloud
+from particles.parameters import Solder
+from particles.reflow import contact_line, start_flow
+from workflow.effect_registry.costs import MEASURED
+
+CELLS, PER_EDGE, STRETCH = (40, 20, 4), 11, 2.0e-3
+PULSE = BodyAcceleration(DOWN, HalfSine(1.5e4, 5e-4))
+WEIGHT = BodyAcceleration(DOWN, Constant(STANDARD_GRAVITY))
+DROP = Solder(volume=1e-9, pad_contact_angle=np.radians(120.0))
+RESTING = {"gravity": True, "surface_tension": True, "wall_adhesion": True, "inertia": False, "viscosity": False}
+RATELESS = SAC305.model_copy(update={"plasticity": SAC305.plasticity.model_copy(update={"C": 0.0})})
+BOARD = dns_body(
+    mesh_of(
+        *grid(*(np.linspace(0.0, size, cells + 1) for size, cells in zip((40e-3, 20e-3, 1e-3), CELLS, strict=True))),
+        "board",
+        {"mounting_holes": on(0, 0.0)},
+    )
+)
+
+# Effect -> what is told of the measurement, the name of the side with it, that of the side without.
+PAIRS = {
+    "gravity": (f"a step towards rest of {PER_EDGE**3} particles", "reflow", "reflow_weightless"),
+    "inertia": (f"a step of {PER_EDGE**3} particles, which is also shorter", "reflow_inertia", "reflow"),
+    "viscosity": ("the same: both are solved on tetrahedra", "reflow_viscosity", "reflow"),
+    "gravity_in_the_shock": ("an explicit step of 3200 boxes", "drop_weight", "drop"),
+    "damping": ("the same, alpha alone; with beta see damping_stiffness", "drop_alpha", "drop"),
+    "damping_stiffness": ("the same", "drop_beta", "drop"),
+    "finite_rotation": ("the force of 3200 boxes, incompatible modes", "force_finite", "force"),
+    "plasticity": ("the same, below yield", "force_yielding", "force"),
+    "strain_rate": ("the force of 3200 boxes that flow", "flowing", "flowing_rateless"),
+}
+
+
+def reflow(**changes: bool) -> Callable[[], object]:
+    """Return a step of a cube of solder on a wall, which goes on flowing."""
+    cloud = box_cloud(DROP.volume ** (1.0 / 3.0), PER_EDGE)
+    return start_flow(cloud, DROP, RESTING | changes, (contact_line(cloud, 0, np.inf, DROP),)).step
+
+
+def drop(*loads: Load) -> Callable[[], object]:
+    """Return an explicit step of a board under loads."""
+    body, critical = BOARD
+    motion = motion_of(body, 0.5 * critical, loads)
+
+    def step() -> None:
+        motion.advance()
+        motion.update_force()
+
+    return step
+
+
+def force(material: Material, kinematics: Kinematics = "small", stretch: float = 0.0) -> Callable[[], object]:
+    """Return the force of a step of elements, stretched more and more."""
+    body, _ = BOARD
+    terms = force_terms(body.elements, [material], kinematics, 1e-8)
+    points, result = body.local.points, np.zeros_like(body.local.points)
+    pattern = points[:, :1] * [1.0, 0.0, 0.0]
+    strain = 0.0
+
+    def work() -> None:
+        nonlocal strain
+        strain += stretch
+        for term in terms:
+            term.add(strain * pattern, result)
+
+    return work
+
+
+def sides() -> dict[str, Callable[[], object]]:
+    """Return the work of each side."""
+    body = BOARD[0]
+    return {
+        "reflow": reflow(),
+        "reflow_weightless": reflow(gravity=False),
+        "reflow_inertia": reflow(inertia=True),
+        "reflow_viscosity": reflow(viscosity=True),
+        "drop": drop(PULSE),
+        "drop_weight": drop(PULSE, WEIGHT),
+        "drop_alpha": drop(PULSE, RayleighDamping.build(body, (1.0, 0.0))),
+        "drop_beta": drop(PULSE, RayleighDamping.build(body, (0.0, 1e-10))),
+        "force": force(FR4),
+        "force_finite": force(FR4, "finite"),
+        "force_yielding": force(SAC305),
+        "flowing": force(SAC305, stretch=STRETCH),
+        "flowing_rateless": force(RATELESS, stretch=STRETCH),
+    }
+
+
+def ratios(seconds: Mapping[str, np.ndarray]) -> dict[str, dict]:
+    """Return effect -> processor seconds with it over those without, the median over rounds."""
+    return {
+        name: {"ratio": float(np.median(seconds[acting] / seconds[left_out])), "of": what}
+        for name, (what, acting, left_out) in PAIRS.items()
+    }
+
+
+def main() -> None:
+    seconds = turns.in_turns({name: turns.batch(work) for name, work in sides().items()})
+    found = ratios(seconds)
+    MEASURED.write_text(json.dumps({"source": "benchmarks/effects.py", "effects": found}, indent=1) + "\n")
+    turns.write("effects", {"effects": found, "seconds": {name: float(np.median(s)) for name, s in seconds.items()}})
+
+
+if __name__ == "__main__":
+    main()
