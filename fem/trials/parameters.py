@@ -52,6 +52,13 @@ class Bending(Parameters):
     cells: tuple[int, int, int] = (16, 2, 4)
 
 
+class Order(Parameters):
+    """A cube of ever smaller elements, none of them a box."""
+
+    element: Element = "incompatible_modes"
+    poisson_ratio: float = Field(0.3, ge=0, lt=0.5)
+
+
 class Hinge(Parameters):
     """A beam of layers of elements that is bent to six times the curvature at which it yields."""
 

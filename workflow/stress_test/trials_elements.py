@@ -12,6 +12,7 @@ TRIALS = {
         of.Compression, "fem.trials.fields:compression", "stress_error stress_scatter force_error"
     ),
     "bending": solver_trial(of.Bending, "fem.trials.bending:bending", "deflection_error"),
+    "order": solver_trial(of.Order, "fem.trials.order:order", "displacement_order strain_order"),
     "hinge": solver_trial(of.Hinge, "fem.trials.bending:hinge", "moment_error"),
     "flight": solver_trial(of.Flight, "fem.trials.flight:flight", MEASURES_OF_FLIGHT),
     "impact": solver_trial(
