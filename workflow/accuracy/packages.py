@@ -18,6 +18,7 @@ from workflow.shock_launch import MODES
 from workflow.units import from_si
 
 REFINED = (1.5, 1.0, 0.75, 0.5, 0.4)  # sizes of elements over those of the case
+TWO_MODELS = (1.5, 1.0, 0.75, 0.5)  # the same with two models
 ALONE, FINEST = (1.5, 1.0, 0.75), 0.5  # of board or joints alone, against the finest of them
 FINE = (1, 3)  # most stressed joints that are fine
 SAME_MESH = "all x 1"  # one model on the mesh of the case
@@ -34,6 +35,7 @@ ERRORS = {
 SIDES = ("von_mises_board", "von_mises_package")
 DEFLECTIONS = ("board_centre", "die_centre")
 
+TWO_SCALE = {"shock.numerics.modes": '["two_scale"]', "shock.identical_joints": "false"}
 TRUE_MASS = {"shock.numerics.mass_scaled": "[]"}  # of copper, whose step two models can do with
 
 Settings = dict[str, str]
@@ -55,7 +57,7 @@ def _dropped(case: BoardDropCase) -> Ladder:
         apart(_joints(case, whole), FINEST),
         apart(_particles(case, whole, SPACINGS), FINEST_SPACING),
     ]
-    knobs = (_mesh(case, whole), *(knob for knob, _ in parts))
+    knobs = (_mesh(case, whole), _critical(case), *(knob for knob, _ in parts))
     choices = (*(finest for _, finest in parts), *_couplings(case))
     return Ladder("shock", ("shock",), ERRORS, _motion, knobs, choices)
 
@@ -103,6 +105,23 @@ def _one_model(case: BoardDropCase, solver: str = "") -> Settings:
 def _mesh(case: BoardDropCase, whole: Settings) -> Knob:
     """All elements of board, package and joints."""
     return _sized(MESH, "all", REFINED, lambda size: whole | _of_board(case, size) | _of_joints(case, size))
+
+
+def _critical(case: BoardDropCase) -> Knob:
+    """All elements, with two models of which one has the critical joint alone fine."""
+    fine = _fine(1)
+    return _sized(
+        f"{MESH}, one fine joint",
+        "1 fine",
+        TWO_MODELS,
+        lambda size: fine | _of_board(case, size) | _of_joints(case, size),
+    )
+
+
+def _fine(count: int) -> Settings:
+    """Two models, as many joints fine as are given, the most stressed ones."""
+    key = "shock.coupling"
+    return TWO_SCALE | {f"{key}.fine_joints": "critical", f"{key}.critical_joints": f"{count}"}
 
 
 def _board(case: BoardDropCase, whole: Settings) -> Knob:
@@ -172,20 +191,16 @@ def _length(value: float) -> str:
 def _couplings(case: BoardDropCase) -> Iterator[Rung]:
     """Two models, or one in explicit steps, on the mesh of the case; also against one model on that mesh."""
     for name, settings in (_two_models(case) | _explicit(case)).items():
-        yield Rung(name, "coupling", settings)
+        if settings != _fine(1):  # which is on the way of all meshes
+            yield Rung(name, "coupling", settings)
         yield Rung(f"{name}: alone", "coupling, same mesh", settings, None, SAME_MESH)
 
 
 def _two_models(case: BoardDropCase) -> dict[str, Settings]:
     """Extent of the fine region, schemes, one way; name -> settings."""
     key, joints = "shock.coupling", len(pad_table(case.package, case.board, case.warpage))
-    two = {"shock.numerics.modes": '["two_scale"]', "shock.identical_joints": "false"}
-    every = two | {f"{key}.fine_joints": "all"}
-    few = {
-        f"{count} fine": two | {f"{key}.fine_joints": "critical", f"{key}.critical_joints": f"{count}"}
-        for count in FINE
-        if count < joints
-    }
+    every = TWO_SCALE | {f"{key}.fine_joints": "all"}
+    few = {f"{count} fine": _fine(count) for count in FINE if count < joints}
     ways = few | {f"{name}, one way": settings | {f"{key}.direction": "one_way"} for name, settings in few.items()}
     ways |= {"all fine": every, "all fine, held velocity": every | {f"{key}.scheme": "held_velocity"}}
     if _is_linear(case):
