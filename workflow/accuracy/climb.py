@@ -64,9 +64,13 @@ class Climb:
         return [Store(self.folder), *(Store(self.folder / f"again-{number}") for number in range(1, AGAIN + 1))]
 
     def climb(self, rungs: Sequence[Rung]) -> None:
-        """Compute the points of rungs that are missing, the cheapest first; then cheap ones again."""
+        """Compute the points of rungs that are missing, the cheapest first; then cheap ones again.
+
+        Those of the first knob go before all others, which may have to be compared with them.
+        """
         self._read(rungs)
-        ready = sorted((rung for rung in rungs if rung.name in self.points), key=self.foreseen)
+        main, known = self.ladder.knobs[0].name, [rung for rung in rungs if rung.name in self.points]
+        ready = sorted(known, key=lambda rung: (rung.knob != main, self.foreseen(rung)))
         for batch in [ready] if self.budget == float("inf") else [[rung] for rung in ready]:
             self._run(self.stores[0], batch)
         for store in self.stores[1:]:

@@ -203,7 +203,7 @@ def _two_models(case: BoardDropCase) -> dict[str, Settings]:
     few = {f"{count} fine": _fine(count) for count in FINE if count < joints}
     ways = few | {f"{name}, one way": settings | {f"{key}.direction": "one_way"} for name, settings in few.items()}
     ways |= {"all fine": every, "all fine, held velocity": every | {f"{key}.scheme": "held_velocity"}}
-    if _is_linear(case):
+    if _is_linear(case) and not case.shock.numerics.mass_scaled:
         ways["all fine, one level"] = every | {f"{key}.scheme": "local_steps", f"{key}.levels": "1"}
     if case.shock.numerics.mass_scaled:
         ways |= {f"{name}, true mass": settings | TRUE_MASS for name, settings in few.items()}
