@@ -128,8 +128,12 @@ def accuracy(
     from workflow.accuracy.command import read_wish, show
 
     wish = replace(read_wish(case, settings or [], tolerance, budget), oversubscribe=oversubscribe)
-    if not show(wish, out, console):
-        raise typer.Exit(1)
+    try:
+        kept = show(wish, out, console)
+    except KeyboardInterrupt as error:
+        print_error("interrupted; complete points and checkpoints are kept: the same command continues")
+        raise typer.Exit(1) from error
+    raise typer.Exit(0 if kept else 1)
 
 
 @app.command()

@@ -86,11 +86,14 @@ class Climb:
         found = {rung.name: self._measurement(rung, errors.get(rung.name, {})) for rung in rungs}
         return {name: one for name, one in found.items() if one.stages or one.failed}
 
-    def foreseen(self, rung: Rung) -> float:
-        """Wall time of all stages of a rung that are missing [s]: the forecast, corrected by what others took."""
-        point, known = self.points[rung.name], calibration(self._costs(self.points[one]) for one in self._known())
-        seconds = self._forecast(point)
-        return sum(known.seconds(stage, seconds[stage]) for stage in self._missing(point) if stage in seconds)
+    def foreseen(self, rung: Rung, store: Store | None = None) -> float:
+        """Wall time of the stages of a rung that a store does not have [s]: the forecast, corrected by measurements."""
+        point, store = self.points[rung.name], store or self.stores[0]
+        known, seconds = calibration(self._costs(self.points[one]) for one in self._known()), self._forecast(point)
+        stages = [stage.name for stage in point.case.pipeline.upstream(self.ladder.until)]
+        return sum(
+            known.seconds(name, seconds[name]) for name in stages if name in seconds and not store.has(point, name)
+        )
 
     def _known(self) -> list[str]:
         return [name for name, point in self.points.items() if self.stores[0].is_complete(point, self.ladder.until)]
@@ -99,10 +102,6 @@ class Climb:
         if point.key not in self._forecasts:
             self._forecasts[point.key] = stage_seconds(point.case)
         return self._forecasts[point.key]
-
-    def _missing(self, point: Point) -> list[str]:
-        stages = point.case.pipeline.upstream(self.ladder.until)
-        return [stage.name for stage in stages if not self.stores[0].has(point, stage.name)]
 
     def _read(self, rungs: Sequence[Rung]) -> None:
         """Read the cases of rungs; one that cannot be is noted."""
@@ -122,11 +121,11 @@ class Climb:
             point = self.points[rung.name]
             if store.is_complete(point, until) or point.key in self.failed:
                 continue
-            expected = self.foreseen(rung) + SECONDS_TO_SCHEDULE
-            if expected > self.left:
-                self.left_out[rung.name] = expected
-            else:
+            expected = self.foreseen(rung, store) + SECONDS_TO_SCHEDULE
+            if expected <= self.left:
                 wanted.append(point)
+            elif store == self.stores[0]:
+                self.left_out[rung.name] = expected
         if wanted:
             self.failed |= self.compute(store, wanted)
 

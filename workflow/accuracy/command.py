@@ -167,7 +167,10 @@ def show(wish: Wish, out: Path | None, console: Console) -> bool:
     accuracy, climb = measure(wish, folder, compute)
     remarks = (*_left_out(climb), *_impossible(climb), *_own_size(wish, accuracy))
     write_pages(folder, accuracy, remarks)
-    console.print(table(tables.runs(accuracy), f"Errors and costs, {accuracy.machine}"))
+    console.print(
+        table(tables.runs(accuracy), f"Errors and costs, the least of all times that it was run: {accuracy.machine}")
+    )
+    console.print(f"[dim]{tables.legend(accuracy)}", soft_wrap=True)
     console.print(table(tables.orders(accuracy), "Orders in h, the value of a knob; core-seconds t0 + D h^-q"))
     for remark in remarks:
         console.print(f"\n{remark}", soft_wrap=True)
@@ -217,9 +220,9 @@ def _own_size(wish: Wish, accuracy: Accuracy) -> list[str]:
     own = {key: value for key, value in wish.settings.items() if key != "scale"}
     known, chosen = calibration(one.stages for one in accuracy.measurements), accuracy.recommended
     told = [f"{duration(total(known, _case(wish.case, own)))} as it is"]
-    if chosen is not None:
+    if chosen is not None and own != wish.settings:
         told.append(f"{duration(total(known, _case(wish.case, own | dict(chosen.rung.settings))))} as recommended")
-    how = f"forecast, times what {known.points} points took over what was foreseen of them"
+    how = f"forecast, times measured over foreseen of the nearest of {known.points} points"
     return [f"Wall time of the case at its own size: about {', '.join(told)} ({how})."]
 
 
@@ -237,7 +240,7 @@ def _show_choice(accuracy: Accuracy, console: Console) -> None:
     if chosen is None:
         console.print("\n[bold]Nothing to recommend[/]: no run has a known error within the budget.")
         return
-    console.print(f"\n[bold]Recommended: {chosen.rung.name}[/], {chosen.why}. In the case file:\n")
+    console.print(f"\n[bold]Recommended: {chosen.rung.name}[/], {chosen.why}. In the case file:\n", soft_wrap=True)
     for line in tables.as_lines(chosen.rung.settings):
         console.print(f"    {line}", markup=False)
     console.print(f"\nor {tables.as_options(chosen.rung.settings)}", markup=False, soft_wrap=True)

@@ -55,6 +55,7 @@ def section(accuracy: Accuracy, remarks: tuple[str, ...] = (), elsewhere: bool =
         "judged": accuracy.errors[accuracy.judged],
         "stages": " and ".join(f"stage {stage}" for stage in stages),
         "plot": svg(figure(accuracy)),
+        "legend": tables.legend(accuracy),
         "runs": tables.runs(accuracy),
         "orders": tables.orders(accuracy),
         "prediction": tables.prediction(accuracy),

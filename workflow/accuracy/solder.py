@@ -22,12 +22,15 @@ STEPS_TO_A_PARTICLE = 16  # of a period, that the spacing alone is seen to err
 LARGEST_COUNT, SMALLEST_COUNT = 50, 5
 TIME_STEPS = (20.0, 5.0)  # capillary limits
 WHERE = 11  # particles per edge of rungs that vary something else
-GRIPC = {
+MOVING = {  # what Hu et al. print: so viscous that a drop with inertia comes to rest soon
+    "solder.effects.inertia": "on",
+    "solder.parameters": "paper",
+    "solder.process_time": "0.1 s",
+    "solder.numerics.max_steps": "20000",
+}
+GRIPC = MOVING | {
     "solder.numerics.scheme": "gripc",
     "solder.numerics.time_step_limit": "0.5",
-    "solder.numerics.max_steps": "20000",
-    "solder.parameters": "paper",
-    "solder.effects.inertia": "on",
     "solder.process_time": "5 ms",
 }
 
@@ -67,13 +70,12 @@ def drop_ladder(case: DropCase) -> Ladder:
         for limit in TIME_STEPS
         if limit != case.molten.numerics.time_step_limit
     ]
-    coarse = _per_edge(case, PER_EDGE[1]) | GRIPC
-    seeds = [
-        Rung(f"gripc, {basis}", "scheme", coarse | {"solder.numerics.basis": basis})
-        for basis in ("linear", "quadratic")
-    ]
+    coarse = _per_edge(case, PER_EDGE[1])
+    others = [Rung(f"inertia, {PER_EDGE[1]} per edge", "effects", coarse | MOVING)]
+    for basis in ("linear", "quadratic"):
+        others.append(Rung(f"gripc, {basis}", "scheme", coarse | GRIPC | {"solder.numerics.basis": basis}))
     exact = "sphere" if drop.is_free else "Young-Laplace"
-    choices = (*steps, *(seeds if not drop.is_free else ()))
+    choices = (*steps, *(() if drop.is_free else others))
     return Ladder("reflow", ("reflow",), errors, partial(of_metrics, exact, errors, "reflow"), knobs, choices)
 
 

@@ -36,13 +36,18 @@ def on_front(accuracy: Accuracy) -> set[str]:
 def runs(accuracy: Accuracy) -> dict:
     """Head and rows of text: each run with errors, cost and what it is compared with; or why it failed."""
     best = on_front(accuracy)
-    head = ["setting", *accuracy.errors, "wall s", "core s", "front", "compared with"]
+    head = ["setting", *(short(name) for name in accuracy.errors), "wall s", "core s", "front", "compared with"]
     rows = []
     for one in sorted(every_run(accuracy), key=lambda one: (bool(one.failed), bool(one.against), one.core_seconds)):
         errors = [percent(one.errors[name].value) if name in one.errors else "" for name in accuracy.errors]
         cost = ["", ""] if one.failed else [f"{one.seconds:.1f}", f"{one.core_seconds:.1f}"]
         rows.append([one.rung, *errors, *cost, ON_FRONT if one.rung in best else "", _remark(one, accuracy)])
     return {"head": head, "rows": rows, "prose": True}
+
+
+def short(quantity: str) -> str:
+    """Name of a quantity at the head of a column."""
+    return quantity.removesuffix("_error").replace("_", " ")
 
 
 def _remark(one: Measurement, accuracy: Accuracy) -> str:
@@ -54,10 +59,15 @@ def _remark(one: Measurement, accuracy: Accuracy) -> str:
     return "" if error is None else error.against
 
 
+def legend(accuracy: Accuracy) -> str:
+    """Say what the errors are of."""
+    return "; ".join(f"{short(name)}: {words}" for name, words in accuracy.errors.items() if short(name) != words)
+
+
 def orders(accuracy: Accuracy) -> dict:
     """Observed orders beside theory, and how cost grows."""
     rows = [
-        [knob, name, f"{error.order:.2f}", "" if error.theory is None else f"{error.theory:g}", _growth(fit)]
+        [knob, short(name), f"{error.order:.2f}", "" if error.theory is None else f"{error.theory:g}", _growth(fit)]
         for knob, fit in accuracy.fits.items()
         for name, error in fit.errors.items()
     ]
@@ -69,7 +79,7 @@ def _growth(fit: Fit) -> str:
     if fit.cost is None:
         return ""
     cost = fit.cost
-    return f"{cost.start:.2g} + {number(cost.constant)} h^-{cost.exponent:.2f}, within {percent(cost.scatter)}"
+    return f"{cost.start:.2g} + {number(cost.constant)} h^-{cost.exponent:.2f}, within {100.0 * cost.scatter:.2g} %"
 
 
 def prediction(accuracy: Accuracy) -> dict | None:

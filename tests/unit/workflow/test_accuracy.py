@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from workflow.accuracy import command
 from workflow.accuracy.calibration import calibration, calibration_of, default_folder
 from workflow.accuracy.climb import AGAIN
 from workflow.accuracy.command import Wish, keeps_promise, measure, read_wish
@@ -14,6 +15,7 @@ from workflow.accuracy.measured import StageCost, read_accuracy
 from workflow.accuracy.page import section, section_for, write_pages
 from workflow.accuracy.tables import as_lines, as_options, on_front, runs
 from workflow.case import read_case
+from workflow.cli import main
 from workflow.plan import foreseen_costs
 from workflow.problems import CaseError
 
@@ -184,6 +186,21 @@ def test_settings_can_be_pasted():
         "[drop]", "particles_per_edge = 24", 'volume = "1 mm^3"', "[solder.numerics]", "time_step_limit = 20",
     ]  # fmt: skip
     assert "--set 'drop.volume=1 mm^3'" in as_options(settings)
+
+
+@pytest.mark.parametrize(("tolerance", "code"), [("0.2%", 0), ("0.0001%", 1)])
+def test_the_command_tells_it_in_a_hundred_columns(tmp_path, monkeypatch, capsys, tolerance, code):
+    compute = Fake()
+    monkeypatch.setattr(command, "_compute", lambda store, points, **_: compute(store, points))
+    line = ["reflowshock", "accuracy", str(CASE), "--tolerance", tolerance, "--out", str(tmp_path)]
+    monkeypatch.setattr("sys.argv", line)
+    with pytest.raises(SystemExit) as ended:
+        main()
+    shown = capsys.readouterr().out
+    assert ended.value.code == code
+    assert "Recommended: " in shown and "--set drop.particles_per_edge=" in shown
+    table = [line for line in shown.splitlines() if "Young-Laplace" in line]
+    assert len(table) > 10 and max(map(len, table)) <= 100
 
 
 @pytest.mark.parametrize(
