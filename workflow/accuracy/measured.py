@@ -140,7 +140,8 @@ def _fit(rungs: tuple[Rung, ...], order: float | None, ladder: Ladder, measureme
     errors = {}
     for quantity in ladder.errors:
         place = [k for k, one in enumerate(known) if quantity in one.errors]
-        fit = fit_error([values[k] for k in place], [known[k].errors[quantity].value for k in place], order)
+        theory = order if quantity == ladder.judged else None
+        fit = fit_error([values[k] for k in place], [known[k].errors[quantity].value for k in place], theory)
         if fit is not None:
             errors[quantity] = fit
     return Fit(errors, fit_cost(values, [one.core_seconds for one in known]))

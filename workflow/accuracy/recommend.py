@@ -13,7 +13,7 @@ class Goal:
 
     Attributes:
         tolerance: of the judged error; None: as small as can be.
-        core_seconds: that a run may cost [s]; infinite without a limit.
+        core_seconds: that a run may cost which is still to be made [s]; infinite without a limit.
     """
 
     tolerance: float | None
@@ -55,7 +55,7 @@ def recommend(
         those that were measured). None where nothing is within the cost.
     """
     every = [*_measured(ladder, measurements), *_between(ladder, measurements, fits, goal)]
-    within = [one for one in every if one.core_seconds <= goal.core_seconds]
+    within = [one for one in every if one.measured or one.core_seconds <= goal.core_seconds]
     if not within:
         return None
     good = [one for one in within if goal.tolerance is not None and one.bound <= goal.tolerance]

@@ -13,7 +13,7 @@ from workflow.scene_cases import DropCase, DropsCase, JointCase, OscillationCase
 from workflow.units import from_si
 
 SECOND = 2.0  # order in the spacing of a surface that minimises a discrete area
-PER_EDGE = (6, 7, 9, 11, 13, 15, 17, 21, 27)
+PER_EDGE = (6, 7, 9, 11, 13, 15, 17, 21, 27, 41)
 OF_A_QUARTER = (9, 11, 15, 21, 27)
 FINENESS = (0.55, 0.7, 0.85, 1.0, 1.2, 1.45, 1.75, 2.1)  # of a spacing that the case gives
 PER_RADIUS = (2, 3, 4, 5, 6, 7)

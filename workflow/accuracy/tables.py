@@ -36,12 +36,13 @@ def on_front(accuracy: Accuracy) -> set[str]:
 def runs(accuracy: Accuracy) -> dict:
     """Head and rows of text: each run with errors, cost and what it is compared with; or why it failed."""
     best = on_front(accuracy)
-    head = ["setting", *(short(name) for name in accuracy.errors), "wall s", "core s", "front", "compared with"]
+    head = ["setting", *(short(name) for name in accuracy.errors), "wall s", "core s", "compared with"]
     rows = []
     for one in sorted(every_run(accuracy), key=lambda one: (bool(one.failed), bool(one.against), one.core_seconds)):
         errors = [percent(one.errors[name].value) if name in one.errors else "" for name in accuracy.errors]
         cost = ["", ""] if one.failed else [f"{one.seconds:.1f}", f"{one.core_seconds:.1f}"]
-        rows.append([one.rung, *errors, *cost, ON_FRONT if one.rung in best else "", _remark(one, accuracy)])
+        name = f"{one.rung} {ON_FRONT}" if one.rung in best else one.rung
+        rows.append([name, *errors, *cost, _remark(one, accuracy)])
     return {"head": head, "rows": rows, "prose": True}
 
 
@@ -60,8 +61,9 @@ def _remark(one: Measurement, accuracy: Accuracy) -> str:
 
 
 def legend(accuracy: Accuracy) -> str:
-    """Say what the errors are of."""
-    return "; ".join(f"{short(name)}: {words}" for name, words in accuracy.errors.items() if short(name) != words)
+    """Say what marks and errors mean."""
+    names = [f"{short(name)}: {words}" for name, words in accuracy.errors.items() if short(name) != words]
+    return "; ".join([f"{ON_FRONT} on the Pareto front", *names])
 
 
 def orders(accuracy: Accuracy) -> dict:
