@@ -104,7 +104,7 @@ class Climb:
         return self._forecasts[point.key]
 
     def _read(self, rungs: Sequence[Rung]) -> None:
-        """Read the cases of rungs; one that cannot be is noted."""
+        """Read the cases of rungs; one that cannot be is noted, and one that failed before, as it would again."""
         for rung in rungs:
             points, wrong = read_possible_points(
                 self.case, [dict(self.settings) | dict(rung.settings)], self.oversubscribe
@@ -113,6 +113,7 @@ class Climb:
                 self.impossible[rung.name] = "; ".join(str(problem) for problem in wrong[0].problems)
             else:
                 self.points[rung.name] = points[0]
+                self.failed |= _failed_before(self.stores[0], points[0], self.ladder.until)
 
     def _run(self, store: Store, rungs: Sequence[Rung]) -> None:
         """Compute what is missing and fits into the budget."""
@@ -174,3 +175,10 @@ def _record(store: Store, point: Point, stage: str) -> dict | None:
     if not store.run_folder(point).exists():
         store.prepare(point)  # another point has made all its products
     return read_record(store.run_folder(point), point.case.pipeline[stage])
+
+
+def _failed_before(store: Store, point: Point, until: str) -> dict[str, str]:
+    """Return key and message of a point of which a stage was tried and failed."""
+    missing = [stage.name for stage in point.case.pipeline.upstream(until) if not store.has(point, stage.name)]
+    told = [f"stage {stage}: {message}" for stage in missing if (message := store.message(point, stage)) is not None]
+    return {point.key: told[0]} if told else {}

@@ -15,7 +15,7 @@ from workflow.accuracy.climb import Climb, Compute
 from workflow.accuracy.ladder import Ladder
 from workflow.accuracy.ladders import ladder_of
 from workflow.accuracy.machine import this_machine
-from workflow.accuracy.measured import FILE, Accuracy, Recommended, fits_of, read_accuracy, write_accuracy
+from workflow.accuracy.measured import FILE, Accuracy, Recommended, fits_of, write_accuracy
 from workflow.accuracy.page import PAGE, PICTURE, write_pages
 from workflow.accuracy.recommend import Goal, recommend
 from workflow.case import available_cores, read_case
@@ -123,7 +123,6 @@ def measure(wish: Wish, folder: Path, compute: Compute, ladder: Ladder | None = 
     case = read_case(wish.case, wish.overrides, wish.oversubscribe)
     ladder = ladder or ladder_of(case)
     climb = Climb(ladder, wish.case, wish.settings, folder, compute, wish.budget, wish.oversubscribe)
-    climb.failed |= _failed_before(folder)
     climb.climb(ladder.rungs)
     measured = climb.measured(ladder.rungs)
     fits = fits_of(ladder, measured)
@@ -135,12 +134,6 @@ def measure(wish: Wish, folder: Path, compute: Compute, ladder: Ladder | None = 
     )  # fmt: skip
     write_accuracy(folder, accuracy)
     return accuracy, climb
-
-
-def _failed_before(folder: Path) -> dict[str, str]:
-    """Return key and message of points that failed before: their inputs are the same, so they would again."""
-    before = read_accuracy(folder / FILE)
-    return {} if before is None else {one.key: one.failed for one in before.measurements if one.failed and one.key}
 
 
 def _run(chosen: Recommended, climb: Climb) -> Recommended:

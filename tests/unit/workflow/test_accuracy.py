@@ -18,6 +18,7 @@ from workflow.case import read_case
 from workflow.cli import main
 from workflow.plan import foreseen_costs
 from workflow.problems import CaseError
+from workflow.stage_runner import MESSAGE
 
 CASE = Path(__file__).resolve().parents[3] / "cases/sessile_drop/case.toml"
 BROKEN = "the flow is unstable"
@@ -35,7 +36,10 @@ class Fake:
         for point in points:
             self.computed.append((store.folder.name, point.key))
             if point.case.solder.numerics.scheme == "gripc":
-                failed[point.key] = BROKEN
+                failed[point.key] = f"stage reflow: {BROKEN}"
+                partial = store.work_folder(point, "reflow") / ".reflow.partial"
+                partial.mkdir(parents=True)
+                (partial / MESSAGE).write_text(BROKEN)
                 continue
             store.prepare(point)
             folder = store.stage_folder(point.case, "reflow")
@@ -103,7 +107,7 @@ def test_cheap_points_are_run_again_and_the_smallest_time_counts(done):
 def test_a_failed_run_is_a_row_with_its_message(done):
     accuracy = done[0]
     rows = {row[0].removesuffix(" *"): row for row in runs(accuracy)["rows"]}
-    assert rows["gripc, linear"][-1] == f"failed: {BROKEN}"
+    assert rows["gripc, linear"][-1] == f"failed: stage reflow: {BROKEN}"
     assert rows["21 per edge"][-1] == "exact: Young-Laplace"
     assert rows["21 per edge"][1:3] == ["0.25 %", "5 %"]
 
