@@ -24,6 +24,8 @@ def write_report(run_folder: Path, case) -> dict:
     Returns:
         The summary.
     """
+    import vtkmodules.vtkCommonCore  # noqa: F401  # before the forecasts load DOLFINx, with whose symbols VTK would abort
+
     summary = collect_summary(run_folder, case.case.name)
     write_summary(run_folder, summary)
     write_page(run_folder / "report.html", "report.html.j2", _context(run_folder, case, summary))
