@@ -48,7 +48,7 @@ PartitionName=one Nodes={host} Default=YES MaxTime=INFINITE State=UP
 """
 PROFILE = """\
 slurm-status-command: squeue
-slurm-init-seconds-before-status-checks: 3
+slurm-init-seconds-before-status-checks: 8
 latency-wait: 10
 """
 
