@@ -209,25 +209,29 @@ def effects(
 @app.command()
 def study(
     study: Annotated[Path, typer.Argument(metavar="STUDY", help="study file (TOML)")],
-    cores: Annotated[int | None, typer.Option("-j", "--cores", min=1, help="cores to use [default: all]")] = None,
+    cores: AtOnce = None,
     dry_run: Annotated[bool, typer.Option("--dry-run", "-n", help="say what would be computed, and its cost")] = False,
     out: Annotated[
         Path | None, typer.Option("--out", metavar="DIR", help="folder of the study [default: runs/<study name>]")
     ] = None,
     oversubscribe: Oversubscribe = False,
+    executor: ExecutorOption = ExecutorName.LOCAL,
+    profile: ProfileOption = None,
 ) -> None:
     """Run a case at many settings; only what is missing. Results as tables, plots and a page."""
-    from workflow.points.batch import Machine
+    from workflow.points.batch import machine_of
     from workflow.points.store import Store
     from workflow.study.command import read_points_of, run_study, show_outlook
 
-    points = read_points_of(study, oversubscribe)
+    points = read_points_of(study, oversubscribe or executor != ExecutorName.LOCAL)
     store = Store(out or Path("runs") / points.study.about.name)
     if dry_run:
         show_outlook(points, store)
         return
+    cases = [point.case for point in points.possible.values()]
+    machine = machine_of(executor_for(executor, profile, cores, oversubscribe, cases))
     try:
-        healthy = run_study(points, store, Machine(cores or available_cores(), oversubscribe=oversubscribe))
+        healthy = run_study(points, store, machine)
     except KeyboardInterrupt as error:
         print_error("interrupted; complete products and checkpoints are kept: the same command continues")
         raise typer.Exit(1) from error

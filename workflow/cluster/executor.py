@@ -158,7 +158,7 @@ class Slurm:
 
 def executor_for(
     name: ExecutorName, profile: Path | None, at_once: int | None, oversubscribe: bool, cases: Sequence[Case]
-) -> Executor:
+) -> Local | Slurm:
     """Return where stages run, when it is known that they can.
 
     Args:

@@ -4,8 +4,9 @@ import json
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
-from workflow.cluster.executor import Local
+from workflow.cluster.executor import SAID, Executor, Jobs, Local, Slurm
 from workflow.pipeline import locked, snakemake
 from workflow.points.point import Point
 from workflow.points.store import Store
@@ -24,11 +25,25 @@ class Machine:
         cores: number of cores that may be used.
         exclusive: one stage at a time, with all cores, for measurements that must not disturb each other.
         oversubscribe: whether MPI may have more ranks than cores.
+        slurm: where stages are jobs of a cluster.
     """
 
     cores: int
     exclusive: bool = False
     oversubscribe: bool = False
+    slurm: Slurm | None = None
+
+    @property
+    def executor(self) -> Executor:
+        """Where stages run."""
+        return self.slurm or Local(self.cores, self.oversubscribe)
+
+
+def machine_of(executor: Local | Slurm) -> Machine:
+    """Return what points are computed with where the user chose where stages run."""
+    if isinstance(executor, Slurm):
+        return Machine(executor.largest, oversubscribe=executor.oversubscribe, slurm=executor)
+    return Machine(executor.cores, oversubscribe=executor.oversubscribe)
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +70,8 @@ class Job:
 class _Task:
     """A job as the Snakefile reads it, paths relative to the store.
 
-    ``pattern`` is the product with ``{digest}`` in place of it; ``moves``: whether it is made elsewhere, in ``work``.
+    ``pattern`` is the product with ``{digest}`` in place of it; ``moves``: whether it is made elsewhere, in ``work``;
+    ``resources``: what it asks a cluster for, if it is a job there.
     """
 
     stage: str
@@ -66,6 +82,7 @@ class _Task:
     moves: bool
     threads: int
     priority: int
+    resources: dict[str, Any]
 
 
 def job_name(point: Point, stage: str) -> str:
@@ -120,8 +137,8 @@ def run_points(
                 store.prepare_work(job.point, job.stage)
             _write(store, jobs, machine)
             options = ("--snakefile", str(SNAKEFILE), "--keep-going", "--scheduler", "greedy")
-            config = ("--config", f"oversubscribe={int(machine.oversubscribe)}")
-            snakemake(store.folder.resolve(), Local(machine.cores), [*options, *config], lock, each_second)
+            config = ("--config", f"oversubscribe={int(machine.oversubscribe)}", f"cluster={int(bool(machine.slurm))}")
+            snakemake(store.folder.resolve(), machine.executor, [*options, *config], lock, each_second)
     return {point.key: why(store, point, until) for point in points if not store.is_complete(point, until)}
 
 
@@ -129,13 +146,15 @@ def why(store: Store, point: Point, until: str) -> str:
     """Say why a point is not complete: the first of its stages without a product, and what it said when it failed."""
     stage = next(stage.name for stage in point.case.pipeline.upstream(until) if not store.has(point, stage.name))
     log = store.folder / "logs" / f"{job_name(point, stage)}.txt"
-    untold = UNTOLD.format(log=log) if log.exists() else UNTRIED
+    by_cluster = f", {store.folder / SAID}" if (store.folder / SAID).is_file() else ""
+    untold = UNTOLD.format(log=log) + by_cluster if log.exists() else UNTRIED
     return f"stage {stage}: {store.message(point, stage) or untold}"
 
 
 def _write(store: Store, jobs: Sequence[Job], machine: Machine) -> None:
     """Write the jobs for the Snakefile; later stages first, so that points are complete one after the other."""
     tasks = {}
+    wanted = {job.point.key: machine.executor.jobs(job.point.case) for job in jobs}
     for job in jobs:
         work, folder = store.work_folder(job.point, job.stage), store.stage_folder(job.point.case, job.stage)
         product = str(folder.relative_to(store.folder))
@@ -146,15 +165,18 @@ def _write(store: Store, jobs: Sequence[Job], machine: Machine) -> None:
             product=product,
             pattern=product.replace(job.point.digests[job.stage], "{digest}"),
             moves=folder.parent != work,
-            threads=_threads(job, jobs, machine),
+            threads=_threads(job, jobs, machine, wanted[job.point.key]),
             priority=job.point.case.pipeline.names.index(job.stage),
+            resources=wanted[job.point.key].get(job.stage, {}),
         )
     written = {name: asdict(task) for name, task in tasks.items()}
     (store.folder / JOBS).write_text(json.dumps(written, indent=1) + "\n")
 
 
-def _threads(job: Job, jobs: Sequence[Job], machine: Machine) -> int:
+def _threads(job: Job, jobs: Sequence[Job], machine: Machine, wanted: Jobs) -> int:
     """Return the cores of a job: a shock's are its ranks, a reflow has its share, other stages are serial."""
+    if machine.slurm:
+        return wanted[job.stage]["cpus_per_task"] if job.stage in wanted else 1
     if machine.exclusive:
         return machine.cores
     if job.stage == "shock":
