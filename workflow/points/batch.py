@@ -146,8 +146,8 @@ def why(store: Store, point: Point, until: str) -> str:
     """Say why a point is not complete: the first of its stages without a product, and what it said when it failed."""
     stage = next(stage.name for stage in point.case.pipeline.upstream(until) if not store.has(point, stage.name))
     log = store.folder / "logs" / f"{job_name(point, stage)}.txt"
-    by_cluster = f", {store.folder / SAID}" if (store.folder / SAID).is_file() else ""
-    untold = UNTOLD.format(log=log) + by_cluster if log.exists() else UNTRIED
+    by_cluster = f"; see {store.folder / SAID}" if (store.folder / SAID).is_file() else ""
+    untold = (UNTOLD.format(log=log) if log.exists() else UNTRIED) + by_cluster
     return f"stage {stage}: {store.message(point, stage) or untold}"
 
 
