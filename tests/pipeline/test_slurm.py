@@ -41,7 +41,7 @@ def command(slurm: OneNode, case: Path, folder: Path, settings: tuple[str, ...],
 
 
 def run(slurm: OneNode, line: list[str]) -> subprocess.CompletedProcess:
-    return subprocess.run(line, env=slurm.environment, capture_output=True, text=True, timeout=240, check=False)
+    return subprocess.run(line, env=slurm.environment, capture_output=True, text=True, timeout=400, check=False)
 
 
 def metrics(folder: Path) -> dict[str, object]:
@@ -62,7 +62,7 @@ def test_stages_are_jobs_with_ranks_and_products_those_of_a_local_run(slurm, tmp
     jobs = {comment.removeprefix("rule_"): (state, tasks) for _, state, tasks, comment, _ in slurm.queue()}
     assert jobs == {"geometry": ("COMPLETED", "1"), "shock": ("COMPLETED", "2")}
     said = first.stdout
-    assert "shock, explicit on 2 ranks" in said
+    assert "shock, explicit solver on 2 ranks" in said
     assert [said.count(f"ok     {stage}") for stage in ("geometry", "shock", "comparison", "report")] == [1] * 4
     assert not list((tmp_path / "jobs").glob(".*.partial"))
 
