@@ -6,12 +6,12 @@ from pathlib import Path
 import meshio
 import numpy as np
 
-from meshing.joint_mesh import JointMesh
 from meshing.pads import PadSite, pad_table
 from meshing.parameters import Warpage
 from meshing.solder_mesh import mesh_joint
 from meshing.surface import ClosedSurface
 from meshing.trials.faults import FAULTS
+from meshing.trials.joints import Meshed
 from meshing.trials.models import MM, board, package, side_of
 from meshing.trials.surfaces import barrel
 from meshing.user_surface import load_surface
@@ -50,6 +50,7 @@ def load_given(fault: str, bulge: float, noise: float, turn: float) -> tuple[Clo
         return load_surface(path, "mm", site()), exact
 
 
-def mesh_given(surface: ClosedSurface) -> JointMesh:
+def mesh_given(surface: ClosedSurface) -> Meshed:
     """Mesh what was read; JointMeshError where no mesh meets its bars."""
-    return mesh_joint(surface, site(), package(), side_of(Warpage(), package()))
+    whole, side = package(), side_of(Warpage(), package())
+    return Meshed(mesh_joint(surface, site(), whole, side), surface, side, whole.copper.thickness)

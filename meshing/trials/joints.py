@@ -7,7 +7,7 @@ import numpy as np
 
 from meshing.hexahedra import scaled_jacobian, volumes
 from meshing.joint_mesh import JointMesh, joint_quality
-from meshing.package_side import PackageSide
+from meshing.joint_place import Underside as Placed
 from meshing.pad_planes import PadPlanes
 from meshing.pads import PadSite, lift, pad_table
 from meshing.parameters import JointNumerics, Warpage
@@ -33,6 +33,19 @@ class Underside:
         return self.level + self.planes.height(x - self.x, y - self.y)
 
 
+@dataclass(frozen=True, slots=True)
+class Meshed:
+    """A mesh, the surface that it fills in its own frame, and the plane or curved underside that its head must reach.
+
+    The copper [m] is between head and underside.
+    """
+
+    mesh: JointMesh
+    surface: ClosedSurface
+    side: Placed
+    copper: float
+
+
 def sites_of(surface: ClosedSurface, pair: bool) -> tuple[PadSite, ...]:
     """The site of a joint, or the two of a pair that is 1 mm apart."""
     planes = pad_planes(surface)
@@ -56,7 +69,7 @@ def sites_of(surface: ClosedSurface, pair: bool) -> tuple[PadSite, ...]:
     return (replace(site, x=-0.5 * PAIR), replace(site, name="A2", x=0.5 * PAIR)) if pair else (site,)
 
 
-def mesh_at(surface: ClosedSurface, sites: Sequence[PadSite], numerics: JointNumerics | None = None) -> JointMesh:
+def mesh_at(surface: ClosedSurface, sites: Sequence[PadSite], numerics: JointNumerics | None = None) -> Meshed:
     """Mesh a joint, or two that are one body, under a plane that is where its head is.
 
     Args:
@@ -71,14 +84,14 @@ def mesh_at(surface: ClosedSurface, sites: Sequence[PadSite], numerics: JointNum
     whole = package() if numerics is None else package(joint_numerics=numerics.model_dump())
     middle = float(np.mean([site.x for site in sites]))
     side = Underside(pad_planes(surface), middle, first.y, first.z_board + whole.copper.thickness)
-    if len(sites) == 2:
-        return mesh_bridge(surface, sites, whole, side)
-    return mesh_joint(surface, first, whole, side)
+    pair = len(sites) == 2
+    made = mesh_bridge(surface, sites, whole, side) if pair else mesh_joint(surface, first, whole, side)
+    return Meshed(made, surface, side, whole.copper.thickness)
 
 
 def mesh_warped(
     corner: float, bulge: float, discs: tuple[float, float], offset: float, numerics: JointNumerics | None = None
-) -> tuple[JointMesh, ClosedSurface]:
+) -> Meshed:
     """Mesh the corner joint of a small package that is warped, in a shape as high as the package is over its head.
 
     Args:
@@ -87,9 +100,6 @@ def mesh_warped(
         discs: radii of the wetted discs on board and package [m].
         offset: of the package's disc along x [m].
         numerics: how finely; None for the package's own.
-
-    Returns:
-        The mesh and the surface that it fills.
 
     Raises:
         JointMeshError: no mesh meets its bars.
@@ -108,19 +118,31 @@ def mesh_warped(
         pad_radius_package=0.32 * MM,
     )
     surface = barrel(site.gap, bulge, lower, upper, offset)
-    side: PackageSide = side_of(warpage, whole)
-    return mesh_joint(surface, site, whole, side), surface
+    side = side_of(warpage, whole)
+    return Meshed(mesh_joint(surface, site, whole, side), surface, side, whole.copper.thickness)
 
 
-def measured(made: JointMesh, surface: ClosedSurface) -> dict[str, float]:
+def measured(meshed: Meshed) -> dict[str, float]:
     """Measure a mesh: errors against the surface that it fills, smallest scaled Jacobian, hexahedra of solder."""
+    made = meshed.mesh
     quality = joint_quality(made)
     (solder,) = (cells for part, cells in made.cells.items() if part.startswith("solder@"))
     return {
-        "volume_error": abs(float(volumes(made.points, solder).sum()) / enclosed_volume(surface) - 1.0),
+        "volume_error": abs(float(volumes(made.points, solder).sum()) / enclosed_volume(meshed.surface) - 1.0),
         "standoff_error": quality["standoff_error"],
         "contact_area_error": quality["contact_area_error"],
         "shape_deviation": quality["shape_deviation"],
         "scaled_jacobian": min(float(scaled_jacobian(made.points, cells).min()) for cells in made.cells.values()),
+        "head_error": head_error(meshed),
+        "tries": len(quality["tries"]) + 1,
         "hexahedra": len(solder),
     }
+
+
+def head_error(meshed: Meshed) -> float:
+    """Largest distance [m] of the solder's upper face from the package's copper."""
+    made = meshed.mesh
+    heads = [quads for name, quads in made.facets.items() if name.startswith("pad_package@")]
+    points = made.points[np.unique(np.concatenate([quads.ravel() for quads in heads]))]
+    place = meshed.side.height(points[:, 0], points[:, 1]) - meshed.copper
+    return float(np.abs(points[:, 2] - place).max())

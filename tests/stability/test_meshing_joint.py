@@ -27,8 +27,7 @@ HARD = {
 
 def quality_of(corner=0.0, bulge=0.0, lower=0.24 * MM, upper=0.24 * MM, offset=0.0):
     """Mesh the corner joint of the small package in a shape of its own, as high as the package is over its head."""
-    made, _ = mesh_warped(corner, bulge, (lower, upper), offset)
-    return joint_quality(made)
+    return joint_quality(mesh_warped(corner, bulge, (lower, upper), offset).mesh)
 
 
 @pytest.mark.parametrize("shape", HARD.values(), ids=HARD.keys())

@@ -52,7 +52,7 @@ def samples(every: int = 1) -> Iterator[Sample]:
 
 def mesh(sample: Sample) -> JointMesh:
     """Mesh a joint in its place."""
-    return mesh_at(sample.surface, sample.sites)
+    return mesh_at(sample.surface, sample.sites).mesh
 
 
 def outcome(sample: Sample) -> dict:
@@ -62,16 +62,15 @@ def outcome(sample: Sample) -> dict:
     """
     start = time.process_time()
     try:
-        made = mesh(sample)
+        made = mesh_at(sample.surface, sample.sites)
     except JointMeshError as error:
         return {"kind": sample.kind, "method": "refused", "reason": str(error), "seconds": time.process_time() - start}
-    quality = joint_quality(made)
+    quality = joint_quality(made.mesh)
     return {
         "kind": sample.kind,
         "method": quality["method"],
-        **measured(made, sample.surface),
+        **measured(made),
         "smallest_length": quality["smallest_length"]["solder"],
-        "tries": len(quality["tries"]) + 1,
         "missed": [way["missed"] for way in quality["tries"]],
         "seconds": time.process_time() - start,
     }

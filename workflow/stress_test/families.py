@@ -23,6 +23,7 @@ RANDOM_OF: dict[str, str] = {
     "reflow": "workflow.stress_test.random_reflow",
     "elements": "workflow.stress_test.random_elements",
     "coupling": "workflow.stress_test.random_coupling",
+    "remesh": "workflow.stress_test.random_remesh",
 }
 OF_ALL_FAMILIES = "workflow.stress_test.trials_run"
 FAMILIES = ("reflow", "elements", "coupling", "remesh")

@@ -8,8 +8,8 @@ from meshing.parameters import JointNumerics, Parameters
 from workflow.stress_test.trial import Measured, Refused, Trial
 
 if TYPE_CHECKING:
-    from meshing.joint_mesh import JointMesh
     from meshing.surface import ClosedSurface
+    from meshing.trials.joints import Meshed
 
 PI = 3.14159265
 Fault = Literal[
@@ -142,7 +142,7 @@ def body(parameters: BodyTrial) -> dict[str, Measured]:
         made = mesh_at(surface, sites_of(surface, shape.kind == "bridged"), parameters.numerics)
     except JointMeshError as error:
         raise Refused(str(error)) from error
-    return _measured(made, surface)
+    return _measured(made)
 
 
 def warped(parameters: WarpedTrial) -> dict[str, Measured]:
@@ -155,7 +155,7 @@ def warped(parameters: WarpedTrial) -> dict[str, Measured]:
         meshed = mesh_warped(parameters.corner, parameters.bulge, discs, parameters.offset, parameters.numerics)
     except JointMeshError as error:
         raise Refused(str(error)) from error
-    return _measured(*meshed)
+    return _measured(meshed)
 
 
 def given(parameters: GivenTrial) -> dict[str, Measured]:
@@ -168,13 +168,13 @@ def given(parameters: GivenTrial) -> dict[str, Measured]:
     except SurfaceError as error:
         raise Refused(str(error)) from error
     read = Measured(enclosed_volume(surface) / enclosed_volume(exact) - 1.0)
-    return _measured(mesh_given(surface), surface) | {"read_volume_error": read}
+    return _measured(mesh_given(surface)) | {"read_volume_error": read}
 
 
-def _measured(made: "JointMesh", surface: "ClosedSurface") -> dict[str, Measured]:
+def _measured(made: "Meshed") -> dict[str, Measured]:
     from meshing.trials.joints import measured
 
-    return {name: Measured(value, MEASURES[name]) for name, value in measured(made, surface).items()}
+    return {name: Measured(value, MEASURES[name]) for name, value in measured(made).items()}
 
 
 MEASURES = {
@@ -183,6 +183,8 @@ MEASURES = {
     "contact_area_error": "",
     "shape_deviation": "m",
     "scaled_jacobian": "",
+    "head_error": "m",
+    "tries": "",
     "hexahedra": "",
 }
 TRIALS = {

@@ -1,0 +1,50 @@
+"""Faults that are planted into reflow and remesh: hard cases must miss them by the bounds that hold without."""
+
+import pytest
+
+from meshing import levels, user_surface
+from meshing.joint_place import JointPlace
+from particles.force_gravity import Gravity
+from particles.force_wetting import Wetting
+from workflow.stress_test.command import HARD
+from workflow.stress_test.hard_case import read_hard_cases
+from workflow.stress_test.verdict import attempt
+
+
+def flip(patch, owner, name):
+    """Let a method return its result with the other sign."""
+    whole = getattr(owner, name)
+    patch.setattr(owner, name, lambda *given: -whole(*given))
+
+
+def flip_shear(patch):
+    """A joint's head moves away from a warped package, not towards it."""
+    whole = JointPlace.rise
+    patch.setattr(JointPlace, "rise", lambda self, points: -whole(self, points))
+
+
+def forget_volume(patch):
+    patch.setattr(levels, "volume_keeping_scale", lambda swept_volume, volume: 1.0)
+
+
+def forget_check(patch):
+    patch.setattr(user_surface, "check_triangulation", lambda *given: None)
+
+
+FAULTS = [
+    ("reflow_resolution", "particles per edge 5", lambda patch: flip(patch, Wetting, "force")),
+    ("reflow_bond", "bond 1, contact angle 120 deg", lambda patch: flip(patch, Gravity, "force")),
+    ("remesh_warped", "corner 0.1 mm", flip_shear),
+    ("remesh_barrel", "bulge 0.1 mm", forget_volume),
+    ("remesh_refused_inside_out", "", forget_check),
+]
+IDS = ["wall adhesion", "gravity", "head", "volume", "normals"]
+
+
+@pytest.mark.parametrize(("name", "tried", "fault"), FAULTS, ids=IDS)
+def test_a_planted_fault_is_a_miss(name, tried, fault, monkeypatch):
+    (case,) = (case for case in read_hard_cases(HARD / f"{name}.toml") if case.tried == tried)
+    assert attempt(case).ok
+    fault(monkeypatch)
+    verdict = attempt(case)
+    assert not verdict.ok, verdict.checks
