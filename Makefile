@@ -5,7 +5,7 @@ PYTHON := .venv/bin/python
 CASE := cases/bga_drop/case.toml
 
 help:  ## this list
-	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 12
+	@grep -hE '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 16
 
 setup:  ## install what is missing: Debian packages, .venv
 	@.ci/setup
@@ -16,6 +16,9 @@ demo: setup  ## run the default case from case file to report
 test: setup  ## run every check and test, on all cores
 	@.ci/setup-slurm
 	$(PYTHON) -m pytest --numprocesses=logical --maxprocesses=8 --dist=loadfile
+
+test-debian13:  ## run every test on Debian 13 too, in a chroot; compare results (root)
+	@.ci/debian13
 
 test-mpi: setup  ## run the tests that start several MPI ranks
 	$(PYTHON) -m pytest tests/mpi
@@ -31,5 +34,5 @@ clean:  ## remove runs and caches (keeps .venv)
 	rm -rf runs build *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
 	find . -name __pycache__ -not -path './.venv/*' -prune -exec rm -rf {} +
 
-.PHONY: help setup demo test test-mpi lint bench clean
+.PHONY: help setup demo test test-debian13 test-mpi lint bench clean
 .DEFAULT_GOAL := help
