@@ -16,6 +16,7 @@ TOLD = "error: "  # begins what a program says of an error that it knows
 LAST_LINES = 15
 LAUNCHER = "REFLOWSHOCK_MPI_LAUNCHER"  # variable: what starts MPI ranks, e.g. "srun --mpi=pmix" within a job of Slurm
 MPIRUN = "mpirun"
+QUIET = ("--mca", "orte_execute_quiet", "1")  # of Open MPI 4; 5 has no option --quiet, and lets this one pass
 
 # In front of a command: the system sends the signal when the process that starts it ends, however that happens.
 END_WITH_PARENT = ("setpriv", "--pdeathsig", "TERM")
@@ -37,7 +38,7 @@ def mpi_command(ranks: int, program: Sequence[str], oversubscribe: bool) -> list
     launcher = shlex.split(os.environ.get(LAUNCHER, "")) or [MPIRUN]
     if Path(launcher[0]).name != MPIRUN:
         return [*launcher, "-n", str(ranks), *program]
-    command = [*launcher, "--quiet", "-n", str(ranks)]
+    command = [*launcher, *QUIET, "-n", str(ranks)]
     if os.geteuid() == 0:
         command.append("--allow-run-as-root")
     if oversubscribe:
