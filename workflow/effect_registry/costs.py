@@ -6,6 +6,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from fem.errors import PulseError
 from workflow.board_drop_case import PackageCase
 from workflow.case_kind import Case
 from workflow.effect_registry.registry import effect_of
@@ -42,7 +43,10 @@ def cost_shares(case: Case, effects: Mapping[str, Any]) -> dict[str, float]:
 
     Negative where the effect saves time. Effects whose cost is neither foreseen nor measured are left out.
     """
-    seconds = predicted(case)
+    try:
+        seconds = predicted(case)
+    except PulseError:
+        return {}  # a report of a run whose table of the pulse is no longer there
     total = sum(seconds.values())
     shares = {}
     for name, decision in effects.items():
