@@ -77,7 +77,7 @@ def show_outlook(points: Points, store: Store) -> None:
     table.add_row(
         "all",
         f"{sum(own.products for own in stages)}",
-        "",
+        f"{sum(own.products - own.missing for own in stages)}",
         f"{count}",
         f"about {duration(total)}" if total else "",
         style="bold",
