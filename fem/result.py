@@ -19,7 +19,7 @@ from fem.kinematics import finite_rotation
 from fem.materials.effects import failure_effect, material_effects
 from fem.materials.failure import Verdicts, failed_joints, failure_criteria, judge, worst
 from fem.model import Model
-from fem.shock_loads import shock_pulse
+from fem.shock_pulse import shock_pulse
 from fem.steps import Steps
 from fem.watch_joints import FLOW_LAYERS, LAYERS
 

@@ -33,7 +33,8 @@ from fem.parameters import Shock
 from fem.participant import Alone, uncut_motion
 from fem.pulse import Pulse
 from fem.result import Found, Timings, write_result
-from fem.shock_loads import shock_loads, shock_pulse
+from fem.shock_loads import shock_loads
+from fem.shock_pulse import shock_pulse
 from fem.steps import Steps
 from fem.structure.pulses import pulse_durations
 from fem.watch_joints import JointWatch

@@ -2,7 +2,7 @@
 
 Numbers agree to a relative difference of 1e-6; those without a unit also if they differ by less than 1e-6 (errors and
 residuals are near zero, and what they are relative to is one). Words and counts are the same. Only what the machine
-decides is left out: times, speeds, and how its library of solvers stores a factor.
+decides is left out: times, speeds, shares of time, and how its library of solvers stores a factor.
 """
 
 import argparse
@@ -16,7 +16,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 TOLERANCE = 1e-6
 MEASURED_UNITS = {"1/s", "MB", "B"}
-MEASURED = ("seconds", "time_ratio", "per_second", "factor_")
+MEASURED = ("seconds", "time_ratio", "per_second", "factor_", "busy_share", "coupling_overhead")
 HEATED = (
     "warpage.corner=0 mm", "thermal.melting=100 degC", "thermal.peak=200 degC", "thermal.solidification=200 degC",
     "thermal.steps=1", "thermal.effects.solder_force=on", "solder.numerics.time_step_limit=100",

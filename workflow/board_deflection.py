@@ -29,7 +29,7 @@ def expected_deflection(case: "BoardDropCase") -> Deflection:
     The board is a beam between its holes that swings in its first mode, q'' + omega^2 q = 4/pi a(t): w = q sin(pi x/L).
     Width, package and later modes are left out.
     """
-    from fem.shock_loads import shock_pulse
+    from fem.shock_pulse import shock_pulse
 
     board, (young_x, young_y, _) = case.board, case.materials.board.engineering_constants.young
     holes = board.holes

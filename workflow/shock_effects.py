@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 def shock_effects(case: "BoardDropCase") -> dict:
     """Return effect -> {"on", "why"} and, where it is foreseen, "influence"."""
-    from fem.shock_loads import shock_pulse
+    from fem.shock_pulse import shock_pulse
 
     shock = case.shock
     omega = expected_deflection(case).omega

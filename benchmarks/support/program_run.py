@@ -10,7 +10,7 @@ from fem.coupling.placement import shared
 from fem.inputs import RunInput
 from fem.model import build_models, divided_scene
 from fem.run import make_crew, make_history, planned
-from fem.shock_loads import shock_pulse
+from fem.shock_pulse import shock_pulse
 
 
 class ProgramRun:

@@ -14,7 +14,7 @@ from fem.loads import BodyAcceleration, PrescribedMotion
 from fem.mesh import MeshData
 from fem.parameters import Damping, Shock
 from fem.pulse import Constant
-from fem.shock_loads import shock_pulse
+from fem.shock_pulse import shock_pulse
 from fem.trials.bodies import dns_body, motion_of
 from fem.trials.grids import grid, mesh_of, on
 from tests.support.fem_bodies import STEEL
