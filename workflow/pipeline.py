@@ -79,7 +79,7 @@ def drive(run_folder: Path, case: Case, until: str, executor: Executor, lock: in
     write_json(run_folder / JOBS, jobs)
     output = JobOutput(run_folder, [stage.name for stage in case.pipeline.upstream(until)])
     done = snakemake(run_folder, executor, [*arguments, f"jobs={run_folder / JOBS}", *wanted], lock, output.show)
-    for message in output.untold(run_folder / SAID):
+    for message in () if done else output.untold(run_folder / SAID):
         print_error(message)
     return done
 

@@ -52,11 +52,13 @@ class JobOutput:
         where.print(line, markup=False, soft_wrap=True)
 
     def untold(self, said: Path) -> list[str]:
-        """Return what Snakemake says of jobs that failed without a word of their own, as one that Slurm has ended.
+        """Say why Snakemake failed: of jobs without a word of their own, as one that Slurm has ended.
 
         Args:
-            said: file with its output.
+            said: file with the output of Snakemake, which is named where no job has failed.
         """
         text = said.read_text(errors="replace") if said.is_file() else ""
         found = {match["rule"]: match["why"] for match in FAILED.finditer(text)}
+        if not found and not self._failed:
+            return [f"Snakemake has ended; what it said is in {said}"]
         return [f"stage {stage} failed: {why}" for stage, why in found.items() if stage not in self._failed]

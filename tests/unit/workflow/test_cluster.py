@@ -151,6 +151,8 @@ def test_what_jobs_say_is_shown_as_it_comes(tmp_path, capfd):
 
 def test_jobs_that_ended_without_a_word_are_told(tmp_path):
     said = tmp_path / "snakemake.txt"
+    said.write_text("WorkflowError: the account is invalid")
+    assert JobOutput(tmp_path, ["shock"]).untold(said) == [f"Snakemake has ended; what it said is in {said}"]
     said.write_text(SAID)
     told = JobOutput(tmp_path, ["reflow", "shock"]).untold(said)
     assert told == [
