@@ -6,6 +6,7 @@ from meshing import levels, user_surface
 from meshing.joint_place import JointPlace
 from particles.force_gravity import Gravity
 from particles.force_wetting import Wetting
+from particles.inertial_flow import InertialFlow
 from workflow.stress_test.command import HARD
 from workflow.stress_test.hard_case import read_hard_cases
 from workflow.stress_test.verdict import attempt
@@ -15,6 +16,11 @@ def flip(patch, owner, name):
     """Let a method return its result with the other sign."""
     whole = getattr(owner, name)
     patch.setattr(owner, name, lambda *given: -whole(*given))
+
+
+def double_step(patch):
+    whole = InertialFlow.step
+    patch.setattr(InertialFlow, "step", lambda self, time_step: whole(self, 2.0 * time_step))
 
 
 def flip_shear(patch):
@@ -34,11 +40,12 @@ def forget_check(patch):
 FAULTS = [
     ("reflow_resolution", "particles per edge 5", lambda patch: flip(patch, Wetting, "force")),
     ("reflow_bond", "bond 1, contact angle 120 deg", lambda patch: flip(patch, Gravity, "force")),
+    ("reflow_swing", "amplitude 0.05, parameters paper", double_step),
     ("remesh_warped", "corner 0.1 mm", flip_shear),
     ("remesh_barrel", "bulge 0.1 mm", forget_volume),
     ("remesh_refused_inside_out", "", forget_check),
 ]
-IDS = ["wall adhesion", "gravity", "head", "volume", "normals"]
+IDS = ["wall adhesion", "gravity", "step", "head", "volume", "normals"]
 
 
 @pytest.mark.parametrize(("name", "tried", "fault"), FAULTS, ids=IDS)

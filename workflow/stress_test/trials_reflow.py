@@ -140,10 +140,16 @@ def swing(parameters: SwingTrial) -> dict[str, Measured]:
     energy, mass = found.history["energy"], solder.density * solder.volume
     fastest = np.sqrt(2.0 * found.history["kinetic_energy"].max() / mass)
     own = {
+        "swings_error": Measured(_swings(found.history["amplitude"]) / scene.periods - 1.0),
         "momentum": Measured(float(found.history["momentum"].max() / (mass * fastest))),
         **_energy(energy),
     }
     return {name: Measured(*found.metrics[name]) for name in MEASURES_OF_SWING if name in found.metrics} | own
+
+
+def _swings(amplitude: np.ndarray) -> float:
+    """How often it swung to and fro, by changes of sign: a fit with a second harmonic does not see an octave."""
+    return 0.5 * float(np.count_nonzero(np.diff(np.sign(amplitude[1:]))) + 1)
 
 
 def _refuse(problems: list) -> None:
@@ -163,6 +169,7 @@ MEASURES_OF_SWING = {
     "volume_drift": "",
     "period_error": "",
     "decay_rate_error": "",
+    "swings_error": "",
     "momentum": "",
     "energy_rise": "",
     "energy_over_start": "",
