@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 
 import numpy as np
+from scipy.integrate import trapezoid
 
 from fem.elements.element import critical_steps, element_geometry
 from fem.elements.kind import ElementKind
@@ -73,7 +74,7 @@ def beam(length: float, width: float, heights: np.ndarray, young: np.ndarray, po
     fine = np.linspace(0, z[-1], 20001)
     modulus = young[np.clip(np.searchsorted(z, fine, side="right") - 1, 0, len(young) - 1)]
     shear = np.cumsum(modulus * (fine - axis)) * fine[1] * width / rigidity
-    flexibility = np.trapz(shear**2 * 2 * (1 + poisson) / modulus, fine) / width
+    flexibility = trapezoid(shear**2 * 2 * (1 + poisson) / modulus, fine) / width
     return float(length**3 / (3 * rigidity) + length * flexibility)
 
 

@@ -8,6 +8,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = ("workflow", "meshing", "particles", "fem")
+HEAVY = {"gmsh", "numba", "dolfinx", "petsc4py", "mpi4py", "pyvista", "matplotlib", "vtkmodules"}
 LONGEST_FILE = 400
 
 
@@ -42,8 +43,20 @@ def test_files_are_short(package):
 
 @pytest.mark.parametrize("module", ["workflow", "workflow.cli", "workflow.case", "workflow.stages", "workflow.plan"])
 def test_import_is_light(module):
-    heavy = "{'gmsh', 'numba', 'dolfinx', 'petsc4py', 'mpi4py', 'pyvista', 'matplotlib', 'vtkmodules'}"
-    run_tool("-c", f"import sys, {module}; loaded = {heavy} & set(sys.modules); assert not loaded, loaded")
+    run_tool("-c", f"import sys, {module}; loaded = {HEAVY} & set(sys.modules); assert not loaded, loaded")
+
+
+def test_plans_are_light():
+    """A report tells costs beside its pictures, and VTK draws no text in a process that has loaded DOLFINx."""
+    lines = [
+        "import sys; from pathlib import Path; from rich.console import Console",
+        "from workflow.case import read_case; from workflow.plan import show_plan",
+        "for name in ('bga_drop', 'hu_bga_drop', 'two_scale_bar', 'sessile_drop', 'oscillating_drop'):",
+        f"    case = read_case(Path('{ROOT}/cases') / name / 'case.toml', [], True)",
+        "    show_plan(case, Path('nowhere'), Console(quiet=True))",
+        "assert not {'dolfinx', 'petsc4py', 'mpi4py'} & set(sys.modules)",
+    ]
+    run_tool("-c", "\n".join(lines))
 
 
 @pytest.mark.parametrize("first, second", [("dolfinx", "h5py"), ("h5py", "dolfinx")])

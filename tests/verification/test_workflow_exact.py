@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.integrate import trapezoid
 
 from fem.materials.elasticity import elasticity_matrix
 from fem.materials.parameters import Isotropic
@@ -88,7 +89,7 @@ def modal_tip(strip: exact_cantilever.Strip, time: np.ndarray, modes: int = 12) 
         shape = np.cosh(root * x) - np.cos(root * x) - ratio * (np.sinh(root * x) - np.sin(root * x))
         omega = 2.0 * np.pi * strip.frequency * (root / exact_cantilever.ROOTS[0]) ** 2
         static = (
-            strip.pressure * np.trapz(shape, x) / np.trapz(shape**2, x) / (strip.density * strip.thickness * omega**2)
+            strip.pressure * trapezoid(shape, x) / trapezoid(shape**2, x) / (strip.density * strip.thickness * omega**2)
         )
         tip += static * shape[-1] * (1.0 - np.cos(omega * time))
     return tip

@@ -24,8 +24,6 @@ def write_report(run_folder: Path, case) -> dict:
     Returns:
         The summary.
     """
-    import vtkmodules.vtkCommonCore  # noqa: F401  # before the forecasts load DOLFINx, with whose symbols VTK would abort
-
     summary = collect_summary(run_folder, case.case.name)
     write_summary(run_folder, summary)
     write_page(run_folder / "report.html", "report.html.j2", _context(run_folder, case, summary))
@@ -55,6 +53,7 @@ def _context(run_folder: Path, case, summary: dict) -> dict:
         "health": tables.health_rows(summary["health"]),
         "tables": {
             "parameters": tables.parameters(case),
+            "effects": tables.effects(case, summary["effects"]),
             "versions": tables.versions(),
         },
         "preview_caption": "Mesh of board and package, coloured by part. Joints are meshed after reflow.",
@@ -69,8 +68,6 @@ def _context(run_folder: Path, case, summary: dict) -> dict:
     if preview.exists():
         context["pictures"]["preview"] = base64.b64encode(preview.read_bytes()).decode()
     _add_sections(run_folder, case, context, summary)
-    # After all pictures: forecasts load DOLFINx, with which VTK draws no text any more.
-    context["tables"]["effects"] = tables.effects(case, summary["effects"])
     from workflow.accuracy.page import section_for
 
     context["accuracy"] = section_for(run_folder, case)
