@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 Values = float | NDArray[np.float64]
 
-LARGEST_ORDER = 8.0
+LARGEST_ORDER = 2.5  # that is believed: no method here is of more than second order
 ORDER_MARGIN = 0.5  # of an observed order from theory, beyond which runs are not yet fine enough to extrapolate from
 
 
