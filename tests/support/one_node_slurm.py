@@ -77,9 +77,9 @@ class OneNode:
         return [dict(word.split("=", 1) for word in line.split() if "=" in word) for line in lines]
 
     def queue(self) -> list[list[str]]:
-        """Number, state, tasks, comment and working folder of each job that is known."""
+        """Number, state, tasks, comment and working folder of each job that is known, in the order of submission."""
         rows = self.ask("squeue", "--noheader", "--states=all", "--format=%A|%T|%C|%k|%Z").splitlines()
-        return [row.split("|") for row in rows]
+        return sorted((row.split("|") for row in rows), key=lambda job: int(job[0]))
 
 
 @contextmanager
