@@ -1,17 +1,26 @@
-"""Wall time of the stages of any case, from its parameters alone."""
+"""The forecast of any case, from its parameters alone: wall time of its stages, its effects."""
 
 from workflow.board_drop_case import PackageCase
 from workflow.case_kind import Case
-from workflow.forecast import forecast
-from workflow.scene_forecast import forecast_scene
+from workflow.forecast import Forecast, forecast
+from workflow.scene_forecast import SceneForecast, forecast_scene
 from workflow.structure.case import StructureCase
-from workflow.structure.forecast import forecast_structure
+from workflow.structure.forecast import StructureForecast, forecast_structure
 
 
 def stage_seconds(case: Case) -> dict[str, float]:
     """Predict the wall time [s] of each stage of which there is a prediction."""
+    return _forecast_of(case).seconds
+
+
+def scene_effects(case: Case) -> dict:
+    """Return effect -> {"on", "why"} and, where it is foreseen, "influence"."""
+    return dict(_forecast_of(case).effects)
+
+
+def _forecast_of(case: Case) -> Forecast | StructureForecast | SceneForecast:
     if isinstance(case, PackageCase):
-        return forecast(case).seconds
+        return forecast(case)
     if isinstance(case, StructureCase):
-        return forecast_structure(case).seconds
-    return forecast_scene(case).seconds
+        return forecast_structure(case)
+    return forecast_scene(case)

@@ -7,12 +7,11 @@ from pathlib import Path
 from typing import Any
 
 from fem.errors import PulseError
-from workflow.board_drop_case import PackageCase
 from workflow.case_kind import Case
 from workflow.effect_registry.registry import effect_of
 from workflow.effect_registry.switches import switches
 from workflow.problems import CaseError
-from workflow.structure.case import StructureCase
+from workflow.stage_forecast import stage_seconds
 
 MEASURED = Path(__file__).with_name("costs.json")  # written by benchmarks/effects.py
 
@@ -23,28 +22,13 @@ def measured() -> dict[str, float]:
     return {name: item["ratio"] for name, item in json.loads(MEASURED.read_text())["effects"].items()}
 
 
-def predicted(case: Case) -> dict[str, float]:
-    """Return stage -> predicted wall time [s] of a case."""
-    if isinstance(case, PackageCase):
-        from workflow.forecast import forecast
-
-        return forecast(case).seconds
-    if isinstance(case, StructureCase):
-        from workflow.structure.forecast import forecast_structure
-
-        return forecast_structure(case).seconds
-    from workflow.scene_forecast import forecast_scene
-
-    return forecast_scene(case).seconds
-
-
 def cost_shares(case: Case, effects: Mapping[str, Any]) -> dict[str, float]:
     """Return effect -> its share of the predicted cost; of one that is off, what it would add.
 
     Negative where the effect saves time. Effects whose cost is neither foreseen nor measured are left out.
     """
     try:
-        seconds = predicted(case)
+        seconds = stage_seconds(case)
     except PulseError:
         return {}  # a report of a run whose table of the pulse is no longer there
     total = sum(seconds.values())
@@ -62,7 +46,7 @@ def _other_way(case: Case, name: str, seconds: Mapping[str, float], acts: bool) 
     toggles, total = switches(case), sum(seconds.values())
     if name in toggles:
         try:
-            return sum(predicted(toggles[name](case, acts)).values())
+            return sum(stage_seconds(toggles[name](case, acts)).values())
         except CaseError:
             return None  # the case could not be run that way
     effect = effect_of(name, reflowed="reflow" in case.pipeline.names)

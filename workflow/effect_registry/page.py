@@ -13,6 +13,7 @@ from workflow.effect_registry.effect import Effect
 from workflow.effect_registry.registry import registry
 from workflow.effect_registry.table import CAPTION, HEAD, per_cent, rows
 from workflow.plan_table import new_table
+from workflow.stage_forecast import scene_effects
 
 FIELDS = (("adds", "adds"), ("number", "number"), ("influence", "influence"), ("switch", "key"), ("place", "object"))
 
@@ -55,6 +56,4 @@ def effects_table(case: Case, effects: Mapping[str, Any], of_what: str) -> Table
 
 def show_effects(case: Case, console: Console) -> None:
     """Print the effects of a case."""
-    from workflow.effect_registry.scene import scene_effects
-
     console.print(effects_table(case, scene_effects(case), case.case.name))

@@ -3,11 +3,9 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from workflow.board_drop_case import PackageCase
-from workflow.case_kind import Case
 from workflow.points.batch import Job
 from workflow.points.point import Point
-from workflow.structure.case import StructureCase
+from workflow.stage_forecast import stage_seconds
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,22 +38,7 @@ def outlook(points: Sequence[Point], jobs: Sequence[Job]) -> list[StageOutlook]:
     for stage in dict.fromkeys(name for point in points for name in point.case.pipeline.names):
         wanted = [point.digests[stage] for point in points if stage in point.digests]
         own = [job for job in jobs if job.stage == stage]
-        seconds = [foreseen_seconds(job.point.case).get(stage) for job in own]
+        seconds = [stage_seconds(job.point.case).get(stage) for job in own]
         known = [value for value in seconds if value is not None]
         found.append(StageOutlook(stage, len(wanted), len(set(wanted)), len(own), sum(known) if known else None))
     return found
-
-
-def foreseen_seconds(case: Case) -> dict[str, float]:
-    """Return the wall time [s] that `plan` foresees, by stage; stages without a forecast are left out."""
-    if isinstance(case, PackageCase):
-        from workflow.forecast import forecast
-
-        return forecast(case).seconds
-    if isinstance(case, StructureCase):
-        from workflow.structure.forecast import forecast_structure
-
-        return forecast_structure(case).seconds
-    from workflow.scene_forecast import forecast_scene
-
-    return forecast_scene(case).seconds

@@ -14,9 +14,9 @@ from workflow.cli import app
 from workflow.effect_registry.costs import cost_shares, measured
 from workflow.effect_registry.page import effects_table
 from workflow.effect_registry.registry import effect_of, registry
-from workflow.effect_registry.scene import scene_effects
 from workflow.effect_registry.table import per_cent
 from workflow.problems import CaseError
+from workflow.stage_forecast import scene_effects
 
 CASES = Path(__file__).parents[3] / "cases"
 FILES = [*sorted(CASES.glob("*/case.toml")), SMALL_CASE]

@@ -11,12 +11,13 @@ from workflow.points.batch import Machine, missing
 from workflow.points.point import PointsError
 from workflow.points.store import Store
 from workflow.problems import CaseError
+from workflow.stage_forecast import stage_seconds
 from workflow.study import tables
 from workflow.study.command import read_points_of, results, run_study
 from workflow.study.designs import Factor
 from workflow.study.hypercube import Hypercube
 from workflow.study.main_effects import effect_of, ranked
-from workflow.study.outlook import foreseen_seconds, outlook
+from workflow.study.outlook import outlook
 from workflow.study.progress import seconds_left
 from workflow.study.results import HEALTHY, IMPOSSIBLE, UNHEALTHY, Row, columns, write_csv, write_parquet
 from workflow.study.setting_text import as_text, between
@@ -120,7 +121,7 @@ def test_what_is_shared_is_foreseen_once(write, tmp_path):
     points = list(read_points_of(write(GRID)).possible.values())
     found = {own.stage: own for own in outlook(points, missing(Store(tmp_path / "store"), points, "report"))}
     assert (found["geometry"].products, found["reflow"].products, found["geometry"].points) == (2, 4, 4)
-    expected = sum(foreseen_seconds(point.case)["reflow"] for point in points)
+    expected = sum(stage_seconds(point.case)["reflow"] for point in points)
     assert found["reflow"].seconds == pytest.approx(expected)
 
 
