@@ -16,16 +16,24 @@ def fit_oscillation(time: Floats, values: Floats, frequency: float) -> tuple[flo
     Args:
         time: `(k,)` [s], more than a period.
         values: `(k,)`.
-        frequency: a guess within some 20 % [rad/s].
+        frequency: a guess within some 20 % [rad/s]; an octave too low is noticed: the harmonic is then the larger one.
     """
 
-    def misfit(unknowns: Floats) -> Floats:
+    def columns(unknowns: Floats) -> Floats:
         decay, angle = np.exp(-unknowns[0] * scaled), unknowns[1] * scaled
         first, second = decay * np.exp(1j * angle), decay**2 * np.exp(2j * angle)
-        columns = (first.real, first.imag, second.real, second.imag, decay**2, np.ones_like(decay))
-        basis = np.column_stack(columns)
-        return basis @ np.linalg.lstsq(basis, values, rcond=None)[0] - values
+        return np.column_stack((first.real, first.imag, second.real, second.imag, decay**2, np.ones_like(decay)))
+
+    def factors(basis: Floats) -> Floats:
+        return np.linalg.lstsq(basis, values, rcond=None)[0]
+
+    def misfit(unknowns: Floats) -> Floats:
+        basis = columns(unknowns)
+        return basis @ factors(basis) - values
 
     scaled = time * frequency
-    decay, ratio = least_squares(misfit, (0.01, 1.0), x_scale=(0.01, 0.01), xtol=1e-12, ftol=1e-12).x
-    return decay * frequency, ratio * frequency
+    found = least_squares(misfit, (0.01, 1.0), x_scale=(0.01, 0.01), xtol=1e-12, ftol=1e-12).x
+    first, second = np.hypot(*factors(columns(found))[:4].reshape(2, 2).T)
+    if second > first:
+        return fit_oscillation(time, values, 2.0 * frequency)
+    return found[0] * frequency, found[1] * frequency
