@@ -95,7 +95,7 @@ SHOCK: Entries = (
         "adds": "f = M g",
         "number": "g / peak acceleration",
         "threshold": NEGLIGIBLE_WEIGHT,
-        "influence": "g / peak of all displacements and stresses",
+        "influence": "what g alone deflects the board by, over the deflection of the shock",
         "place": "fem.loads.BodyAcceleration",
         "switch": "shock.gravity = auto, on, off",
         "source": "linear in the load",

@@ -78,3 +78,17 @@ def kinematics_effect(case: "BoardDropCase") -> dict:
         why += "" if wanted == "small" else "; auto would take it"
     why = f"the board is expected to deflect by about {ratio:.2g} times its thickness; {why}"
     return {"finite_rotation": effect(finite, why, stiffened(ratio, STIFFENING_OF_BOARD))}
+
+
+def weight_effect(case: "BoardDropCase") -> dict:
+    """Return whether weight acts in the shock, why, and how far alone it bends the board, as an effect of a plan.
+
+    It lasts, and a pulse does not: a board that is slow against the pulse feels it more than g over the peak says.
+    """
+    from fem.pulse import STANDARD_GRAVITY
+    from fem.shock_pulse import shock_pulse
+
+    expected = expected_deflection(case)
+    alone = first_mode_peak(expected.omega, lambda time: STANDARD_GRAVITY * time, case.shock.duration)
+    influence = min(1.0, alone / expected.largest) if expected.largest > 0.0 else 1.0
+    return {"gravity_in_the_shock": shock_pulse(case.shock).gravity | {"influence": influence}}

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 from fem.effects import damping, effect
 from fem.materials.effects import failure_effect, material_effects
-from workflow.board_deflection import expected_deflection, kinematics_effect
+from workflow.board_deflection import expected_deflection, kinematics_effect, weight_effect
 from workflow.fine_joints import coarse_joints_effect
 from workflow.identical_joints import identical_joints_effect
 
@@ -15,12 +15,10 @@ if TYPE_CHECKING:
 
 def shock_effects(case: "BoardDropCase") -> dict:
     """Return effect -> {"on", "why"} and, where it is foreseen, "influence"."""
-    from fem.shock_pulse import shock_pulse
-
     shock = case.shock
     omega = expected_deflection(case).omega
     return (
-        {"gravity_in_the_shock": shock_pulse(shock).gravity}
+        weight_effect(case)
         | kinematics_effect(case)
         | {"damping": damping(shock.damping.coefficients, omega, shock.duration)}
         | material_effects(case.materials.by_role)
@@ -49,4 +47,4 @@ def with_influence(found: dict, case: "BoardDropCase") -> dict:
     foreseen = shock_effects(case)
     told = {name: foreseen.get(f"{name}_in_the_shock", foreseen.get(name, {})) for name in found}
     expected = {name: {"influence": item["influence"]} if "influence" in item else {} for name, item in told.items()}
-    return {name: expected[name] | record for name, record in found.items()}
+    return {name: record | expected[name] for name, record in found.items()}

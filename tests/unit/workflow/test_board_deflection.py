@@ -7,6 +7,7 @@ import pytest
 
 from workflow.board_deflection import SHARE, expected_deflection, first_mode_peak, kinematics_effect
 from workflow.case import read_case
+from workflow.shock_effects import shock_effects
 
 CASE = Path(__file__).parents[3] / "cases/bga_drop/case.toml"
 
@@ -36,3 +37,16 @@ def test_a_plan_says_what_small_kinematics_would_leave_out():
     assert "times its thickness" in effect["why"] and "shock.numerics.kinematics = finite" in effect["why"]
     finite = read_case(CASE, ["shock.numerics.kinematics=finite", "shock.coupling.scheme=held_velocity"], True)
     assert kinematics_effect(finite)["finite_rotation"]["on"]
+
+
+def test_weight_bends_a_slow_board_by_more_than_g_over_the_peak():
+    """Against a push of 2 A T / pi, much shorter than a swing: q = 4/pi g (1 - cos omega t) / omega^2 until the end."""
+    case = read_case(CASE, (), True)
+    omega, shock = expected_deflection(case).omega, case.shock
+    left = shock.duration - 0.5 * shock.pulse_duration
+    swing = 2.0 * shock.peak_acceleration * shock.pulse_duration / np.pi / omega * np.sin(omega * left)
+    bent = 9.80665 * (1.0 - np.cos(omega * shock.duration)) / omega**2
+    effect = shock_effects(case)["gravity_in_the_shock"]
+    assert not effect["on"]
+    assert effect["influence"] == pytest.approx(bent / swing, rel=0.02)
+    assert effect["influence"] > 2.0 * 9.80665 / shock.peak_acceleration
