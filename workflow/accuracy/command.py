@@ -20,6 +20,7 @@ from workflow.accuracy.page import PAGE, PICTURE, write_pages
 from workflow.accuracy.recommend import Goal, recommend
 from workflow.case import available_cores, read_case
 from workflow.case_kind import Case
+from workflow.pipeline import failed_checks
 from workflow.plan_table import duration
 from workflow.points import batch
 from workflow.points.point import Point
@@ -158,7 +159,7 @@ def show(wish: Wish, out: Path | None, console: Console) -> bool:
     folder = out or default_folder(case)
     compute = partial(_compute, oversubscribe=wish.oversubscribe, until=ladder_of(case).until)
     accuracy, climb = measure(wish, folder, compute)
-    remarks = (*_left_out(climb), *_impossible(climb), *_own_size(wish, accuracy))
+    remarks = (*_left_out(climb), *_impossible(climb), *_unhealthy(accuracy, climb), *_own_size(wish, accuracy))
     write_pages(folder, accuracy, remarks)
     console.print(
         table(tables.runs(accuracy), f"Errors and costs, the least of all times that it was run: {accuracy.machine}")
@@ -206,6 +207,17 @@ def _left_out(climb: Climb) -> list[str]:
 
 def _impossible(climb: Climb) -> list[str]:
     return [f"Not possible for this case: {name}: {why}" for name, why in climb.impossible.items()]
+
+
+def _unhealthy(accuracy: Accuracy, climb: Climb) -> list[str]:
+    """Say which checks of the recommended run do not hold, for which `run` would call it a failure."""
+    chosen = accuracy.recommended
+    if chosen is None or chosen.found is None or chosen.found.failed:
+        return []
+    point = climb.points[chosen.rung.name]
+    stages = point.case.pipeline.upstream(climb.ladder.until)
+    missed = failed_checks(climb.stores[0].run_folder(point), stages)
+    return [f"Checks of the recommended run that do not hold: {'; '.join(missed)}."] if missed else []
 
 
 def _own_size(wish: Wish, accuracy: Accuracy) -> list[str]:

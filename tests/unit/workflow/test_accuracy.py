@@ -29,6 +29,7 @@ class Fake:
     """Computes points at once, and writes down which."""
 
     slow: float = 1.0
+    drift: float = 0.0
     computed: list[tuple[str, str]] = field(default_factory=list)
 
     def __call__(self, store, points):
@@ -53,7 +54,9 @@ class Fake:
         spacing = 1.0 / (drop.count - 1)
         seconds = self.slow * (2.0 + (0.3 if drop.symmetry == "quarter" else 1.0) * spacing**-4 / 1000.0)
         metrics = {"shape_error": {"value": spacing**2, "unit": ""}, "height_error": {"value": -spacing, "unit": ""}}
-        return {"seconds": 1.1 * seconds, "core_seconds": seconds, "metrics": metrics, "continued": "", "inputs": {}}
+        health = {"volume_drift": {"value": self.drift, "limit": 1e-6, "ok": self.drift <= 1e-6}}
+        times = {"seconds": 1.1 * seconds, "core_seconds": seconds}
+        return times | {"metrics": metrics, "health": health, "continued": "", "inputs": {}}
 
 
 def wish(tolerance: float | None = 0.02, budget: float = float("inf"), **settings: str) -> Wish:
@@ -190,6 +193,15 @@ def test_settings_can_be_pasted():
         "[drop]", "particles_per_edge = 24", 'volume = "1 mm^3"', "[solder.numerics]", "time_step_limit = 20",
     ]  # fmt: skip
     assert "--set 'drop.volume=1 mm^3'" in as_options(settings)
+
+
+def test_checks_that_the_recommended_run_does_not_keep_are_told(tmp_path, monkeypatch, capsys):
+    compute = Fake(drift=1e-3)
+    monkeypatch.setattr(command, "_compute", lambda store, points, **_: compute(store, points))
+    monkeypatch.setattr("sys.argv", ["reflowshock", "accuracy", str(CASE), "--out", str(tmp_path)])
+    with pytest.raises(SystemExit):
+        main()
+    assert "Checks of the recommended run that do not hold: reflow: volume drift" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(("tolerance", "code"), [("0.2%", 0), ("0.0001%", 1)])
