@@ -84,7 +84,7 @@ def compare(first: Path, second: Path, names: list[str]) -> int:
         worst = max(found, key=lambda item: item[3])
         print(f"{name:16}{len(found):4} metrics, most apart {worst[0]}: {worst[3] * TOLERANCE:.1e}")
         for metric, value, other, excess in found:
-            if excess > 1.0:
+            if not excess <= 1.0:  # nan is no agreement
                 count += 1
                 print(f"    {metric}: {value} and {other}, {excess * TOLERANCE:.1e} apart")
     return count
