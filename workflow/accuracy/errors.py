@@ -1,5 +1,6 @@
 """Errors of answers: against an exact one, a chosen run, a Richardson extrapolation, or else the finest run."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -58,7 +59,8 @@ def errors_of(
         order: of the error in that knob's value by theory; None without one.
 
     Returns:
-        Name of rung -> quantity -> error. A run that others are compared with has none of its own.
+        Name of rung -> quantity -> error. A run that others are compared with has none of its own, nor one whose answer
+        is not finite.
     """
     found: dict[str, dict[str, Error]] = {}
     for rung in rungs:
@@ -67,7 +69,7 @@ def errors_of(
                 error: Error | None = _exact(answer, answer.exact)
             else:
                 error = _compared(quantity, rung, answers, _Reference.of(quantity, rung, answers, main, order))
-            if error is not None:
+            if error is not None and math.isfinite(error.value):
                 found.setdefault(rung.name, {})[quantity] = error
     return found
 

@@ -73,8 +73,11 @@ def fit_error(values: Sequence[float], errors: Sequence[float], theory: float | 
 
 
 def fit_cost(values: Sequence[float], costs: Sequence[float]) -> CostFit | None:
-    """Fit a constant and a power to costs, by least squares of relative differences; None unless three are known."""
-    if len(values) < 3 or min(costs) <= 0.0:
+    """Fit a constant and a power to costs, by least squares of relative differences; None unless four are known.
+
+    Through three, its three numbers would fit whatever they are, without a scatter.
+    """
+    if len(values) < 4 or min(costs) <= 0.0:
         return None
     measured = np.asarray(costs, dtype=float)
 

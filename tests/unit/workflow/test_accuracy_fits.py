@@ -76,12 +76,19 @@ def test_a_run_that_failed_has_no_error():
     assert "size 0.1" not in errors_of(found, RUNGS, RUNGS, 2.0)
 
 
+def test_an_answer_that_is_not_finite_has_no_error():
+    found = answers(3.0) | {"size 0.1": {"height": Quantity(float("nan"), 3.0)}}
+    errors = errors_of(found, RUNGS, RUNGS, 2.0)
+    assert "size 0.1" not in errors and "size 0.2" in errors
+
+
 def test_fits_find_what_they_were_made_of():
     errors = fit_error(SIZES, [3.0 * size**2 for size in SIZES], 2.0)
     assert (errors.constant, errors.order, errors.scatter) == pytest.approx((3.0, 2.0, 1.0))
     assert errors.at(errors.value_for(1e-3)) == pytest.approx(1e-3)
     cost = fit_cost(SIZES, [2.0 + 0.1 * size**-4 for size in SIZES])
     assert (cost.start, cost.constant, cost.exponent) == pytest.approx((2.0, 0.1, 4.0), rel=1e-3)
+    assert fit_cost(SIZES[:3], [1.0, 3.0, 4.0]) is None
     assert cost.at(0.07) == pytest.approx(2.0 + 0.1 * 0.07**-4, rel=1e-2)
 
 
