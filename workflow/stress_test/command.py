@@ -42,7 +42,7 @@ class Request:
 
 
 def stress_test(request: Request) -> bool:
-    """Try hard cases, then random ones; write the results, also of a test that was broken off.
+    """Try hard cases, then random ones; write the results.
 
     Returns:
         Whether all survived within their bounds.
