@@ -137,6 +137,8 @@ def show_results(study: Study, rows: Sequence[Row], folder: Path) -> None:
         count = min(SHOWN, len(ranking["rows"]))
         console.print(_printed(f"{count} of {len(rows)} points by {study.about.rank_by}", ranking, count))
         console.print(_printed("\nMain effects", tables.effect_table(tables.effects(study, rows))))
+        if remark := tables.imbalance(rows):
+            console.print(remark, soft_wrap=True)
     for row in rows:
         if row.verdict != HEALTHY:
             print_error(f"point {row.number} {row.key} {row.verdict}: {row.message}")

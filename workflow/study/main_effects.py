@@ -18,14 +18,12 @@ class Level:
         mean: of the metric over all points with this value.
         low: its least.
         high: its largest.
-        count: number of points.
     """
 
     value: str
     mean: float
     low: float
     high: float
-    count: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +52,7 @@ class Effect:
         distinct = sorted(set(self.values)) if self.is_ordered else list(dict.fromkeys(self.values))
         chosen = [self.metrics[[own == value for own in self.values]] for value in distinct]
         return [
-            Level(f"{value:g}" if isinstance(value, float) else value, own.mean(), own.min(), own.max(), len(own))
+            Level(f"{value:g}" if isinstance(value, float) else value, own.mean(), own.min(), own.max())
             for value, own in zip(distinct, chosen, strict=True)
         ]
 

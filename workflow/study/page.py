@@ -35,6 +35,7 @@ def _context(study: Study, rows: Sequence[Row], found: list) -> dict:
         "healthy": healthy,
         "ranking": tables.ranking(study, rows),
         "effects": tables.effect_table(found),
+        "imbalance": tables.imbalance(rows),
         "troubles": tables.troubles(rows),
         "continuous": any(factor.continuous for factor in study.design.factors),
         "rank_by": study.about.rank_by.replace("_", " "),

@@ -7,6 +7,8 @@ from workflow.study.main_effects import Effect, effect_of, measured, ranked
 from workflow.study.results import HEALTHY, Row
 from workflow.study.study_file import Study
 
+MIXED = "{} of {} points have no result: means at the values of a factor then differ also by what other factors do."
+
 
 def ranking(study: Study, rows: Sequence[Row]) -> dict:
     """Return the table of healthy points, best first; of keys that change together only the first."""
@@ -52,6 +54,12 @@ def effect_table(found: Sequence[tuple[str, str, Sequence[Effect]]]) -> dict:
             for effect in sorted(own, key=lambda effect: -effect.size)
         ],
     }
+
+
+def imbalance(rows: Sequence[Row]) -> str:
+    """Say that means at a factor's values are not of equal points where some have no result; else nothing."""
+    missing = sum(not row.metrics for row in rows)
+    return MIXED.format(missing, len(rows)) if missing else ""
 
 
 def troubles(rows: Sequence[Row]) -> dict:
