@@ -140,7 +140,7 @@ def _(effect, _folder):
 
 @on("surface_tension", "wall_adhesion")
 def _(effect, _folder):
-    """Where the Bond number calls for neither, weight pushes more than a hundred times harder."""
+    """Where the Bond number calls for neither, weight pushes more than ten times harder."""
     heavy = scene.SOLDER.model_copy(update={"gravity": 6.0e3})
     assert not decide_drop(heavy, is_free=False)[effect.name]["on"]
     flow = scene.flow_with(scene.RESTING, solder=heavy)
