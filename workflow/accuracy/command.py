@@ -159,7 +159,8 @@ def show(wish: Wish, out: Path | None, console: Console) -> bool:
     folder = out or default_folder(case)
     compute = partial(_compute, oversubscribe=wish.oversubscribe, until=ladder_of(case).until)
     accuracy, climb = measure(wish, folder, compute)
-    remarks = (*_left_out(climb), *_impossible(climb), *_unhealthy(accuracy, climb), *_own_size(wish, accuracy))
+    tried = (*_left_out(climb), *_impossible(climb), *_failed(climb))
+    remarks = (*tried, *_unhealthy(accuracy, climb), *_own_size(wish, accuracy))
     write_pages(folder, accuracy, remarks)
     console.print(
         table(tables.runs(accuracy), f"Errors and costs, the least of all times that it was run: {accuracy.machine}")
@@ -207,6 +208,12 @@ def _left_out(climb: Climb) -> list[str]:
 
 def _impossible(climb: Climb) -> list[str]:
     return [f"Not possible for this case: {name}: {why}" for name, why in climb.impossible.items()]
+
+
+def _failed(climb: Climb) -> list[str]:
+    """Say how runs that failed are tried again, which no call does by itself."""
+    work = climb.stores[0].folder / "work"
+    return [f"Runs that failed are not tried again, unless you remove {work}."] if climb.failed else []
 
 
 def _unhealthy(accuracy: Accuracy, climb: Climb) -> list[str]:
