@@ -16,6 +16,7 @@ from workflow.stage_forecast import stage_seconds
 
 AGAIN = 2  # times that a cheap point is run once more: load of the machine and first compilation are then not counted
 CHEAP = 8.0  # up to these core-seconds [s]
+LEAST = 4  # coarsest rungs of a knob that are run, however long they take
 SECONDS_TO_SCHEDULE = 4.0  # of a call that computes points, until the first stage runs
 
 Compute = Callable[[Store, Sequence[Point]], Mapping[str, str]]
@@ -32,6 +33,7 @@ class Climb:
         folder: of the store.
         compute: computes points in a store up to the ladder's last stage; returns the key of each that failed and why.
         budget: wall time that may be spent [s]; infinite without a limit.
+        longest: that a rung of the ladder may be foreseen to take [s], but for the coarsest ones of the knobs.
         oversubscribe: whether MPI may have more ranks than cores.
         failed: key of a point -> why it failed, also of earlier calls.
         points: name of rung -> its point.
@@ -45,6 +47,7 @@ class Climb:
     folder: Path
     compute: Compute
     budget: float = float("inf")
+    longest: float = float("inf")
     oversubscribe: bool = False
     failed: dict[str, str] = field(default_factory=dict)
     points: dict[str, Point] = field(default_factory=dict)
@@ -123,12 +126,17 @@ class Climb:
             if store.is_complete(point, until) or point.key in self.failed:
                 continue
             expected = self.foreseen(rung, store) + SECONDS_TO_SCHEDULE
-            if expected <= self.left:
+            if expected <= self.left and (expected <= self.longest or self._is_wanted(rung)):
                 wanted.append(point)
             elif store == self.stores[0]:
                 self.left_out[rung.name] = expected
         if wanted:
             self.failed |= self.compute(store, wanted)
+
+    def _is_wanted(self, rung: Rung) -> bool:
+        """Whether a rung is run however long it takes: one of the coarsest of a knob, or chosen off the ladder."""
+        coarsest = {one.name for knob in self.ladder.knobs for one in knob.rungs[:LEAST]}
+        return rung.name in coarsest or all(rung.name != one.name for one in self.ladder.rungs)
 
     def _is_done(self, rung: Rung) -> bool:
         return self.stores[0].is_complete(self.points[rung.name], self.ladder.until)

@@ -31,6 +31,7 @@ from workflow.stage_forecast import stage_seconds
 from workflow.units import UnitError, to_si
 
 TOLERANCE = 0.02  # where neither a tolerance nor a budget is given
+LONGEST = 600.0  # wall time of a run that nobody has given a budget for [s]
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +53,11 @@ class Wish:
     budget: float
     command: str
     oversubscribe: bool = False
+
+    @property
+    def longest(self) -> float:
+        """Wall time that a run of the ladder may take [s]."""
+        return LONGEST if self.budget == float("inf") else self.budget
 
     @property
     def overrides(self) -> list[str]:
@@ -123,7 +129,7 @@ def measure(wish: Wish, folder: Path, compute: Compute, ladder: Ladder | None = 
     """
     case = read_case(wish.case, wish.overrides, wish.oversubscribe)
     ladder = ladder or ladder_of(case)
-    climb = Climb(ladder, wish.case, wish.settings, folder, compute, wish.budget, wish.oversubscribe)
+    climb = Climb(ladder, wish.case, wish.settings, folder, compute, wish.budget, wish.longest, wish.oversubscribe)
     climb.climb(ladder.rungs)
     measured = climb.measured(ladder.rungs)
     fits = fits_of(ladder, measured)
@@ -203,7 +209,10 @@ def _left_out(climb: Climb) -> list[str]:
     if not climb.left_out:
         return []
     texts = [f"{name} (about {duration(seconds)})" for name, seconds in climb.left_out.items()]
-    return [f"Not run, since they did not fit into what was left of the budget: {', '.join(texts)}."]
+    limited = climb.budget < float("inf")
+    why = "did not fit into what was left of the budget" if limited else f"take more than {duration(climb.longest)}"
+    more = "" if limited else "; a budget pays for them, e.g. --budget 10h"
+    return [f"Not run, since they {why}: {', '.join(texts)}{more}."]
 
 
 def _impossible(climb: Climb) -> list[str]:

@@ -17,8 +17,8 @@ from workflow.shock_forecast import implicit_seconds
 from workflow.shock_launch import MODES
 from workflow.units import from_si
 
-REFINED = (1.5, 1.0, 0.75, 0.5, 0.4)  # sizes of elements over those of the case
-TWO_MODELS = (1.5, 1.0, 0.75, 0.5)  # the same with two models
+REFINED = (2.0, 1.5, 1.0, 0.75, 0.5, 0.4, 0.3)  # sizes of elements over those of the case
+TWO_MODELS = (2.0, 1.5, 1.0, 0.75, 0.5)  # the same with two models
 ALONE, FINEST = (1.5, 1.0, 0.75), 0.5  # of board or joints alone, against the finest of them
 FINE = (1, 3)  # most stressed joints that are fine
 SAME_MESH = "all x 1"  # one model on the mesh of the case

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from workflow.accuracy.ladder import Knob, Ladder, Rung
+from workflow.accuracy.ladder import Ladder, Rung
 from workflow.accuracy.measured import Fit, Measurement, Recommended
 
 
@@ -87,11 +87,12 @@ def _between(
         error, cost = fit.errors.get(ladder.judged), fit.cost
         if error is None or cost is None:
             continue
-        largest, smallest = max(knob.values), min(knob.values) / knob.extent
+        known = [found.value for rung in knob.rungs if (found := measurements.get(rung.name)) and found.value]
+        largest, smallest = max(known), min(known) / knob.extent
         if goal.tolerance is not None:
             wanted = error.value_for(goal.tolerance)
         else:
-            wanted = _finest(knob, fit, goal.core_seconds)
+            wanted = _finest(min(known), knob.extent, fit, goal.core_seconds)
         if not wanted >= smallest:
             continue
         rung = knob.at(min(wanted, largest))
@@ -105,14 +106,14 @@ def _between(
             yield Candidate(rung, expected, expected * error.scatter, cost.at(rung.value), False)
 
 
-def _finest(knob: Knob, fit: Fit, limit: float) -> float:
-    """Smallest value whose cost is within a limit [core-seconds], that of the finest rung without one."""
+def _finest(finest: float, extent: float, fit: Fit, limit: float) -> float:
+    """Smallest value whose cost is within a limit [core-seconds], that of the finest known one without a limit."""
     cost = fit.cost
     if cost is None or limit == float("inf"):
-        return min(knob.values)
+        return finest
     if limit <= cost.start or cost.constant <= 0.0:
         return float("nan")
-    return max((cost.constant / (limit - cost.start)) ** (1.0 / cost.exponent), min(knob.values) / knob.extent)
+    return max((cost.constant / (limit - cost.start)) ** (1.0 / cost.exponent), finest / extent)
 
 
 def _foreseen(chosen: Candidate, fits: Mapping[str, Fit], judged: str) -> tuple[float, float]:

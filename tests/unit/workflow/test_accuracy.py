@@ -148,6 +148,18 @@ def test_within_a_budget_nothing_is_started_that_does_not_fit(tmp_path):
     assert not nothing.measurements and nothing.recommended is None and not keeps_promise(nothing)
 
 
+def test_without_a_budget_long_runs_of_the_ladder_are_left_out(tmp_path, monkeypatch):
+    monkeypatch.setattr(command, "LONGEST", 20.0)
+    accuracy, climb = measure(wish(), tmp_path, Fake())
+    assert "27 per edge" in climb.left_out and "11 per edge" not in climb.left_out
+    coarsest = {rung.name for knob in climb.ladder.knobs for rung in knob.rungs[:4]}
+    assert coarsest.isdisjoint(climb.left_out)
+    (told,) = command._left_out(climb)
+    assert "more than 20 s" in told and "--budget" in told
+    assert accuracy.recommended.found is not None
+
+
+
 def test_a_broken_off_run_is_timed_again(tmp_path):
     compute = Fake()
 
