@@ -9,6 +9,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 LINE = 512  # bytes; longer texts are cut
+ERROR = "error.txt"  # in the folder of a run: why it ended, as on standard error
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from mpi4py import MPI
 
-from fem.status_board import Status, StatusBoard
+from fem.status_board import ERROR, Status, StatusBoard
 from fem.whereabouts import HERE
 
 TICK = 1.0  # [s] between two looks, at most
@@ -35,6 +35,8 @@ class Watchdog:
             limit: How long a wait may last [s].
         """
         HERE.begin(world)
+        self._told = folder / ERROR
+        self._told.unlink(missing_ok=True)
         name = world.bcast(f".watchdog-{os.getpid()}")
         self._rank, self._limit, self._tick = world.rank, limit, min(TICK, limit / TICKS)
         self._board = StatusBoard(folder / name)
@@ -59,9 +61,15 @@ class Watchdog:
         HERE.world, HERE.tell = None, None
 
     def speak(self, text: str, details: str = "") -> None:
-        """Say why the run ends, and from where it could continue, unless another rank has."""
+        """Say why the run ends, and from where it could continue, unless another rank has.
+
+        In a file, too: Open MPI 5 loses what ranks write to standard error once one of them has died.
+        """
         if self._board.claim():
-            print(f"error: {text}{HERE.last_checkpoint}{details}", file=sys.stderr, flush=True)
+            words = f"error: {text}{HERE.last_checkpoint}{details}\n"
+            self._told.write_text(words)
+            sys.stderr.write(words)
+            sys.stderr.flush()
 
     def _watch(self) -> None:
         """Look at each tick until stopped."""

@@ -10,6 +10,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from fem.own_job import own_environment
+from fem.status_board import ERROR
 
 GRACE = 5.0  # seconds that a program has to end by itself after SIGTERM
 TOLD = "error: "  # begins what a program says of an error that it knows
@@ -52,7 +53,7 @@ def launch(command: Sequence[str], on_line: Callable[[str], None], log: Path) ->
     Args:
         command: program and arguments.
         on_line: called with each line of standard output.
-        log: file that takes standard error.
+        log: file that takes standard error; a program may say in ``ERROR`` beside it, too, why it ended.
 
     Raises:
         LaunchError: the program cannot be started or its exit code is not 0.
@@ -78,9 +79,13 @@ def launch(command: Sequence[str], on_line: Callable[[str], None], log: Path) ->
             end_group(process)
             raise
     if code != 0:
-        lines = log.read_text(errors="replace").strip().splitlines()
+        lines = _read(log) + _read(log.with_name(ERROR))
         words = "\n".join(lines[-LAST_LINES:]) or "it said nothing"
         raise LaunchError(told(lines) or f"{program} {ending(code)}: {words}")
+
+
+def _read(path: Path) -> list[str]:
+    return path.read_text(errors="replace").strip().splitlines() if path.is_file() else []
 
 
 def told(lines: Sequence[str]) -> str:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from fem.status_board import ERROR
 from tests.support.fem_models import write_small_assembly
 from tests.support.fem_program import run_python
 
@@ -63,15 +64,17 @@ def assembly(tmp_path_factory) -> Path:
 
 
 def errors_of(directory: Path, checkpoints: Path, what: str, where: str) -> str:
-    """Return what a run with a misfortune says."""
+    """Return what a run with a misfortune says, in its file and, where that is passed on, on standard error."""
     path = checkpoints.parent / "input.json"
     path.write_text(json.dumps(json.loads((directory / "input.json").read_text()) | {"checkpoints": str(checkpoints)}))
     done = run_python([str(directory / "script.py"), str(path), what, where], 2)
     assert done.returncode != 0
     assert time.time() - float((checkpoints.parent / "begin").read_text()) < 30.0
-    told = [line for line in done.stderr.splitlines() if line.startswith("error: ")]
-    assert len(told) == 1, done.stderr
-    return done.stderr
+    said = (directory / "out" / ERROR).read_text()
+    told = [[line for line in text.splitlines() if line.startswith("error: ")] for text in (said, done.stderr)]
+    assert told[0] == said.splitlines()[:1], said
+    assert told[1] in (told[0], []), done.stderr
+    return said
 
 
 @pytest.mark.parametrize(

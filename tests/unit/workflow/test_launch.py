@@ -56,6 +56,12 @@ def test_all_that_a_program_tells_of_a_failure_is_told(tmp_path):
         launch([sys.executable, "-c", program], print, tmp_path / "log.txt")
 
 
+def test_words_that_a_program_leaves_in_a_file_are_told(tmp_path):
+    program = "import pathlib, sys; pathlib.Path(sys.argv[1]).write_text('error: rank 1 has died\\n'); sys.exit(1)"
+    with pytest.raises(LaunchError, match=r"^rank 1 has died$"):
+        launch([sys.executable, "-c", program, str(tmp_path / "error.txt")], print, tmp_path / "log.txt")
+
+
 def test_a_program_that_is_killed(tmp_path):
     program = "import os, signal; os.kill(os.getpid(), signal.SIGKILL)"
     with pytest.raises(LaunchError, match="was killed, as the system does when memory is short: it said nothing"):
