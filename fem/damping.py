@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from fem.body import Body
 from fem.energy import InternalForce
 from fem.force import linear_terms
+from fem.kernels.damping import add_damping, power
 from fem.loads import Kept, Load
 from fem.residual.pretension import Pretension
 
@@ -21,6 +22,7 @@ class RayleighDamping(Load):
 
     The mass term is implicit, -alpha M (v(t - dt/2) + v(t + dt/2)) / 2, which needs no smaller step. The stiffness term
     takes v(t - dt/2), as K v(t) would need a solve, and lowers the critical step (``estimate.damped_critical_step``).
+    With v(t) = (v(t - dt/2) + dt a / 2) / (1 + alpha dt / 2), a without drag, no equation is left to solve.
 
     Attributes:
         force: ``(n, 3)`` [N] at the motion's time, summed over ranks.
@@ -41,6 +43,7 @@ class RayleighDamping(Load):
         self._terms = terms if stiffness else ()
         self.force = np.empty((0, 3))
         self._velocity = np.empty((0, 3))
+        self._runs = np.empty((0, 2), np.int64)  # of nodes that this rank counts
 
     @classmethod
     def build(cls, body: Body, coefficients: tuple[float, float]) -> "RayleighDamping":
@@ -57,6 +60,8 @@ class RayleighDamping(Load):
         self.force = np.zeros_like(motion.force)
         if self._terms:
             self._velocity = np.empty_like(motion.velocity)
+        edges = np.diff(motion.body.shared.owned, prepend=False, append=False)
+        self._runs = np.flatnonzero(edges).reshape(-1, 2)
 
     def add(self, motion: "Motion") -> None:
         """Add both forces; those of the loads are there, those of elements too."""
@@ -68,18 +73,9 @@ class RayleighDamping(Load):
                 term.add(self._velocity, self.force)
             motion.body.tie.gather(self.force)
             motion.body.shared.add(self.force)
-            motion.force += self.force
-        if self.mass:
-            drag = self._drag(motion)
-            self.force += drag
-            motion.force += drag
-
-    def _drag(self, motion: "Motion") -> NDArray[np.float64]:
-        """Return -alpha M v ``(n, 3)`` [N], v(t) = (v(t - dt/2) + dt a / 2) / (1 + alpha dt / 2), a without drag."""
-        middle = motion.velocity + 0.5 * motion.step * motion.acceleration()
-        mobility = motion.mobility
-        mass = np.divide(1.0, mobility, out=np.zeros_like(mobility), where=mobility > 0.0)
-        return -self.mass / (1.0 + 0.5 * self.mass * motion.step) * mass * middle
+        half = 0.5 * motion.step
+        coefficients = self.mass / (1.0 + self.mass * half), half
+        add_damping(motion.velocity, motion.mobility, motion.gravity, coefficients, (self.force, motion.force))
 
     def remove(self, force: NDArray[np.float64]) -> None:
         """Subtract both from a copy."""
@@ -87,5 +83,4 @@ class RayleighDamping(Load):
 
     def collect(self, motion: "Motion") -> None:
         """Add half a step's work."""
-        owned = motion.body.shared.owned
-        self.work += 0.5 * motion.step * float(np.sum((self.force * motion.velocity)[owned]))
+        self.work += 0.5 * motion.step * power(self._runs, self.force, motion.velocity)
