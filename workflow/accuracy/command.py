@@ -197,7 +197,7 @@ def _compute(
 ) -> Mapping[str, str]:
     """Compute points one stage at a time, so that measurements do not disturb each other; show how far it is."""
     again = " once more, for their times" if store.folder.name.startswith("again") else ""
-    with progress_bar(f"{len(points)} points{again}") as progress:
+    with progress_bar(f"{len(points)} point{'s' if len(points) > 1 else ''}{again}") as progress:
 
         def count() -> None:
             progress(sum(store.is_complete(point, until) for point in points) / len(points))

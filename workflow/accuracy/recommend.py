@@ -65,9 +65,14 @@ def recommend(
         chosen = min(within, key=lambda one: one.bound)
         why = "the most accurate" + (" within the budget" if goal.core_seconds < float("inf") else "")
         why += "" if goal.tolerance is None else "; none is within the tolerance"
-    place = "measured" if chosen.measured else "between measured points"
+    place = "measured" if chosen.measured else _place(chosen.rung, measurements)
     error, cost = _foreseen(chosen, fits, ladder.judged)
     return Recommended(chosen.rung, f"{why}, {place}", error, cost)
+
+
+def _place(rung: Rung, measurements: Mapping[str, Measurement]) -> str:
+    finest = min(one.value for one in measurements.values() if one.knob == rung.knob and one.value)
+    return "between measured points" if rung.value and rung.value >= finest else "finer than all measured points"
 
 
 def _measured(ladder: Ladder, measurements: Mapping[str, Measurement]) -> Iterator[Candidate]:
