@@ -24,7 +24,7 @@ def shape_errors(surface: ClosedSurface, solder: Solder) -> dict[str, float]:
     ]
     return {
         "standoff_error": abs(standoff / pad_planes(surface).gap - 1.0),
-        "contact_area_error": max(areas),
+        "contact_area_error": float(np.max(areas)),
         "shape_deviation": _deviation(surface, solder),
     }
 
@@ -43,4 +43,4 @@ def _deviation(surface: ClosedSurface, solder: Solder) -> float:
     there = nearest_on_triangles(surface.points, surface.triangles, samples)
     back = nearest_on_triangles(solder.points, triangles, surface.points)
     distances = [np.linalg.norm(there - samples, axis=1).max(), np.linalg.norm(back - surface.points, axis=1).max()]
-    return float(max(distances))
+    return float(np.max(distances))

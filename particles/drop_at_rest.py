@@ -98,4 +98,4 @@ def _excess(drop: Drop, metrics: Metrics) -> Metrics:
         return {}
     receding, advancing = np.degrees(drop.hysteresis)
     below, above = receding - metrics["contact_angle_min"][0], metrics["contact_angle_max"][0] - advancing
-    return {"contact_angle_excess": (float(max(0.0, below, above)), "deg")}
+    return {"contact_angle_excess": (float(np.max([0.0, below, above])), "deg")}

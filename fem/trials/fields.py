@@ -84,9 +84,9 @@ def turns(given: Turns) -> dict[str, float]:
     modulus = float(term.elements.elasticity.max())
     for turn in np.linspace(0.0, given.turns, 4 * given.turns + 1)[1:]:
         matrix = Rotation.from_rotvec(2 * np.pi * turn * AXIS).as_matrix()
-        worst = max(worst, np.abs(force_of(term, points @ matrix.T - points)).max())
+        worst = np.maximum(worst, np.abs(force_of(term, points @ matrix.T - points)).max())
     stress = term.means(np.arange(len(term.numbers))).stress
-    return {"force_error": worst / (modulus * area), "stress_error": float(np.abs(stress).max()) / modulus}
+    return {"force_error": float(worst) / (modulus * area), "stress_error": float(np.abs(stress).max()) / modulus}
 
 
 def tension(given: Tension) -> dict[str, float]:

@@ -29,7 +29,7 @@ def impact(given: Impact) -> dict[str, float]:
     return {
         "energy_error": imbalance(energies),
         "plastic_share": float(energies[-1, 2] / first),
-        "plastic_return": float(max(0.0, -np.diff(energies[:, 2]).min()) / first),
+        "plastic_return": float(np.abs(np.diff(energies[:, 2]).min(initial=0.0)) / first),
         "hourglass_share": float(np.abs(energies[:, 3]).max() / first),
     }
 

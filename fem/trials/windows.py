@@ -57,8 +57,8 @@ def momentum_error(coupling: Coupling, fraction: float) -> float:
     start, largest = coupled.momentum(), 0.0
     for _ in range(round(180 / fraction)):
         coupled.run()
-        largest = max(largest, momentum_change(coupled, start))
-    return largest
+        largest = np.maximum(largest, momentum_change(coupled, start))
+    return float(largest)
 
 
 def transfer(given: PairTransfer) -> dict[str, float]:

@@ -1,4 +1,4 @@
-"""A joint of known shape is meshed in its place, and the mesh measured again, whatever the mesher says of it."""
+"""A joint of known shape is meshed in its place, and the mesh measured again: its volume, elements and head."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -123,7 +123,10 @@ def mesh_warped(
 
 
 def measured(meshed: Meshed) -> dict[str, float]:
-    """Measure a mesh: errors against the surface that it fills, smallest scaled Jacobian, hexahedra of solder."""
+    """Measure a mesh: errors against the surface that it fills, smallest scaled Jacobian, hexahedra of solder.
+
+    Volume, Jacobian and head are measured anew; standoff, contact areas and deviation are what the mesher found.
+    """
     made = meshed.mesh
     quality = joint_quality(made)
     (solder,) = (cells for part, cells in made.cells.items() if part.startswith("solder@"))
@@ -132,7 +135,7 @@ def measured(meshed: Meshed) -> dict[str, float]:
         "standoff_error": quality["standoff_error"],
         "contact_area_error": quality["contact_area_error"],
         "shape_deviation": quality["shape_deviation"],
-        "scaled_jacobian": min(float(scaled_jacobian(made.points, cells).min()) for cells in made.cells.values()),
+        "scaled_jacobian": float(np.min([scaled_jacobian(made.points, cells).min() for cells in made.cells.values()])),
         "head_error": head_error(meshed),
         "tries": len(quality["tries"]) + 1,
         "hexahedra": len(solder),

@@ -160,8 +160,8 @@ def _refuse(problems: list) -> None:
 def _energy(energy: np.ndarray) -> dict[str, Measured]:
     """Largest rise of the energy in a step, and above the start, over the energy at the start."""
     scale = abs(float(energy[0]))
-    rise = max(0.0, float(np.diff(energy).max(initial=0.0)))
-    over = max(0.0, float(energy.max() - energy[0]))
+    rise = float(np.diff(energy).max(initial=0.0))
+    over = float(energy.max() - energy[0])
     return {"energy_rise": Measured(rise / scale), "energy_over_start": Measured(over / scale)}
 
 

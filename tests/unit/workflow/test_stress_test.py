@@ -7,10 +7,12 @@ import os
 import time
 from typing import Annotated
 
+import numpy as np
 import pytest
 from hypothesis import strategies as st
 from pydantic import Field
 
+from fem.trials.parameters import Impact, Turns
 from particles.parameters import Parameters
 from workflow.problems import CaseError
 from workflow.stress_test import families, hard_case, sample
@@ -95,6 +97,20 @@ def test_every_combination_of_varied_values_is_a_case():
 def test_errors_and_nan_are_misses(fate):
     (case,) = cases(parameters={"length": "3 mm", "fate": fate})
     assert not attempt(case).ok
+
+
+def test_no_measure_hides_nan(monkeypatch):
+    """The largest of zero and nan is zero to Python: a trial that compares so would survive without a number."""
+    from fem.trials import fields, impact
+    from workflow.stress_test import trials_reflow
+
+    energies = np.array([1.0, math.nan, 0.5])
+    told = {name: found.value for name, found in trials_reflow._energy(energies).items()}
+    monkeypatch.setattr(fields, "force_of", lambda term, displacement: np.full_like(displacement, math.nan))
+    told["force_error"] = fields.turns(Turns(turns=1, cells=1))["force_error"]
+    monkeypatch.setattr(impact, "march", lambda *_: np.outer(energies, np.ones(4)))
+    told |= impact.impact(Impact())
+    assert all(math.isnan(told[name]) for name in told if name != "plastic_share"), told
 
 
 def test_an_expected_error_is_no_miss_and_its_absence_is():
