@@ -189,7 +189,12 @@ def stress_test(
 
     count = random if random is not None else 0 if cases else RANDOM_COUNT
     request = Request(cases or [], family or [], count, seed, cores or available_cores(), out)
-    raise typer.Exit(0 if try_cases(request) else 1)
+    try:
+        survived = try_cases(request)
+    except KeyboardInterrupt as error:
+        print_error("interrupted; no results are written, the same command begins anew")
+        raise typer.Exit(1) from error
+    raise typer.Exit(0 if survived else 1)
 
 
 @app.command()

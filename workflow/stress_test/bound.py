@@ -66,13 +66,15 @@ def read_bound(measure: str, given: object, unit: str | None) -> Bound:
         unit: of the measure; None where it is not known yet.
 
     Raises:
-        UnitError: no number, another dimension, or not positive.
+        UnitError: no number, another dimension, not positive, or infinite.
     """
     match = TEXT.fullmatch(str(given))
     text, sign = (match["quantity"], match["sign"]) if match else ("", "")
     own, limit = _quantity(text, unit)
     if not limit > 0.0:
         raise UnitError("must be positive")
+    if math.isinf(limit):
+        raise UnitError("must be finite")
     return Bound(measure, text, own, limit, sign.startswith(">"))
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from fem.names import nearest
 from workflow.case_text import CASES
+from workflow.pipeline import locked
 from workflow.problems import CaseError, Problem
 from workflow.stress_test.families import FAMILIES, random_trials
 from workflow.stress_test.hard_case import HardCase, read_hard_cases
@@ -48,12 +49,19 @@ def stress_test(request: Request) -> bool:
         Whether all survived within their bounds.
 
     Raises:
-        CaseError: a case cannot be tried; nothing was.
+        CaseError: a case cannot be tried, or results cannot be written; nothing was.
+        RunFolderBusy: another stress test is at work in the folder of the results.
     """
     families = _families(request.families)
     cases = fixed_cases(request.files, families)
     if not cases and not request.count:
         raise CaseError("stress-test", [Problem("", "no case to try", None, "families " + ", ".join(FAMILIES))])
+    with locked(request.out):
+        return _try_all(request, families, cases)
+
+
+def _try_all(request: Request, families: Sequence[str], cases: Sequence[HardCase]) -> bool:
+    """Try fixed cases, then random ones of each family; as ``stress_test``."""
     verdicts: list[Verdict] = []
     samples: list[Sample] = []
     with Pool(request.cores) as pool:

@@ -153,7 +153,10 @@ def _bounds(head: HardCaseFile, trial: Trial, problems: list[Problem]) -> Iterat
             choice, hint = "one of " + ", ".join(names), nearest(measure, names)
             problems.append(Problem(key, f"the trial {head.trial} measures no such thing", given, choice, hint))
             continue
-        for text in given if isinstance(given, list) else [given]:
+        texts = given if isinstance(given, list) else [given]
+        if not texts:
+            problems.append(Problem(key, "nothing is judged: give a bound, or a list of some", given))
+        for text in texts:
             try:
                 yield read_bound(measure, text, None if names is None else names[measure])
             except UnitError as error:

@@ -10,6 +10,7 @@ import time
 from collections import deque
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
 from typing import Any
 
@@ -82,15 +83,22 @@ class Pool:
         idle = next((worker for worker in self._workers if worker.case is None), None)
         if idle is None and len(self._workers) < self._processes:
             idle = self._start()
-            self._workers.append(idle)
         return idle
 
     def _start(self) -> _Worker:
+        """Start a process; an interrupt waits until it is known, and does not reach it."""
         ours, theirs = self._context.Pipe()
         process = self._context.Process(target=_work, args=(theirs,))
-        process.start()
+        worker = _Worker(process, ours)
+        resource_tracker.ensure_running()  # to start it would let signals through again
+        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        try:
+            process.start()
+            self._workers.append(worker)
+        finally:
+            signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
         theirs.close()
-        return _Worker(process, ours)
+        return worker
 
     def _answers(self) -> Iterator[Verdict]:
         """Wait until a process answers, ends or is overdue, and yield the verdicts."""
@@ -128,7 +136,7 @@ class Pool:
 
 def _work(pipe: Connection) -> None:
     """Try what comes through a pipe until it is closed; what solvers print is left out."""
-    os.setsid()  # its parent ends it with all that it starts; Ctrl-C is for the parent
+    os.setsid()  # its parent ends it with all that it starts
     threading.Thread(target=end_with_parent, daemon=True).start()
     os.environ["NUMBA_NUM_THREADS"] = os.environ["OMP_NUM_THREADS"] = "1"
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)

@@ -4,19 +4,26 @@ import dataclasses
 import json
 import math
 import os
+import signal
+import subprocess
+import sys
 import time
 from typing import Annotated
 
 import numpy as np
+import psutil
 import pytest
 from hypothesis import strategies as st
 from pydantic import Field
 
 from fem.trials.parameters import Impact, Turns
 from particles.parameters import Parameters
+from tests.support.workflow_command import wait_until
 from workflow.problems import CaseError
 from workflow.stress_test import families, hard_case, sample
 from workflow.stress_test.bound import read_bound
+from workflow.stress_test.case_file import hard_case_text
+from workflow.stress_test.command import HARD, Request, stress_test
 from workflow.stress_test.hard_case import hard_cases, read_hard_cases
 from workflow.stress_test.pool import Pool
 from workflow.stress_test.random_cases import drawn
@@ -55,16 +62,18 @@ def rods(monkeypatch):
     monkeypatch.setattr(hard_case, "trials", lambda: {"rod": ROD})
 
 
+TABLE = {
+    "family": "elements",
+    "title": "a rod",
+    "why": "rods break",
+    "trial": "rod",
+    "parameters": {"length": "3 mm"},
+    "bounds": {"error": "0.5 %", "width": "> 2 mm"},
+}
+
+
 def cases(**changes):
-    table = {
-        "family": "elements",
-        "title": "a rod",
-        "why": "rods break",
-        "trial": "rod",
-        "parameters": {"length": "3 mm"},
-        "bounds": {"error": "0.5 %", "width": "> 2 mm"},
-    }
-    return hard_cases("elements_rod", table | changes, "elements_rod.toml", None)
+    return hard_cases("elements_rod", TABLE | changes, "elements_rod.toml", None)
 
 
 def refused(**changes):
@@ -128,7 +137,9 @@ def test_an_expected_error_is_no_miss_and_its_absence_is():
         ({"bounds": {"width": "1 kg"}}, "is a mass"),
         ({"bounds": {"error": "1 mm"}}, "is not a pure number"),
         ({"bounds": {"error": 0}}, "must be positive"),
+        ({"bounds": {"error": "1e999"}}, "must be finite"),
         ({"bounds": {}}, "nothing is judged"),
+        ({"bounds": {"error": []}}, "bounds.error = []: nothing is judged"),
         ({"parameters": {"lenght": "3 mm"}}, "did you mean length?"),
         ({"parameters": {"length": "-3 mm"}}, 'parameters.length = "-3 mm": is out of range; allowed: > 0 mm'),
         ({"parameters": {"length": 3}}, "needs a unit"),
@@ -151,6 +162,23 @@ def test_hangs_and_deaths_are_misses_and_the_rest_goes_on():
     assert verdicts["fate hangs"].message == "no answer in 4 s: taken to hang"
     assert verdicts["fate dies"].message == "the process ended with code 3"
     assert verdicts["fate holds"].ok
+
+
+def test_ctrl_c_ends_a_stress_test_with_a_word(tmp_path):
+    line = [sys.executable, "-m", "workflow", "stress-test", "--family", "coupling", "--out", str(tmp_path), "-j", "2"]
+    process = subprocess.Popen(line, stderr=subprocess.PIPE, text=True, start_new_session=True)
+    wait_until(lambda: len(psutil.Process(process.pid).children()) > 1)
+    os.killpg(process.pid, signal.SIGINT)  # as a terminal does, to all that have not left its group
+    told = process.communicate(timeout=60)[1]
+    assert (process.returncode, told.count("\n")) == (1, 1), told
+    assert "interrupted" in told
+
+
+def test_results_that_cannot_be_written_are_told_before_anything_is_tried(tmp_path):
+    case = tmp_path / "elements_rod.toml"
+    case.write_text(hard_case_text(TABLE))
+    with pytest.raises(CaseError, match="--out"):
+        stress_test(Request([case], [], 0, 1, 1, case))
 
 
 @pytest.fixture
@@ -197,7 +225,5 @@ def test_refusals_in_words_are_counted_and_too_many_are_a_miss(rods_of_any_lengt
 
 def test_all_cases_of_the_program_can_be_read(monkeypatch):
     monkeypatch.setattr(hard_case, "trials", families.trials)
-    from workflow.stress_test.command import HARD
-
     found = [case for path in sorted(HARD.glob("*.toml")) for case in read_hard_cases(path)]
     assert all(case.name.split("_")[0] == case.family for case in found)
