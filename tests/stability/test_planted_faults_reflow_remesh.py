@@ -1,5 +1,7 @@
 """Faults that are planted into reflow and remesh: hard cases must miss them by the bounds that hold without."""
 
+from dataclasses import replace
+
 import pytest
 
 from meshing import levels, user_surface
@@ -55,3 +57,11 @@ def test_a_planted_fault_is_a_miss(name, tried, fault, monkeypatch):
     fault(monkeypatch)
     verdict = attempt(case)
     assert not verdict.ok, verdict.checks
+
+
+def test_a_case_file_is_run_to_its_report_and_judged():
+    (case,) = read_hard_cases(HARD / "reflow_run.toml")
+    assert attempt(case).ok
+    given = case.parameters.model_copy(update={"settings": {"drop": {"particles_per_edge": 1}}})
+    verdict = attempt(replace(case, parameters=given))
+    assert "drop.particles_per_edge = 1: is out of range" in verdict.message, verdict

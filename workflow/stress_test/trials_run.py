@@ -7,10 +7,12 @@ import sys
 import tempfile
 from pathlib import Path
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic_core import PydanticCustomError
 
 from fem.own_job import own_environment
-from workflow.problems import as_toml
+from workflow.case import read_case
+from workflow.problems import CaseError, as_toml
 from workflow.scales import dotted
 from workflow.stress_test.trial import Measured, Trial
 
@@ -25,6 +27,19 @@ class RunParameters(BaseModel):
     case: str = Field(min_length=1)
     settings: dict = {}
 
+    @property
+    def overrides(self) -> list[str]:
+        """The settings as ``--set`` takes them."""
+        return [f"{key}={as_toml(value)}" for key, value in dotted(self.settings)]
+
+    @model_validator(mode="after")
+    def _case_can_run(self) -> "RunParameters":
+        try:
+            read_case(Path(self.case), self.overrides)
+        except CaseError as error:
+            raise PydanticCustomError("case", "{told}", {"told": "; ".join(error.lines())}) from None
+        return self
+
 
 def run_case(parameters: RunParameters) -> dict[str, Measured]:
     """Run a case to its report; all its metrics.
@@ -32,7 +47,7 @@ def run_case(parameters: RunParameters) -> dict[str, Measured]:
     Raises:
         RuntimeError: the run failed or a check did not hold; with its last words.
     """
-    settings = [part for key, value in dotted(parameters.settings) for part in ("--set", f"{key}={as_toml(value)}")]
+    settings = [part for override in parameters.overrides for part in ("--set", override)]
     with tempfile.TemporaryDirectory() as folder:
         command = [sys.executable, "-m", "workflow", "run", parameters.case, "--out", folder, "-j", "1", *settings]
         environment = own_environment(os.environ)

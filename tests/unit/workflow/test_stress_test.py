@@ -150,6 +150,15 @@ def test_what_is_wrong_in_a_file_is_told(changes, told):
     assert told in refused(**changes)
 
 
+def test_a_run_that_cannot_be_is_told_before_it_is_tried(monkeypatch, tmp_path):
+    monkeypatch.setattr(hard_case, "trials", families.trials)
+    drop = {"case": str(HARD.parent / "sessile_drop/case.toml"), "settings": {"drop": {"volum": "1 mm^3"}}}
+    run = {"family": "reflow", "title": "a run", "why": "", "trial": "run", "bounds": {"shape_error": "1 %"}}
+    for parameters, told in (({"case": "no.toml"}, "no such case file"), (drop, "did you mean drop.volume?")):
+        with pytest.raises(CaseError, match=f"parameters.*{told}"):
+            hard_cases("reflow_run", run | {"parameters": parameters}, "reflow_run.toml", tmp_path)
+
+
 def test_a_measure_that_only_the_run_knows_is_compared_by_its_dimension():
     with pytest.raises(UnitError, match="standoff is in m"):
         read_bound("standoff", "1 kg", None).margin(Measured(1.0, "m"))
