@@ -17,6 +17,7 @@ from workflow.scene_cases import DropCase, DropsCase, JointCase, OscillationCase
 from workflow.structure.case import StructureCase
 from workflow.validation import translate
 
+SETTING = "--set"  # where a value is from that an option gives
 KINDS: dict[str, type[Case]] = {
     model.kind: model for model in (BoardDropCase, DropCase, JointCase, DropsCase, OscillationCase, StructureCase)
 }
@@ -122,7 +123,7 @@ def _override(table: dict, overrides: Sequence[str], path: Path, problems: list[
     for key, value in [*of_scale.items(), *settings]:
         if all(key.split(".")) and not set_value(table, key.split("."), value):
             problems.append(Problem(key, "lies below a value, not a table", value))
-    return dict.fromkeys(of_scale, f"{path} [scales.{chosen}]") | {key: "--set" for key, _ in settings}
+    return dict.fromkeys(of_scale, f"{path} [scales.{chosen}]") | {key: SETTING for key, _ in settings}
 
 
 def _setting(override: str, problems: list[Problem]) -> tuple[str, object]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from workflow import __version__
-from workflow.case import read_case
+from workflow.case import SETTING, read_case
 from workflow.case_kind import Case
 from workflow.inputs import stage_inputs
 from workflow.problems import CaseError
@@ -42,18 +42,22 @@ class PointsError(CaseError):
     """Points that must not run, each with everything that is wrong with it."""
 
     def __init__(self, source: str, impossible: Mapping[int, CaseError], settings: Sequence[Mapping[str, str]]) -> None:
-        """Take the case file, what is wrong with a point, by its place in the list, and the settings of all."""
+        """Take the file, what is wrong with a point, by its place in the list, and the settings of all."""
         self.impossible = impossible
         self.settings = settings
         super().__init__(source, [problem for error in impossible.values() for problem in error.problems])
 
     def lines(self) -> list[str]:
-        """One line a problem, each beginning with the point."""
-        return [
-            f"point {place + 1} ({told(self.settings[place])}): {line}"
-            for place, error in self.impossible.items()
-            for line in error.lines()
-        ]
+        """One line a problem, with the first point that has it, and how many others have."""
+        places: dict[str, list[int]] = {}
+        for place, error in self.impossible.items():
+            for line in error.lines():
+                places.setdefault(line.removeprefix(f"{SETTING}: "), []).append(place)
+        return [f"{self._told(those)}: {line}" for line, those in places.items()]
+
+    def _told(self, places: Sequence[int]) -> str:
+        others = f" and {len(places) - 1} more" if len(places) > 1 else ""
+        return f"{self.source}: point {places[0] + 1} ({told(self.settings[places[0]])}){others}"
 
 
 def digests(case: Case) -> dict[str, str]:
@@ -73,7 +77,9 @@ def digests(case: Case) -> dict[str, str]:
     return found
 
 
-def read_points(case: Path, settings: Sequence[Mapping[str, str]], oversubscribe: bool = False) -> list[Point]:
+def read_possible_points(
+    case: Path, settings: Sequence[Mapping[str, str]], oversubscribe: bool = False
+) -> tuple[list[Point], dict[int, CaseError]]:
     """Read and check a case with several settings.
 
     Args:
@@ -81,19 +87,9 @@ def read_points(case: Path, settings: Sequence[Mapping[str, str]], oversubscribe
         settings: of each point, dotted key -> value, as text for ``--set``.
         oversubscribe: whether more MPI ranks than cores are welcome.
 
-    Raises:
-        PointsError: with all problems of all points.
+    Returns:
+        The points that can be, and what is wrong with the others, by place in the list.
     """
-    points, impossible = read_possible_points(case, settings, oversubscribe)
-    if impossible:
-        raise PointsError(str(case), impossible, settings)
-    return points
-
-
-def read_possible_points(
-    case: Path, settings: Sequence[Mapping[str, str]], oversubscribe: bool = False
-) -> tuple[list[Point], dict[int, CaseError]]:
-    """Return the points that can be, and what is wrong with the others, by place in the list."""
     points: list[Point] = []
     impossible: dict[int, CaseError] = {}
     for place, chosen in enumerate(settings):

@@ -52,7 +52,7 @@ def read_points_of(path: Path, oversubscribe: bool = False) -> Points:
     settings = study.points
     points, impossible = read_possible_points(study.case, settings, oversubscribe)
     if impossible and not (study.about.skip_impossible and points):
-        raise PointsError(str(study.case), impossible, settings)
+        raise PointsError(str(path), impossible, settings)
     places = [place for place in range(len(settings)) if place not in impossible]
     return Points(study, settings, dict(zip(places, points, strict=True)), impossible)
 

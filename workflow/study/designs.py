@@ -37,6 +37,12 @@ class Design:
         """All keys that vary."""
         return tuple(key for factor in self.factors for key in factor.keys)
 
+    @property
+    def given(self) -> tuple[str, ...]:
+        """All keys that points have, also those that do not vary; one that a factor has twice is there twice."""
+        fixed = dict.fromkeys(key for point in self.points for key in point if key not in self.keys)
+        return self.keys + tuple(fixed)
+
     def __mul__(self, other: "Design") -> "Design":
         """Each point of one with each of the other."""
         points = tuple({**one, **two} for one, two in product(self.points, other.points))

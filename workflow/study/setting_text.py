@@ -9,10 +9,10 @@ DIGITS = 6
 
 
 def as_text(value: object) -> str:
-    """Write a value of TOML as ``--set`` takes it: names and quantities without quotes."""
+    """Write a value of TOML as ``--set`` takes it: names, quantities and dates without quotes."""
     if isinstance(value, str):
         return json.dumps(value, ensure_ascii=False) if _is_toml(value) else value
-    return json.dumps(value, ensure_ascii=False)
+    return json.dumps(value, ensure_ascii=False, default=str)
 
 
 def between(low: object, high: object, share: float) -> str | None:

@@ -1,5 +1,6 @@
 """A study file: which case, at which settings, ranked by what."""
 
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -103,7 +104,7 @@ def read_study(path: Path) -> Study:
     settings |= {"scale": file.study.scale} if file.study.scale else {}
     problems += [
         Problem(key, "is fixed and varied at once", settings[key], "either [settings] or a design")
-        for key in sorted(settings.keys() & set(design.keys))
+        for key in sorted(settings.keys() & {key for point in design.points for key in point})
     ]
     if problems:
         raise CaseError(str(path), problems)
@@ -112,12 +113,18 @@ def read_study(path: Path) -> Study:
 
 def _design(file: StudyFile, problems: list[Problem]) -> Design:
     """Every combination of the grid with every row of the list and every sample."""
-    design = Design.of(*grid_axes(dict(dotted(file.grid)), problems))
+    axes = list(grid_axes(dict(dotted(file.grid)), problems))
     if file.list:
-        design = design * list_axis([dict(dotted(row)) for row in file.list], problems)
+        axes.append(list_axis([dict(dotted(row)) for row in file.list], problems))
     if file.latin_hypercube is not None:
         cube = file.latin_hypercube
-        design = design * sampled(dict(dotted(cube.ranges)), Hypercube(cube.samples, cube.seed), problems)
+        axes.append(sampled(dict(dotted(cube.ranges)), Hypercube(cube.samples, cube.seed), problems))
+    design = Design.of(*axes)
+    problems += [
+        Problem(key, "is given twice, of which one would be lost", None, "one place in [grid], [[list]] or ranges")
+        for key, count in Counter(key for axis in axes for key in axis.given).items()
+        if count > 1
+    ]
     if not design.factors and not problems:
         problems.append(Problem("", "varies nothing", None, DESIGNS))
     return design

@@ -95,6 +95,9 @@ def test_ends_of_a_range_must_be_alike():
         ("[grid]\na = 1\n", ["grid.a = 1", "a list"]),
         ('[grid]\n"a, b" = [[1, 2, 3]]\n', ["one for each of 2 keys"]),
         ("[grid]\na = [1]\n[settings]\na = 2\n", ["fixed and varied at once"]),
+        ("[grid]\na = [1]\n[[list]]\na = 2\n", ["a: is given twice"]),
+        ("[grid]\n'a, a' = [1]\n", ["a: is given twice"]),
+        ("[grid]\na = [1, 2]\n[[list]]\na = 3\nb = 1\n[[list]]\na = 3\nb = 2\n", ["a: is given twice"]),
         ("[[list]]\na = 1\n[[list]]\nb = 1\n", ["is not in all rows"]),
         ('[latin_hypercube]\nsamples = 2\nranges.a = ["1 mm", "1 s"]\n', ["ranges.a", "same unit"]),
         ("[latin_hypercube]\nsamples = 0\nranges.a = [1, 2]\n", ["samples = 0", ">= 1"]),
@@ -115,6 +118,19 @@ def test_points_that_cannot_be_are_told_or_skipped(write):
     rows = results(points, Store(Path("nowhere")), {points.possible[1].key: "stage reflow: no"})
     assert [row.verdict for row in rows] == [IMPOSSIBLE, "failed"]
     assert "pads overlap" in rows[0].message
+
+
+def test_a_problem_of_many_points_is_told_once(write):
+    with pytest.raises(PointsError) as caught:
+        read_points_of(write(GRID + '[settings]\nshock.duraton = "1 ms"\n'))
+    (line,) = caught.value.lines()
+    assert "study.toml: point 1 (shock.duraton = 1 ms, package.pitch = 0.9 mm, solder.volume = 0.07 mm^3) and 3" in line
+    assert "did you mean shock.duration?" in line
+
+
+def test_a_date_is_no_value_of_a_key(write):
+    with pytest.raises(PointsError, match="2020-01-01"):
+        read_points_of(write("[grid]\nsolder.volume = [2020-01-01]\n"))
 
 
 def test_what_is_shared_is_foreseen_once(write, tmp_path):
