@@ -54,7 +54,8 @@ def test_plans_are_light():
         "for name in ('bga_drop', 'hu_bga_drop', 'two_scale_bar', 'sessile_drop', 'oscillating_drop'):",
         f"    case = read_case(Path('{ROOT}/cases') / name / 'case.toml', [], True)",
         "    show_plan(case, Path('nowhere'), Console(quiet=True))",
-        "assert not {'dolfinx', 'mpi4py'} & set(sys.modules)",
+        "    solved = {'petsc4py'} if name == 'oscillating_drop' else set()",  # its forecast loads the solver
+        "    assert not {'dolfinx', 'mpi4py', 'petsc4py'} & set(sys.modules) - solved, name",
     ]
     run_tool("-c", "\n".join(lines))
 
