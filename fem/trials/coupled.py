@@ -1,6 +1,6 @@
 """Two coupled models on one rank: any scheme, by the program's own operators and division."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple, Protocol, cast
 
@@ -106,17 +106,18 @@ class Coupled:
         """Return the ledger's energies of both models."""
         return dict(zip(ENERGIES, self.sums().tolist(), strict=False))
 
-    def drift(self, windows: int, samples: int) -> tuple[float, float]:
+    def drift(self, windows: int, samples: int, look: Callable[[], None] = lambda: None) -> tuple[float, float]:
         """Run; return how far kinetic plus internal energy drifts, and the most that the interface holds, of the first.
 
         The energy swings with what the interface holds; its drift is that of its mean, from the first tenth of the run
-        to the last.
+        to the last. ``look`` is called at each sample.
         """
         first, found = self.held(), []
         for _ in range(samples):
             for _ in range(windows // samples):
                 self.run()
             found.append((self.held(), abs(self.energies()["interface"])))
+            look()
         energy, interface = np.array(found).T / first
         tenth = samples // 10
         return abs(float(energy[-tenth:].mean() - energy[:tenth].mean())), float(interface.max())

@@ -22,6 +22,7 @@ ERRORS_OF_DROP = {
     "contact_angle_error": "deg",
     "contact_angle_excess": "deg",
 }
+ERRORS_OF_PAIR = {"radius_error": "", "place_error": "", "drops_left": ""}
 ERRORS_OF_JOINT = {
     "width_error": "",
     "waist_error": "",
@@ -115,9 +116,10 @@ def joint(parameters: JointTrial) -> dict[str, Measured]:
 
 
 def pair(parameters: PairTrial) -> dict[str, Measured]:
-    """Let two drops flow until they, or the one that they became, are at rest."""
+    """Let two drops flow until they, or the one that they became, are at rest; their place is over V^(1/3)."""
     from particles.drop_pair import pair_to_rest
     from particles.scene_checks import pair_problems
+    from particles.surface_measure import centre_of_volume
 
     solder = parameters.molten(parameters.drops)
     _refuse(pair_problems(parameters.drops, solder))
@@ -125,7 +127,8 @@ def pair(parameters: PairTrial) -> dict[str, Measured]:
     wanted = "merged" if parameters.drops.merge else "apart"
     if shape.verdict != wanted:
         raise ArithmeticError(f"the drops are {shape.verdict}, must be {wanted}")
-    return parameters.measured(shape)
+    aside = np.linalg.norm(centre_of_volume(shape.surface_points, shape.triangles)[:2])
+    return parameters.measured(shape) | {"place_error": Measured(float(aside) / solder.volume ** (1.0 / 3.0))}
 
 
 def swing(parameters: SwingTrial) -> dict[str, Measured]:
@@ -177,6 +180,6 @@ MEASURES_OF_SWING = {
 TRIALS = {
     "drop": Trial(DropTrial, drop, SHAPE | ERRORS_OF_DROP),
     "joint": Trial(JointTrial, joint, SHAPE | ERRORS_OF_JOINT),
-    "drops": Trial(PairTrial, pair, SHAPE | ERRORS_OF_DROP | {"radius_error": "", "drops_left": ""}),
+    "drops": Trial(PairTrial, pair, SHAPE | ERRORS_OF_DROP | ERRORS_OF_PAIR),
     "swing": Trial(SwingTrial, swing, MEASURES_OF_SWING),
 }

@@ -16,7 +16,7 @@ import pytest
 from hypothesis import strategies as st
 from pydantic import Field
 
-from fem.trials.parameters import Impact, Turns
+from fem.trials.parameters import Impact, PairRun, Turns
 from particles.parameters import Parameters
 from tests.support.workflow_command import wait_until
 from workflow.problems import CaseError
@@ -120,6 +120,14 @@ def test_no_measure_hides_nan(monkeypatch):
     monkeypatch.setattr(impact, "march", lambda *_: np.outer(energies, np.ones(4)))
     told |= impact.impact(Impact())
     assert all(math.isnan(told[name]) for name in told if name != "plastic_share"), told
+
+
+def test_a_push_in_the_middle_of_a_run_counts(monkeypatch):
+    from fem.trials import windows
+
+    pushes = iter([0.0] * 100 + [0.5] + [0.0] * 100)
+    monkeypatch.setattr(windows, "momentum_change", lambda *_: next(pushes))
+    assert windows.run(PairRun(free=True, windows=400, columns=2))["momentum_error"] == 0.5
 
 
 def test_an_expected_error_is_no_miss_and_its_absence_is():
