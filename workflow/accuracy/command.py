@@ -243,8 +243,8 @@ def _own_size(wish: Wish, accuracy: Accuracy) -> list[str]:
     told = [f"{duration(total(known, _case(wish.case, own)))} as it is"]
     if chosen is not None and own != wish.settings:
         told.append(f"{duration(total(known, _case(wish.case, own | dict(chosen.rung.settings))))} as recommended")
-    how = f"forecast, times measured over foreseen of the nearest of {known.points} points"
-    return [f"Wall time of the case at its own size: about {', '.join(told)} ({how})."]
+    how = f"times measured over foreseen of the nearest of {known.points} points" if known.points else "not measured"
+    return [f"Wall time of the case at its own size: about {', '.join(told)} (forecast, {how})."]
 
 
 def _case(path: Path, settings: Mapping[str, str]) -> Case:

@@ -92,7 +92,8 @@ class _Reference:
         order: float | None,
     ) -> "_Reference | None":
         """Take the rung that is named, else an extrapolation of the three finest of the first knob, else the finest."""
-        known = [one for one in main if quantity in answers.get(one.name, {})]
+        # What a run has compared with an exact answer itself may be an error, no answer.
+        known = [one for one in main if (own := answers.get(one.name, {}).get(quantity)) and own.exact is None]
         if rung.against:
             answer = answers.get(rung.against, {}).get(quantity)
             return None if answer is None else cls(answer.value, f"run {rung.against}", rung.against)
@@ -118,9 +119,9 @@ def _compared(
 
 
 def _difference(answer: Quantity, other: Values) -> float:
-    """Euclidean norm of a difference over the scale, or over that of the other answer."""
+    """Euclidean norm of a difference over the scale, or over that of the other answer; nan where that is nothing."""
     scale = _norm(other) if answer.scale is None else answer.scale
-    return _norm(np.asarray(answer.value) - np.asarray(other)) / scale
+    return _norm(np.asarray(answer.value) - np.asarray(other)) / scale if scale else math.nan
 
 
 def _norm(values: Values) -> float:

@@ -156,10 +156,16 @@ def write_accuracy(folder: Path, accuracy: Accuracy) -> None:
 
 
 def read_accuracy(path: Path) -> Accuracy | None:
-    """Read ``accuracy.json``; None where there is none."""
+    """Read ``accuracy.json``; None where there is none, or that of a version that wrote other fields."""
     if not path.is_file():
         return None
-    table = json.loads(path.read_text())
+    try:
+        return _accuracy(json.loads(path.read_text()))
+    except (KeyError, TypeError, json.JSONDecodeError):
+        return None
+
+
+def _accuracy(table: dict) -> Accuracy:
     chosen = table["recommended"]
     if chosen is not None:
         found = chosen["found"]

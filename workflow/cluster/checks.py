@@ -51,6 +51,8 @@ def _missing() -> Iterator[Problem]:
 
 def _chosen(profile: Profile, found: Sequence[Partition]) -> Partition:
     """Return the partition of the profile, else the default one; where there is none, the first."""
+    if not found:
+        raise CaseError("run", [Problem("--executor", "Slurm has no partition for you", "slurm")])
     if not profile.partition:
         return next((partition for partition in found if partition.is_default), found[0])
     names = [partition.name for partition in found]

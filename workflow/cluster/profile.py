@@ -58,10 +58,17 @@ def read_profile(folder: Path | None) -> Profile:
             message = Problem(f"config.{key}", "unknown key", config[key], ", ".join(KEYS), nearest(key, KEYS))
             raise _wrong(path, message)
     launcher = str(config.get("launcher", "mpirun"))
-    if not shlex.split(launcher):
+    if not _is_command(launcher):
         raise _wrong(path, Problem("config.launcher", "is no command", launcher, "mpirun, srun --mpi=pmix, …"))
     partition = str(resources.get("slurm_partition", "")).strip("'\"")
     return Profile(folder, partition, launcher, _factor(path, config.get("walltime_factor", 1.0)))
+
+
+def _is_command(text: str) -> bool:
+    try:
+        return bool(shlex.split(text))
+    except ValueError:  # a quote is open
+        return False
 
 
 def _factor(path: Path, value: object) -> float:

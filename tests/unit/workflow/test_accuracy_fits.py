@@ -70,6 +70,18 @@ def test_a_rung_may_name_what_it_is_compared_with():
     assert errors["one way"]["height"] == Error(pytest.approx(0.01), "run size 0.1")
 
 
+def test_an_answer_is_not_compared_with_errors():
+    lost = Rung("lost", "scheme", {})
+    found = {one.name: {"height": Quantity(one.value**2, 0.0, 1.0)} for one in RUNGS}
+    found["lost"] = {"height": Quantity(3.0)}
+    assert "lost" not in errors_of(found, [*RUNGS, lost], RUNGS, 2.0)
+
+
+def test_what_is_relative_to_nothing_has_no_error():
+    found = {one.name: {"height": Quantity(one.value, 0.0)} for one in RUNGS}
+    assert errors_of(found, RUNGS, RUNGS, 2.0) == {}
+
+
 def test_a_run_that_failed_has_no_error():
     found = answers(3.0)
     del found["size 0.1"]
@@ -122,6 +134,8 @@ def test_a_measurement_comes_back_from_its_file(tmp_path: Path):
         write_accuracy(tmp_path, accuracy)
         assert read_accuracy(tmp_path / "accuracy.json") == accuracy
     assert read_accuracy(tmp_path / "no such file") is None
+    (tmp_path / "accuracy.json").write_text('{"of": "another version"}')
+    assert read_accuracy(tmp_path / "accuracy.json") is None
 
 
 def _measurement(one: Rung) -> Measurement:

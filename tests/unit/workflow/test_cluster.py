@@ -82,6 +82,7 @@ def test_profile_of_the_user(tmp_path, monkeypatch):
     [
         ("config: {luncher: mpirun}", "config.luncher = \"mpirun\": unknown key; allowed: launcher, walltime_factor"),
         ("config: {launcher: ''}", "config.launcher"),
+        ("config: {launcher: mpirun 'x}", "config.launcher = \"mpirun 'x\": is no command"),
         ("config: {walltime_factor: -1}", "walltime_factor = -1: is no factor; allowed: 0.1 to 1000"),
         ("config: [launcher=srun]", "config: must be a table"),
         ("a: b: c", "cannot be read"),
@@ -129,6 +130,9 @@ def test_partitions_and_jobs_of_a_folder(tmp_path, monkeypatch):
     monkeypatch.setattr(checks, "_missing", lambda: ())
     with pytest.raises(CaseError, match="asks for 70 MPI ranks, Slurm's partition long has 64 cores"):
         checks.check_slurm(Profile(tmp_path), [case("bga_drop", "shock.ranks.total=70")])
+    program(tmp_path, "sinfo", "pass")
+    with pytest.raises(CaseError, match="no partition"):
+        checks.check_slurm(Profile(tmp_path), [])
     program(tmp_path, "sinfo", "raise SystemExit('sinfo: error: no controller')")
     with pytest.raises(queue.NoAnswer, match="no controller"):
         partitions()
