@@ -9,7 +9,7 @@ from workflow.study.hypercube import Hypercube
 from workflow.study.setting_text import as_text, between
 
 VALUES = 'a list of values; of several keys ("a, b") each one value for all, or a list of one for each'
-RANGE = 'a range of two values in the same unit, e.g. ["0.8 mm", "1 mm"]'
+RANGE = 'a range of two different values in the same unit, e.g. ["0.8 mm", "1 mm"]'
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,6 +65,8 @@ def grid_axes(table: Mapping[str, object], problems: list[Problem]) -> Iterator[
             problems.append(Problem(f"grid.{text}", "must be a list with at least one value", values, VALUES))
             continue
         points = [_level(keys, value) for value in values]
+        if any(point in points[:place] for place, point in enumerate(points)):
+            problems.append(Problem(f"grid.{text}", "has a value twice", values, VALUES))
         if None in points:
             problems.append(
                 Problem(f"grid.{text}", f"has values that are not one for each of {len(keys)} keys", values, VALUES)
@@ -130,4 +132,5 @@ def _range(keys: Sequence[str], ends: object) -> dict[str, tuple[object, object]
     if any(len(values) != len(keys) for values in own):
         return None
     found = {key: (own[0][place], own[1][place]) for place, key in enumerate(keys)}
-    return found if all(between(*range_, 0.0) is not None for range_ in found.values()) else None
+    texts = [[between(*range_, share) for range_ in found.values()] for share in (0.0, 1.0)]
+    return None if None in texts[0] or texts[0] == texts[1] else found

@@ -94,6 +94,8 @@ def test_ends_of_a_range_must_be_alike():
         ("[gird]\na = [1]\n", ["gird", "unknown key", "did you mean grid?"]),
         ("[grid]\na = 1\n", ["grid.a = 1", "a list"]),
         ('[grid]\n"a, b" = [[1, 2, 3]]\n', ["one for each of 2 keys"]),
+        ('[grid]\n"a, b" = [[1, 1], [1, 2], 1]\n', ["has a value twice"]),
+        ('[latin_hypercube]\nsamples = 2\nranges.a = ["1 mm", "1 mm"]\n', ["ranges.a", "two different values"]),
         ("[grid]\na = [1]\n[settings]\na = 2\n", ["fixed and varied at once"]),
         ("[grid]\na = [1]\n[[list]]\na = 2\n", ["a: is given twice"]),
         ("[grid]\n'a, a' = [1]\n", ["a: is given twice"]),
