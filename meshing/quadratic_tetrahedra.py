@@ -1,6 +1,8 @@
 """Ten-node tetrahedra of a free-form body, for other codes: curved along its surface, straight inside."""
 
 from dataclasses import dataclass
+from itertools import product
+from math import factorial
 from pathlib import Path
 
 import gmsh
@@ -14,6 +16,8 @@ ORDER = np.array([0, 3, 1, 2, 5, 4])  # Gmsh's edges 01 12 20 03 23 13 among our
 # Exact for cubics (Keast 1986, five points): barycentric coordinates and weights of the unit tetrahedron.
 STATIONS = np.vstack([np.full(4, 0.25), np.full((4, 4), 1.0 / 6.0) + np.eye(4) / 3.0])
 WEIGHTS = np.array([-0.8, 0.45, 0.45, 0.45, 0.45]) / 6.0
+CUBIC = np.array([powers for powers in product(range(4), repeat=4) if sum(powers) == 3])  # of its Bernstein polynomials
+LEAST_JACOBIAN = 0.05  # of a curved tetrahedron, over that of the straight one
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +54,7 @@ def quadratic_tetrahedra(
     ends = np.empty((count, 2), dtype=np.int64)
     ends[cells[:, 4:]] = tetrahedra[:, EDGES[ORDER]]
     placed[inside] = points[ends[inside]].mean(axis=1)
-    return QuadraticTetrahedra(placed, cells, curved)
+    return QuadraticTetrahedra(_unfold(placed, cells, ends), cells, curved)
 
 
 def tetrahedra_quality(tetrahedra: QuadraticTetrahedra, volume: float) -> dict[str, float]:
@@ -62,14 +66,26 @@ def tetrahedra_quality(tetrahedra: QuadraticTetrahedra, volume: float) -> dict[s
     }
 
 
+def least_jacobian(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
+    """Return a lower bound of the Jacobian of ten-node tetrahedra (c, 10), over that of the straight ones (c,).
+
+    It is a cubic, so no smaller than the least of its coefficients in Bernstein polynomials (Johnen, Remacle & Geuzaine
+    2013).
+    """
+    corners = points[cells]
+    straight = np.linalg.det(corners[:, 1:4] - corners[:, :1])
+    values = np.stack([np.linalg.det(_jacobian(station, corners)) for station in CUBIC / 3.0], axis=1)
+    ways = np.array([6.0 / np.prod([factorial(power) for power in powers]) for powers in CUBIC])
+    bernstein = ways * np.prod((CUBIC / 3.0)[:, None, :] ** CUBIC, axis=2)
+    return np.linalg.solve(bernstein, values.T).min(axis=0) / straight
+
+
 def curved_volume(points: np.ndarray, cells: np.ndarray) -> float:
     """Volume of ten-node tetrahedra (c, 10) [m^3], exact."""
     total = 0.0
     corners = points[cells]
     for station, weight in zip(STATIONS, WEIGHTS, strict=True):
-        slopes = _slopes(station)
-        jacobian = np.einsum("na,cni->cai", slopes[:, 1:] - slopes[:, :1], corners)
-        total += weight * float(np.linalg.det(jacobian).sum())
+        total += weight * float(np.linalg.det(_jacobian(station, corners)).sum())
     return total
 
 
@@ -101,9 +117,24 @@ def write_tetrahedra(path: Path, name: str, tetrahedra: QuadraticTetrahedra) -> 
         write_msh(path)
 
 
+def _unfold(points: np.ndarray, cells: np.ndarray, ends: np.ndarray) -> np.ndarray:
+    """Straighten the edges of tetrahedra that are flat on a surface so curved that they would fold."""
+    while len(folded := cells[least_jacobian(points, cells) < LEAST_JACOBIAN]):
+        middles = np.unique(folded[:, 4:])
+        points = points.copy()
+        points[middles] = points[ends[middles]].mean(axis=1)
+    return points
+
+
 def _with_middles(split: SplitTetrahedra, triangles: np.ndarray) -> np.ndarray:
     pairs = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2)
     return np.hstack([triangles, split.middles(pairs)])
+
+
+def _jacobian(station: np.ndarray, corners: np.ndarray) -> np.ndarray:
+    """Jacobian matrices (c, 3, 3) at a place of tetrahedra with nodes (c, 10, 3)."""
+    slopes = _slopes(station)
+    return np.einsum("na,cni->cai", slopes[:, 1:] - slopes[:, :1], corners)
 
 
 def _slopes(station: np.ndarray) -> np.ndarray:

@@ -15,7 +15,7 @@ from meshing.hexahedra import quad_areas, shortest_lengths
 from meshing.parameters import JointNumerics
 from meshing.solder import Solder
 from meshing.swept import swept_solder
-from meshing.tetrahedra import fill_with_tetrahedra
+from meshing.tetrahedra import fill_apart
 from meshing.trials.models import MM
 from meshing.trials.surfaces import barrel
 
@@ -61,7 +61,7 @@ def swept(core: int, rings: int, layers: int) -> Answer:
 @pytest.fixture(scope="module")
 def answers() -> dict[str, Answer]:
     """By the wanted resolution of a joint, swept and split, and by fine swept hexahedra."""
-    split = free_form_solder(COLUMN, fill_with_tetrahedra(COLUMN, 0.16 * MM, False), np.asarray)
+    split = free_form_solder(COLUMN, fill_apart(COLUMN, 0.16 * MM, False), np.asarray)
     return {"split": answer(split), "swept": swept(2, 1, 6), "exact": swept(4, 2, 14)}
 
 

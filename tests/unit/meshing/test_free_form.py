@@ -51,8 +51,9 @@ def test_a_void_is_left_free(hollow):
 
 
 def test_the_way_that_failed_is_told(hollow):
-    (missed,) = joint_quality(hollow[0])["tries"]
-    assert missed["method"] == "free-form" and missed["missed"].startswith("Gmsh: ")
+    first, *others = joint_quality(hollow[0])["tries"]
+    assert first["method"] == "free-form" and first["missed"].startswith("Gmsh: ")
+    assert all(way["missed"] for way in others)  # how many there are depends on the system's numerical libraries
 
 
 def test_a_bridge_has_the_pads_of_both_joints(bridge, sites):

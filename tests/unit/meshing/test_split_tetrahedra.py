@@ -3,7 +3,7 @@ import pytest
 from scipy.spatial import Delaunay
 
 from meshing.hexahedra import boundary_quads, quad_areas, scaled_jacobian, volumes
-from meshing.quadratic_tetrahedra import curved_volume, quadratic_tetrahedra
+from meshing.quadratic_tetrahedra import curved_volume, least_jacobian, quadratic_tetrahedra
 from meshing.split_tetrahedra import split_tetrahedra
 
 REGULAR = np.array([[1.0, 1.0, 1.0], [-1.0, 1.0, -1.0], [1.0, -1.0, -1.0], [-1.0, -1.0, 1.0]])
@@ -60,3 +60,17 @@ def test_curved_tetrahedra_have_the_volume_of_the_straight_ones_and_more_where_t
     bulged[middle] = [0.5, 1.0, 1.5] + 1.02 * (bulged[middle] - [0.5, 1.0, 1.5])
     curved = quadratic_tetrahedra(split, bulged, cells, {"all": surface})
     assert curved_volume(curved.points, curved.cells) > 6.0
+
+
+def test_a_tetrahedron_that_would_fold_is_straight_where_it_is_bent():
+    points = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.3, 0.3, 0.1]])
+    split = split_tetrahedra(points, np.array([[0, 1, 2, 3]]))
+    bent = split.points.copy()
+    base = split.middles(np.array([[[0, 1], [1, 2], [2, 0]]])).ravel()
+    for lift, folds in ((-0.1, False), (0.3, True)):
+        bent[base, 2] = lift
+        mesh = quadratic_tetrahedra(split, bent, np.array([[0, 1, 2, 3]]), {"base": np.array([[0, 2, 1]])})
+        assert least_jacobian(mesh.points, mesh.cells).min() > 0.05
+        assert (np.abs(mesh.points[base, 2]).max() < 1e-15) == folds
+    straight = quadratic_tetrahedra(split, split.points, np.array([[0, 1, 2, 3]]), {"base": np.array([[0, 2, 1]])})
+    assert least_jacobian(straight.points, straight.cells) == pytest.approx([1.0])
