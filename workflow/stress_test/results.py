@@ -96,5 +96,6 @@ def _page(folder: Path, verdicts: Sequence[Verdict], samples: Sequence[Sample], 
         samples=samples,
         tried=sum(len(sample.verdicts) for sample in samples),
         missed=sum(not verdict.ok for verdict in verdicts) + sum(len(sample.missed) for sample in samples),
+        refused=sum(sample.too_many_refused for sample in samples),
         picture=base64.b64encode((folder / "stress_test.png").read_bytes()).decode(),
     )

@@ -57,7 +57,7 @@ def sample_said(sample: Sample) -> str:
 
 
 def show_table(verdicts: Sequence[Verdict], samples: Sequence[Sample]) -> None:
-    """Print how many of each family were tried and missed, and the closest of each."""
+    """Print how many of each family were tried and missed, the closest of each, and what was refused too often."""
     table = Table(box=None, header_style="bold")
     for column in ("family", "fixed", "random", "missed", "smallest margin", "of"):
         table.add_column(column, justify="left" if column in ("family", "of") else "right")
@@ -68,6 +68,9 @@ def show_table(verdicts: Sequence[Verdict], samples: Sequence[Sample]) -> None:
             missed = sum(not verdict.ok for verdict in own)
             table.add_row(family, str(len(fixed)), str(len(drawn)), str(missed), *_least(own))
     console.print(table)
+    for sample in samples:
+        if sample.too_many_refused:
+            show_sample(sample)
 
 
 def _least(verdicts: Sequence[Verdict]) -> tuple[str, str]:

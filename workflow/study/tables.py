@@ -4,10 +4,11 @@ from collections.abc import Iterable, Sequence
 
 from workflow.report.tables import quantity
 from workflow.study.main_effects import Effect, effect_of, measured, ranked
-from workflow.study.results import HEALTHY, Row
+from workflow.study.results import HEALTHY, UNHEALTHY, Row
 from workflow.study.study_file import Study
 
 MIXED = "{} of {} points have no result: means at the values of a factor then differ also by what other factors do."
+UNSOUND = "{} of {} points, which count in the means, broke a check."
 
 
 def ranking(study: Study, rows: Sequence[Row]) -> dict:
@@ -57,9 +58,10 @@ def effect_table(found: Sequence[tuple[str, str, Sequence[Effect]]]) -> dict:
 
 
 def imbalance(rows: Sequence[Row]) -> str:
-    """Say that means at a factor's values are not of equal points where some have no result; else nothing."""
-    missing = sum(not row.metrics for row in rows)
-    return MIXED.format(missing, len(rows)) if missing else ""
+    """Say that means at a factor's values are not of equal points where some have no result, or a bad one."""
+    missing, unsound = sum(not row.metrics for row in rows), sum(row.verdict == UNHEALTHY for row in rows)
+    told = [text.format(count, len(rows)) for text, count in ((MIXED, missing), (UNSOUND, unsound)) if count]
+    return " ".join(told)
 
 
 def troubles(rows: Sequence[Row]) -> dict:

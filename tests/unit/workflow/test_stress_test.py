@@ -231,13 +231,15 @@ def test_a_random_case_that_misses_is_made_simple_and_is_a_hard_case(rods_of_any
     assert "30 random ones (seed 1)" in (tmp_path / "stress_test.html").read_text()
 
 
-def test_refusals_in_words_are_counted_and_too_many_are_a_miss(rods_of_any_length, monkeypatch):
+def test_refusals_in_words_are_counted_and_too_many_are_a_miss(rods_of_any_length, monkeypatch, tmp_path):
     def refuse(rod):
         raise Refused("no such rod")
 
     monkeypatch.setattr(hard_case, "trials", lambda: {"rod": dataclasses.replace(ROD, run=refuse)})
     (found,) = try_sample("elements", 5, 1, PoolHere())
     assert (found.refused, found.missed, found.ok) == (5, [], False)
+    write_results(tmp_path, [], [found], 1)
+    assert "0 missed, 1 random trials refused too many" in (tmp_path / "stress_test.html").read_text()
 
 
 def test_all_cases_of_the_program_can_be_read(monkeypatch):

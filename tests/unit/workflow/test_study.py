@@ -204,6 +204,7 @@ def test_the_page_tells_ranks_effects_and_troubles(write, tmp_path):
     assert "points/key1/report.html" in page
     assert "1 without a healthy result" in page
     assert "1 of 5 points have no result" in page and not tables.imbalance(ROWS)
+    assert "1 of 5 points, which count in the means," in tables.imbalance([*ROWS, row(5, 1.0, 0.08, 1.0, UNHEALTHY)])
     assert (tmp_path / "main_effects.png").stat().st_size > 10_000
     assert [line[1] for line in tables.ranking(study, rows)["rows"]] == ["key1", "key3", "key2", "key4"]
 
