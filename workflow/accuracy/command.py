@@ -27,6 +27,7 @@ from workflow.points.point import Point
 from workflow.points.store import Store
 from workflow.problems import CaseError, Problem
 from workflow.progress import progress_bar
+from workflow.report.tables import percent
 from workflow.stage_forecast import stage_seconds
 from workflow.units import UnitError, to_si
 
@@ -166,7 +167,7 @@ def show(wish: Wish, out: Path | None, console: Console) -> bool:
     compute = partial(_compute, oversubscribe=wish.oversubscribe, until=ladder_of(case).until)
     accuracy, climb = measure(wish, folder, compute)
     tried = (*_left_out(climb), *_impossible(climb), *_failed(climb))
-    remarks = (*tried, *_unhealthy(accuracy, climb), *_own_size(wish, accuracy))
+    remarks = (*tried, *unproved(accuracy), *_unhealthy(accuracy, climb), *_own_size(wish, accuracy))
     write_pages(folder, accuracy, remarks)
     console.print(
         table(tables.runs(accuracy), f"Errors and costs, the least of all times that it was run: {accuracy.machine}")
@@ -223,6 +224,16 @@ def _failed(climb: Climb) -> list[str]:
     """Say how runs that failed are tried again, which no call does by itself."""
     work = climb.stores[0].folder / "work"
     return [f"Runs that failed are not tried again, unless you remove {work}."] if climb.failed else []
+
+
+def unproved(accuracy: Accuracy) -> list[str]:
+    """Say that the recommended settings were not run to their end, so that nothing was found of them."""
+    chosen = accuracy.recommended
+    if chosen is None or tables.prediction(accuracy) is not None:
+        return []
+    why = chosen.found.failed if chosen.found is not None else "it did not fit into what was left of the budget"
+    foreseen = f"its error of {percent(chosen.error)} and {chosen.core_seconds:.2f} core-seconds"
+    return [f"The recommendation was not run ({why}): {foreseen} are foreseen, not found."]
 
 
 def _unhealthy(accuracy: Accuracy, climb: Climb) -> list[str]:

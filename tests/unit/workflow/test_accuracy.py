@@ -1,7 +1,7 @@
 """The command accuracy on a ladder whose runs are made up: error h^2, cost 2 s + h^-4 / 1000."""
 
 import json
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import pytest
@@ -9,7 +9,7 @@ import pytest
 from workflow.accuracy import command
 from workflow.accuracy.calibration import calibration, calibration_of, default_folder
 from workflow.accuracy.climb import AGAIN
-from workflow.accuracy.command import Wish, keeps_promise, measure, read_wish
+from workflow.accuracy.command import Wish, keeps_promise, measure, read_wish, unproved
 from workflow.accuracy.ladders import ladder_of
 from workflow.accuracy.measured import StageCost, read_accuracy
 from workflow.accuracy.page import section, section_for, write_pages
@@ -197,6 +197,13 @@ def test_the_plan_says_that_a_cost_was_measured(done, monkeypatch):
     expected = known.seconds("reflow", 3.0)
     assert expected != 3.0
     assert foreseen_costs(case, {"reflow": 3.0})["reflow"].endswith(f"s (measured: accuracy, {known.points} points)")
+
+
+def test_a_recommendation_that_was_not_run_is_told(done):
+    accuracy = done[0]
+    assert unproved(accuracy) == []
+    (told,) = unproved(replace(accuracy, recommended=replace(accuracy.recommended, found=None)))
+    assert "was not run (it did not fit into what was left of the budget)" in told and "foreseen, not found" in told
 
 
 def test_settings_can_be_pasted():
