@@ -27,7 +27,7 @@ def ladder_of(case: Case) -> Ladder:
     """Return the ladder of a case.
 
     Raises:
-        CaseError: its kind has none.
+        CaseError: its kind has none, or nothing of it could be compared.
     """
     if case.kind not in LADDERS:
         known = "one of " + ", ".join(f"[{kind}]" for kind in LADDERS)

@@ -12,6 +12,7 @@ from workflow.accuracy.histories import at_same_times, common_times
 from workflow.accuracy.ladder import Knob, Ladder, Rung
 from workflow.case import available_cores
 from workflow.inputs import read_record
+from workflow.problems import CaseError, Problem
 from workflow.structure.case import StructureCase
 from workflow.structure.findings import exact_velocities, read_history, read_places, wave_points
 from workflow.structure.launch import solver_folders
@@ -55,12 +56,19 @@ Measure = Callable[[Any, Path], Mapping[str, Quantity]]
 
 
 def _answers(case: StructureCase) -> tuple[Mapping[str, str], Measure]:
-    """Return what is judged: exact waves or bending where the case has them, else motion and strain of watch points."""
+    """Return what is judged: exact waves or bending where the case has them, else motion and strain of watch points.
+
+    Raises:
+        CaseError: there are none.
+    """
     for reference in case.references.values():
         if isinstance(reference, BarWave | LayeredBar):
             return WAVE, partial(_wave, reference)
         if isinstance(reference, Cantilever):
             return SWING, _swing
+    if not case.watch:
+        message = "has no point, and nothing exact is known: there is nothing that could be compared"
+        raise CaseError("case", [Problem("watch", message, None, "tables [watch.NAME]")])
     return CURVES, _curves
 
 
@@ -91,7 +99,6 @@ def _curves(case: StructureCase, run_folder: Path) -> dict[str, Quantity]:
             at_same_times(history, [f"{name}@{point}" for point in case.watch], case.dynamics.duration, count)
         )
         for name in CURVES
-        if case.watch
     }
 
 

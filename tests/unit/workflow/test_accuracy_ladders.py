@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 
+from tests.support.workflow_command import SMALL_CASE
 from workflow.accuracy.errors import Error, errors_of
 from workflow.accuracy.histories import at_same_times
 from workflow.accuracy.ladder import Knob, Ladder, Rung
@@ -14,6 +15,7 @@ from workflow.accuracy.recommend import Goal, recommend
 from workflow.accuracy.structures import structure_ladder
 from workflow.case import read_case
 from workflow.case_text import CASES
+from workflow.problems import CaseError
 from workflow.structure.findings import exact_velocities, wave_points
 
 
@@ -37,6 +39,13 @@ def test_histories_of_other_steps_are_compared_at_the_same_times():
     first, second = (at_same_times(history, ("a", "b"), 1.0, 11) for history in histories)
     assert first.shape == (33,)
     assert first == pytest.approx(second, abs=1e-5)
+
+
+def test_a_structure_of_which_nothing_could_be_compared_has_no_ladder():
+    case = read_case(SMALL_CASE.with_name("structure.toml"))
+    assert structure_ladder(case).judged == "displacement"
+    with pytest.raises(CaseError, match="watch: has no point"):
+        structure_ladder(case.model_copy(update={"watch": {}}))
 
 
 @pytest.mark.parametrize("name", ["two_scale_bar", "cantilever"])
