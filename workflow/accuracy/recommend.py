@@ -92,7 +92,8 @@ def _between(
         error, cost = fit.errors.get(ladder.judged), fit.cost
         if error is None or cost is None:
             continue
-        known = [found.value for rung in knob.rungs if (found := measurements.get(rung.name)) and found.value]
+        runs = [found for rung in knob.rungs if (found := measurements.get(rung.name)) and not found.failed]
+        known = [found.value for found in runs if found.value]
         largest, smallest = max(known), min(known) / knob.extent
         if goal.tolerance is not None:
             wanted = error.value_for(goal.tolerance)

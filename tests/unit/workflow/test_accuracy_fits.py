@@ -19,6 +19,7 @@ from workflow.accuracy.measured import (
 )
 from workflow.accuracy.orders import fit_cost, fit_error
 from workflow.accuracy.pareto import front
+from workflow.accuracy.recommend import Goal, recommend
 
 SIZES = (0.4, 0.2, 0.1, 0.05)
 
@@ -136,6 +137,15 @@ def test_a_measurement_comes_back_from_its_file(tmp_path: Path):
     assert read_accuracy(tmp_path / "no such file") is None
     (tmp_path / "accuracy.json").write_text('{"of": "another version"}')
     assert read_accuracy(tmp_path / "accuracy.json") is None
+
+
+def test_what_is_finer_than_all_runs_that_came_to_their_end_is_not_chosen():
+    sizes = (*SIZES, 0.01)
+    ladder = Ladder("reflow", ("reflow",), {"height": "height"}, LADDER.measure, (Knob("size", sizes, rung, 2.0),))
+    failed = Measurement("size 0.01", "size", 0.01, {}, "abc", {}, {}, "it broke")
+    measured = {one.name: _measurement(one) for one in RUNGS} | {failed.rung: failed}
+    chosen = recommend(ladder, measured, fits_of(ladder, measured), Goal(0.02**2))
+    assert chosen.rung.name == "size 0.05" and "none is within the tolerance" in chosen.why
 
 
 def _measurement(one: Rung) -> Measurement:
