@@ -147,6 +147,8 @@ def _bounds(head: HardCaseFile, trial: Trial, problems: list[Problem]) -> Iterat
     """Yield the bounds; a measure may have several, as a list."""
     if not head.bounds and not head.expect:
         problems.append(Problem("bounds", "nothing is judged: give bounds, or expect", None))
+    if head.bounds and head.expect:
+        problems.append(Problem("bounds", "nothing is measured of a case that must be refused", None, "expect alone"))
     for measure, given in head.bounds.items():
         key, names = f"bounds.{measure}", trial.measures
         if names is not None and measure not in names:

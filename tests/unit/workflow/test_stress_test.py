@@ -131,7 +131,7 @@ def test_a_push_in_the_middle_of_a_run_counts(monkeypatch):
 
 
 def test_an_expected_error_is_no_miss_and_its_absence_is():
-    fates = {"vary": {"fate": ["raises", "holds"]}, "expect": "the rod broke"}
+    fates = {"vary": {"fate": ["raises", "holds"]}, "expect": "the rod broke", "bounds": {}}
     assert [attempt(case).ok for case in cases(**fates)] == [True, False]
 
 
@@ -147,6 +147,7 @@ def test_an_expected_error_is_no_miss_and_its_absence_is():
         ({"bounds": {"error": 0}}, "must be positive"),
         ({"bounds": {"error": "1e999"}}, "must be finite"),
         ({"bounds": {}}, "nothing is judged"),
+        ({"expect": "the rod broke"}, "nothing is measured of a case that must be refused"),
         ({"bounds": {"error": []}}, "bounds.error = []: nothing is judged"),
         ({"parameters": {"lenght": "3 mm"}}, "did you mean length?"),
         ({"parameters": {"length": "-3 mm"}}, 'parameters.length = "-3 mm": is out of range; allowed: > 0 mm'),
