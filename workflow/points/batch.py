@@ -135,6 +135,7 @@ def run_points(
         if jobs:
             for job in jobs:
                 store.prepare_work(job.point, job.stage)
+                _log(store, job.name).unlink(missing_ok=True)
             _write(store, jobs, machine)
             options = ("--snakefile", str(SNAKEFILE), "--keep-going", "--scheduler", "greedy")
             config = ("--config", f"oversubscribe={int(machine.oversubscribe)}", f"cluster={int(bool(machine.slurm))}")
@@ -145,10 +146,15 @@ def run_points(
 def why(store: Store, point: Point, until: str) -> str:
     """Say why a point is not complete: the first of its stages without a product, and what it said when it failed."""
     stage = next(stage.name for stage in point.case.pipeline.upstream(until) if not store.has(point, stage.name))
-    log = store.folder / "logs" / f"{job_name(point, stage)}.txt"
+    log = _log(store, job_name(point, stage))
     by_cluster = f"; see {store.folder / SAID}" if (store.folder / SAID).is_file() else ""
     untold = (UNTOLD.format(log=log) if log.exists() else UNTRIED) + by_cluster
     return f"stage {stage}: {store.message(point, stage) or untold}"
+
+
+def _log(store: Store, job: str) -> Path:
+    """Return the file that takes what a job says, as the Snakefile names it."""
+    return store.folder / "logs" / f"{job}.txt"
 
 
 def _write(store: Store, jobs: Sequence[Job], machine: Machine) -> None:

@@ -50,13 +50,20 @@ class Store:
         self._prepare(self.run_folder(point), point, point.case.pipeline.names[-1])
 
     def prepare_work(self, point: Point, stage: str) -> None:
-        """Make the run folder in which a stage's product will be made, with links to those of the stages before it."""
+        """Make the run folder in which a stage's product will be made, with links to those of the stages before it.
+
+        Why it failed when it was last tried is forgotten.
+        """
         self._prepare(self.work_folder(point, stage), point, stage)
+        self._message(point, stage).unlink(missing_ok=True)
 
     def message(self, point: Point, stage: str) -> str | None:
         """Return why a stage failed when it was last tried; None where it did not, or was not tried."""
-        path = self.work_folder(point, stage) / f".{stage}.partial" / MESSAGE
+        path = self._message(point, stage)
         return path.read_text() if path.is_file() else None
+
+    def _message(self, point: Point, stage: str) -> Path:
+        return self.work_folder(point, stage) / f".{stage}.partial" / MESSAGE
 
     def _prepare(self, folder: Path, point: Point, last: str) -> None:
         folder.mkdir(parents=True, exist_ok=True)

@@ -20,6 +20,7 @@ from workflow.accuracy.measured import (
 from workflow.accuracy.orders import fit_cost, fit_error
 from workflow.accuracy.pareto import front
 from workflow.accuracy.recommend import Goal, recommend
+from workflow.case_text import CASES
 
 SIZES = (0.4, 0.2, 0.1, 0.05)
 
@@ -135,6 +136,7 @@ def test_a_measurement_comes_back_from_its_file(tmp_path: Path):
         write_accuracy(tmp_path, accuracy)
         assert read_accuracy(tmp_path / "accuracy.json") == accuracy
     assert read_accuracy(tmp_path / "no such file") is None
+    assert all(read_accuracy(path) for path in CASES.glob("*/accuracy.json"))
     (tmp_path / "accuracy.json").write_text('{"of": "another version"}')
     assert read_accuracy(tmp_path / "accuracy.json") is None
 

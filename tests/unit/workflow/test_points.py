@@ -9,6 +9,7 @@ from workflow.inputs import examine
 from workflow.points.batch import job_name, missing, why
 from workflow.points.point import PointsError, read_possible_points
 from workflow.points.store import Store, publish
+from workflow.stage_runner import MESSAGE
 
 HEATED = {"warpage.corner": "0 mm", "thermal.steps": "2"}
 
@@ -83,6 +84,12 @@ def test_a_point_has_a_run_folder_as_any_other(tmp_path):
     (tmp_path / "logs").mkdir()
     (tmp_path / "logs" / f"{job_name(point, 'reflow')}.txt").write_text("")
     assert "stage reflow: ended without a word" in why(store, point, "report")
+    message = store.work_folder(point, "reflow") / ".reflow.partial" / MESSAGE
+    message.parent.mkdir(parents=True)
+    message.write_text("it broke")
+    assert why(store, point, "report") == "stage reflow: it broke"
+    store.prepare_work(point, "reflow")
+    assert store.message(point, "reflow") is None
 
 
 def test_all_that_is_wrong_with_points_is_told_with_their_settings():
