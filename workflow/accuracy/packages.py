@@ -17,7 +17,7 @@ from workflow.shock_forecast import implicit_seconds
 from workflow.shock_launch import MODES
 from workflow.units import from_si
 
-REFINED = (2.0, 1.5, 1.0, 0.75, 0.5, 0.4, 0.3)  # sizes of elements over those of the case
+REFINED = (2.0, 1.5, 1.0, 0.75, 0.5, 0.4, 0.25)  # sizes of elements over those of the case
 TWO_MODELS = (2.0, 1.5, 1.0, 0.75, 0.5)  # the same with two models
 ALONE, FINEST = (1.5, 1.0, 0.75), 0.5  # of board or joints alone, against the finest of them
 FINE = (1, 3)  # most stressed joints that are fine

@@ -122,7 +122,12 @@ def _elements(name: str, suffix: str, base: Settings, refined: tuple[float, ...]
         factor = GRAIN * ceil(1.0 / (GRAIN * value) - ROUNDING)
         return Rung(f"elements x {factor:.3g}{suffix}", name, base | _refine(case, factor), 1.0 / factor)
 
-    return Knob(name, tuple(1.0 / factor for factor in refined), at, SECOND)
+    return Knob(name, tuple(1.0 / factor for factor in refined), at, _order(case))
+
+
+def _order(case: StructureCase) -> float | None:
+    """Order in the size of elements; none where a half-sine runs along a bar, whose kinks are no smooth motion."""
+    return None if any(isinstance(one, BarWave) for one in case.references.values()) else SECOND
 
 
 def _refine(case: StructureCase, factor: float) -> Settings:
