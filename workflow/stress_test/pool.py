@@ -79,7 +79,8 @@ class Pool:
             yield from self._answers()
 
     def _idle(self) -> _Worker | None:
-        """A process without work, a new one where more may be started."""
+        """A process without work, a new one where more may be started or one has ended, as by lack of memory."""
+        self._workers = [worker for worker in self._workers if worker.case or worker.process.is_alive()]
         idle = next((worker for worker in self._workers if worker.case is None), None)
         if idle is None and len(self._workers) < self._processes:
             idle = self._start()

@@ -3,6 +3,7 @@
 import dataclasses
 import json
 import math
+import multiprocessing
 import os
 import signal
 import subprocess
@@ -197,6 +198,16 @@ def test_results_that_cannot_be_written_are_told_before_anything_is_tried(tmp_pa
     case.write_text(hard_case_text(TABLE))
     with pytest.raises(CaseError, match="--out"):
         stress_test(Request([case], [], 0, 1, 1, case))
+
+
+def test_a_process_that_ended_between_two_cases_is_replaced():
+    with Pool(1) as pool:
+        for _ in range(2):
+            (verdict,) = pool.attempt(cases())
+            assert verdict.ok, verdict.message
+            for child in multiprocessing.active_children():
+                child.kill()
+                child.join()
 
 
 @pytest.fixture
