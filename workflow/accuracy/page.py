@@ -81,7 +81,8 @@ def section_for(run_folder: Path, case: Case) -> dict | None:
 
 def markdown(accuracy: Accuracy) -> str:
     """Return tables of runs, orders and the recommendation in Markdown."""
-    blocks = [_markdown(tables.runs(accuracy)), _markdown(tables.orders(accuracy))]
+    legend = tables.legend(accuracy).replace(tables.ON_FRONT, f"\\{tables.ON_FRONT}")
+    blocks = [_markdown(tables.runs(accuracy)), f"{legend}.", _markdown(tables.orders(accuracy))]
     told = tables.prediction(accuracy)
     if told is not None and accuracy.recommended is not None:
         options = tables.as_options(accuracy.recommended.rung.settings)

@@ -1,6 +1,7 @@
 """Tables of what accuracy costs: for the terminal, the page, a report and a README."""
 
 import shlex
+from collections import Counter
 from collections.abc import Mapping
 
 from workflow.accuracy.measured import Accuracy, Fit, Measurement
@@ -34,15 +35,15 @@ def on_front(accuracy: Accuracy) -> set[str]:
 
 
 def runs(accuracy: Accuracy) -> dict:
-    """Head and rows of text: each run with errors, cost and what it is compared with; or why it failed."""
-    best = on_front(accuracy)
-    head = ["setting", *(short(name) for name in accuracy.errors), "wall s", "core s", "compared with"]
+    """Head and rows of text: each run with errors and cost, what it is compared with if not the usual, why it failed."""
+    best, usual = on_front(accuracy), usually_against(accuracy)
+    head = ["setting", *(short(name) for name in accuracy.errors), "wall s", "core s", ""]
     rows = []
     for one in sorted(every_run(accuracy), key=lambda one: (bool(one.failed), bool(one.against), one.core_seconds)):
         errors = [percent(one.errors[name].value) if name in one.errors else "" for name in accuracy.errors]
         cost = ["", ""] if one.failed else [f"{one.seconds:.1f}", f"{one.core_seconds:.1f}"]
         name = f"{one.rung} {ON_FRONT}" if one.rung in best else one.rung
-        rows.append([name, *errors, *cost, _remark(one, accuracy)])
+        rows.append([name, *errors, *cost, _remark(one, accuracy, usual)])
     return {"head": head, "rows": rows, "prose": True}
 
 
@@ -51,19 +52,27 @@ def short(quantity: str) -> str:
     return quantity.removesuffix("_error").replace("_", " ")
 
 
-def _remark(one: Measurement, accuracy: Accuracy) -> str:
-    """Say what a run is compared with, or why it failed."""
+def usually_against(accuracy: Accuracy) -> str:
+    """Return what most runs are compared with that have the error of the whole answer."""
+    against = Counter(one.errors[accuracy.judged].against for one in compared(accuracy))
+    return against.most_common(1)[0][0] if against else ""
+
+
+def _remark(one: Measurement, accuracy: Accuracy, usual: str) -> str:
+    """Say what a run is compared with, if it is not the usual, or why it failed."""
     if one.failed:
         words = " ".join(one.failed.split())
         return f"failed: {words if len(words) <= LONGEST_MESSAGE else words[:LONGEST_MESSAGE] + ' …'}"
     error = one.errors.get(accuracy.judged)
-    return "" if error is None else error.against
+    return "" if error is None or error.against == usual else f"against {error.against}"
 
 
 def legend(accuracy: Accuracy) -> str:
     """Say what marks and errors mean."""
     names = [f"{short(name)}: {words}" for name, words in accuracy.errors.items() if short(name) != words]
-    return "; ".join([f"{ON_FRONT} on the Pareto front", *names])
+    usual = usually_against(accuracy)
+    reference = [f"compared with {usual}, where nothing else is said"] if usual else []
+    return "; ".join([f"{ON_FRONT} on the Pareto front", *reference, *names])
 
 
 def orders(accuracy: Accuracy) -> dict:
@@ -92,7 +101,7 @@ def prediction(accuracy: Accuracy) -> dict | None:
     error, seconds = chosen.found.errors[accuracy.judged].value, chosen.found.core_seconds
     rows = [
         [
-            f"error of the {accuracy.errors[accuracy.judged]}",
+            f"error: {short(accuracy.judged)}",
             percent(chosen.error),
             percent(error),
             change(error, chosen.error),
