@@ -35,7 +35,7 @@ def on_front(accuracy: Accuracy) -> set[str]:
 
 
 def runs(accuracy: Accuracy) -> dict:
-    """Head and rows of text: each run with errors and cost, what it is compared with if not the usual, why it failed."""
+    """Head and rows of text: runs, errors and costs, what they are compared with if not the usual, why they failed."""
     best, usual = on_front(accuracy), usually_against(accuracy)
     head = ["setting", *(short(name) for name in accuracy.errors), "wall s", "core s", ""]
     rows = []
