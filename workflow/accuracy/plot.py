@@ -1,17 +1,19 @@
 """The Pareto plot: error against wall time and core-seconds."""
 
 from pathlib import Path
+from textwrap import fill
 
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from workflow.accuracy.measured import Accuracy, Measurement
 from workflow.accuracy.pareto import front
-from workflow.accuracy.tables import compared
+from workflow.accuracy.tables import compared, every_run
 from workflow.report.curves import STYLE, pyplot
 
 COLOURS = ("#0b5fa5", "#d1495b", "#2a7d4f", "#7a5ea8", "#e09f3e", "#5f6c7b", "#1b998b", "#8c564b")
 MARKERS = "osD^vP*X"
 LABELLED = 14  # runs that are written beside their marks
+WIDTH = 48  # letters of a line along the axis of errors
 
 
 def save_picture(accuracy: Accuracy, path: Path) -> None:
@@ -25,7 +27,8 @@ def figure(accuracy: Accuracy):
     """Plot the judged error against wall time and core-seconds, both logarithmic.
 
     Returns:
-        A figure of matplotlib: marks of one colour for each knob, the front as a line, tolerance and recommendation.
+        A figure of matplotlib: marks of one colour for each knob, the front as a line, tolerance, recommendation, and
+        the cost of the finest run where others are compared with it.
     """
     with pyplot.rc_context(STYLE):
         drawing, axes = pyplot.subplots(1, 2, figsize=(9.6, 4.6), sharey=True, constrained_layout=True)
@@ -34,7 +37,7 @@ def figure(accuracy: Accuracy):
             _panel(axis, accuracy, cost)
             _plain(axis.xaxis)
         _plain(axes[0].yaxis)
-        axes[0].set_ylabel(f"error [%]: {accuracy.errors[accuracy.judged]}")
+        axes[0].set_ylabel(fill(f"error [%]: {accuracy.errors[accuracy.judged]}", WIDTH))
         hours = axes[1].secondary_xaxis("top", functions=(lambda s: s / 3600.0, lambda h: h * 3600.0))
         hours.set_xlabel("core-hours")
         _plain(hours.xaxis)
@@ -62,6 +65,10 @@ def _panel(axis, accuracy: Accuracy, cost: str) -> None:
     for place in best[:LABELLED]:
         position = (costs[place], errors[place])
         axis.annotate(known[place].rung, position, (4, 3), textcoords="offset points", fontsize=6)
+    for one in every_run(accuracy):
+        if one.value is not None and one.stages and not one.errors:  # the finest, whose own error is not known
+            style = {"color": "#5f6c7b", "lw": 1.2, "ls": ":", "label": f"cost of the finest run, {one.rung}"}
+            axis.axvline(getattr(one, cost), **style)
     if accuracy.tolerance is not None:
         axis.axhline(100.0 * accuracy.tolerance, color="#b3261e", lw=0.9, ls="--", label="tolerance")
     chosen = accuracy.recommended
