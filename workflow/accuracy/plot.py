@@ -67,8 +67,8 @@ def _panel(axis, accuracy: Accuracy, cost: str) -> None:
         axis.annotate(known[place].rung, position, (4, 3), textcoords="offset points", fontsize=6)
     for one in every_run(accuracy):
         if one.value is not None and one.stages and not one.errors:  # the finest, whose own error is not known
-            style = {"color": "#5f6c7b", "lw": 1.2, "ls": ":", "label": f"cost of the finest run, {one.rung}"}
-            axis.axvline(getattr(one, cost), **style)
+            label = f"cost of the finest run, {one.rung}"
+            axis.axvline(getattr(one, cost), color="#5f6c7b", lw=1.2, ls=":", label=label)
     if accuracy.tolerance is not None:
         axis.axhline(100.0 * accuracy.tolerance, color="#b3261e", lw=0.9, ls="--", label="tolerance")
     chosen = accuracy.recommended
