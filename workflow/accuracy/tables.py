@@ -64,7 +64,7 @@ def _remark(one: Measurement, accuracy: Accuracy, usual: str) -> str:
         words = " ".join(one.failed.split())
         return f"failed: {words if len(words) <= LONGEST_MESSAGE else words[:LONGEST_MESSAGE] + ' …'}"
     error = one.errors.get(accuracy.judged)
-    return "" if error is None or error.against == usual else f"against {error.against}"
+    return "" if error is None or error.against == usual else f"from {error.against.removeprefix('run ')}"
 
 
 def legend(accuracy: Accuracy) -> str:
