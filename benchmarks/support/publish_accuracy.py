@@ -1,7 +1,7 @@
 """What accuracy costs, into the README of a case: its ladder is climbed, plot, table and `accuracy.json` are put there.
 
-Run: .venv/bin/python benchmarks/publish_accuracy.py sessile_drop -- --tolerance 0.03%     (nothing else should run)
-     .venv/bin/python benchmarks/publish_accuracy.py sessile_drop --stored                 (what was measured last)
+Run: .venv/bin/python benchmarks/support/publish_accuracy.py sessile_drop -- --tolerance 0.03%   (nothing else should run)
+     .venv/bin/python benchmarks/support/publish_accuracy.py sessile_drop --stored               (what was measured last)
 The report of any case of that kind shows the stored measurement, where it has none of its own.
 """
 
@@ -14,8 +14,8 @@ from pathlib import Path
 from workflow.accuracy.measured import FILE, read_accuracy
 from workflow.accuracy.page import PICTURE, markdown
 
-ROOT = Path(__file__).resolve().parents[1]
-BEGIN, END = "<!-- accuracy: written by benchmarks/publish_accuracy.py -->", "<!-- accuracy: end -->"
+ROOT = Path(__file__).resolve().parents[2]
+BEGIN, END = "<!-- accuracy: written by benchmarks/support/publish_accuracy.py -->", "<!-- accuracy: end -->"
 
 
 def publish(measured: Path, case: Path) -> None:
