@@ -1,7 +1,7 @@
 """What accuracy costs, into the README of a case: its ladder is climbed, plot, table and `accuracy.json` are put there.
 
 Run: .venv/bin/python benchmarks/support/publish_accuracy.py sessile_drop -- --tolerance 0.03%   (on an idle machine)
-     .venv/bin/python benchmarks/support/publish_accuracy.py sessile_drop --stored               (what was measured last)
+     .venv/bin/python benchmarks/support/publish_accuracy.py sessile_drop --stored                    (measured last)
 The report of any case of that kind shows the stored measurement, where it has none of its own.
 """
 
