@@ -186,7 +186,7 @@ def test_hangs_and_deaths_are_misses_and_the_rest_goes_on():
 
 def test_ctrl_c_ends_a_stress_test_with_a_word(tmp_path):
     line = [sys.executable, "-m", "workflow", "stress-test", "--family", "coupling", "--out", str(tmp_path), "-j", "2"]
-    heed = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)  # which a shell's background job, as this may be, ignores
+    heed = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)  # a shell lets background jobs ignore it
     process = subprocess.Popen(line, stderr=subprocess.PIPE, text=True, start_new_session=True, preexec_fn=heed)
     wait_until(lambda: len(psutil.Process(process.pid).children()) > 1)
     os.killpg(process.pid, signal.SIGINT)  # as a terminal does, to all that have not left its group
