@@ -36,7 +36,8 @@ class Watchdog:
         """
         HERE.begin(world)
         self._told = folder / ERROR
-        self._told.unlink(missing_ok=True)
+        if world.rank == 0:  # before any rank can go on and speak
+            self._told.unlink(missing_ok=True)
         name = world.bcast(f".watchdog-{os.getpid()}")
         self._rank, self._limit, self._tick = world.rank, limit, min(TICK, limit / TICKS)
         self._board = StatusBoard(folder / name)

@@ -2,6 +2,7 @@
 
 import json
 import re
+import subprocess
 import time
 from pathlib import Path
 
@@ -63,8 +64,14 @@ def assembly(tmp_path_factory) -> Path:
     return directory
 
 
+def loses_words() -> bool:
+    """Whether the launcher may lose what ranks write once one of them has died, as Open MPI 5 does."""
+    said = subprocess.run(["mpirun", "--version"], capture_output=True, text=True, check=True).stdout
+    return int(re.search(r"Open MPI\D*(\d+)", said)[1]) >= 5
+
+
 def errors_of(directory: Path, checkpoints: Path, what: str, where: str) -> str:
-    """Return what a run with a misfortune says, in its file and, where that is passed on, on standard error."""
+    """Return what a run with a misfortune says, in its file and on standard error, where that is not lost."""
     path = checkpoints.parent / "input.json"
     path.write_text(json.dumps(json.loads((directory / "input.json").read_text()) | {"checkpoints": str(checkpoints)}))
     done = run_python([str(directory / "script.py"), str(path), what, where], 2)
@@ -73,7 +80,7 @@ def errors_of(directory: Path, checkpoints: Path, what: str, where: str) -> str:
     said = (directory / "out" / ERROR).read_text()
     told = [[line for line in text.splitlines() if line.startswith("error: ")] for text in (said, done.stderr)]
     assert told[0] == said.splitlines()[:1], said
-    assert told[1] in (told[0], []), done.stderr
+    assert told[1] == told[0] or (not told[1] and what == "exit" and loses_words()), done.stderr
     return said
 
 
