@@ -1,4 +1,4 @@
-"""Command line: new, plan, run, accuracy, status, report, clean, study, effects, stress-test, schema."""
+"""Command line: new, plan, run, accuracy, status, report, verify, clean, study, effects, stress-test, schema."""
 
 import json
 import os
@@ -13,12 +13,12 @@ import typer
 
 from workflow import __version__
 from workflow.case import available_cores, read_case
-from workflow.case_kind import Case
 from workflow.cluster.executor import JOBS, ExecutorName, executor_for
-from workflow.inputs import CASE, examine, read_case_of_run, write_inputs
 from workflow.kernel_cache import keep_kernels_by_source
-from workflow.pipeline import RunFolderBusy, drive, failed_checks, locked
 from workflow.problems import CaseError
+from workflow.store.folders import RunFolderBusy
+from workflow.store.point import Point
+from workflow.store.store import Store, read_case_of_run
 from workflow.terminal import console, print_error
 
 app = typer.Typer(
@@ -37,6 +37,7 @@ Out = Annotated[
     Path | None, typer.Option("--out", metavar="DIR", help="run folder [default: runs/<case name>, with its scale]")
 ]
 Oversubscribe = Annotated[bool, typer.Option("--oversubscribe", help="allow more MPI ranks than cores")]
+Force = Annotated[bool, typer.Option("--force", help="write also into the folder of another case")]
 AtOnce = Annotated[
     int | None,
     typer.Option("-j", "--cores", min=1, help=f"cores to use [default: all]; of a cluster: jobs at a time [{JOBS}]"),
@@ -67,8 +68,7 @@ def plan(case: CasePath, settings: Settings = None, out: Out = None, oversubscri
     """Show what a run would do and cost; runs nothing."""
     from workflow.plan import show_plan
 
-    resolved, folder = _load(case, settings, out, oversubscribe)
-    show_plan(resolved, folder, console)
+    show_plan(*_load(case, settings, out, oversubscribe), console)
 
 
 @app.command()
@@ -81,30 +81,23 @@ def run(
     oversubscribe: Oversubscribe = False,
     executor: ExecutorOption = ExecutorName.LOCAL,
     profile: ProfileOption = None,
+    force: Force = False,
 ) -> None:
-    """Run what is stale."""
-    resolved, folder = _load(case, settings, out, oversubscribe or executor != ExecutorName.LOCAL)
-    pipeline = resolved.pipeline
-    if until not in pipeline.names:
-        allowed = ", ".join(pipeline.names)
+    """Run what is missing, stale or damaged."""
+    from workflow.run import run_case
+    from workflow.store.batch import machine_of
+
+    store, point = _load(case, settings, out, oversubscribe or executor != ExecutorName.LOCAL)
+    if until not in point.case.pipeline.names:
+        allowed = ", ".join(point.case.pipeline.names)
         raise typer.BadParameter(f"'{until}' is no stage of this case; allowed: {allowed}", param_hint="--until")
-    where = executor_for(executor, profile, cores, oversubscribe, [resolved])
+    machine = machine_of(executor_for(executor, profile, cores, oversubscribe, [point.case]), one_run=True)
     try:
-        with locked(folder) as lock:
-            write_inputs(folder, resolved)
-            if not _has_work(folder, resolved, until):
-                console.print(f"nothing to do: {folder} is up to date")
-            elif not drive(folder, resolved, until, where, lock):
-                raise typer.Exit(1)
+        healthy = run_case(store, point, until, machine, force=force)
     except KeyboardInterrupt as error:
         print_error("interrupted; complete stages and checkpoints are kept: the same command continues")
         raise typer.Exit(1) from error
-    failures = failed_checks(folder, pipeline.upstream(until))
-    for failure in failures:
-        print_error(failure)
-    if until == pipeline.names[-1]:
-        console.print(f"report: {folder / 'report.html'}")
-    raise typer.Exit(1 if failures else 0)
+    raise typer.Exit(0 if healthy else 1)
 
 
 @app.command()
@@ -138,36 +131,47 @@ def accuracy(
 
 @app.command()
 def status(case: CasePath, settings: Settings = None, out: Out = None) -> None:
-    """Show what a run folder holds: stages done, stale or missing, their times and main figures."""
+    """Show what a run folder holds: stages done, stale, damaged or missing, their times and main figures."""
     from workflow.status import show_status
 
-    resolved, folder = _load(case, settings, out, True)
-    show_status(resolved, folder, console)
+    show_status(*_load(case, settings, out, True), console)
 
 
 @app.command()
 def report(case: CasePath, settings: Settings = None, out: Out = None) -> None:
     """Write the report again, from the products that are there and the values that they were made with."""
     from workflow.report.page import write_report
+    from workflow.run import report_again
+    from workflow.stages import report as stage_function
 
-    _, folder = _load(case, settings, out, True)
-    if not (folder / CASE).is_file():
-        print_error(f"{folder} is no run folder: nothing was run")
+    store, point = _load(case, settings, out, True)
+    if not report_again(store.folder, point.case.case.name, write_report, stage_function):
         raise typer.Exit(1)
-    write_report(folder, read_case_of_run(folder))
-    console.print(f"report: {folder / 'report.html'}")
+    console.print(f"report: {store.folder / 'report.html'}")
 
 
 @app.command()
-def clean(case: CasePath, settings: Settings = None, out: Out = None) -> None:
-    """Remove a case's run folder."""
-    _, folder = _load(case, settings, out, True)
-    if not (folder / CASE).is_file():
-        console.print(f"nothing to remove: {folder} is no run folder")
-        return
-    with locked(folder):
-        shutil.rmtree(folder)
-    console.print(f"removed {folder}")
+def verify(case: CasePath, settings: Settings = None, out: Out = None) -> None:
+    """Look at every file of a run folder: are all products there, and as they were written?"""
+    from workflow.run import verify as verify_run
+
+    raise typer.Exit(0 if verify_run(*_load(case, settings, out, True)) else 1)
+
+
+@app.command()
+def clean(
+    case: CasePath,
+    settings: Settings = None,
+    out: Out = None,
+    unused: Annotated[
+        bool, typer.Option("--unused", help="only products of other settings, and work that was broken off")
+    ] = False,
+) -> None:
+    """Remove what the program has written into a case's run folder."""
+    from workflow.run import clean as clean_run
+
+    store, point = _load(case, settings, out, True)
+    clean_run(store.folder, point.case.case.name, unused=unused)
 
 
 @app.command()
@@ -222,10 +226,10 @@ def study(
     oversubscribe: Oversubscribe = False,
     executor: ExecutorOption = ExecutorName.LOCAL,
     profile: ProfileOption = None,
+    force: Force = False,
 ) -> None:
     """Run a case at many settings; only what is missing. Results as tables, plots and a page."""
-    from workflow.points.batch import machine_of
-    from workflow.points.store import Store
+    from workflow.store.batch import machine_of
     from workflow.study.command import read_points_of, run_study, show_outlook
 
     points = read_points_of(study, oversubscribe or executor != ExecutorName.LOCAL)
@@ -236,7 +240,7 @@ def study(
     cases = [point.case for point in points.possible.values()]
     machine = machine_of(executor_for(executor, profile, cores, oversubscribe, cases))
     try:
-        healthy = run_study(points, store, machine)
+        healthy = run_study(points, store, machine, force=force)
     except KeyboardInterrupt as error:
         print_error("interrupted; complete products and checkpoints are kept: the same command continues")
         raise typer.Exit(1) from error
@@ -254,21 +258,22 @@ def schema() -> None:
 @app.command(hidden=True)
 def stage(
     name: str,
-    folder: Path,
+    key: str,
     cores: Annotated[int, typer.Option("--cores")] = 1,
     oversubscribe: Oversubscribe = False,
-    product: Annotated[Path | None, typer.Option(help="where its product goes, and the run folder is removed")] = None,
+    mark: Annotated[Path | None, typer.Option(help="file that says to Snakemake that it is done")] = None,
 ) -> None:
-    """Run one stage; Snakemake calls this."""
-    from workflow.points.store import publish
+    """Make one product, in the store that is the working directory; Snakemake calls this."""
     from workflow.stage_runner import Run, execute
     from workflow.stages import STAGE_FUNCTIONS
 
+    product, folder = Path("products", f"{name}-{key}"), Path("work", f"{name}-{key}")
     run = Run(folder, read_case_of_run(folder), cores, oversubscribe)
-    if not execute(name, STAGE_FUNCTIONS[run.case.kind][name], run):
+    if not execute(name, STAGE_FUNCTIONS[run.case.kind][name], run, product):
         raise typer.Exit(1)
-    if product is not None:
-        publish(folder, name, product)
+    shutil.rmtree(folder)
+    if mark is not None:
+        mark.touch()
 
 
 def main() -> None:
@@ -310,11 +315,6 @@ def _options(
     pass
 
 
-def _load(path: Path, settings: list[str] | None, out: Path | None, oversubscribe: bool) -> tuple[Case, Path]:
+def _load(path: Path, settings: list[str] | None, out: Path | None, oversubscribe: bool) -> tuple[Store, Point]:
     case = read_case(path, settings or [], oversubscribe)
-    return case, out or Path("runs") / case.run_name
-
-
-def _has_work(folder: Path, case: Case, until: str) -> bool:
-    verdicts = examine(folder, case)
-    return any(verdicts[stage.name].stale for stage in case.pipeline.upstream(until))
+    return Store(out or Path("runs") / case.run_name, one_run=True), Point({}, case)

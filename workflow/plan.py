@@ -1,7 +1,6 @@
 """What a run would do, and what it would cost. Nothing is run, nothing is written."""
 
 from collections.abc import Mapping
-from pathlib import Path
 
 from rich.console import Console
 from rich.table import Table
@@ -12,10 +11,13 @@ from workflow.case_kind import FULL, Case
 from workflow.effect_registry.page import effects_table
 from workflow.fields import display, leaves
 from workflow.forecast import Forecast, forecast
-from workflow.inputs import Change, Verdict, examine
 from workflow.plan_table import duration, new_table, short
 from workflow.scene_forecast import SceneForecast, forecast_scene
 from workflow.shock_forecast import ShockForecast
+from workflow.store.keys import Change
+from workflow.store.point import Point
+from workflow.store.state import Verdict, examine, why_stale
+from workflow.store.store import Store
 from workflow.structure import plan as structure_plan
 from workflow.structure.case import StructureCase
 from workflow.structure.forecast import StructureForecast, forecast_structure
@@ -28,13 +30,14 @@ SCHEMES = {
 }
 
 
-def show_plan(case: Case, run_folder: Path, console: Console) -> None:
+def show_plan(store: Store, point: Point, console: Console) -> None:
     """Print stages to run and why, effects, sizes, time steps, predicted cost and rank placement."""
+    case = point.case
     scale = "" if case.scale == FULL else f", scale {case.scale}"
     console.print(f"[bold]{case.case.name}{scale}[/]  {case.case.title}\n")
     if isinstance(case, PackageCase):
         outlook = forecast(case)
-        _show(case, run_folder, outlook, console, "reflow" if outlook.shock is None else "reflow and shock")
+        _show(store, point, outlook, console, "reflow" if outlook.shock is None else "reflow and shock")
         console.print(_sizes(case, outlook) if outlook.parts else f"\n{_joints(case, outlook)}")
         if not isinstance(case, BoardDropCase) or outlook.shock is None:
             console.print("\n[dim]Costs assume the reflow speed in particles/estimate.py, as benchmarks/ measured it.")
@@ -45,21 +48,21 @@ def show_plan(case: Case, run_folder: Path, console: Console) -> None:
         console.print("[dim]and the reflow speed in particles/estimate.py, both as benchmarks/ measured them.")
     elif isinstance(case, StructureCase):
         motion = forecast_structure(case)
-        _show(case, run_folder, motion, console, "motion")
+        _show(store, point, motion, console, "motion")
         for shown in (structure_plan.layers(motion), structure_plan.solvers(case, motion)):
             console.print(shown)
     else:
         body = forecast_scene(case)
-        _show(case, run_folder, body, console, "reflow")
+        _show(store, point, body, console, "reflow")
         console.print(_particles(body))
         console.print("\n[dim]Costs assume the reflow speed in particles/estimate.py, as benchmarks/ measured it.")
 
 
 def _show(
-    case: Case, run_folder: Path, outlook: Forecast | SceneForecast | StructureForecast, console: Console, what: str
+    store: Store, point: Point, outlook: Forecast | SceneForecast | StructureForecast, console: Console, what: str
 ) -> None:
-    console.print(_stages(case, run_folder, foreseen_costs(case, outlook.seconds)))
-    console.print(effects_table(case, outlook.effects, what))
+    console.print(_stages(store, point, foreseen_costs(point.case, outlook.seconds)))
+    console.print(effects_table(point.case, outlook.effects, what))
 
 
 def _particles(outlook: SceneForecast) -> Table:
@@ -91,15 +94,18 @@ def change_text(change: Change, case: Case) -> str:
 def reason(verdict: Verdict, case: Case) -> str:
     """Say why a stage will run or not."""
     if not verdict.stale:
-        return "up to date"
+        redone = ", ".join(verdict.because_of)
+        return f"up to date, if {redone} comes out the same" if redone else "up to date"
     if verdict.missing:
         return "no product yet"
+    if verdict.damaged:
+        return why_stale(verdict)
     changes = [change_text(change, case) for change in verdict.changes]
     if len(changes) > LONGEST_LIST:
         changes = [*changes[:LONGEST_LIST], f"and {len(changes) - LONGEST_LIST} more"]
     if verdict.because_of:
         changes.append("follows " + ", ".join(verdict.because_of))
-    return "\n".join(changes)
+    return "\n".join(changes) or "no product yet"
 
 
 def foreseen_costs(case: Case, seconds: Mapping[str, float]) -> dict[str, str]:
@@ -115,12 +121,12 @@ def foreseen_costs(case: Case, seconds: Mapping[str, float]) -> dict[str, str]:
     return texts
 
 
-def _stages(case: Case, run_folder: Path, costs: Mapping[str, str]) -> Table:
-    table = new_table(f"Stages, in {run_folder}", "stage", "", "cost", "why")
-    for name, verdict in examine(run_folder, case).items():
+def _stages(store: Store, point: Point, costs: Mapping[str, str]) -> Table:
+    table = new_table(f"Stages, in {store.folder}", "stage", "", "cost", "why")
+    for name, verdict in examine(store, point).items():
         mark = "[yellow]run[/]" if verdict.stale else "[green]skip[/]"
         cost = costs.get(name, "") if verdict.stale else ""
-        table.add_row(name, mark, cost, reason(verdict, case))
+        table.add_row(name, mark, cost, reason(verdict, point.case))
     return table
 
 

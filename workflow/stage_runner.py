@@ -1,6 +1,5 @@
 """Running one stage: a fresh partial folder, a record of what was used and found, a rename when all is there."""
 
-import json
 import resource
 import shutil
 import time
@@ -11,11 +10,13 @@ from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 from workflow.case_kind import Case
-from workflow.inputs import stage_inputs
 from workflow.launch import LaunchError
-from workflow.terminal import health_line, print_error
+from workflow.stage_table import Stage
+from workflow.store.keys import compare, stage_inputs
+from workflow.store.product import publish, seal
+from workflow.store.store import MESSAGE, TRACEBACK, reads
+from workflow.terminal import health_line
 
-MESSAGE = "message.txt"  # in the partial folder of a stage that failed: why
 AnyCase = TypeVar("AnyCase", bound=Case)
 
 
@@ -57,21 +58,30 @@ class Findings:
     continued: str = ""
 
 
+class StageError(RuntimeError):
+    """A stage cannot use what it was given, or has not made what it is to make."""
+
+
 StageFunction = Callable[[Run[Any], Path], Findings]
 
 
-def run_stage(name: str, function: StageFunction, run: Run) -> dict:
-    """Run a stage; its folder appears at once and complete, or not at all.
+def run_stage(name: str, function: StageFunction, run: Run, product: Path) -> dict:
+    """Run a stage; its product appears at once and complete, or not at all.
 
     Args:
         name: name of the stage.
         function: writes products into the given folder and returns what it found.
         run: what the stage works with.
+        product: the folder that its product becomes; one that is there is replaced.
 
     Returns:
-        The record written to ``stage.json``: seconds, core_seconds, metrics, health, effects, continued, inputs.
+        The record: seconds, core_seconds, metrics, health, effects, continued, key, inputs, reads, files.
+
+    Raises:
+        StageError: a file that the case names has changed while the stage was at work, or a product was not written.
     """
-    folder, partial = run.folder / name, run.folder / f".{name}.partial"
+    stage, partial = run.case.pipeline[name], run.folder / f".{name}.partial"
+    before = {"inputs": stage_inputs(run.case, stage), "reads": _reads(run, stage)}
     _remove(partial)
     partial.mkdir(parents=True)
     start, used = time.perf_counter(), core_seconds()
@@ -83,13 +93,30 @@ def run_stage(name: str, function: StageFunction, run: Run) -> dict:
         "health": findings.health,
         "effects": findings.effects,
         "continued": findings.continued,
-        "inputs": stage_inputs(run.case, run.case.pipeline[name]),
+        "key": product.name.rpartition("-")[2],
     }
-    (partial / "stage.json").write_text(json.dumps(record, indent=1) + "\n")
-    _remove(folder)
-    partial.rename(folder)
+    _check(run, stage, before, partial)
+    record = seal(partial, record | before)
+    publish(partial, product)
     _remove(run.checkpoints(name))
     return record
+
+
+def _reads(run: Run, stage: Stage) -> dict[str, str] | None:
+    return reads({one.name: run.folder / one.name for one in run.case.pipeline.stages}, run.case, stage)
+
+
+def _check(run: Run, stage: Stage, before: dict, partial: Path) -> None:
+    """See to it that what a stage has used is still so, and that it has written what it is to write."""
+    changed = compare(before["inputs"], stage_inputs(run.case, stage))
+    if changed:
+        names = ", ".join(change.key.removesuffix(".sha256") for change in changed)
+        raise StageError(f"{names}: the file has changed while the stage was at work; run it again")
+    if before["reads"] is None or before["reads"] != _reads(run, stage):
+        raise StageError("a product that it reads has changed, or is damaged; run it again")
+    missing = [name for name in stage.products if not (partial / name.removeprefix(f"{stage.name}/")).exists()]
+    if missing:
+        raise StageError(f"it has not written {', '.join(missing)}")
 
 
 def core_seconds() -> float:
@@ -101,25 +128,32 @@ def core_seconds() -> float:
     return sum(one.ru_utime + one.ru_stime for one in used)
 
 
-def execute(name: str, function: StageFunction, run: Run) -> bool:
-    """Run a stage and tell the user how it ended.
+def execute(name: str, function: StageFunction, run: Run, product: Path) -> bool:
+    """Run a stage and tell the user how it ended, if it did well.
 
     Returns:
         Whether it completed. If not, ``.<stage>.partial`` of the run folder has the traceback and the message.
     """
     try:
-        record = run_stage(name, function, run)
+        record = run_stage(name, function, run, product)
     except Exception as error:  # the boundary of a stage: whatever went wrong is told with the stage's name
         if _is_interrupt(error):
             raise KeyboardInterrupt from error
-        log = run.folder / f".{name}.partial" / "error.txt"
-        log.write_text(traceback.format_exc())
-        told = str(error) if isinstance(error, LaunchError) else f"{type(error).__name__}: {error}"
-        log.with_name(MESSAGE).write_text(told)
-        print_error(f"stage {name} failed: {told}\ntraceback: {log}")
+        _write_message(run.folder / f".{name}.partial", error)
         return False
     health_line(name, record["seconds"], record["health"], record["continued"])
     return True
+
+
+def _write_message(folder: Path, error: Exception) -> None:
+    """Leave traceback and message for the command, which tells the user; on standard error where they cannot be."""
+    told = str(error) if isinstance(error, LaunchError | StageError) else f"{type(error).__name__}: {error}"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / TRACEBACK).write_text(traceback.format_exc(), encoding="utf-8")
+        (folder / MESSAGE).write_text(told, encoding="utf-8")
+    except OSError:
+        traceback.print_exc()
 
 
 def _is_interrupt(error: BaseException | None) -> bool:

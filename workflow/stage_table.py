@@ -22,7 +22,7 @@ JOINT_MESHES = (
     "shock.identical_joints",
 )
 
-REPORT, REPORT_PRODUCTS = ("case", "scale"), ("report.html", "summary.json")
+PAGE = ("report.html", "summary.json")
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,6 +36,7 @@ class Stage:
         pads: whether it reads the pad table as drawn. Its ``parameters`` then contain all that this table depends on,
             so that it need not run again when the geometry changes elsewhere.
         products: files that it writes, relative to the run folder.
+        on_top: those of its files that a run folder also shows at its top.
     """
 
     name: str
@@ -43,16 +44,12 @@ class Stage:
     follows: tuple[str, ...]
     products: tuple[str, ...]
     pads: bool = False
+    on_top: tuple[str, ...] = ()
 
     @property
     def record(self) -> str:
         """File, relative to the run folder, in which the stage says what it used, found and measured."""
         return f"{self.name}/stage.json"
-
-    @property
-    def inputs(self) -> str:
-        """File, relative to the run folder, with the values of its parameters."""
-        return f"inputs/{self.name}.json"
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,6 +69,18 @@ class Pipeline:
     def upstream(self, name: str) -> tuple[Stage, ...]:
         """Return the stages up to and including one."""
         return self.stages[: self.names.index(name) + 1]
+
+    def before(self, name: str) -> tuple[str, ...]:
+        """Return the names of the stages that one follows, and that those follow, in order."""
+        found = set(self[name].follows)
+        for stage in reversed(self.upstream(name)[:-1]):
+            found |= set(stage.follows) if stage.name in found else set()
+        return tuple(one for one in self.names if one in found)
+
+
+def report_of(*follows: str) -> Stage:
+    """Return the last stage of a pipeline, which tells what the others found."""
+    return Stage("report", ("case", "scale"), follows, tuple(f"report/{name}" for name in PAGE), on_top=PAGE)
 
 
 DRAWN_MESH = (*DRAWN, "package.copper", "package.substrate", "package.die", "package.numerics", "board")
@@ -113,7 +122,7 @@ def package_pipeline(heated: bool, dropped: bool) -> Pipeline:
     shock = Stage("shock", ("shock", "materials", *COOLED), ("solder_mesh",), ())
     stages = (geometry, reflow, surface, solder_mesh, *((shock,) if dropped else ()))
     follows = tuple(stage.name for stage in stages)
-    return Pipeline((*stages, Stage("report", REPORT, follows, REPORT_PRODUCTS)))
+    return Pipeline((*stages, report_of(*follows)))
 
 
 BOARD_DROP = package_pipeline(heated=False, dropped=True)
@@ -122,7 +131,7 @@ BOARD_DROP = package_pipeline(heated=False, dropped=True)
 def _one_body(scene: str) -> Pipeline:
     """Reflow of one scene, and its report."""
     reflow = Stage("reflow", (scene, "solder", "gravity"), (), ("reflow/shape.h5", "reflow/particles.vtu"))
-    return Pipeline((reflow, Stage("report", REPORT, ("reflow",), REPORT_PRODUCTS)))
+    return Pipeline((reflow, report_of("reflow")))
 
 
 DROP = _one_body("drop")
@@ -141,6 +150,6 @@ STRUCTURE = Pipeline(
         ),
         Stage("shock", ("structure", "materials", "supports", "loads", "watch", "dynamics"), ("geometry",), ()),
         Stage("comparison", ("references",), ("shock",), ("comparison/comparison.json",)),
-        Stage("report", REPORT, ("geometry", "shock", "comparison"), REPORT_PRODUCTS),
+        report_of("geometry", "shock", "comparison"),
     )
 )

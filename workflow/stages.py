@@ -85,7 +85,7 @@ def report(run: Run, folder: Path) -> Findings:
     """Write report.html and summary.json from the products."""
     from workflow.report.page import write_report
 
-    write_report(run.folder, run.case)
+    write_report(run.folder, run.case, folder)
     return Findings()
 
 

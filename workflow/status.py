@@ -1,12 +1,11 @@
 """What a run folder holds, stage by stage."""
 
-from pathlib import Path
-
 from rich.console import Console
 from rich.table import Table
 
-from workflow.case_kind import Case
-from workflow.inputs import Verdict, examine, read_record
+from workflow.store.point import Point
+from workflow.store.state import Verdict, examine
+from workflow.store.store import Store
 from workflow.units import from_si
 
 SHOWN_UNITS = {"m": "mm", "m^3": "mm^3", "Pa": "MPa", "J": "mJ", "kg": "mg", "s": "ns"}
@@ -32,17 +31,18 @@ FIGURES = {
 }  # fmt: skip
 
 
-def show_status(case: Case, run_folder: Path, console: Console) -> None:
-    """Print for each stage whether its product is up to date, the time it took and its main figures."""
-    table = Table(title=f"{case.case.name} in {run_folder}", title_justify="left", expand=True)
+def show_status(store: Store, point: Point, console: Console) -> None:
+    """Print for each stage whether its product is there and intact, the time it took and its main figures."""
+    table = Table(title=f"{point.case.case.name} in {store.folder}", title_justify="left", expand=True)
     table.add_column("stage", no_wrap=True)
     table.add_column("state", no_wrap=True)
     table.add_column("time", justify="right", no_wrap=True)
     table.add_column("figures", ratio=1)
-    for name, verdict in examine(run_folder, case).items():
-        record = read_record(run_folder, case.pipeline[name]) or {"metrics": {}, "health": {}}
+    for name, verdict in examine(store, point).items():
+        record = store.record(point, name) or {"metrics": {}, "health": {}}
         seconds = f"{record['seconds']:.1f} s" if "seconds" in record else ""
-        table.add_row(name, _state(verdict, record["health"]), seconds, _figures(name, record["metrics"]))
+        figures = ", ".join(verdict.damaged) or _figures(name, record["metrics"])
+        table.add_row(name, _state(verdict, record["health"]), seconds, figures)
     console.print(table)
 
 
@@ -57,6 +57,8 @@ def metric_text(metric: dict) -> str:
 def _state(verdict: Verdict, health: dict) -> str:
     if verdict.missing:
         return "[dim]missing[/]"
+    if verdict.damaged:
+        return "[bold red]damaged[/]"
     if verdict.stale:
         return "[yellow]stale[/]"
     if not all(check["ok"] for check in health.values()):

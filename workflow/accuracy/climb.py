@@ -9,10 +9,9 @@ from workflow.accuracy.calibration import calibration
 from workflow.accuracy.errors import Error, Quantity, errors_of
 from workflow.accuracy.ladder import Ladder, Rung
 from workflow.accuracy.measured import Measurement, StageCost
-from workflow.inputs import read_record
-from workflow.points.point import Point, read_possible_points
-from workflow.points.store import Store
 from workflow.stage_forecast import stage_seconds
+from workflow.store.point import Point, read_possible_points
+from workflow.store.store import Store
 
 AGAIN = 2  # times that a cheap point is run once more: load of the machine and first compilation are then not counted
 CHEAP = 8.0  # up to these core-seconds [s]
@@ -145,7 +144,7 @@ class Climb:
         """Whether a point is cheap, by measurement or forecast, or its time is not that of the whole run."""
         point, store = self.points[rung.name], self.stores[0]
         stages = [stage.name for stage in point.case.pipeline.upstream(self.ladder.until)]
-        records = [record for stage in stages if (record := _record(store, point, stage)) is not None]
+        records = [record for stage in stages if (record := store.record(point, stage)) is not None]
         taken = sum(record["core_seconds"] for record in records)
         foreseen = sum(seconds for stage, seconds in self._forecast(point).items() if stage in stages)
         return min(taken, foreseen or taken) < CHEAP or any(record["continued"] for record in records)
@@ -169,20 +168,11 @@ class Climb:
         """Return the smallest times of the stages that count, of all runs that were not broken off."""
         foreseen, costs = self._forecast(point), {}
         for stage in self.ladder.timed:
-            records = [record for store in self.stores if (record := _record(store, point, stage)) is not None]
+            records = [record for store in self.stores if (record := store.record(point, stage)) is not None]
             whole = [record for record in records if not record["continued"]] or records
             times = {name: min(record[name] for record in whole) for name in ("seconds", "core_seconds")}
             costs[stage] = StageCost(**times, forecast=foreseen.get(stage))
         return costs
-
-
-def _record(store: Store, point: Point, stage: str) -> dict | None:
-    """Return what a stage of a point said of itself; None where it was not run in this store."""
-    if not store.has(point, stage):
-        return None
-    if not store.run_folder(point).exists():
-        store.prepare(point)  # another point has made all its products
-    return read_record(store.run_folder(point), point.case.pipeline[stage])
 
 
 def _failed_before(store: Store, point: Point, until: str) -> dict[str, str]:

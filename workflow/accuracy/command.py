@@ -20,17 +20,19 @@ from workflow.accuracy.page import PAGE, PICTURE, write_pages
 from workflow.accuracy.recommend import Goal, recommend
 from workflow.case import available_cores, read_case
 from workflow.case_kind import Case
-from workflow.pipeline import failed_checks
 from workflow.plan_table import duration
-from workflow.points import batch
-from workflow.points.point import Point
-from workflow.points.store import Store
 from workflow.problems import CaseError, Problem
 from workflow.progress import progress_bar
 from workflow.report.tables import percent
 from workflow.stage_forecast import stage_seconds
+from workflow.store import batch
+from workflow.store.folders import check_folder, locked
+from workflow.store.point import Point
+from workflow.store.state import failed_checks
+from workflow.store.store import Store
 from workflow.units import UnitError, to_si
 
+WHAT = "accuracy"  # its folder holds
 TOLERANCE = 0.02  # where neither a tolerance nor a budget is given
 LONGEST = 600.0  # wall time of a run that nobody has given a budget for [s]
 
@@ -164,6 +166,7 @@ def show(wish: Wish, out: Path | None, console: Console) -> bool:
     """
     case = read_case(wish.case, wish.overrides, wish.oversubscribe)
     folder = out or default_folder(case)
+    check_folder(folder, WHAT, case.case.name)
     compute = partial(_compute, oversubscribe=wish.oversubscribe, until=ladder_of(case).until)
     accuracy, climb = measure(wish, folder, compute)
     tried = (*_left_out(climb), *_impossible(climb), *_failed(climb))
@@ -203,7 +206,9 @@ def _compute(
         def count() -> None:
             progress(sum(store.is_complete(point, until) for point in points) / len(points))
 
-        return batch.run_points(store, points, until, batch.Machine(available_cores(), True, oversubscribe), count)
+        machine = batch.Machine(available_cores(), True, oversubscribe, each_second=count)
+        with locked(store.folder, WHAT, points[0].case.case.name) as lock:
+            return batch.run_points(store, points, until, machine, lock)
 
 
 def _left_out(climb: Climb) -> list[str]:
@@ -242,8 +247,7 @@ def _unhealthy(accuracy: Accuracy, climb: Climb) -> list[str]:
     if chosen is None or chosen.found is None or chosen.found.failed:
         return []
     point = climb.points[chosen.rung.name]
-    stages = point.case.pipeline.upstream(climb.ladder.until)
-    missed = failed_checks(climb.stores[0].run_folder(point), stages)
+    missed = failed_checks(climb.stores[0], point, climb.ladder.until)
     return [f"Checks of the recommended run that do not hold: {'; '.join(missed)}."] if missed else []
 
 

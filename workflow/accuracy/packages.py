@@ -11,10 +11,10 @@ from workflow.accuracy.errors import Quantity
 from workflow.accuracy.histories import at_same_times
 from workflow.accuracy.ladder import Knob, Ladder, Rung
 from workflow.board_drop_case import BoardDropCase, PackageCase
-from workflow.inputs import read_record
 from workflow.products import read_json
 from workflow.shock_forecast import implicit_seconds
 from workflow.shock_launch import MODES
+from workflow.store.product import read_record
 from workflow.units import from_si
 
 REFINED = (2.0, 1.5, 1.0, 0.75, 0.5, 0.4, 0.25)  # sizes of elements over those of the case
@@ -63,7 +63,7 @@ def _dropped(case: BoardDropCase) -> Ladder:
 
 
 def _widths(case: Any, run_folder: Path) -> dict[str, Quantity]:
-    record = read_record(run_folder, case.pipeline["reflow"]) or {"metrics": {}}
+    record = read_record(run_folder / "reflow") or {"metrics": {}}
     name = "joint_width_error_max"
     return {name: Quantity(record["metrics"][name]["value"], 0.0, 1.0, "Young-Laplace")}
 

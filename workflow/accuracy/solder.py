@@ -8,8 +8,8 @@ from pathlib import Path
 from workflow.accuracy.errors import Quantity
 from workflow.accuracy.ladder import Knob, Ladder, Rung
 from workflow.case_kind import Case
-from workflow.inputs import read_record
 from workflow.scene_cases import DropCase, DropsCase, JointCase, OscillationCase
+from workflow.store.product import read_record
 from workflow.units import from_si
 
 SECOND = 2.0  # order in the spacing of a surface that minimises a discrete area
@@ -48,7 +48,7 @@ def of_metrics(exact: str, errors: Mapping[str, str], stage: str, case: Case, ru
         case: the case.
         run_folder: of the run.
     """
-    record = read_record(run_folder, case.pipeline[stage])
+    record = read_record(run_folder / stage)
     metrics = {} if record is None else record["metrics"]
     found = {}
     for name in errors:

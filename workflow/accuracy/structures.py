@@ -11,8 +11,8 @@ from workflow.accuracy.errors import Quantity
 from workflow.accuracy.histories import at_same_times, common_times
 from workflow.accuracy.ladder import Knob, Ladder, Rung
 from workflow.case import available_cores
-from workflow.inputs import read_record
 from workflow.problems import CaseError, Problem
+from workflow.store.product import read_record
 from workflow.structure.case import StructureCase
 from workflow.structure.findings import exact_velocities, read_history, read_places, wave_points
 from workflow.structure.launch import solver_folders
@@ -84,7 +84,7 @@ def _wave(reference: BarWave | LayeredBar, case: StructureCase, run_folder: Path
 
 
 def _swing(case: StructureCase, run_folder: Path) -> dict[str, Quantity]:
-    record = read_record(run_folder, case.pipeline["comparison"]) or {"metrics": {}}
+    record = read_record(run_folder / "comparison") or {"metrics": {}}
     return {
         name: Quantity(record["metrics"][name]["value"], 0.0, 1.0, "beam theory")
         for name in SWING

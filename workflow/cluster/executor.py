@@ -19,7 +19,6 @@ from workflow.cluster.resources import MOST_CORES, stage_resources
 from workflow.launch import DIE_WITH_PARENT, LAUNCHER, end_group
 from workflow.problems import CaseError, Problem
 
-SAID = "logs/snakemake.txt"  # what Snakemake says of its jobs, below its working folder
 LONGEST_END = 70.0  # seconds that Snakemake has to cancel its jobs
 JOBS = 20  # that may be queued or at work at a time, unless the user says how many
 
@@ -55,9 +54,6 @@ class Executor(Protocol):
     def jobs(self, case: Case) -> Jobs:
         """Return what the job of each stage asks for; nothing where stages are no jobs."""
 
-    def output(self, folder: Path) -> Path | None:
-        """Return the file that takes what Snakemake says; None: the terminal."""
-
     def left_over(self, folder: Path) -> list[str]:
         """Return the jobs of an earlier command that are still at work in a folder."""
 
@@ -81,16 +77,12 @@ class Local:
 
     @property
     def options(self) -> Sequence[str]:
-        """All that stages say goes to the terminal; Snakemake says nothing."""
-        return ("--cores", str(self.cores), "--quiet", "all")
+        """Cores that may be used."""
+        return ("--cores", str(self.cores))
 
     def jobs(self, case: Case) -> Jobs:
         """No stage is a job."""
         return {}
-
-    def output(self, folder: Path) -> Path | None:
-        """To the terminal."""
-        return None
 
     def left_over(self, folder: Path) -> list[str]:
         """Nothing outlives a command."""
@@ -126,7 +118,7 @@ class Slurm:
 
     @property
     def options(self) -> Sequence[str]:
-        """What Snakemake says is kept: it knows of jobs that Slurm ended."""
+        """The profile, and how many jobs there may be."""
         profile = str(self.profile.folder.resolve())
         jobs = ("--executor", "slurm", "--jobs", str(self.at_once), "--workflow-profile", profile)
         return (*jobs, "--nocolor", "--quiet", "progress", "host")
@@ -135,10 +127,6 @@ class Slurm:
         """What ``plan`` foresees, with a margin."""
         wanted = stage_resources(case, self.profile.walltime_factor, self.largest)
         return {stage: resources.of_rule(self.profile.launcher) for stage, resources in wanted.items()}
-
-    def output(self, folder: Path) -> Path | None:
-        """To a file."""
-        return folder / SAID
 
     def left_over(self, folder: Path) -> list[str]:
         """Those that Slurm knows; none where it does not answer."""

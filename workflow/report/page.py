@@ -14,19 +14,20 @@ from workflow.summary import collect_summary, write_summary
 TEMPLATES = Path(__file__).parent / "templates"
 
 
-def write_report(run_folder: Path, case) -> dict:
-    """Write ``report.html`` and ``summary.json`` at the top of a run folder.
+def write_report(run_folder: Path, case, folder: Path) -> dict:
+    """Write ``report.html`` and ``summary.json``.
 
     Args:
         run_folder: folder of the run; stages that have not run are left out of the page.
         case: the resolved case (``workflow.case.Case``).
+        folder: where they are written.
 
     Returns:
         The summary.
     """
-    summary = collect_summary(run_folder, case.case.name)
-    write_summary(run_folder, summary)
-    write_page(run_folder / "report.html", "report.html.j2", _context(run_folder, case, summary))
+    summary = collect_summary(run_folder, case)
+    write_summary(folder, summary)
+    write_page(folder / "report.html", "report.html.j2", _context(run_folder, case, summary))
     return summary
 
 

@@ -6,8 +6,8 @@ from pathlib import Path
 
 from fem.names import nearest
 from workflow.case_text import CASES
-from workflow.pipeline import locked
 from workflow.problems import CaseError, Problem
+from workflow.store.folders import locked
 from workflow.stress_test.families import FAMILIES, random_trials
 from workflow.stress_test.hard_case import HardCase, read_hard_cases
 from workflow.stress_test.pool import Pool
@@ -56,7 +56,7 @@ def stress_test(request: Request) -> bool:
     cases = fixed_cases(request.files, families)
     if not cases and not request.count:
         raise CaseError("stress-test", [Problem("", "no case to try", None, "families " + ", ".join(FAMILIES))])
-    with locked(request.out):
+    with locked(request.out, "stress test", "hard cases"):
         return _try_all(request, families, cases)
 
 

@@ -1,18 +1,19 @@
 """The command study: reads the study, checks every point, computes what is missing, writes the results."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from rich.table import Table
 
 from fem.names import nearest
 from workflow.plan_table import duration, new_table
-from workflow.points.batch import Machine, missing, run_points
-from workflow.points.point import Point, PointsError, read_possible_points
-from workflow.points.store import Store
 from workflow.problems import CaseError
 from workflow.progress import progress_bar
+from workflow.store.batch import Machine, missing, run_points, show_products
+from workflow.store.folders import locked
+from workflow.store.point import Point, PointsError, read_possible_points
+from workflow.store.store import Store
 from workflow.study import tables
 from workflow.study.main_effects import is_number
 from workflow.study.outlook import outlook
@@ -22,6 +23,7 @@ from workflow.study.study_file import Study, read_study
 from workflow.terminal import console, print_error
 
 LAST = "report"
+WHAT = "study"  # its folder holds
 SHOWN = 10  # points of the ranking in the terminal
 
 
@@ -87,24 +89,38 @@ def show_outlook(points: Points, store: Store) -> None:
         console.print(f"{len(points.impossible)} points cannot be and are skipped")
 
 
-def run_study(points: Points, store: Store, machine: Machine) -> bool:
+def run_study(points: Points, store: Store, machine: Machine, *, force: bool = False) -> bool:
     """Compute what is missing of a study and write its results.
+
+    Args:
+        points: of the study.
+        store: where products are.
+        machine: what they are computed with.
+        force: whether the folder may hold another study.
 
     Returns:
         Whether every point that can be is complete and healthy.
-    """
-    every = list(points.possible.values())
-    jobs = missing(store, every, LAST)
-    if jobs:
-        with progress_bar(f"{points.study.about.name}: {len(jobs)} products to compute") as bar:
-            failed = run_points(store, every, LAST, machine, teller(store, every, jobs, bar))
-    else:
-        console.print(f"nothing to compute: {store.folder} has all {len(every)} points")
-        failed = {}
-    rows = results(points, store, failed)
-    from workflow.study.page import write_results
 
-    write_results(store.folder, points.study, rows)
+    Raises:
+        CaseError: the folder must not, or cannot be written into.
+        RunFolderBusy: another process is at work in it.
+    """
+    every, about = list(points.possible.values()), points.study.about
+    with locked(store.folder, WHAT, about.name, force) as lock:
+        jobs = missing(store, every, LAST)
+        if jobs:
+            with progress_bar(f"{about.name}: {len(jobs)} products to compute") as bar:
+                watched = replace(machine, each_second=teller(store, every, jobs, bar))
+                failed = run_points(store, every, LAST, watched, lock)
+        else:
+            console.print(f"nothing to compute: {store.folder} has all {len(every)} points")
+            for point in every:
+                show_products(store, point)
+            failed = {}
+        rows = results(points, store, failed)
+        from workflow.study.page import write_results
+
+        write_results(store.folder, points.study, rows)
     show_results(points.study, rows, store.folder)
     return has_metrics(points.study, rows) and all(row.verdict in (HEALTHY, IMPOSSIBLE) for row in rows)
 

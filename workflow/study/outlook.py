@@ -3,9 +3,9 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from workflow.points.batch import Job
-from workflow.points.point import Point
 from workflow.stage_forecast import stage_seconds
+from workflow.store.batch import Job
+from workflow.store.point import Point
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,12 +3,11 @@
 import time
 from collections.abc import Callable, Sequence
 
-from workflow.inputs import read_record
 from workflow.plan_table import duration
-from workflow.points.batch import Job
-from workflow.points.point import Point
-from workflow.points.store import Store
 from workflow.progress import ProgressBar
+from workflow.store.batch import Job
+from workflow.store.point import Point
+from workflow.store.store import Store
 from workflow.terminal import console
 
 
@@ -23,7 +22,7 @@ def teller(store: Store, points: Sequence[Point], jobs: Sequence[Job], bar: Prog
 
     def tell() -> None:
         for job in [job for job in waiting if store.has(job.point, job.stage)]:
-            record = read_record(store.run_folder(job.point), job.point.case.pipeline[job.stage])
+            record = store.record(job.point, job.stage)
             seconds.setdefault(job.stage, []).append(record["seconds"] if record else 0.0)
             waiting.remove(job)
         done = [point for point in points if store.is_complete(point, point.case.pipeline.names[-1])]

@@ -8,8 +8,8 @@ from pathlib import Path
 
 from workflow.case import display_values
 from workflow.check_text import against_limit
-from workflow.points.point import Point
-from workflow.points.store import Store
+from workflow.store.point import Point
+from workflow.store.store import Store
 from workflow.study.study_file import Study
 from workflow.units import QUANTITY
 

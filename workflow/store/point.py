@@ -1,18 +1,13 @@
 """A point: a case file with settings, known by what all its stages depend on."""
 
-import hashlib
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from workflow import __version__
 from workflow.case import SETTING, read_case
 from workflow.case_kind import Case
-from workflow.inputs import stage_inputs
 from workflow.problems import CaseError
-
-DIGITS = 12  # hexadecimal: two of a million products are alike with a probability of 0.2 %
+from workflow.store.keys import product_keys
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,7 +17,7 @@ class Point:
     Attributes:
         settings: dotted key -> value, as text for ``--set``.
         case: the resolved case.
-        digests: stage -> digest of all that its product depends on.
+        digests: stage -> key of its product.
     """
 
     settings: Mapping[str, str]
@@ -30,7 +25,7 @@ class Point:
     digests: Mapping[str, str] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "digests", digests(self.case))
+        object.__setattr__(self, "digests", product_keys(self.case))
 
     @property
     def key(self) -> str:
@@ -58,23 +53,6 @@ class PointsError(CaseError):
     def _told(self, places: Sequence[int]) -> str:
         others = f" and {len(places) - 1} more" if len(places) > 1 else ""
         return f"{self.source}: point {places[0] + 1} ({told(self.settings[places[0]])}){others}"
-
-
-def digests(case: Case) -> dict[str, str]:
-    """Return for each stage a digest of its own parameters, of those of all stages that it follows, and of the version.
-
-    Stages with equal digests have equal products. Names of case and scale enter the report's only.
-    """
-    found: dict[str, str] = {}
-    for stage in case.pipeline.stages:
-        content = {
-            "version": __version__,
-            "stage": f"{case.kind} {stage.name}",
-            "inputs": stage_inputs(case, stage),
-            "follows": [found[name] for name in stage.follows],
-        }
-        found[stage.name] = hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:DIGITS]
-    return found
 
 
 def read_possible_points(

@@ -1,0 +1,36 @@
+"""What Snakemake needs to run a case without the command line: the jobs of a run, written into its store."""
+
+import shutil
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from workflow.case import read_case
+from workflow.store.batch import BATCH, Machine, missing, write_jobs
+from workflow.store.folders import locked
+from workflow.store.point import Point
+from workflow.store.store import Store
+
+
+def prepare_run(config: Mapping[str, Any], cores: int) -> tuple[Store, Point]:
+    """Read a case and write the jobs that make what is missing of its run.
+
+    Args:
+        config: ``case``, and perhaps ``set``, ``out``, ``oversubscribe``.
+        cores: that Snakemake may use.
+
+    Raises:
+        CaseError: the case, or the folder of the run, is not possible.
+        RunFolderBusy: a run is at work in the folder.
+    """
+    oversubscribe = bool(int(config.get("oversubscribe", 0)))
+    case = read_case(Path(config["case"]), config.get("set", []), oversubscribe)
+    folder = Path(config.get("out", f"runs/{case.run_name}")).resolve()
+    store, point = Store(folder, one_run=True), Point({}, case)
+    with locked(folder, "run", case.case.name):
+        jobs = missing(store, [point], case.pipeline.names[-1])
+        shutil.rmtree(store.home / BATCH, ignore_errors=True)
+        for job in jobs:
+            store.prepare_work(point, job.stage)
+        write_jobs(store, jobs, Machine(cores, exclusive=True, oversubscribe=oversubscribe, live=True))
+    return store, point

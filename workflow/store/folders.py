@@ -1,0 +1,129 @@
+"""Folders that are the program's own: marked as such, used by one command at a time, cleaned of what it has written."""
+
+import fcntl
+import json
+import os
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from workflow import __version__
+from workflow.problems import CaseError, Problem
+from workflow.store.store import HOME
+
+MARK = ".reflowshock.json"
+LOCK = ".lock"
+
+
+class RunFolderBusy(RuntimeError):
+    """Another process is running in the run folder."""
+
+
+def check_folder(folder: Path, what: str, name: str, force: bool = False) -> None:
+    """See to it that a folder may be written into: it is empty or new, or the program's own for the same thing.
+
+    Args:
+        folder: the folder.
+        what: it is to hold, such as "run".
+        name: of the case or study.
+        force: whether it may hold another case or study.
+
+    Raises:
+        CaseError: it is a file, has files of somebody else, or holds another case or study.
+    """
+    try:
+        if not os.path.lexists(folder):
+            return
+        names = {path.name for path in folder.iterdir()}
+    except NotADirectoryError as error:
+        raise _refused(folder, "is not a folder", "a folder, or the name of a new one") from error
+    except OSError as error:
+        raise _refused(folder, f"cannot be used: {error.strerror}", "a folder that can be written to") from error
+    mark = read_mark(folder)
+    if mark is None and {"inputs", "stages"} & names and ".snakemake" in names:
+        raise _refused(folder, "was written by an earlier version of reflowshock", "another folder, or remove it")
+    if mark is None and names - {LOCK}:
+        raise _refused(folder, "has files that are not the program's", "an empty folder, or the name of a new one")
+    if mark is not None and (mark["holds"], mark["name"]) != (what, name) and not force:
+        held = f"holds the {mark['holds']} of {mark['name']}, not the {what} of {name}"
+        raise _refused(folder, held, "another folder, or --force")
+
+
+def read_mark(folder: Path) -> dict[str, str] | None:
+    """Return what a folder of the program's holds; None where it is none."""
+    try:
+        mark = json.loads((folder / MARK).read_text(encoding="utf-8"))
+        return {"holds": str(mark["holds"]), "name": str(mark["name"])}
+    except FileNotFoundError:
+        return None
+    except (OSError, ValueError, KeyError, TypeError):
+        return {"holds": "run", "name": "a case whose mark is damaged"}
+
+
+@contextmanager
+def locked(folder: Path, what: str, name: str, force: bool = False) -> Iterator[int]:
+    """Make a folder, mark it as the program's and hold its lock, which the system releases when this process ends.
+
+    Args:
+        folder: the folder.
+        what: it is to hold, such as "run".
+        name: of the case or study.
+        force: whether it may hold another case or study.
+
+    Yields:
+        The file descriptor that holds the lock.
+
+    Raises:
+        RunFolderBusy: another process holds it.
+        CaseError: the folder must not, or cannot be written into.
+    """
+    check_folder(folder, what, name, force)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        descriptor = os.open(folder / LOCK, os.O_RDWR | os.O_CREAT, 0o644)
+    except OSError as error:
+        raise _refused(
+            folder, f"cannot be written into: {error.strerror}", "a folder that can be written to"
+        ) from error
+    try:
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            raise RunFolderBusy(f"another run is at work in {folder}") from error
+        _mark(folder, what, name)
+        yield descriptor
+    finally:
+        os.close(descriptor)
+
+
+def remove_own(folder: Path) -> list[str]:
+    """Remove a folder's store, mark and lock; and the folder, if nothing else is in it and nobody works in it.
+
+    Returns:
+        Names of what is left.
+    """
+    if (folder / HOME).is_symlink():
+        raise _refused(folder / HOME, "is a link", "a folder; remove the link yourself")
+    with suppress(FileNotFoundError):
+        shutil.rmtree(folder / HOME)
+    for name in (MARK, LOCK):
+        (folder / name).unlink(missing_ok=True)
+    left = sorted(path.name for path in folder.iterdir())
+    if not left and folder.resolve() not in (Path.cwd(), *Path.cwd().parents):
+        folder.rmdir()
+    return left
+
+
+def _mark(folder: Path, what: str, name: str) -> None:
+    content = {"holds": what, "name": name, "version": __version__}
+    path = folder / MARK
+    if read_mark(folder) == {"holds": what, "name": name}:
+        return
+    partial = path.with_suffix(".partial")
+    partial.write_text(json.dumps(content) + "\n", encoding="utf-8")
+    partial.replace(path)
+
+
+def _refused(folder: Path, message: str, allowed: str) -> CaseError:
+    return CaseError("--out", [Problem("", f"{folder} {message}", None, allowed)])

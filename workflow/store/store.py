@@ -1,0 +1,138 @@
+"""A store: every product of a stage once, under the key of all that it depends on; run folders show them by name."""
+
+import json
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from workflow.case import kind_of
+from workflow.case_kind import Case
+from workflow.problems import CaseError, Problem
+from workflow.stage_table import Stage
+from workflow.store.keys import digest_of
+from workflow.store.point import Point
+from workflow.store.product import RECORD, SEAL, content_digest, read_record
+
+HOME = ".store"  # in a run folder, or in the folder of a study
+CASE = "inputs/case.json"
+MESSAGE, TRACEBACK = "message.txt", "error.txt"  # in the partial folder of a stage that failed: why
+
+
+@dataclass(frozen=True, slots=True)
+class Store:
+    """The products of one run folder, or of all points of a study.
+
+    ``.store/products/<stage>-<key>`` are the products. ``.store/work/<stage>-<key>`` is the run folder in which a
+    product is being made: it becomes one at once and complete; checkpoints of a stage that was killed stay there.
+
+    Attributes:
+        folder: of the run, study or accuracy.
+        one_run: whether the folder itself is the run folder; otherwise each point has its own, ``points/<key>``.
+    """
+
+    folder: Path
+    one_run: bool = False
+
+    @property
+    def home(self) -> Path:
+        """The folder that holds all of the store."""
+        return self.folder / HOME
+
+    def product(self, point: Point, stage: str) -> Path:
+        """Return the folder of a product, which may not be there yet."""
+        return self.home / "products" / f"{stage}-{point.digests[stage]}"
+
+    def work_folder(self, point: Point, stage: str) -> Path:
+        """Return the run folder in which a product is made."""
+        return self.home / "work" / f"{stage}-{point.digests[stage]}"
+
+    def run_folder(self, point: Point) -> Path:
+        """Return the run folder of a point, which shows its products."""
+        return self.folder if self.one_run else self.folder / "points" / point.key
+
+    def has(self, point: Point, stage: str) -> bool:
+        """Whether a product is there; its files are not looked at."""
+        return (self.product(point, stage) / RECORD).is_file()
+
+    def record(self, point: Point, stage: str) -> dict | None:
+        """Return what a stage said of itself; None where its product is missing or its record is damaged."""
+        return read_record(self.product(point, stage))
+
+    def is_complete(self, point: Point, until: str) -> bool:
+        """Whether the products of all stages up to one are there; their files are not looked at."""
+        return all(self.has(point, stage.name) for stage in point.case.pipeline.upstream(until))
+
+    def prepare_work(self, point: Point, stage: str) -> None:
+        """Make the run folder in which a product will be made, with links to those of the stages before it.
+
+        Why it failed when it was last tried is forgotten.
+        """
+        folder = self.work_folder(point, stage)
+        folder.mkdir(parents=True, exist_ok=True)
+        for before in point.case.pipeline.upstream(stage)[:-1]:
+            link = folder / before.name
+            link.unlink(missing_ok=True)
+            link.symlink_to(os.path.relpath(self.product(point, before.name), folder))
+        write_case(folder, point.case)
+        self._message(point, stage).unlink(missing_ok=True)
+
+    def message(self, point: Point, stage: str) -> str | None:
+        """Return why a stage failed when it was last tried; None where it did not, or was not tried."""
+        path = self._message(point, stage)
+        return path.read_text(encoding="utf-8") if path.is_file() else None
+
+    def _message(self, point: Point, stage: str) -> Path:
+        return self.work_folder(point, stage) / f".{stage}.partial" / MESSAGE
+
+
+def reads(products: Mapping[str, Path], case: Case, stage: Stage) -> dict[str, str] | None:
+    """Return digests of all that a stage reads, or None where a product of it is missing or damaged.
+
+    These are the products of the stages that it follows, and that those follow; of the geometry only the pad table,
+    for a stage that reads no more of it.
+
+    Args:
+        products: stage -> folder of its product.
+        case: the case.
+        stage: that reads them.
+    """
+    names = (*case.pipeline.before(stage.name), *(("geometry",) if stage.pads else ()))
+    records = {name: record for name in names if (record := read_record(products[name])) is not None}
+    if len(records) < len(names):
+        return None
+    found = {name: content_digest(records[name]) for name in names}
+    if stage.pads:
+        found["geometry"] = records["geometry"]["files"]["pads.json"]
+    return found
+
+
+def write_case(folder: Path, case: Case) -> None:
+    """Write the resolved case into a run folder, if it is not there."""
+    path, content = folder / CASE, case.model_dump(mode="json")
+    text = json.dumps(content | {SEAL: digest_of(content)}, indent=1) + "\n"
+    if path.is_file() and path.read_bytes() == text.encode():
+        return
+    path.parent.mkdir(parents=True, exist_ok=True)
+    partial = path.with_suffix(".partial")
+    partial.write_text(text, encoding="utf-8")
+    partial.replace(path)
+
+
+def read_case_of_run(folder: Path) -> Case:
+    """Return the case of a run folder.
+
+    Raises:
+        CaseError: there is none, or it is damaged.
+    """
+    path = folder / CASE
+    try:
+        table = json.loads(path.read_text(encoding="utf-8"))
+        if table.pop(SEAL) != digest_of(table):
+            raise ValueError(SEAL)
+        return kind_of(table).model_validate(table)
+    except FileNotFoundError as error:
+        raise CaseError(str(folder), [Problem("", "is not a run folder: nothing was run in it")]) from error
+    except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
+        message = "is not as it was written; `reflowshock run` with the case file writes it again"
+        raise CaseError(str(path), [Problem("", message)]) from error
