@@ -13,6 +13,7 @@ from particles.young_laplace import Meridian
 BODY = "body"
 REFERENCE = "reference"
 ARRAYS = ("points", "velocity", "pressure", "triangles")
+TIMES = ("seconds", "particle_steps_per_second")  # of one run: in no product, so that the same shape gives the same file
 
 
 def write_shapes(path: Path | str, shapes: Mapping[str, JointShape]) -> None:
@@ -41,9 +42,14 @@ def _write_shape(group: h5py.Group, shape: JointShape) -> None:
         place = group.create_group(f"snapshots/{number:04d}")
         place.attrs["time"] = snapshot.time
         place["points"], place["triangles"] = snapshot.points, snapshot.triangles
-    for name, (value, unit) in shape.metrics.items():
+    for name, (value, unit) in untimed(shape.metrics).items():
         place = group.create_group(f"metrics/{name}")
         place.attrs["value"], place.attrs["unit"] = value, unit
+
+
+def untimed(metrics: Mapping[str, tuple]) -> dict[str, tuple]:
+    """Return metrics that are the same whenever and wherever a shape is computed."""
+    return {name: metric for name, metric in metrics.items() if name not in TIMES}
 
 
 def write_body(folder: Path, shape: JointShape, reference: Meridian | None) -> None:

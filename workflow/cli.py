@@ -16,7 +16,7 @@ from workflow.case import available_cores, read_case
 from workflow.cluster.executor import JOBS, ExecutorName, executor_for
 from workflow.kernel_cache import keep_kernels_by_source
 from workflow.problems import CaseError
-from workflow.store.folders import RunFolderBusy
+from workflow.store.folders import RunFolderBusy, read_mark
 from workflow.store.point import Point
 from workflow.store.store import Store, read_case_of_run
 from workflow.terminal import console, print_error
@@ -145,6 +145,9 @@ def report(case: CasePath, settings: Settings = None, out: Out = None) -> None:
     from workflow.stages import report as stage_function
 
     store, point = _load(case, settings, out, True)
+    if read_mark(store.folder) is None:
+        print_error(f"{store.folder} is not a run folder: nothing was run")
+        raise typer.Exit(1)
     if not report_again(store.folder, point.case.case.name, write_report, stage_function):
         raise typer.Exit(1)
     console.print(f"report: {store.folder / 'report.html'}")

@@ -92,10 +92,12 @@ def joint_records(
         Joint name -> ``shape``, ``turn`` [rad] and ``mirror`` (how it lies seen from that shape: mirrored first, y to
         -y, then turned about z), ``place`` of the package's pad over the board's, ``verdict``, ``metrics``.
     """
+    from particles.products import untimed
+
     records: dict[str, dict] = {}
     for group in groups:
         shape = shapes[group.name]
-        metrics = {key: {"value": value, "unit": unit} for key, (value, unit) in shape.metrics.items()}
+        metrics = {key: {"value": value, "unit": unit} for key, (value, unit) in untimed(shape.metrics).items()}
         for name, orientation in group.members.items():
             geometry = geometries[name]
             records[name] = {

@@ -102,7 +102,7 @@ def run_stage(name: str, function: StageFunction, run: Run, product: Path) -> di
     return record
 
 
-def _reads(run: Run, stage: Stage) -> dict[str, str] | None:
+def _reads(run: Run, stage: Stage) -> dict[str, str | None]:
     return reads({one.name: run.folder / one.name for one in run.case.pipeline.stages}, run.case, stage)
 
 
@@ -112,7 +112,7 @@ def _check(run: Run, stage: Stage, before: dict, partial: Path) -> None:
     if changed:
         names = ", ".join(change.key.removesuffix(".sha256") for change in changed)
         raise StageError(f"{names}: the file has changed while the stage was at work; run it again")
-    if before["reads"] is None or before["reads"] != _reads(run, stage):
+    if None in before["reads"].values() or before["reads"] != _reads(run, stage):
         raise StageError("a product that it reads has changed, or is damaged; run it again")
     missing = [name for name in stage.products if not (partial / name.removeprefix(f"{stage.name}/")).exists()]
     if missing:

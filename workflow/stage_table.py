@@ -70,8 +70,10 @@ class Pipeline:
         """Return the stages up to and including one."""
         return self.stages[: self.names.index(name) + 1]
 
-    def before(self, name: str) -> tuple[str, ...]:
-        """Return the names of the stages that one follows, and that those follow, in order."""
+    def read_by(self, name: str) -> tuple[str, ...]:
+        """Return the names of the stages whose products one reads: that it follows, and that those follow, in order."""
+        if self[name].pads:
+            return ("geometry",)
         found = set(self[name].follows)
         for stage in reversed(self.upstream(name)[:-1]):
             found |= set(stage.follows) if stage.name in found else set()

@@ -68,7 +68,7 @@ def test_a_kill_in_the_midst_of_an_exchange_changes_nothing(folder, tmp_path):
     result = reflowshock("run", tmp_path, "--until", "reflow", settings=HEATED)
     assert result.returncode == 0, result.stderr
     assert "continued from checkpoints" in " ".join(result.stdout.split())
-    assert not (tmp_path / ".reflow.checkpoints").exists()
+    assert not list((tmp_path / ".store/work").iterdir())
     expected, found = (read_shapes(run / "reflow/shapes.h5") for run in (folder, tmp_path))
     assert found.keys() == expected.keys()
     for name, shape in expected.items():

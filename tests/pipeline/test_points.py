@@ -11,11 +11,11 @@ import psutil
 import pytest
 
 from tests.support.workflow_command import wait_until
-from workflow.inputs import read_record
-from workflow.points.batch import Machine, missing, run_points
-from workflow.points.store import Store
 from workflow.stage_runner import Run, run_stage
 from workflow.stages import STAGE_FUNCTIONS
+from workflow.store.batch import Machine, missing, run_points
+from workflow.store.folders import locked
+from workflow.store.store import Store
 from workflow.study.command import read_points_of, run_study
 
 CASE = Path(__file__).resolve().parents[2] / "cases" / "sessile_drop" / "case.toml"
@@ -37,7 +37,7 @@ def test_a_study_is_computed_once_and_survives_a_kill(tmp_path):
     study = read_points_of(path)
     good, bad = study.possible.values()
     process = subprocess.Popen([sys.executable, "-m", "workflow", "study", str(path), "--out", str(store.folder)])
-    reflow = store.stage_folder(good.case, "reflow") / "stage.json"
+    reflow = store.product(good, "reflow") / "stage.json"
     wait_until(reflow.exists)
     children = psutil.Process(process.pid).children(recursive=True)
     process.send_signal(signal.SIGKILL)
@@ -54,14 +54,16 @@ def test_a_study_is_computed_once_and_survives_a_kill(tmp_path):
     assert [job.stage for job in missing(store, [good, bad], "report")] == ["reflow", "report"]
 
     summary = json.loads((store.run_folder(good) / "summary.json").read_text())
-    record = run_stage("reflow", STAGE_FUNCTIONS["drop"]["reflow"], Run(tmp_path / "run", good.case, cores=1))
+    stage, run = STAGE_FUNCTIONS["drop"]["reflow"], Run(tmp_path / "run", good.case, cores=1)
+    record = run_stage("reflow", stage, run, tmp_path / "product")
     assert untimed(summary) == untimed(record)
-    found = read_record(store.run_folder(good), good.case.pipeline["reflow"])
+    found = store.record(good, "reflow")
     assert found is not None
     assert found["health"] == record["health"]
 
     written = (store.run_folder(good) / "report.html").stat().st_mtime_ns
-    assert run_points(store, [good], "report", Machine(cores=2)) == {}
+    with locked(store.folder, "study", "drops") as lock:
+        assert run_points(store, [good], "report", Machine(cores=2), lock) == {}
     assert (store.run_folder(good) / "report.html").stat().st_mtime_ns == written
     path.write_text(STUDY.replace("20000, ", "20000, 10000, "))
     more = list(read_points_of(path).possible.values())

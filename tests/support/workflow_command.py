@@ -40,9 +40,9 @@ def break_off(line: list[str], folder: Path, end: signal.Signals, whom: str, *, 
 
     Nothing that it started may be left, and the command fails.
     """
-    checkpoints = folder / ".reflow.checkpoints"
+    checkpoints = ".store/work/reflow-*/.reflow.checkpoints"
     process = subprocess.Popen(line, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
-    wait_until(lambda: checkpoints.exists() and any(path.suffix == "" for path in checkpoints.glob(pattern)))
+    wait_until(lambda: any(path.suffix == "" for path in folder.glob(f"{checkpoints}/{pattern}")))
     children = psutil.Process(process.pid).children(recursive=True)
     for victim in [process] if whom == "command" else [child for child in children if "stage" in child.cmdline()]:
         victim.send_signal(end)

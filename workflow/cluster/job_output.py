@@ -9,7 +9,7 @@ from workflow.terminal import console
 # Options of env: Open MPI would take a stage that is a step of Slurm for one of the ranks that srun starts.
 OWN_STEP = "-u SLURM_STEPID -u SLURM_STEP_ID"
 # How Snakemake says that a job failed: its message ends where the command, advice or the next entry begins.
-FAILED = re.compile(r"^Error in (?:rule|group) .*?(?=^\S|\Z)", re.MULTILINE | re.DOTALL)
+FAILED = re.compile(r"^Error in (?:rule|group) .*?(?=^Error in |^\[|\Z)", re.MULTILINE | re.DOTALL)
 MESSAGE = re.compile(
     r"^\s+message: (?P<why>.*?)\s*(?:sbatch call:|For further error details|\n    \w+:)", re.MULTILINE | re.DOTALL
 )
@@ -49,6 +49,6 @@ def failures_of(said: Path) -> dict[str, str]:
     found = {}
     for entry in FAILED.findall(text):
         why, mark = MESSAGE.search(entry), OUTPUT.search(entry)
-        if why is not None and mark is not None and "non-zero exit code" not in why["why"]:
+        if why is not None and mark is not None and why["why"] != "None":
             found[Path(mark["mark"]).name] = why["why"]
     return found

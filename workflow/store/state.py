@@ -50,15 +50,15 @@ def _of_product(store: Store, point: Point, name: str, before: Mapping[str, Verd
     stage, product = point.case.pipeline[name], store.product(point, name)
     if found := damage(product):
         return Verdict(stale=True, missing=False, damaged=found)
-    redone = tuple(one for one in stage.follows if before[one].stale)
-    if redone:
-        return Verdict(stale=False, missing=False, because_of=redone)
-    if stage.pads and before["geometry"].stale:
-        return Verdict(stale=False, missing=False)  # whether the pads are the same is seen when the geometry is there
-    record = store.record(point, name) or {}
     folders = {one.name: store.product(point, one.name) for one in point.case.pipeline.stages}
-    changed = reads(folders, point.case, stage) != record.get("reads")
-    return Verdict(stale=changed, missing=False, because_of=stage.follows if changed else ())
+    present = reads(folders, point.case, stage)
+    was = (store.record(point, name) or {}).get("reads", {})
+    redone = tuple(one for one in present if before[one].stale)
+    changed = tuple(one for one in present if one not in redone and present[one] != was.get(one))
+    if changed:
+        return Verdict(stale=True, missing=False, because_of=changed)
+    # Whether the pads are the same is seen when the geometry is there.
+    return Verdict(stale=False, missing=False, because_of=() if stage.pads else redone)
 
 
 def _of_absence(point: Point, name: str, shown: Mapping[str, dict], before: Mapping[str, Verdict]) -> Verdict:

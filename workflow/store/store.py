@@ -86,8 +86,8 @@ class Store:
         return self.work_folder(point, stage) / f".{stage}.partial" / MESSAGE
 
 
-def reads(products: Mapping[str, Path], case: Case, stage: Stage) -> dict[str, str] | None:
-    """Return digests of all that a stage reads, or None where a product of it is missing or damaged.
+def reads(products: Mapping[str, Path], case: Case, stage: Stage) -> dict[str, str | None]:
+    """Return digests of all that a stage reads, None of a product that is missing or whose record is damaged.
 
     These are the products of the stages that it follows, and that those follow; of the geometry only the pad table,
     for a stage that reads no more of it.
@@ -97,13 +97,13 @@ def reads(products: Mapping[str, Path], case: Case, stage: Stage) -> dict[str, s
         case: the case.
         stage: that reads them.
     """
-    names = (*case.pipeline.before(stage.name), *(("geometry",) if stage.pads else ()))
-    records = {name: record for name in names if (record := read_record(products[name])) is not None}
-    if len(records) < len(names):
-        return None
-    found = {name: content_digest(records[name]) for name in names}
-    if stage.pads:
-        found["geometry"] = records["geometry"]["files"]["pads.json"]
+    found: dict[str, str | None] = {}
+    for name in case.pipeline.read_by(stage.name):
+        record = read_record(products[name])
+        if record is None:
+            found[name] = None
+        else:
+            found[name] = record["files"]["pads.json"] if stage.pads else content_digest(record)
     return found
 
 

@@ -1,11 +1,11 @@
 """The command accuracy on a ladder whose runs are made up: error h^2, cost 2 s + h^-4 / 1000."""
 
-import json
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import pytest
 
+from tests.support.products import record_of
 from workflow.accuracy import command
 from workflow.accuracy.calibration import calibration, calibration_of, default_folder
 from workflow.accuracy.climb import AGAIN
@@ -18,7 +18,8 @@ from workflow.case import read_case
 from workflow.cli import main
 from workflow.plan import foreseen_costs
 from workflow.problems import CaseError
-from workflow.stage_runner import MESSAGE
+from workflow.store.store import MESSAGE
+from workflow.store.view import show
 
 CASE = Path(__file__).resolve().parents[3] / "cases/sessile_drop/case.toml"
 BROKEN = "the flow is unstable"
@@ -42,12 +43,8 @@ class Fake:
                 partial.mkdir(parents=True)
                 (partial / MESSAGE).write_text(BROKEN)
                 continue
-            store.prepare(point)
-            folder = store.stage_folder(point.case, "reflow")
-            folder.mkdir(parents=True)
-            for product in ("shape.h5", "particles.vtu"):
-                (folder / product).touch()
-            (folder / "stage.json").write_text(json.dumps(self.record(point.case.drop)))
+            record_of(store.product(point, "reflow"), **self.record(point.case.drop))
+            show(store, point, ["reflow"])
         return failed
 
     def record(self, drop) -> dict:
@@ -159,7 +156,6 @@ def test_without_a_budget_long_runs_of_the_ladder_are_left_out(tmp_path, monkeyp
     assert accuracy.recommended.found is not None
 
 
-
 def test_a_broken_off_run_is_timed_again(tmp_path):
     compute = Fake()
 
@@ -167,11 +163,9 @@ def test_a_broken_off_run_is_timed_again(tmp_path):
         failed = compute(store, points)
         if store.folder == tmp_path:
             for point in points:
-                path = store.stage_folder(point.case, "reflow") / "stage.json"
-                if path.exists():
-                    path.write_text(
-                        json.dumps(json.loads(path.read_text()) | {"continued": "the drop", "core_seconds": 9.9})
-                    )
+                record = store.record(point, "reflow")
+                if record is not None:
+                    record_of(store.product(point, "reflow"), **record | {"continued": "the drop", "core_seconds": 9.9})
         return failed
 
     accuracy, _ = measure(wish(), tmp_path, broken_off)

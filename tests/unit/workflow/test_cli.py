@@ -11,8 +11,8 @@ import pytest
 from tests.support.workflow_command import command_line
 from workflow import cli
 from workflow.case import display_values, read_case
-from workflow.pipeline import locked
 from workflow.schema import case_schema
+from workflow.store.folders import locked
 
 CASE = Path(__file__).resolve().parents[3] / "cases" / "bga_drop" / "case.toml"
 
@@ -103,27 +103,44 @@ def test_status_of_nothing(call):
     assert output.count("missing") == 6
 
 
-def test_a_report_of_nothing_fails(call):
+def test_a_report_of_nothing_fails(call, tmp_path):
     code, _, errors = call("report", str(CASE))
     assert (code, "nothing was run" in errors) == (1, True)
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_clean_removes_run_folders_only(call, tmp_path):
     precious = tmp_path / "precious"
-    precious.mkdir()
-    assert "nothing to remove" in call("clean", str(CASE), "--out", str(precious))[1]
-    assert precious.exists()
-    (precious / "inputs").mkdir()
+    (precious / "inputs").mkdir(parents=True)
     (precious / "inputs/case.json").write_text("{}")
-    assert call("clean", str(CASE), "--out", str(precious))[0] == 0
-    assert not precious.exists()
+    assert "nothing to remove" in call("clean", str(CASE), "--out", str(precious))[1]
+    assert (precious / "inputs/case.json").exists()
+    with locked(tmp_path / "run", "run", "bga_drop"):
+        pass
+    assert call("clean", str(CASE), "--out", str(tmp_path / "run"))[0] == 0
+    assert not (tmp_path / "run").exists()
+
+
+def test_another_case_is_not_cleaned(call, tmp_path):
+    with locked(tmp_path / "run", "run", "other"):
+        pass
+    code, _, errors = call("clean", str(CASE), "--out", str(tmp_path / "run"))
+    assert (code, "holds the run of other" in errors) == (2, True)
+
+
+def test_nothing_is_written_beside_files_of_a_user(call, tmp_path):
+    (tmp_path / "mine.toml").write_bytes(CASE.read_bytes())
+    for command in ("run", "clean"):
+        call(command, "mine.toml", "--out", ".")
+    assert [path.name for path in tmp_path.iterdir()] == ["mine.toml"]
 
 
 def test_a_run_folder_in_use_is_left_alone(call, tmp_path):
-    with locked(tmp_path / "busy"):
+    with locked(tmp_path / "busy", "run", "bga_drop"):
+        before = sorted(tmp_path.rglob("*"))
         code, _, errors = call("run", str(CASE), "--out", str(tmp_path / "busy"))
     assert (code, "another run is at work" in errors) == (1, True)
-    assert [path.name for path in (tmp_path / "busy").iterdir()] == [".lock"]
+    assert sorted(tmp_path.rglob("*")) == before
 
 
 def test_the_schema_accepts_cases_and_refuses_bare_numbers(call):

@@ -8,7 +8,7 @@ import pytest
 from workflow.case import read_case
 from workflow.cluster import checks, queue
 from workflow.cluster.executor import ExecutorName, Local, Slurm, executor_for
-from workflow.cluster.job_output import JobOutput, log_of
+from workflow.cluster.job_output import JobOutput, failures_of
 from workflow.cluster.profile import FILE, SHIPPED, Profile, read_profile
 from workflow.cluster.queue import Partition, jobs_in, partitions
 from workflow.cluster.resources import stage_resources
@@ -24,12 +24,20 @@ rule shock:
 Error in rule shock:
     message: SLURM-job '7' failed, SLURM status is: 'TIMEOUT'. Reason: Unknown.For further error details see the log.
     jobid: 2
+    output: batch/done/shock-1
 Error in rule reflow:
     message: SLURM sbatch failed. The error message was 'sbatch: error: Memory specification can not be satisfied
 sbatch: error: Batch job submission failed'.
     sbatch call:
         sbatch --parsable
     jobid: 1
+    output: batch/done/reflow-2
+
+[Sun Nov 22 03:33:13 2026]
+Error in rule surface:
+    message: None
+    jobid: 3
+    output: batch/done/surface-3
 """
 
 
@@ -139,31 +147,27 @@ def test_partitions_and_jobs_of_a_folder(tmp_path, monkeypatch):
 
 
 def test_what_jobs_say_is_shown_as_it_comes(tmp_path, capfd):
-    (tmp_path / "logs").mkdir()
-    log = tmp_path / log_of("shock")
-    log.write_text("of an earlier run\n")
-    output = JobOutput(tmp_path, ["reflow", "shock"])
+    log = tmp_path / "shock-1.txt"
+    output = JobOutput([tmp_path / "reflow-1.txt", log])
     output.show()
     log.write_text("  shock on 2 ranks …\nhalf")
     output.show()
-    log.write_text("  shock on 2 ranks …\nhalf a line\nerror stage shock failed: why\ntraceback: x\n")
+    log.write_text("  shock on 2 ranks …\nhalf a line\n")
     output.show()
-    told = capfd.readouterr()
-    assert told.out == "  shock on 2 ranks …\nhalf a line\n"
-    assert told.err == "error stage shock failed: why\ntraceback: x\n"
+    assert capfd.readouterr().out == "  shock on 2 ranks …\nhalf a line\n"
 
 
 def test_jobs_that_ended_without_a_word_are_told(tmp_path):
     said = tmp_path / "snakemake.txt"
+    assert failures_of(said) == {}
     said.write_text("WorkflowError: the account is invalid")
-    assert JobOutput(tmp_path, ["shock"]).untold(said) == [f"Snakemake has ended; what it said is in {said}"]
+    assert failures_of(said) == {}
     said.write_text(SAID)
-    told = JobOutput(tmp_path, ["reflow", "shock"]).untold(said)
-    assert told == [
-        "stage shock failed: SLURM-job '7' failed, SLURM status is: 'TIMEOUT'. Reason: Unknown.",
-        "stage reflow failed: SLURM sbatch failed. The error message was 'sbatch: error: Memory specification can not"
+    assert failures_of(said) == {
+        "shock-1": "SLURM-job '7' failed, SLURM status is: 'TIMEOUT'. Reason: Unknown.",
+        "reflow-2": "SLURM sbatch failed. The error message was 'sbatch: error: Memory specification can not"
         " be satisfied\nsbatch: error: Batch job submission failed'.",
-    ]
+    }
 
 
 def test_launcher_of_mpi_ranks_is_a_choice(monkeypatch):

@@ -14,11 +14,11 @@ from tests.support.workflow_command import SMALL_CASE
 from workflow import findings
 from workflow.case import read_case
 from workflow.forecast import forecast
-from workflow.inputs import stage_inputs
 from workflow.reflow.stage import reflow
 from workflow.report import joint_tables
 from workflow.report.joint_records import joint_records
 from workflow.stage_runner import Run
+from workflow.store.keys import stage_inputs
 
 NAMES = ("A3", "A4", "B3", "B4")
 

@@ -24,12 +24,12 @@ from tests.support.workflow_command import SMALL_CASE
 from workflow import findings
 from workflow.case import display_values, read_case
 from workflow.case_text import case_text
-from workflow.inputs import stage_inputs
 from workflow.joint_meshes import mesh_real_joints
 from workflow.joint_surfaces import write_surfaces
 from workflow.problems import CaseError
 from workflow.products import write_json
 from workflow.stage_runner import Run
+from workflow.store.keys import stage_inputs
 
 
 @pytest.fixture

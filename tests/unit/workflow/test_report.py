@@ -7,6 +7,9 @@ import pytest
 
 from fem.materials.failure import failure_criteria, judge
 from fem.parameters import Failure
+from tests.support.products import record_of
+from tests.support.workflow_command import SMALL_CASE
+from workflow.case import read_case
 from workflow.report import body as report_body
 from workflow.report import joint_tables, tables
 from workflow.report.array_map import array_map
@@ -14,7 +17,8 @@ from workflow.report.curves import energy_curves, history_curves
 from workflow.report.histories import late_peak
 from workflow.report.pictures import exaggeration
 from workflow.report.shock import ranking_mode
-from workflow.summary import collect_summary, inputs_digest, write_summary
+from workflow.store.keys import inputs_digest
+from workflow.summary import collect_summary, write_summary
 
 JOINT = {"standoff": 3.2e-4, "max_width": 5.5e-4}
 
@@ -104,16 +108,11 @@ def test_curves_are_inline_svg(history):
 
 
 def test_summary_merges_the_stages_that_have_run(tmp_path):
+    case = read_case(SMALL_CASE)
     for stage, value in (("geometry", 25), ("shock", 1e8)):
-        (tmp_path / stage).mkdir()
-        record = {
-            "seconds": 1.5,
-            "metrics": {stage: {"value": value, "unit": ""}},
-            "health": {},
-            "effects": {"gravity": stage},
-        }
-        (tmp_path / stage / "stage.json").write_text(json.dumps(record))
-    summary = collect_summary(tmp_path, "small")
+        metrics = {stage: {"value": value, "unit": ""}}
+        record_of(tmp_path / stage, seconds=1.5, metrics=metrics, effects={"gravity": stage})
+    summary = collect_summary(tmp_path, case)
     assert summary["timings"] == {"geometry": 1.5, "shock": 1.5}
     assert set(summary["metrics"]) == {"geometry", "shock"}
     assert summary["effects"] == {"gravity": "geometry", "gravity_in_the_shock": "shock"}
@@ -121,12 +120,9 @@ def test_summary_merges_the_stages_that_have_run(tmp_path):
     assert json.loads((tmp_path / "summary.json").read_text()) == summary
 
 
-def test_digest_changes_with_any_input(tmp_path):
-    (tmp_path / "inputs").mkdir()
-    (tmp_path / "inputs/shock.json").write_text("{}")
-    before = inputs_digest(tmp_path)
-    (tmp_path / "inputs/shock.json").write_text('{"a": 1}')
-    assert inputs_digest(tmp_path) != before
+def test_digest_changes_with_any_input():
+    changed = read_case(SMALL_CASE, ["shock.peak_acceleration=1000 G"])
+    assert inputs_digest(changed) != inputs_digest(read_case(SMALL_CASE))
 
 
 def test_a_board_at_rest_is_drawn_as_it_is():

@@ -5,8 +5,8 @@ import pytest
 from tests.support.workflow_command import SMALL_CASE
 from workflow.case import read_case
 from workflow.case_text import templates, write_new_case
-from workflow.inputs import stage_inputs
 from workflow.problems import CaseError
+from workflow.store.keys import stage_inputs
 
 SCALES = """
 [scales.quick]

@@ -10,11 +10,11 @@ from tests.support.workflow_command import WHO_COMPUTES
 from workflow.board_drop_case import BoardDropCase
 from workflow.case import display_values, read_case
 from workflow.case_text import templates, write_new_case
-from workflow.inputs import stage_inputs
 from workflow.problems import CaseError
 from workflow.scene_cases import DropCase, JointCase
 from workflow.scene_forecast import forecast_scene
 from workflow.schema import case_schema
+from workflow.store.keys import stage_inputs
 
 CASES = Path(__file__).resolve().parents[3] / "cases"
 DROP, BALL, JOINT, FREE = (

@@ -1,23 +1,30 @@
-"""A stage's folder appears complete, or not at all; a run folder has one user at a time."""
+"""A product appears complete, or not at all; what a stage has used is still so when it ends."""
 
 import json
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from tests.support.products import record_of
 from tests.support.workflow_command import SMALL_CASE
 from workflow.case import read_case
 from workflow.check_text import against_limit
-from workflow.pipeline import RunFolderBusy, failed_checks, locked
-from workflow.problems import CaseError
-from workflow.stage_runner import Findings, Run, execute, run_stage
+from workflow.stage_runner import Findings, Run, StageError, execute, run_stage
+from workflow.store.store import MESSAGE, TRACEBACK
 
 
 @pytest.fixture
 def run(tmp_path):
+    record_of(tmp_path / "reflow")
     return Run(tmp_path, read_case(SMALL_CASE), cores=1)
+
+
+@pytest.fixture
+def product(tmp_path):
+    return tmp_path / "products/surface-1"
 
 
 def write_surfaces(_run: Run, folder: Path) -> Findings:
@@ -33,64 +40,81 @@ def fail(_run: Run, folder: Path) -> Findings:
     raise ValueError("no surface")
 
 
-def test_a_stage_leaves_products_and_a_record(run):
-    record = run_stage("surface", write_surfaces, run)
-    written = json.loads((run.folder / "surface/stage.json").read_text())
+def test_a_stage_leaves_products_and_a_record(run, product):
+    record = run_stage("surface", write_surfaces, run, product)
+    written = json.loads((product / "stage.json").read_text())
     assert written == record
+    assert written["key"] == "1"
+    assert set(written["reads"]) == {"reflow"}
+    assert set(written["files"]) == {"surfaces.json"}
     assert written["metrics"]["volume"] == {"value": 1.0, "unit": "m^3"}
     assert written["seconds"] >= 0.0
-    assert sorted(path.name for path in run.folder.iterdir()) == ["surface"]
+    assert sorted(path.name for path in run.folder.iterdir()) == ["products", "reflow"]
 
 
-def test_processor_time_of_programs_that_a_stage_starts_is_counted(run):
+def test_processor_time_of_programs_that_a_stage_starts_is_counted(run, product):
     busy = "import time\nwhile time.process_time() < 0.2: pass"
 
-    def start(_run: Run, _folder: Path) -> Findings:
+    def start(run: Run, folder: Path) -> Findings:
         subprocess.run([sys.executable, "-c", busy], check=True)
-        return Findings()
+        return write_surfaces(run, folder)
 
-    assert run_stage("surface", start, run)["core_seconds"] >= 0.2
+    assert run_stage("surface", start, run, product)["core_seconds"] >= 0.2
 
 
-def test_a_failed_stage_leaves_no_product(run):
+def test_a_failed_stage_leaves_no_product(run, product):
     with pytest.raises(ValueError, match="no surface"):
-        run_stage("surface", fail, run)
-    assert not (run.folder / "surface").exists()
+        run_stage("surface", fail, run, product)
+    assert not product.exists()
+    assert not execute("surface", fail, run, product)
+    assert (run.folder / ".surface.partial" / MESSAGE).read_text() == "ValueError: no surface"
+    assert "no surface" in (run.folder / ".surface.partial" / TRACEBACK).read_text()
 
 
-def test_a_rerun_replaces_all_of_a_product(run):
-    run_stage("surface", write_surfaces, run)
-    (run.folder / "surface/old.vtu").write_text("old")
+def test_a_rerun_replaces_all_of_a_product(run, product):
+    run_stage("surface", write_surfaces, run, product)
+    (product / "old.vtu").write_text("old")
     (run.folder / ".surface.partial").mkdir()
-    run_stage("surface", write_surfaces, run)
-    assert not (run.folder / "surface/old.vtu").exists()
+    run_stage("surface", write_surfaces, run, product)
+    assert not (product / "old.vtu").exists()
 
 
-def test_a_check_that_failed_is_named(run):
-    run_stage("surface", write_surfaces, run)
-    assert failed_checks(run.folder, run.case.pipeline.upstream("report")) == ["surface: volume error 0.2, limit 0.1"]
-    assert failed_checks(run.folder, run.case.pipeline.upstream("reflow")) == []
+def test_a_stage_that_does_not_write_what_it_is_to_write_has_failed(run, product):
+    with pytest.raises(StageError, match=r"has not written surface/surfaces\.json"):
+        run_stage("surface", lambda *_: Findings(), run, product)
+    assert not product.exists()
 
 
-def test_a_run_folder_has_one_user(tmp_path):
-    with locked(tmp_path), pytest.raises(RunFolderBusy, match="another run is at work"), locked(tmp_path):
-        pass
-    with locked(tmp_path):
-        pass
+def test_a_product_that_changes_while_a_stage_reads_it_is_noticed(run, product):
+    def change(run: Run, folder: Path) -> Findings:
+        (run.folder / "reflow/more.txt").write_text("more")
+        record_of(run.folder / "reflow")
+        return write_surfaces(run, folder)
+
+    with pytest.raises(StageError, match="a product that it reads has changed"):
+        run_stage("surface", change, run, product)
 
 
-def test_an_interrupt_that_compiled_code_wraps_is_one(run):
+def test_a_file_of_the_case_that_changes_while_a_stage_is_at_work_is_noticed(run, product, tmp_path):
+    surface = tmp_path / "A1.stl"
+    surface.write_text("first")
+    given = run.case.package.model_copy(update={"surfaces": {"A1": str(surface)}})
+    run = replace(run, case=run.case.model_copy(update={"package": given}))
+
+    def change(run: Run, folder: Path) -> Findings:
+        surface.write_text("second")
+        return write_surfaces(run, folder)
+
+    with pytest.raises(StageError, match=r"package\.surfaces\.A1: the file has changed"):
+        run_stage("surface", change, run, product)
+
+
+def test_an_interrupt_that_compiled_code_wraps_is_one(run, product):
     def interrupted(_run: Run, _folder: Path):
         raise SystemError("returned a result with an exception set") from KeyboardInterrupt()
 
     with pytest.raises(KeyboardInterrupt):
-        execute("surface", interrupted, run)
-
-
-def test_a_file_is_no_run_folder(tmp_path):
-    (tmp_path / "file").touch()
-    with pytest.raises(CaseError, match="cannot be a run folder"), locked(tmp_path / "file"):
-        pass
+        execute("surface", interrupted, run, product)
 
 
 def test_checks_of_quantities_have_their_unit():

@@ -8,9 +8,9 @@ import pytest
 
 from workflow.case import display_values, read_case
 from workflow.case_text import case_text, templates
-from workflow.inputs import compare, stage_inputs
 from workflow.problems import CaseError
 from workflow.schema import case_schema
+from workflow.store.keys import compare, stage_inputs
 from workflow.structure.forecast import forecast_structure
 from workflow.structure.report import meshed_part
 

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from tests.support.workflow_command import SMALL_CASE
-from workflow.points.batch import Machine, missing
-from workflow.points.point import PointsError
-from workflow.points.store import Store
 from workflow.problems import CaseError
 from workflow.stage_forecast import stage_seconds
+from workflow.store.batch import Machine, missing
+from workflow.store.point import PointsError
+from workflow.store.store import Store
 from workflow.study import tables
 from workflow.study.command import read_points_of, results, run_study
 from workflow.study.designs import Factor
@@ -214,5 +214,5 @@ def test_a_metric_that_there_is_not_is_told(write, tmp_path, monkeypatch, capsys
     monkeypatch.setattr("workflow.study.command.missing", lambda *_: [])
     monkeypatch.setattr("workflow.study.command.row_of", lambda *_: ROWS[0])
     monkeypatch.setattr("workflow.study.page.write_results", lambda *_: None)
-    assert not run_study(points, Store(tmp_path), Machine(1))
+    assert not run_study(points, Store(tmp_path / "store"), Machine(1))
     assert "did you mean stress?" in capsys.readouterr().err

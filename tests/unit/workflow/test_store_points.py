@@ -1,15 +1,13 @@
 """Points: what their products depend on, which are missing, what is said of those that cannot be."""
 
-import json
-
 import pytest
 
+from tests.support.products import make
 from tests.support.workflow_command import SMALL_CASE
-from workflow.inputs import examine
-from workflow.points.batch import job_name, missing, why
-from workflow.points.point import PointsError, read_possible_points
-from workflow.points.store import Store, publish
-from workflow.stage_runner import MESSAGE
+from workflow.store.batch import log_of, missing, show_products, why
+from workflow.store.point import PointsError, read_possible_points
+from workflow.store.state import examine
+from workflow.store.store import MESSAGE, Store
 
 HEATED = {"warpage.corner": "0 mm", "thermal.steps": "2"}
 
@@ -44,7 +42,7 @@ def test_where_the_solder_freezes_changes_the_reflow_and_what_cools_from_there_o
 
 def test_another_version_makes_other_products(monkeypatch):
     before = digests({})
-    monkeypatch.setattr("workflow.points.point.__version__", "0")
+    monkeypatch.setattr("workflow.store.keys.__version__", "0")
     assert not set(before.values()) & set(digests({}).values())
 
 
@@ -55,10 +53,7 @@ def test_a_shared_product_is_missing_once(tmp_path):
     jobs = missing(store, points, "report")
     count = {stage: sum(job.stage == stage for job in jobs) for stage in points[0].case.pipeline.names}
     assert count == {"geometry": 1, "reflow": 2, "surface": 2, "solder_mesh": 2, "shock": 3, "report": 3}
-    for job in jobs[:2]:
-        folder = store.stage_folder(job.point.case, job.stage)
-        folder.mkdir(parents=True)
-        (folder / "stage.json").write_text("{}")
+    make(store, points[0], ["geometry", "reflow"])
     assert [job.stage for job in missing(store, points[:2], "solder_mesh")] == ["surface", "solder_mesh"]
     assert missing(store, points[:1], "surface")[0].needs == ()
     assert not store.is_complete(points[0], "surface")
@@ -67,23 +62,28 @@ def test_a_shared_product_is_missing_once(tmp_path):
 
 def test_a_point_has_a_run_folder_as_any_other(tmp_path):
     store, point = Store(tmp_path), read_possible_points(SMALL_CASE, [{}])[0][0]
-    store.prepare(point)
-    store.prepare_work(point, "geometry")
-    made = store.work_folder(point, "geometry") / "geometry"
-    made.mkdir()
-    for product in point.case.pipeline["geometry"].products:
-        (made.parent / product).write_text("made")
-    record = {"inputs": json.loads((store.run_folder(point) / "inputs/geometry.json").read_text())}
-    (made / "stage.json").write_text(json.dumps(record))
-    publish(made.parent, "geometry", store.stage_folder(point.case, "geometry"))
-    assert not made.parent.exists()
-    verdicts = examine(store.run_folder(point), point.case)
+    make(store, point, ["geometry"])
+    show_products(store, point)
+    assert (store.run_folder(point) / "geometry/assembly.msh").samefile(
+        store.product(point, "geometry") / "assembly.msh"
+    )
+    verdicts = examine(store, point)
     assert not verdicts["geometry"].stale
     assert verdicts["reflow"].missing
+
+
+def test_why_a_point_is_not_complete_is_told(tmp_path):
+    store, point = Store(tmp_path), read_possible_points(SMALL_CASE, [{}])[0][0]
+    make(store, point, ["geometry"])
+    assert why(store, point, "geometry") == ""
     assert why(store, point, "report") == "stage reflow: was not reached"
-    (tmp_path / "logs").mkdir()
-    (tmp_path / "logs" / f"{job_name(point, 'reflow')}.txt").write_text("")
-    assert "stage reflow: ended without a word" in why(store, point, "report")
+    log = log_of(store, point, "reflow")
+    log.parent.mkdir(parents=True)
+    log.write_text("some words\nKilled\n")
+    assert (
+        f'stage reflow: ended without an error of its own, as when it is killed; its last words: "Killed"; see {log}'
+        == (why(store, point, "report"))
+    )
     message = store.work_folder(point, "reflow") / ".reflow.partial" / MESSAGE
     message.parent.mkdir(parents=True)
     message.write_text("it broke")

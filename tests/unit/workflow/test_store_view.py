@@ -1,0 +1,158 @@
+"""Run folders: they show products by name, keep what is a user's, and are cleaned of the program's files only."""
+
+import os
+import shutil
+
+import pytest
+
+from tests.support.products import make
+from tests.support.workflow_command import SMALL_CASE
+from workflow.case import read_case
+from workflow.problems import CaseError
+from workflow.store.batch import show_products
+from workflow.store.folders import RunFolderBusy, locked, remove_own
+from workflow.store.point import Point
+from workflow.store.state import examine
+from workflow.store.store import Store
+from workflow.store.view import remove_unused, withdraw_all
+
+POINT = Point({}, read_case(SMALL_CASE))
+OTHER = Point({}, read_case(SMALL_CASE, ["shock.peak_acceleration=1000 G"]))
+NAMES = POINT.case.pipeline.names
+
+
+@pytest.fixture
+def store(tmp_path):
+    store = Store(tmp_path / "run", one_run=True)
+    with locked(store.folder, "run", "small"):
+        make(store, POINT, NAMES)
+        show_products(store, POINT)
+    return store
+
+
+def test_products_have_the_names_that_users_know(store):
+    for stage in POINT.case.pipeline.stages:
+        assert all((store.folder / name).is_file() for name in (*stage.products, stage.record))
+    assert (store.folder / "report.html").read_text() == "report/report.html"
+    assert (store.folder / "summary.json").samefile(store.product(POINT, "report") / "summary.json")
+
+
+@pytest.mark.parametrize("lost", ["report.html", "reflow/shapes.h5", "surface"])
+def test_what_is_lost_is_put_back(store, lost):
+    path = store.folder / lost
+    shutil.rmtree(path) if path.is_dir() else path.unlink()
+    assert show_products(store, POINT)
+    assert path.exists()
+    assert show_products(store, POINT) == []
+
+
+def test_a_run_folder_shows_no_product_of_other_parameters(store):
+    show_products(store, OTHER)
+    assert (store.folder / "geometry/assembly.msh").exists()
+    assert not any((store.folder / name).exists() for name in ("report.html", "report", "summary.json", "shock"))
+    show_products(store, POINT)
+    assert (store.folder / "report.html").exists()
+
+
+def test_files_of_a_user_stay(store):
+    mine = [store.folder / "notes.txt", store.folder / "shock/notes.txt"]
+    for path in mine:
+        path.write_text("mine")
+    (store.folder / "report.html").unlink()
+    (store.folder / "report.html").write_text("mine, too")
+    show_products(store, POINT)
+    assert (store.folder / "report.html").read_text() == "report/report.html"
+    assert (store.folder / "report.html.kept-1").read_text() == "mine, too"
+    show_products(store, OTHER)
+    withdraw_all(store, store.folder)
+    assert remove_own(store.folder) == ["notes.txt", "report.html.kept-1", "shock"]
+    assert all(path.read_text() == "mine" for path in mine)
+
+
+def test_all_is_removed_where_nothing_is_a_users(store, monkeypatch):
+    withdraw_all(store, store.folder)
+    assert remove_own(store.folder) == []
+    assert not store.folder.exists()
+    store.folder.mkdir()
+    monkeypatch.chdir(store.folder)
+    assert remove_own(store.folder) == []
+    assert store.folder.is_dir()
+
+
+def test_a_store_that_is_a_link_is_not_followed(store, tmp_path):
+    precious = tmp_path / "precious"
+    store.home.rename(precious)
+    store.home.symlink_to(precious)
+    with pytest.raises(CaseError, match="is a link"):
+        remove_own(store.folder)
+    assert precious.is_dir()
+
+
+def test_a_file_where_a_folder_belongs_is_set_aside(store):
+    shutil.rmtree(store.folder / "reflow")
+    (store.folder / "reflow").write_text("mine")
+    show_products(store, POINT)
+    assert (store.folder / "reflow/shapes.h5").is_file()
+    assert (store.folder / "reflow.kept-1").read_text() == "mine"
+
+
+def test_without_hard_links_products_are_copied(store, monkeypatch):
+    def refuse(*_: object) -> None:
+        raise OSError(1, "Operation not permitted")
+
+    monkeypatch.setattr(os, "link", refuse)
+    (store.folder / "report.html").unlink()
+    assert show_products(store, POINT) == ["report.html"]
+    assert not (store.folder / "report.html").samefile(store.product(POINT, "report") / "report.html")
+    assert show_products(store, POINT) == []
+    (store.folder / "report.html").write_text("bits")
+    assert show_products(store, POINT) == ["report.html"]
+
+
+def test_unused_products_can_be_removed(store):
+    make(store, OTHER, ("shock", "report"))
+    assert remove_unused(store) == 2
+    assert not any(verdict.stale for verdict in examine(store, POINT).values())
+
+
+def test_a_copy_of_a_run_folder_is_one(store, tmp_path):
+    copy = Store(shutil.copytree(store.folder, tmp_path / "copy"), one_run=True)
+    assert show_products(copy, POINT) == []
+    assert not any(verdict.stale for verdict in examine(copy, POINT).values())
+
+
+@pytest.mark.parametrize(("what", "name"), [("run", "other"), ("study", "small")])
+def test_another_case_needs_force(store, what, name):
+    with pytest.raises(CaseError, match=r"holds the run of small.*--force"), locked(store.folder, what, name):
+        pass
+    with locked(store.folder, what, name, force=True):
+        pass
+    with locked(store.folder, what, name):
+        pass
+
+
+@pytest.mark.parametrize(
+    ("names", "words"), [(["notes.txt"], "files that are not"), (["inputs", ".snakemake"], "earlier")]
+)
+def test_a_folder_of_somebody_else_is_left_alone(tmp_path, names, words):
+    for name in names:
+        (tmp_path / name).mkdir()
+    for force in (False, True):
+        with pytest.raises(CaseError, match=words), locked(tmp_path, "run", "small", force):
+            pass
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(names)
+
+
+def test_a_run_folder_has_one_user(tmp_path):
+    first, second = locked(tmp_path, "run", "a"), locked(tmp_path, "run", "a")
+    with first, pytest.raises(RunFolderBusy, match="another run is at work"), second:
+        pass
+    with locked(tmp_path, "run", "a"):
+        pass
+
+
+@pytest.mark.parametrize("make_it", [lambda path: path.touch(), lambda path: path.symlink_to(path)])
+def test_what_is_no_folder_is_refused(tmp_path, make_it):
+    make_it(tmp_path / "file")
+    with pytest.raises(CaseError, match=r"is not a folder|cannot be used"), locked(tmp_path / "file", "run", "a"):
+        pass
