@@ -17,6 +17,11 @@ test: setup  ## run every check and test, on all cores
 	@.ci/setup-slurm
 	$(PYTHON) -m pytest --numprocesses=logical --maxprocesses=8 --dist=loadfile
 
+test-long: setup  ## the expensive sweeps: 50 interrupts, damage, random hard cases on three new seeds
+	REFLOWSHOCK_LONG=1 $(PYTHON) -m pytest tests/faults --numprocesses=logical --maxprocesses=4
+	@for seed in $$($(PYTHON) -c 'import random; print(*random.sample(range(10**6), 3))'); do echo "seed $$seed"; \
+	    $(PYTHON) -m workflow stress-test --random 500 --seed $$seed --out runs/stress-test-$$seed || exit 1; done
+
 test-debian13:  ## run every test on Debian 13 too, in a chroot; compare results (root)
 	@.ci/debian13
 
@@ -34,5 +39,5 @@ clean:  ## remove runs and caches (keeps .venv)
 	rm -rf runs build *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
 	find . -name __pycache__ -not -path './.venv/*' -prune -exec rm -rf {} +
 
-.PHONY: help setup demo test test-debian13 test-mpi lint bench clean
+.PHONY: help setup demo test test-long test-debian13 test-mpi lint bench clean
 .DEFAULT_GOAL := help

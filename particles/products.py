@@ -13,7 +13,10 @@ from particles.young_laplace import Meridian
 BODY = "body"
 REFERENCE = "reference"
 ARRAYS = ("points", "velocity", "pressure", "triangles")
-TIMES = ("seconds", "particle_steps_per_second")  # of one run: in no product, so that the same shape gives the same file
+TIMES = (
+    "seconds",
+    "particle_steps_per_second",
+)  # of one run: in no product, so that the same shape gives the same file
 
 
 def write_shapes(path: Path | str, shapes: Mapping[str, JointShape]) -> None:

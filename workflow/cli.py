@@ -37,7 +37,7 @@ Out = Annotated[
     Path | None, typer.Option("--out", metavar="DIR", help="run folder [default: runs/<case name>, with its scale]")
 ]
 Oversubscribe = Annotated[bool, typer.Option("--oversubscribe", help="allow more MPI ranks than cores")]
-Force = Annotated[bool, typer.Option("--force", help="write also into the folder of another case")]
+Force = Annotated[bool, typer.Option("--force", help="also where the folder holds another case")]
 AtOnce = Annotated[
     int | None,
     typer.Option("-j", "--cores", min=1, help=f"cores to use [default: all]; of a cluster: jobs at a time [{JOBS}]"),
@@ -169,12 +169,13 @@ def clean(
     unused: Annotated[
         bool, typer.Option("--unused", help="only products of other settings, and work that was broken off")
     ] = False,
+    force: Force = False,
 ) -> None:
     """Remove what the program has written into a case's run folder."""
     from workflow.run import clean as clean_run
 
     store, point = _load(case, settings, out, True)
-    clean_run(store.folder, point.case.case.name, unused=unused)
+    clean_run(store.folder, point.case.case.name, unused=unused, force=force)
 
 
 @app.command()

@@ -114,13 +114,14 @@ def verify(store: Store, point: Point) -> bool:
     return not any(verdict.stale for verdict in verdicts.values())
 
 
-def clean(folder: Path, name: str, *, unused: bool = False) -> None:
+def clean(folder: Path, name: str, *, unused: bool = False, force: bool = False) -> None:
     """Remove what the program has written into a run folder; what a user has put there stays.
 
     Args:
         folder: the run folder.
         name: of the case.
         unused: remove only products that the run folder does not show, and work that was broken off.
+        force: whether the folder may hold another case.
 
     Raises:
         CaseError: the folder holds another case.
@@ -129,7 +130,7 @@ def clean(folder: Path, name: str, *, unused: bool = False) -> None:
     if read_mark(folder) is None:
         console.print(f"nothing to remove: {folder} is not a run folder")
         return
-    with locked(folder, WHAT, name):
+    with locked(folder, WHAT, name, force):
         store = Store(folder, one_run=True)
         if unused:
             count = remove_unused(store)

@@ -227,7 +227,7 @@ def _impossible(climb: Climb) -> list[str]:
 
 def _failed(climb: Climb) -> list[str]:
     """Say how runs that failed are tried again, which no call does by itself."""
-    work = climb.stores[0].folder / "work"
+    work = climb.stores[0].home / "work"
     return [f"Runs that failed are not tried again, unless you remove {work}."] if climb.failed else []
 
 

@@ -14,6 +14,7 @@ from workflow.store.store import HOME
 
 MARK = ".reflowshock.json"
 LOCK = ".lock"
+UNKNOWN = {"holds": "run", "name": "a case that is not known, since its mark is damaged"}
 
 
 class RunFolderBusy(RuntimeError):
@@ -56,9 +57,9 @@ def read_mark(folder: Path) -> dict[str, str] | None:
         mark = json.loads((folder / MARK).read_text(encoding="utf-8"))
         return {"holds": str(mark["holds"]), "name": str(mark["name"])}
     except FileNotFoundError:
-        return None
+        return UNKNOWN if (folder / HOME).is_dir() else None
     except (OSError, ValueError, KeyError, TypeError):
-        return {"holds": "run", "name": "a case whose mark is damaged"}
+        return UNKNOWN
 
 
 @contextmanager

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from workflow.store.point import Point
 from workflow.store.product import RECORD, file_digest, read_record
-from workflow.store.store import CASE, Store, write_case
+from workflow.store.store import CASE, HOME, Store, write_case
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +54,20 @@ def listed(store: Store, folder: Path) -> dict[str, Shown]:
         table = json.loads(_list(store, folder).read_text(encoding="utf-8"))
         return {str(name): Shown(str(source), str(digest)) for name, (source, digest) in table.items()}
     except (OSError, ValueError, AttributeError, TypeError):
-        return {}
+        return _recognised(store, folder)
+
+
+def _recognised(store: Store, folder: Path) -> dict[str, Shown]:
+    """Return the files of a run folder that hold the same as files of products, where the list of them is lost."""
+    known: dict[str, Shown] = {}
+    for product in (store.home / "products").glob("*"):
+        files = (read_record(product) or {"files": {}})["files"]
+        if (product / RECORD).is_file():
+            files = files | {RECORD: file_digest(product / RECORD)}
+        known |= {digest: Shown(f"products/{product.name}/{name}", digest) for name, digest in files.items()}
+    own = [path for path in folder.rglob("*") if path.is_file() and HOME not in path.relative_to(folder).parts]
+    digests = {path.relative_to(folder).as_posix(): file_digest(path) for path in own}
+    return {name: known[digest] for name, digest in digests.items() if digest in known}
 
 
 def shown_records(store: Store, point: Point) -> dict[str, dict]:

@@ -54,6 +54,15 @@ def test_a_run_folder_shows_no_product_of_other_parameters(store):
     assert (store.folder / "report.html").exists()
 
 
+@pytest.mark.parametrize("harm", ["", "{", "[1]", '{"report.html": 1}'])
+def test_where_the_list_is_lost_products_are_recognised(store, harm):
+    (store.folder / "notes.txt").write_text("mine")
+    (store.home / "views/run.json").write_text(harm)
+    show_products(store, OTHER)
+    assert (store.folder / "geometry/assembly.msh").exists() and (store.folder / "notes.txt").exists()
+    assert not any((store.folder / name).exists() for name in ("report.html", "report", "summary.json", "shock"))
+
+
 def test_files_of_a_user_stay(store):
     mine = [store.folder / "notes.txt", store.folder / "shock/notes.txt"]
     for path in mine:

@@ -1,0 +1,49 @@
+"""Folders of any name, folders of somebody else, names that lead elsewhere."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+from tests.support.faults import DROP, SMALL_DROP, run_drop
+
+ODD = "Drop test #3: a\n\"b' {c} [/x] $(touch pwned) %d *é;\\ -e"
+
+
+def test_a_folder_of_any_name_will_do(tmp_path):
+    folder = tmp_path / ODD / "run"
+    for words in ("ok     reflow", "nothing to do"):
+        result = run_drop(folder, cwd=tmp_path)
+        assert result.returncode == 0, result.stdout + result.stderr
+        assert words in result.stdout
+    assert (folder / "report.html").is_file()
+    assert [path.name for path in tmp_path.iterdir()] == [ODD]
+    for command in ("status", "verify", "plan", "report", "clean"):
+        result = run_drop(folder, command, cwd=tmp_path)
+        assert result.returncode == 0, command + result.stdout + result.stderr
+    assert not folder.exists()
+
+
+def test_products_of_another_time_are_products(tmp_path):
+    """Times of files do not matter: neither those that lie in the future nor those of a copy."""
+    folder = tmp_path / "run"
+    assert run_drop(folder).returncode == 0
+    for path in (folder / ".store/products").rglob("*"):
+        os.utime(path, (4e9, 4e9))
+    assert "nothing to do" in run_drop(folder).stdout
+    other = run_drop(folder, "run", "--set", "drop.contact_angle=70 deg")
+    assert other.returncode == 0, other.stderr
+    assert "ok     reflow" in other.stdout
+
+
+@pytest.mark.parametrize("name", ["../../esc", "a/b", "..", ".", "a\n", "x" * 5000, "/etc", "-x y"])
+def test_names_do_not_lead_out_of_a_folder(tmp_path, name):
+    text = f'[scales."{name}"]\n'.replace("\n", "\\n", name.count("\n"))
+    case = tmp_path / "case.toml"
+    case.write_text(DROP.read_text() + "\n" + text + '"drop.particles_per_edge" = 5\n')
+    line = [sys.executable, "-m", "workflow", "run", str(case), "--set", f"scale={name}", *SMALL_DROP]
+    result = subprocess.run(line, capture_output=True, text=True, timeout=60, check=False, cwd=tmp_path)
+    assert result.returncode == 2, result.stdout + result.stderr
+    assert len(result.stderr) < 2000
+    assert [path.name for path in tmp_path.iterdir()] == ["case.toml"]

@@ -1,0 +1,92 @@
+"""A run that is broken off anywhere, at any time, by any signal, ends the same as one that is not.
+
+A success that is reported has happened: whatever was broken off, the command that is repeated computes what is missing.
+"""
+
+import os
+import random
+import shutil
+import signal
+import subprocess
+import time
+
+import psutil
+import pytest
+
+from tests.support.faults import SEED, answers
+from tests.support.workflow_command import command_line, reflowshock
+
+LONG = bool(os.environ.get("REFLOWSHOCK_LONG"))  # make test-long
+COUNT = 50 if LONG else 4
+CHANGED = ("shock.peak_acceleration=1000 G",)
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGKILL)
+ROUNDING = 1e-6
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory):
+    """Folder, and how long it took."""
+    folder, begin = tmp_path_factory.mktemp("undisturbed") / "small", time.monotonic()
+    result = reflowshock("run", folder)
+    assert result.returncode == 0, result.stdout + result.stderr
+    return folder, time.monotonic() - begin
+
+
+def same(found: dict[str, object], expected: dict[str, object]) -> None:
+    assert found.keys() == expected.keys()
+    for name, value in expected.items():
+        if isinstance(value, float):
+            assert found[name] == pytest.approx(value, rel=ROUNDING, abs=1e-12), name
+        else:
+            assert found[name] == value, name
+
+
+def whom(process: subprocess.Popen, choice: random.Random) -> list[psutil.Process]:
+    """The command, a process of its Snakemake, stage, launcher or MPI ranks."""
+    children = psutil.Process(process.pid).children(recursive=True)
+    return [choice.choice([psutil.Process(process.pid), *children])]
+
+
+@pytest.mark.parametrize("number", range(COUNT))
+def test_a_run_that_was_broken_off_goes_on_to_the_same_answer(undisturbed, tmp_path, number):
+    choice = random.Random(f"{SEED} {number}")
+    expected, seconds = undisturbed
+    process = subprocess.Popen(
+        command_line("run", tmp_path / "small"), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    )
+    time.sleep(choice.uniform(0.5, seconds))
+    chosen = choice.choice(SIGNALS)
+    if process.poll() is None:
+        children = psutil.Process(process.pid).children(recursive=True)
+        for victim in whom(process, choice):
+            victim.send_signal(chosen)
+        process.wait(timeout=120)
+        assert psutil.wait_procs(children, timeout=20)[1] == []
+    result = reflowshock("run", tmp_path / "small")
+    assert result.returncode == 0, f"seed {SEED}, {number}: {result.stdout}{result.stderr}"
+    same(answers(tmp_path / "small"), answers(expected))
+    assert reflowshock("verify", tmp_path / "small").returncode == 0
+
+
+@pytest.mark.parametrize("end", [signal.SIGINT, signal.SIGTERM])
+def test_an_old_result_is_never_reported_as_a_new_one(undisturbed, tmp_path, end):
+    """A complete run, a changed one that is broken off in its shock, and the changed one again."""
+    folder = tmp_path / "small"
+    shutil.copytree(undisturbed[0], folder)
+    line = command_line("run", folder, settings=CHANGED)
+    process = subprocess.Popen(line, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    deadline = time.monotonic() + 100.0
+    while not list(folder.glob(".store/work/shock-*/.shock.partial/two_scale/input.json")):
+        assert process.poll() is None and time.monotonic() < deadline
+        time.sleep(0.02)
+    process.send_signal(end)
+    assert process.wait(timeout=60) == 1
+    assert not (folder / "report.html").exists() and not (folder / "summary.json").exists()
+    result = reflowshock("run", folder, settings=CHANGED)
+    assert result.returncode == 0, result.stdout + result.stderr
+    assert "ok     shock" in result.stdout
+    ratio = answers(folder)["peak_board_strain"] / answers(undisturbed[0])["peak_board_strain"]
+    assert ratio == pytest.approx(1000 / 1500, rel=0.05)
+    back = reflowshock("run", folder)
+    assert "nothing to do" in back.stdout
+    assert answers(folder) == answers(undisturbed[0])

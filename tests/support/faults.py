@@ -1,0 +1,24 @@
+"""Helpers of the fault tests: a small drop by the command, its answers, the seed of what is random."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+DROP = Path(__file__).resolve().parents[2] / "cases/sessile_drop/case.toml"
+SMALL_DROP = ("--set", "drop.particles_per_edge=5")
+SEED = int(os.environ.get("REFLOWSHOCK_SEED", "15"))  # of whatever is random; pytest shows it in the names of tests
+TIMES = ("seconds", "per_second", "memory", "wall", "setup", "time_ratio", "core_ratio")  # of metrics no two runs share
+
+
+def run_drop(folder: Path, command: str = "run", *options: str, **more: object) -> subprocess.CompletedProcess:
+    """Run a command on a drop of 125 particles to its end."""
+    line = [sys.executable, "-m", "workflow", command, str(DROP), *SMALL_DROP, "--out", str(folder), *options]
+    return subprocess.run(line, capture_output=True, text=True, timeout=240, check=False, **more)
+
+
+def answers(folder: Path) -> dict[str, object]:
+    """Return the metrics of a run that another run must repeat."""
+    found = json.loads((folder / "summary.json").read_text())["metrics"]
+    return {name: entry["value"] for name, entry in found.items() if not any(word in name for word in TIMES)}
