@@ -200,7 +200,11 @@ def _run(store: Store, jobs: Sequence[Job], machine: Machine, lock: int) -> bool
     if machine.live and machine.slurm:
         follow = JobOutput([log_of(store, job.point, job.stage) for job in jobs]).show
     config = ("--config", f"oversubscribe={int(machine.oversubscribe)}", f"cluster={int(bool(machine.slurm))}")
-    return snakemake(store.home.resolve(), machine.executor, ["--scheduler", "greedy", *config], lock, follow)
+    try:
+        return snakemake(store.home.resolve(), machine.executor, ["--scheduler", "greedy", *config], lock, follow)
+    finally:
+        for job in jobs:
+            store.drop_work(job.point, job.stage)
 
 
 def write_jobs(store: Store, jobs: Sequence[Job], machine: Machine) -> None:

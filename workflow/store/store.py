@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -76,6 +77,12 @@ class Store:
             link.symlink_to(os.path.relpath(self.product(point, before.name), folder))
         write_case(folder, point.case)
         self._message(point, stage).unlink(missing_ok=True)
+
+    def drop_work(self, point: Point, stage: str) -> None:
+        """Remove the run folder in which a product was to be made, if its stage has left nothing in it."""
+        folder = self.work_folder(point, stage)
+        if folder.is_dir() and not any((folder / f".{stage}.{kind}").exists() for kind in ("partial", "checkpoints")):
+            shutil.rmtree(folder)
 
     def message(self, point: Point, stage: str) -> str | None:
         """Return why a stage failed when it was last tried; None where it did not, or was not tried."""
