@@ -109,8 +109,9 @@ def missing(store: Store, points: Sequence[Point], until: str) -> list[Job]:
 
 
 def show_products(store: Store, point: Point) -> list[str]:
-    """Show in a point's run folder what is there and intact; return files that had to be put back."""
-    return show(store, point, [name for name, verdict in examine(store, point).items() if not verdict.stale])
+    """Show in a point's run folder what is there, intact, and made from what is there; return files put back."""
+    verdicts = examine(store, point)
+    return show(store, point, [name for name, one in verdicts.items() if not (one.stale or one.because_of)])
 
 
 def run_points(
