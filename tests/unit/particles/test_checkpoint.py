@@ -135,7 +135,7 @@ def test_a_write_that_fails_leaves_the_old_file(tmp_path, monkeypatch):
     def fail(_):
         raise OSError("no space")
 
-    monkeypatch.setattr("particles.checkpoint.os.fsync", fail)
+    monkeypatch.setattr("particles.data_file.os.fsync", fail)
     with pytest.raises(OSError, match="no space"):
         checkpoint.write("new")
     assert checkpoint.read() == "old"
