@@ -3,7 +3,8 @@
 Every rank has files of its own, in a folder for the inputs and the division into ranks that the run has. A run
 continues from the latest window of which all files are whole: to the same bits where the division is its own, else with
 what the files of all ranks together say (``portable``); its first own checkpoint then replaces those. The other
-generation is there for a kill between two ranks' files. As in every pickle, a file from a stranger must not be read.
+generation is there for a kill between two ranks' files, and for files that are broken. All are data (``data_file``):
+nothing in them is executed, whoever has written them.
 """
 
 import hashlib
@@ -23,9 +24,10 @@ from fem.checkpoint_files import (
     Checkpoint,
     Header,
     digest_of,
+    fault_of,
     find_checkpoints,
-    is_whole,
     read_state,
+    warn,
     write_state,
 )
 from fem.errors import CheckpointError
@@ -89,12 +91,20 @@ class Checkpoints:
             self._own.mkdir(parents=True, exist_ok=True)
         found = find_checkpoints(self._folder, self._owner, self._own) if self._comm.rank == 0 else []
         for checkpoint in self._comm.bcast(found):
-            mine = checkpoint.paths[self._comm.rank :: self._comm.size]
-            if self._comm.allreduce(all(is_whole(path) for path in mine), MPI.LAND):
+            if self._is_whole(checkpoint):
                 self.latest, self.continued, self.moved = checkpoint, checkpoint.window, not checkpoint.preferred
                 self._generation = (checkpoint.generation + 1) % GENERATIONS
                 return portable.values(self._part(checkpoint.paths, like))
         return None
+
+    def _is_whole(self, checkpoint: Checkpoint) -> bool:
+        """Return whether all files of a checkpoint are whole; warn of those that are not; collective."""
+        mine = checkpoint.paths[self._comm.rank :: self._comm.size]
+        faults = self._comm.allgather([fault for path in mine if (fault := fault_of(path))])
+        if self._comm.rank == 0:
+            for fault in (fault for some in faults for fault in some):
+                warn(f"{fault}: the run continues from an older checkpoint, or starts anew")
+        return not any(faults)
 
     def is_due(self) -> bool:
         """Return whether the interval has passed on rank 0; collective."""
