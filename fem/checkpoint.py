@@ -20,23 +20,23 @@ from mpi4py import MPI
 from fem import portable
 from fem.checkpoint_files import (
     FOLDER_NAME,
+    KEPT,
     STATE,
     Checkpoint,
     Header,
     digest_of,
-    fault_of,
     find_checkpoints,
-    read_state,
+    header_of,
     warn,
     write_state,
 )
+from fem.data_file import NotData, read_data
 from fem.errors import CheckpointError
-from fem.portable import State
+from fem.portable import ENTRIES, State
 from fem.whereabouts import HERE
 
 LIBRARIES = ("numpy", "scipy", "numba")
 GENERATIONS = 2
-KEPT = "{name}-{rank:04d}"
 
 
 class Checkpoints:
@@ -62,6 +62,7 @@ class Checkpoints:
         self.moved = False
         self._owner = digest_of(repr(inputs).encode() + _code())
         self._own, self._first = Path(), set[str]()
+        self._kept: dict[str, None] = {}  # names, in order
         self._written, self._generation = monotonic(), 0
 
     @property
@@ -94,13 +95,17 @@ class Checkpoints:
             if self._is_whole(checkpoint):
                 self.latest, self.continued, self.moved = checkpoint, checkpoint.window, not checkpoint.preferred
                 self._generation = (checkpoint.generation + 1) % GENERATIONS
+                header = None if self.moved else header_of(checkpoint.paths[self._comm.rank])
+                self._kept = dict.fromkeys(header.kept) if header else {}
                 return portable.values(self._part(checkpoint.paths, like))
         return None
 
     def _is_whole(self, checkpoint: Checkpoint) -> bool:
         """Return whether all files of a checkpoint are whole; warn of those that are not; collective."""
-        mine = checkpoint.paths[self._comm.rank :: self._comm.size]
-        faults = self._comm.allgather([fault for path in mine if (fault := fault_of(path))])
+        mine = range(self._comm.rank, checkpoint.ranks, self._comm.size)
+        faults = self._comm.allgather(
+            [fault for rank in mine for fault in faults_of(checkpoint.folder, rank, checkpoint.generation)]
+        )
         if self._comm.rank == 0:
             for fault in (fault for some in faults for fault in some):
                 warn(f"{fault}: the run continues from an older checkpoint, or starts anew")
@@ -119,7 +124,7 @@ class Checkpoints:
         """Write this rank's state at a window and a time [s] over the older generation; after ``read``; collective."""
         if self._folder is None:
             return
-        header = Header(self._owner, self._comm.size, window, time)
+        header = Header(self._owner, self._comm.size, window, time, tuple(self._kept))
         write_state(self._own / STATE.format(rank=self._comm.rank, generation=self._generation), header, state)
         self._comm.Barrier()  # no rank may overwrite its older file before all have the newer one
         self.latest = Checkpoint(window, True, self._own, self._generation, self._comm.size, time)
@@ -133,6 +138,7 @@ class Checkpoints:
         if self._folder is not None:
             path = self._own / KEPT.format(name=name, rank=self._comm.rank)
             write_state(path, Header(self._owner, self._comm.size), state)
+            self._kept[name] = None
 
     def kept(self, name: str, like: State) -> dict[str, Any]:
         """Return the values of what was kept before the window from which the run continues; before the next ``write``.
@@ -170,6 +176,28 @@ class Checkpoints:
         before = {name for _, names in everyone[: self._comm.rank] for name in names}
         self._first = like.keys() - before
         return digest_of(repr(everyone).encode())
+
+
+def read_state(path: Path) -> Any:
+    """Return the state in a file.
+
+    Raises:
+        NotData: The file is broken off, changed or no state.
+    """
+    return read_data(path, ENTRIES)
+
+
+def faults_of(folder: Path, rank: int, generation: int) -> list[str]:
+    """Say what is wrong with the files of a rank: its state and what it had kept until then; empty if all are whole."""
+    path = folder / STATE.format(rank=rank, generation=generation)
+    header, faults = header_of(path), []
+    names = header.kept if header else ()
+    for file in (path, *(folder / KEPT.format(name=name, rank=rank) for name in names)):
+        try:
+            read_state(file)
+        except NotData as error:
+            faults.append(str(error))
+    return faults
 
 
 def remove_others(own: Path) -> None:

@@ -6,14 +6,14 @@ A checkpoint is the files of all ranks of a run at one window, in a folder named
 import hashlib
 import json
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
-from fem.data_file import NotData, fields_of, read_data, read_header, write_data
-from fem.portable import ENTRIES
+from fem.data_file import NotData, fields_of, read_header, write_data
 
 STATE = "state-{rank:04d}-{generation}"
+KEPT = "{name}-{rank:04d}"
 STATE_NAME = re.compile(r"state-(\d{4,})-(\d)")
 FOLDER_NAME = re.compile(r"[0-9a-f]{12}-[0-9a-f]{12}")
 
@@ -26,12 +26,14 @@ class Header:
         owner: Digest of the inputs and the code.
         ranks: How many ranks the run has.
         window: After which it was written, and the ``time`` [s] there.
+        kept: Names of what the rank has kept in files of their own until then.
     """
 
     owner: str
     ranks: int
     window: int = 0
     time: float = 0.0
+    kept: Sequence[str] = ()
 
 
 @dataclass(frozen=True, order=True)
@@ -92,24 +94,6 @@ def header_of(path: Path) -> Header | None:
 def warn(what: str) -> None:
     """Tell the launcher, which shows it, what is wrong and what comes of it."""
     print(json.dumps({"warning": what}), flush=True)
-
-
-def read_state(path: Path) -> Any:
-    """Return the state in a file.
-
-    Raises:
-        NotData: The file is broken off, changed or no state.
-    """
-    return read_data(path, ENTRIES)
-
-
-def fault_of(path: Path) -> str:
-    """Say what is wrong with a file; empty where it has all of its state."""
-    try:
-        read_state(path)
-    except NotData as error:
-        return str(error)
-    return ""
 
 
 def write_state(path: Path, header: Header, state: object) -> None:
