@@ -3,7 +3,8 @@
 Every rank has files of its own, in a folder for the inputs and the division into ranks that the run has. A run
 continues from the latest window of which all files are whole: to the same bits where the division is its own, else with
 what the files of all ranks together say (``portable``); its first own checkpoint then replaces those. The other
-generation is there for a kill between two ranks' files. As in every pickle, a file from a stranger must not be read.
+generation is there for a kill between two ranks' files, and for files that are broken. All are data (``data_file``):
+nothing in them is executed, whoever has written them.
 """
 
 import hashlib
@@ -19,22 +20,23 @@ from mpi4py import MPI
 from fem import portable
 from fem.checkpoint_files import (
     FOLDER_NAME,
+    KEPT,
     STATE,
     Checkpoint,
     Header,
     digest_of,
     find_checkpoints,
-    is_whole,
-    read_state,
+    header_of,
+    warn,
     write_state,
 )
+from fem.data_file import NotData, read_data
 from fem.errors import CheckpointError
-from fem.portable import State
+from fem.portable import ENTRIES, State
 from fem.whereabouts import HERE
 
 LIBRARIES = ("numpy", "scipy", "numba")
 GENERATIONS = 2
-KEPT = "{name}-{rank:04d}"
 
 
 class Checkpoints:
@@ -60,6 +62,7 @@ class Checkpoints:
         self.moved = False
         self._owner = digest_of(repr(inputs).encode() + _code())
         self._own, self._first = Path(), set[str]()
+        self._kept: dict[str, None] = {}  # names, in order
         self._written, self._generation = monotonic(), 0
 
     @property
@@ -89,12 +92,24 @@ class Checkpoints:
             self._own.mkdir(parents=True, exist_ok=True)
         found = find_checkpoints(self._folder, self._owner, self._own) if self._comm.rank == 0 else []
         for checkpoint in self._comm.bcast(found):
-            mine = checkpoint.paths[self._comm.rank :: self._comm.size]
-            if self._comm.allreduce(all(is_whole(path) for path in mine), MPI.LAND):
+            if self._is_whole(checkpoint):
                 self.latest, self.continued, self.moved = checkpoint, checkpoint.window, not checkpoint.preferred
                 self._generation = (checkpoint.generation + 1) % GENERATIONS
+                header = None if self.moved else header_of(checkpoint.paths[self._comm.rank])
+                self._kept = dict.fromkeys(header.kept) if header else {}
                 return portable.values(self._part(checkpoint.paths, like))
         return None
+
+    def _is_whole(self, checkpoint: Checkpoint) -> bool:
+        """Return whether all files of a checkpoint are whole; warn of those that are not; collective."""
+        mine = range(self._comm.rank, checkpoint.ranks, self._comm.size)
+        faults = self._comm.allgather(
+            [fault for rank in mine for fault in faults_of(checkpoint.folder, rank, checkpoint.generation)]
+        )
+        if self._comm.rank == 0:
+            for fault in (fault for some in faults for fault in some):
+                warn(f"{fault}: the run continues from an older checkpoint, or starts anew")
+        return not any(faults)
 
     def is_due(self) -> bool:
         """Return whether the interval has passed on rank 0; collective."""
@@ -109,7 +124,7 @@ class Checkpoints:
         """Write this rank's state at a window and a time [s] over the older generation; after ``read``; collective."""
         if self._folder is None:
             return
-        header = Header(self._owner, self._comm.size, window, time)
+        header = Header(self._owner, self._comm.size, window, time, tuple(self._kept))
         write_state(self._own / STATE.format(rank=self._comm.rank, generation=self._generation), header, state)
         self._comm.Barrier()  # no rank may overwrite its older file before all have the newer one
         self.latest = Checkpoint(window, True, self._own, self._generation, self._comm.size, time)
@@ -123,6 +138,7 @@ class Checkpoints:
         if self._folder is not None:
             path = self._own / KEPT.format(name=name, rank=self._comm.rank)
             write_state(path, Header(self._owner, self._comm.size), state)
+            self._kept[name] = None
 
     def kept(self, name: str, like: State) -> dict[str, Any]:
         """Return the values of what was kept before the window from which the run continues; before the next ``write``.
@@ -160,6 +176,28 @@ class Checkpoints:
         before = {name for _, names in everyone[: self._comm.rank] for name in names}
         self._first = like.keys() - before
         return digest_of(repr(everyone).encode())
+
+
+def read_state(path: Path) -> Any:
+    """Return the state in a file.
+
+    Raises:
+        NotData: The file is broken off, changed or no state.
+    """
+    return read_data(path, ENTRIES)
+
+
+def faults_of(folder: Path, rank: int, generation: int) -> list[str]:
+    """Say what is wrong with the files of a rank: its state and what it had kept until then; empty if all are whole."""
+    path = folder / STATE.format(rank=rank, generation=generation)
+    header, faults = header_of(path), []
+    names = header.kept if header else ()
+    for file in (path, *(folder / KEPT.format(name=name, rank=rank) for name in names)):
+        try:
+            read_state(file)
+        except NotData as error:
+            faults.append(str(error))
+    return faults
 
 
 def remove_others(own: Path) -> None:

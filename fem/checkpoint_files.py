@@ -1,38 +1,39 @@
-"""Files of checkpoints: a line that says what a file is, then a pickled state; written at once or not at all.
+"""Files of checkpoints: data with a header that says which run and window they are of; written at once or not at all.
 
 A checkpoint is the files of all ranks of a run at one window, in a folder named after inputs and division into ranks.
 """
 
 import hashlib
 import json
-import os
-import pickle
 import re
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+
+from fem.data_file import NotData, fields_of, read_header, write_data
 
 STATE = "state-{rank:04d}-{generation}"
+KEPT = "{name}-{rank:04d}"
 STATE_NAME = re.compile(r"state-(\d{4,})-(\d)")
 FOLDER_NAME = re.compile(r"[0-9a-f]{12}-[0-9a-f]{12}")
 
 
 @dataclass(frozen=True, slots=True)
 class Header:
-    """The first line of a file.
+    """What a file is.
 
     Attributes:
         owner: Digest of the inputs and the code.
         ranks: How many ranks the run has.
         window: After which it was written, and the ``time`` [s] there.
-        sha256: Digest of the state.
+        kept: Names of what the rank has kept in files of their own until then.
     """
 
     owner: str
     ranks: int
     window: int = 0
     time: float = 0.0
-    sha256: str = ""
+    kept: Sequence[str] = ()
 
 
 @dataclass(frozen=True, order=True)
@@ -68,8 +69,9 @@ class Checkpoint:
 def find_checkpoints(folder: Path, owner: str, preferred: Path) -> list[Checkpoint]:
     """Return the checkpoints of an owner in the subfolders of ``folder``, best first, by the headers of their files."""
     found: dict[tuple[Path, int, int], dict[int, Header]] = {}
-    for path in folder.glob("*/state-*"):
-        name, header = STATE_NAME.fullmatch(path.name), read_header(path)
+    for path in sorted(folder.glob("*/state-*")):
+        name = STATE_NAME.fullmatch(path.name)
+        header = header_of(path) if name else None
         if name and header and header.owner == owner:
             found.setdefault((path.parent, int(name[2]), header.window), {})[int(name[1])] = header
     complete = {which: headers for which, headers in found.items() if 0 in headers and len(headers) == headers[0].ranks}
@@ -80,36 +82,23 @@ def find_checkpoints(folder: Path, owner: str, preferred: Path) -> list[Checkpoi
     return sorted(checkpoints, reverse=True)
 
 
-def read_header(path: Path) -> Header | None:
-    """Return the first line of a file, None where it has none."""
-    with path.open("rb") as file:
-        try:
-            return Header(**json.loads(file.readline()))
-        except (ValueError, TypeError):
-            return None
+def header_of(path: Path) -> Header | None:
+    """Return the header of a file; None, with a warning, where it has none."""
+    try:
+        return Header(**read_header(path))
+    except (NotData, TypeError) as error:
+        warn(f"{path} is no file of a checkpoint and is not used: {error}")
+    return None
 
 
-def read_state(path: Path) -> Any:
-    """Return the state in a file that is whole."""
-    return pickle.loads(content_of(path))
-
-
-def content_of(path: Path) -> bytes:
-    """Return what follows the header of a file."""
-    return path.read_bytes().partition(b"\n")[2]
-
-
-def is_whole(path: Path) -> bool:
-    """Return whether a file has all of its state."""
-    header = read_header(path)
-    return header is not None and digest_of(content_of(path)) == header.sha256
+def warn(what: str) -> None:
+    """Tell the launcher, which shows it, what is wrong and what comes of it."""
+    print(json.dumps({"warning": what}), flush=True)
 
 
 def write_state(path: Path, header: Header, state: object) -> None:
-    """Write a state with its header, whose digest is filled in."""
-    content = pickle.dumps(state, pickle.HIGHEST_PROTOCOL)
-    line = json.dumps(asdict(replace(header, sha256=digest_of(content))))
-    write_at_once(path, line.encode() + b"\n" + content)
+    """Write a state with its header."""
+    write_data(path, fields_of(header), state)
 
 
 def digest_of(content: bytes) -> str:
@@ -120,13 +109,3 @@ def digest_of(content: bytes) -> str:
 def digest_of_files(*paths: Path) -> tuple[str, ...]:
     """Return the SHA-256 digest of each file."""
     return tuple(digest_of(path.read_bytes()) for path in paths)
-
-
-def write_at_once(path: Path, content: bytes) -> None:
-    """Replace a file; a kill at any moment leaves the old one or the new one."""
-    partial = path.with_name(f".{path.name}.partial")
-    with partial.open("wb") as file:
-        file.write(content)
-        file.flush()
-        os.fsync(file.fileno())
-    partial.replace(path)

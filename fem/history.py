@@ -9,6 +9,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from fem.communicators import Role
+from fem.data_file import columns, fields_of, rows
 from fem.ledger import Ledger, ledger_sums
 from fem.participant import Participant
 from fem.portable import Log, Same, State
@@ -60,11 +61,11 @@ class History:
 
     def state(self) -> State:
         """Return ledger and samples, for a checkpoint."""
-        return {"ledger": Same(self.ledger), "rows": Log(self._rows)}
+        return {"ledger": Same(fields_of(self.ledger)), "rows": Log(columns(self._rows))}
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """Continue from the values of what ``state`` returned."""
-        self.ledger, self._rows = state["ledger"], state["rows"]
+        self.ledger, self._rows = Ledger(**state["ledger"]), rows(state["rows"])
 
     def _combine(self, part: NDArray[np.float64], operation: MPI.Op = MPI.SUM) -> NDArray[np.float64]:
         result = np.empty_like(part)
@@ -75,8 +76,7 @@ class History:
 
     def arrays(self) -> dict[str, NDArray]:
         """Return all samples as arrays, by name; on rank 0."""
-        result: dict[str, NDArray] = {name: np.array([row[name] for row in self._rows]) for name in self._rows[0]}
-        return result | self._watch.labels
+        return columns(self._rows) | self._watch.labels
 
     def write(self, directory: Path) -> None:
         """Write ``history.npz``; on rank 0."""

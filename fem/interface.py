@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from fem.body import Body
 from fem.communicators import Role
+from fem.data_file import columns, rows
 from fem.estimate import WindowPlan
 from fem.interface_table import InterfaceTable
 from fem.participant import Participant
@@ -43,7 +44,7 @@ class InterfaceStress:
             cells = body.local.locate_cells(table.cells)
             here = np.flatnonzero(cells >= 0)
             self._shares[role] = here, StressRecovery(body, cells[here])
-        self._rows: list[tuple[float, NDArray[np.float64]]] = []
+        self._rows: list[dict[str, Any]] = []
 
     def sample(self, crew: Mapping[Role, Participant]) -> None:
         """Take the stress as it is now; collective over all models."""
@@ -56,22 +57,22 @@ class InterfaceStress:
         self._world.Allreduce(MPI.IN_PLACE, stress)
         HERE.go_on()
         if self._world.rank == 0:
-            self._rows.append((time, stress))
+            self._rows.append({"time": time, "stress": stress})
 
     def state(self) -> State:
         """Return what was taken so far, for a checkpoint."""
-        return {"rows": Log(self._rows)}
+        return {"rows": Log(columns(self._rows))}
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """Continue from the values of what ``state`` returned."""
-        self._rows = state["rows"]
+        self._rows = rows(state["rows"])
 
     def write(self, directory: Path) -> None:
         """Write ``times (k,)`` [s], the joints' ``surfaces`` and ``von_mises@<joint> (k, m)`` [Pa], on rank 0."""
         if self._world.rank:
             return
         table, count = self._table, len(self._rows)
-        stress = np.array([row for _, row in self._rows]).reshape(count, len(table.cells))
+        stress = np.array([row["stress"] for row in self._rows]).reshape(count, len(table.cells))
         by_joint = {f"von_mises@{name}": stress[:, table.joint == k] for k, name in enumerate(table.joints)}
-        times = np.array([time for time, _ in self._rows])
+        times = np.array([row["time"] for row in self._rows])
         np.savez(directory / "interface.npz", times=times, **table.surfaces(), **by_joint)

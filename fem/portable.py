@@ -120,19 +120,22 @@ class Same:
 
 @dataclass(slots=True)
 class Log:
-    """A list that the first rank keeps; empty on the others."""
+    """A table that the first rank keeps, arrays by name whose rows are those of a list; empty on the others."""
 
-    value: list
+    value: dict[str, NDArray]
     place: ClassVar[bytes] = b""
 
     def blank(self) -> "Log":
-        """Return an empty list."""
-        return Log([])
+        """Return an empty table."""
+        return Log({})
 
     def take(self, part: "Log", first: bool) -> None:
-        """Take the list of the rank that has it."""
+        """Take the table of the rank that has it."""
         if first:
-            self.value = self.value + part.value
+            self.value = self.value or part.value
+
+
+ENTRIES = (Rows, Shares, Sum, Same, Log)
 
 
 def leaves(state: "State | Entry") -> Iterator[Entry]:

@@ -4,8 +4,9 @@ The flow at rest in one place is where the next one begins, so that a further ex
 fraction of a first reflow. What is in the file is all that there is: any process may carry the joint on.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,8 +20,8 @@ from particles.geometry import JointGeometry
 from particles.moving_joint import travel
 from particles.parameters import Solder
 from particles.plate_force import plate_wrench
-from particles.reflow import joint_shape, parted, solve_joint, start_joint, stop_rule
-from particles.rest import Run, StopRule, run_to_rest
+from particles.reflow import joint_flow, joint_shape, parted, solve_joint, start_joint, stop_rule
+from particles.rest import RECORDS, Run, StopRule, run_to_rest
 from particles.shape import JointShape
 
 Floats = NDArray[np.float64]
@@ -60,12 +61,12 @@ def carry_joint(
 
     Raises: as `solve_joint`, but for too little solder: an open joint does nothing to its pads.
     """
-    known = None if before is None else before.read()
+    known = None if before is None else before.read(RECORDS)
     if known is not None:
-        flow, run = known
-        if run.ruptured:
-            now.write((flow, run))
+        if known["run"]["ruptured"]:
+            now.write(known)
             return OPEN
+        flow = _resumed(known, place, solder)
         rule = _rule(flow, place, solder)
     else:
         try:
@@ -75,6 +76,14 @@ def carry_joint(
     flow.physics = replace(flow.physics, motions=(travel(place, flow),))
     run = run_to_rest(flow, replace(rule, max_steps=flow.steps + rule.max_steps), progress, checkpoint=now)
     return OPEN if run.ruptured else Carried(_wrenches(flow), len(run.records))
+
+
+def _resumed(known: Mapping[str, Any], place: JointGeometry, solder: Solder) -> LiquidFlow:
+    """The flow as it was left; its effects are still those that were decided for the gap at which it began."""
+    cloud = known["flow"]["body"].cloud
+    flow = joint_flow(cloud, replace(place, gap=float(cloud.plates[1].origin[2])), solder)
+    flow.restore(known["flow"])
+    return flow
 
 
 def _rule(flow: LiquidFlow, place: JointGeometry, solder: Solder) -> StopRule:
@@ -98,12 +107,12 @@ def carried_shape(place: JointGeometry, solder: Solder, first: Checkpoint, last:
 
     Raises: as `solve_joint`.
     """
-    state = last.read()
-    if state is None:
+    known = last.read(RECORDS)
+    if known is None:
         return solve_joint(place, solder)
-    flow, run = state
-    begun = None if first.path == last.path else first.read()
-    whole = run if begun is None else _joined(begun[1], run)
+    flow, run = _resumed(known, place, solder), Run.restored(known["run"])
+    begun = None if first.path == last.path else first.read(RECORDS)
+    whole = run if begun is None else _joined(Run.restored(begun["run"]), run)
     shape = joint_shape(place, solder, flow, whole)
     return parted(place, solder, flow, shape) if run.ruptured else shape
 

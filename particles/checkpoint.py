@@ -1,20 +1,19 @@
 """Checkpoint of a run in one file: written at once or not at all, read only if it belongs to the same inputs and code.
 
-The state is pickled whole: whatever an effect adds to it is in the file without being listed anywhere, and shared
-objects stay shared, so that the run continues to the last bit. A digest finds truncated files; like every pickle,
-a file from a stranger must not be read.
+A state is data (`data_file.py`): what has one says of which arrays, numbers and records it consists, and how it is made
+of them again, so that the run continues to the last bit. Nothing in a file is executed, whoever has written it.
 """
 
 import hashlib
 import logging
-import os
-import pickle
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from time import monotonic
 from typing import Any
+
+from particles.data_file import NotData, read_data, read_header, write_data
 
 logger = logging.getLogger(__name__)
 
@@ -38,50 +37,37 @@ class Checkpoint:
             interval: wall time between two checkpoints [s].
         """
         self.path, self.interval, self.continued = path, interval, False
-        self._owner = hashlib.sha256(repr(inputs).encode() + _code()).digest()
+        self._owner = hashlib.sha256(repr(inputs).encode() + _code()).hexdigest()
         self._written = monotonic()
 
-    def read(self) -> Any | None:
-        """Return the state; None where there is none, or, with a warning, where it is broken or of another run."""
+    def read(self, records: Collection[type] = ()) -> Any | None:
+        """Return the state; None where there is none, or, with a warning, where it is broken or of another run.
+
+        Args:
+            records: dataclasses that it may consist of; no others are made.
+        """
         if not self.path.exists():
             return None
-        content = self.path.read_bytes()
-        size = len(self._owner)
-        owner, digest, state = content[:size], content[size : 2 * size], content[2 * size :]
-        if hashlib.sha256(state).digest() != digest:
-            logger.warning("%s is broken off: the run starts anew", self.path)
+        try:
+            owner = read_header(self.path).get("owner")
+            state = read_data(self.path, records) if owner == self._owner else None
+        except NotData as error:
+            logger.warning("%s: the run starts anew", error)
             return None
         if owner != self._owner:
             logger.warning("%s belongs to other inputs or another version: the run starts anew", self.path)
             return None
         self.continued = True
-        return pickle.loads(state)
+        return state
 
     def is_due(self) -> bool:
         """Whether the interval has passed."""
         return monotonic() - self._written >= self.interval
 
     def write(self, state: object) -> None:
-        """Replace the file; a kill at any moment leaves the old one or the new one."""
-        content = pickle.dumps(state, pickle.HIGHEST_PROTOCOL)
-        self.path.parent.mkdir(parents=True, exist_ok=True)
-        partial = self.path.with_name(f"{self.path.name}.{os.getpid()}.partial")
-        with partial.open("wb") as file:
-            file.write(self._owner + hashlib.sha256(content).digest() + content)
-            file.flush()
-            os.fsync(file.fileno())
-        partial.replace(self.path)
-        _sync(self.path.parent)
+        """Replace the file by a state that is data; a kill at any moment leaves the old one or the new one."""
+        write_data(self.path, {"owner": self._owner}, state)
         self._written = monotonic()
-
-
-def _sync(folder: Path) -> None:
-    """Make a rename in a folder last."""
-    descriptor = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
 
 
 @cache

@@ -1,6 +1,7 @@
 """Contact lines: each vertex is pinned at the edge of a pad, or free on a pad, or free on the mask between pads."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,17 +45,30 @@ class ContactLine:
             local: `(k, 2)` or `(k, 3)` vertices in the frame of the plate [m].
             corners: `(m,)` vertices that a line along the whole edge of each pad has: their polygon has the pad's area.
         """
-        self.wall, self.pads = wall, tuple(pads)
-        self._centres = np.array([pad.centre for pad in pads])
-        radii = np.array([pad.radius for pad in pads])
-        self.edges = equal_area_radius(radii, corners)
-        self._square = np.where(np.isfinite(radii), radii, 0.0) ** 2
-        self._pad_cosine, self._mask_cosine = np.cos([pad.angle for pad in pads]), float(np.cos(mask_angle))
+        self.wall, self._mask_cosine = wall, float(np.cos(mask_angle))
+        self._take_pads(pads)
+        self.edges = equal_area_radius(np.array([pad.radius for pad in pads]), corners)
         self.pad = self._nearest(local)
         distance = self._offset(local)[1]
         edge = self.edges[self.pad]
         self.state = np.where(distance < edge, ON_PAD, ON_MASK).astype(np.int8)
         self.state[np.isclose(distance, edge, rtol=1e-9)] = PINNED
+
+    def _take_pads(self, pads: Sequence[Pad]) -> None:
+        self.pads = tuple(pads)
+        self._centres = np.array([pad.centre for pad in pads])
+        radii = np.array([pad.radius for pad in pads])
+        self._square = np.where(np.isfinite(radii), radii, 0.0) ** 2
+        self._pad_cosine = np.cos([pad.angle for pad in pads])
+
+    def saved(self) -> dict[str, Any]:
+        """Pads and where the vertices stand on them, for a checkpoint."""
+        return {"pads": self.pads, "edges": self.edges, "pad": self.pad, "state": self.state}
+
+    def restore(self, saved: Mapping[str, Any]) -> None:
+        """Continue from what `saved` returned."""
+        self._take_pads(saved["pads"])
+        self.edges, self.pad, self.state = saved["edges"], saved["pad"], saved["state"]
 
     @property
     def has_edge(self) -> bool:

@@ -49,10 +49,7 @@ class LinearTetrahedra:
     def start(cls, points: Floats, cells: Indices, density: float, viscosity: float = 0.0) -> "LinearTetrahedra":
         """Give the particles the volumes of the tetrahedra at these points."""
         volumes = cell_volumes(points, cells)
-        # Inverted tetrahedra mend the boundary of others. Only flat ones count, so that the mass stays definite.
-        counted = np.where(volumes > -SMALLEST_VOLUME * volumes.mean(), volumes, 0.0)
-        counted *= volumes.sum() / counted.sum()
-        return cls(cells, consistent_mass(cells, counted, len(points)), density, viscosity, volumes)
+        return cls(cells, particle_mass(cells, volumes, len(points)), density, viscosity, volumes)
 
     def is_worn(self, points: Floats) -> bool:
         """Whether a tetrahedron has been squeezed flat on the way to these points `(n, 3)` [m]."""
@@ -81,6 +78,14 @@ class LinearTetrahedra:
             stabilisation=STABILISATION / self.density * _unresolved((x, y, z), weights, average[:, thick]),
             diffusion_rate=DIFFUSION * self.viscosity / (self.density * body.cloud.spacing**2),
         )
+
+
+def particle_mass(cells: Indices, volumes: Floats, count: int) -> sparse.csr_matrix:
+    """Volumes `(n, n)` [m^3] that `count` particles have of tetrahedra with some volumes `(t,)` [m^3]."""
+    # Inverted tetrahedra mend the boundary of others. Only flat ones count, so that the mass stays definite.
+    counted = np.where(volumes > -SMALLEST_VOLUME * volumes.mean(), volumes, 0.0)
+    counted *= volumes.sum() / counted.sum()
+    return consistent_mass(cells, counted, count)
 
 
 def consistent_mass(cells: Indices, volumes: Floats, count: int) -> sparse.csr_matrix:

@@ -1,15 +1,17 @@
 """Several drops: each flows by itself until it is at rest; two that touch become one, collapsed ones are rebuilt."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations
 from time import perf_counter
+from typing import Any
 
 from particles.body import Body
 from particles.checkpoint import Checkpoint
+from particles.data_file import columns, fields_of, rows
 from particles.flow import LiquidFlow, StepRecord
 from particles.rebuild import collapsing, overlap, rebuild, touch
-from particles.rest import CALM_STEPS, NoRest, StopRule, fraction_done, is_calm
+from particles.rest import CALM_STEPS, RECORDS, NoRest, StopRule, fraction_done, is_calm
 from particles.shape import Snapshot
 
 LARGEST_OVERLAP = 0.5  # spacings
@@ -47,6 +49,23 @@ class Drop:
         first = Snapshot(flow.time, flow.body.points.copy(), flow.body.triangles.copy())
         return cls(flow, origins, first, parents)
 
+    def saved(self) -> dict[str, Any]:
+        """All of it, for a checkpoint."""
+        return fields_of(self) | {
+            "flow": self.flow.saved(),
+            "parents": [parent.saved() for parent in self.parents],
+            "records": columns([fields_of(record) for record in self.records]),
+        }
+
+    @classmethod
+    def restored(cls, saved: Mapping[str, Any], start: Callable[[Body], LiquidFlow]) -> "Drop":
+        """Make it again of what `saved` returned; `start` as for `run_drops`."""
+        flow = start(Body.at_rest(saved["flow"]["body"].cloud))
+        flow.restore(saved["flow"])
+        parents = tuple(cls.restored(parent, start) for parent in saved["parents"])
+        records = [StepRecord(**row) for row in rows(saved["records"])]
+        return cls(**{**saved, "flow": flow, "parents": parents, "records": records})
+
     def step(self, rule: StopRule) -> None:
         """Advance one time step."""
         start = perf_counter()
@@ -83,8 +102,8 @@ def run_drops(
         NoRest: a drop took too many steps.
         CannotRebuild: drops touch, or one collapses, between walls.
     """
-    state = checkpoint.read() if checkpoint else None
-    drops = state or _merge_touching(_apart(flows), start)
+    saved = checkpoint.read(RECORDS) if checkpoint else None
+    drops = [Drop.restored(drop, start) for drop in saved or []] or _merge_touching(_apart(flows), start)
     while moving := [drop for drop in drops if drop.moves(rule)]:
         drop = min(moving, key=lambda candidate: candidate.flow.time)
         if len(drop.records) >= rule.max_steps:
@@ -94,7 +113,7 @@ def run_drops(
             drop.flow = _restarted(start, drop)
         drops = _merge_touching(drops, start)
         if checkpoint is not None and checkpoint.is_due():
-            checkpoint.write(drops)
+            checkpoint.write([drop.saved() for drop in drops])
         if progress is not None:
             progress(min((fraction_done(one.records, rule) for one in drops if one.moves(rule)), default=1.0))
     return drops

@@ -4,15 +4,19 @@ A step: contact line events; forces; saddle-point solve for velocity and pressur
 shift the interior; correct the volume along its gradient. Each of these lives in its own module.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from particles.body import Body
+from particles.cloud import Cloud
 from particles.interior_shift import interior_shift
 from particles.neighbours import NeighbourList
 from particles.physics import Physics
+from particles.plate import Pad, Plate
 from particles.step_solver import Motion, StepSolver
 from particles.surface_quality import flip_to_delaunay, smoothing_offsets
 from particles.symmetry import surface_planes
@@ -23,6 +27,8 @@ Floats = NDArray[np.float64]
 SKIN = 0.2
 VOLUME_PASSES = 2
 FLIP_INTERVAL = 2
+FLOW_RECORDS = (Body, Cloud, Plate, Pad, TimeStep)  # that a saved flow consists of
+SAVED = ("body", "time_step", "volume", "time", "steps")
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,6 +74,23 @@ class LiquidFlow:
         self.volume = body.volume()[0]
         self.neighbours = NeighbourList(solver.support * spacing, SKIN * spacing)
         self.time, self.steps = 0.0, 0
+
+    def saved(self) -> dict[str, Any]:
+        """All that a flow of the same physics needs to continue to the same bits, for a checkpoint."""
+        return {name: getattr(self, name) for name in SAVED} | {
+            "lines": [line.saved() for line in self.physics.lines],
+            "solver": self.solver.saved(),
+            "neighbours": self.neighbours.saved(),
+        }
+
+    def restore(self, saved: Mapping[str, Any]) -> None:
+        """Continue from what `saved` returned."""
+        for name in SAVED:
+            setattr(self, name, saved[name])
+        for line, kept in zip(self.physics.lines, saved["lines"], strict=True):
+            line.restore(kept)
+        self.solver.restore(saved["solver"])
+        self.neighbours.restore(saved["neighbours"])
 
     def step(self) -> StepRecord:
         """Advance one time step.

@@ -1,9 +1,10 @@
 """A free drop with inertia: at rest (Laplace pressure) or swinging in its second mode (Rayleigh)."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from math import ceil, pi
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,8 @@ from particles.body import Body
 from particles.checkpoint import Checkpoint
 from particles.cloud_sphere import sphere_cloud
 from particles.damped_oscillation import fit_oscillation
+from particles.data_file import fields_of
+from particles.flow import FLOW_RECORDS
 from particles.inertial_flow import InertialFlow
 from particles.parameters import Solder
 from particles.rayleigh import rayleigh_frequency, viscous_oscillation
@@ -26,6 +29,7 @@ COLUMNS = ("time", "amplitude", "energy", "kinetic_energy", "volume", "momentum"
 # Ways to the rest of the polyhedron, whose vertices are not quite on a sphere; the step in radians of the second mode.
 SETTLING_STEP, SETTLING_STEPS = 3.0, 10
 SNAPSHOTS_PER_PERIOD = 8
+RECORDS = (*FLOW_RECORDS, Snapshot)  # that a swing consists of in a checkpoint
 SECOND_MOMENT = np.array([-1.0, -1.0, 2.0])
 
 
@@ -71,6 +75,17 @@ class _Swing:
         swing.snap()
         return swing
 
+    def saved(self) -> dict[str, Any]:
+        """All of it, for a checkpoint."""
+        return fields_of(self) | {"flow": self.flow.saved(), "rows": np.array(self.rows)}
+
+    @classmethod
+    def restored(cls, saved: Mapping[str, Any], solder: Solder) -> "_Swing":
+        """Make it again of what `saved` returned."""
+        flow = _flow(saved["flow"]["body"], solder)
+        flow.restore(saved["flow"])
+        return cls(**{**saved, "flow": flow, "rows": [tuple(row) for row in saved["rows"].tolist()]})
+
     def snap(self) -> None:
         """Keep the present shape."""
         body = self.flow.body
@@ -103,7 +118,8 @@ def solve_free_drop(  # noqa: PLR0913 - what swings and for how long, how it is 
         ValueError: the spacing leaves fewer than two shells.
         SolveFailed: a linear solve failed.
     """
-    swing = (checkpoint.read() if checkpoint else None) or _Swing.start(_start(solder, amplitude), solder)
+    saved = checkpoint.read(RECORDS) if checkpoint else None
+    swing = _Swing.restored(saved, solder) if saved else _Swing.start(_start(solder, amplitude), solder)
     flow, rows = swing.flow, swing.rows
     period = 2.0 * pi / rayleigh_frequency(2, _radius(solder), solder.density, solder.surface_tension)
     steps, time_step = ceil(periods * steps_per_period), period / steps_per_period
@@ -115,7 +131,7 @@ def solve_free_drop(  # noqa: PLR0913 - what swings and for how long, how it is 
         if step % max(1, steps_per_period // SNAPSHOTS_PER_PERIOD) == 0:
             swing.snap()
         if checkpoint is not None and checkpoint.is_due():
-            checkpoint.write(swing)
+            checkpoint.write(swing.saved())
         if progress is not None:
             progress(step / steps)
     body, count = flow.body, flow.body.cloud.surface_count
@@ -149,12 +165,17 @@ def _start(solder: Solder, amplitude: float) -> InertialFlow:
         raise ValueError(f"solder.numerics.spacing = {spacing:.4g} m must be below half the radius {radius:.4g} m")
     ball = sphere_cloud(solder.volume, shells)
     body = Body.at_rest(ball)
-    physics = build_physics(solder, EFFECTS | {"viscosity": solder.effects.viscosity != "off"}, ())
-    flow = InertialFlow(body, physics, solder.density)
+    flow = _flow(body, solder)
     omega = rayleigh_frequency(2, radius, solder.density, solder.surface_tension)
     flow.settle(SETTLING_STEP / omega, SETTLING_STEPS)
     body.velocity = 0.5 * amplitude * omega * SECOND_MOMENT * body.points
     return flow
+
+
+def _flow(body: Body, solder: Solder) -> InertialFlow:
+    """Let a body flow."""
+    physics = build_physics(solder, EFFECTS | {"viscosity": solder.effects.viscosity != "off"}, ())
+    return InertialFlow(body, physics, solder.density)
 
 
 def _sample(flow: InertialFlow, solder: Solder, time: float) -> tuple[float, ...]:

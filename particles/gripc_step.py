@@ -9,13 +9,16 @@ With a quadratic basis a drop at rest stays there, and a cube becomes a drop som
 loses particles at its contact line; with the linear basis, as printed, even a drop at rest breaks up.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from particles.body import Body
 from particles.collocation import Operators, collocate
+from particles.data_file import fields_of
 from particles.mass import Mass
 from particles.mls import SUPPORT
 from particles.neighbours import NeighbourList
@@ -61,6 +64,14 @@ class GripcStep:
         rest = np.zeros(3 * len(body.points))
         last = self.velocities if physics.momenta and self.velocities is not None else Velocities(rest, rest)
         return PreparedGripcStep(self, body, physics, operators, last)
+
+    def saved(self) -> dict[str, Any]:
+        """What it remembers of the last step, for a checkpoint."""
+        return {"velocities": self.velocities and fields_of(self.velocities)}
+
+    def restore(self, saved: Mapping[str, Any]) -> None:
+        """Continue from what `saved` returned."""
+        self.velocities = saved["velocities"] and Velocities(**saved["velocities"])
 
 
 @dataclass(frozen=True, slots=True)

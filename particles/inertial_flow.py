@@ -1,5 +1,8 @@
 """A free body that moves with inertia, its particles and tetrahedra with it: nothing is shifted or smoothed."""
 
+from collections.abc import Mapping
+from typing import Any
+
 from scipy import sparse
 
 from particles.body import Body
@@ -20,6 +23,15 @@ class InertialFlow:
         """
         self.body, self.physics, self.solver = body, physics, InertialStep(density)
         self.volume = body.volume()[0]
+
+    def saved(self) -> dict[str, Any]:
+        """All that a flow of the same physics needs to continue to the same bits, for a checkpoint."""
+        return {"body": self.body, "volume": self.volume, "solver": self.solver.saved()}
+
+    def restore(self, saved: Mapping[str, Any]) -> None:
+        """Continue from what `saved` returned."""
+        self.body, self.volume = saved["body"], saved["volume"]
+        self.solver.restore(saved["solver"])
 
     @property
     def mass(self) -> sparse.csr_matrix:

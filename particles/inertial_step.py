@@ -5,7 +5,9 @@ acts on v - v_n only: an added mass of order dt^2, not a damping of order dt. Th
 until these are shifted, the surface changes or they are worn out: then they are made anew.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +15,8 @@ from scipy import sparse
 
 from particles.backward_difference import BackwardDifference, Base
 from particles.body import Body
-from particles.discretisation_tetrahedra import LinearTetrahedra
+from particles.data_file import fields_of
+from particles.discretisation_tetrahedra import LinearTetrahedra, particle_mass
 from particles.field_transfer import Transfer, interpolation
 from particles.incompressibility import solve
 from particles.inner_tetrahedra import fill
@@ -55,6 +58,25 @@ class Past:
         """Fill a body that has not moved yet with tetrahedra."""
         space = LinearTetrahedra.start(body.points, fill(body), density, viscosity)
         return cls(space, body.triangles, body.points, BackwardDifference.start(len(body.points)), {})
+
+    def saved(self) -> dict[str, Any]:
+        """Return what a checkpoint keeps: the mass follows from the volumes."""
+        kept = {name: getattr(self.space, name) for name in ("cells", "volumes", "viscosity")}
+        plates = {str(wall): way for wall, way in self.plates.items()}
+        return fields_of(self) | {"space": kept, "history": fields_of(self.history), "plates": plates}
+
+    @classmethod
+    def restored(cls, saved: Mapping[str, Any], density: float) -> "Past":
+        """Make it again of what `saved` returned."""
+        space, points = saved["space"], saved["points"]
+        mass = particle_mass(space["cells"], space["volumes"], len(points))
+        return cls(
+            LinearTetrahedra(mass=mass, density=density, **space),
+            saved["triangles"],
+            points,
+            BackwardDifference(**saved["history"]),
+            {int(wall): way for wall, way in saved["plates"].items()},
+        )
 
     def fits(self, body: Body) -> bool:
         """Whether the tetrahedra still fill the body well."""
@@ -109,6 +131,14 @@ class InertialStep:
         if not physics.momenta:
             body.velocity = np.zeros_like(body.velocity)
         return PreparedInertialStep(body, physics, self, self.past)
+
+    def saved(self) -> dict[str, Any]:
+        """What it remembers of earlier steps, for a checkpoint."""
+        return {"past": self.past and self.past.saved()}
+
+    def restore(self, saved: Mapping[str, Any]) -> None:
+        """Continue from what `saved` returned."""
+        self.past = saved["past"] and Past.restored(saved["past"], self.density)
 
     def stop(self, body: Body) -> None:
         """Bring the body to rest."""

@@ -1,6 +1,8 @@
 """Conjugate gradients on a sequence of similar Laplacians, with the multigrid hierarchy of an earlier one."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,14 +38,19 @@ class LaggedMultigrid:
     iterations: int = 0
     _solver: PETSc.KSP | None = field(default=None, repr=False)
 
-    def __getstate__(self) -> tuple[sparse.csr_matrix | None, int]:
-        """What is pickled: all but the PETSc objects."""
-        return self.origin, self.iterations
+    def saved(self) -> dict[str, Any]:
+        """All but the PETSc objects, for a checkpoint."""
+        origin = self.origin
+        rows = None if origin is None else {name: getattr(origin, name) for name in ("data", "indices", "indptr")}
+        return {"origin": rows, "iterations": self.iterations}
 
-    def __setstate__(self, state: tuple[sparse.csr_matrix | None, int]) -> None:
-        """Restore what was pickled."""
-        self.origin, self.iterations = state
-        self._solver = None
+    def restore(self, saved: Mapping[str, Any]) -> None:
+        """Continue from what `saved` returned."""
+        rows, self.iterations, self._solver = saved["origin"], saved["iterations"], None
+        self.origin = None
+        if rows is not None:
+            count = len(rows["indptr"]) - 1
+            self.origin = sparse.csr_matrix((rows["data"], rows["indices"], rows["indptr"]), shape=(count, count))
 
     def solve(self, laplacian: sparse.csr_matrix, flux: Floats) -> tuple[Floats, int]:
         """Solve L phi = b.

@@ -1,5 +1,8 @@
 """Neighbour lists: cell grid, compressed rows, Verlet skin."""
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
@@ -105,6 +108,16 @@ class NeighbourList:
         self._built_at: Points = np.empty((0, 3))
         self.offsets: Indices = np.zeros(1, np.int32)
         self.indices: Indices = np.empty(0, np.int32)
+
+    def saved(self) -> dict[str, Any]:
+        """Where the list was built, for a checkpoint: it follows from that."""
+        return {"built_at": self._built_at, "builds": self.builds}
+
+    def restore(self, saved: Mapping[str, Any]) -> None:
+        """Continue from what `saved` returned."""
+        self._built_at, self.builds = saved["built_at"], saved["builds"]
+        if len(self._built_at):
+            self.offsets, self.indices = find_neighbours(self._built_at, self.radius + self.skin)
 
     def update(self, points: Points) -> None:
         """Make the list valid for these points `(n, 3)` [m]."""

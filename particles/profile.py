@@ -33,6 +33,13 @@ class Profile:
     radius: Floats
     areas: Legendre
 
+    @classmethod
+    def of(cls, areas: Legendre) -> "Profile":
+        """Sample the fitted areas on their domain."""
+        low, high = areas.domain
+        sample = np.linspace(low, high, SAMPLES)
+        return cls(sample, np.sqrt(np.maximum(areas(sample), 0.0) / np.pi), areas)
+
     @property
     def max_width(self) -> float:
         """Largest diameter [m]."""
@@ -111,6 +118,4 @@ def fit_profile(points: Floats, triangles: Indices, span: tuple[float, float] | 
     nodes, _ = np.polynomial.legendre.leggauss(SLICES)
     heights = 0.5 * (low + high) + 0.5 * (high - low) * nodes
     areas = parts * section_areas(points, triangles, heights)
-    fit = Legendre.fit(heights, areas, DEGREE, domain=[low, high])
-    sample = np.linspace(low, high, SAMPLES)
-    return Profile(sample, np.sqrt(np.maximum(fit(sample), 0.0) / np.pi), fit)
+    return Profile.of(Legendre.fit(heights, areas, DEGREE, domain=[low, high]))

@@ -106,9 +106,14 @@ def start_joint(geometry: JointGeometry, solder: Solder) -> tuple[LiquidFlow, St
     """Set up the flow of a joint from its double cone, with the effects that are called for, and when it ends."""
     cloud = joint_cloud(geometry, solder.volume, solder.numerics.spacing)
     effects = switched(decide_effects(geometry, solder))
+    return joint_flow(cloud, geometry, solder), stop_rule(cloud, solder, effects)
+
+
+def joint_flow(cloud: Cloud, geometry: JointGeometry, solder: Solder) -> LiquidFlow:
+    """Set up the flow of a cloud that fills a joint, with the effects that are called for."""
     radii = (geometry.radius_board, geometry.radius_package)
     lines = tuple(contact_line(cloud, wall, radius, solder) for wall, radius in enumerate(radii))
-    return start_flow(cloud, solder, effects, lines), stop_rule(cloud, solder, effects)
+    return start_flow(cloud, solder, switched(decide_effects(geometry, solder)), lines)
 
 
 def contact_line(cloud: Cloud, wall: int, radius: float, solder: Solder) -> ContactLine:

@@ -9,7 +9,9 @@ of the body, one unknown. At rest f = -p a makes the discrete energy stationary.
 a potential flow inside, which keeps the particles evenly spread; its pressure vanishes at rest.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,6 +68,15 @@ class Relaxation:
         surface = body.surface()
         equations = StepEquations(surface, physics, _volume_only(surface))
         return PreparedRelaxation(self, body, equations, PotentialFlow.of(body, neighbours))
+
+    def saved(self) -> dict[str, Any]:
+        """What it remembers of earlier steps, for a checkpoint."""
+        return {"centre": self.centre, "multigrid": self._multigrid.saved()}
+
+    def restore(self, saved: Mapping[str, Any]) -> None:
+        """Continue from what `saved` returned."""
+        self.centre = saved["centre"]
+        self._multigrid.restore(saved["multigrid"])
 
     def potential(self, flow: PotentialFlow, flux: Floats) -> tuple[Floats, int]:
         """Potential `(n,)` [m^2/s] of the fluxes into the particles `(n,)` [m^3/s], and the iterations."""

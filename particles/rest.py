@@ -1,15 +1,18 @@
 """Running a flow until the body is at rest."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import log
 from time import perf_counter
+from typing import Any
 
 import numpy as np
+from numpy.polynomial import Legendre
 from numpy.typing import NDArray
 
 from particles.checkpoint import Checkpoint
-from particles.flow import LiquidFlow, StepRecord
+from particles.data_file import columns, fields_of, rows
+from particles.flow import FLOW_RECORDS, LiquidFlow, StepRecord
 from particles.incompressibility import SolveFailed
 from particles.profile import Profile, fit_profile
 from particles.shape import Snapshot
@@ -18,6 +21,8 @@ CALM_STEPS = 3
 CALM_DISPLACEMENT = 1e-4
 SNAPSHOT_DISPLACEMENT = 0.1
 RUPTURE_SPACINGS = 2.0
+RECORDS = (*FLOW_RECORDS, Snapshot)  # that a flow and its run consist of in a checkpoint
+COUNTS = ("seconds", "ruptured", "calm", "moved")
 
 
 class NoRest(RuntimeError):
@@ -63,6 +68,25 @@ class Run:
     calm: int = 0
     moved: float = 0.0
 
+    def saved(self) -> dict[str, Any]:
+        """All of it, for a checkpoint."""
+        return {name: getattr(self, name) for name in COUNTS} | {
+            "records": columns([fields_of(record) for record in self.records]),
+            "areas": np.array([profile.areas.coef for profile in self.profiles]),
+            "spans": np.array([profile.areas.domain for profile in self.profiles]),
+            "snapshots": self.snapshots,
+        }
+
+    @classmethod
+    def restored(cls, saved: Mapping[str, Any]) -> "Run":
+        """Make it again of what `saved` returned."""
+        return cls(
+            records=[StepRecord(**row) for row in rows(saved["records"])],
+            profiles=[Profile.of(Legendre(*fit)) for fit in zip(saved["areas"], saved["spans"], strict=True)],
+            snapshots=saved["snapshots"],
+            **{name: saved[name] for name in COUNTS},
+        )
+
     @property
     def at_rest(self) -> bool:
         """Whether the body came to rest; else the process ended, or the neck ruptured, before it did."""
@@ -105,14 +129,14 @@ def run_to_rest(
         if run.moved > SNAPSHOT_DISPLACEMENT:
             _snap(run, flow, on_snapshot)
         if checkpoint is not None and checkpoint.is_due():
-            checkpoint.write((flow, run))
+            checkpoint.write(saved_run(flow, run))
         done = max(done, fraction_done(run.records, rule))
         if progress is not None:
             progress(done)
     if run.moved > 0.0:
         _snap(run, flow, on_snapshot)
     if checkpoint is not None:
-        checkpoint.write((flow, run))
+        checkpoint.write(saved_run(flow, run))
     if progress is not None:
         progress(1.0)
     return run
@@ -120,14 +144,18 @@ def run_to_rest(
 
 def _start(flow: LiquidFlow, on_snapshot: Callable[[Snapshot], None] | None, checkpoint: Checkpoint | None) -> Run:
     """Start a run, or continue that of the checkpoint, whose state the flow takes over."""
-    state = None if checkpoint is None else checkpoint.read()
-    if state is not None:
-        saved, run = state
-        vars(flow).update(vars(saved))
-        return run
+    saved = None if checkpoint is None else checkpoint.read(RECORDS)
+    if saved is not None:
+        flow.restore(saved["flow"])
+        return Run.restored(saved["run"])
     run = Run()
     _snap(run, flow, on_snapshot)
     return run
+
+
+def saved_run(flow: LiquidFlow, run: Run) -> dict[str, Any]:
+    """What a checkpoint keeps of a flow and its run, made of `RECORDS`."""
+    return {"flow": flow.saved(), "run": run.saved()}
 
 
 def _limit_steps(flow: LiquidFlow, run: Run, rule: StopRule) -> None:

@@ -1,7 +1,8 @@
 """What solves for the motion in a time step: a member of this family for each way to treat pressure and inertia."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,3 +64,9 @@ class StepSolver(Protocol):
 
     def prepare(self, body: Body, physics: Physics, neighbours: NeighbourList) -> PreparedStep:
         """Build what does not depend on the size of the step."""
+
+    def saved(self) -> dict[str, Any]:
+        """What it remembers of earlier steps, for a checkpoint."""
+
+    def restore(self, saved: Mapping[str, Any]) -> None:
+        """Continue from what `saved` returned."""

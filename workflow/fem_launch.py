@@ -1,6 +1,7 @@
 """One run of the package fem: input file, MPI run, progress."""
 
 import json
+import logging
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -8,6 +9,8 @@ from pathlib import Path
 from workflow.launch import launch, mpi_command
 from workflow.progress import progress_bar
 from workflow.stage_runner import Run
+
+logger = logging.getLogger(__name__)
 
 
 def run_fem(run: Run, folder: Path, request: dict, title: str) -> None:
@@ -32,6 +35,8 @@ def run_fem(run: Run, folder: Path, request: dict, title: str) -> None:
 
 
 def _pass_on(line: str, progress: Callable[[float], None]) -> None:
-    """Show how far a run is, if a line of its output says so."""
+    """Show how far a run is, or what it warns of, if a line of its output says so."""
     if line.startswith('{"progress"'):
         progress(json.loads(line)["progress"])
+    if line.startswith('{"warning"'):
+        logger.warning(json.loads(line)["warning"])

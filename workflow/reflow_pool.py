@@ -30,6 +30,14 @@ class Job:
     checkpoint: Path
 
 
+def records() -> tuple[type, ...]:
+    """Return what jobs and results consist of."""
+    from particles.geometry import JointGeometry
+    from particles.shape import JointShape, Snapshot
+
+    return Job, JointGeometry, Solder, JointShape, Snapshot
+
+
 def joint_geometries(pads: "Sequence[PadSite]") -> "dict[str, JointGeometry]":
     """Return the geometry of each joint of a pad table, by name."""
     from particles.geometry import JointGeometry

@@ -10,7 +10,7 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from fem.checkpoint_files import write_at_once
+from fem.checkpoint_files import warn
 from fem.coupling.division import SchemeName
 from fem.coupling.placement import (
     Alternative,
@@ -24,6 +24,7 @@ from fem.coupling.placement import (
 )
 from fem.coupling.speeds import FAMILIES, Kind, StepCost, families, measured_costs, measured_latency, samples, speeds_of
 from fem.coupling.whole import Treatment
+from fem.data_file import write_at_once
 from fem.materials.elasticity import materials_of_parts
 from fem.materials.parameters import Material
 from fem.materials.roles import Materials
@@ -142,11 +143,19 @@ def kept(world: MPI.Comm, folder: Path | None, present: NDArray[np.int8]) -> Mea
     """Return what ``keep`` wrote with as many ranks of all families that rank 0 finds ``present``; collective."""
     found = None
     if world.rank == 0 and folder is not None and (folder / KEPT).exists():
-        record = json.loads((folder / KEPT).read_text())
-        cost = StepCost(np.array(record["fixed"]), np.array(record["element"]))
-        fits = len(cost.fixed) == world.size and bool((cost.element[:, present] > 0.0).all())
-        found = Measured(cost, record["latency"]) if fits else None
+        try:
+            found = read(folder / KEPT, world.size, present)
+        except (OSError, ValueError, KeyError, TypeError, IndexError) as error:
+            warn(f"{folder / KEPT} is broken, this machine is measured again: {type(error).__name__}: {error}")
     return world.bcast(found)
+
+
+def read(path: Path, ranks: int, present: NDArray[np.int8]) -> Measured | None:
+    """Return a measurement; None where it is of another number of ranks, or a family is missing."""
+    record = json.loads(path.read_text())
+    cost = StepCost(np.array(record["fixed"], float), np.array(record["element"], float))
+    fits = len(cost.fixed) == ranks and bool((cost.element[:, present] > 0.0).all())
+    return Measured(cost, float(record["latency"])) if fits else None
 
 
 def keep(folder: Path, measured: Measured) -> None:

@@ -7,7 +7,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 from workflow import reflow_pool
-from workflow.reflow_pool import Job
+from workflow.reflow_pool import Job, records
+
+__all__ = ["records"]
 
 Report = Callable[[float], None]
 

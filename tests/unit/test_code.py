@@ -1,5 +1,6 @@
 """The rules that the code itself keeps: style, types, who may import whom, size of files."""
 
+import ast
 import subprocess
 import sys
 from pathlib import Path
@@ -11,6 +12,8 @@ ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = ("workflow", "meshing", "particles", "fem")
 HEAVY = {"gmsh", "numba", "dolfinx", "petsc4py", "mpi4py", "pyvista", "matplotlib", "vtkmodules"}
 LONGEST_FILE = 400
+PICKLING = {"pickle", "_pickle", "cPickle", "cloudpickle", "dill", "joblib", "marshal", "shelve"}
+UNPICKLING = {"read_pickle", "to_pickle", "allow_pickle", "eval", "exec"}
 
 
 def run_tool(*arguments: str) -> None:
@@ -31,6 +34,23 @@ def test_types():
 
 def test_import_rules():
     run_tool("-c", "from importlinter.cli import lint_imports_command as main; main()")
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_no_file_that_is_read_can_run_code(package):
+    """Pickles and their like are code; `np.load` takes none unless it is asked to, and nothing asks it."""
+    found = []
+    for path in (ROOT / package).rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text())):
+            names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+            names += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
+            odd = [name for name in names if name.partition(".")[0] in PICKLING]
+            if isinstance(node, ast.keyword) and node.arg == "allow_pickle":
+                odd += ["allow_pickle"] * (getattr(node.value, "value", None) is not False)
+            if isinstance(node, ast.Attribute | ast.Name):
+                odd += [name for name in (getattr(node, "attr", ""), getattr(node, "id", "")) if name in UNPICKLING]
+            found += [f"{path.relative_to(ROOT)}:{getattr(node, 'lineno', 0)}: {name}" for name in odd]
+    assert not found
 
 
 @pytest.mark.parametrize("package", PACKAGES)

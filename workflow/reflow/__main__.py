@@ -1,4 +1,4 @@
-"""Entry point of the ranks that reflow joints: `mpirun -n N python -m workflow.reflow FOLDER`, see `ranks.py`.
+"""Entry point of the ranks that reflow joints: `mpirun -n N python -m workflow.reflow FOLDER WORK`, see `ranks.py`.
 
 Exit code 1 when a joint fails, upon which mpirun ends all.
 """
@@ -9,11 +9,11 @@ from pathlib import Path
 
 from fem.own_job import own_environment
 from workflow.kernel_cache import keep_kernels_by_source
-from workflow.reflow.rank import main
+from workflow.reflow.rank import find, main
 
 if __name__ == "__main__":
     own = own_environment(os.environ)  # PETSc's MPI is to be each rank's own: else it would wait for those without work
     os.environ.clear()
     os.environ.update(own | {"NUMBA_NUM_THREADS": "1"})
     keep_kernels_by_source()
-    sys.exit(main(Path(sys.argv[1])))
+    sys.exit(main(Path(sys.argv[1]), find(sys.argv[2])))

@@ -55,6 +55,15 @@ class Job:
         return Checkpoint(self.files / f"{source.name}@{source.number}", (source, self.solder))
 
 
+def records() -> tuple[type, ...]:
+    """Return what jobs and results consist of."""
+    from particles.carried_joint import Carried
+    from particles.geometry import JointGeometry
+    from particles.shape import JointShape, Snapshot
+
+    return Job, Source, JointGeometry, Solder, Carried, JointShape, Snapshot
+
+
 class JointArray:
     """The joints, `coupling.Joints`. Those that are alike stay one as long as their places are.
 

@@ -13,15 +13,16 @@ from fem.thermal.parameters import KELVIN, Thermal
 from workflow.board_drop_case import PackageCase
 from workflow.findings import at_most, metric
 from workflow.progress import ProgressBar, progress_bar
-from workflow.reflow.array import JointArray
+from workflow.reflow.array import JointArray, Left, Source
 from workflow.reflow.between import frozen_displacement, open_structure, thermal_effects
 from workflow.reflow.coupling import Coupled, Coupling, Exchange, placed
 from workflow.reflow.forecast import thermal_effect
 from workflow.reflow.load_steps import LoadStep, load_steps
 from workflow.reflow.open_pool import open_pool
 from workflow.reflow.pool import Shares
+from workflow.reflow.rigid_balance import RigidBalance
 from workflow.reflow.start import scale_of, start
-from workflow.reflow_pool import joint_geometries
+from workflow.reflow_pool import Alike, joint_geometries
 from workflow.stage_runner import Run
 
 if TYPE_CHECKING:
@@ -29,7 +30,6 @@ if TYPE_CHECKING:
     from meshing.pads import PadSite
     from particles.geometry import JointGeometry
     from particles.shape import JointShape
-    from workflow.reflow_pool import Alike
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,6 +130,15 @@ def all_inputs(case: PackageCase, pads: "list[PadSite]") -> tuple:
     return case.package, case.board, case.warpage, case.solder, case.materials, case.thermal, pads, sources
 
 
+def _records() -> tuple[type, ...]:
+    """What the file of a coupling consists of."""
+    from fem.thermal.state import State
+    from particles.geometry import JointGeometry
+    from particles.orientation import Orientation
+
+    return Coupled, RigidBalance, State, Exchange, Left, Source, Alike, JointGeometry, Orientation
+
+
 class Saved:
     """The file of the coupling: a run that continues takes up the exchange that was going on."""
 
@@ -141,15 +150,15 @@ class Saved:
 
     def read(self, joints: JointArray) -> Coupled | None:
         """Return where the coupling was, and set the joints to that; None where nothing was saved."""
-        known = self._file.read()
+        known = self._file.read(_records())
         if known is None:
             return None
-        coupled, joints.left = known
-        return coupled
+        joints.left = known["left"]
+        return known["coupled"]
 
     def writer(self, joints: JointArray) -> Callable[[Coupled], None]:
         """Return what saves where coupling and joints are."""
-        return lambda coupled: self._file.write((coupled, joints.left))
+        return lambda coupled: self._file.write({"coupled": coupled, "left": joints.left})
 
 
 class Telling:

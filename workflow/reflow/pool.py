@@ -29,7 +29,8 @@ class JointPool(Protocol):
         """Do a piece of work for each joint.
 
         Args:
-            work: function of a module, called with a job and a function that takes the fraction done.
+            work: function of a module, called with a job and a function that takes the fraction done; jobs and results
+                are data and the records that the module's function `records` lists.
             jobs: name of a joint -> job.
             progress: called with name -> fraction done.
 

@@ -1,12 +1,18 @@
-"""What one MPI rank does: it takes jobs from a folder, until none is left or one fails; see `ranks.py`."""
+"""What one MPI rank does: it takes jobs from a folder, until none is left or one fails; see `ranks.py`.
+
+Jobs and what they gave are files of data. Which function does them stands on the command line, in no file.
+"""
 
 import json
-import pickle
 import sys
+from collections.abc import Callable
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 from time import monotonic
 from typing import Any
+
+from particles.data_file import read_data, write_data
 
 JOB, TAKEN, RESULT = ".job", ".taken", ".result"
 PAUSE = 0.2  # seconds between two words of the progress
@@ -35,6 +41,23 @@ class Voice:
             sys.stdout.flush()
 
 
+def name_of(work: Callable) -> str:
+    """Return the name by which another process finds a function of a module."""
+    return f"{work.__module__}:{work.__qualname__}"
+
+
+def find(name: str) -> Callable:
+    """Return the function of which `name_of` has given the name."""
+    module, _, function = name.partition(":")
+    found: Callable = getattr(import_module(module), function)
+    return found
+
+
+def records_of(work: Callable) -> tuple[type, ...]:
+    """Return the records that may be in the files of jobs and results: its module lists them."""
+    return (Done, *sys.modules[work.__module__].records())
+
+
 def take(path: Path) -> bool:
     """Take a job, unless another rank has."""
     try:
@@ -44,27 +67,19 @@ def take(path: Path) -> bool:
     return True
 
 
-def done(path: Path) -> Done:
+def done(path: Path, work: Callable) -> Done:
     """Do a job."""
-    work, job = pickle.loads(path.read_bytes())
     try:
-        return Done(work(job, Voice(path.stem)))
+        return Done(work(read_data(path, records_of(work)), Voice(path.stem)))
     except Exception as error:  # whatever it is, the launcher must hear of it
         return Done(error=f"{type(error).__name__}: {error}")
 
 
-def leave(path: Path, result: Done) -> None:
-    """Write what a job gave, at once or not at all."""
-    partial = path.with_suffix(".partial")
-    partial.write_bytes(pickle.dumps(result))
-    partial.replace(path.with_suffix(RESULT))
-
-
-def main(folder: Path) -> int:
+def main(folder: Path, work: Callable) -> int:
     """Do jobs until none is left or one fails; return the exit code."""
     for path in filter(take, sorted(folder.glob(f"*{JOB}"))):
-        result = done(path)
-        leave(path, result)
+        result = done(path, work)
+        write_data(path.with_suffix(RESULT), {}, result)
         if result.error:
             return 1
         Voice(path.stem)(1.0)

@@ -1,12 +1,11 @@
 """MPI ranks, of any number of machines with a common file system, that bring joints to rest.
 
-The joints do not know each other, so no rank sends anything: jobs, what they gave and their checkpoints are files. Each
-piece of work is a program of its own, since a rank that waited for the next one would look for it in vain for as long
-as a network file system keeps a listing (30 s as usual); its start takes a second or two.
+The joints do not know each other, so no rank sends anything: jobs, what they gave and their checkpoints are files of
+data. Each piece of work is a program of its own, since a rank that waited for the next one would look for it in vain
+for as long as a network file system keeps a listing (30 s as usual); its start takes a second or two.
 """
 
 import json
-import pickle
 import shutil
 import sys
 from collections.abc import Callable, Mapping
@@ -14,9 +13,10 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
+from particles.data_file import NotData, read_data, write_data
 from workflow.launch import DIE_WITH_PARENT, LaunchError, launch, mpi_command
 from workflow.reflow.pool import Job, ReflowError, Report, Result, Shares
-from workflow.reflow.rank import JOB, RESULT, TAKEN, Done
+from workflow.reflow.rank import JOB, RESULT, TAKEN, Done, name_of, records_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +49,7 @@ class Ranks:
         shutil.rmtree(self.folder, ignore_errors=True)
         self.folder.mkdir(parents=True)
         for name, job in jobs.items():
-            (self.folder / f"{name}{JOB}").write_bytes(pickle.dumps((work, job)))
+            write_data(self.folder / f"{name}{JOB}", {}, job)
         done = dict.fromkeys(jobs, 0.0)
 
         def take(line: str) -> None:
@@ -58,22 +58,25 @@ class Ranks:
                 done.update({name: float(said[name]) for name in said if name in done})
                 progress(done)
 
-        program = [*DIE_WITH_PARENT, sys.executable, "-m", "workflow.reflow", str(self.folder.resolve())]
+        program = [*DIE_WITH_PARENT, sys.executable, "-m", "workflow.reflow", str(self.folder.resolve()), name_of(work)]
         try:
             launch(mpi_command(min(self.count, len(jobs)), program, self.oversubscribe), take, self.folder / "log.txt")
         except LaunchError as error:
-            raise self._failure(jobs, error) from error
-        return {name: self._done(name).value for name in jobs}
+            raise self._failure(work, jobs, error) from error
+        return {name: self._done(work, name).value for name in jobs}
 
-    def _done(self, name: str) -> Done:
-        done: Done = pickle.loads((self.folder / f"{name}{RESULT}").read_bytes())
+    def _done(self, work: Callable, name: str) -> Done:
+        try:
+            done: Done = read_data(self.folder / f"{name}{RESULT}", records_of(work))
+        except NotData as error:
+            raise ReflowError(f"joint {name}: {error}") from error
         return done
 
-    def _failure(self, jobs: Mapping[str, object], error: LaunchError) -> ReflowError:
+    def _failure(self, work: Callable, jobs: Mapping[str, object], error: LaunchError) -> ReflowError:
         """Say which joint failed and how; where none did, which were under way."""
         ended = [name for name in jobs if (self.folder / f"{name}{RESULT}").exists()]
         for name in ended:
-            failed = self._done(name).error
+            failed = self._done(work, name).error
             if failed:
                 return ReflowError(f"joint {name}: {failed}")
         busy = [name for name in jobs if name not in ended and (self.folder / f"{name}{TAKEN}").exists()]

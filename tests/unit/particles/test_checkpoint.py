@@ -12,6 +12,7 @@ from particles.checkpoint import Checkpoint
 from particles.geometry import JointGeometry
 from particles.parameters import Solder, SolderEffects, SolderNumerics
 from particles.reflow import solve_joint
+from tests.support.forged_files import DAMAGES
 
 JOINT = JointGeometry(0.31e-3, 0.24e-3, 0.24e-3)
 COARSE = SolderNumerics(spacing=1e-4)
@@ -113,6 +114,31 @@ def test_a_truncated_file_is_ignored_with_a_message(tmp_path, caplog, share):
     assert not checkpoint.continued
 
 
+@pytest.mark.parametrize("damage", DAMAGES.values(), ids=DAMAGES)
+def test_a_broken_or_foreign_file_starts_the_run_anew(tmp_path, caplog, damage):
+    path, marker = tmp_path / "joint", tmp_path / "marker"
+    Checkpoint(path, ("inputs",)).write({"points": np.arange(1000.0)})
+    path.write_bytes(damage(path.read_bytes(), marker))
+    checkpoint = Checkpoint(path, ("inputs",))
+    assert checkpoint.read() is None
+    assert f"{path}" in caplog.text
+    assert "the run starts anew" in caplog.text
+    assert not checkpoint.continued
+    assert not marker.exists()
+
+
+@pytest.mark.parametrize("damage", [DAMAGES["pickle"], DAMAGES["pickled array"]])
+def test_a_reflow_beside_a_forged_checkpoint_starts_anew(tmp_path, caplog, uninterrupted, damage):
+    path, marker = tmp_path / "joint", tmp_path / "marker"
+    break_off(QUASI_STATIC, path)
+    path.write_bytes(damage(path.read_bytes(), marker))
+    checkpoint = Checkpoint(path, (JOINT, QUASI_STATIC))
+    check_equal(solve_joint(JOINT, QUASI_STATIC, checkpoint=checkpoint), uninterrupted)
+    assert not checkpoint.continued
+    assert "the run starts anew" in caplog.text
+    assert not marker.exists()
+
+
 def test_a_file_of_other_inputs_is_ignored_with_a_message(tmp_path, caplog):
     path = tmp_path / "joint"
     Checkpoint(path, (JOINT, QUASI_STATIC)).write("state")
@@ -135,7 +161,7 @@ def test_a_write_that_fails_leaves_the_old_file(tmp_path, monkeypatch):
     def fail(_):
         raise OSError("no space")
 
-    monkeypatch.setattr("particles.checkpoint.os.fsync", fail)
+    monkeypatch.setattr("particles.data_file.os.fsync", fail)
     with pytest.raises(OSError, match="no space"):
         checkpoint.write("new")
     assert checkpoint.read() == "old"

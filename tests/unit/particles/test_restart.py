@@ -1,23 +1,32 @@
-"""Runs besides a single joint that are broken off continue to the same bits: a floating plate, a path, free drops."""
+"""Runs that are broken off continue to the same bits: joints that move, drops, every way to solve a step."""
 
 from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
+from scipy import sparse
 
+from particles.carried_joint import carried_shape, carry_joint
 from particles.checkpoint import Checkpoint
+from particles.cloud import box_cloud
 from particles.cloud_sphere import sphere_cloud
+from particles.drop_at_rest import flow_to_rest
 from particles.drops import run_drops
 from particles.free_drop import solve_free_drop
 from particles.geometry import JointGeometry
 from particles.moving_joint import follow_path, settle_joint
-from particles.parameters import Solder, SolderNumerics
+from particles.parameters import Solder, SolderEffects, SolderNumerics
 from particles.plate_motion import LIFT, Floating
-from particles.reflow import start_flow, stop_rule
+from particles.reflow import contact_line, start_flow, start_joint, stop_rule
+from particles.rest import RECORDS
+from particles.scenes import Drop
 
 RADIUS = 0.24e-3
 JOINT = JointGeometry(0.31e-3, RADIUS, RADIUS)
 SOLDER = Solder(volume=0.0724e-9, numerics=SolderNumerics(spacing=1e-4, time_step_limit=100))
+WETTING = dict.fromkeys(("surface_tension", "gravity", "wall_adhesion", "viscosity", "inertia"), True)
 FREE = {"surface_tension": True, "gravity": False, "wall_adhesion": False, "viscosity": False, "inertia": False}
 
 
@@ -59,6 +68,39 @@ def follow(checkpoint):
     return points_of(follow_path(JOINT, SOLDER, path, at if checkpoint else None))
 
 
+def carry(checkpoint):
+    """Carried from a file to another place, on the way to which it is broken off; then its shape there."""
+    if checkpoint is None:
+        with TemporaryDirectory() as folder:
+            return carry(BreakingCheckpoint(Path(folder) / "state", -1))
+    first, now = (Checkpoint(checkpoint.path.with_name(name), ("inputs",)) for name in ("first", "now"))
+    moved = JointGeometry(0.29e-3, RADIUS + 1e-10, RADIUS, (1e-5, 0.0), (0.0, -0.01))  # alike, but not to the bit
+    carry_joint(JOINT, SOLDER, None, first)
+    wrenches = carry_joint(moved, SOLDER, first, BreakingCheckpoint(now.path, checkpoint.left)).wrenches
+    return [wrenches, carried_shape(moved, SOLDER, first, now).points]
+
+
+def stand(checkpoint):
+    """A drop whose contact line has hysteresis."""
+    drop = Drop(volume=1e-9, receding_angle=1.0, advancing_angle=2.2, particles_per_edge=7)
+    flow, _ = flow_to_rest(drop, SOLDER.model_copy(update={"volume": 1e-9}), checkpoint=checkpoint)
+    return [flow.body.points, *(line.state for line in flow.physics.lines)]
+
+
+def flow_of(scheme, limit):
+    """A drop that moves with inertia, for the time of some steps."""
+    effects = SolderEffects(inertia="on", viscosity="on")
+    numerics = SolderNumerics(spacing=1e-4, scheme=scheme, time_step_limit=limit)
+    solder = Solder(volume=1e-9, effects=effects, numerics=numerics, process_time=2e-4)
+    return Drop(volume=1e-9, contact_angle=1.7, particles_per_edge=7), solder
+
+
+def flow_as_printed(checkpoint):
+    flow, run = flow_to_rest(*flow_of("gripc", 0.5), checkpoint=checkpoint)
+    assert len(run.records) > 8
+    return [flow.body.points, flow.body.velocity, flow.body.pressure, run.history(1.0)["energy"]]
+
+
 def swing(checkpoint):
     drop = solve_free_drop(SOLDER, amplitude=0.1, periods=0.1, steps_per_period=100, checkpoint=checkpoint)
     return [drop.points, *drop.history.values(), *(snapshot.points for snapshot in drop.snapshots)]
@@ -74,7 +116,7 @@ def merge(checkpoint):
     return [drop.flow.body.points for drop in drops]
 
 
-@pytest.mark.parametrize("run", [settle, follow, swing, merge])
+@pytest.mark.parametrize("run", [settle, follow, carry, stand, flow_as_printed, swing, merge])
 def test_a_broken_off_run_continues_to_the_same_bits(tmp_path, run):
     path = tmp_path / "state"
     with pytest.raises(BrokenOff):
@@ -82,3 +124,45 @@ def test_a_broken_off_run_continues_to_the_same_bits(tmp_path, run):
     expected, found = run(None), run(BreakingCheckpoint(path, -1))
     assert len(found) == len(expected)
     assert all(np.array_equal(one, other) for one, other in zip(found, expected, strict=True))
+
+
+def leaves(value, place=""):
+    """All numbers and arrays of an object by their place; what PETSc keeps is left out: it is made anew."""
+    if sparse.issparse(value):
+        value = {name: getattr(value, name) for name in ("data", "indices", "indptr", "shape")}
+    if place.endswith("/_solver"):
+        return
+    if value is None or isinstance(value, bool | int | float | str | np.ndarray | np.generic):
+        yield place, value
+        return
+    if isinstance(value, list | tuple):
+        value = dict(enumerate(value))
+    if not isinstance(value, dict):
+        slots = [name for kind in type(value).__mro__ for name in getattr(kind, "__slots__", ())]
+        value = getattr(value, "__dict__", {}) | {name: getattr(value, name) for name in slots}
+    for name, part in value.items():
+        yield from leaves(part, f"{place}/{name}")
+
+
+def start_drop(scheme, limit):
+    drop, solder = flow_of(scheme, limit)
+    cloud = box_cloud(drop.edge, drop.count)
+    return start_flow(cloud, solder, WETTING, (contact_line(cloud, 0, np.inf, solder),))
+
+
+@pytest.mark.parametrize(
+    "begin",
+    [lambda: start_joint(JOINT, SOLDER)[0], lambda: start_drop("energy", 20), lambda: start_drop("gripc", 0.5)],
+    ids=["relaxation", "inertial", "gripc"],
+)
+def test_nothing_of_a_flow_is_forgotten(tmp_path, begin):
+    """Whatever a flow, its solver or what acts on it may remember from now on must be saved, too."""
+    flow, again = begin(), begin()
+    for _ in range(4):
+        flow.step()
+    Checkpoint(tmp_path / "state", ()).write(flow.saved())
+    again.restore(Checkpoint(tmp_path / "state", ()).read(RECORDS))
+    found, expected = dict(leaves(again)), dict(leaves(flow))
+    assert found.keys() == expected.keys()
+    different = [place for place, value in expected.items() if not np.array_equal(found[place], value)]
+    assert not different

@@ -1,0 +1,133 @@
+"""Files of data come back as they were written; any other file is refused, and nothing in it is executed."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import fem.data_file
+from particles import data_file
+from particles.data_file import NotData, columns, read_data, read_header, rows, write_data
+from particles.parameters import Solder, SolderNumerics
+from tests.support.forged_files import DAMAGES, forged_array, with_digest
+
+
+@dataclass(frozen=True, slots=True)
+class Wheel:
+    radius: float
+    spokes: np.ndarray
+
+
+@dataclass
+class Cart:
+    wheels: tuple[Wheel, ...]
+    name: str | None = None
+
+
+def test_both_packages_have_the_same_file():
+    assert Path(data_file.__file__).read_bytes() == Path(fem.data_file.__file__).read_bytes()
+
+
+def test_a_value_comes_back_as_it_was(tmp_path):
+    shared = np.arange(6.0).reshape(2, 3)
+    value = {
+        "numbers": [1, -2.5e-300, True, None, float("inf"), np.float64(0.1), np.int32(7)],
+        "text": "°C, \n and \u0000",
+        "pair": (1, (2.0, "three")),
+        "path": tmp_path / "there",
+        "nested": {"a/b": shared, "a": {"b": shared + 1.0}, "nothing": {}},
+        "again": [shared, shared.T, shared[:0], np.array(3, np.int8), np.array(["growth", "by displacement"])],
+    }
+    write_data(tmp_path / "file", {"owner": "me", "window": 3}, value)
+    assert read_header(tmp_path / "file") == {"owner": "me", "window": 3}
+    found = read_data(tmp_path / "file")
+    assert [*found["numbers"]] == [1, -2.5e-300, True, None, float("inf"), 0.1, 7]
+    assert {name: found[name] for name in ("text", "pair", "path")} == {
+        name: value[name] for name in ("text", "pair", "path")
+    }
+    assert found["nested"]["nothing"] == {}
+    arrays = [found["nested"]["a/b"], found["nested"]["a"]["b"], *found["again"]]
+    for one, other in zip(arrays, [shared, shared + 1.0, *value["again"]], strict=True):
+        assert one.dtype == other.dtype
+        assert one.flags.f_contiguous == other.flags.f_contiguous
+        np.testing.assert_array_equal(one, other)
+    assert found["again"][0] is found["nested"]["a/b"]
+
+
+def test_records_come_back_where_the_reader_takes_them(tmp_path):
+    cart = Cart((Wheel(0.5, np.ones(3)), Wheel(0.7, np.zeros(2))), "hay")
+    solder = Solder(volume=1e-10, numerics=SolderNumerics(spacing=1e-4))
+    write_data(tmp_path / "file", {}, [cart, solder])
+    found, melted = read_data(tmp_path / "file", (Cart, Wheel, Solder))
+    assert melted == solder
+    assert isinstance(found, Cart)
+    assert found.name == "hay"
+    assert [wheel.radius for wheel in found.wheels] == [0.5, 0.7]
+    np.testing.assert_array_equal(found.wheels[0].spokes, np.ones(3))
+    with pytest.raises(NotData, match="Wheel"):
+        read_data(tmp_path / "file", (Cart, Solder))
+
+
+def test_rows_become_a_table_and_rows_again():
+    told = [{"time": 0.5 * k, "flips": k, "binding": "growth", "strain": np.arange(2.0) * k} for k in range(3)]
+    found = rows(columns(told))
+    assert [{**row, "strain": row["strain"].tolist()} for row in found] == [
+        {**row, "strain": row["strain"].tolist()} for row in told
+    ]
+    assert type(found[1]["time"]) is float
+    assert rows(columns([])) == []
+
+
+@pytest.mark.parametrize(
+    "value, what",
+    [
+        ({"work": print}, "no data"),
+        ([np.array([None])], "value/0: an array of objects"),
+        ({1: "wall"}, "1 is no name"),
+        ({"@": "array"}, "'@' is no name"),
+    ],
+)
+def test_what_is_no_data_is_not_written(tmp_path, value, what):
+    with pytest.raises(TypeError, match=what):
+        write_data(tmp_path / "file", {}, value)
+    assert not list(tmp_path.iterdir())
+
+
+def test_any_flipped_bit_is_noticed(tmp_path):
+    path = tmp_path / "file"
+    write_data(path, {"owner": "me"}, {"points": np.arange(4.0), "time": 1.0})
+    content = path.read_bytes()
+    for at in range(len(content)):
+        path.write_bytes(content[:at] + bytes([content[at] ^ (1 << at % 8)]) + content[at + 1 :])
+        with pytest.raises(NotData):
+            read_data(path)
+
+
+@pytest.mark.parametrize("damage", DAMAGES.values(), ids=DAMAGES)
+def test_a_file_that_is_none_is_refused_and_not_executed(tmp_path, damage):
+    path, marker = tmp_path / "file", tmp_path / "marker"
+    write_data(path, {"owner": "me"}, {"points": np.arange(100.0)})
+    path.write_bytes(damage(path.read_bytes(), marker))
+    with pytest.raises(NotData, match=str(path)):
+        read_data(path)
+    assert not marker.exists()
+
+
+def test_forged_files_would_run_code(tmp_path):
+    """Else the test above shows nothing."""
+    (tmp_path / "file.npz").write_bytes(forged_array(tmp_path / "marker"))
+    with np.load(tmp_path / "file.npz", allow_pickle=True) as arrays:
+        arrays["tree"]
+    assert (tmp_path / "marker").exists()
+
+
+def test_a_class_of_the_library_is_not_made(tmp_path):
+    path, marker = tmp_path / "file", tmp_path / "marker"
+    tree = f'{{"@": "pathlib.Path.touch", "fields": {{"self": "{marker}"}}}}'
+    write_data(path, {}, None)
+    np.savez(tmp_path / "rest.npz", tree=np.frombuffer(tree.encode(), np.uint8))
+    path.write_bytes(with_digest(path.read_bytes(), (tmp_path / "rest.npz").read_bytes()))
+    with pytest.raises(NotData, match=r"KeyError: 'pathlib\.Path\.touch'"):
+        read_data(path, (Wheel,))
+    assert not marker.exists()

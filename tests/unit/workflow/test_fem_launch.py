@@ -1,0 +1,13 @@
+"""What a run of the package fem says on its standard output reaches the user."""
+
+import json
+
+from workflow.fem_launch import _pass_on
+
+
+def test_progress_and_warnings_are_passed_on_and_other_words_are_not(caplog):
+    told = []
+    for line in (json.dumps({"warning": "a file is broken"}), "scheme: held velocity", '{"progress": 0.25, "time": 1}'):
+        _pass_on(line, told.append)
+    assert told == [0.25]
+    assert [record.message for record in caplog.records] == ["a file is broken"]
