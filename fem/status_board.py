@@ -52,7 +52,7 @@ class Status:
         if self.host != socket.gethostname():
             return False
         try:
-            state = Path(f"/proc/{self.process}/stat").read_text().rpartition(")")[2].split()[0]
+            state = Path(f"/proc/{self.process}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()[0]
         except FileNotFoundError:
             return True
         return state in "ZX"  # it has ended, its parent has not looked yet

@@ -68,7 +68,7 @@ class Watchdog:
         """
         if self._board.claim():
             words = f"error: {text}{HERE.last_checkpoint}{details}\n"
-            self._told.write_text(words)
+            self._told.write_text(words, encoding="utf-8")
             sys.stderr.write(words)
             sys.stderr.flush()
 

@@ -24,7 +24,7 @@ def run_fem(run: Run, folder: Path, request: dict, title: str) -> None:
     """
     folder.mkdir()
     path = folder / "input.json"
-    path.write_text(json.dumps(request | {"output": str(folder.resolve())}, indent=1) + "\n")
+    path.write_text(json.dumps(request | {"output": str(folder.resolve())}, indent=1) + "\n", encoding="utf-8")
     ranks = run.case.ranks
     command = mpi_command(ranks, [sys.executable, "-m", "fem", str(path)], run.oversubscribe)
     with progress_bar(f"{title} on {ranks} rank{'s' if ranks > 1 else ''}") as progress:

@@ -73,7 +73,7 @@ def write_inputs(run_folder: Path, case: Case) -> None:
 
 def read_case_of_run(run_folder: Path) -> Case:
     """Return the case whose inputs were last written."""
-    table = json.loads((run_folder / CASE).read_text())
+    table = json.loads((run_folder / CASE).read_text(encoding="utf-8"))
     return kind_of(table).model_validate(table)
 
 
@@ -81,7 +81,7 @@ def read_record(run_folder: Path, stage: Stage) -> dict | None:
     """Return what a stage said of itself; None where it or one of its products is missing."""
     if not all((run_folder / product).exists() for product in (stage.record, *stage.products)):
         return None
-    return json.loads((run_folder / stage.record).read_text())
+    return json.loads((run_folder / stage.record).read_text(encoding="utf-8"))
 
 
 def examine(run_folder: Path, case: Case) -> dict[str, Verdict]:
@@ -120,7 +120,7 @@ def _flat(table: dict, prefix: str = "") -> Iterator[tuple[str, object]]:
 
 def _write_if_changed(path: Path, content: dict) -> None:
     text = json.dumps(content, indent=1) + "\n"
-    if not path.exists() or path.read_text() != text:
+    if not path.exists() or path.read_text(encoding="utf-8") != text:
         partial = path.with_suffix(".partial")
-        partial.write_text(text)
+        partial.write_text(text, encoding="utf-8")
         partial.replace(path)

@@ -62,7 +62,7 @@ def launch(command: Sequence[str], on_line: Callable[[str], None], log: Path) ->
     if shutil.which(program) is None:
         raise LaunchError(f"{program} is not installed")
     environment = own_environment(os.environ) | {"OMP_NUM_THREADS": "1"}
-    with log.open("w") as errors:
+    with log.open("w", encoding="utf-8") as errors:
         process = subprocess.Popen(
             [*END_WITH_PARENT, *command],
             stdout=subprocess.PIPE,
@@ -85,7 +85,7 @@ def launch(command: Sequence[str], on_line: Callable[[str], None], log: Path) ->
 
 
 def _read(path: Path) -> list[str]:
-    return path.read_text(errors="replace").strip().splitlines() if path.is_file() else []
+    return path.read_text(encoding="utf-8", errors="replace").strip().splitlines() if path.is_file() else []
 
 
 def told(lines: Sequence[str]) -> str:

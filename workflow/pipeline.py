@@ -138,7 +138,7 @@ def _opened(path: Path | None) -> Iterator[IO | None]:
         yield None
         return
     path.parent.mkdir(parents=True, exist_ok=True)
-    with path.open("w") as file:
+    with path.open("w", encoding="utf-8") as file:
         yield file
 
 

@@ -26,14 +26,15 @@ def progress_bar(description: str) -> Iterator[ProgressBar]:
         What is to be told.
     """
     columns = (
-        TextColumn("  {task.description}"),
+        TextColumn("  {task.description}", markup=False),
         BarColumn(bar_width=30),
         TaskProgressColumn(),
         TimeElapsedColumn(),
         TimeRemainingColumn(),
     )
-    if not console.is_terminal:
-        console.print(f"       {description} …")
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+    moving = console.is_terminal and not console.is_dumb_terminal
+    if not moving:
+        console.print(f"       {description} …", soft_wrap=True)
+    with Progress(*columns, console=console, transient=True, disable=not moving) as bar:
         task = bar.add_task(description, total=1.0)
         yield lambda share, text="": bar.update(task, completed=share, description=text or description)

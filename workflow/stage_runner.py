@@ -85,7 +85,7 @@ def run_stage(name: str, function: StageFunction, run: Run) -> dict:
         "continued": findings.continued,
         "inputs": stage_inputs(run.case, run.case.pipeline[name]),
     }
-    (partial / "stage.json").write_text(json.dumps(record, indent=1) + "\n")
+    (partial / "stage.json").write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
     _remove(folder)
     partial.rename(folder)
     _remove(run.checkpoints(name))
@@ -113,9 +113,9 @@ def execute(name: str, function: StageFunction, run: Run) -> bool:
         if _is_interrupt(error):
             raise KeyboardInterrupt from error
         log = run.folder / f".{name}.partial" / "error.txt"
-        log.write_text(traceback.format_exc())
+        log.write_text(traceback.format_exc(), encoding="utf-8")
         told = str(error) if isinstance(error, LaunchError) else f"{type(error).__name__}: {error}"
-        log.with_name(MESSAGE).write_text(told)
+        log.with_name(MESSAGE).write_text(told, encoding="utf-8")
         print_error(f"stage {name} failed: {told}\ntraceback: {log}")
         return False
     health_line(name, record["seconds"], record["health"], record["continued"])

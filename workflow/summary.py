@@ -34,7 +34,7 @@ def collect_summary(run_folder: Path, case_name: str) -> dict:
         path = run_folder / stage / "stage.json"
         if not path.exists():
             continue
-        record = json.loads(path.read_text())
+        record = json.loads(path.read_text(encoding="utf-8"))
         summary["timings"][stage] = record["seconds"]
         for key in ("metrics", "health"):
             summary[key].update(record[key])
@@ -46,7 +46,7 @@ def collect_summary(run_folder: Path, case_name: str) -> dict:
 def write_summary(run_folder: Path, summary: dict) -> None:
     """Write ``summary.json`` under a temporary name, then rename it."""
     partial = run_folder / ".summary.json.partial"
-    partial.write_text(json.dumps(summary, indent=2) + "\n")
+    partial.write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
     partial.rename(run_folder / "summary.json")
 
 

@@ -142,7 +142,7 @@ def kept(world: MPI.Comm, folder: Path | None, present: NDArray[np.int8]) -> Mea
     """Return what ``keep`` wrote with as many ranks of all families that rank 0 finds ``present``; collective."""
     found = None
     if world.rank == 0 and folder is not None and (folder / KEPT).exists():
-        record = json.loads((folder / KEPT).read_text())
+        record = json.loads((folder / KEPT).read_text(encoding="utf-8"))
         cost = StepCost(np.array(record["fixed"]), np.array(record["element"]))
         fits = len(cost.fixed) == world.size and bool((cost.element[:, present] > 0.0).all())
         found = Measured(cost, record["latency"]) if fits else None

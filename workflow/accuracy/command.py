@@ -29,6 +29,7 @@ from workflow.problems import CaseError, Problem
 from workflow.progress import progress_bar
 from workflow.report.tables import percent
 from workflow.stage_forecast import stage_seconds
+from workflow.terminal import styled
 from workflow.units import UnitError, to_si
 
 TOLERANCE = 0.02  # where neither a tolerance nor a budget is given
@@ -172,7 +173,7 @@ def show(wish: Wish, out: Path | None, console: Console) -> bool:
     console.print(
         table(tables.runs(accuracy), f"Errors and costs, the least of all times that it was run: {accuracy.machine}")
     )
-    console.print(f"[dim]{tables.legend(accuracy)}", soft_wrap=True)
+    console.print(styled("[dim]{}", tables.legend(accuracy)), soft_wrap=True)
     console.print(table(tables.orders(accuracy), "Orders in h, the value of a knob; core-seconds t0 + D h^-q"))
     for remark in remarks:
         console.print(f"\n{remark}", soft_wrap=True)
@@ -270,12 +271,13 @@ def total(known, case: Case) -> float:
 def _show_choice(accuracy: Accuracy, console: Console) -> None:
     chosen = accuracy.recommended
     if chosen is None:
-        console.print("\n[bold]Nothing to recommend[/]: no run has a known error within the budget.")
+        console.print(styled("\n[bold]Nothing to recommend[/]: no run has a known error within the budget."))
         return
-    console.print(f"\n[bold]Recommended: {chosen.rung.name}[/], {chosen.why}. In the case file:\n", soft_wrap=True)
+    told_first = "\n[bold]Recommended: {}[/], {}. In the case file:\n"
+    console.print(styled(told_first, chosen.rung.name, chosen.why), soft_wrap=True)
     for line in tables.as_lines(chosen.rung.settings):
-        console.print(f"    {line}", markup=False)
-    console.print(f"\nor {tables.as_options(chosen.rung.settings)}", markup=False, soft_wrap=True)
+        console.print(f"    {line}")
+    console.print(f"\nor {tables.as_options(chosen.rung.settings)}", soft_wrap=True)
     told = tables.prediction(accuracy)
     if told is not None:
         console.print(table(told, ""))

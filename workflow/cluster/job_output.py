@@ -8,7 +8,7 @@ from workflow.terminal import console, errors
 
 # Options of env: Open MPI would take a stage that is a step of Slurm for one of the ranks that srun starts.
 OWN_STEP = "-u SLURM_STEPID -u SLURM_STEP_ID"
-ERROR = "error "  # begins what a stage says when it fails
+ERROR = "error: "  # begins what a stage says when it fails
 # How Snakemake says that a job failed; its message ends where the command, advice or the next entry begins.
 FAILED = re.compile(
     r"^Error in rule (?P<rule>\S+):\n\s+message: (?P<why>.*?)"
@@ -49,7 +49,7 @@ class JobOutput:
         if line.startswith(ERROR):
             self._failed.add(stage)
         where = errors if stage in self._failed else console
-        where.print(line, markup=False, soft_wrap=True)
+        where.print(line, soft_wrap=True)
 
     def untold(self, said: Path) -> list[str]:
         """Say why Snakemake failed: of jobs without a word of their own, as one that Slurm has ended.
@@ -57,7 +57,7 @@ class JobOutput:
         Args:
             said: file with the output of Snakemake, which is named where no job has failed.
         """
-        text = said.read_text(errors="replace") if said.is_file() else ""
+        text = said.read_text(encoding="utf-8", errors="replace") if said.is_file() else ""
         found = {match["rule"]: match["why"] for match in FAILED.finditer(text)}
         if not found and not self._failed:
             return [f"Snakemake has ended; what it said is in {said}"]

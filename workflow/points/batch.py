@@ -176,7 +176,7 @@ def _write(store: Store, jobs: Sequence[Job], machine: Machine) -> None:
             resources=wanted[job.point.key].get(job.stage, {}),
         )
     written = {name: asdict(task) for name, task in tasks.items()}
-    (store.folder / JOBS).write_text(json.dumps(written, indent=1) + "\n")
+    (store.folder / JOBS).write_text(json.dumps(written, indent=1) + "\n", encoding="utf-8")
 
 
 def _threads(job: Job, jobs: Sequence[Job], machine: Machine, wanted: Jobs) -> int:

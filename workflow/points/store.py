@@ -60,7 +60,7 @@ class Store:
     def message(self, point: Point, stage: str) -> str | None:
         """Return why a stage failed when it was last tried; None where it did not, or was not tried."""
         path = self._message(point, stage)
-        return path.read_text() if path.is_file() else None
+        return path.read_text(encoding="utf-8") if path.is_file() else None
 
     def _message(self, point: Point, stage: str) -> Path:
         return self.work_folder(point, stage) / f".{stage}.partial" / MESSAGE

@@ -39,7 +39,7 @@ def write_page(path: Path, template: str, context: dict) -> None:
         trim_blocks=True,
     )
     partial = path.with_name(f".{path.name}.partial")
-    partial.write_text(environment.get_template(template).render(context))
+    partial.write_text(environment.get_template(template).render(context), encoding="utf-8")
     partial.rename(path)
 
 

@@ -34,7 +34,7 @@ def write_results(folder: Path, verdicts: Sequence[Verdict], samples: Sequence[S
         if sample.simplest is not None:
             path = counterexample_path(folder, sample)
             path.parent.mkdir(exist_ok=True)
-            path.write_text(hard_case_text(sample.simplest))
+            path.write_text(hard_case_text(sample.simplest), encoding="utf-8")
     draw_margins(folder / "stress_test.png", verdicts, samples)
     told = {
         "version": __version__,
@@ -42,8 +42,8 @@ def write_results(folder: Path, verdicts: Sequence[Verdict], samples: Sequence[S
         "fixed": [_record(verdict) for verdict in verdicts],
         "random": [_sample_record(sample) for sample in samples],
     }
-    (folder / "stress_test.json").write_text(json.dumps(told, indent=1))
-    (folder / "stress_test.html").write_text(_page(folder, verdicts, samples, seed))
+    (folder / "stress_test.json").write_text(json.dumps(told, indent=1), encoding="utf-8")
+    (folder / "stress_test.html").write_text(_page(folder, verdicts, samples, seed), encoding="utf-8")
 
 
 def counterexample_path(folder: Path, sample: Sample) -> Path:

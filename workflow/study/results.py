@@ -59,7 +59,7 @@ def row_of(number: int, store: Store, point: Point, keys: Sequence[str], failure
     settings = {key: shown.get(key, point.settings[key]) for key in keys}
     if failure is not None:
         return Row(number, point.key, settings, FAILED, failure)
-    summary = json.loads((store.run_folder(point) / "summary.json").read_text())
+    summary = json.loads((store.run_folder(point) / "summary.json").read_text(encoding="utf-8"))
     missed = [_check(name, check) for name, check in summary["health"].items() if not check["ok"]]
     return Row(
         number,

@@ -146,11 +146,11 @@ def test_what_jobs_say_is_shown_as_it_comes(tmp_path, capfd):
     output.show()
     log.write_text("  shock on 2 ranks …\nhalf")
     output.show()
-    log.write_text("  shock on 2 ranks …\nhalf a line\nerror stage shock failed: why\ntraceback: x\n")
+    log.write_text("  shock on 2 ranks …\nhalf a line\nerror: stage shock failed: why\ntraceback: x\n")
     output.show()
     told = capfd.readouterr()
     assert told.out == "  shock on 2 ranks …\nhalf a line\n"
-    assert told.err == "error stage shock failed: why\ntraceback: x\n"
+    assert told.err == "error: stage shock failed: why\ntraceback: x\n"
 
 
 def test_jobs_that_ended_without_a_word_are_told(tmp_path):
