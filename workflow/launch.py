@@ -11,6 +11,7 @@ from pathlib import Path
 
 from fem.own_job import own_environment
 from fem.status_board import ERROR
+from workflow.stopped_processes import PATIENCE, StoppedProcesses
 
 GRACE = 5.0  # seconds that a program has to end by itself after SIGTERM
 TOLD = "error: "  # begins what a program says of an error that it knows
@@ -47,41 +48,48 @@ def mpi_command(ranks: int, program: Sequence[str], oversubscribe: bool) -> list
     return [*command, *program]
 
 
-def launch(command: Sequence[str], on_line: Callable[[str], None], log: Path) -> None:
+def launch(command: Sequence[str], on_line: Callable[[str], None], log: Path, patience: float = PATIENCE) -> None:
     """Run a program to its end, reading its standard output line by line.
 
     Args:
         command: program and arguments.
         on_line: called with each line of standard output.
         log: file that takes standard error; a program may say in ``ERROR`` beside it, too, why it ended.
+        patience: how long one of its processes may be stopped [s]; all are ended then.
 
     Raises:
-        LaunchError: the program cannot be started or its exit code is not 0.
+        LaunchError: the program cannot be started, its exit code is not 0, or one of its processes was stopped.
     """
     program = command[0]
     if shutil.which(program) is None:
         raise LaunchError(f"{program} is not installed")
-    environment = own_environment(os.environ) | {"OMP_NUM_THREADS": "1"}
+    # What it writes is read here, not on a terminal: in UTF-8, whatever the terminal has.
+    environment = own_environment(os.environ) | {"OMP_NUM_THREADS": "1", "PYTHONIOENCODING": "utf-8:backslashreplace"}
     with log.open("w", encoding="utf-8") as errors:
         process = subprocess.Popen(
             [*END_WITH_PARENT, *command],
             stdout=subprocess.PIPE,
             stderr=errors,
-            text=True,
+            encoding="utf-8",
+            errors="replace",
             env=environment,
             start_new_session=True,
         )
         try:
-            for line in process.stdout or ():
-                on_line(line.rstrip("\n"))
-            code = process.wait()
+            with StoppedProcesses(process.pid, patience) as watch:
+                for line in process.stdout or ():
+                    on_line(line.rstrip("\n"))
+                code = process.wait()
         except BaseException:
             end_group(process)
             raise
     if code != 0:
         lines = _read(log) + _read(log.with_name(ERROR))
         words = "\n".join(lines[-LAST_LINES:]) or "it said nothing"
-        raise LaunchError(told(lines) or f"{program} {ending(code)}: {words}")
+        said = told(lines)
+        if watch.told:
+            raise LaunchError(f"{watch.told}; {said}".removesuffix("; "))
+        raise LaunchError(said or f"{program} {ending(code)}: {words}")
 
 
 def _read(path: Path) -> list[str]:

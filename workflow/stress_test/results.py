@@ -7,9 +7,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import jinja2
-
 from workflow import __version__
+from workflow.report.template import template_environment
 from workflow.stress_test.case_file import hard_case_text
 from workflow.stress_test.families import FAMILIES
 from workflow.stress_test.picture import draw_margins
@@ -82,11 +81,7 @@ def _sample_record(sample: Sample) -> dict[str, Any]:
 
 
 def _page(folder: Path, verdicts: Sequence[Verdict], samples: Sequence[Sample], seed: int) -> str:
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(TEMPLATES),
-        autoescape=jinja2.select_autoescape(["html", "j2"]),
-        trim_blocks=True,
-    )
+    environment = template_environment(TEMPLATES)
     environment.globals.update(said=said, sample_said=sample_said, margin_text=margin_text)
     in_order = sorted(verdicts, key=lambda one: (FAMILIES.index(one.case.family), one.case.name))
     return environment.get_template("stress_test.html.j2").render(
