@@ -7,9 +7,10 @@ def main() -> None:
     """Prepare the process, then load and run the command line."""
     with last_word():
         heed_signals()
-        from workflow.environment import begin_again_in_utf8
+        from workflow.environment import begin_again_in_utf8, prepare
 
         begin_again_in_utf8()
+        prepare()  # before any library is loaded
         from workflow.cli import main as run_command_line
 
         run_command_line()

@@ -5,9 +5,11 @@ Matplotlib, Snakemake, Open MPI) each fail in their own way then. Here it is men
 """
 
 import os
+import resource
 import stat
 import sys
 import tempfile
+import threading
 from collections.abc import Mapping, MutableMapping
 from contextlib import suppress
 from pathlib import Path
@@ -33,6 +35,18 @@ DEFAULTS = {
     "OPENBLAS_NUM_THREADS": "1",
     "PATH": os.defpath,
 }
+# Limits of the shell below which nothing runs: a small case needs 1.4 GB of addresses, 24 files, 4 MB of MPI's own.
+LEAST = (
+    (resource.RLIMIT_AS, 2_000_000_000, "only {:.3g} MB of memory may be used (ulimit -v), {:g} MB are needed"),
+    (
+        resource.RLIMIT_FSIZE,
+        16_000_000,
+        "only files of {:.3g} MB may be written (ulimit -f), {:g} MB are needed",
+    ),
+)
+LEAST_FILES = 64
+WANTED_FILES = 4096
+LEAST_THREADS, AMPLE_THREADS = 24, 1000
 
 
 class EnvironmentProblem(RuntimeError):
@@ -51,6 +65,7 @@ def prepare() -> None:
         EnvironmentProblem: the program cannot work here.
     """
     check_ranks(os.environ)
+    check_limits()
     write_any_text()
     complete(os.environ)
 
@@ -106,6 +121,46 @@ def check_ranks(environment: Mapping[str, str]) -> None:
         if count.isdigit() and int(count) > 1:
             message = f"started on {count} MPI ranks; start it once, it starts its own ranks"
             raise EnvironmentProblem(message, 2, environment.get(rank, "0") != "0")
+
+
+def check_limits() -> None:
+    """Refuse to work within limits of the shell that are too small, since libraries end in their own ways then.
+
+    Raises:
+        EnvironmentProblem: a limit is too small.
+    """
+    for number, least, message in LEAST:
+        soft, _ = resource.getrlimit(number)
+        if soft != resource.RLIM_INFINITY and soft < least:
+            raise EnvironmentProblem(message.format(soft / 1e6, least / 1e6))
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    most = WANTED_FILES if hard == resource.RLIM_INFINITY else min(hard, WANTED_FILES)
+    if soft != resource.RLIM_INFINITY and soft < most:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (most, hard))
+        soft = most
+    if soft != resource.RLIM_INFINITY and soft < LEAST_FILES:
+        raise EnvironmentProblem(f"only {soft} files may be open (ulimit -n), at least {LEAST_FILES} are needed")
+    soft, _ = resource.getrlimit(resource.RLIMIT_NPROC)
+    if soft != resource.RLIM_INFINITY and soft < AMPLE_THREADS and not _can_start(LEAST_THREADS):
+        raise EnvironmentProblem(f"{LEAST_THREADS} more processes or threads cannot be started (ulimit -u {soft})")
+
+
+def _can_start(count: int) -> bool:
+    """Return whether some threads can be started beside all that this user has: by starting them."""
+    over = threading.Event()
+    threads = [threading.Thread(target=over.wait) for _ in range(count)]
+    started = []
+    try:
+        for thread in threads:
+            thread.start()
+            started.append(thread)
+    except RuntimeError:
+        return False
+    finally:
+        over.set()
+        for thread in started:
+            thread.join()
+    return True
 
 
 def give_places(environment: MutableMapping[str, str]) -> None:

@@ -26,7 +26,8 @@ def keep_kernels_by_source(environment: MutableMapping[str, str] = os.environ) -
         return
     name = f"kernels-{digest()}"
     with suppress(RuntimeError):  # this user has no home
-        folder = Path(environment.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "reflowshock" / name
+        home = environment.get("HOME") or Path.home()
+        folder = Path(environment.get("XDG_CACHE_HOME") or Path(home, ".cache")) / "reflowshock" / name
         if _is_made(folder):
             environment[VARIABLE] = str(folder)
             return

@@ -132,7 +132,10 @@ def last_word() -> Iterator[None]:
     except SystemExit as ended:
         _end(ended.code)
     except BaseException as error:
-        _end(say(error))
+        code = say(error)
+        if NO_MEMORY in in_words(error):  # libraries that could not start their threads would wait for them at the end
+            os._exit(code)
+        _end(code)
 
 
 def answer(app: Callable[..., Any]) -> None:

@@ -23,6 +23,13 @@ QUIET = ("--mca", "orte_execute_quiet", "1")  # of Open MPI 4; 5 has no option -
 # In front of a command: the system sends the signal when the process that starts it ends, however that happens.
 END_WITH_PARENT = ("setpriv", "--pdeathsig", "TERM")
 DIE_WITH_PARENT = ("setpriv", "--pdeathsig", "KILL")
+ENDINGS: dict[int, str] = {
+    signal.SIGKILL: "was killed, as the system does when memory is short",
+    signal.SIGXFSZ: "was ended, since a file exceeded the largest allowed size (ulimit -f)",
+    signal.SIGXCPU: "was ended, since it took all the processor time allowed (ulimit -t)",
+    signal.SIGSEGV: "crashed (segmentation fault)",
+    signal.SIGBUS: "crashed (bus error, as when no space is left for a file in memory)",
+}
 
 
 class LaunchError(RuntimeError):
@@ -105,8 +112,8 @@ def told(lines: Sequence[str]) -> str:
 def ending(code: int) -> str:
     """Say how a program ended, from its exit code: below 0 or above 128 by a signal."""
     number = -code if code < 0 else code - 128
-    if number == signal.SIGKILL:
-        return "was killed, as the system does when memory is short"
+    if number in ENDINGS:
+        return ENDINGS[number]
     return f"ended with exit code {code}"
 
 

@@ -6,7 +6,7 @@ from typing import Protocol
 
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-from workflow.terminal import console
+from workflow.terminal import console, visible
 
 
 class ProgressBar(Protocol):
@@ -36,5 +36,5 @@ def progress_bar(description: str) -> Iterator[ProgressBar]:
     if not moving:
         console.print(f"       {description} …", soft_wrap=True)
     with Progress(*columns, console=console, transient=True, disable=not moving) as bar:
-        task = bar.add_task(description, total=1.0)
-        yield lambda share, text="": bar.update(task, completed=share, description=text or description)
+        task = bar.add_task(visible(description), total=1.0)
+        yield lambda share, text="": bar.update(task, completed=share, description=visible(text or description))

@@ -273,8 +273,8 @@ def _show_choice(accuracy: Accuracy, console: Console) -> None:
     if chosen is None:
         console.print(styled("\n[bold]Nothing to recommend[/]: no run has a known error within the budget."))
         return
-    told_first = "\n[bold]Recommended: {}[/], {}. In the case file:\n"
-    console.print(styled(told_first, chosen.rung.name, chosen.why), soft_wrap=True)
+    advice = styled("\n[bold]Recommended: {}[/], {}. In the case file:\n", chosen.rung.name, chosen.why)
+    console.print(advice, soft_wrap=True)
     for line in tables.as_lines(chosen.rung.settings):
         console.print(f"    {line}")
     console.print(f"\nor {tables.as_options(chosen.rung.settings)}", soft_wrap=True)

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 from rich.table import Table
+from rich.text import Text
 
 from workflow.stress_test.families import FAMILIES
 from workflow.stress_test.sample import Sample
@@ -14,12 +15,12 @@ LARGEST_SHOWN = 1000.0
 
 def show_verdict(verdict: Verdict) -> None:
     """Print one verdict: what was tried, the closest bound, what was measured, the margin."""
-    told = styled(f"{_mark(verdict.ok)} {{}}  {{}}  {{}} s", named(verdict), said(verdict), f"{verdict.seconds:.1f}")
-    console.print(told, soft_wrap=True)
+    told = styled(" {}  {}  {} s", named(verdict), said(verdict), f"{verdict.seconds:.1f}")
+    console.print(_mark(verdict.ok) + told, soft_wrap=True)
 
 
-def _mark(ok: bool) -> str:
-    return "[green]ok  [/]" if ok else "[bold red]MISS[/]"
+def _mark(ok: bool) -> Text:
+    return styled("[green]ok  [/]" if ok else "[bold red]MISS[/]")
 
 
 def named(verdict: Verdict) -> str:
@@ -45,8 +46,8 @@ def margin_text(check: Check) -> str:
 def show_sample(sample: Sample) -> None:
     """Print how the random cases of a trial ended, and what was missed."""
     seconds = f"{sum(verdict.seconds for verdict in sample.verdicts):.1f}"
-    told = styled(f"{_mark(sample.ok)} {{}}  {{}}  {{}} s", sample.trial.name, sample_said(sample), seconds)
-    console.print(told, soft_wrap=True)
+    told = styled(" {}  {}  {} s", sample.trial.name, sample_said(sample), seconds)
+    console.print(_mark(sample.ok) + told, soft_wrap=True)
     for verdict in sample.missed:
         console.print(f"     {named(verdict)}  {said(verdict)}", soft_wrap=True)
 
