@@ -134,7 +134,7 @@ class FieldFile:
 
 def _name_each_piece_once(parallel_file: Path) -> None:
     """Drop repeated pieces: dolfinx 0.5 lists a piece once a function, and readers show as many copies of the mesh."""
-    lines = parallel_file.read_text().splitlines()
+    lines = parallel_file.read_text(encoding="utf-8").splitlines()
     first = {line: k for k, line in reversed(list(enumerate(lines)))}
     kept = [line for k, line in enumerate(lines) if "<Piece " not in line or first[line] == k]
-    parallel_file.write_text("\n".join(kept) + "\n")
+    parallel_file.write_text("\n".join(kept) + "\n", encoding="utf-8")

@@ -7,9 +7,11 @@ from collections.abc import Mapping
 # What Open MPI leaves in the environment of a process that initialised MPI. An mpirun, or a child, that inherits it
 # takes itself for a part of that job and fails (seen from notebooks and test runs that imported mpi4py).
 OTHER_MPI_JOB = (
-    "PMIX_NAMESPACE", "PMIX_RANK", "PMIX_SERVER_", "PMIX_DSTORE_", "PMIX_SECURITY_MODE", "PMIX_GDS_MODULE",
+    "PMIX_NAMESPACE", "PMIX_RANK", "PMIX_ID", "PMIX_SERVER_", "PMIX_DSTORE_", "PMIX_SECURITY_MODE", "PMIX_GDS_MODULE",
     "PMIX_BFROP_BUFFER_TYPE", "PMIX_VERSION", "PMIX_HOSTNAME", "PMIX_SYSTEM_TMPDIR", "PMIX_MCA_psec", "ORTE_",
-    "OMPI_COMM_WORLD_", "OMPI_APP_CTX_", "OMPI_MCA_ess", "OMPI_MCA_orte_", "OMPI_MCA_pmix",
+    "OMPI_COMM_WORLD_", "OMPI_APP_CTX_", "OMPI_NUM_APP_CTX", "OMPI_FIRST_RANKS", "OMPI_UNIVERSE_SIZE", "OMPI_COMMAND",
+    "OMPI_ARGV", "OMPI_FILE_LOCATION", "OMPI_MCA_ess", "OMPI_MCA_orte_", "OMPI_MCA_pmix", "OMPI_MCA_initial_wdir",
+    "OMPI_MCA_shmem_RUNTIME_QUERY_hint", "OMPI_MCA_mpi_oversubscribe", "PRTE_", "OMPI_MCA_prte", "PMI_",
 )  # fmt: skip
 
 

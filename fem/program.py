@@ -56,7 +56,7 @@ def read_input(arguments: list[str]) -> RunInput | CoolingInput | StructureInput
     """Read and check the input file, and make the output directory."""
     if len(arguments) != 1:
         raise ValueError("usage: mpirun -n N python -m fem INPUT.json")
-    request = INPUT.validate_python(json.loads(Path(arguments[0]).read_text()))
+    request = INPUT.validate_python(json.loads(Path(arguments[0]).read_text(encoding="utf-8")))
     if isinstance(request, StructureInput):
         check(request)
     request.output.mkdir(parents=True, exist_ok=True)

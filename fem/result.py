@@ -100,7 +100,7 @@ def write_result(comms: Communicators, request: RunInput, built: Built, found: F
             "model": summary,
             "parts": list(next(iter(models.values())).tables.part_names),
         }
-        (request.output / "result.json").write_text(json.dumps(result, indent=1))
+        (request.output / "result.json").write_text(json.dumps(result, indent=1), encoding="utf-8")
 
 
 def coupling_of(request: RunInput, coupling: dict[str, Any]) -> dict[str, Any]:

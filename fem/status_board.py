@@ -49,13 +49,23 @@ class Status:
     @property
     def has_died(self) -> bool:
         """Return whether its process is gone; False where that cannot be known, as on another machine."""
+        return self._state in ("gone", "Z", "X")  # the last two: it has ended, its parent has not looked yet
+
+    @property
+    def is_stopped(self) -> bool:
+        """Return whether its process is stopped (SIGSTOP); False where that cannot be known, as on another machine."""
+        return self._state == "T"
+
+    @property
+    def _state(self) -> str:
+        """Return the letter by which the system says what the process does; nothing where that cannot be known."""
         if self.host != socket.gethostname():
-            return False
+            return ""
         try:
-            state = Path(f"/proc/{self.process}/stat").read_text().rpartition(")")[2].split()[0]
+            stat = Path(f"/proc/{self.process}/stat").read_text(encoding="utf-8", errors="replace")
         except FileNotFoundError:
-            return True
-        return state in "ZX"  # it has ended, its parent has not looked yet
+            return "gone"
+        return stat.rpartition(")")[2].split()[0]
 
     def told(self, silence: float) -> str:
         """Return in words what it does; a rank not heard of for ``silence`` seconds may be stopped."""

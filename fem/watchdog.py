@@ -68,23 +68,28 @@ class Watchdog:
         """
         if self._board.claim():
             words = f"error: {text}{HERE.last_checkpoint}{details}\n"
-            self._told.write_text(words)
+            self._told.write_text(words, encoding="utf-8")
             sys.stderr.write(words)
             sys.stderr.flush()
 
     def _watch(self) -> None:
         """Look at each tick until stopped."""
-        waited, latest, before = 0.0, -1, time.monotonic()
+        waited, stopped, latest, before = 0.0, 0.0, -1, time.monotonic()
         while not (heard := self._pause()):
             passed, before = time.monotonic() - before, time.monotonic()
             same = bool(HERE.waiting) and HERE.waits == latest
             latest = HERE.waits
             # A job that was stopped as a whole must not take the time of its rest for a wait.
-            waited = waited + min(passed, 2.0 * self._tick) if same else 0.0
+            passed = min(passed, 2.0 * self._tick)
+            waited = waited + passed if same else 0.0
+            stopped = stopped + passed if self._stopped() else 0.0
             self._board.write(self._status(waited))
             if waited > self._limit and not self._excuses():
                 text = f"a rank has waited longer than {self._limit:g} s (watchdog_seconds), all are ended"
                 self._end(text, self._who_waits())
+            if stopped > self._limit + 3.0 * self._tick:  # a rank that waits for it has had the time to say so
+                names = " and ".join(self._stopped())
+                self._end(f"stopped (SIGSTOP) for {self._limit:g} s (watchdog_seconds): {names}; all are ended")
         if heard[0] == signal.SIGTERM:
             self._end(self._who_died())
 
@@ -101,6 +106,10 @@ class Watchdog:
     def _excuses(self) -> bool:
         """Return whether a rank that is alive does something that may take any time."""
         return any(status.slow and time.time() - status.seen < self._limit for status in self._board.read())
+
+    def _stopped(self) -> list[str]:
+        """Return the names of ranks of this machine that are stopped: whatever the others do, they will wait."""
+        return [status.name for status in self._board.read() if status.is_stopped]
 
     def _who_waits(self) -> str:
         """Return in words what all ranks do, a line each."""

@@ -132,10 +132,13 @@ def lift(package: Package, warpage: Warpage, x: Length, y: Length) -> Length:
 
 def write_pads(path: Path, sites: Iterable[PadSite]) -> None:
     """Write the pad table as JSON."""
-    path.write_text(json.dumps([asdict(site) for site in sites], indent=1) + "\n")
+    path.write_text(json.dumps([asdict(site) for site in sites], indent=1) + "\n", encoding="utf-8")
 
 
 def read_pads(path: Path) -> list[PadSite]:
     """Read a pad table written by ``write_pads``."""
     pairs = ("offset", "tilt")
-    return [PadSite(**record | {key: tuple(record[key]) for key in pairs}) for record in json.loads(path.read_text())]
+    return [
+        PadSite(**record | {key: tuple(record[key]) for key in pairs})
+        for record in json.loads(path.read_text(encoding="utf-8"))
+    ]

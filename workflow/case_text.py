@@ -55,7 +55,7 @@ def write_new_case(name: str, template: str, folder: Path = Path()) -> Path:
         raise CaseError("new", [Problem("NAME", f"{path} exists already", name)])
     case = read_case(known[template], [f"case.name='{name}'"], oversubscribe=True)
     scales = scales_text(take_scales(read_toml(known[template]), []))
-    path.write_text("\n".join([case_text(case, template), *scales]))
+    path.write_text("\n".join([case_text(case, template), *scales]), encoding="utf-8")
     return path
 
 

@@ -1,10 +1,7 @@
 """Command line: new, plan, run, accuracy, status, report, verify, clean, study, effects, stress-test, schema."""
 
 import json
-import os
 import shutil
-import signal
-import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
@@ -14,9 +11,9 @@ import typer
 from workflow import __version__
 from workflow.case import available_cores, read_case
 from workflow.cluster.executor import JOBS, ExecutorName, executor_for
-from workflow.kernel_cache import keep_kernels_by_source
-from workflow.problems import CaseError
-from workflow.store.folders import RunFolderBusy, read_mark
+from workflow.environment import prepare
+from workflow.last_word import answer, heed_signals, last_word
+from workflow.store.folders import read_mark
 from workflow.store.point import Point
 from workflow.store.store import Store, read_case_of_run
 from workflow.terminal import console, print_error
@@ -282,26 +279,10 @@ def stage(
 
 def main() -> None:
     """Run the command line; exit codes: 0 done and healthy, 1 failed, 2 bad input."""
-    signal.signal(signal.SIGTERM, _interrupt)
-    keep_kernels_by_source()
-    # PETSc would end a command whose reader has gone, or a stage whose structure was killed, before it can say so.
-    os.environ.setdefault("PETSC_OPTIONS", "-no_signal_handler")
-    if "DISPLAY" not in os.environ:
-        # VTK would look for an X server first, and complain.
-        os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
-    try:
-        app()
-    except CaseError as error:
-        for line in error.lines():
-            print_error(line)
-        sys.exit(2)
-    except RunFolderBusy as error:
-        print_error(str(error))
-        sys.exit(1)
-
-
-def _interrupt(*_: object) -> None:
-    raise KeyboardInterrupt
+    with last_word():
+        heed_signals()
+        prepare()
+        answer(app)
 
 
 def _version(wanted: bool) -> None:

@@ -9,6 +9,9 @@ from pathlib import Path
 from workflow.launch import launch, mpi_command
 from workflow.progress import progress_bar
 from workflow.stage_runner import Run
+from workflow.stopped_processes import PATIENCE
+
+AFTER_THE_RANKS = 10.0  # [s]
 
 logger = logging.getLogger(__name__)
 
@@ -27,11 +30,17 @@ def run_fem(run: Run, folder: Path, request: dict, title: str) -> None:
     """
     folder.mkdir()
     path = folder / "input.json"
-    path.write_text(json.dumps(request | {"output": str(folder.resolve())}, indent=1) + "\n")
+    path.write_text(json.dumps(request | {"output": str(folder.resolve())}, indent=1) + "\n", encoding="utf-8")
     ranks = run.case.ranks
     command = mpi_command(ranks, [sys.executable, "-m", "fem", str(path)], run.oversubscribe)
     with progress_bar(f"{title} on {ranks} rank{'s' if ranks > 1 else ''}") as progress:
-        launch(command, lambda line: _pass_on(line, progress), folder / "log.txt")
+        launch(command, lambda line: _pass_on(line, progress), folder / "log.txt", _patience(request))
+
+
+def _patience(request: dict) -> float:
+    """Return how long a rank may be stopped [s]: a little longer than ranks wait, which can tell more of it."""
+    model = request.get("shock") or request.get("dynamics") or {}
+    return float(model.get("numerics", {}).get("watchdog_seconds", PATIENCE)) + AFTER_THE_RANKS
 
 
 def _pass_on(line: str, progress: Callable[[float], None]) -> None:

@@ -260,7 +260,9 @@ def _comparison(results: Mapping[str, dict], folder: Path) -> dict:
     ratios |= {} if ideal is None else {"two_scale_ideal_ratio": ideal}
     search = folder / "coarse/result.json"
     if search.exists():
-        ratios["coarse_run_dns_time_ratio"] = _wall_time(json.loads(search.read_text())) / seconds["dns"]
+        ratios["coarse_run_dns_time_ratio"] = (
+            _wall_time(json.loads(search.read_text(encoding="utf-8"))) / seconds["dns"]
+        )
     return {name: metric(value, "s" if name == COMPARED else "") for name, value in (errors | ratios).items()}
 
 

@@ -65,7 +65,9 @@ def most_stressed(history: Path, count: int) -> FineJoints:
 
 def write_fine_joints(folder: Path, fine: FineJoints) -> None:
     """Write ``fine_joints.json`` of a shock."""
-    (folder / "fine_joints.json").write_text(json.dumps({"names": fine.names, "why": fine.why}, indent=1) + "\n")
+    (folder / "fine_joints.json").write_text(
+        json.dumps({"names": fine.names, "why": fine.why}, indent=1) + "\n", encoding="utf-8"
+    )
 
 
 def read_fine_joints(folder: Path) -> FineJoints | None:
@@ -73,7 +75,7 @@ def read_fine_joints(folder: Path) -> FineJoints | None:
     path = folder / "fine_joints.json"
     if not path.exists():
         return None
-    table = json.loads(path.read_text())
+    table = json.loads(path.read_text(encoding="utf-8"))
     names = table["names"]
     return FineJoints(names if isinstance(names, str) else tuple(names), table["why"])
 

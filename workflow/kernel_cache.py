@@ -6,7 +6,9 @@ with machine code that holds the old ones.
 
 import hashlib
 import os
+import tempfile
 from collections.abc import MutableMapping
+from contextlib import suppress
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -17,17 +19,29 @@ VARIABLE = "NUMBA_CACHE_DIR"
 def keep_kernels_by_source(environment: MutableMapping[str, str] = os.environ) -> None:
     """Name the folder to Numba, which must not be loaded yet, and to all processes that this one starts.
 
-    A folder that the user has named stays. Where none can be made, Numba keeps its own place.
+    A folder that the user has named stays, if it can be written to. Where none can be made, it is a temporary one.
     """
-    if VARIABLE in environment:
+    named = environment.get(VARIABLE)
+    if named and _is_made(Path(named)):
         return
-    cache = Path(environment.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    folder = cache / "reflowshock" / f"kernels-{digest()}"
+    name = f"kernels-{digest()}"
+    with suppress(RuntimeError):  # this user has no home
+        home = environment.get("HOME") or Path.home()
+        folder = Path(environment.get("XDG_CACHE_HOME") or Path(home, ".cache")) / "reflowshock" / name
+        if _is_made(folder):
+            environment[VARIABLE] = str(folder)
+            return
+    environment[VARIABLE] = tempfile.mkdtemp(prefix="reflowshock-kernels-")
+
+
+def _is_made(folder: Path) -> bool:
+    """Return whether a folder is there, or made now, in which files can be written."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            return True
     except OSError:
-        return
-    environment[VARIABLE] = str(folder)
+        return False
 
 
 def digest() -> str:

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from fem.own_job import own_environment
 from fem.status_board import ERROR
+from workflow.stopped_processes import PATIENCE, StoppedProcesses
 
 GRACE = 5.0  # seconds that a program has to end by itself after SIGTERM
 TOLD = "error: "  # begins what a program says of an error that it knows
@@ -22,6 +23,13 @@ QUIET = ("--mca", "orte_execute_quiet", "1")  # of Open MPI 4; 5 has no option -
 # In front of a command: the system sends the signal when the process that starts it ends, however that happens.
 END_WITH_PARENT = ("setpriv", "--pdeathsig", "TERM")
 DIE_WITH_PARENT = ("setpriv", "--pdeathsig", "KILL")
+ENDINGS: dict[int, str] = {
+    signal.SIGKILL: "was killed, as the system does when memory is short",
+    signal.SIGXFSZ: "was ended, since a file exceeded the largest allowed size (ulimit -f)",
+    signal.SIGXCPU: "was ended, since it took all the processor time allowed (ulimit -t)",
+    signal.SIGSEGV: "crashed (segmentation fault)",
+    signal.SIGBUS: "crashed (bus error, as when no space is left for a file in memory)",
+}
 
 
 class LaunchError(RuntimeError):
@@ -47,45 +55,52 @@ def mpi_command(ranks: int, program: Sequence[str], oversubscribe: bool) -> list
     return [*command, *program]
 
 
-def launch(command: Sequence[str], on_line: Callable[[str], None], log: Path) -> None:
+def launch(command: Sequence[str], on_line: Callable[[str], None], log: Path, patience: float = PATIENCE) -> None:
     """Run a program to its end, reading its standard output line by line.
 
     Args:
         command: program and arguments.
         on_line: called with each line of standard output.
         log: file that takes standard error; a program may say in ``ERROR`` beside it, too, why it ended.
+        patience: how long one of its processes may be stopped [s]; all are ended then.
 
     Raises:
-        LaunchError: the program cannot be started or its exit code is not 0.
+        LaunchError: the program cannot be started, its exit code is not 0, or one of its processes was stopped.
     """
     program = command[0]
     if shutil.which(program) is None:
         raise LaunchError(f"{program} is not installed")
-    environment = own_environment(os.environ) | {"OMP_NUM_THREADS": "1"}
-    with log.open("w") as errors:
+    # What it writes is read here, not on a terminal: in UTF-8, whatever the terminal has.
+    environment = own_environment(os.environ) | {"OMP_NUM_THREADS": "1", "PYTHONIOENCODING": "utf-8:backslashreplace"}
+    with log.open("w", encoding="utf-8") as errors:
         process = subprocess.Popen(
             [*END_WITH_PARENT, *command],
             stdout=subprocess.PIPE,
             stderr=errors,
-            text=True,
+            encoding="utf-8",
+            errors="replace",
             env=environment,
             start_new_session=True,
         )
         try:
-            for line in process.stdout or ():
-                on_line(line.rstrip("\n"))
-            code = process.wait()
+            with StoppedProcesses(process.pid, patience) as watch:
+                for line in process.stdout or ():
+                    on_line(line.rstrip("\n"))
+                code = process.wait()
         except BaseException:
             end_group(process)
             raise
     if code != 0:
         lines = _read(log) + _read(log.with_name(ERROR))
         words = "\n".join(lines[-LAST_LINES:]) or "it said nothing"
-        raise LaunchError(told(lines) or f"{program} {ending(code)}: {words}")
+        said = told(lines)
+        if watch.told:
+            raise LaunchError(f"{watch.told}; {said}".removesuffix("; "))
+        raise LaunchError(said or f"{program} {ending(code)}: {words}")
 
 
 def _read(path: Path) -> list[str]:
-    return path.read_text(errors="replace").strip().splitlines() if path.is_file() else []
+    return path.read_text(encoding="utf-8", errors="replace").strip().splitlines() if path.is_file() else []
 
 
 def told(lines: Sequence[str]) -> str:
@@ -97,8 +112,8 @@ def told(lines: Sequence[str]) -> str:
 def ending(code: int) -> str:
     """Say how a program ended, from its exit code: below 0 or above 128 by a signal."""
     number = -code if code < 0 else code - 128
-    if number == signal.SIGKILL:
-        return "was killed, as the system does when memory is short"
+    if number in ENDINGS:
+        return ENDINGS[number]
     return f"ended with exit code {code}"
 
 

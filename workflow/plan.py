@@ -21,8 +21,10 @@ from workflow.store.store import Store
 from workflow.structure import plan as structure_plan
 from workflow.structure.case import StructureCase
 from workflow.structure.forecast import StructureForecast, forecast_structure
+from workflow.terminal import styled
 
 LONGEST_LIST = 4
+REFLOW_SPEED = "Costs assume the reflow speed in particles/estimate.py, as benchmarks/ measured it."
 SCHEMES = {
     "energy": "least energy of the tracked surface at exactly the volume",
     "inertia": "tetrahedra that move with the liquid, second order in space and time; cost of all steps allowed",
@@ -34,18 +36,18 @@ def show_plan(store: Store, point: Point, console: Console) -> None:
     """Print stages to run and why, effects, sizes, time steps, predicted cost and rank placement."""
     case = point.case
     scale = "" if case.scale == FULL else f", scale {case.scale}"
-    console.print(f"[bold]{case.case.name}{scale}[/]  {case.case.title}\n")
+    console.print(styled("[bold]{}{}[/]  {}\n", case.case.name, scale, case.case.title))
     if isinstance(case, PackageCase):
         outlook = forecast(case)
         _show(store, point, outlook, console, "reflow" if outlook.shock is None else "reflow and shock")
         console.print(_sizes(case, outlook) if outlook.parts else f"\n{_joints(case, outlook)}")
         if not isinstance(case, BoardDropCase) or outlook.shock is None:
-            console.print("\n[dim]Costs assume the reflow speed in particles/estimate.py, as benchmarks/ measured it.")
+            console.print(styled("\n[dim]{}", REFLOW_SPEED))
             return
         console.print(_shock(case, outlook.shock))
         rate = f"{outlook.shock.updates_per_second:.1e} element updates per second and rank (fem/estimate.py)"
-        console.print(f"\n[dim]Costs assume {rate}")
-        console.print("[dim]and the reflow speed in particles/estimate.py, both as benchmarks/ measured them.")
+        console.print(styled("\n[dim]Costs assume {}", rate))
+        console.print(styled("[dim]and the reflow speed in particles/estimate.py, both as benchmarks/ measured them."))
     elif isinstance(case, StructureCase):
         motion = forecast_structure(case)
         _show(store, point, motion, console, "motion")
@@ -55,7 +57,7 @@ def show_plan(store: Store, point: Point, console: Console) -> None:
         body = forecast_scene(case)
         _show(store, point, body, console, "reflow")
         console.print(_particles(body))
-        console.print("\n[dim]Costs assume the reflow speed in particles/estimate.py, as benchmarks/ measured it.")
+        console.print(styled("\n[dim]{}", REFLOW_SPEED))
 
 
 def _show(
@@ -124,7 +126,7 @@ def foreseen_costs(case: Case, seconds: Mapping[str, float]) -> dict[str, str]:
 def _stages(store: Store, point: Point, costs: Mapping[str, str]) -> Table:
     table = new_table(f"Stages, in {store.folder}", "stage", "", "cost", "why")
     for name, verdict in examine(store, point).items():
-        mark = "[yellow]run[/]" if verdict.stale else "[green]skip[/]"
+        mark = styled("[yellow]run[/]" if verdict.stale else "[green]skip[/]")
         cost = costs.get(name, "") if verdict.stale else ""
         table.add_row(name, mark, cost, reason(verdict, point.case))
     return table

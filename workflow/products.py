@@ -6,9 +6,9 @@ from pathlib import Path
 
 def read_json(path: Path) -> dict:
     """Read a JSON product."""
-    return json.loads(path.read_text())
+    return json.loads(path.read_text(encoding="utf-8"))
 
 
 def write_json(path: Path, content: dict | list) -> None:
     """Write a JSON product, one value a line."""
-    path.write_text(json.dumps(content, indent=1) + "\n")
+    path.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")

@@ -6,7 +6,7 @@ from typing import Protocol
 
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-from workflow.terminal import console
+from workflow.terminal import console, visible
 
 
 class ProgressBar(Protocol):
@@ -26,14 +26,15 @@ def progress_bar(description: str) -> Iterator[ProgressBar]:
         What is to be told.
     """
     columns = (
-        TextColumn("  {task.description}"),
+        TextColumn("  {task.description}", markup=False),
         BarColumn(bar_width=30),
         TaskProgressColumn(),
         TimeElapsedColumn(),
         TimeRemainingColumn(),
     )
-    if not console.is_terminal:
-        console.print(f"       {description} …")
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
-        task = bar.add_task(description, total=1.0)
-        yield lambda share, text="": bar.update(task, completed=share, description=text or description)
+    moving = console.is_terminal and not console.is_dumb_terminal
+    if not moving:
+        console.print(f"       {description} …", soft_wrap=True)
+    with Progress(*columns, console=console, transient=True, disable=not moving) as bar:
+        task = bar.add_task(visible(description), total=1.0)
+        yield lambda share, text="": bar.update(task, completed=share, description=visible(text or description))

@@ -76,12 +76,12 @@ def _cool(run: Run[BoardDropCase], folder: Path, request: dict) -> None:
     )
     identity = hashlib.sha256(f"{json.dumps(cooling, sort_keys=True)} {files} {digest()}".encode()).hexdigest()
     written = folder / IDENTITY
-    if written.exists() and written.read_text() == identity:
+    if written.exists() and written.read_text(encoding="utf-8") == identity:
         return
     shutil.rmtree(folder, ignore_errors=True)
     folder.parent.mkdir(parents=True, exist_ok=True)
     run_fem(run, folder, cooling, "cooling to the shock's temperature")
-    written.write_text(identity)
+    written.write_text(identity, encoding="utf-8")
 
 
 def with_cooling(found: Findings, case: BoardDropCase, folder: Path) -> Findings:
@@ -89,7 +89,7 @@ def with_cooling(found: Findings, case: BoardDropCase, folder: Path) -> Findings
     paths = sorted(folder.glob(f"*residual*/{RESULT}"), key=lambda path: FIRST.get(path.parent.name, len(FIRST)))
     metrics, health = dict(found.metrics), dict(found.health)
     for number, path in enumerate(paths):
-        result, prefix = json.loads(path.read_text()), f"{path.parent.name}_" if number else ""
+        result, prefix = json.loads(path.read_text(encoding="utf-8")), f"{path.parent.name}_" if number else ""
         metrics = metrics if number else result["metrics"] | metrics
         health |= {f"{prefix}{check}": value for check, value in result["health"].items()}
     return replace(found, metrics=metrics, health=health, effects={**found.effects, **effect(case)})

@@ -71,4 +71,8 @@ def _request(run: Run[BoardDropCase], mode: str, meshes: tuple[str, ...], coupli
 
 def read_results(folder: Path) -> dict[str, dict]:
     """Return ``result.json`` of each mode that ran, two-scale first."""
-    return {mode: json.loads((folder / mode / "result.json").read_text()) for mode in MODES if (folder / mode).is_dir()}
+    return {
+        mode: json.loads((folder / mode / "result.json").read_text(encoding="utf-8"))
+        for mode in MODES
+        if (folder / mode).is_dir()
+    }

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 from workflow.case_kind import Case
-from workflow.launch import LaunchError
+from workflow.last_word import in_words, is_interrupt
 from workflow.stage_table import Stage
 from workflow.store.keys import compare, stage_inputs
 from workflow.store.product import publish, seal
@@ -137,7 +137,7 @@ def execute(name: str, function: StageFunction, run: Run, product: Path) -> bool
     try:
         record = run_stage(name, function, run, product)
     except Exception as error:  # the boundary of a stage: whatever went wrong is told with the stage's name
-        if _is_interrupt(error):
+        if is_interrupt(error):
             raise KeyboardInterrupt from error
         _write_message(run.folder / f".{name}.partial", error)
         return False
@@ -147,18 +147,13 @@ def execute(name: str, function: StageFunction, run: Run, product: Path) -> bool
 
 def _write_message(folder: Path, error: Exception) -> None:
     """Leave traceback and message for the command, which tells the user; on standard error where they cannot be."""
-    told = str(error) if isinstance(error, LaunchError | StageError) else f"{type(error).__name__}: {error}"
+    told = in_words(error, folder)
     try:
         folder.mkdir(parents=True, exist_ok=True)
         (folder / TRACEBACK).write_text(traceback.format_exc(), encoding="utf-8")
         (folder / MESSAGE).write_text(told, encoding="utf-8")
     except OSError:
         traceback.print_exc()
-
-
-def _is_interrupt(error: BaseException | None) -> bool:
-    """Whether an interrupt is behind an error: compiled functions wrap it."""
-    return error is not None and (isinstance(error, KeyboardInterrupt) or _is_interrupt(error.__cause__))
 
 
 def _remove(folder: Path) -> None:

@@ -2,10 +2,12 @@
 
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from workflow.store.point import Point
 from workflow.store.state import Verdict, examine
 from workflow.store.store import Store
+from workflow.terminal import styled
 from workflow.units import from_si
 
 SHOWN_UNITS = {"m": "mm", "m^3": "mm^3", "Pa": "MPa", "J": "mJ", "kg": "mg", "s": "ns"}
@@ -54,16 +56,16 @@ def metric_text(metric: dict) -> str:
     return from_si(value, SHOWN_UNITS[unit], 4) if unit in SHOWN_UNITS else f"{value:.4g} {unit}".strip()
 
 
-def _state(verdict: Verdict, health: dict) -> str:
+def _state(verdict: Verdict, health: dict) -> Text:
     if verdict.missing:
-        return "[dim]missing[/]"
+        return styled("[dim]missing[/]")
     if verdict.damaged:
-        return "[bold red]damaged[/]"
+        return styled("[bold red]damaged[/]")
     if verdict.stale:
-        return "[yellow]stale[/]"
+        return styled("[yellow]stale[/]")
     if not all(check["ok"] for check in health.values()):
-        return "[bold red]unhealthy[/]"
-    return "[green]done[/]"
+        return styled("[bold red]unhealthy[/]")
+    return styled("[green]done[/]")
 
 
 def _figures(stage: str, metrics: dict) -> str:

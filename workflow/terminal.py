@@ -1,24 +1,87 @@
-"""What the user sees: one console, errors, one health line a stage."""
+r"""What the user sees: one console that takes no text for markup, errors, one health line a stage.
+
+A title, a folder or a message may hold anything: brackets are shown as they are, control characters as ``\x1b``.
+"""
 
 import os
+import re
+from collections.abc import Iterable
+from typing import Any
 
-from rich.console import Console
-from rich.markup import escape
+from rich.console import Console, ConsoleOptions, RenderableType
+from rich.segment import Segment
+from rich.text import Span, Text
 
 from workflow.check_text import against_limit
 
-# A terminal has its own width; a file or a pipe gets lines that a report or a log can hold.
-WIDTH = None if os.isatty(1) else 100
-console = Console(width=WIDTH, highlight=False)
-errors = Console(stderr=True, width=None if os.isatty(2) else 200, highlight=False)
+# All that a terminal obeys (but for line end and tab), that turns the direction of text, or that no encoding has.
+CONTROL = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
+PLACE = "{}"
+WIDTHS = {1: 100, 2: 200}  # of lines in a file or a pipe: what a report or a log can hold
+
+
+def visible(text: str) -> str:
+    r"""Return a text whose control characters are written out, as ``\x1b``."""
+    return CONTROL.sub(lambda found: found[0].encode("unicode_escape").decode(), text)
+
+
+def styled(template: str, *values: object) -> Text:
+    """Style the program's own words; each ``{}`` among them takes a value, which is no markup whatever it holds.
+
+    Args:
+        template: a constant with markup, as ``"[bold]{}[/] in {}"``.
+        values: in the order of their places.
+    """
+    words = Text.from_markup(template, emoji=False)
+    ends = [end for found in re.finditer(re.escape(PLACE), words.plain) for end in found.span()]
+    pieces = list(words.divide(ends))
+    for place, value in zip(range(1, len(pieces), 2), values, strict=True):
+        told = visible(str(value))
+        pieces[place] = Text(told, spans=[Span(0, len(told), span.style) for span in pieces[place].spans])
+    return Text("").join(pieces)
+
+
+class Terminal(Console):
+    """A console that shows text as it is: no markup, no emoji, no colours but those of ``styled``, nothing obeyed."""
+
+    def __init__(self, descriptor: int = 1, **options: Any) -> None:
+        """Take standard output (1) or standard error (2); into a file or a pipe go no control sequences."""
+        shown = _is_terminal(descriptor)
+        width = None if shown else WIDTHS[descriptor]
+        defaults = {"stderr": descriptor == 2, "width": width, "force_terminal": shown}
+        super().__init__(**defaults | options, markup=False, emoji=False, highlight=False)
+
+    def print(self, *objects: Any, soft_wrap: bool | None = None, **options: Any) -> None:
+        """Print as ``Console.print``; lines that a file has as they are (``soft_wrap``) end on a terminal at words."""
+        super().print(*objects, soft_wrap=soft_wrap and not self.is_terminal, **options)
+
+    def render_str(self, text: str, **options: Any) -> Text:
+        """Return a text, which is no markup, unless it is asked for, with its control characters visible."""
+        return super().render_str(visible(text), **options)
+
+    def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
+        """Yield the segments of anything; what it obeys are those of rich alone."""
+        for segment in super().render(renderable, options):
+            yield segment if segment.control else segment._replace(text=visible(segment.text))
+
+
+def _is_terminal(descriptor: int) -> bool:
+    try:
+        return os.isatty(descriptor)
+    except OSError:  # it is closed
+        return False
+
+
+console = Terminal()
+errors = Terminal(2)
 
 
 def print_error(text: str) -> None:
     """Print an error, its first line emphasised."""
     first, _, rest = text.partition("\n")
-    errors.print(f"[bold red]error[/] {escape(first)}", soft_wrap=True)
+    errors.print(styled("[bold red]error:[/] {}", first), soft_wrap=True)
     if rest:
-        errors.print(escape(rest), soft_wrap=True)
+        errors.print(rest, soft_wrap=True)
 
 
 def health_line(stage: str, seconds: float, health: dict, continued: str = "") -> None:
@@ -31,7 +94,7 @@ def health_line(stage: str, seconds: float, health: dict, continued: str = "") -
         continued: what continued from checkpoints, in words.
     """
     failed = [name for name, result in health.items() if not result["ok"]]
-    mark = "[bold red]FAILED[/]" if failed else "[green]ok[/]    "
+    mark = styled("[bold red]FAILED[/]") if failed else styled("[green]ok[/]    ")
     if failed:
         text = ", ".join(_against_limit(name, health[name]) for name in failed)
     elif health:
@@ -42,7 +105,8 @@ def health_line(stage: str, seconds: float, health: dict, continued: str = "") -
         text = "done"
     if continued:
         text += f"; {continued} continued from checkpoints"
-    console.print(f"{mark} [bold]{stage:<11}[/] {seconds:6.1f} s  {escape(text)}", soft_wrap=True)
+    told = styled(" [bold]{}[/] {} s  {}", f"{stage:<11}", f"{seconds:6.1f}", text)
+    console.print(mark + told, soft_wrap=True)
 
 
 def _against_limit(name: str, result: dict) -> str:

@@ -79,7 +79,7 @@ def write_cooling(
         "joints": {name: joints[name].tolist() for name in joints},
         "timings": {"cooling": unbalanced.seconds},
     }
-    (request.output / "result.json").write_text(json.dumps(record, indent=1))
+    (request.output / "result.json").write_text(json.dumps(record, indent=1), encoding="utf-8")
 
 
 def joint_row(world: MPI.Comm, body: Body, tables: JointTables, yields: bool) -> dict[str, NDArray]:

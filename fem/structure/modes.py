@@ -49,7 +49,7 @@ def find_modes(comm: MPI.Comm, model: StructureModel, request: StructureInput) -
         raise AgreedError(f"dynamics.modes: {error}") from error
     table = ModeTable(modes.frequency, modes.effective_mass / (model.steps.model_mass + model.steps.added_mass))
     if comm.rank == 0:
-        (request.output / "modes.json").write_text(json.dumps(mode_rows(table), indent=1))
+        (request.output / "modes.json").write_text(json.dumps(mode_rows(table), indent=1), encoding="utf-8")
     write_shapes(comm, replace(model, body=body), request, modes)
     return table
 

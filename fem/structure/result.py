@@ -70,7 +70,7 @@ def write_result(
             "model": summary,
             "parts": list(model.tables.part_names),
         }
-        (request.output / "result.json").write_text(json.dumps(result, indent=1))
+        (request.output / "result.json").write_text(json.dumps(result, indent=1), encoding="utf-8")
 
 
 def model_summary(

@@ -107,6 +107,11 @@ def test_misfortune_of_one_rank_ends_all(assembly, tmp_path, what, message):
         assert re.search(r"rank 1 \((macro|meso)\): no sign of life for", said)
 
 
+def test_a_rank_that_is_stopped_in_set_up_is_named(assembly, tmp_path):
+    said = errors_of(assembly, tmp_path / "checkpoints", "SIGSTOP", "set-up")
+    assert re.search(r"error: stopped \(SIGSTOP\) for 2 s \(watchdog_seconds\): rank 1", said), said
+
+
 def test_misfortune_in_set_up_ends_all(assembly, tmp_path):
     said = errors_of(assembly, tmp_path / "checkpoints", "raise", "set-up")
     assert "ZeroDivisionError: broken rank" in said

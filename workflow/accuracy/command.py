@@ -30,6 +30,7 @@ from workflow.store.folders import check_folder, locked
 from workflow.store.point import Point
 from workflow.store.state import failed_checks
 from workflow.store.store import Store
+from workflow.terminal import styled
 from workflow.units import UnitError, to_si
 
 WHAT = "accuracy"  # its folder holds
@@ -175,7 +176,7 @@ def show(wish: Wish, out: Path | None, console: Console) -> bool:
     console.print(
         table(tables.runs(accuracy), f"Errors and costs, the least of all times that it was run: {accuracy.machine}")
     )
-    console.print(f"[dim]{tables.legend(accuracy)}", soft_wrap=True)
+    console.print(styled("[dim]{}", tables.legend(accuracy)), soft_wrap=True)
     console.print(table(tables.orders(accuracy), "Orders in h, the value of a knob; core-seconds t0 + D h^-q"))
     for remark in remarks:
         console.print(f"\n{remark}", soft_wrap=True)
@@ -274,12 +275,13 @@ def total(known, case: Case) -> float:
 def _show_choice(accuracy: Accuracy, console: Console) -> None:
     chosen = accuracy.recommended
     if chosen is None:
-        console.print("\n[bold]Nothing to recommend[/]: no run has a known error within the budget.")
+        console.print(styled("\n[bold]Nothing to recommend[/]: no run has a known error within the budget."))
         return
-    console.print(f"\n[bold]Recommended: {chosen.rung.name}[/], {chosen.why}. In the case file:\n", soft_wrap=True)
+    advice = styled("\n[bold]Recommended: {}[/], {}. In the case file:\n", chosen.rung.name, chosen.why)
+    console.print(advice, soft_wrap=True)
     for line in tables.as_lines(chosen.rung.settings):
-        console.print(f"    {line}", markup=False)
-    console.print(f"\nor {tables.as_options(chosen.rung.settings)}", markup=False, soft_wrap=True)
+        console.print(f"    {line}")
+    console.print(f"\nor {tables.as_options(chosen.rung.settings)}", soft_wrap=True)
     told = tables.prediction(accuracy)
     if told is not None:
         console.print(table(told, ""))

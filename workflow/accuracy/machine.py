@@ -28,5 +28,5 @@ def this_machine() -> Machine:
 def _model() -> str:
     if not CPU_INFO.is_file():
         return ""
-    lines = (line.partition(":") for line in CPU_INFO.read_text().splitlines())
+    lines = (line.partition(":") for line in CPU_INFO.read_text(encoding="utf-8").splitlines())
     return next((value.strip() for key, _, value in lines if key.strip() == "model name"), "")

@@ -151,7 +151,7 @@ def write_accuracy(folder: Path, accuracy: Accuracy) -> None:
     """Write ``accuracy.json``."""
     folder.mkdir(parents=True, exist_ok=True)
     partial = folder / f".{FILE}.partial"
-    partial.write_text(json.dumps(asdict(accuracy), indent=1) + "\n")
+    partial.write_text(json.dumps(asdict(accuracy), indent=1) + "\n", encoding="utf-8")
     partial.rename(folder / FILE)
 
 
@@ -160,7 +160,7 @@ def read_accuracy(path: Path) -> Accuracy | None:
     if not path.is_file():
         return None
     try:
-        return _accuracy(json.loads(path.read_text()))
+        return _accuracy(json.loads(path.read_text(encoding="utf-8")))
     except (KeyError, TypeError, json.JSONDecodeError):
         return None
 

@@ -25,7 +25,7 @@ def write_pages(folder: Path, accuracy: Accuracy, remarks: tuple[str, ...] = ())
     """
     write_page(folder / PAGE, "accuracy.html.j2", {"version": __version__, "accuracy": section(accuracy, remarks)})
     save_picture(accuracy, folder / PICTURE)
-    (folder / TEXT).write_text(markdown(accuracy))
+    (folder / TEXT).write_text(markdown(accuracy), encoding="utf-8")
 
 
 def section(accuracy: Accuracy, remarks: tuple[str, ...] = (), elsewhere: bool = False) -> dict:

@@ -33,7 +33,7 @@ class JobOutput:
             complete = new[: new.rfind(b"\n") + 1]
             self._read[path] = done + len(complete)
             for line in complete.decode(errors="replace").splitlines():
-                console.print(line, markup=False, soft_wrap=True)
+                console.print(line, soft_wrap=True)
 
 
 def failures_of(said: Path) -> dict[str, str]:

@@ -61,7 +61,9 @@ def cancel(jobs: list[str]) -> None:
 
 def _ask(*command: str) -> Iterator[str]:
     try:
-        answer = subprocess.run(command, capture_output=True, text=True, timeout=WAIT, check=False)
+        answer = subprocess.run(
+            command, capture_output=True, encoding="utf-8", errors="replace", timeout=WAIT, check=False
+        )
     except (OSError, subprocess.TimeoutExpired) as error:
         raise NoAnswer(f"{command[0]}: {error}") from error
     if answer.returncode != 0:

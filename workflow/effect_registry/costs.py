@@ -19,7 +19,7 @@ MEASURED = Path(__file__).with_name("costs.json")  # written by benchmarks/effec
 @cache
 def measured() -> dict[str, float]:
     """Return effect -> processor seconds of a step with it over those of one without."""
-    return {name: item["ratio"] for name, item in json.loads(MEASURED.read_text())["effects"].items()}
+    return {name: item["ratio"] for name, item in json.loads(MEASURED.read_text(encoding="utf-8"))["effects"].items()}
 
 
 def cost_shares(case: Case, effects: Mapping[str, Any]) -> dict[str, float]:

@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from typing import Any
 
 from rich.console import Console
-from rich.markup import escape
 from rich.table import Table
 
 from workflow.case_kind import Case
@@ -14,6 +13,7 @@ from workflow.effect_registry.registry import registry
 from workflow.effect_registry.table import CAPTION, HEAD, per_cent, rows
 from workflow.plan_table import new_table
 from workflow.stage_forecast import scene_effects
+from workflow.terminal import styled
 
 FIELDS = (("adds", "adds"), ("number", "number"), ("influence", "influence"), ("switch", "key"), ("place", "object"))
 
@@ -27,7 +27,7 @@ def show_registry(console: Console) -> None:
                 _add(table, effect)
         console.print(table)
     console.print(
-        "\n[dim]An effect that is off is absent: no memory, no work, no branch. `effects CASE` says what acts."
+        styled("\n[dim]An effect that is off is absent: no memory, no work, no branch. `effects CASE` says what acts.")
     )
 
 
@@ -40,14 +40,14 @@ def _add(table: Table, effect: Effect) -> None:
     lines.append(("source", effect.source))
     for place, (title, text) in enumerate(lines):
         name = effect.name.replace("_", " ") if place == 0 else ""
-        table.add_row(f"[bold]{name}[/]" if name else "", f"[dim]{title}[/]", escape(text))
+        table.add_row(styled("[bold]{}[/]", name), styled("[dim]{}[/]", title), text)
 
 
 def effects_table(case: Case, effects: Mapping[str, Any], of_what: str) -> Table:
     """Return the effects of a scene: on or off, expected influence, share of the cost, why."""
     table = new_table(f"\nEffects of the {of_what}", *HEAD)
     for name, acts, influence, cost, why in rows(case, effects):
-        table.add_row(name, "[green]on[/]" if acts else "[dim]off[/]", influence, cost, escape(why))
+        table.add_row(name, styled("[green]on[/]" if acts else "[dim]off[/]"), influence, cost, why)
     for column in table.columns[2:4]:
         column.justify = "right"
     table.caption, table.caption_justify = CAPTION, "left"

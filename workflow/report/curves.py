@@ -9,6 +9,7 @@ matplotlib.use("Agg")
 from matplotlib import pyplot
 
 from workflow.report.histories import joint_stress
+from workflow.terminal import visible
 
 MODE_STYLE = {
     "two_scale": {"color": "#0b5fa5", "linestyle": "-", "linewidth": 1.6, "label": "two-scale"},
@@ -22,6 +23,8 @@ STYLE = {
     "axes.spines.right": False,
     "svg.fonttype": "none",
     "font.family": "sans-serif",
+    "text.usetex": False,
+    "text.parse_math": False,  # a dollar sign in a title or a name is no formula
 }
 MILLI, MICRO = 1.0e-3, 1.0e-6
 ENERGIES = {
@@ -128,4 +131,4 @@ def svg(figure) -> str:
     figure.savefig(stream, format="svg")
     pyplot.close(figure)
     text = stream.getvalue()
-    return text[text.index("<svg") :]
+    return visible(text[text.index("<svg") :])

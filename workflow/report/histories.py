@@ -20,7 +20,7 @@ def read_modes(shock: Path, modes: tuple[str, ...] = MODES) -> tuple[dict[str, d
         if (folder / "history.npz").exists():
             with np.load(folder / "history.npz") as arrays:
                 histories[mode] = dict(arrays)
-            results[mode] = json.loads((folder / "result.json").read_text())
+            results[mode] = json.loads((folder / "result.json").read_text(encoding="utf-8"))
     return histories, results
 
 

@@ -3,11 +3,10 @@
 import base64
 from pathlib import Path
 
-import jinja2
-
 from workflow.report import tables
 from workflow.report.joints import add_joints
 from workflow.report.scenes import add_scene
+from workflow.report.template import template_environment
 from workflow.structure.case import StructureCase
 from workflow.summary import collect_summary, write_summary
 
@@ -33,14 +32,9 @@ def write_report(run_folder: Path, case, folder: Path) -> dict:
 
 def write_page(path: Path, template: str, context: dict) -> None:
     """Write a page from one of the templates, under a temporary name, then rename it."""
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(TEMPLATES),
-        autoescape=jinja2.select_autoescape(["html", "j2"]),
-        undefined=jinja2.ChainableUndefined,
-        trim_blocks=True,
-    )
+    environment = template_environment(TEMPLATES)
     partial = path.with_name(f".{path.name}.partial")
-    partial.write_text(environment.get_template(template).render(context))
+    partial.write_text(environment.get_template(template).render(context), encoding="utf-8", errors="backslashreplace")
     partial.rename(path)
 
 

@@ -24,6 +24,6 @@ def add_scene(run_folder: Path, kind: str, context: dict, summary: dict) -> None
         context["curves"]["body_history"] = report_body.history_curve(shape.history)
     path = run_folder / "reflow" / "path.json"
     if path.exists():
-        kind, context["curves"]["path"] = "path", report_body.path_curve(json.loads(path.read_text()))
+        kind, context["curves"]["path"] = "path", report_body.path_curve(json.loads(path.read_text(encoding="utf-8")))
     stages = report_body.stages(kind, shape)
     context["pictures"]["body"], _ = embedded(lambda picture: report_body.render_stages(stages, shape, picture))

@@ -142,7 +142,7 @@ def _add_two_scales(run_folder: Path, case: BoardDropCase, context: dict, result
     )
     seconds = implicit_seconds(case)
     search = run_folder / "shock/coarse/result.json"
-    runs = [result, json.loads(search.read_text())] if search.exists() else [result]
+    runs = [result, json.loads(search.read_text(encoding="utf-8"))] if search.exists() else [result]
     context["oracle"] = scales.oracle(seconds, runs) if seconds is not None else ""
 
 

@@ -9,6 +9,7 @@ import matplotlib
 matplotlib.use("Agg")
 from matplotlib import pyplot
 from matplotlib.axes import Axes
+from matplotlib.ticker import LogFormatter
 
 from workflow.report.curves import STYLE
 from workflow.stress_test.families import FAMILIES
@@ -37,6 +38,7 @@ def draw_margins(path: Path, verdicts: Sequence[Verdict], samples: Sequence[Samp
             _draw_row(axis, place, own, 0.35 if "random" in name else 0.9)
         axis.set_yticks(range(len(rows)), [name.replace("_", " ") for name, _ in rows])
         axis.set(xscale="log", xlim=(LEAST, 1.3 * MOST), ylim=(len(rows) - 0.3, -0.7))
+        axis.xaxis.set_major_formatter(LogFormatter())  # no formula, which STYLE does not write
         axis.set_xlabel("margin: bound over measured value (1: at the bound; left of it: a miss); square: refused")
         figure.savefig(path, dpi=110)
         pyplot.close(figure)

@@ -7,9 +7,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import jinja2
-
 from workflow import __version__
+from workflow.report.template import template_environment
 from workflow.stress_test.case_file import hard_case_text
 from workflow.stress_test.families import FAMILIES
 from workflow.stress_test.picture import draw_margins
@@ -34,7 +33,7 @@ def write_results(folder: Path, verdicts: Sequence[Verdict], samples: Sequence[S
         if sample.simplest is not None:
             path = counterexample_path(folder, sample)
             path.parent.mkdir(exist_ok=True)
-            path.write_text(hard_case_text(sample.simplest))
+            path.write_text(hard_case_text(sample.simplest), encoding="utf-8")
     draw_margins(folder / "stress_test.png", verdicts, samples)
     told = {
         "version": __version__,
@@ -42,8 +41,8 @@ def write_results(folder: Path, verdicts: Sequence[Verdict], samples: Sequence[S
         "fixed": [_record(verdict) for verdict in verdicts],
         "random": [_sample_record(sample) for sample in samples],
     }
-    (folder / "stress_test.json").write_text(json.dumps(told, indent=1))
-    (folder / "stress_test.html").write_text(_page(folder, verdicts, samples, seed))
+    (folder / "stress_test.json").write_text(json.dumps(told, indent=1), encoding="utf-8")
+    (folder / "stress_test.html").write_text(_page(folder, verdicts, samples, seed), encoding="utf-8")
 
 
 def counterexample_path(folder: Path, sample: Sample) -> Path:
@@ -82,11 +81,7 @@ def _sample_record(sample: Sample) -> dict[str, Any]:
 
 
 def _page(folder: Path, verdicts: Sequence[Verdict], samples: Sequence[Sample], seed: int) -> str:
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(TEMPLATES),
-        autoescape=jinja2.select_autoescape(["html", "j2"]),
-        trim_blocks=True,
-    )
+    environment = template_environment(TEMPLATES)
     environment.globals.update(said=said, sample_said=sample_said, margin_text=margin_text)
     in_order = sorted(verdicts, key=lambda one: (FAMILIES.index(one.case.family), one.case.name))
     return environment.get_template("stress_test.html.j2").render(

@@ -51,10 +51,12 @@ def run_case(parameters: RunParameters) -> dict[str, Measured]:
     with tempfile.TemporaryDirectory() as folder:
         command = [sys.executable, "-m", "workflow", "run", parameters.case, "--out", folder, "-j", "1", *settings]
         environment = own_environment(os.environ)
-        process = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
+        process = subprocess.run(
+            command, capture_output=True, encoding="utf-8", errors="replace", check=False, env=environment
+        )
         if process.returncode:
             raise RuntimeError("; ".join(process.stderr.strip().splitlines()[-LAST_LINES:]))
-        metrics = json.loads((Path(folder) / "summary.json").read_text())["metrics"]
+        metrics = json.loads((Path(folder) / "summary.json").read_text(encoding="utf-8"))["metrics"]
     return {name: Measured(entry["value"], entry["unit"]) for name, entry in metrics.items()}
 
 

@@ -2,21 +2,25 @@
 
 from collections.abc import Sequence
 
-from rich.markup import escape
 from rich.table import Table
+from rich.text import Text
 
 from workflow.stress_test.families import FAMILIES
 from workflow.stress_test.sample import Sample
 from workflow.stress_test.verdict import Check, Verdict
-from workflow.terminal import console
+from workflow.terminal import console, styled
 
 LARGEST_SHOWN = 1000.0
 
 
 def show_verdict(verdict: Verdict) -> None:
     """Print one verdict: what was tried, the closest bound, what was measured, the margin."""
-    mark = "[green]ok  [/]" if verdict.ok else "[bold red]MISS[/]"
-    console.print(f"{mark} {escape(named(verdict))}  {escape(said(verdict))}  {verdict.seconds:.1f} s", soft_wrap=True)
+    told = styled(" {}  {}  {} s", named(verdict), said(verdict), f"{verdict.seconds:.1f}")
+    console.print(_mark(verdict.ok) + told, soft_wrap=True)
+
+
+def _mark(ok: bool) -> Text:
+    return styled("[green]ok  [/]" if ok else "[bold red]MISS[/]")
 
 
 def named(verdict: Verdict) -> str:
@@ -41,11 +45,11 @@ def margin_text(check: Check) -> str:
 
 def show_sample(sample: Sample) -> None:
     """Print how the random cases of a trial ended, and what was missed."""
-    mark = "[green]ok  [/]" if sample.ok else "[bold red]MISS[/]"
-    seconds = sum(verdict.seconds for verdict in sample.verdicts)
-    console.print(f"{mark} {escape(sample.trial.name)}  {escape(sample_said(sample))}  {seconds:.1f} s", soft_wrap=True)
+    seconds = f"{sum(verdict.seconds for verdict in sample.verdicts):.1f}"
+    told = styled(" {}  {}  {} s", sample.trial.name, sample_said(sample), seconds)
+    console.print(_mark(sample.ok) + told, soft_wrap=True)
     for verdict in sample.missed:
-        console.print(f"     {escape(named(verdict))}  {escape(said(verdict))}", soft_wrap=True)
+        console.print(f"     {named(verdict)}  {said(verdict)}", soft_wrap=True)
 
 
 def sample_said(sample: Sample) -> str:
@@ -79,4 +83,4 @@ def _least(verdicts: Sequence[Verdict]) -> tuple[str, str]:
     if not found:
         return "", ""
     check, verdict = min(found, key=lambda pair: pair[0].rank)
-    return margin_text(check), escape(named(verdict))
+    return margin_text(check), named(verdict)

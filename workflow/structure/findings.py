@@ -80,7 +80,9 @@ def two_scale_errors(differences: Mapping[str, float]) -> dict[str, float]:
 
 def cost_ratio(folders: Mapping[str, Path]) -> dict:
     """Return the wall time of a coupled run's windows over that of the DNS, on as many ranks."""
-    results = [json.loads((folders[solver] / "result.json").read_text()) for solver in ("explicit", "dns")]
+    results = [
+        json.loads((folders[solver] / "result.json").read_text(encoding="utf-8")) for solver in ("explicit", "dns")
+    ]
     coupled, dns = (result["timings"]["windows"] for result in results)
     return {"two_scale_dns_time_ratio": metric(coupled / dns)}
 
@@ -94,12 +96,12 @@ def read_history(folder: Path) -> dict[str, NDArray]:
 def read_modes(folder: Path) -> list[dict]:
     """Read the natural modes that a solver left, lowest first; none where another solver has found them."""
     path = folder / "modes.json"
-    return json.loads(path.read_text()) if path.exists() else []
+    return json.loads(path.read_text(encoding="utf-8")) if path.exists() else []
 
 
 def read_places(folder: Path) -> dict[str, tuple[float, float, float]]:
     """Read where the motion of each watch point is recorded [m]: at the node that is nearest to it."""
-    watch = json.loads((folder / "result.json").read_text())["model"]["watch"]
+    watch = json.loads((folder / "result.json").read_text(encoding="utf-8"))["model"]["watch"]
     return {name: point["node_at"] for name, point in watch.items()}
 
 

@@ -38,4 +38,7 @@ def solver_folders(folder: Path) -> dict[str, Path]:
 
 def read_results(folder: Path) -> dict[str, dict]:
     """Return ``result.json`` of each solver that ran, explicit first."""
-    return {solver: json.loads((own / "result.json").read_text()) for solver, own in solver_folders(folder).items()}
+    return {
+        solver: json.loads((own / "result.json").read_text(encoding="utf-8"))
+        for solver, own in solver_folders(folder).items()
+    }

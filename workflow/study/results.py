@@ -15,6 +15,7 @@ from workflow.units import QUANTITY
 
 HEALTHY, UNHEALTHY, FAILED, IMPOSSIBLE = "healthy", "unhealthy", "failed", "impossible"
 Value = str | float | int | bool | None
+FORMULA = ("=", "+", "-", "@", "\t", "\r")  # with which a formula of a spreadsheet begins
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +60,7 @@ def row_of(number: int, store: Store, point: Point, keys: Sequence[str], failure
     settings = {key: shown.get(key, point.settings[key]) for key in keys}
     if failure is not None:
         return Row(number, point.key, settings, FAILED, failure)
-    summary = json.loads((store.run_folder(point) / "summary.json").read_text())
+    summary = json.loads((store.run_folder(point) / "summary.json").read_text(encoding="utf-8"))
     missed = [_check(name, check) for name, check in summary["health"].items() if not check["ok"]]
     return Row(
         number,
@@ -104,13 +105,20 @@ def numbers(texts: Sequence[str]) -> tuple[str, list[Value]]:
 
 
 def write_csv(path: Path, table: Mapping[str, Sequence[Value]]) -> None:
-    """Write columns as CSV, the first line has their names; what is missing is empty."""
+    """Write columns as CSV, the first line has their names; what is missing is empty.
+
+    A text that a spreadsheet would take for a formula has an apostrophe in front, as such programs write it.
+    """
     partial = path.with_suffix(".partial")
-    with partial.open("w", newline="", encoding="utf-8") as file:
+    with partial.open("w", newline="", encoding="utf-8", errors="backslashreplace") as file:
         writer = csv.writer(file)
-        writer.writerow(table)
-        writer.writerows(zip(*table.values(), strict=True))
+        writer.writerow(map(_no_formula, table))
+        writer.writerows(map(_no_formula, row) for row in zip(*table.values(), strict=True))
     partial.replace(path)
+
+
+def _no_formula(value: Value) -> Value:
+    return f"'{value}" if isinstance(value, str) and value.startswith(FORMULA) else value
 
 
 def write_parquet(path: Path, table: Mapping[str, Sequence[Value]]) -> None:

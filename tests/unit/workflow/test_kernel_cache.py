@@ -23,9 +23,9 @@ def test_folder_changes_with_a_kernel(tmp_path: Path, monkeypatch: pytest.Monkey
 
 
 def test_folder_of_the_user_stays(tmp_path: Path) -> None:
-    environment = {"XDG_CACHE_HOME": str(tmp_path), "NUMBA_CACHE_DIR": "mine"}
+    environment = {"XDG_CACHE_HOME": str(tmp_path), "NUMBA_CACHE_DIR": str(tmp_path / "mine")}
     kernel_cache.keep_kernels_by_source(environment)
-    assert environment["NUMBA_CACHE_DIR"] == "mine"
+    assert environment["NUMBA_CACHE_DIR"] == str(tmp_path / "mine")
 
 
 def test_folder_is_made(tmp_path: Path) -> None:
@@ -34,11 +34,15 @@ def test_folder_is_made(tmp_path: Path) -> None:
     assert Path(environment["NUMBA_CACHE_DIR"]).parent == tmp_path / "reflowshock"
 
 
-def test_a_place_that_cannot_be_made_is_left_to_numba(tmp_path: Path) -> None:
+@pytest.mark.parametrize("variable", ["XDG_CACHE_HOME", "NUMBA_CACHE_DIR"])
+def test_where_none_can_be_made_it_is_temporary(tmp_path: Path, monkeypatch, variable: str) -> None:
     (tmp_path / "file").write_text("")
-    environment = {"XDG_CACHE_HOME": str(tmp_path / "file")}
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    environment = {"HOME": str(tmp_path), "XDG_CACHE_HOME": str(tmp_path / "file"), variable: str(tmp_path / "file")}
     kernel_cache.keep_kernels_by_source(environment)
-    assert "NUMBA_CACHE_DIR" not in environment
+    folder = Path(environment["NUMBA_CACHE_DIR"])
+    assert folder.is_dir()
+    assert folder.parent == tmp_path
 
 
 def test_tests_use_it() -> None:

@@ -1,0 +1,123 @@
+"""The command where it is hard: no home, no locale, folders that cannot be written to, odd names, small limits."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+TITLE = "Lötstelle [/x] [ ] [bold]b $\\\\frac{$ :smile: <b> 焊"  # in TOML, which reads \\ as one
+NOBODY = ["setpriv", "--reuid", "65534", "--regid", "65534", "--clear-groups"]
+ENVIRONMENTS = {
+    "nothing": {},
+    "home that is not there": {"HOME": "/nonexistent"},
+    "home that cannot be written to": {"HOME": "/proc"},
+    "cache that cannot be written to": {"HOME": "/tmp", "XDG_CACHE_HOME": "/proc/x"},
+    "read-only folder for temporary files": {"TMPDIR": "/proc"},
+    "C": {"LANG": "C", "LC_ALL": "C", "PYTHONCOERCECLOCALE": "0", "PYTHONUTF8": "0"},
+    "POSIX": {"LC_ALL": "POSIX", "PYTHONCOERCECLOCALE": "0", "PYTHONUTF8": "0"},
+    "another encoding": {"PYTHONIOENCODING": "iso-8859-1", "LC_ALL": "C", "PYTHONCOERCECLOCALE": "0"},
+}
+
+
+@pytest.fixture
+def place(tmp_path) -> Path:
+    """A folder that anybody may enter, with a case of few particles and an awkward title."""
+    text = (ROOT / "cases/sessile_drop/case.toml").read_text(encoding="utf-8")
+    text = text.replace("particles_per_edge = 11", "particles_per_edge = 5")
+    text = text.replace(
+        'title = "1 mm cube of solder on a wall, contact angle 60 deg"', f'title = "{TITLE}\\u001b[31m"'
+    )
+    assert TITLE in text
+    (tmp_path / "case.toml").write_text(text, encoding="utf-8")
+    for folder in (tmp_path, *tmp_path.parents[:3]):
+        if folder.stat().st_uid == os.getuid() and folder != Path("/tmp"):
+            folder.chmod(0o777)
+    return tmp_path
+
+
+def command(place: Path, *arguments: str, environment: dict | None = None, before: list[str] | None = None):
+    own = {"PYTHONPATH": str(ROOT)} | (environment if environment is not None else dict(os.environ))
+    line = [*(before or []), sys.executable, "-m", "workflow", *arguments]
+    return subprocess.run(line, cwd=place, env=own, capture_output=True, timeout=300, check=False)
+
+
+def is_plain(text: bytes) -> bool:
+    return not any(byte in text for byte in (b"\x1b", b"\x07", b"Traceback", b"\xc2\x9b"))
+
+
+@pytest.mark.parametrize("name", ENVIRONMENTS)
+def test_a_plan_in_any_environment(place, name):
+    done = command(place, "plan", "case.toml", "--out", "Gehäuse [x] ü", environment=ENVIRONMENTS[name])
+    assert (done.returncode, done.stderr.decode()) == (0, "")
+    assert b"[/x] [ ] [bold]b $" in done.stdout
+    assert rb"\x1b[31m" in done.stdout
+    assert is_plain(done.stdout)
+    written = {"C": rb"L\xf6tstelle", "POSIX": rb"L\xf6tstelle", "another encoding": "Lötstelle".encode("latin-1")}
+    assert written.get(name, "Lötstelle".encode()) in done.stdout
+
+
+@pytest.mark.parametrize("name", ["home that is not there", "C"])
+def test_a_run_in_any_environment(place, name):
+    out = "Gehäuse [x] ü"
+    done = command(place, "run", "case.toml", "--out", out, environment=ENVIRONMENTS[name] | {"TMPDIR": str(place)})
+    assert (done.returncode, done.stderr.decode()) == (0, "")
+    assert is_plain(done.stdout)
+    page = (place / out / "report.html").read_text(encoding="utf-8")
+    assert "Lötstelle [/x] [ ] [bold]b $\\frac{$ :smile: &lt;b&gt; 焊\\x1b[31m" in page
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="becomes another user")
+def test_a_run_of_a_user_without_anything(place):
+    done = command(place, "run", "case.toml", "--out", "out", environment={"TMPDIR": str(place)}, before=NOBODY)
+    assert (done.returncode, done.stderr.decode()) == (0, "")
+    assert (place / "out/report.html").stat().st_uid == 65534
+
+
+def mpirun(ranks: int) -> list[str]:
+    root = ["--allow-run-as-root"] if os.geteuid() == 0 else []
+    return ["mpirun", *root, "--oversubscribe", "-n", str(ranks)]
+
+
+def test_a_run_within_a_job_of_mpi(place):
+    assert command(place, "run", "case.toml", "--out", "out", before=mpirun(1)).returncode == 0
+
+
+def test_several_ranks_are_refused_in_one_line(place):
+    done = command(place, "run", "case.toml", "--out", "out", before=mpirun(2))
+    assert done.returncode == 2
+    assert done.stderr.count(b"error: started on 2 MPI ranks; start it once, it starts its own ranks") == 1
+    assert not (place / "out").exists()
+
+
+@pytest.mark.parametrize(
+    "limit, words",
+    [
+        ("-v 300000", b"error: only 307 MB of memory may be used (ulimit -v)"),
+        ("-v 60000", b"error: only 61.4 MB of memory may be used (ulimit -v)"),
+        ("-n 16", b"error: only 16 files may be open (ulimit -n)"),
+        ("-f 8", b"error: only files of 0.00"),
+    ],
+)
+def test_a_limit_of_the_shell_is_told_in_one_line(place, limit, words):
+    before = ["bash", "-c", f'ulimit {limit}; exec "$@"', "bash"]
+    done = command(place, "run", "case.toml", "--out", "out", before=before)
+    assert done.returncode == 1
+    assert done.stderr.startswith(words)
+    assert done.stderr.count(b"\n") == 1
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="mounts a file system")
+def test_a_full_device_is_told_in_plain_words(place):
+    disk = place / "disk"
+    disk.mkdir()
+    if subprocess.run(["mount", "-t", "tmpfs", "-o", "size=64k", "none", str(disk)], check=False).returncode:
+        pytest.skip("nothing can be mounted here")
+    try:
+        done = command(place, "run", "case.toml", "--out", "disk/out")
+    finally:
+        subprocess.run(["umount", "-l", str(disk)], check=False)
+    assert done.returncode == 1
+    assert b"no space left on" in done.stderr.lower()
