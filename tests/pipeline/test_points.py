@@ -49,7 +49,7 @@ def test_a_study_is_computed_once_and_survives_a_kill(tmp_path):
     with (store.folder / "results.csv").open() as file:
         lines = list(csv.DictReader(file))
     assert [line["result"] for line in lines] == ["healthy", "failed"]
-    assert lines[1]["message"].startswith("stage reflow: NoRest: ")
+    assert lines[1]["message"].startswith("stage reflow: ")
     assert float(lines[0]["height [m]"]) == pytest.approx(5.8e-4, rel=0.01)
     assert [job.stage for job in missing(store, [good, bad], "report")] == ["reflow", "report"]
 

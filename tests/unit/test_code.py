@@ -73,9 +73,10 @@ def test_plans_are_light():
     lines = [
         "import sys; from pathlib import Path; from rich.console import Console",
         "from workflow.case import read_case; from workflow.plan import show_plan",
+        "from workflow.store.point import Point; from workflow.store.store import Store",
         "for name in ('bga_drop', 'hu_bga_drop', 'two_scale_bar', 'sessile_drop', 'oscillating_drop'):",
         f"    case = read_case(Path('{ROOT}/cases') / name / 'case.toml', [], True)",
-        "    show_plan(case, Path('nowhere'), Console(quiet=True))",
+        "    show_plan(Store(Path('nowhere'), one_run=True), Point({}, case), Console(quiet=True))",
         "    solved = {'petsc4py'} if name == 'oscillating_drop' else set()",  # its forecast loads the solver
         "    assert not {'dolfinx', 'mpi4py', 'petsc4py'} & set(sys.modules) - solved, name",
     ]

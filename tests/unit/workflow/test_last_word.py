@@ -8,12 +8,12 @@ import sys
 from pathlib import Path
 
 import pytest
-from workflow.pipeline import RunFolderBusy
 
 from workflow import last_word
 from workflow.last_word import in_words, say
 from workflow.launch import LaunchError
 from workflow.problems import CaseError, Problem
+from workflow.store.folders import RunFolderBusy
 
 COMMAND = "from workflow.__main__ import main; main()"
 
