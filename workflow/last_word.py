@@ -100,8 +100,13 @@ def _known_words(error: BaseException, where: Path | None) -> str:
     if isinstance(error, OSError) and error.errno in SYSTEM:
         does = " while writing" if error.errno in WRITING else ":" if place else ""
         return f"{SYSTEM[error.errno]}{does} {place}".rstrip() if place else SYSTEM[error.errno]
-    told = next((words for pattern, words in LIBRARIES if pattern.search(str(error))), "")
+    told = words_of(str(error))
     return f"{told} while writing {place}" if told in (SYSTEM[one] for one in WRITING) and place else told
+
+
+def words_of(text: str) -> str:
+    """Return plain words for what a library says of a system that ends; nothing where it says something else."""
+    return next((words for pattern, words in LIBRARIES if pattern.search(text)), "")
 
 
 def _place(error: BaseException, where: Path | None) -> str:

@@ -11,9 +11,11 @@ from pathlib import Path
 
 from fem.own_job import own_environment
 from fem.status_board import ERROR
+from workflow.last_word import words_of
 from workflow.stopped_processes import PATIENCE, StoppedProcesses
 
 GRACE = 5.0  # seconds that a program has to end by itself after SIGTERM
+TRACEBACK = "Traceback (most recent call last):"
 TOLD = "error: "  # begins what a program says of an error that it knows
 LAST_LINES = 15
 LAUNCHER = "REFLOWSHOCK_MPI_LAUNCHER"  # variable: what starts MPI ranks, e.g. "srun --mpi=pmix" within a job of Slurm
@@ -93,7 +95,7 @@ def launch(command: Sequence[str], on_line: Callable[[str], None], log: Path, pa
     if code != 0:
         lines = _read(log) + _read(log.with_name(ERROR))
         words = "\n".join(lines[-LAST_LINES:]) or "it said nothing"
-        said = told(lines)
+        said, words = (without_traceback(text, log) for text in (told(lines), words))
         if watch.told:
             raise LaunchError(f"{watch.told}; {said}".removesuffix("; "))
         raise LaunchError(said or f"{program} {ending(code)}: {words}")
@@ -107,6 +109,16 @@ def told(lines: Sequence[str]) -> str:
     """Return what a program says of an error that it knows, from the last line that begins so; nothing without one."""
     begins = [k for k, line in enumerate(lines) if line.startswith(TOLD)]
     return "\n".join(lines[begins[-1] :]).removeprefix(TOLD) if begins else ""
+
+
+def without_traceback(text: str, log: Path) -> str:
+    """Return what a program says without the way through its code, which stays in its log: where, and what it was."""
+    before, traceback, after = text.partition(TRACEBACK)
+    if not traceback:
+        return text
+    last = after.strip().splitlines()[-1]
+    what, semicolon, checkpoint = last.partition("; last checkpoint")
+    return f"{before.strip()} {words_of(what) or what}{semicolon}{checkpoint} (details: {log})".strip()
 
 
 def ending(code: int) -> str:

@@ -8,7 +8,7 @@ def new_table(title: str, *columns: str) -> Table:
     table = Table(title=title, title_justify="left", title_style="bold", expand=True, show_edge=False, pad_edge=False)
     for position, name in enumerate(columns):
         last = position == len(columns) - 1
-        table.add_column(name, no_wrap=not last, ratio=1 if last else None)
+        table.add_column(name, no_wrap=not last, overflow="fold", ratio=1 if last else None)
     return table
 
 

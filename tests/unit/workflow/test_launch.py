@@ -56,6 +56,40 @@ def test_all_that_a_program_tells_of_a_failure_is_told(tmp_path):
         launch([sys.executable, "-c", program], print, tmp_path / "log.txt")
 
 
+@pytest.mark.parametrize(
+    "raising, words",
+    [
+        ("ValueError('cannot reshape')", "ValueError: cannot reshape"),
+        ("OSError(28, 'No space left on device')", "no space left on the device"),
+    ],
+)
+def test_a_traceback_stays_in_the_log(tmp_path, raising, words):
+    log = tmp_path / "log.txt"
+    program = (
+        f"import sys, traceback\ntry:\n  raise {raising}\nexcept Exception:\n  text = traceback.format_exc().strip()"
+    )
+    program += "\nsys.exit(f'error: rank 1: \\n{text}; last checkpoint: folder (window 3)')"
+    with pytest.raises(LaunchError) as failed:
+        launch([sys.executable, "-c", program], print, log)
+    assert str(failed.value) == f"rank 1: {words}; last checkpoint: folder (window 3) (details: {log})"
+    assert "Traceback" in log.read_text(encoding="utf-8")
+
+
+def test_a_program_that_raises_tells_what_alone(tmp_path):
+    log = tmp_path / "log.txt"
+    with pytest.raises(LaunchError, match=r"exit code 1: ModuleNotFoundError: .* 'nothing' \(details: .*\)$"):
+        launch([sys.executable, "-c", "import nothing"], print, log)
+
+
+@pytest.mark.parametrize("number, words", [("SIGXFSZ", "ulimit -f"), ("SIGSEGV", "segmentation fault")])
+def test_a_program_that_the_system_ends(tmp_path, number, words):
+    program = (
+        f"import os, signal; signal.signal(signal.{number}, signal.SIG_DFL); os.kill(os.getpid(), signal.{number})"
+    )
+    with pytest.raises(LaunchError, match=words):
+        launch([sys.executable, "-c", program], print, tmp_path / "log.txt")
+
+
 def test_words_that_a_program_leaves_in_a_file_are_told(tmp_path):
     program = "import pathlib, sys; pathlib.Path(sys.argv[1]).write_text('error: rank 1 has died\\n'); sys.exit(1)"
     with pytest.raises(LaunchError, match=r"^rank 1 has died$"):

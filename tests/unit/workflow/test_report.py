@@ -128,3 +128,23 @@ def test_digest_changes_with_any_input():
 def test_a_board_at_rest_is_drawn_as_it_is():
     assert exaggeration(0.1, 2e-3) == 5.0
     assert exaggeration(0.1, 0.0) == 1.0
+
+
+def test_dollars_and_backslashes_are_no_formulas():
+    from workflow.report.curves import STYLE, pyplot, svg
+
+    with pyplot.rc_context(STYLE):
+        figure, axis = pyplot.subplots()
+        axis.set(title=r"$\frac{$", xlabel=r"50 $ a $x^$")
+        axis.plot([0, 1], label=r"$\nothing$")
+        axis.legend()
+    assert svg(figure).startswith("<svg")
+
+
+def test_pages_take_no_text_for_code(tmp_path):
+    from workflow.report.template import template_environment
+
+    (tmp_path / "page.html.j2").write_text("<p>{{ text }}</p>{{ own | safe }}", encoding="utf-8")
+    text = "<script>[/x] {{ 1 }} \x1b[31m\udce4"
+    page = template_environment(tmp_path).get_template("page.html.j2").render(text=text, own="<b>")
+    assert page == r"<p>&lt;script&gt;[/x] {{ 1 }} \x1b[31m\udce4</p><b>"

@@ -216,3 +216,12 @@ def test_a_metric_that_there_is_not_is_told(write, tmp_path, monkeypatch, capsys
     monkeypatch.setattr("workflow.study.page.write_results", lambda *_: None)
     assert not run_study(points, Store(tmp_path / "store"), Machine(1))
     assert "did you mean stress?" in capsys.readouterr().err
+
+
+def test_no_text_of_a_csv_file_is_a_formula(tmp_path):
+    from workflow.study.results import write_csv
+
+    path = tmp_path / "results.csv"
+    write_csv(path, {"a": ["=1+1", "+x", "-40 degC", "@x", "\tx", "x"], "b": [-1.0, 2, None, True, "1", "ä"]})
+    lines = path.read_text(encoding="utf-8").splitlines()
+    assert lines == ["a,b", "'=1+1,-1.0", "'+x,2", "'-40 degC,", "'@x,True", "'\tx,1", "x,ä"]

@@ -102,6 +102,16 @@ def test_words_stay_whole_on_a_narrow_terminal():
     assert " ".join(line.strip() for line in lines) == words
 
 
+def test_nothing_of_a_table_is_lost_on_a_narrow_terminal():
+    console = Terminal(file=io.StringIO(), width=40)
+    table = new_table("Effects", "effect", "influence", "why")
+    table.add_row("surface tension", "100 %", "quasi-static, extraordinarily")
+    console.print(table)
+    last = "".join(line.rpartition("│")[2].strip() for line in console.file.getvalue().splitlines())
+    assert "…" not in console.file.getvalue()
+    assert last.endswith("quasi-static,extraordinarily")
+
+
 def test_markup_is_read_in_constants_alone():
     """All markup stands in constants inside of `styled(...)`; nobody formats a text into it."""
     for path in set(WORKFLOW.rglob("*.py")) - {Path(terminal.__file__)}:
