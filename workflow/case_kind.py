@@ -3,10 +3,11 @@
 from abc import abstractmethod
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict
 
+from workflow.names import Name
 from workflow.problems import Problem
 from workflow.stage_table import Pipeline
 
@@ -14,7 +15,6 @@ if TYPE_CHECKING:
     from particles.checks import Problem as ParticlesProblem
 
 FULL = "full"  # the scale of a case as its file says it
-NAME = r"^[A-Za-z0-9][A-Za-z0-9_.-]*$"
 
 
 class Title(BaseModel):
@@ -22,7 +22,7 @@ class Title(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    name: Annotated[str, Field(pattern=NAME)]
+    name: Name
     title: str = ""
 
 
@@ -44,7 +44,7 @@ class Case(BaseModel):
     ranks_key: ClassVar[str] = ""
 
     case: Title
-    scale: str = FULL
+    scale: Name = FULL
 
     @property
     def run_name(self) -> str:

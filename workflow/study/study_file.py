@@ -4,12 +4,12 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from workflow.case import read_toml
-from workflow.case_kind import NAME
+from workflow.toml_file import read_toml
+from workflow.names import Name
 from workflow.problems import CaseError, Problem
 from workflow.scales import dotted
 from workflow.study.designs import Design, grid_axes, list_axis, sampled
@@ -25,10 +25,10 @@ class StudyTable(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    name: Annotated[str, Field(pattern=NAME)]
+    name: Name
     title: str = ""
     case: str
-    scale: str | None = None
+    scale: Name | None = None
     rank_by: str
     goal: Literal["minimise", "maximise"] = "minimise"
     metrics: tuple[str, ...] = ()
