@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 
 SHARE = 4.0 / math.pi  # of the base's acceleration in the first mode of a pinned beam, at its middle
 SAMPLES, SAMPLES_A_PERIOD = 1000, 100
+MOST_PERIODS = 1000  # that are looked at: no pulse of a drop lasts longer
 
 
 class Deflection(NamedTuple):
@@ -49,6 +50,7 @@ def first_mode_peak(omega: float, velocity: Callable[[float], float], duration: 
         velocity: integral of a from 0 to a time [m/s].
         duration: of what is looked at [s].
     """
+    duration = min(duration, MOST_PERIODS * math.tau / omega)
     count = max(SAMPLES, math.ceil(SAMPLES_A_PERIOD * omega * duration / math.tau))
     ends = np.linspace(0.0, duration, count + 1)
     middle = 0.5 * (ends[1:] + ends[:-1])

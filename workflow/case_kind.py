@@ -81,6 +81,11 @@ class Case(BaseModel):
         return table
 
     @property
+    def pulse_tables(self) -> dict[str, tuple[Path, str]]:
+        """Those of its files that are tables of a pulse, by key, and which quantity each has."""
+        return {}
+
+    @property
     def files(self) -> dict[str, Path]:
         """Files that its parameters name, by key: what they hold counts as a parameter, too."""
         return {}

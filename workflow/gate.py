@@ -11,7 +11,7 @@ from rich.console import Console
 
 from workflow.case_kind import Case
 from workflow.plan_table import duration
-from workflow.plausible import FORCE, implausible
+from workflow.plausible import FORCE, implausible, implausible_tables
 from workflow.problems import CaseError, Problem
 from workflow.toml_file import fault_of
 
@@ -32,18 +32,21 @@ class Leave:
 
 def problems_of(case: Case, leave: Leave) -> list[Problem]:
     """Find why a case whose values are valid, each for itself, cannot be run; the cheapest checks first."""
+    with np.errstate(all="ignore"):
+        try:
+            return _values(case, leave) or case.problems() or list(too_large(case, leave))
+        except CaseError as error:
+            return error.problems
+        except (ArithmeticError, ValueError, MemoryError) as error:  # beyond what floats can tell
+            return [Problem("", f"has values with which nothing can be computed: {error or type(error).__name__}")]
+
+
+def _values(case: Case, leave: Leave) -> list[Problem]:
+    """Find ranks that there are not, values and tables that are not plausible, files that cannot be read."""
     found = [] if leave.oversubscribe else list(too_many_ranks(case))
     found += [] if leave.force else list(implausible(case))
     found += unreadable_files(case)
-    if found:
-        return found
-    try:
-        with np.errstate(all="ignore"):
-            return case.problems() or list(too_large(case, leave))
-    except CaseError as error:
-        return error.problems
-    except (ArithmeticError, ValueError, MemoryError) as error:  # beyond what floats can tell
-        return [Problem("", f"has values with which nothing can be computed: {error or type(error).__name__}")]
+    return found if found or leave.force else list(implausible_tables(case))
 
 
 def unreadable_files(case: Case) -> Iterator[Problem]:

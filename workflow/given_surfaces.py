@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from fem.names import nearest
 from workflow.problems import Problem
+from workflow.toml_file import beside
 
 if TYPE_CHECKING:
     from meshing.pads import PadSite
@@ -21,7 +22,7 @@ def located(table: dict, folder: Path) -> dict:
     surfaces = package.get("surfaces") if isinstance(package, dict) else None
     if isinstance(surfaces, dict):
         for name, path in surfaces.items():
-            surfaces[name] = str((folder / path).resolve()) if isinstance(path, str) else path
+            surfaces[name] = beside(folder, path) if isinstance(path, str) else path
     return table
 
 

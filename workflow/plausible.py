@@ -10,7 +10,8 @@ from pydantic.fields import FieldInfo
 from workflow import fields
 from workflow.case_kind import Case
 from workflow.problems import Problem
-from workflow.units import dimension, to_si
+from workflow.pulse_files import largest_values
+from workflow.units import dimension, from_si, to_si
 
 FORCE = "--force"
 
@@ -59,6 +60,14 @@ def implausible(case: Case) -> Iterator[Problem]:
         for number in value if isinstance(value, tuple) else (value,):
             if isinstance(number, int | float) and not isinstance(number, bool) and number != 0:
                 yield from _implausible(key, number, field)
+
+
+def implausible_tables(case: Case) -> Iterator[Problem]:
+    """Find tables of pulses that last too long, or whose values nothing can have."""
+    for key, unit, number in largest_values(case.pulse_tables):
+        found = BY_DIMENSION[dimension(unit)]
+        if number > to_si(found.high, unit):
+            yield Problem(key, f"has {from_si(number, unit, 6)} in it, which is not plausible", None, f"up to {found.high}, or {FORCE}")
 
 
 def _implausible(key: str, number: float, field: FieldInfo) -> Iterator[Problem]:

@@ -96,6 +96,14 @@ def fault_of(path: Path, most_bytes: int) -> str:
     return ""
 
 
+def beside(folder: Path, name: str) -> str:
+    """Return the path of a file that a case names, relative to the folder of the case."""
+    try:
+        return str((folder / name).resolve())
+    except (OSError, RuntimeError, ValueError):  # a loop of links, a null character: the gate says what is wrong
+        return str(folder / name)
+
+
 def _too_deep() -> Problem:
     return Problem("", "has tables or lists nested too deeply", None, f"up to {DEEPEST} levels")
 
