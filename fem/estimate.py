@@ -8,7 +8,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.coupling.placement import ModelCost, WindowCost, alternatives
+from fem.coupling.placement import ModelCost, WindowCost, least_seconds
 from fem.materials.elasticity import elasticity_matrix
 from fem.materials.parameters import Material
 from fem.parameters import Ranks
@@ -136,7 +136,7 @@ def predict_seconds(
     work = sum(elements * steps for elements, steps in meso) / UPDATES_PER_SECOND
     sums = sum(steps for _, steps in meso)
     cost = WindowCost(ModelCost(board, WINDOW_OVERHEAD, 1), ModelCost(work, sums * STEP_OVERHEAD, sums), LATENCY)
-    two_scale = alternatives(ranks, [1.0] * ranks.total, cost)[0].seconds
+    two_scale = least_seconds(ranks, cost)
     everything = board + sum(elements for elements, _ in meso) / UPDATES_PER_SECOND
     dns = plan.substeps * (everything / ranks.total + STEP_OVERHEAD + (ranks.total > 1) * LATENCY)
     return plan.windows * two_scale, plan.windows * dns

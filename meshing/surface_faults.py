@@ -10,6 +10,7 @@ from meshing.surface import SurfaceError, volume_of
 
 LARGE = 2.0  # of the median radius: larger triangles are compared with all others
 CHUNK = 64  # large triangles at a time
+SHAKEN = 1.0e-7  # of the extent: below the distance at which two vertices are one
 INSIDE = 1.0e-9  # of an edge: how far inside another triangle a crossing has to be
 
 
@@ -63,7 +64,13 @@ def _shell_faults(points: np.ndarray, triangles: np.ndarray) -> Iterator[tuple[s
 
 
 def _crossings(points: np.ndarray, triangles: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
-    """Edges that pierce a triangle with which they share no vertex."""
+    """Edges that pierce a triangle with which they share no vertex.
+
+    Vertices are shaken a little first: a ring that is turned inside out meets itself in one point, where an edge only
+    touches others.
+    """
+    extent = float(np.ptp(points, axis=0).max())
+    points = points + np.random.default_rng(0).uniform(-SHAKEN * extent, SHAKEN * extent, points.shape)
     for first, second in _near_pairs(points, triangles):
         apart = (triangles[first][:, :, None] != triangles[second][:, None, :]).all(axis=(1, 2))
         for one, other in ((first[apart], second[apart]), (second[apart], first[apart])):
