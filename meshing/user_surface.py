@@ -2,6 +2,7 @@
 
 from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass
+from functools import lru_cache
 from io import StringIO
 from pathlib import Path
 from typing import Literal
@@ -27,8 +28,9 @@ from meshing.surface_faults import check_triangulation
 Unit = Literal["um", "mm", "m"]
 UNITS: dict[Unit, float] = {"um": 1.0e-6, "mm": 1.0e-3, "m": 1.0}
 LARGEST = 1.0  # [m] of a vertex from the middle of all
-MOST_TRIANGLES = 400_000  # checked in about ten seconds
+MOST_TRIANGLES = 200_000  # checked in about ten seconds
 SUFFIXES = (".stl", ".ply", ".vtu")
+CELLS = 1_000_002  # along the largest extent, in which vertices are one
 WELD = 1.0e-6  # of the largest extent: vertices nearer than this are one
 LEVEL = np.cos(np.radians(20.0))  # a pad's triangles face within 20 degrees of its normal
 FLAT = 0.02  # of the height: how far from its plane a pad's vertices may lie
@@ -61,8 +63,7 @@ def load_surface(path: Path, unit: Unit, site: PadSite) -> ClosedSurface:
         SurfaceError: the file, what is wrong with it, where in its own coordinates, and what is allowed.
     """
     try:
-        points, triangles = _welded(*_read(path, UNITS[unit]))
-        check_triangulation(points, triangles, UNITS[unit])
+        points, triangles = closed_triangles(path, unit)
         _check_height(points, unit, site)
         return _between_pads(points, triangles, site)
     except SurfaceError as error:
@@ -71,14 +72,37 @@ def load_surface(path: Path, unit: Unit, site: PadSite) -> ClosedSurface:
 
 def file_volume(path: Path, unit: Unit) -> float:
     """Return the volume [m^3] that a file that ``load_surface`` took encloses before its heights are stretched."""
-    return volume_of(*_welded(*_read(path, UNITS[unit])))
+    return volume_of(*closed_triangles(path, unit))
+
+
+def closed_triangles(path: Path, unit: Unit) -> tuple[np.ndarray, np.ndarray]:
+    """Return vertices [m] and triangles of a file that enclose a body, wherever that is; errors as ``load_surface``."""
+    if path.suffix.lower() not in SUFFIXES:
+        raise SurfaceError(f"suffix {path.suffix or 'none'}, allowed {', '.join(SUFFIXES)}")
+    try:
+        found = path.stat()
+    except (OSError, ValueError) as error:
+        raise SurfaceError("no such file") from error
+    read = _read_version(path, unit, (found.st_mtime_ns, found.st_size, found.st_ino))
+    if isinstance(read, SurfaceError):
+        raise read
+    return read
+
+
+@lru_cache(maxsize=8)
+def _read_version(
+    path: Path, unit: Unit, version: tuple[int, int, int]
+) -> tuple[np.ndarray, np.ndarray] | SurfaceError:
+    """Read and check a version of a file, which several joints may name; or return what is wrong with it."""
+    try:
+        points, triangles = _welded(*_read(path, UNITS[unit]))
+        check_triangulation(points, triangles, UNITS[unit])
+        return points, triangles
+    except SurfaceError as error:
+        return error
 
 
 def _read(path: Path, scale: float) -> tuple[np.ndarray, np.ndarray]:
-    if path.suffix.lower() not in SUFFIXES:
-        raise SurfaceError(f"suffix {path.suffix or 'none'}, allowed {', '.join(SUFFIXES)}")
-    if not path.is_file():
-        raise SurfaceError("no such file")
     try:
         with redirect_stdout(StringIO()), redirect_stderr(StringIO()), np.errstate(all="ignore"):  # meshio prints
             mesh = meshio.read(path)
@@ -123,8 +147,10 @@ def _welded(points: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.n
     extent = float(np.ptp(points[np.unique(triangles)], axis=0).max())
     if extent == 0.0:
         raise SurfaceError("all its vertices are one point")
-    _, first, number = np.unique(np.round(points / (WELD * extent)), axis=0, return_index=True, return_inverse=True)
-    merged = number.reshape(-1)[triangles]
+    cells = np.round((points - points[np.unique(triangles)].min(axis=0)) / (WELD * extent)).clip(-1, CELLS - 1)
+    cell = (cells.astype(np.int64) + 1) @ np.array([(CELLS + 1) ** 2, CELLS + 1, 1])
+    _, first, number = np.unique(cell, return_index=True, return_inverse=True)
+    merged = number[triangles]
     whole = (merged != np.roll(merged, 1, axis=1)).all(axis=1)
     if not whole.any():
         raise SurfaceError(f"all its triangles are smaller than {WELD * extent:.3g} m, {WELD:g} of its extent")

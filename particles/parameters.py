@@ -42,7 +42,7 @@ class Reflow(Parameters):
     The joints are the same to the last bit. Ranks may be on several machines that see the run folder.
     """
 
-    ranks: int | None = Field(None, ge=1)
+    ranks: int | None = Field(None, ge=1, le=100_000)
 
 
 class FlowEffects(Parameters):

@@ -80,11 +80,12 @@ class PackageCase(Case):
         heated = (
             thermal_checks.problems(self.thermal, self.materials.by_role, self.warpage.corner) if self.thermal else []
         )
-        geometries = joint_geometries(pad_table(self.package, self.board, self.warpage))
+        pads = pad_table(self.package, self.board, self.warpage)
+        geometries = joint_geometries(pads)
         of_solder = of_particles(particles_checks.problems(self.solder, geometries, self.package.pitch))
         if self.thermal:
             of_solder += reflow_forecast.problems(self.solder, geometries, self.thermal, self.package.pitch)
-        given = given_surfaces.problems(self.package, geometries)
+        given = given_surfaces.problems(self.package, pads, self.thermal is not None)
         return self.in_words(heated) + of_solder + list(given)
 
     def in_words(self, found: Iterable[Any]) -> list[Problem]:
