@@ -81,7 +81,8 @@ def _read_at_once(path: Path, text: str, quantity: str) -> NDArray[np.float64] |
     if head is None:
         return None
     try:
-        scales = read_header(path, head + 1, [cell.strip() for cell in next(csv.reader(lines[head : head + 1]))], quantity)
+        titles = [cell.strip() for cell in next(csv.reader(lines[head : head + 1]))]
+        scales = read_header(path, head + 1, titles, quantity)
         with warnings.catch_warnings():
             warnings.simplefilter("error")  # a table without rows
             table = np.loadtxt(lines[head + 1 :], delimiter=",", comments="#", ndmin=2)
@@ -104,8 +105,8 @@ def _read_rows(path: Path, text: str, quantity: str) -> NDArray[np.float64]:
         lines.append(number)
         table.append(read_row(path, number, row, scales))
     if len(table) < 2:
-        found = len(table) + bool(row)
-        raise PulseError(f"{path}: a header and at least two rows are needed, found {found} lines with content")
+        count = len(table) + (number > 0)
+        raise PulseError(f"{path}: a header and at least two rows are needed, found {count} lines with content")
     found = np.array(table)
     check_times(path, lines, found[:, 0])
     return found
@@ -136,7 +137,8 @@ def read_unit(path: Path, number: int, title: str, units: dict[str, float]) -> f
         near = get_close_matches(unit, units, n=1, cutoff=0.3)
         hint = f"; did you mean [{near[0]}]?" if near else ""
         raise PulseError(
-            f"{path}, line {number}: column {shown(title)!r} needs its unit in brackets, one of {', '.join(units)}{hint}"
+            f"{path}, line {number}: column {shown(title)!r} needs its unit in brackets, "
+            f"one of {', '.join(units)}{hint}"
         )
     return units[unit]
 

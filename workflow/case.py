@@ -47,9 +47,7 @@ def kind_of(table: Mapping) -> type[Case]:
     raise CaseError("case", [Problem("", "does not say what kind of case it is", None, choice, hint)])
 
 
-def read_case(
-    path: Path, overrides: Sequence[str] = (), oversubscribe: bool = False, force: bool = False
-) -> Case:
+def read_case(path: Path, overrides: Sequence[str] = (), oversubscribe: bool = False, force: bool = False) -> Case:
     """Read and check a case file, and every file that it names: what it returns can be run.
 
     Args:
@@ -76,9 +74,7 @@ def read_case(
         raise CaseError(str(path), error.problems, origins).located(Places(text)) from error
 
 
-def _checked_case(
-    path: Path, table: dict, overrides: Sequence[str], origins: dict[str, Origin], leave: Leave
-) -> Case:
+def _checked_case(path: Path, table: dict, overrides: Sequence[str], origins: dict[str, Origin], leave: Leave) -> Case:
     """Return the case of a table; its origins are noted; errors as ``read_case``, without their places."""
     problems: list[Problem] = []
     origins |= _override(table, overrides, problems)

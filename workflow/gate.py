@@ -147,9 +147,11 @@ def _group_memory() -> Iterator[float]:
         return
     for _, controllers, name in groups:
         if controllers in ("", "memory"):
-            root = CGROUPS / controllers
-            own = root / name.lstrip("/")
-            yield from (left for folder in [own, *own.parents] if root in [folder, *folder.parents] for left in _left(folder))
+            folder = CGROUPS / controllers
+            yield from _left(folder)
+            for part in Path(name.lstrip("/")).parts:
+                folder /= part
+                yield from _left(folder)
 
 
 def _left(folder: Path) -> Iterator[float]:

@@ -67,7 +67,8 @@ def implausible_tables(case: Case) -> Iterator[Problem]:
     for key, unit, number in largest_values(case.pulse_tables):
         found = BY_DIMENSION[dimension(unit)]
         if number > to_si(found.high, unit):
-            yield Problem(key, f"has {from_si(number, unit, 6)} in it, which is not plausible", None, f"up to {found.high}, or {FORCE}")
+            message = f"has {from_si(number, unit, 6)} in it, which is not plausible"
+            yield Problem(key, message, None, f"up to {found.high}, or {FORCE}")
 
 
 def _implausible(key: str, number: float, field: FieldInfo) -> Iterator[Problem]:

@@ -73,6 +73,11 @@ def to_si(text: object, unit: str) -> float:
     return value
 
 
+def quantity_in_si(value: float, unit: str) -> float:
+    """Return the SI value of a number in a unit of any dimension."""
+    return float(_in_base_units(Decimal(repr(float(value))), registry().Unit(unit)))
+
+
 def from_si(value: float, unit: str, digits: int = 10) -> str:
     """Write an SI value in a unit, e.g. ``from_si(4.8e-4, "mm")`` is "0.48 mm"."""
     return f"{in_unit(value, unit):.{digits}g} {unit}"
@@ -132,7 +137,7 @@ def _parse_unit(text: str, wanted: str) -> pint.Unit:
         raise UnitError(f'"{text}" is not a unit; {expected}') from error
     if parsed.dimensionality != registry().Unit(wanted).dimensionality or parsed == registry().Unit(""):
         raise UnitError(f"is {_article(dimension(parsed))}; {expected}")
-    # An angle has no dimension in SI, yet neither "1", "5 percent" nor "3 bit" is an angle, and "1 mm*deg" is no length.
+    # An angle has no dimension in SI; yet "1", "5 percent" and "3 bit" are not angles, nor is "1 mm*deg" a length.
     pure = [name for name in dict(registry().Quantity(1, parsed).unit_items()) if registry().Unit(name).dimensionless]
     if foreign := [name for name in pure if name not in PURE_FACTORS.get(dimension(wanted), ())]:
         raise UnitError(f'"{text}" has the pure number {foreign[0]} in it; {expected}')

@@ -152,7 +152,8 @@ def window_costs(
         counts = np.cumprod(ratios, axis=1)
         least = np.full(ratios.shape, pace.outermost)
         for level in range(1, length):
-            reaches = np.array([1.0, 1.0, *(reach_of(ratio, level, pace.damping) for ratio in range(2, LARGEST_RATIO + 1))])
+            reach = {ratio: reach_of(ratio, level, pace.damping) for ratio in range(2, LARGEST_RATIO + 1)}
+            reaches = np.array([reach.get(ratio, 1.0) for ratio in range(LARGEST_RATIO + 1)])
             least[:, level] = pace.window / (counts[:, level - 1] * reaches[ratios[:, level - 1]])
         finer = cost[np.searchsorted(needed, least * (1.0 - ROUNDING))]
         beyond = np.concatenate([finer[:, 1:], np.zeros((len(rows), 1))], axis=1)

@@ -73,7 +73,8 @@ class StructureCase(StructureScene, Case):
             Problem(found.key, found.message, found.value, found.allowed, found.hint)
             for found in structure_checks.problems(self.scene)
         ]
-        found = [*boxes, *scenes, *unreadable_pulses(self.pulse_tables), *reference_problems(self.references, self.scene)]
+        found = [*boxes, *scenes, *unreadable_pulses(self.pulse_tables)]
+        found += reference_problems(self.references, self.scene)
         return found or self._impossible_steps()
 
     def _impossible_steps(self) -> list[Problem]:

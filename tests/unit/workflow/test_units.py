@@ -42,8 +42,8 @@ def test_quantities_become_si(text, unit, value):
         ("inf mm", "is not a number and a unit"),
         ("nan mm", "is not a number and a unit"),
         ("1e999 mm", "is not finite"),
-        ("1 kg", "is a mass; wanted is a length, e.g. in mm"),
-        ("1 deg", "is an angle; wanted is a length"),
+        ("1 kg", "is a mass; expected a length, e.g. in mm"),
+        ("1 deg", "is an angle; expected a length"),
         ("1 mmm", '"mmm" is not a known unit'),
         ("1 2 mm", '"2 mm" is not a unit'),
         ("1 mm/", '"mm/" is not a unit'),
@@ -58,7 +58,7 @@ def test_what_is_no_length_is_refused(text, words):
 
 
 def test_an_angle_needs_its_unit():
-    with pytest.raises(UnitError, match="is a pure number; wanted is an angle"):
+    with pytest.raises(UnitError, match="is a pure number; expected an angle"):
         to_si("1 dimensionless", "deg")
 
 
