@@ -54,7 +54,7 @@ BAD_VALUES = {
     "value in a material": ("materials.cover.density=3 mm", ["materials.cover.density", "is a length"]),
     "layer named as a face": (
         "structure.layers.z_max={material='FR4',thickness='1 mm'}",
-        ["structure.layers.z_max", "is no name of a layer"],
+        ["structure.layers.z_max", "is not a valid name of a layer"],
     ),
 }
 
@@ -92,12 +92,12 @@ BAD_REFERENCES = {
     "no pressure": (
         "jedec_board",
         "references.x={kind='cantilever',load='drop',tip='centre'}",
-        ["references.x.load", "is no constant pressure"],
+        ["references.x.load", "is not a constant pressure"],
     ),
     "not sudden": (
         "cantilever",
         "loads.wind={kind='pressure',on='z_max',peak='1 Pa',duration='1 s'}",
-        ["no constant pr"],
+        ["not a constant pr"],
     ),
     "no such load": ("cantilever", "references.tip.load=wnd", ["references.tip.load", "did you mean wind?"]),
     "too many layers": (
