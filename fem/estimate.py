@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import TypeVar
 
 import numpy as np
@@ -55,7 +56,13 @@ def box_critical_step(material: Material, size: NDArray[np.float64]) -> float:
     4 C_ij / (density h_i h_j) over the normal strains, and 4 G_ij (1/h_i^2 + 1/h_j^2) / density in shear. Incompatible
     modes soften bending below both.
     """
-    elasticity = elasticity_matrix(material)
+    return _box_critical_step(material, tuple(map(float, size)))
+
+
+@lru_cache(maxsize=4096)
+def _box_critical_step(material: Material, lengths: tuple[float, ...]) -> float:
+    """Return the same; a plan asks for the same boxes hundreds of times."""
+    elasticity, size = elasticity_matrix(material), np.array(lengths)
     normal = np.linalg.eigvalsh(elasticity[:3, :3] / np.outer(size, size))[-1]
     pairs = ((3, 0, 1), (4, 1, 2), (5, 0, 2))
     shear = max(elasticity[k, k] * (size[i] ** -2.0 + size[j] ** -2.0) for k, i, j in pairs)

@@ -36,7 +36,7 @@ def expected_deflection(case: "BoardDropCase") -> Deflection:
     holes = board.holes
     spans = ((board.length - 2.0 * holes.inset_x, young_x), (board.width - 2.0 * holes.inset_y, young_y))
     length, young = max(spans)
-    stiffness = young * board.thickness**2 / 12.0 / case.materials.board.density
+    stiffness = young * board.thickness * board.thickness / 12.0 / case.materials.board.density
     omega = (math.pi / length) ** 2 * math.sqrt(stiffness)
     deflection = first_mode_peak(omega, shock_pulse(case.shock).pulse.integral, case.shock.duration)
     return Deflection(deflection, math.pi / length * deflection, omega)

@@ -45,7 +45,7 @@ class Problem:
 
     @property
     def position(self) -> str:
-        """ ":line:column" as editors read it; empty where it is not known."""
+        """Return ":line:column", as editors read it; empty where it is not known."""
         return "" if self.line is None else f":{self.line}:{self.column or 1}"
 
 

@@ -89,9 +89,10 @@ def _keys(content: object, before: str) -> Iterator[str]:
 
 
 def _column(chunk: str, key: str) -> int:
-    """Return the column of the last name of a key in the text that gives it, if that is in its first line."""
-    first = chunk.partition("\n")[0]
-    for name in (key, key.rpartition(".")[2]):
+    """Return the column of a key in the first line of the text that gives it: of as much of its end as stands there."""
+    first, names = chunk.partition("\n")[0], key.split(".")
+    for start in range(len(names)):
+        name = ".".join(names[start:])
         found = re.search(rf"(?<![\w-])[\"']?{re.escape(name)}[\"']?(?![\w-])", first)
         if found:
             return found.start() + 1

@@ -123,7 +123,9 @@ def _pulse(key: str, name: str, scene: StructureScene) -> Iterator[Problem]:
     yield from _known(key, name, scene.loads, "load")
     load = scene.loads.get(name)
     if load is not None and not (isinstance(load, Pressure) and load.on == "z_min" and _ends(load)):
-        yield Problem(key, "is not a pulse of pressure on z_min", name, "a pressure on z_min with a duration or a table")
+        yield Problem(
+            key, "is not a pulse of pressure on z_min", name, "a pressure on z_min with a duration or a table"
+        )
 
 
 def _ends(load: Pressure) -> bool:
