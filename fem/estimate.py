@@ -3,12 +3,13 @@
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.coupling.placement import ModelCost, WindowCost, alternatives
+from fem.coupling.placement import ModelCost, WindowCost, least_seconds
 from fem.materials.elasticity import elasticity_matrix
 from fem.materials.parameters import Material
 from fem.parameters import Ranks
@@ -55,7 +56,13 @@ def box_critical_step(material: Material, size: NDArray[np.float64]) -> float:
     4 C_ij / (density h_i h_j) over the normal strains, and 4 G_ij (1/h_i^2 + 1/h_j^2) / density in shear. Incompatible
     modes soften bending below both.
     """
-    elasticity = elasticity_matrix(material)
+    return _box_critical_step(material, tuple(map(float, size)))
+
+
+@lru_cache(maxsize=4096)
+def _box_critical_step(material: Material, lengths: tuple[float, ...]) -> float:
+    """Return the same; a plan asks for the same boxes hundreds of times."""
+    elasticity, size = elasticity_matrix(material), np.array(lengths)
     normal = np.linalg.eigvalsh(elasticity[:3, :3] / np.outer(size, size))[-1]
     pairs = ((3, 0, 1), (4, 1, 2), (5, 0, 2))
     shear = max(elasticity[k, k] * (size[i] ** -2.0 + size[j] ** -2.0) for k, i, j in pairs)
@@ -136,7 +143,7 @@ def predict_seconds(
     work = sum(elements * steps for elements, steps in meso) / UPDATES_PER_SECOND
     sums = sum(steps for _, steps in meso)
     cost = WindowCost(ModelCost(board, WINDOW_OVERHEAD, 1), ModelCost(work, sums * STEP_OVERHEAD, sums), LATENCY)
-    two_scale = alternatives(ranks, [1.0] * ranks.total, cost)[0].seconds
+    two_scale = least_seconds(ranks, cost)
     everything = board + sum(elements for elements, _ in meso) / UPDATES_PER_SECOND
     dns = plan.substeps * (everything / ranks.total + STEP_OVERHEAD + (ranks.total > 1) * LATENCY)
     return plan.windows * two_scale, plan.windows * dns

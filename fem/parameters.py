@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
 
+MOST_RANKS = 100_000  # of one run
 MOST_LEVELS = 4  # below the window, that "auto" tries
 ServiceCondition = Literal["A", "B", "C", "D", "E", "F", "G", "H"]
 
@@ -27,9 +28,9 @@ class Ranks(Parameters):
     speeds that are measured when the run begins.
     """
 
-    total: int = Field(2, ge=1)
+    total: int = Field(2, ge=1, le=MOST_RANKS)
     placement: Literal["auto", "disjoint", "shared"] = "auto"
-    macro: int | None = Field(None, ge=1)
+    macro: int | None = Field(None, ge=1, le=MOST_RANKS)
 
     @field_validator("placement")
     @classmethod

@@ -19,7 +19,7 @@ def _layers(box: Box) -> Iterator[Problem]:
     for layer in box.layers:
         if NAME.fullmatch(layer.name) is None or layer.name in FACETS:
             allowed = f"letters, digits and _, a letter first; none of {', '.join(FACETS)}"
-            yield Problem(f"structure.layers.{layer.name}", layer.name, allowed, "is no name of a layer")
+            yield Problem(f"structure.layers.{layer.name}", layer.name, allowed, "is not a valid name of a layer")
 
 
 def _stacks(box: Box) -> Iterator[Problem]:

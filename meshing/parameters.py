@@ -105,7 +105,7 @@ class BoardNumerics(Parameters):
 
     element_size: Length = Field(5.0e-4, gt=0)
     coarse_size: Length = Field(2.0e-3, gt=0)
-    growth: float = Field(1.2, gt=1.0, le=2.0)
+    growth: float = Field(1.2, ge=1.01, le=2.0)
     layers: int = Field(4, ge=1, le=40)
     patch_layers: int = Field(2, ge=1, le=40)
     patch_margin: int = Field(2, ge=1, le=20)

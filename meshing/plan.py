@@ -7,6 +7,8 @@ import numpy as np
 
 from meshing.parameters import Board, BoardNumerics, Package
 
+MOST_LINES = 100_000
+
 
 @dataclass(frozen=True, slots=True)
 class Interval:
@@ -18,8 +20,12 @@ class Interval:
     ratio: float = 1.0
 
     def smallest(self) -> float:
-        """Length of the shortest cell [m]."""
-        return float(np.diff(self.lines()).min())
+        """Length of the shortest cell [m]; the lines of more than are ever meshed are not laid out."""
+        if self.cells <= MOST_LINES:
+            return float(np.diff(self.lines()).min())
+        ratio = max(self.ratio, 1.0 / self.ratio)
+        share = 1.0 / self.cells if ratio == 1.0 else math.exp(-self.cells * math.log(ratio)) * (ratio - 1.0)
+        return (self.end - self.start) * share
 
     def lines(self) -> np.ndarray:
         """Grid lines from start to end, (cells + 1,) [m]."""

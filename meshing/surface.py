@@ -68,8 +68,8 @@ def close_rings(points: np.ndarray, triangles: np.ndarray, rings: Sequence[np.nd
 def check_surface(surface: ClosedSurface) -> None:
     """Raise SurfaceError unless the surface is watertight, outward oriented and without degenerate triangles."""
     edges = np.vstack([surface.triangles[:, [k, (k + 1) % 3]] for k in range(3)])
-    ordered = np.unique(edges, axis=0)
-    if len(ordered) != len(edges) or not np.array_equal(ordered, np.unique(edges[:, ::-1], axis=0)):
+    ordered = np.unique(edge_numbers(edges))
+    if len(ordered) != len(edges) or not np.array_equal(ordered, np.unique(edge_numbers(edges[:, ::-1]))):
         raise SurfaceError("surface is not watertight: an edge is not shared by two triangles of opposite direction")
     areas = area_vectors(surface.points, surface.triangles)
     sizes = np.linalg.norm(areas, axis=1)
@@ -83,6 +83,11 @@ def check_surface(surface: ClosedSurface) -> None:
     facing = np.select([surface.boundary == BOARD_PAD, surface.boundary == PACKAGE_PAD], [-1.0, 1.0]) * areas[:, 2]
     if facing.min() < 0.0:
         raise SurfaceError(f"triangle {int(facing.argmin())} on a pad faces the joint: a contact line crosses itself")
+
+
+def edge_numbers(edges: np.ndarray) -> np.ndarray:
+    """Return one number for each edge (e, 2), the same for the same two vertices in the same order."""
+    return (edges[:, 0].astype(np.int64) << 32) + edges[:, 1]
 
 
 def enclosed_volume(surface: ClosedSurface) -> float:

@@ -6,10 +6,11 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from meshing.outlines import pieces
-from meshing.surface import SurfaceError, volume_of
+from meshing.surface import SurfaceError, edge_numbers, volume_of
 
-LARGE = 2.0  # of the median radius: larger triangles are compared with all others
-CHUNK = 64  # large triangles at a time
+STEP = 1.5  # between two sizes of triangles
+SMALLEST = 1.0e-6  # of the largest radius: below it triangles are of one size
+SHAKEN = 1.0e-7  # of the extent: below the distance at which two vertices are one
 INSIDE = 1.0e-9  # of an edge: how far inside another triangle a crossing has to be
 
 
@@ -36,13 +37,13 @@ def _faults(points: np.ndarray, triangles: np.ndarray) -> Iterator[tuple[str, np
 def _edge_faults(points: np.ndarray, triangles: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
     """Edges that not exactly two triangles share, or two in the same direction."""
     edges = np.concatenate([triangles[:, [k, (k + 1) % 3]] for k in range(3)])
-    _, label, count = np.unique(np.sort(edges, axis=1), axis=0, return_inverse=True, return_counts=True)
-    own = count[label.reshape(-1)]
+    _, label, count = np.unique(edge_numbers(np.sort(edges, axis=1)), return_inverse=True, return_counts=True)
+    own = count[label]
     for wrong, told in ((own == 1, "open edge: a hole"), (own > 2, "edge of more than two triangles: a double shell")):
         if wrong.any():
             where = points[edges[np.argmax(wrong)]].mean(axis=0)
-            yield f"{told} ({len(np.unique(label.reshape(-1)[wrong]))} such edges, allowed 0), first", where
-    _, first, twice = np.unique(edges, axis=0, return_index=True, return_counts=True)
+            yield f"{told} ({len(np.unique(label[wrong]))} such edges, allowed 0), first", where
+    _, first, twice = np.unique(edge_numbers(edges), return_index=True, return_counts=True)
     if (twice > 1).any():
         where = points[edges[first[np.argmax(twice > 1)]]].mean(axis=0)
         yield f"triangle that faces another way than its neighbour ({int((twice > 1).sum())} edges, allowed 0),", where
@@ -63,7 +64,13 @@ def _shell_faults(points: np.ndarray, triangles: np.ndarray) -> Iterator[tuple[s
 
 
 def _crossings(points: np.ndarray, triangles: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
-    """Edges that pierce a triangle with which they share no vertex."""
+    """Edges that pierce a triangle with which they share no vertex.
+
+    Vertices are shaken a little first: a ring that is turned inside out meets itself in one point, where an edge only
+    touches others.
+    """
+    extent = float(np.ptp(points, axis=0).max())
+    points = points + np.random.default_rng(0).uniform(-SHAKEN * extent, SHAKEN * extent, points.shape)
     for first, second in _near_pairs(points, triangles):
         apart = (triangles[first][:, :, None] != triangles[second][:, None, :]).all(axis=(1, 2))
         for one, other in ((first[apart], second[apart]), (second[apart], first[apart])):
@@ -75,20 +82,22 @@ def _crossings(points: np.ndarray, triangles: np.ndarray) -> Iterator[tuple[str,
 
 
 def _near_pairs(points: np.ndarray, triangles: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Pairs of triangles whose boxes meet: small ones by their distance, large ones with all."""
+    """Pairs of triangles whose boxes meet: those of about the same size by their distance, then of each two sizes."""
     corners = points[triangles]
     low, high, centre = corners.min(axis=1), corners.max(axis=1), corners.mean(axis=1)
     radius = np.linalg.norm(corners - centre[:, None], axis=2).max(axis=1)
-    limit = LARGE * np.median(radius)
-    small, large = np.flatnonzero(radius <= limit), np.flatnonzero(radius > limit)
-    first, second = small[cKDTree(centre[small]).query_pairs(2.0 * limit, output_type="ndarray")].T
-    meet = (low[first] <= high[second]).all(axis=1) & (low[second] <= high[first]).all(axis=1)
-    yield first[meet], second[meet]
-    for start in range(0, len(large), CHUNK):
-        some = large[start : start + CHUNK]
-        meet = (low[some, None] <= high[None]).all(axis=2) & (low[None] <= high[some, None]).all(axis=2)
-        rows, others = np.nonzero(meet)
-        yield some[rows], others
+    size = np.floor(np.log(np.maximum(radius, SMALLEST * radius.max())) / np.log(STEP)).astype(int)
+    of_size = [np.flatnonzero(size == number) for number in np.unique(size)]
+    groups = [(cKDTree(centre[rows]), rows, radius[rows].max()) for rows in of_size]
+    for place, (tree, rows, reach) in enumerate(groups):
+        near = tree.query_pairs(2.0 * reach, output_type="ndarray")
+        pairs = [(rows[near[:, 0]], rows[near[:, 1]])]
+        for other, others, further in groups[:place]:
+            found = tree.sparse_distance_matrix(other, reach + further, output_type="ndarray")
+            pairs.append((rows[found["i"]], others[found["j"]]))
+        for first, second in pairs:
+            meet = (low[first] <= high[second]).all(axis=1) & (low[second] <= high[first]).all(axis=1)
+            yield first[meet], second[meet]
 
 
 def _pierced(ends: np.ndarray, corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

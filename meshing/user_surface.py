@@ -1,6 +1,9 @@
 """Surfaces of joints from elsewhere, as X-ray tomography: read, checked, laid between their pads."""
 
+from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass
+from functools import lru_cache
+from io import StringIO
 from pathlib import Path
 from typing import Literal
 
@@ -24,7 +27,10 @@ from meshing.surface_faults import check_triangulation
 
 Unit = Literal["um", "mm", "m"]
 UNITS: dict[Unit, float] = {"um": 1.0e-6, "mm": 1.0e-3, "m": 1.0}
+LARGEST = 1.0  # [m] of a vertex from the middle of all
+MOST_TRIANGLES = 200_000  # checked in about ten seconds
 SUFFIXES = (".stl", ".ply", ".vtu")
+CELLS = 1_000_002  # along the largest extent, in which vertices are one
 WELD = 1.0e-6  # of the largest extent: vertices nearer than this are one
 LEVEL = np.cos(np.radians(20.0))  # a pad's triangles face within 20 degrees of its normal
 FLAT = 0.02  # of the height: how far from its plane a pad's vertices may lie
@@ -57,8 +63,7 @@ def load_surface(path: Path, unit: Unit, site: PadSite) -> ClosedSurface:
         SurfaceError: the file, what is wrong with it, where in its own coordinates, and what is allowed.
     """
     try:
-        points, triangles = _welded(*_read(path, UNITS[unit]))
-        check_triangulation(points, triangles, UNITS[unit])
+        points, triangles = closed_triangles(path, unit)
         _check_height(points, unit, site)
         return _between_pads(points, triangles, site)
     except SurfaceError as error:
@@ -67,36 +72,88 @@ def load_surface(path: Path, unit: Unit, site: PadSite) -> ClosedSurface:
 
 def file_volume(path: Path, unit: Unit) -> float:
     """Return the volume [m^3] that a file that ``load_surface`` took encloses before its heights are stretched."""
-    return volume_of(*_welded(*_read(path, UNITS[unit])))
+    return volume_of(*closed_triangles(path, unit))
+
+
+def closed_triangles(path: Path, unit: Unit) -> tuple[np.ndarray, np.ndarray]:
+    """Return vertices [m] and triangles of a file that enclose a body, wherever that is; errors as ``load_surface``."""
+    if path.suffix.lower() not in SUFFIXES:
+        raise SurfaceError(f"suffix {path.suffix or 'none'}, allowed {', '.join(SUFFIXES)}")
+    try:
+        found = path.stat()
+    except (OSError, ValueError) as error:
+        raise SurfaceError("no such file") from error
+    read = _read_version(path, unit, (found.st_mtime_ns, found.st_size, found.st_ino))
+    if isinstance(read, SurfaceError):
+        raise read
+    return read
+
+
+@lru_cache(maxsize=8)
+def _read_version(
+    path: Path, unit: Unit, version: tuple[int, int, int]
+) -> tuple[np.ndarray, np.ndarray] | SurfaceError:
+    """Read and check a version of a file, which several joints may name; or return what is wrong with it."""
+    try:
+        points, triangles = _welded(*_read(path, UNITS[unit]))
+        check_triangulation(points, triangles, UNITS[unit])
+        return points, triangles
+    except SurfaceError as error:
+        return error
 
 
 def _read(path: Path, scale: float) -> tuple[np.ndarray, np.ndarray]:
-    if path.suffix.lower() not in SUFFIXES:
-        raise SurfaceError(f"suffix {path.suffix or 'none'}, allowed {', '.join(SUFFIXES)}")
-    if not path.is_file():
-        raise SurfaceError("no such file")
     try:
-        mesh = meshio.read(path)
+        with redirect_stdout(StringIO()), redirect_stderr(StringIO()), np.errstate(all="ignore"):  # meshio prints
+            mesh = meshio.read(path)
     except (Exception, SystemExit) as error:  # whatever a reader makes of a broken file
-        raise SurfaceError(f"cannot be read: {error or type(error).__name__}") from error
+        kind = path.suffix[1:].upper()
+        raise SurfaceError(f"cannot be read as {kind}: it is damaged, cut off, or of another format") from error
     others = sorted({block.type for block in mesh.cells} - {"triangle", "vertex", "line"})
-    if others or "triangle" not in mesh.cells_dict:
+    if others or not len(mesh.cells_dict.get("triangle", ())):
         raise SurfaceError(f"holds {', '.join(others) or 'no facets'}, allowed triangles")
-    return scale * np.asarray(mesh.points, float)[:, :3], mesh.cells_dict["triangle"].astype(np.int64)
+    points, triangles = np.asarray(mesh.points, float), mesh.cells_dict["triangle"].astype(np.int64)
+    _check_numbers(points, triangles)
+    _check_extent(scale * points[:, :3])
+    return scale * points[:, :3], triangles
+
+
+def _check_numbers(points: np.ndarray, triangles: np.ndarray) -> None:
+    """Refuse vertices that are no points, and triangles of vertices that are not there."""
+    if points.ndim != 2 or points.shape[1] < 3:
+        raise SurfaceError("has vertices without three coordinates")
+    if len(triangles) > MOST_TRIANGLES:
+        raise SurfaceError(f"has {len(triangles)} triangles, allowed up to {MOST_TRIANGLES}")
+    wrong = ((triangles < 0) | (triangles >= len(points))).any(axis=1)
+    if wrong.any():
+        row = int(np.argmax(wrong))
+        vertices = ", ".join(map(str, triangles[row]))
+        raise SurfaceError(f"triangle {row} has the vertices {vertices}, allowed 0 to {len(points) - 1}")
+    finite = np.isfinite(points[:, :3]).all(axis=1)
+    if not finite.all():
+        raise SurfaceError(f"vertex {int(np.argmin(finite))} has coordinates that are not numbers")
+
+
+def _check_extent(points: np.ndarray) -> None:
+    """Refuse vertices (n, 3) [m] far away from all others, beside which these would be one point."""
+    distance = np.abs(points - np.median(points, axis=0)).max(axis=1)
+    if distance.max() > LARGEST:
+        told = f"vertex {int(distance.argmax())} lies {distance.max():.3g} m away from the others"
+        raise SurfaceError(f"{told}, allowed up to {LARGEST:g} m")
 
 
 def _welded(points: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Make vertices that lie together one, and drop triangles that thereby vanish."""
-    if not np.isfinite(points).all():
-        raise SurfaceError(
-            f"vertex {int(np.argmin(np.isfinite(points).all(axis=1)))} has coordinates that are no numbers"
-        )
     extent = float(np.ptp(points[np.unique(triangles)], axis=0).max())
     if extent == 0.0:
         raise SurfaceError("all its vertices are one point")
-    _, first, number = np.unique(np.round(points / (WELD * extent)), axis=0, return_index=True, return_inverse=True)
-    merged = number.reshape(-1)[triangles]
+    cells = np.round((points - points[np.unique(triangles)].min(axis=0)) / (WELD * extent)).clip(-1, CELLS - 1)
+    cell = (cells.astype(np.int64) + 1) @ np.array([(CELLS + 1) ** 2, CELLS + 1, 1])
+    _, first, number = np.unique(cell, return_index=True, return_inverse=True)
+    merged = number[triangles]
     whole = (merged != np.roll(merged, 1, axis=1)).all(axis=1)
+    if not whole.any():
+        raise SurfaceError(f"all its triangles are smaller than {WELD * extent:.3g} m, {WELD:g} of its extent")
     used, compact = np.unique(merged[whole], return_inverse=True)
     return points[first][used], compact.reshape(-1, 3)
 

@@ -1,7 +1,6 @@
 """A free drop that swings: the flow of `free_drop.py` for a case of its own."""
 
 from collections.abc import Callable
-from math import pi
 
 import numpy as np
 
@@ -9,8 +8,7 @@ from particles.checkpoint import Checkpoint
 from particles.free_drop import solve_free_drop
 from particles.metrics import Metrics
 from particles.parameters import Solder
-from particles.rayleigh import rayleigh_frequency
-from particles.scene_oscillation import Oscillation
+from particles.scene_oscillation import Oscillation, rayleigh_period
 from particles.shape import JointShape
 from particles.time_step import capillary_limit
 
@@ -23,11 +21,6 @@ METRICS = (
     "particles",
     "particle_steps_per_second",
 )
-
-
-def rayleigh_period(scene: Oscillation, solder: Solder) -> float:
-    """Period of the second mode at small amplitude and viscosity [s]."""
-    return 2.0 * pi / rayleigh_frequency(2, scene.radius, solder.density, solder.surface_tension)
 
 
 def solve_oscillation(

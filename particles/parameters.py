@@ -3,6 +3,7 @@
 All values are SI floats; see ``meshing.parameters`` for what the unit strings mean.
 """
 
+import math
 from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
@@ -42,7 +43,7 @@ class Reflow(Parameters):
     The joints are the same to the last bit. Ranks may be on several machines that see the run folder.
     """
 
-    ranks: int | None = Field(None, ge=1)
+    ranks: int | None = Field(None, ge=1, le=100_000)
 
 
 class FlowEffects(Parameters):
@@ -77,8 +78,8 @@ class Solder(Walls):
     density: Annotated[float, "kg/m^3"] = Field(8930.0, gt=0)
     surface_tension: Annotated[float, "N/m"] = Field(0.4985, gt=0)
     viscosity: Annotated[float, "Pa*s"] = Field(2.27e-3, gt=0)
-    pad_contact_angle: Annotated[float, "deg"] = Field(0.0872664626, gt=0, lt=3.14159265)
-    mask_contact_angle: Annotated[float, "deg"] = Field(2.5830872929, gt=0, lt=3.14159265)
+    pad_contact_angle: Annotated[float, "deg"] = Field(math.radians(5.0), gt=0, lt=3.14159265)
+    mask_contact_angle: Annotated[float, "deg"] = Field(math.radians(148.0), gt=0, lt=3.14159265)
     gravity: Annotated[float, "m/s^2"] = Field(9.81, ge=0)
     process_time: Annotated[float, "s"] = Field(60.0, gt=0)
     effects: SolderEffects = SolderEffects()

@@ -6,6 +6,7 @@ from typing import Annotated
 from pydantic import Field
 
 from particles.parameters import Parameters, Solder, SolderNumerics
+from particles.rayleigh import rayleigh_frequency
 from particles.scenes import Liquid
 
 
@@ -35,3 +36,8 @@ class Oscillation(Parameters):
         """Return the drop's liquid."""
         numerics = SolderNumerics(spacing=self.radius / self.particles_per_radius)
         return Solder(volume=self.volume, numerics=numerics, **liquid.properties)
+
+
+def rayleigh_period(scene: Oscillation, solder: Solder) -> float:
+    """Period of the second mode at small amplitude and viscosity [s]."""
+    return 2.0 * pi / rayleigh_frequency(2, scene.radius, solder.density, solder.surface_tension)

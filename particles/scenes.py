@@ -3,6 +3,7 @@
 A scene is resolved into the `Solder` and the geometry that the solvers take.
 """
 
+import math
 from math import inf
 from typing import Annotated, Literal, Protocol
 
@@ -44,7 +45,7 @@ class Drop(Parameters):
     receding_angle: Annotated[float | None, "deg"] = Field(None, gt=0, lt=PI)
     advancing_angle: Annotated[float | None, "deg"] = Field(None, gt=0, lt=PI)
     pad_radius: Annotated[float | None, "mm"] = Field(None, gt=0)
-    mask_contact_angle: Annotated[float, "deg"] = Field(2.5830872929, gt=0, lt=PI)
+    mask_contact_angle: Annotated[float, "deg"] = Field(math.radians(148.0), gt=0, lt=PI)
     spacing: Annotated[float | None, "mm"] = Field(None, gt=0)
     particles_per_edge: int | None = Field(None, ge=5, le=50)
     symmetry: Literal["none", "half", "quarter"] = "none"
@@ -115,8 +116,8 @@ class Joint(Parameters):
     standoff: Annotated[float, "mm"] = Field(gt=0)
     offset: Annotated[float, "mm"] = Field(0.0, ge=0)
     tilt: Annotated[float, "deg"] = Field(0.0, gt=-PI / 6.0, lt=PI / 6.0)
-    pad_contact_angle: Annotated[float, "deg"] = Field(0.0872664626, gt=0, lt=PI)
-    mask_contact_angle: Annotated[float, "deg"] = Field(2.5830872929, gt=0, lt=PI)
+    pad_contact_angle: Annotated[float, "deg"] = Field(math.radians(5.0), gt=0, lt=PI)
+    mask_contact_angle: Annotated[float, "deg"] = Field(math.radians(148.0), gt=0, lt=PI)
     spacing: Annotated[float, "mm"] = Field(4.0e-5, gt=0)
     package: FloatingPackage | None = None
     path: PackagePath | None = None

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 
 SHARE = 4.0 / math.pi  # of the base's acceleration in the first mode of a pinned beam, at its middle
 SAMPLES, SAMPLES_A_PERIOD = 1000, 100
+MOST_PERIODS = 1000  # that are looked at: no pulse of a drop lasts longer
 
 
 class Deflection(NamedTuple):
@@ -35,7 +36,7 @@ def expected_deflection(case: "BoardDropCase") -> Deflection:
     holes = board.holes
     spans = ((board.length - 2.0 * holes.inset_x, young_x), (board.width - 2.0 * holes.inset_y, young_y))
     length, young = max(spans)
-    stiffness = young * board.thickness**2 / 12.0 / case.materials.board.density
+    stiffness = young * board.thickness * board.thickness / 12.0 / case.materials.board.density
     omega = (math.pi / length) ** 2 * math.sqrt(stiffness)
     deflection = first_mode_peak(omega, shock_pulse(case.shock).pulse.integral, case.shock.duration)
     return Deflection(deflection, math.pi / length * deflection, omega)
@@ -49,6 +50,7 @@ def first_mode_peak(omega: float, velocity: Callable[[float], float], duration: 
         velocity: integral of a from 0 to a time [m/s].
         duration: of what is looked at [s].
     """
+    duration = min(duration, MOST_PERIODS * math.tau / omega)
     count = max(SAMPLES, math.ceil(SAMPLES_A_PERIOD * omega * duration / math.tau))
     ends = np.linspace(0.0, duration, count + 1)
     middle = 0.5 * (ends[1:] + ends[:-1])

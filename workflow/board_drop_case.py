@@ -12,7 +12,9 @@ from particles.parameters import Reflow, Solder
 from workflow import fields, given_surfaces
 from workflow.case_kind import Case, of_particles
 from workflow.problems import Problem
+from workflow.pulse_files import unreadable_pulses
 from workflow.stage_table import Pipeline, package_pipeline
+from workflow.toml_file import beside
 
 # Where solder overflows a sixth of the steps: tests/verification/test_particles_large_steps.py
 LARGE_STEPS = 100.0
@@ -78,11 +80,12 @@ class PackageCase(Case):
         heated = (
             thermal_checks.problems(self.thermal, self.materials.by_role, self.warpage.corner) if self.thermal else []
         )
-        geometries = joint_geometries(pad_table(self.package, self.board, self.warpage))
+        pads = pad_table(self.package, self.board, self.warpage)
+        geometries = joint_geometries(pads)
         of_solder = of_particles(particles_checks.problems(self.solder, geometries, self.package.pitch))
         if self.thermal:
             of_solder += reflow_forecast.problems(self.solder, geometries, self.thermal, self.package.pitch)
-        given = given_surfaces.problems(self.package, geometries)
+        given = given_surfaces.problems(self.package, pads, self.thermal is not None)
         return self.in_words(heated) + of_solder + list(given)
 
     def in_words(self, found: Iterable[Any]) -> list[Problem]:
@@ -111,14 +114,18 @@ class BoardDropCase(PackageCase):
         """Take surfaces and the shock's table as relative to the folder of the case file."""
         shock = table.get("shock")
         if isinstance(shock, dict) and isinstance(shock.get("table"), str):
-            shock["table"] = str((folder / shock["table"]).resolve())
+            shock["table"] = beside(folder, shock["table"])
         return super().located(table, folder)
 
     @property
     def files(self) -> dict[str, Path]:
         """Surfaces of joints, and the shock's table."""
-        table = {"shock.table": Path(self.shock.table)} if self.shock.table is not None else {}
-        return super().files | table
+        return super().files | {key: path for key, (path, _) in self.pulse_tables.items()}
+
+    @property
+    def pulse_tables(self) -> dict[str, tuple[Path, str]]:
+        """The shock's table, if it has one."""
+        return {} if self.shock.table is None else {"shock.table": (Path(self.shock.table), "acceleration")}
 
     def problems(self) -> list[Problem]:
         """Find parameters that make no possible package, joint, board or shock together."""
@@ -130,6 +137,7 @@ class BoardDropCase(PackageCase):
         if meshing_checks.problems(self.package, self.board, self.warpage):
             return found
         found += self.in_words(shock_checks.problems(self.shock)) + list(fine_joints.problems(self))
+        found += unreadable_pulses(self.pulse_tables)
         if self.shock.numerics.kinematics == "auto" and not found:
             found += self._decided_problems()
         if found:
@@ -155,12 +163,8 @@ class BoardDropCase(PackageCase):
     def _decided_problems(self) -> list[Problem]:
         """Find what does not go with the kinematics that ``auto`` decides on."""
         from fem import shock_checks
-        from fem.errors import PulseError
 
-        try:
-            return self.in_words(shock_checks.problems(self.decided.shock))
-        except PulseError as error:
-            return [Problem("shock.table", str(error), self.shock.table)]
+        return self.in_words(shock_checks.problems(self.decided.shock))
 
     def _impossible_steps(self) -> list[Problem]:
         from workflow.forecast import step_problems

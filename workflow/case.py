@@ -8,13 +8,16 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from fem.names import nearest
-from workflow import fields
+from workflow import fields, gate
 from workflow.board_drop_case import BoardDropCase, PackageCase
 from workflow.case_kind import FULL, Case
-from workflow.problems import CaseError, Problem
-from workflow.scales import choose, take_scales
+from workflow.gate import Leave
+from workflow.problems import CaseError, Origin, Problem
+from workflow.scales import choose, is_key, take_scales
 from workflow.scene_cases import DropCase, DropsCase, JointCase, OscillationCase
 from workflow.structure.case import StructureCase
+from workflow.toml_file import is_too_deep, parse_toml, read_text
+from workflow.toml_places import Places
 from workflow.validation import translate
 
 SETTING = "--set"  # where a value is from that an option gives
@@ -38,32 +41,47 @@ def kind_of(table: Mapping) -> type[Case]:
     if found:
         message = "is of several kinds at once: it has " + " and ".join(f"[{kind}]" for kind in found)
         raise CaseError("case", [Problem("", message, None, choice)])
+    if isinstance(table.get("study"), dict):
+        raise CaseError("case", [Problem("", "is a study, not a case; use: reflowshock study")])
     hint = next((f"[{near}]" for name in table if (near := nearest(name, KINDS))), "")
-    raise CaseError("case", [Problem("", "says not what kind of case it is", None, choice, hint)])
+    raise CaseError("case", [Problem("", "does not say what kind of case it is", None, choice, hint)])
 
 
-def read_case(path: Path, overrides: Sequence[str] = (), oversubscribe: bool = False) -> Case:
-    """Read and check a case file.
+def read_case(path: Path, overrides: Sequence[str] = (), oversubscribe: bool = False, force: bool = False) -> Case:
+    """Read and check a case file, and every file that it names: what it returns can be run.
 
     Args:
         path: TOML file.
         overrides: "dotted.key=value" settings, applied over the file and its scale; values are TOML, quotes may be
             left out.
-        oversubscribe: whether more MPI ranks than cores are welcome.
+        oversubscribe: whether more MPI ranks than cores are welcome, and more memory than this machine has: the case
+            is for other machines, or not to be run.
+        force: whether values that are not plausible are welcome where they can be computed with.
 
     Returns:
         The case, every value checked.
 
     Raises:
-        CaseError: with all problems found: syntax, names, units, ranges, and geometry that cannot be.
+        CaseError: with all problems found, each with its place: syntax, names, units, ranges, geometry that cannot be,
+            files that cannot be read, sizes that this machine cannot hold.
     """
+    text = read_text(path)
+    table = parse_toml(str(path), text)
+    origins: dict[str, Origin] = {}
+    try:
+        return _checked_case(path, table, overrides, origins, Leave(oversubscribe, force))
+    except CaseError as error:
+        raise CaseError(str(path), error.problems, origins).located(Places(text)) from error
+
+
+def _checked_case(path: Path, table: dict, overrides: Sequence[str], origins: dict[str, Origin], leave: Leave) -> Case:
+    """Return the case of a table; its origins are noted; errors as ``read_case``, without their places."""
     problems: list[Problem] = []
-    table = read_toml(path)
-    origins = _override(table, overrides, path, problems)
+    origins |= _override(table, overrides, problems)
     try:
         kind = kind_of(table)
     except CaseError as error:
-        raise CaseError(str(path), error.problems + problems, origins) from None
+        raise CaseError(str(path), error.problems + problems) from None
     values = kind.located(fields.to_si_table(kind, kind.completed(table), "", problems), path.parent)
     case = None
     try:
@@ -71,9 +89,9 @@ def read_case(path: Path, overrides: Sequence[str] = (), oversubscribe: bool = F
     except ValidationError as error:
         problems += translate(kind, error, table, {problem.key for problem in problems})
     if case is not None and not problems:
-        problems = case.problems() + too_many_ranks(case, oversubscribe)
+        problems = gate.problems_of(case, leave)
     if case is None or problems:
-        raise CaseError(str(path), problems, origins)
+        raise CaseError(str(path), problems)
     return case
 
 
@@ -82,65 +100,41 @@ def display_values(case: Case) -> dict[str, str]:
     return {key: fields.display(value, field) for key, value, field in fields.leaves(case) if value is not None}
 
 
-def too_many_ranks(case: Case, oversubscribe: bool) -> list[Problem]:
-    """Find out whether a case asks for more MPI ranks than there are cores."""
-    cores = available_cores()
-    return [
-        Problem(
-            key,
-            f"asks for {ranks} MPI ranks, this machine offers {cores} cores",
-            ranks,
-            f"<= {cores} in all, or more with --oversubscribe",
-        )
-        for key, ranks in case.ranks_by_key.items()
-        if ranks > cores and not oversubscribe
-    ]
-
-
 def available_cores() -> int:
     """Return the number of cores that this process may use."""
     return len(os.sched_getaffinity(0))
 
 
-def read_toml(path: Path) -> dict:
-    """Read a TOML file; CaseError where it cannot be read."""
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError as error:
-        raise CaseError(str(path), [Problem("", "no such case file")]) from error
-    except (OSError, UnicodeDecodeError) as error:
-        raise CaseError(str(path), [Problem("", f"cannot be read: {error}")]) from error
-    except tomllib.TOMLDecodeError as error:
-        raise CaseError(str(path), [Problem("", f"is not TOML: {error}")]) from error
-
-
-def _override(table: dict, overrides: Sequence[str], path: Path, problems: list[Problem]) -> dict[str, str]:
+def _override(table: dict, overrides: Sequence[str], problems: list[Problem]) -> dict[str, Origin]:
     """Write the values of the chosen scale, then overrides, into a table; return where each key was given."""
     settings = [_setting(override, problems) for override in overrides]
     scales, chosen = take_scales(table, problems), table.get("scale", FULL)
     chosen = next((value for key, value in reversed(settings) if key == "scale"), chosen)
     of_scale = choose(chosen, scales, problems)
+    wrong = {problem.key for problem in problems}
     for key, value in [*of_scale.items(), *settings]:
-        if all(key.split(".")) and not set_value(table, key.split("."), value):
-            problems.append(Problem(key, "lies below a value, not a table", value))
-    return dict.fromkeys(of_scale, f"{path} [scales.{chosen}]") | {key: SETTING for key, _ in settings}
+        if key not in wrong and not set_value(table, key.split("."), value):
+            problems.append(Problem(key, "is below a key that has a value, not a table", value))
+    of_file = {key: Origin(f"[scales.{chosen}]", f"scales.{chosen}.{key}") for key in of_scale}
+    return of_file | {key: Origin(SETTING) for key, _ in settings}
 
 
 def _setting(override: str, problems: list[Problem]) -> tuple[str, object]:
-    """Return key and value of an override."""
+    """Return key and value of an override; what is not one is its own key, and a problem."""
     key, equals, text = override.partition("=")
-    key = key.strip()
-    if not equals or not all(key.split(".")):
-        problems.append(Problem(key, "is no setting", override, "--set dotted.key=value"))
-        return "", None
-    return key, override_value(text.strip())
+    key, value = key.strip(), override_value(text.strip())
+    if not equals or not is_key(key):
+        problems.append(Problem(key or override, "is not a setting", override, "--set dotted.key=value"))
+    elif is_too_deep(value):
+        problems.append(Problem(key, "has lists or tables nested too deeply", None, "a value, or a list of values"))
+    return key or override, value
 
 
 def override_value(text: str) -> object:
     """Return the value that a setting's text stands for: TOML, quotes may be left out."""
     try:
         return tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
+    except (ValueError, RecursionError):
         return text
 
 

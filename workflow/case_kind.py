@@ -3,10 +3,11 @@
 from abc import abstractmethod
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict
 
+from workflow.names import Name
 from workflow.problems import Problem
 from workflow.stage_table import Pipeline
 
@@ -14,7 +15,6 @@ if TYPE_CHECKING:
     from particles.checks import Problem as ParticlesProblem
 
 FULL = "full"  # the scale of a case as its file says it
-NAME = r"^[A-Za-z0-9][A-Za-z0-9_.-]*$"
 
 
 class Title(BaseModel):
@@ -22,7 +22,7 @@ class Title(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    name: Annotated[str, Field(pattern=NAME)]
+    name: Name
     title: str = ""
 
 
@@ -44,7 +44,7 @@ class Case(BaseModel):
     ranks_key: ClassVar[str] = ""
 
     case: Title
-    scale: str = FULL
+    scale: Name = FULL
 
     @property
     def run_name(self) -> str:
@@ -79,6 +79,11 @@ class Case(BaseModel):
     def located(cls, table: dict, folder: Path) -> dict:
         """Take names of files in a table of SI values as relative to the folder of the case file."""
         return table
+
+    @property
+    def pulse_tables(self) -> dict[str, tuple[Path, str]]:
+        """Those of its files that are tables of a pulse, by key, and which quantity each has."""
+        return {}
 
     @property
     def files(self) -> dict[str, Path]:

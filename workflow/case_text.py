@@ -1,6 +1,5 @@
 """Writing a case file: every parameter, its value, its default and its range."""
 
-import re
 import textwrap
 from pathlib import Path
 
@@ -9,12 +8,13 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
 from fem.names import nearest
-from workflow.case import read_case, read_toml
-from workflow.case_kind import NAME, Case, Title
+from workflow.case import read_case
+from workflow.case_kind import Case, Title
 from workflow.fields import allowed, alternatives, display, holds_named_tables, literal_names, models_of, unit_of
+from workflow.names import is_name, wrong_name
 from workflow.problems import CaseError, Problem, as_toml
 from workflow.scales import scales_text, take_scales
-from workflow.validation import NAMES
+from workflow.toml_file import read_toml
 
 CASES = Path(__file__).resolve().parent.parent / "cases"
 COMMENT_COLUMN = 44
@@ -48,8 +48,8 @@ def write_new_case(name: str, template: str, folder: Path = Path()) -> Path:
     if template not in known:
         choice, hint = "one of " + ", ".join(known), nearest(template, known)
         raise CaseError("new", [Problem("--template", "unknown template", template, choice, hint)])
-    if not re.match(NAME, name):
-        raise CaseError("new", [Problem("NAME", "is no name", name, NAMES)])
+    if not is_name(name):
+        raise CaseError("new", [wrong_name("NAME", name)])
     path = folder / f"{name}.toml"
     if path.exists():
         raise CaseError("new", [Problem("NAME", f"{path} exists already", name)])

@@ -9,6 +9,7 @@ import annotated_types
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
+from workflow.names import is_name, wrong_name
 from workflow.problems import Problem
 from workflow.units import UnitError, dimension, from_si, to_si
 
@@ -122,6 +123,7 @@ def _to_si_value(field: FieldInfo, value: object, key: str, problems: list[Probl
     if unit is not None:
         return _quantity(field, unit, (key, value), problems)
     if isinstance(value, dict) and holds_named_tables(field):
+        problems += [wrong_name(key, name) for name in value if not is_name(name)]
         return {name: _of_table(field, item, f"{key}.{name}", problems) for name, item in value.items()}
     if isinstance(value, dict):
         return _of_table(field, value, key, problems)

@@ -1,12 +1,13 @@
 """Joints whose surfaces the user gives, as files: where these are, and what does not fit."""
 
 import math
-from collections.abc import Container, Iterable, Iterator
+from collections.abc import Container, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from fem.names import nearest
 from workflow.problems import Problem
+from workflow.toml_file import beside
 
 if TYPE_CHECKING:
     from meshing.pads import PadSite
@@ -21,7 +22,7 @@ def located(table: dict, folder: Path) -> dict:
     surfaces = package.get("surfaces") if isinstance(package, dict) else None
     if isinstance(surfaces, dict):
         for name, path in surfaces.items():
-            surfaces[name] = str((folder / path).resolve()) if isinstance(path, str) else path
+            surfaces[name] = beside(folder, path) if isinstance(path, str) else path
     return table
 
 
@@ -30,20 +31,34 @@ def files(package: "Package") -> dict[str, Path]:
     return {f"{KEY}.{name}": Path(path) for name, path in package.surfaces.items()}
 
 
-def problems(package: "Package", joints: Iterable[str]) -> Iterator[Problem]:
-    """Find surfaces of joints that there are not, and files that are missing or of no known format."""
-    from meshing.user_surface import SUFFIXES
+def problems(package: "Package", pads: "Sequence[PadSite]", heated: bool) -> Iterator[Problem]:
+    """Find surfaces of joints that there are not, and files that hold no surface that fits its joint.
 
-    names = list(joints)
+    Args:
+        package: names their files, which are there.
+        pads: the pad table, as drawn.
+        heated: whether pads move before the joints freeze: how high a joint is then, only the reflow finds.
+    """
+    from meshing.surface import SurfaceError
+    from meshing.user_surface import SUFFIXES, closed_triangles, load_surface
+
+    sites = {pad.name: pad for pad in pads}
     for name, text in package.surfaces.items():
-        path = Path(text)
-        if name not in names:
+        key, path = f"{KEY}.{name}", Path(text)
+        if name not in sites:
+            names = list(sites)
             hint = nearest(name, names)
-            yield Problem(f"{KEY}.{name}", "is no joint of the model", None, f"{names[0]} to {names[-1]}", hint)
+            yield Problem(key, "is not a joint of the model", None, f"{names[0]} to {names[-1]}", hint)
         if path.suffix.lower() not in SUFFIXES:
-            yield Problem(f"{KEY}.{name}", "has no format that is read", text, ", ".join(SUFFIXES))
-        elif not path.is_file():
-            yield Problem(f"{KEY}.{name}", "there is no such file", text)
+            yield Problem(key, "is not in a format that is read", text, ", ".join(SUFFIXES))
+        elif name in sites:
+            try:
+                if heated:
+                    closed_triangles(path, package.surface_unit)
+                else:
+                    load_surface(path, package.surface_unit, sites[name])
+            except SurfaceError as error:
+                yield Problem(key, str(error).removeprefix(f"surface of joint {name}, {path}: "), text)
 
 
 def given_records(package: "Package", pads: "Iterable[PadSite]", reflowed: Container[str]) -> dict[str, dict]:

@@ -9,7 +9,9 @@ from collections.abc import Iterator
 
 from fem.names import nearest
 from workflow.case_kind import FULL
+from workflow.names import is_name, wrong_name
 from workflow.problems import Problem, as_toml
+from workflow.toml_file import DEEPEST
 
 KEYS = 'a table of dotted keys, e.g. "board.numerics.coarse_size" = "2 mm"'
 
@@ -32,11 +34,25 @@ def take_scales(table: dict, problems: list[Problem]) -> dict[str, dict[str, obj
     for name, values in given.items():
         if name == FULL:
             problems.append(Problem(f"scales.{name}", "is the file as it is", None, "any other name"))
+        elif not is_name(name):
+            problems.append(wrong_name("scales", name))
         elif not isinstance(values, dict):
             problems.append(Problem(f"scales.{name}", "must be a table", values, KEYS))
         else:
-            scales[name] = dict(dotted(values))
+            given = dict(dotted(values))
+            scales[name] = {key: value for key, value in given.items() if is_key(key)}
+            problems += [
+                Problem(f"scales.{name}.{key}", "is not a dotted key", value, KEYS)
+                for key, value in given.items()
+                if key not in scales[name]
+            ]
     return scales
+
+
+def is_key(text: str) -> bool:
+    """Whether a text may be a dotted key."""
+    names = text.split(".")
+    return all(names) and len(names) <= DEEPEST
 
 
 def choose(name: object, scales: dict[str, dict[str, object]], problems: list[Problem]) -> dict[str, object]:

@@ -87,7 +87,7 @@ def _towards_rest(case: SceneCase, effects: Mapping[str, Any], particles: int, s
 def _of_oscillation(case: OscillationCase) -> SceneForecast:
     from particles.effects import decide_oscillation
     from particles.estimate import inertial_seconds
-    from particles.oscillation import rayleigh_period
+    from particles.scene_oscillation import rayleigh_period
     from particles.time_step import capillary_limit
 
     scene, solder = case.oscillation, case.molten

@@ -11,12 +11,14 @@ from pydantic_core import PydanticUndefined
 from workflow.board_drop_case import PackageCase
 from workflow.case import KINDS
 from workflow.case_kind import Case
-from workflow.fields import allowed, display, models_of, unit_of
+from workflow.fields import allowed, display, holds_named_tables, models_of, unit_of
+from workflow.names import NAME
 from workflow.units import QUANTITY, dimension
 
 SCALES = {
     "description": "values, by dotted keys, that replace those of the file where its scale is chosen",
     "type": "object",
+    "propertyNames": {"pattern": NAME},
     "additionalProperties": {"type": "object"},
 }
 PATTERN = re.sub(r"\?P<\w+>", "", f"^{QUANTITY.pattern}$")
@@ -71,6 +73,8 @@ def _kind_schema(kind: type[Case]) -> dict:
                     "x-unit": unit,
                     **_default(field),
                 }
+            if holds_named_tables(field):
+                properties["properties"][name]["propertyNames"] = {"pattern": NAME}
     # Defaults of whole tables would be repeated in SI floats; each field has its own.
     _drop_table_defaults(schema)
     return schema

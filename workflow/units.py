@@ -2,13 +2,27 @@
 
 import math
 import re
-from functools import cache
+from decimal import Decimal
+from functools import cache, lru_cache
 
 import pint
 
-QUANTITY = re.compile(r"\s*(?P<number>[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(?P<unit>.*?)\s*")
+# The digits of a number are counted: a pattern without bounds takes minutes for a megabyte of them.
+QUANTITY = re.compile(
+    r"\s*(?P<number>[-+]?(?:[0-9]{1,400}(?:\.[0-9]{0,400})?|\.[0-9]{1,400})(?:[eE][-+]?[0-9]{1,9})?)"
+    r"\s*(?P<unit>(?:\S(?:.*\S)?)?)\s*"
+)
 FACTOR = r"[^\W\d]\w*(?:(?:\^|\*\*)-?\d)?"
-UNIT = re.compile(rf"{FACTOR}(?:\s*[*/]\s*{FACTOR})*")
+UNIT = re.compile(rf"(?:1?\s*/\s*)?{FACTOR}(?:\s*[*/]\s*{FACTOR})*")
+FLOAT_MAX, LARGEST_EXPONENT = 1.0e308, 1000
+LONGEST = 1000  # characters of a quantity
+LONGEST_UNIT = 64
+# As people write units, and as pint reads them.
+SPELLINGS = {"°C": "degC", "℃": "degC", "°F": "degF", "°": "deg", "µ": "u", "μ": "u", "·": "*", "²": "^2", "³": "^3"}
+# Pint counts bits, percents and turns alike, as pure numbers.
+ANGLES = ("radian", "milliradian", "degree", "grade", "turn", "arcminute", "arcsecond")
+# What may stand in a unit of the wanted dimension, though it is a pure number itself.
+PURE_FACTORS = {"angle": ANGLES, "frequency": ("radian", "turn", "degree"), "thermal expansion": ("ppm", "percent")}
 
 
 class UnitError(ValueError):
@@ -17,9 +31,13 @@ class UnitError(ValueError):
 
 @cache
 def registry() -> pint.UnitRegistry:
-    """Return the unit registry; G is the standard acceleration of gravity, as in shock specifications."""
-    units: pint.UnitRegistry = pint.UnitRegistry(on_redefinition="ignore", autoconvert_offset_to_baseunit=True)
+    """Return the unit registry; G is the standard acceleration of gravity, as in shock specifications, mil a thou."""
+    # Decimals: "0.04 mm" and "40 um" are the same float, the one nearest to 4e-5.
+    units: pint.UnitRegistry = pint.UnitRegistry(
+        on_redefinition="ignore", autoconvert_offset_to_baseunit=True, non_int_type=Decimal
+    )
     units.define("standard_gravity = 9.80665 * meter / second**2 = G")
+    units.define("thou = 0.001 * inch = mil = th")  # as in board drawings; pint's mil is an angle of the artillery
     return units
 
 
@@ -31,23 +49,33 @@ def to_si(text: object, unit: str) -> float:
         unit: any unit of the wanted dimension, e.g. "m".
 
     Returns:
-        The value in SI base units (rad for angles, K for temperatures and for differences, e.g. "5 delta_degC").
+        The float nearest to the value in SI base units (rad for angles, K for temperatures and for differences, e.g.
+        "5 delta_degC").
 
     Raises:
         UnitError: not a string, no number, no unit, unknown unit or another dimension.
     """
     if not isinstance(text, str):
         raise UnitError(f'needs a unit, as a string such as "{_plain(text)} {unit}"')
-    match = QUANTITY.fullmatch(text)
+    match = QUANTITY.fullmatch(text) if len(text) <= LONGEST else None
     if match is None:
         raise UnitError(f'is not a number and a unit, such as "1 {unit}"')
     if not match["unit"]:
         raise UnitError(f'needs a unit, such as "{match["number"]} {unit}"')
     parsed = _parse_unit(match["unit"], unit)
-    value = registry().Quantity(float(match["number"]), parsed).to_base_units().magnitude
+    number = Decimal(match["number"])
+    # Nine digits of exponent are more than decimals bear beside a unit.
+    value = float(number) if abs(number.adjusted()) > LARGEST_EXPONENT else float(_in_base_units(number, parsed))
     if not math.isfinite(value):
         raise UnitError("is not finite")
-    return float(value)
+    if number and not value:
+        raise UnitError("is too small to be told from zero")
+    return value
+
+
+def quantity_in_si(value: float, unit: str) -> float:
+    """Return the SI value of a number in a unit of any dimension."""
+    return float(_in_base_units(Decimal(repr(float(value))), registry().Unit(unit)))
 
 
 def from_si(value: float, unit: str, digits: int = 10) -> str:
@@ -57,16 +85,18 @@ def from_si(value: float, unit: str, digits: int = 10) -> str:
 
 def in_unit(value: float, unit: str) -> float:
     """Return the magnitude of an SI value in a unit."""
+    if not math.isfinite(value):
+        return value
     parsed = registry().Unit(unit)
     base = registry().get_base_units(parsed)[1]
-    return float(registry().Quantity(value, base).to(parsed).magnitude)
+    return float(registry().Quantity(Decimal(repr(float(value))), base).to(parsed).magnitude)
 
 
 def dimension(unit: str | pint.Unit) -> str:
     """Name the dimension of a unit: "length" for "mm", "acceleration" for "G"; else its formula."""
     wanted = registry().Unit(unit)
     if wanted.dimensionless:
-        return "pure number" if wanted == registry().Unit("") else "angle"
+        return "angle" if str(wanted) in ANGLES else "pure number"
     for name, example in KINDS.items():
         if registry().Unit(example).dimensionality == wanted.dimensionality:
             return name
@@ -91,18 +121,35 @@ KINDS = {
 }
 
 
+@lru_cache(maxsize=1024)
 def _parse_unit(text: str, wanted: str) -> pint.Unit:
-    expected = f"wanted is {_article(dimension(wanted))}, e.g. in {wanted}"
-    if UNIT.fullmatch(text) is None:
-        raise UnitError(f'"{text}" is not a unit; {expected}')
+    expected = f"expected {_article(dimension(wanted))}, e.g. in {wanted}"
+    spelled = text
+    for written, read in SPELLINGS.items():
+        spelled = spelled.replace(written, read)
+    if len(spelled) > LONGEST_UNIT or UNIT.fullmatch(spelled) is None:
+        raise UnitError(f'"{text[:LONGEST_UNIT]}" is not a unit; {expected}')
     try:
-        parsed = registry().parse_units(text)
+        parsed = registry().parse_units(re.sub(r"^1?\s*/", "1/", spelled))
     except pint.UndefinedUnitError as error:
         raise UnitError(f'"{text}" is not a known unit; {expected}') from error
-    # An angle has no dimension in SI, yet "1" is no angle and "1 deg" is no length.
+    except (pint.PintError, ValueError, TypeError, ArithmeticError) as error:  # pint evaluates products and powers
+        raise UnitError(f'"{text}" is not a unit; {expected}') from error
     if parsed.dimensionality != registry().Unit(wanted).dimensionality or parsed == registry().Unit(""):
         raise UnitError(f"is {_article(dimension(parsed))}; {expected}")
+    # An angle has no dimension in SI; yet "1", "5 percent" and "3 bit" are not angles, nor is "1 mm*deg" a length.
+    pure = [name for name in dict(registry().Quantity(1, parsed).unit_items()) if registry().Unit(name).dimensionless]
+    if foreign := [name for name in pure if name not in PURE_FACTORS.get(dimension(wanted), ())]:
+        raise UnitError(f'"{text}" has the pure number {foreign[0]} in it; {expected}')
     return parsed
+
+
+def _in_base_units(number: Decimal, unit: pint.Unit) -> Decimal:
+    """Convert a number; UnitError where the unit has a zero of its own inside a product, as degC/m."""
+    try:
+        return registry().Quantity(number, unit).to_base_units().magnitude
+    except (pint.PintError, ArithmeticError) as error:
+        raise UnitError("cannot be converted to SI units") from error
 
 
 def _article(noun: str) -> str:
@@ -110,5 +157,5 @@ def _article(noun: str) -> str:
 
 
 def _plain(value: object) -> str:
-    is_number = isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+    is_number = isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < FLOAT_MAX
     return f"{value:g}" if is_number else "1"

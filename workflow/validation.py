@@ -9,9 +9,9 @@ from pydantic_core import ErrorDetails
 
 from fem.names import nearest
 from workflow import fields
+from workflow.names import wrong_name
 from workflow.problems import Problem
 
-NAMES = "letters, digits, _ . -, the first one a letter or digit"
 RANGES = ("greater_than", "greater_than_equal", "less_than", "less_than_equal", "finite_number")
 
 
@@ -62,7 +62,7 @@ def _problem(root: type[BaseModel], names: list[str], record: ErrorDetails, tabl
     if kind in RANGES:
         return Problem(key, "is out of range", value, fields.allowed(field))
     if kind == "string_pattern_mismatch":
-        return Problem(key, "is no name", value, NAMES)
+        return wrong_name(key, value)
     return Problem(key, text[0].lower() + text[1:], value, fields.allowed(field))
 
 

@@ -112,17 +112,36 @@ def alternatives(ranks: Ranks, speeds: Sequence[float], cost: WindowCost) -> lis
     return sorted(found, key=lambda item: item.seconds)
 
 
+def least_seconds(ranks: Ranks, cost: WindowCost) -> float:
+    """Return the predicted seconds of the fastest placement on ranks of speed one, however many these are."""
+    size, found = ranks.total, []
+    if ranks.placement != "disjoint":
+        macro, meso = (model_seconds(model, (size, size > 1), cost.latency) for model in (cost.macro, cost.meso))
+        found.append(_together(cost, macro, meso, 2.0 * (size > 1)))
+    if ranks.placement != "shared":
+        for count in [ranks.macro] if ranks.macro else range(1, size):
+            macro = model_seconds(cost.macro, (count, count > 1), cost.latency)
+            meso = model_seconds(cost.meso, (size - count, size - count > 1), cost.latency)
+            found.append(_together(cost, macro, meso, None))
+    return min(found)
+
+
 def window_seconds(placement: Placement, speeds: Sequence[float], cost: WindowCost) -> float:
     """Return the predicted seconds of a window: work over the speeds of those who do it, and messages.
 
     Ranks that carry both models do them one after the other, ranks that carry one wait for the slower model.
     """
-    several = {role: len(ranks) > 1 for role, ranks in placement.ranks.items()}
     power = {role: sum(speeds[rank] for rank in ranks) for role, ranks in placement.ranks.items()}
+    several = {role: len(ranks) > 1 for role, ranks in placement.ranks.items()}
     macro = model_seconds(cost.macro, (power["macro"], several["macro"]), cost.latency)
     meso = model_seconds(cost.meso, (power["meso"], several["meso"]), cost.latency)
-    if placement.name == "shared":
-        return macro + meso + several["macro"] * 2.0 * cost.latency
+    return _together(cost, macro, meso, 2.0 * several["macro"] if placement.name == "shared" else None)
+
+
+def _together(cost: WindowCost, macro: float, meso: float, sharing: float | None) -> float:
+    """Return the seconds of both models: in turn where ranks carry both, which exchange ``sharing`` messages."""
+    if sharing is not None:
+        return macro + meso + sharing * cost.latency
     return (max if cost.overlap else sum)((macro, meso)) + 2.0 * cost.latency
 
 

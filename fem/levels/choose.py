@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import pairwise
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -82,9 +82,7 @@ def choose_levels(
             f"the window {pace.window:.3e} s is {pace.window / needed.min():.3g} times the smallest step of an element,"
             f" {needed.min():.3e} s: allowed are {LARGEST_RATIO} steps a level, and {most} levels"
         )
-    finer = [np.searchsorted(needed[order], least_steps(ratios, pace)[:-1]) for ratios in candidates]
-    totals = [window_cost(cost[below], ratios) for below, ratios in zip(finer, candidates, strict=True)]
-    ratios = candidates[int(np.argmin(totals))]
+    ratios = candidates[int(np.argmin(window_costs(candidates, needed[order], cost, pace)))]
     return np.sum(needed[:, None] < least_steps(ratios, pace)[:-1], axis=1, dtype=np.int32), ratios
 
 
@@ -104,8 +102,14 @@ def governing_steps(cells: NDArray[np.int32], tie: Tie, steps: NDArray[np.float6
 def least_steps(ratios: tuple[int, ...], pace: Pace) -> NDArray[np.float64]:
     """Return the smallest critical step times the fraction that levels 0, 1, ... bear: ``(levels + 1,)`` [s]."""
     counts = np.cumprod(ratios)
-    reaches = [Substeps.of(ratio, level, pace.damping).reach for level, ratio in enumerate(ratios, 1)]
+    reaches = [reach_of(ratio, level, pace.damping) for level, ratio in enumerate(ratios, 1)]
     return np.array([pace.outermost, *(pace.window / (counts * reaches))]) * (1.0 - ROUNDING)
+
+
+@cache
+def reach_of(ratio: int, level: int, damping: float) -> float:
+    """Return how far the substeps of a level reach, of those of leapfrog."""
+    return Substeps.of(ratio, level, damping).reach
 
 
 def all_ratios(pace: Pace, needed: float, inner: tuple[int, ...], most: int) -> Iterator[tuple[int, ...]]:
@@ -119,23 +123,39 @@ def all_ratios(pace: Pace, needed: float, inner: tuple[int, ...], most: int) -> 
     """
     level = len(inner) + 1
     for ratio in range(2, LARGEST_RATIO + 1):
-        reached = ratio * Substeps.of(ratio, level, pace.damping).reach
+        reached = ratio * reach_of(ratio, level, pace.damping)
         if reached >= needed * (1.0 - ROUNDING):
             yield (*inner, ratio)
             return
-        if most > 1:
+        if most > 1 and needed / ratio <= LARGEST_RATIO ** (most - 1):
             yield from all_ratios(pace, needed / ratio, (*inner, ratio), most - 1)
 
 
-def window_cost(finer: NDArray[np.float64], ratios: tuple[int, ...]) -> float:
-    """Return the cost of a window: elements of each level times their steps, and of each substep.
+def window_costs(
+    candidates: list[tuple[int, ...]], needed: NDArray[np.float64], cost: NDArray[np.float64], pace: Pace
+) -> NDArray[np.float64]:
+    """Return the cost of a window for each candidate: elements of each level times their steps, and of each substep.
+
+    There may be a quarter of a million: those of as many levels are taken at once.
 
     Args:
-        finer: ``(levels,)`` cost of one update of all elements of level 1 and above, 2 and above, ...
-        ratios: Ratios of the levels.
+        candidates: Ratios of the levels.
+        needed: ``(ne,)`` step that each element needs, ascending [s].
+        cost: ``(ne + 1,)`` sum of the costs of an update of the first elements.
+        pace: What the steps follow.
     """
-    total, count = 0.0, 1
-    for ratio, (here, beyond) in zip(ratios, pairwise([*finer, 0.0]), strict=True):
-        count *= ratio
-        total += count * (here - beyond + SUBSTEP_COST)
-    return total - finer[0]
+    totals = np.empty(len(candidates))
+    lengths = np.array([len(ratios) for ratios in candidates])
+    for length in np.unique(lengths):
+        rows = np.flatnonzero(lengths == length)
+        ratios = np.array([candidates[row] for row in rows])
+        counts = np.cumprod(ratios, axis=1)
+        least = np.full(ratios.shape, pace.outermost)
+        for level in range(1, length):
+            reach = {ratio: reach_of(ratio, level, pace.damping) for ratio in range(2, LARGEST_RATIO + 1)}
+            reaches = np.array([reach.get(ratio, 1.0) for ratio in range(LARGEST_RATIO + 1)])
+            least[:, level] = pace.window / (counts[:, level - 1] * reaches[ratios[:, level - 1]])
+        finer = cost[np.searchsorted(needed, least * (1.0 - ROUNDING))]
+        beyond = np.concatenate([finer[:, 1:], np.zeros((len(rows), 1))], axis=1)
+        totals[rows] = (counts * (finer - beyond + SUBSTEP_COST)).sum(axis=1) - finer[:, 0]
+    return totals

@@ -12,7 +12,7 @@ from pydantic import Field
 
 from fem.materials.library import LIBRARY
 from fem.materials.parameters import Material
-from fem.parameters import Coupling, Damping, Parameters, ServiceCondition
+from fem.parameters import MOST_RANKS, Coupling, Damping, Parameters, ServiceCondition
 
 AXES = "xyz"
 SMALLER = 0.5  # of the longest step of a layer: below it a layer is fine, unless the user names those that are
@@ -179,7 +179,7 @@ class LayerCoupling(Coupling):
     fine: tuple[str, ...] = ()
     compare: bool = False
     placement: Literal["auto", "disjoint", "shared"] = "auto"
-    macro_ranks: int | None = Field(None, ge=1)
+    macro_ranks: int | None = Field(None, ge=1, le=MOST_RANKS)
 
 
 def fine_layers(coupling: LayerCoupling, steps: Mapping[str, float]) -> tuple[str, ...]:
@@ -215,7 +215,7 @@ class Dynamics(Parameters):
     initial_velocity: Annotated[tuple[float, float, float], "m/s"] = (0.0, 0.0, 0.0)
     damping: Damping = Damping()
     modes: int = Field(0, ge=0, le=200)
-    ranks: int = Field(1, ge=1)
+    ranks: int = Field(1, ge=1, le=MOST_RANKS)
     coupling: LayerCoupling | None = None
     numerics: DynamicsNumerics = DynamicsNumerics()
 

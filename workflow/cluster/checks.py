@@ -58,7 +58,7 @@ def _chosen(profile: Profile, found: Sequence[Partition]) -> Partition:
     names = [partition.name for partition in found]
     if profile.partition not in names:
         key, hint = "default-resources.slurm_partition", nearest(profile.partition, names)
-        problem = Problem(key, "is no partition here", profile.partition, ", ".join(names), hint)
+        problem = Problem(key, "is not a partition here", profile.partition, ", ".join(names), hint)
         raise CaseError(str(profile.folder / FILE), [problem])
     return found[names.index(profile.partition)]
 

@@ -10,6 +10,7 @@ import yaml
 
 from fem.names import nearest
 from workflow.problems import CaseError, Problem
+from workflow.toml_file import MOST_BYTES, fault_of
 
 OWN = Path("profiles/slurm")  # of the user, below the working directory
 SHIPPED = Path(__file__).parents[1] / "profiles/slurm"
@@ -45,11 +46,14 @@ def read_profile(folder: Path | None) -> Profile:
     """
     folder = folder or (OWN if (OWN / FILE).is_file() else SHIPPED)
     path = folder / FILE
+    fault = fault_of(path, MOST_BYTES) if path.exists() else ""
+    if fault:
+        raise _wrong(path, Problem("", fault))
     try:
         table = yaml.safe_load(path.read_text(encoding="utf-8")) or {}
     except FileNotFoundError as error:
-        raise _wrong(path, Problem("--profile", "is no profile", str(folder), f"a folder with {FILE}")) from error
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        raise _wrong(path, Problem("--profile", "is not a profile", str(folder), f"a folder with {FILE}")) from error
+    except (OSError, ValueError, RecursionError, yaml.YAMLError) as error:
         raise _wrong(path, Problem("", f"cannot be read: {error}")) from error
     config = _table(path, table, "config")
     resources = _table(path, table, "default-resources")
@@ -59,7 +63,7 @@ def read_profile(folder: Path | None) -> Profile:
             raise _wrong(path, message)
     launcher = str(config.get("launcher", "mpirun"))
     if not _is_command(launcher):
-        raise _wrong(path, Problem("config.launcher", "is no command", launcher, "mpirun, srun --mpi=pmix, …"))
+        raise _wrong(path, Problem("config.launcher", "is not a command", launcher, "mpirun, srun --mpi=pmix, …"))
     partition = str(resources.get("slurm_partition", "")).strip("'\"")
     return Profile(folder, partition, launcher, _factor(path, config.get("walltime_factor", 1.0)))
 
@@ -73,7 +77,7 @@ def _is_command(text: str) -> bool:
 
 def _factor(path: Path, value: object) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float) or not 0.1 <= value <= 1000.0:
-        raise _wrong(path, Problem("config.walltime_factor", "is no factor", value, "0.1 to 1000"))
+        raise _wrong(path, Problem("config.walltime_factor", "is not a factor", value, "0.1 to 1000"))
     return float(value)
 
 

@@ -5,7 +5,7 @@ import re
 from dataclasses import dataclass
 
 from workflow.stress_test.trial import Measured
-from workflow.units import UnitError, dimension, in_unit, registry, to_si
+from workflow.units import UnitError, dimension, in_unit, quantity_in_si, to_si
 
 TEXT = re.compile(r"\s*(?P<sign><=|>=|<|>|)\s*(?P<quantity>.*?)\s*")
 PURE = re.compile(r"(?P<number>[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(?P<percent>%?)")
@@ -82,7 +82,7 @@ def si_value(found: Measured) -> float:
     """Return a measured value in SI base units."""
     if found.unit in ("", "%"):
         return found.value / (100.0 if found.unit else 1.0)
-    return float(registry().Quantity(found.value, found.unit).to_base_units().magnitude)
+    return quantity_in_si(found.value, found.unit)
 
 
 def kind(unit: str) -> str:

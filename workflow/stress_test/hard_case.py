@@ -11,12 +11,13 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from fem.names import nearest
 from workflow import fields
-from workflow.case import read_toml, set_value
+from workflow.case import set_value
 from workflow.problems import CaseError, Problem
 from workflow.scales import dotted
 from workflow.stress_test.bound import Bound, read_bound
 from workflow.stress_test.families import FAMILIES, trials
 from workflow.stress_test.trial import Trial
+from workflow.toml_file import read_toml
 from workflow.units import UnitError
 from workflow.validation import translate
 

@@ -1,6 +1,5 @@
 """The case of a structure: a box of layers, held and loaded, whose motion is computed."""
 
-from collections.abc import Iterator
 from pathlib import Path
 
 from pydantic import Field
@@ -9,8 +8,10 @@ from fem.structure.parameters import StructureScene
 from meshing.box_plan import Box, BoxHoles, BoxLayer
 from workflow.case_kind import Case
 from workflow.problems import Problem
+from workflow.pulse_files import unreadable_pulses
 from workflow.stage_table import STRUCTURE
 from workflow.structure.references import AnyReference, reference_problems
+from workflow.toml_file import beside
 
 
 class StructureCase(StructureScene, Case):
@@ -28,14 +29,24 @@ class StructureCase(StructureScene, Case):
         loads = table.get("loads")
         for load in loads.values() if isinstance(loads, dict) else ():
             if isinstance(load, dict) and isinstance(load.get("table"), str):
-                load["table"] = str((folder / load["table"]).resolve())
+                load["table"] = beside(folder, load["table"])
         return table
+
+    @property
+    def pulse_tables(self) -> dict[str, tuple[Path, str]]:
+        """Tables of loads."""
+        from fem.structure.pulses import QUANTITY
+
+        return {
+            f"loads.{name}.table": (Path(load.table), QUANTITY[load.kind])
+            for name, load in self.loads.items()
+            if load.table is not None
+        }
 
     @property
     def files(self) -> dict[str, Path]:
         """Tables of loads."""
-        tables = {f"loads.{name}.table": load.table for name, load in self.loads.items()}
-        return {key: Path(table) for key, table in tables.items() if table is not None}
+        return {key: path for key, (path, _) in self.pulse_tables.items()}
 
     @property
     def scene(self) -> StructureScene:
@@ -62,7 +73,8 @@ class StructureCase(StructureScene, Case):
             Problem(found.key, found.message, found.value, found.allowed, found.hint)
             for found in structure_checks.problems(self.scene)
         ]
-        found = [*boxes, *scenes, *self._unreadable_tables(), *reference_problems(self.references, self.scene)]
+        found = [*boxes, *scenes, *unreadable_pulses(self.pulse_tables)]
+        found += reference_problems(self.references, self.scene)
         return found or self._impossible_steps()
 
     def _impossible_steps(self) -> list[Problem]:
@@ -70,16 +82,6 @@ class StructureCase(StructureScene, Case):
         from workflow.structure.forecast import step_problems
 
         return [*step_problems(self), *waves_that_do_not_pass(self)]
-
-    def _unreadable_tables(self) -> Iterator[Problem]:
-        from fem.errors import PulseError
-        from fem.structure.pulses import pulse_of
-
-        for key, path in self.files.items():
-            try:
-                pulse_of(self.loads[key.split(".")[1]])
-            except PulseError as error:
-                yield Problem(key, str(error), str(path))
 
     @property
     def ranks(self) -> int:

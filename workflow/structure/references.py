@@ -115,7 +115,7 @@ def _pressure(key: str, name: str, scene: StructureScene, pulse: str) -> Iterato
     load = scene.loads.get(name)
     if load is not None and not (isinstance(load, Pressure) and load.peak is not None and load.pulse == pulse):
         yield Problem(
-            key, f"is no {pulse} pressure that is given by its peak", name, f'a pressure with pulse = "{pulse}"'
+            key, f"is not a {pulse} pressure that is given by its peak", name, f'a pressure with pulse = "{pulse}"'
         )
 
 
@@ -123,7 +123,9 @@ def _pulse(key: str, name: str, scene: StructureScene) -> Iterator[Problem]:
     yield from _known(key, name, scene.loads, "load")
     load = scene.loads.get(name)
     if load is not None and not (isinstance(load, Pressure) and load.on == "z_min" and _ends(load)):
-        yield Problem(key, "is no pulse of pressure on z_min", name, "a pressure on z_min with a duration or a table")
+        yield Problem(
+            key, "is not a pulse of pressure on z_min", name, "a pressure on z_min with a duration or a table"
+        )
 
 
 def _ends(load: Pressure) -> bool:

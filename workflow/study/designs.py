@@ -1,5 +1,6 @@
 """Designs: which settings the points of a study have. A factor is what is varied as one, of one key or several."""
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
@@ -8,8 +9,17 @@ from workflow.problems import Problem
 from workflow.study.hypercube import Hypercube
 from workflow.study.setting_text import as_text, between
 
+MOST_POINTS = 10_000  # each a run
+MOST_SAMPLED = 1_000_000  # values of a Latin hypercube
 VALUES = 'a list of values; of several keys ("a, b") each one value for all, or a list of one for each'
 RANGE = 'a range of two different values in the same unit, e.g. ["0.8 mm", "1 mm"]'
+
+
+class TooManyPoints(ValueError):
+    """A study of more points than are written down; holds their number."""
+
+    def __init__(self, count: int) -> None:
+        super().__init__(f"would have {count} points")
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +60,14 @@ class Design:
 
     @classmethod
     def of(cls, *axes: "Design") -> "Design":
-        """Every combination of designs; of none the one point without settings."""
+        """Every combination of designs; of none the one point without settings.
+
+        Raises:
+            TooManyPoints: there are more than a study can have; they are counted first.
+        """
+        count = math.prod(len(axis.points) for axis in axes)
+        if count > MOST_POINTS:
+            raise TooManyPoints(count)
         design = cls()
         for axis in axes:
             design = design * axis
@@ -64,8 +81,11 @@ def grid_axes(table: Mapping[str, object], problems: list[Problem]) -> Iterator[
         if not isinstance(values, list) or not values:
             problems.append(Problem(f"grid.{text}", "must be a list with at least one value", values, VALUES))
             continue
+        if len(values) > MOST_POINTS:
+            problems.append(Problem(f"grid.{text}", f"has {len(values)} values", None, f"up to {MOST_POINTS}"))
+            continue
         points = [_level(keys, value) for value in values]
-        if any(point in points[:place] for place, point in enumerate(points)):
+        if len({tuple(point.items()) for point in points if point is not None}) < len(points) - points.count(None):
             problems.append(Problem(f"grid.{text}", "has a value twice", values, VALUES))
         if None in points:
             problems.append(
@@ -95,11 +115,15 @@ def sampled(table: Mapping[str, object], cube: Hypercube, problems: list[Problem
     for factor, (text, ends) in zip(factors, table.items(), strict=True):
         found = _range(factor.keys, ends)
         if found is None:
-            problems.append(Problem(f"latin_hypercube.ranges.{text}", "is no range", ends, RANGE))
+            problems.append(Problem(f"latin_hypercube.ranges.{text}", "is not a range", ends, RANGE))
         else:
             ranges.append(found)
     if not table:
         problems.append(Problem("latin_hypercube.ranges", "is empty", None, RANGE))
+    if len(factors) * cube.samples > MOST_SAMPLED:
+        message = f"would have {len(factors) * cube.samples} values"
+        problems.append(Problem("latin_hypercube", message, None, f"up to {MOST_SAMPLED}"))
+        return Design()
     if not table or len(ranges) < len(factors):
         return Design()
     points = tuple(

@@ -30,15 +30,15 @@ def between(low: object, high: object, share: float) -> str | None:
         if ends[0] is None or ends[1] is None or ends[0]["unit"] != ends[1]["unit"]:
             return None
         first, last = float(ends[0]["number"]), float(ends[1]["number"])
-        return f"{first + share * (last - first):.{DIGITS}g} {ends[0]['unit']}"
+        return f"{(1.0 - share) * first + share * last:.{DIGITS}g} {ends[0]['unit']}"
     if isinstance(low, float | int) and isinstance(high, float | int):
-        return f"{low + share * (high - low):.{DIGITS}g}"
+        return f"{(1.0 - share) * low + share * high:.{DIGITS}g}"
     return None
 
 
 def _is_toml(text: str) -> bool:
     try:
         tomllib.loads(f"value = {text}")
-    except tomllib.TOMLDecodeError:
+    except (ValueError, RecursionError):
         return False
     return True

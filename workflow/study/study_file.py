@@ -4,17 +4,19 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from workflow.case import read_toml
-from workflow.case_kind import NAME
+from workflow.case import KINDS
+from workflow.names import Name
 from workflow.problems import CaseError, Problem
-from workflow.scales import dotted
-from workflow.study.designs import Design, grid_axes, list_axis, sampled
+from workflow.scales import dotted, is_key
+from workflow.study.designs import MOST_POINTS, Design, TooManyPoints, grid_axes, list_axis, sampled
 from workflow.study.hypercube import Hypercube
 from workflow.study.setting_text import as_text
+from workflow.toml_file import parse_toml, read_text
+from workflow.toml_places import Places
 from workflow.validation import translate
 
 DESIGNS = "at least one of [grid], [[list]], [latin_hypercube]"
@@ -25,10 +27,10 @@ class StudyTable(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    name: Annotated[str, Field(pattern=NAME)]
+    name: Name
     title: str = ""
     case: str
-    scale: str | None = None
+    scale: Name | None = None
     rank_by: str
     goal: Literal["minimise", "maximise"] = "minimise"
     metrics: tuple[str, ...] = ()
@@ -90,7 +92,17 @@ def read_study(path: Path) -> Study:
     Raises:
         CaseError: with all problems found.
     """
-    table = read_toml(path)
+    text = read_text(path)
+    try:
+        return _study(path, parse_toml(str(path), text))
+    except CaseError as error:
+        raise error.located(Places(text)) from error
+
+
+def _study(path: Path, table: dict) -> Study:
+    """Return the study of a table; errors as ``read_study``, without their places."""
+    if "study" not in table and any(kind in table for kind in KINDS):
+        raise CaseError(str(path), [Problem("", "is a case, not a study; use: reflowshock plan, or run")])
     values = table | ({"list": tuple(table["list"])} if isinstance(table.get("list"), list) else {})
     if isinstance(given := table.get("study"), dict) and isinstance(given.get("metrics"), list):
         values["study"] = given | {"metrics": tuple(given["metrics"])}
@@ -102,9 +114,15 @@ def read_study(path: Path) -> Study:
     design = _design(file, problems)
     settings = {key: as_text(value) for key, value in dotted(file.settings)}
     settings |= {"scale": file.study.scale} if file.study.scale else {}
+    varied = {key for point in design.points for key in point}
     problems += [
         Problem(key, "is fixed and varied at once", settings[key], "either [settings] or a design")
-        for key in sorted(settings.keys() & {key for point in design.points for key in point})
+        for key in sorted(settings.keys() & varied)
+    ]
+    problems += [
+        Problem(key, "is not a dotted key", None, "the key of a case, e.g. package.pitch")
+        for key in sorted(settings.keys() | varied)
+        if not is_key(key)
     ]
     if problems:
         raise CaseError(str(path), problems)
@@ -119,7 +137,11 @@ def _design(file: StudyFile, problems: list[Problem]) -> Design:
     if file.latin_hypercube is not None:
         cube = file.latin_hypercube
         axes.append(sampled(dict(dotted(cube.ranges)), Hypercube(cube.samples, cube.seed), problems))
-    design = Design.of(*axes)
+    try:
+        design = Design.of(*axes)
+    except TooManyPoints as error:
+        problems.append(Problem("", str(error), None, f"up to {MOST_POINTS}"))
+        return Design()
     problems += [
         Problem(key, "is given twice, of which one would be lost", None, "one place in [grid], [[list]] or ranges")
         for key, count in Counter(key for axis in axes for key in axis.given).items()

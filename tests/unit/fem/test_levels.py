@@ -1,5 +1,7 @@
 """Step levels against dense matrix functions; what follows from the equations exactly."""
 
+import math
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -199,3 +201,12 @@ def test_damping_takes_more_substeps_and_has_a_limit():
     assert choose_levels(CHAIN, Tie.none(), damped, 1)[0].min() == 1  # the window is too large for damped elements
     with pytest.raises(LevelError, match=r"too strong for levels, which bear 0\.03"):
         Substeps.of(8, 1, 0.04)
+
+
+def test_very_different_steps_are_divided_in_seconds():
+    pace = Pace(np.geomspace(1e-4, 1.0, 12), np.full(12, 1e6), 0.9, 0.9)
+    start = time.monotonic()
+    level, ratios = choose_levels(CHAIN, Tie.none(), pace, 4)
+    assert time.monotonic() - start < 5.0
+    assert level.max() == len(ratios) >= 2
+    assert 0.9 / math.prod(ratios) < 0.9e-4 * 1.01

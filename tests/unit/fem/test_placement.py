@@ -9,7 +9,7 @@ from mpi4py import MPI
 from pydantic import ValidationError
 
 from fem.communicators import Communicators
-from fem.coupling.placement import ModelCost, WindowCost, alternatives, disjoint, shared, window_seconds
+from fem.coupling.placement import ModelCost, WindowCost, alternatives, disjoint, least_seconds, shared, window_seconds
 from fem.coupling.planner import Load, Measured, keep, kept, plan_from, plan_ranks, words
 from fem.coupling.speeds import Kind, StepCost, families, line_through, sample_terms, seconds_of_step, speeds_of
 from fem.estimate import WindowPlan, predict_seconds
@@ -33,6 +33,16 @@ def test_elements_that_turn_are_timed_at_rest():
     joint = joint_mesh("A1", 0.0, 0.0)
     kind = replace(KIND, materials=[LIBRARY["FR4"]] * len(joint.part_names), kinematics="finite")
     assert seconds_of_step(sample_terms(joint, kind), len(joint.points)) > 0.0
+
+
+@pytest.mark.parametrize(
+    "asked", [{}, {"placement": "shared"}, {"placement": "disjoint"}, {"placement": "disjoint", "macro": 2}]
+)
+@pytest.mark.parametrize("window", [EVEN, cost(3e-3, 1e-4), replace(EVEN, overlap=False)])
+def test_the_fastest_of_equal_ranks_is_known_without_trying_them(asked, window):
+    for total in (3, 8):
+        ranks = Ranks(total=total, **asked)
+        assert least_seconds(ranks, window) == alternatives(ranks, [1.0] * total, window)[0].seconds
 
 
 def test_one_rank_carries_both_models():

@@ -15,6 +15,15 @@ def test_graded_lines_keep_their_ratio():
     assert mirrored.smallest() == pytest.approx(1.0)
 
 
+@pytest.mark.parametrize("ratio", [1.0, 1.01, 0.99])
+def test_the_shortest_of_very_many_cells_is_known_without_their_lines(monkeypatch, ratio):
+    interval = Interval(1.0, 8.0, 3000, ratio)
+    laid_out = interval.smallest()
+    monkeypatch.setattr("meshing.plan.MOST_LINES", 10)
+    assert interval.smallest() == pytest.approx(laid_out, rel=1e-9)
+    assert Interval(0.0, 1.0, 10**12).smallest() == 1e-12
+
+
 def test_axis_is_covered_without_gap():
     for symmetry, start in (("quarter", 0.0), ("full", -20.0 * MM)):
         axis = board_plan(package(), board(symmetry=symmetry)).x

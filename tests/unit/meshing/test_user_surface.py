@@ -95,6 +95,33 @@ def test_faults_are_refused_by_place(tmp_path, fault, told):
         load_surface(path, "mm", SITE)
 
 
+@pytest.mark.parametrize("share", [0.3, 0.5, 0.7])
+def test_a_ring_that_is_turned_inside_out_is_refused(tmp_path, share):
+    points = SHAPE.points.copy()
+    heights = np.unique(np.round(points[:, 2], 12))
+    ring = np.abs(points[:, 2] - heights[np.argmin(np.abs(heights - share * SITE.gap))]) < 1e-11
+    points[ring, :2] *= -1.0
+    with pytest.raises(SurfaceError, match="surface crosses itself"):
+        load_surface(write(tmp_path, points, SHAPE.triangles), "mm", SITE)
+
+
+@pytest.mark.parametrize("suffix", ["ply", "vtu", "stl"])
+@pytest.mark.parametrize("value", [3e38, 1e20, 1e5])
+def test_a_vertex_far_away_is_named(tmp_path, suffix, value):
+    points = SHAPE.points.copy()
+    points[11, 0] = value
+    with pytest.raises(SurfaceError, match=r"vertex \d+ lies .* m away from the others, allowed up to 1 m"):
+        load_surface(write(tmp_path, points, SHAPE.triangles, f"joint.{suffix}", 1.0), "m", SITE)
+
+
+@pytest.mark.parametrize("vertex", [-1, 10**9])
+def test_a_triangle_of_vertices_that_are_not_there_is_named(tmp_path, vertex):
+    triangles = SHAPE.triangles.astype(np.int32)
+    triangles[7, 1] = vertex
+    with pytest.raises(SurfaceError, match=rf"triangle 7 has the vertices \d+, {vertex}, \d+, allowed 0 to"):
+        load_surface(write(tmp_path, SHAPE.points, triangles, "joint.ply"), "mm", SITE)
+
+
 def test_another_unit_is_refused_and_the_right_one_named(tmp_path):
     path = write(tmp_path, SHAPE.points, SHAPE.triangles, scale=1.0e6)
     with pytest.raises(SurfaceError, match=r"height 0\.31 m with lengths in mm, allowed .*; is it in um\?"):

@@ -18,7 +18,7 @@ BAD_VALUES = {
     "unknown table": ("pakage.rows=3", ["pakage", "unknown key", "did you mean package?"]),
     "unit missing": ("package.pitch=1.0", ["package.pitch = 1.0", 'such as "1 mm"', "allowed: > 0 mm"]),
     "unit missing in text": ('package.pitch="1.0"', ['package.pitch = "1.0"', "needs a unit"]),
-    "wrong dimension": ("board.thickness=1 kg", ['board.thickness = "1 kg"', "is a mass; wanted is a length"]),
+    "wrong dimension": ("board.thickness=1 kg", ['board.thickness = "1 kg"', "is a mass; expected a length"]),
     "unknown unit": ("board.thickness=1 mmm", ["board.thickness", '"mmm" is not a known unit']),
     "negative length": ("package.standoff=-0.3 mm", ['package.standoff = "-0.3 mm"', "out of range", "> 0 mm"]),
     "too large": ("package.rows=101", ["package.rows = 101", "allowed: >= 1 and <= 100"]),
@@ -65,8 +65,8 @@ BAD_VALUES = {
         ['shock.numerics.dns_solver = "implicit"', "solder yields", "allowed: explicit"],
     ),
     "unknown constant of plasticity": ("materials.solder.plasticity.D=1", ["unknown key", "one of A, B, n, C"]),
-    "table below a value": ("package.rows.all=1", ["package.rows.all", "lies below a value"]),
-    "no setting": ("package.rows", ["package.rows", "is no setting", "dotted.key=value"]),
+    "table below a value": ("package.rows.all=1", ["package.rows.all", "is below a key that has a value"]),
+    "no setting": ("package.rows", ["package.rows", "is not a setting", "dotted.key=value"]),
     "more ranks than cores": (
         "shock.ranks.total=4096",
         ["shock.ranks.total = 4096", "4096 MPI ranks", "--oversubscribe"],
@@ -92,6 +92,10 @@ def problems_of(*settings: str, path: Path = SMALL_CASE) -> list[str]:
     return caught.value.lines()
 
 
+def line_of(path: Path, start: str) -> int:
+    return 1 + next(k for k, line in enumerate(path.read_text().splitlines()) if line.startswith(start))
+
+
 @pytest.mark.parametrize(("setting", "words"), BAD_VALUES.values(), ids=BAD_VALUES.keys())
 def test_bad_values_are_named(setting, words):
     text = "\n".join(problems_of(*setting.split("\n")))
@@ -107,15 +111,18 @@ def test_all_problems_are_reported_at_once():
 def test_problems_of_the_file_name_the_file(tmp_path):
     path = tmp_path / "case.toml"
     path.write_text(SMALL_CASE.read_text().replace('standoff = "0.31 mm"', "standoff = 0.31"))
+    line = line_of(path, "standoff")
     assert problems_of(path=path) == [
-        f'{path}: package.standoff = 0.31: needs a unit, as a string such as "0.31 mm"; allowed: > 0 mm'
+        f'{path}:{line}:1: package.standoff = 0.31: needs a unit, as a string such as "0.31 mm"; allowed: > 0 mm'
     ]
 
 
 def test_missing_values_are_named(tmp_path):
     path = tmp_path / "case.toml"
     path.write_text(SMALL_CASE.read_text().replace('pitch = "1 mm"', ""))
-    assert problems_of(path=path) == [f"{path}: package.pitch: is missing; allowed: > 0 mm"]
+    assert problems_of(path=path) == [
+        f"{path}:{line_of(path, '[package]')}:2: package.pitch: is missing; allowed: > 0 mm"
+    ]
 
 
 @pytest.mark.parametrize(("text", "words"), [("package = [", "is not TOML"), ("a = 1\na = 2", "is not TOML")])
@@ -126,7 +133,7 @@ def test_broken_files(tmp_path, text, words):
 
 
 def test_absent_file(tmp_path):
-    assert "no such case file" in problems_of(path=tmp_path / "absent.toml")[0]
+    assert "there is no such file" in problems_of(path=tmp_path / "absent.toml")[0]
 
 
 def test_overrides_are_toml_or_bare_text():

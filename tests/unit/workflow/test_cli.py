@@ -77,10 +77,10 @@ def test_a_new_case_overwrites_nothing(call):
     ("arguments", "words"),
     [
         (("new", "mine", "--template", "bga_dorp"), "did you mean bga_drop?"),
-        (("new", "no name"), "is no name"),
+        (("new", "no name"), "is not a valid name"),
         (("run", str(CASE), "--until", "shok"), "is no stage"),
         (("run", str(CASE), "--set", "shock.duration=1"), 'such as "1 ms"'),
-        (("run", "absent.toml"), "no such case file"),
+        (("run", "absent.toml"), "there is no such file"),
         (("plan", str(CASE), "--set", "shock.ranks.total=1000"), "--oversubscribe"),
         (("fly",), "No such command"),
     ],

@@ -90,8 +90,8 @@ def test_profile_of_the_user(tmp_path, monkeypatch):
     [
         ("config: {luncher: mpirun}", "config.luncher = \"mpirun\": unknown key; allowed: launcher, walltime_factor"),
         ("config: {launcher: ''}", "config.launcher"),
-        ("config: {launcher: mpirun 'x}", "config.launcher = \"mpirun 'x\": is no command"),
-        ("config: {walltime_factor: -1}", "walltime_factor = -1: is no factor; allowed: 0.1 to 1000"),
+        ("config: {launcher: mpirun 'x}", "config.launcher = \"mpirun 'x\": is not a command"),
+        ("config: {walltime_factor: -1}", "walltime_factor = -1: is not a factor; allowed: 0.1 to 1000"),
         ("config: [launcher=srun]", "config: must be a table"),
         ("a: b: c", "cannot be read"),
     ],
@@ -104,7 +104,7 @@ def test_wrong_profiles_are_told(tmp_path, text, said):
 
 
 def test_a_folder_without_profile_is_told(tmp_path):
-    with pytest.raises(CaseError, match="is no profile"):
+    with pytest.raises(CaseError, match="is not a profile"):
         read_profile(tmp_path / "nowhere")
 
 

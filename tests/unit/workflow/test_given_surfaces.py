@@ -37,13 +37,20 @@ def case_file(tmp_path) -> Path:
     """A case beside a surface of A4, another 10 % wider than the reflowed ones."""
     shutil.copy(SMALL_CASE, tmp_path / "case.toml")
     given = barrel(0.35 * MM, 0.06 * MM)
-    meshio.write(tmp_path / "a4.stl", meshio.Mesh(given.points / MM, [("triangle", given.triangles)]))
+    low, wrong = barrel(0.25 * MM, 0.06 * MM), given.triangles.copy()
+    wrong[7, 1] = len(given.points) + 5
+    for name, points, triangles in (
+        ("a4.stl", given.points, given.triangles),
+        ("low.ply", low.points, low.triangles),
+        ("index.ply", given.points, wrong),
+    ):
+        meshio.write(tmp_path / name, meshio.Mesh(points / MM, [("triangle", triangles)]))
     return tmp_path / "case.toml"
 
 
 def read(case_file: Path, **surfaces: str):
     settings = [f'package.surfaces.{name}="{path}"' for name, path in surfaces.items()]
-    return read_case(case_file, ["warpage.corner=0.08 mm", *settings])
+    return read_case(case_file, ["package.standoff=0.35 mm", "warpage.corner=0 mm", *settings])
 
 
 def test_files_are_beside_the_case_and_count_by_what_they_hold(case_file):
@@ -65,9 +72,11 @@ def test_a_case_with_them_can_be_written_as_a_template(case_file):
 @pytest.mark.parametrize(
     ("name", "path", "told"),
     [
-        ("A44", "a4.stl", r"package\.surfaces\.A44.*no joint.*A4"),
-        ("A4", "a4.obj", r"package\.surfaces\.A4.*no format.*\.stl, \.ply, \.vtu"),
+        ("A44", "a4.stl", r"package\.surfaces\.A44.*not a joint.*A4"),
+        ("A4", "case.toml", r"package\.surfaces\.A4.*not in a format.*\.stl, \.ply, \.vtu"),
         ("A4", "a5.stl", r"package\.surfaces\.A4.*no such file"),
+        ("A4", "low.ply", r"package\.surfaces\.A4.*its flat ends are .* m apart, allowed"),
+        ("A4", "index.ply", r"package\.surfaces\.A4.*triangle 7 has the vertices .*, allowed 0 to"),
     ],
 )
 def test_what_does_not_fit_is_refused_by_key(case_file, name, path, told):

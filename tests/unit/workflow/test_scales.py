@@ -74,7 +74,7 @@ def test_settings_count_more_than_the_scale(case_file):
         ('[scales.quick]\n"board.thickness" = "1 kg"\n', "scale=quick",
          ["[scales.quick]: board.thickness", "is a mass"]),
         ('[scales.quick]\n"board.thickness.x" = 1\n', "scale=quick",
-         ["[scales.quick]: board.thickness.x", "lies below"]),
+         ["[scales.quick]: board.thickness.x", "is below a key that has a value"]),
     ],
 )  # fmt: skip
 def test_wrong_scales_are_named(case_file, text, setting, words):

@@ -59,7 +59,7 @@ FAULTS = {
         ['thermal.solidification = "250 degC"', "<= 245 degC, the peak"],
     ),
     "liquid in the end": (['thermal.final="0.5 kK"'], ["thermal.final", "<= 217 degC, the solidification"]),
-    "no temperature": (['thermal.peak="3 mm"'], ["is a length; wanted is a temperature"]),
+    "no temperature": (['thermal.peak="3 mm"'], ["is a length; expected a temperature"]),
     "floats and is moved": (MOVED[1:], ["thermal.corner_displacement", "does not go with package = floating"]),
     "moved nowhere": (MOVED[:1], ["thermal.corner_displacement: is missing"]),
     "name": (["thermal.corner_displacment=1"], ["did you mean thermal.corner_displacement?"]),
@@ -76,7 +76,7 @@ FAULTS = {
     "no expansion": (["thermal.steps=1", GLASS], ["materials.board.thermal_expansion: is missing", "16 ppm/K"]),
     "no expansion coefficient": (
         [GLASS.replace(" }", ', thermal_expansion = "9 K" }')],
-        ["materials.board.thermal_expansion", "wanted is a thermal expansion, e.g. in ppm/K"],
+        ["materials.board.thermal_expansion", "expected a thermal expansion, e.g. in ppm/K"],
     ),
 }
 

@@ -26,6 +26,18 @@ from workflow.units import UnitError, dimension, from_si, to_si
         ("498.5 mJ/m**2", "N/m", 0.4985),
         ("25 degC", "K", 298.15),
         ("175 delta_degC", "K", 175.0),
+        ("40 mil", "mm", 1.016e-3),
+        ("40 thou", "mm", 1.016e-3),
+        ("245 °C", "degC", 518.15),
+        ("245degC", "degC", 518.15),
+        ("480 μm", "mm", 4.8e-4),
+        ("2 1/ms", "Hz", 2000.0),
+        ("3/s", "s^-1", 3.0),
+        ("17 ppm/°C", "ppm/K", 17e-6),
+        ("0.25 turn", "deg", math.pi / 2),
+        ("30 mrad", "deg", 0.03),
+        ("100 gradian", "deg", math.pi / 2),
+        ("10 rad/s", "Hz", 10.0),
     ],
 )
 def test_quantities_become_si(text, unit, value):
@@ -42,13 +54,20 @@ def test_quantities_become_si(text, unit, value):
         ("inf mm", "is not a number and a unit"),
         ("nan mm", "is not a number and a unit"),
         ("1e999 mm", "is not finite"),
-        ("1 kg", "is a mass; wanted is a length, e.g. in mm"),
-        ("1 deg", "is an angle; wanted is a length"),
+        ("1 kg", "is a mass; expected a length, e.g. in mm"),
+        ("1 deg", "is an angle; expected a length"),
         ("1 mmm", '"mmm" is not a known unit'),
         ("1 2 mm", '"2 mm" is not a unit'),
         ("1 mm/", '"mm/" is not a unit'),
         ("1 mm^1e9", "is not a unit"),
         ("1 __import__('os')", "is not a unit"),
+        ("1" * 5000 + " mm", "is not a number and a unit"),
+        ("1 " + "m*" * 500 + "m", "is not a"),
+        ("1e-400 mm", "is too small to be told from zero"),
+        ("1e400 mm", "is not finite"),
+        ("1e308 Gm", "is not finite"),
+        pytest.param(10**5000, "needs a unit", id="thousands of digits"),
+        ("1 mm*deg", "has the pure number degree in it"),
     ],
 )
 def test_what_is_no_length_is_refused(text, words):
@@ -58,8 +77,30 @@ def test_what_is_no_length_is_refused(text, words):
 
 
 def test_an_angle_needs_its_unit():
-    with pytest.raises(UnitError, match="is a pure number; wanted is an angle"):
+    with pytest.raises(UnitError, match="is a pure number; expected an angle"):
         to_si("1 dimensionless", "deg")
+
+
+@pytest.mark.parametrize("unit", ["percent", "bit", "count", "ppm", "dB"])
+def test_a_pure_number_is_not_an_angle(unit):
+    with pytest.raises(UnitError, match="expected an angle"):
+        to_si(f"5 {unit}", "deg")
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "unit"), [("0.04 mm", "40 um", "m"), ("2.3 ms", "2300 us", "s"), ("0.07 mm^3", "7e7 um^3", "mm^3")]
+)
+def test_the_same_quantity_is_the_same_number_in_any_unit(one, other, unit):
+    assert to_si(one, unit) == to_si(other, unit)
+
+
+@given(st.text(max_size=30))
+def test_any_text_is_a_quantity_or_refused(text):
+    for given_text in (text, f"1 {text}", f"1 m{text}"):
+        try:
+            assert math.isfinite(to_si(given_text, "mm"))
+        except UnitError as error:
+            assert str(error)
 
 
 @given(st.floats(1e-6, 1e6), st.sampled_from(["mm", "G", "ms", "GPa", "kg/m^3", "deg", "mm^3", "N/m"]))
