@@ -12,7 +12,7 @@ from workflow import __version__
 from workflow.case import available_cores, read_case
 from workflow.cluster.executor import JOBS, ExecutorName, executor_for
 from workflow.environment import prepare
-from workflow.last_word import answer, heed_signals, last_word
+from workflow.last_word import answer, heed_signals, last_word, remember_run_folder
 from workflow.store.folders import read_mark
 from workflow.store.point import Point
 from workflow.store.store import Store, read_case_of_run
@@ -34,7 +34,11 @@ Out = Annotated[
     Path | None, typer.Option("--out", metavar="DIR", help="run folder [default: runs/<case name>, with its scale]")
 ]
 Oversubscribe = Annotated[bool, typer.Option("--oversubscribe", help="allow more MPI ranks than cores")]
-Force = Annotated[bool, typer.Option("--force", help="also where the folder holds another case")]
+Force = Annotated[
+    bool,
+    typer.Option("--force", help="also where the folder holds another case, and with implausible values"),
+]
+Yes = Annotated[bool, typer.Option("--yes", "-y", help="do not ask, also where it takes more than an hour")]
 AtOnce = Annotated[
     int | None,
     typer.Option("-j", "--cores", min=1, help=f"cores to use [default: all]; of a cluster: jobs at a time [{JOBS}]"),
@@ -61,11 +65,17 @@ def new(
 
 
 @app.command()
-def plan(case: CasePath, settings: Settings = None, out: Out = None, oversubscribe: Oversubscribe = False) -> None:
+def plan(
+    case: CasePath,
+    settings: Settings = None,
+    out: Out = None,
+    oversubscribe: Oversubscribe = False,
+    force: Force = False,
+) -> None:
     """Show what a run would do and cost; runs nothing."""
     from workflow.plan import show_plan
 
-    show_plan(*_load(case, settings, out, oversubscribe), console)
+    show_plan(*_load(case, settings, out, oversubscribe, force), console)
 
 
 @app.command()
@@ -79,16 +89,23 @@ def run(
     executor: ExecutorOption = ExecutorName.LOCAL,
     profile: ProfileOption = None,
     force: Force = False,
+    yes: Yes = False,
 ) -> None:
     """Run what is missing, stale or damaged."""
+    from workflow.gate import ask_if_long
+    from workflow.plan import predicted_seconds
     from workflow.run import run_case
     from workflow.store.batch import machine_of
 
-    store, point = _load(case, settings, out, oversubscribe or executor != ExecutorName.LOCAL)
+    store, point = _load(case, settings, out, oversubscribe or executor != ExecutorName.LOCAL, force)
     if until not in point.case.pipeline.names:
         allowed = ", ".join(point.case.pipeline.names)
         raise typer.BadParameter(f"'{until}' is no stage of this case; allowed: {allowed}", param_hint="--until")
     machine = machine_of(executor_for(executor, profile, cores, oversubscribe, [point.case]), one_run=True)
+    if executor == ExecutorName.LOCAL:
+        seconds = predicted_seconds(store, point, until)
+        if not ask_if_long(point.case.run_name, seconds, yes, console):
+            raise typer.Exit(1)
     try:
         healthy = run_case(store, point, until, machine, force=force)
     except KeyboardInterrupt as error:
@@ -131,7 +148,7 @@ def status(case: CasePath, settings: Settings = None, out: Out = None) -> None:
     """Show what a run folder holds: stages done, stale, damaged or missing, their times and main figures."""
     from workflow.status import show_status
 
-    show_status(*_load(case, settings, out, True), console)
+    show_status(*_load(case, settings, out, True, True), console)
 
 
 @app.command()
@@ -141,7 +158,7 @@ def report(case: CasePath, settings: Settings = None, out: Out = None) -> None:
     from workflow.run import report_again
     from workflow.stages import report as stage_function
 
-    store, point = _load(case, settings, out, True)
+    store, point = _load(case, settings, out, True, True)
     if read_mark(store.folder) is None:
         print_error(f"{store.folder} is not a run folder: nothing was run")
         raise typer.Exit(1)
@@ -155,7 +172,7 @@ def verify(case: CasePath, settings: Settings = None, out: Out = None) -> None:
     """Look at every file of a run folder: are all products there, and as they were written?"""
     from workflow.run import verify as verify_run
 
-    raise typer.Exit(0 if verify_run(*_load(case, settings, out, True)) else 1)
+    raise typer.Exit(0 if verify_run(*_load(case, settings, out, True, True)) else 1)
 
 
 @app.command()
@@ -171,7 +188,7 @@ def clean(
     """Remove what the program has written into a case's run folder."""
     from workflow.run import clean as clean_run
 
-    store, point = _load(case, settings, out, True)
+    store, point = _load(case, settings, out, True, True)
     clean_run(store.folder, point.case.case.name, unused=unused, force=force)
 
 
@@ -228,18 +245,24 @@ def study(
     executor: ExecutorOption = ExecutorName.LOCAL,
     profile: ProfileOption = None,
     force: Force = False,
+    yes: Yes = False,
 ) -> None:
     """Run a case at many settings; only what is missing. Results as tables, plots and a page."""
+    from workflow.gate import ask_if_long
     from workflow.store.batch import machine_of
-    from workflow.study.command import read_points_of, run_study, show_outlook
+    from workflow.study.command import predicted_study_seconds, read_points_of, run_study, show_outlook
 
-    points = read_points_of(study, oversubscribe or executor != ExecutorName.LOCAL)
+    points = read_points_of(study, oversubscribe or executor != ExecutorName.LOCAL, force)
     store = Store(out or Path("runs") / points.study.about.name)
     if dry_run:
         show_outlook(points, store)
         return
     cases = [point.case for point in points.possible.values()]
     machine = machine_of(executor_for(executor, profile, cores, oversubscribe, cases))
+    if executor == ExecutorName.LOCAL:
+        seconds = predicted_study_seconds(points, store) / machine.cores
+        if not ask_if_long(f"study {points.study.about.name}", seconds, yes, console):
+            raise typer.Exit(1)
     try:
         healthy = run_study(points, store, machine, force=force)
     except KeyboardInterrupt as error:
@@ -300,6 +323,12 @@ def _options(
     pass
 
 
-def _load(path: Path, settings: list[str] | None, out: Path | None, oversubscribe: bool) -> tuple[Store, Point]:
-    case = read_case(path, settings or [], oversubscribe)
-    return Store(out or Path("runs") / case.run_name, one_run=True), Point({}, case)
+def _load(
+    path: Path, settings: list[str] | None, out: Path | None, lenient: bool, force: bool = False
+) -> tuple[Store, Point]:
+    """Read a case; ``lenient``: it may ask for more than this machine has, since it is not run here and now."""
+    case = read_case(path, settings or [], lenient, force)
+    store = Store(out or Path("runs") / case.run_name, one_run=True)
+    if read_mark(store.folder) is not None:
+        remember_run_folder(store.folder)
+    return store, Point({}, case)

@@ -99,11 +99,11 @@ def machine_memory() -> float:
     return min(limits, default=float("inf"))
 
 
-def ask_if_long(case: Case, seconds: float, yes: bool, console: Console) -> bool:
+def ask_if_long(name: str, seconds: float, yes: bool, console: Console) -> bool:
     """Ask before a run that takes long.
 
     Args:
-        case: what is to be run.
+        name: of what is to be run.
         seconds: its predicted wall time.
         yes: whether the answer is known.
         console: where to ask.
@@ -116,7 +116,7 @@ def ask_if_long(case: Case, seconds: float, yes: bool, console: Console) -> bool
     """
     if yes or seconds <= LONG:
         return True
-    told = f"{case.run_name} is predicted to take about {duration(seconds)}"
+    told = f"{name} is predicted to take about {duration(seconds)}"
     if not (console.is_terminal and sys.stdin is not None and sys.stdin.isatty()):
         raise CaseError("run", [Problem("", f"{told}; start it with --yes")])
     return console.input(f"{told}; run it? \\[y/N] ").strip().lower() in ("y", "yes")

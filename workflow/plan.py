@@ -14,6 +14,7 @@ from workflow.forecast import Forecast, forecast
 from workflow.plan_table import duration, new_table, short
 from workflow.scene_forecast import SceneForecast, forecast_scene
 from workflow.shock_forecast import ShockForecast
+from workflow.stage_forecast import stage_seconds
 from workflow.store.keys import Change
 from workflow.store.point import Point
 from workflow.store.state import Verdict, examine, why_stale
@@ -108,6 +109,17 @@ def reason(verdict: Verdict, case: Case) -> str:
     if verdict.because_of:
         changes.append("follows " + ", ".join(verdict.because_of))
     return "\n".join(changes) or "no product yet"
+
+
+def predicted_seconds(store: Store, point: Point, until: str) -> float:
+    """Predict the wall time [s] of all that has to be made up to a stage, corrected by what accuracy measured here."""
+    from workflow.accuracy.calibration import calibration_of
+
+    known, seconds = calibration_of(point.case), stage_seconds(point.case)
+    verdicts = examine(store, point)
+    stages = [stage.name for stage in point.case.pipeline.upstream(until) if verdicts[stage.name].stale]
+    own = [(name, seconds[name]) for name in stages if name in seconds]
+    return sum(known.seconds(name, foreseen) if known is not None else foreseen for name, foreseen in own)
 
 
 def foreseen_costs(case: Case, seconds: Mapping[str, float]) -> dict[str, str]:

@@ -127,7 +127,8 @@ def _parse_unit(text: str, wanted: str) -> pint.Unit:
     spelled = text
     for written, read in SPELLINGS.items():
         spelled = spelled.replace(written, read)
-    if len(spelled) > LONGEST_UNIT or UNIT.fullmatch(spelled) is None:
+    names = re.findall(r"[^\W\d]\w*", spelled)  # "¼" is a letter to a pattern, and no name
+    if len(spelled) > LONGEST_UNIT or UNIT.fullmatch(spelled) is None or not all(map(str.isidentifier, names)):
         raise UnitError(f'"{text[:LONGEST_UNIT]}" is not a unit; {expected}')
     try:
         parsed = registry().parse_units(re.sub(r"^1?\s*/", "1/", spelled))

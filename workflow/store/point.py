@@ -56,7 +56,7 @@ class PointsError(CaseError):
 
 
 def read_possible_points(
-    case: Path, settings: Sequence[Mapping[str, str]], oversubscribe: bool = False
+    case: Path, settings: Sequence[Mapping[str, str]], oversubscribe: bool = False, force: bool = False
 ) -> tuple[list[Point], dict[int, CaseError]]:
     """Read and check a case with several settings.
 
@@ -64,6 +64,7 @@ def read_possible_points(
         case: TOML file.
         settings: of each point, dotted key -> value, as text for ``--set``.
         oversubscribe: whether more MPI ranks than cores are welcome.
+        force: whether values that are not plausible are welcome.
 
     Returns:
         The points that can be, and what is wrong with the others, by place in the list.
@@ -72,7 +73,7 @@ def read_possible_points(
     impossible: dict[int, CaseError] = {}
     for place, chosen in enumerate(settings):
         try:
-            points.append(Point(chosen, read_case(case, overrides(chosen), oversubscribe)))
+            points.append(Point(chosen, read_case(case, overrides(chosen), oversubscribe, force)))
         except CaseError as error:
             impossible[place] = error
     return points, impossible

@@ -44,15 +44,20 @@ class Points:
     impossible: dict[int, CaseError]
 
 
-def read_points_of(path: Path, oversubscribe: bool = False) -> Points:
+def read_points_of(path: Path, oversubscribe: bool = False, force: bool = False) -> Points:
     """Read a study and all its points.
+
+    Args:
+        path: TOML file.
+        oversubscribe: as `read_case` takes it.
+        force: likewise.
 
     Raises:
         CaseError: the study is wrong, or points of it cannot be and are not to be skipped.
     """
     study = read_study(path)
     settings = study.points
-    points, impossible = read_possible_points(study.case, settings, oversubscribe)
+    points, impossible = read_possible_points(study.case, settings, oversubscribe, force)
     if impossible and not (study.about.skip_impossible and points):
         raise PointsError(str(path), impossible, settings)
     places = [place for place in range(len(settings)) if place not in impossible]
@@ -87,6 +92,12 @@ def show_outlook(points: Points, store: Store) -> None:
     console.print(table)
     if points.impossible:
         console.print(f"{len(points.impossible)} points cannot be and are skipped")
+
+
+def predicted_study_seconds(points: Points, store: Store) -> float:
+    """Predict the wall time [s] of all that is missing of a study, one stage after the other."""
+    every = list(points.possible.values())
+    return sum(own.seconds or 0.0 for own in outlook(every, missing(store, every, LAST)))
 
 
 def run_study(points: Points, store: Store, machine: Machine, *, force: bool = False) -> bool:

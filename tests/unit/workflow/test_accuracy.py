@@ -216,7 +216,8 @@ def test_checks_and_runs_that_failed_are_told(tmp_path, monkeypatch, capsys):
         main()
     said = capsys.readouterr().out
     assert "Checks of the recommended run that do not hold: reflow: volume drift" in said
-    assert f"Runs that failed are not tried again, unless you remove {tmp_path / '.store/work'}." in said.replace("\n", "")
+    place = tmp_path / ".store/work"
+    assert f"Runs that failed are not tried again, unless you remove {place}." in said.replace("\n", "")
 
 
 @pytest.mark.parametrize(("tolerance", "code"), [("0.2%", 0), ("0.0001%", 1)])

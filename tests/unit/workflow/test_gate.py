@@ -121,19 +121,19 @@ class Terminal(io.StringIO):
 
 @pytest.mark.parametrize(("answer", "goes"), [("y\n", True), ("\n", False), ("no\n", False)])
 def test_a_long_run_is_asked_for(monkeypatch, answer, goes):
-    case, console = read_case(SMALL_CASE), Console(file=io.StringIO(), force_terminal=True)
+    console = Console(file=io.StringIO(), force_terminal=True)
     monkeypatch.setattr("sys.stdin", Terminal(answer))
-    assert ask_if_long(case, 7200.0, False, console) is goes
+    assert ask_if_long("small", 7200.0, False, console) is goes
     assert "is predicted to take about" in console.file.getvalue()
 
 
 def test_where_nobody_can_be_asked_a_long_run_needs_yes():
-    case, console = read_case(SMALL_CASE), Console(file=io.StringIO())
+    console = Console(file=io.StringIO())
     with pytest.raises(CaseError, match=r"about 2\.8 h; start it with --yes") as caught:
-        ask_if_long(case, 1e4, False, console)
+        ask_if_long("small", 1e4, False, console)
     assert len(caught.value.lines()) == 1
-    assert ask_if_long(case, 1e4, True, console)
-    assert ask_if_long(case, 60.0, False, console)
+    assert ask_if_long("small", 1e4, True, console)
+    assert ask_if_long("small", 60.0, False, console)
 
 
 TEXT = """\
