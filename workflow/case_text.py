@@ -42,7 +42,7 @@ def write_new_case(name: str, template: str, folder: Path = Path()) -> Path:
         The path of the file.
 
     Raises:
-        CaseError: the name is no name, the template does not exist, or the file does.
+        CaseError: the name is not valid, the template does not exist, or the file does.
     """
     known = templates()
     if template not in known:
