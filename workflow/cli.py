@@ -39,9 +39,16 @@ Force = Annotated[
     typer.Option("--force", help="also where the folder holds another case, and with implausible values"),
 ]
 Yes = Annotated[bool, typer.Option("--yes", "-y", help="do not ask, also where it takes more than an hour")]
+MOST_AT_ONCE = 10_000  # cores, or jobs of a cluster
 AtOnce = Annotated[
     int | None,
-    typer.Option("-j", "--cores", min=1, help=f"cores to use [default: all]; of a cluster: jobs at a time [{JOBS}]"),
+    typer.Option(
+        "-j",
+        "--cores",
+        min=1,
+        max=MOST_AT_ONCE,
+        help=f"cores to use [default: all]; of a cluster: jobs at a time [{JOBS}]",
+    ),
 ]
 ExecutorOption = Annotated[
     ExecutorName, typer.Option("--executor", help="where stages run; slurm: as jobs of a cluster")
@@ -130,11 +137,12 @@ def accuracy(
         Path | None, typer.Option("--out", metavar="DIR", help="folder [default: runs/<case name>-accuracy]")
     ] = None,
     oversubscribe: Oversubscribe = False,
+    force: Force = False,
 ) -> None:
     """Measure what accuracy costs: a ladder of settings, their errors and times; recommend some and run them."""
     from workflow.accuracy.command import read_wish, show
 
-    wish = replace(read_wish(case, settings or [], tolerance, budget), oversubscribe=oversubscribe)
+    wish = replace(read_wish(case, settings or [], tolerance, budget), oversubscribe=oversubscribe, force=force)
     try:
         kept = show(wish, out, console)
     except KeyboardInterrupt as error:
@@ -202,7 +210,9 @@ def stress_test(
         int | None, typer.Option(min=0, metavar="N", help="random cases [default: 200, none beside given CASES]")
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="of the random cases")] = 1,
-    cores: Annotated[int | None, typer.Option("-j", "--cores", min=1, help="cases at a time [default: cores]")] = None,
+    cores: Annotated[
+        int | None, typer.Option("-j", "--cores", min=1, max=MOST_AT_ONCE, help="cases at a time [default: cores]")
+    ] = None,
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="results")] = Path("runs/stress-test"),
 ) -> None:
     """Try the hard cases, and random ones: does each survive within its bounds?"""

@@ -34,6 +34,7 @@ class Climb:
         budget: wall time that may be spent [s]; infinite without a limit.
         longest: that a rung of the ladder may be foreseen to take [s], but for the coarsest ones of the knobs.
         oversubscribe: whether MPI may have more ranks than cores.
+        force: whether values that are not plausible are welcome.
         failed: key of a point -> why it failed, also of earlier calls.
         points: name of rung -> its point.
         impossible: name of rung -> what is wrong with its settings.
@@ -48,6 +49,7 @@ class Climb:
     budget: float = float("inf")
     longest: float = float("inf")
     oversubscribe: bool = False
+    force: bool = False
     failed: dict[str, str] = field(default_factory=dict)
     points: dict[str, Point] = field(default_factory=dict)
     impossible: dict[str, str] = field(default_factory=dict)
@@ -109,7 +111,7 @@ class Climb:
         """Read the cases of rungs; one that cannot be is noted, and one that failed before, as it would again."""
         for rung in rungs:
             points, wrong = read_possible_points(
-                self.case, [dict(self.settings) | dict(rung.settings)], self.oversubscribe
+                self.case, [dict(self.settings) | dict(rung.settings)], self.oversubscribe, self.force
             )
             if wrong:
                 self.impossible[rung.name] = "; ".join(str(problem) for problem in wrong[0].problems)

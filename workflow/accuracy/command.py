@@ -49,6 +49,7 @@ class Wish:
         budget: wall time that all runs together may take [s]; infinite without a limit.
         command: how it was asked for.
         oversubscribe: whether MPI may have more ranks than cores.
+        force: whether values that are not plausible are welcome, and a folder that holds another case.
     """
 
     case: Path
@@ -57,6 +58,7 @@ class Wish:
     budget: float
     command: str
     oversubscribe: bool = False
+    force: bool = False
 
     @property
     def longest(self) -> float:
@@ -102,7 +104,7 @@ def _share(text: str) -> float:
         share = float(number) * (0.01 if percent else 1.0)
     except ValueError:
         share = 0.0
-    if rest or not 0.0 < share < 1.0:
+    if rest or not 0.0 < share < 1.0:  # nan is neither
         message = "is no share of the answer"
         raise CaseError("command line", [Problem("--tolerance", message, text, '"0.0001%" to "99%", e.g. "2%"')])
     return share
@@ -131,9 +133,11 @@ def measure(wish: Wish, folder: Path, compute: Compute, ladder: Ladder | None = 
     Returns:
         What was measured, and how.
     """
-    case = read_case(wish.case, wish.overrides, wish.oversubscribe)
+    case = read_case(wish.case, wish.overrides, wish.oversubscribe, wish.force)
     ladder = ladder or ladder_of(case)
-    climb = Climb(ladder, wish.case, wish.settings, folder, compute, wish.budget, wish.longest, wish.oversubscribe)
+    climb = Climb(
+        ladder, wish.case, wish.settings, folder, compute, wish.budget, wish.longest, wish.oversubscribe, wish.force
+    )
     climb.climb(ladder.rungs)
     measured = climb.measured(ladder.rungs)
     fits = fits_of(ladder, measured)
@@ -165,10 +169,10 @@ def show(wish: Wish, out: Path | None, console: Console) -> bool:
     Returns:
         Whether the recommendation was run and keeps its promise: the tolerance, where there is one.
     """
-    case = read_case(wish.case, wish.overrides, wish.oversubscribe)
+    case = read_case(wish.case, wish.overrides, wish.oversubscribe, wish.force)
     folder = out or default_folder(case)
-    check_folder(folder, WHAT, case.case.name)
-    compute = partial(_compute, oversubscribe=wish.oversubscribe, until=ladder_of(case).until)
+    check_folder(folder, WHAT, case.case.name, wish.force)
+    compute = partial(_compute, wish=wish, until=ladder_of(case).until)
     accuracy, climb = measure(wish, folder, compute)
     tried = (*_left_out(climb), *_impossible(climb), *_failed(climb))
     remarks = (*tried, *unproved(accuracy), *_unhealthy(accuracy, climb), *_own_size(wish, accuracy))
@@ -198,7 +202,7 @@ def _compute(
     points: Sequence[Point],
     *,
     until: str,
-    oversubscribe: bool,
+    wish: Wish,
 ) -> Mapping[str, str]:
     """Compute points one stage at a time, so that measurements do not disturb each other; show how far it is."""
     again = " once more, for their times" if store.folder.name.startswith("again") else ""
@@ -207,8 +211,8 @@ def _compute(
         def count() -> None:
             progress(sum(store.is_complete(point, until) for point in points) / len(points))
 
-        machine = batch.Machine(available_cores(), True, oversubscribe, each_second=count)
-        with locked(store.folder, WHAT, points[0].case.case.name) as lock:
+        machine = batch.Machine(available_cores(), True, wish.oversubscribe, each_second=count)
+        with locked(store.folder, WHAT, points[0].case.case.name, wish.force) as lock:
             return batch.run_points(store, points, until, machine, lock)
 
 
@@ -264,7 +268,7 @@ def _own_size(wish: Wish, accuracy: Accuracy) -> list[str]:
 
 
 def _case(path: Path, settings: Mapping[str, str]) -> Case:
-    return read_case(path, [f"{key}={value}" for key, value in settings.items()], oversubscribe=True)
+    return read_case(path, [f"{key}={value}" for key, value in settings.items()], oversubscribe=True, force=True)
 
 
 def total(known, case: Case) -> float:

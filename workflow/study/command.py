@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 from rich.table import Table
@@ -121,7 +122,8 @@ def run_study(points: Points, store: Store, machine: Machine, *, force: bool = F
         jobs = missing(store, every, LAST)
         if jobs:
             with progress_bar(f"{about.name}: {len(jobs)} products to compute") as bar:
-                watched = replace(machine, each_second=teller(store, every, jobs, bar))
+                told = teller(store, every, jobs, bar, partial(warn_of_metrics, points, store))
+                watched = replace(machine, each_second=told)
                 failed = run_points(store, every, LAST, watched, lock)
         else:
             console.print(f"nothing to compute: {store.folder} has all {len(every)} points")
@@ -145,6 +147,17 @@ def results(points: Points, store: Store, failed: dict[str, str]) -> list[Row]:
         for place, error in points.impossible.items()
     ]
     return sorted(rows, key=lambda row: row.number)
+
+
+def warn_of_metrics(points: Points, store: Store, first: Point) -> None:
+    """Say early which metrics of a study the first point that is complete does not have."""
+    row = row_of(1, store, first, points.study.design.keys, None)
+    known = [name for name, metric in row.metrics.items() if is_number(metric["value"])]
+    for name in points.study.metrics:
+        if name not in known:
+            hint = nearest(name, sorted(known))
+            told = f"; did you mean {hint}?" if hint else ""
+            print_error(f"the first point has no number {name}{told} Ctrl-C stops the study and keeps what is finished")
 
 
 def has_metrics(study: Study, rows: Sequence[Row]) -> bool:

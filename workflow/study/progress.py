@@ -11,13 +11,27 @@ from workflow.store.store import Store
 from workflow.terminal import console
 
 
-def teller(store: Store, points: Sequence[Point], jobs: Sequence[Job], bar: ProgressBar) -> Callable[[], None]:
+def teller(
+    store: Store,
+    points: Sequence[Point],
+    jobs: Sequence[Job],
+    bar: ProgressBar,
+    at_first: Callable[[Point], None] = lambda _: None,
+) -> Callable[[], None]:
     """Return what tells a progress bar, when called, how far a study is; without a terminal a line for each point.
 
     Time left: each missing product takes as long as the mean of those of its stage that were made since the start, and
     as many are made at a time as so far.
+
+    Args:
+        store: where products are made.
+        points: all of them.
+        jobs: the products that are missing.
+        bar: the progress bar.
+        at_first: called with the first point that is complete, once.
     """
     begin = time.monotonic()
+    first = [at_first]
     waiting, seconds, told = list(jobs), dict[str, list[float]](), [""]
 
     def tell() -> None:
@@ -29,6 +43,8 @@ def teller(store: Store, points: Sequence[Point], jobs: Sequence[Job], bar: Prog
         failed = sum(
             any(store.message(point, stage) for stage in point.digests) for point in points if point not in done
         )
+        if done and first:
+            first.pop()(done[0])
         left = seconds_left([job.stage for job in waiting], seconds, time.monotonic() - begin)
         words = f"{len(done)} of {len(points)} points done, {failed} failed"
         line = words if left is None else f"{words}, about {duration(left)} left"

@@ -15,6 +15,7 @@ from workflow.launch import LaunchError
 from workflow.problems import CaseError, Problem
 from workflow.store.folders import RunFolderBusy
 
+
 @pytest.fixture(autouse=True)
 def no_run_before(monkeypatch):
     """Commands that other tests have called in this process are forgotten."""

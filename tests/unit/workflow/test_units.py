@@ -67,6 +67,7 @@ def test_quantities_become_si(text, unit, value):
         ("1e400 mm", "is not finite"),
         ("1e308 Gm", "is not finite"),
         pytest.param(10**5000, "needs a unit", id="thousands of digits"),
+        ("1 ¼", "is not a unit"),
         ("1 mm*deg", "has the pure number degree in it"),
     ],
 )
