@@ -151,6 +151,7 @@ def results(points: Points, store: Store, failed: dict[str, str]) -> list[Row]:
 
 def warn_of_metrics(points: Points, store: Store, first: Point) -> None:
     """Say early which metrics of a study the first point that is complete does not have."""
+    show_products(store, first)
     row = row_of(1, store, first, points.study.design.keys, None)
     known = [name for name, metric in row.metrics.items() if is_number(metric["value"])]
     for name in points.study.metrics:
