@@ -15,7 +15,7 @@ from workflow.stage_table import Stage
 from workflow.store.keys import compare, stage_inputs
 from workflow.store.product import publish, seal
 from workflow.store.store import MESSAGE, TRACEBACK, reads
-from workflow.terminal import health_line
+from workflow.terminal import console, health_line
 
 AnyCase = TypeVar("AnyCase", bound=Case)
 
@@ -139,21 +139,21 @@ def execute(name: str, function: StageFunction, run: Run, product: Path) -> bool
     except Exception as error:  # the boundary of a stage: whatever went wrong is told with the stage's name
         if is_interrupt(error):
             raise KeyboardInterrupt from error
-        _write_message(run.folder / f".{name}.partial", error)
+        _write_message(name, run.folder / f".{name}.partial", error)
         return False
     health_line(name, record["seconds"], record["health"], record["continued"])
     return True
 
 
-def _write_message(folder: Path, error: Exception) -> None:
-    """Leave traceback and message for the command, which tells the user; on standard error where they cannot be."""
+def _write_message(name: str, folder: Path, error: Exception) -> None:
+    """Leave traceback and message for the command, which tells the user; say it at once where they cannot be."""
     told = in_words(error, folder)
     try:
         folder.mkdir(parents=True, exist_ok=True)
         (folder / TRACEBACK).write_text(traceback.format_exc(), encoding="utf-8")
         (folder / MESSAGE).write_text(told, encoding="utf-8")
     except OSError:
-        traceback.print_exc()
+        console.print(f"stage {name} failed: {told}", soft_wrap=True)
 
 
 def _remove(folder: Path) -> None:
