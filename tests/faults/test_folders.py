@@ -20,7 +20,7 @@ def test_a_folder_of_any_name_will_do(tmp_path):
     assert (folder / "report.html").is_file()
     assert [path.name for path in tmp_path.iterdir()] == [
         ODD.partition("/")[0]
-    ]  # nothing else, as by a command in its name
+    ]
     for command in ("status", "verify", "plan", "report", "clean"):
         result = run_drop(folder, command, cwd=tmp_path)
         assert result.returncode == 0, command + result.stdout + result.stderr
