@@ -9,7 +9,8 @@ from pathlib import Path
 DROP = Path(__file__).resolve().parents[2] / "cases/sessile_drop/case.toml"
 SMALL_DROP = ("--set", "drop.particles_per_edge=5")
 SEED = int(os.environ.get("REFLOWSHOCK_SEED", "15"))  # of whatever is random; pytest shows it in the names of tests
-TIMES = ("seconds", "per_second", "memory", "wall", "setup", "time_ratio", "core_ratio")  # of metrics no two runs share
+# In the names of metrics that no two runs share.
+TIMES = ("seconds", "per_second", "memory", "wall", "setup", "time_ratio", "core_ratio", "overhead", "busy_share")
 
 
 def run_drop(folder: Path, command: str = "run", *options: str, **more: object) -> subprocess.CompletedProcess:
