@@ -25,7 +25,7 @@ class Force(Protocol):
         """Energy [J]."""
 
     def force(self, body: Body) -> Floats:
-        """Force -dE/dx, `(n, 3)` [N]; gravity's to second order in the spacing."""
+        """Force -dE/dx, `(n, 3)` [N]: the gradient of this very energy, so that a step along it lowers it."""
 
 
 class Operator(Protocol):
