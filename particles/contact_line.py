@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 from particles.body import Body
 from particles.cloud import equal_area_radius
 from particles.plate import Pad
-from particles.surface_measure import ring_area_gradient
 from particles.symmetry import share, unit, whole_points
 
 Floats = NDArray[np.float64]
@@ -61,6 +60,11 @@ class ContactLine:
         """Whether there is a mask to leave a pad for; a uniform wall has none."""
         return bool(np.isfinite(self.edges).all())
 
+    @property
+    def has_energy(self) -> bool:
+        """Whether the force on the line is the gradient of an energy, `cosine_area`."""
+        return True
+
     def held_pads(self) -> frozenset[int]:
         """The pads that the line is on or at the edge of."""
         return frozenset(self.pad[self.state != ON_MASK].tolist())
@@ -82,16 +86,27 @@ class ContactLine:
         total = self._mask_cosine * (_sectors(local).sum() - 0.5 * self._square @ turns)
         own = local - self._centres[pad]
         beyond = _sectors(own) - 0.5 * self._square[pad] * _turns(own)
+        return float(total + self._beyond_mask(index) @ beyond) / body.cloud.parts
+
+    def cosine_area_gradient(self, body: Body) -> Floats:
+        """Gradient of `cosine_area` by the vertices of the line, `(k, 3)` [m]."""
+        ring, plate = body.cloud.rings[self.wall], body.plates[self.wall]
+        points, index = whole_points(body.cloud, body.points, self.wall)
+        local, pad = plate.local(points)[:, :2], self.pad[index]
+        own, weight = local - self._centres[pad], self._beyond_mask(index)
+        level = self._mask_cosine * _sectors_gradient(local, np.ones(len(local)))
+        level += _sectors_gradient(own, weight)
+        if self.has_edge:  # the angles about the pads that are surrounded add up to whole turns
+            level -= 0.5 * _turns_gradient(own, self._square[pad] * weight)
+        whole = level @ plate.frame[:2]
+        return whole[: len(ring)] * share(body.cloud)[ring][:, None]
+
+    def _beyond_mask(self, index: Indices) -> Floats:
+        """Mean cosine of the free ends of each segment, less that of the mask; 0 from one pad to another, `(k,)`."""
         cosine, free = self.cosine()[index], (self.state[index] != PINNED).astype(float)
         mean = (cosine + np.roll(cosine, -1)) / np.maximum(1.0, free + np.roll(free, -1))
-        same = pad == np.roll(pad, -1)
-        return float(total + ((mean - self._mask_cosine) * beyond)[same].sum()) / body.cloud.parts
-
-    def area_gradient(self, body: Body) -> Floats:
-        """Gradient of the wetted area by the vertices of the line, `(k, 3)` [m]."""
-        ring, (points, index) = body.cloud.rings[self.wall], whole_points(body.cloud, body.points, self.wall)
-        whole = ring_area_gradient(points, np.arange(len(index), dtype=np.int32))
-        return whole[: len(ring)] * share(body.cloud)[ring][:, None]
+        pad = self.pad[index]
+        return np.where(pad == np.roll(pad, -1), mean - self._mask_cosine, 0.0)
 
     def pinned(self, body: Body) -> Indices:
         """The pinned vertices."""
@@ -136,17 +151,39 @@ class ContactLine:
         near = np.abs(radius - edge) < CATCH_DISTANCE * body.cloud.spacing
         # With a margin as for the release: a line at rest just off the edge has the angle of its side.
         holds = near & (cosine < pad_cosine - RELEASE_MARGIN) & (cosine > self._mask_cosine + RELEASE_MARGIN)
-        # Behind the line is the pad that the liquid covers; one before it is stepped onto, not caught at.
-        behind = (offset * (self.outward(body)[0] @ plate.frame.T)[:, :2]).sum(axis=1) > 0.0
+        behind = self._behind(body, offset)
         on_pad, on_mask, held = (self.state == which for which in (ON_PAD, ON_MASK, PINNED))
         caught = behind & ((on_pad & (holds | (radius >= edge))) | (on_mask & (holds | (radius <= edge))))
         self.state[on_mask & ~behind & (radius < edge)] = ON_PAD
         self.state[on_pad & ~behind & (radius > edge)] = ON_MASK
         self.state[held & (cosine > pad_cosine + RELEASE_MARGIN)] = ON_PAD
         self.state[held & (cosine < self._mask_cosine - RELEASE_MARGIN)] = ON_MASK
+        self._catch(body, local, caught)
+
+    def stop_at_edges(self, body: Body) -> None:
+        """Catch the vertices that a step has taken across the edge of their pad (moves these): beyond it, the angle
+        that drove them acts no more, and the energy that they gained there is none.
+        """
+        if not self.has_edge:
+            return
+        local = body.plates[self.wall].local(body.points[body.cloud.rings[self.wall]])
+        offset, radius = self._offset(local)
+        edge = self.edges[self.pad]
+        crossed = ((self.state == ON_PAD) & (radius > edge)) | ((self.state == ON_MASK) & (radius < edge))
+        if crossed.any():
+            self._catch(body, local, crossed & self._behind(body, offset))
+
+    def _behind(self, body: Body, offset: Floats) -> NDArray[np.bool_]:
+        """Whether the pad is behind the line, where the liquid is; one before it is stepped onto, not caught at."""
+        outward, _ = self.outward(body)
+        return (offset * (outward @ body.plates[self.wall].frame.T)[:, :2]).sum(axis=1) > 0.0
+
+    def _catch(self, body: Body, local: Floats, caught: NDArray[np.bool_]) -> None:
+        """Put vertices onto the edge of their pad and hold them there; `local (k, 3)` is where they are [m]."""
+        offset, radius = self._offset(local)
         self.state[caught] = PINNED
-        local[caught, :2] += (edge[caught] / radius[caught] - 1.0)[:, None] * offset[caught]
-        body.points[ring[caught]] = plate.place(local[caught])
+        local[caught, :2] += (self.edges[self.pad][caught] / radius[caught] - 1.0)[:, None] * offset[caught]
+        body.points[body.cloud.rings[self.wall][caught]] = body.plates[self.wall].place(local[caught])
 
     def _nearest(self, local: Floats) -> Indices:
         """The pad whose edge is nearest to each vertex, or that it is deepest inside of, `(k,)`."""
@@ -163,6 +200,20 @@ def _sectors(local: Floats) -> Floats:
     """Areas of the triangles between the origin and each segment of a closed line, `(k,)` [m^2]; `local (k, 2)`."""
     x, y = local.T
     return 0.5 * (x * np.roll(y, -1) - y * np.roll(x, -1))
+
+
+def _sectors_gradient(local: Floats, weight: Floats) -> Floats:
+    """Gradient of the sum of `_sectors` times weights `(k,)`, `(k, 2)` [m]."""
+    after, before = np.roll(local, -1, axis=0), np.roll(local, 1, axis=0)
+    ahead, behind = weight[:, None], np.roll(weight, 1)[:, None]
+    across = ahead * after - behind * before
+    return 0.5 * np.column_stack((across[:, 1], -across[:, 0]))
+
+
+def _turns_gradient(local: Floats, weight: Floats) -> Floats:
+    """Gradient of the sum of `_turns` times weights `(k,)`, `(k, 2)` [1/m]."""
+    around = np.column_stack((-local[:, 1], local[:, 0])) / (local**2).sum(axis=1)[:, None]
+    return (np.roll(weight, 1) - weight)[:, None] * around
 
 
 def _turns(local: Floats) -> Floats:

@@ -33,11 +33,11 @@ class Wetting:
         return -self.coefficient * sum(line.cosine_area(body) for line in self.lines)
 
     def force(self, body: Body) -> Floats:
-        """Force gamma cos(theta) dA_wet/dx on the contact lines, `(n, 3)` [N]."""
+        """Force -dE/dx on the contact lines, gamma cos(theta) dA_wet/dx where one angle acts, `(n, 3)` [N]."""
         force = np.zeros_like(body.points)
         for line in self.lines:
             ring = body.cloud.rings[line.wall]
-            force[ring] += self.coefficient * line.cosine()[:, None] * line.area_gradient(body)
+            force[ring] += self.coefficient * line.cosine_area_gradient(body)
         return force
 
     def contact_cosines(self, body: Body) -> list[Floats]:
