@@ -9,6 +9,7 @@ from particles.body import Body
 from particles.cloud import equal_area_radius
 from particles.plate import Pad
 from particles.symmetry import share, unit, whole_points
+from particles.wetted_area import Around, enclosed_gradient, sectors, turns
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int32]
@@ -77,36 +78,38 @@ class ContactLine:
     def cosine_area(self, body: Body) -> float:
         """Integral of cos(theta) over the wetted area [m^2], zero for a line along the edges of the pads it surrounds.
 
-        Continuous where a vertex leaves an edge, since the area next to a pinned vertex belongs to the free one. On
-        a uniform wall it is the whole wetted area.
+        Continuous where an edge catches or releases a vertex. On a uniform wall it is that of the whole wetted area.
         """
-        points, index = whole_points(body.cloud, body.points, self.wall)
-        local, pad = body.plates[self.wall].local(points)[:, :2], self.pad[index]
-        turns = np.array([_turns(local - centre).sum() for centre in self._centres])
-        total = self._mask_cosine * (_sectors(local).sum() - 0.5 * self._square @ turns)
-        own = local - self._centres[pad]
-        beyond = _sectors(own) - 0.5 * self._square[pad] * _turns(own)
-        return float(total + self._beyond_mask(index) @ beyond) / body.cloud.parts
+        return self._cosine_area(body)[0] / body.cloud.parts
 
     def cosine_area_gradient(self, body: Body) -> Floats:
         """Gradient of `cosine_area` by the vertices of the line, `(k, 3)` [m]."""
-        ring, plate = body.cloud.rings[self.wall], body.plates[self.wall]
-        points, index = whole_points(body.cloud, body.points, self.wall)
-        local, pad = plate.local(points)[:, :2], self.pad[index]
-        own, weight = local - self._centres[pad], self._beyond_mask(index)
-        level = self._mask_cosine * _sectors_gradient(local, np.ones(len(local)))
-        level += _sectors_gradient(own, weight)
-        if self.has_edge:  # the angles about the pads that are surrounded add up to whole turns
-            level -= 0.5 * _turns_gradient(own, self._square[pad] * weight)
-        whole = level @ plate.frame[:2]
+        ring, whole = body.cloud.rings[self.wall], self._cosine_area(body)[1] @ body.plates[self.wall].frame[:2]
         return whole[: len(ring)] * share(body.cloud)[ring][:, None]
 
-    def _beyond_mask(self, index: Indices) -> Floats:
-        """Mean cosine of the free ends of each segment, less that of the mask; 0 from one pad to another, `(k,)`."""
-        cosine, free = self.cosine()[index], (self.state[index] != PINNED).astype(float)
-        mean = (cosine + np.roll(cosine, -1)) / np.maximum(1.0, free + np.roll(free, -1))
-        pad = self.pad[index]
-        return np.where(pad == np.roll(pad, -1), mean - self._mask_cosine, 0.0)
+    def _cosine_area(self, body: Body) -> tuple[float, Floats]:
+        """Integral for the line around the whole body [m^2], and its gradient in the plate's frame `(m, 2)` [m]."""
+        points, index = whole_points(body.cloud, body.points, self.wall)
+        local = body.plates[self.wall].local(points)[:, :2]
+        area, gradient = sectors(local), enclosed_gradient(local)
+        if not self.has_edge:
+            return float(self._pad_cosine[0] * area.sum()), float(self._pad_cosine[0]) * gradient
+        for square, centre in zip(self._square, self._centres, strict=True):
+            area -= 0.5 * square * turns(local - centre)
+        beyond, change = self._around(local, index).beyond()
+        return float(self._mask_cosine * area.sum()) + beyond, self._mask_cosine * gradient + change
+
+    def _around(self, local: Floats, index: Indices) -> Around:
+        """The line around the whole body as the pads see it; `local (m, 2)` [m], `index (m,)` vertices of the part."""
+        pad, free = self.pad[index], self.state[index] != PINNED
+        return Around(
+            local=local - self._centres[pad],
+            same=pad == np.roll(pad, -1),
+            edge=self.edges[pad],
+            square=self._square[pad],
+            weight=np.where(free, self.cosine()[index] - self._mask_cosine, 0.0),
+            step=self._pad_cosine[pad] - self._mask_cosine,
+        )
 
     def pinned(self, body: Body) -> Indices:
         """The pinned vertices."""
@@ -138,52 +141,65 @@ class ContactLine:
         return (0.5 * around + 0.25 * (np.roll(around, 1) + np.roll(around, -1)))[: len(cosine)]
 
     def update(self, body: Body, load: Floats, coefficient: float) -> None:
-        """Release the vertices that their edge no longer holds, catch those that returned to one (moves these).
+        """Release the vertices that their edge no longer holds, catch those that crossed one or step onto a pad.
 
         Args: as `contact_cosine`.
         """
         ring, plate = body.cloud.rings[self.wall], body.plates[self.wall]
-        cosine = self.contact_cosine(body, load, coefficient)
-        local = plate.local(body.points[ring])
+        cosine, local = self.contact_cosine(body, load, coefficient), plate.local(body.points[ring])
         self.pad = np.where(self.state == ON_MASK, self._nearest(local), self.pad)
         offset, radius = self._offset(local)
         edge, pad_cosine = self.edges[self.pad], self._pad_cosine[self.pad]
-        near = np.abs(radius - edge) < CATCH_DISTANCE * body.cloud.spacing
-        # With a margin as for the release: a line at rest just off the edge has the angle of its side.
-        holds = near & (cosine < pad_cosine - RELEASE_MARGIN) & (cosine > self._mask_cosine + RELEASE_MARGIN)
-        behind = self._behind(body, offset)
+        # Behind the line is the pad that the liquid covers; one before it is stepped onto, not caught at.
+        before = ~self._behind(body, offset)
         on_pad, on_mask, held = (self.state == which for which in (ON_PAD, ON_MASK, PINNED))
-        caught = behind & ((on_pad & (holds | (radius >= edge))) | (on_mask & (holds | (radius <= edge))))
-        self.state[on_mask & ~behind & (radius < edge)] = ON_PAD
-        self.state[on_pad & ~behind & (radius > edge)] = ON_MASK
+        self.stop_at_edges(body)
+        self.state[on_mask & before & (radius < edge)] = ON_PAD
+        self.state[on_pad & before & (radius > edge)] = ON_MASK
         self.state[held & (cosine > pad_cosine + RELEASE_MARGIN)] = ON_PAD
         self.state[held & (cosine < self._mask_cosine - RELEASE_MARGIN)] = ON_MASK
-        self._catch(body, local, caught)
+
+    def near_edges(self, body: Body, load: Floats, coefficient: float) -> NDArray[np.bool_]:
+        """Whether a vertex is close to an edge that would hold it `(k,)`; arguments as `contact_cosine`."""
+        nothing = np.zeros(len(self.state), bool)
+        if not self.has_edge:
+            return nothing
+        offset, radius = self._offset(body.plates[self.wall].local(body.points[body.cloud.rings[self.wall]]))
+        near = (self.state != PINNED) & (np.abs(radius - self.edges[self.pad]) < CATCH_DISTANCE * body.cloud.spacing)
+        if not near.any():
+            return nothing
+        cosine = self.contact_cosine(body, load, coefficient)
+        # With a margin as for the release: a line at rest just off the edge has the angle of its side.
+        low, high = self._mask_cosine + RELEASE_MARGIN, self._pad_cosine[self.pad] - RELEASE_MARGIN
+        return near & (low < cosine) & (cosine < high) & self._behind(body, offset)
 
     def stop_at_edges(self, body: Body) -> None:
-        """Catch the vertices that a step has taken across the edge of their pad (moves these): beyond it, the angle
-        that drove them acts no more, and the energy that they gained there is none.
+        """Catch the vertices that have crossed the edge of their pad (moves these).
+
+        Beyond it the angle that drove them acts no more, and the energy that they gained there is none.
         """
         if not self.has_edge:
             return
-        local = body.plates[self.wall].local(body.points[body.cloud.rings[self.wall]])
-        offset, radius = self._offset(local)
+        offset, radius = self._offset(body.plates[self.wall].local(body.points[body.cloud.rings[self.wall]]))
         edge = self.edges[self.pad]
-        crossed = ((self.state == ON_PAD) & (radius > edge)) | ((self.state == ON_MASK) & (radius < edge))
+        crossed = ((self.state == ON_PAD) & (radius >= edge)) | ((self.state == ON_MASK) & (radius <= edge))
         if crossed.any():
-            self._catch(body, local, crossed & self._behind(body, offset))
+            self.catch(body, crossed & self._behind(body, offset))
+
+    def catch(self, body: Body, caught: NDArray[np.bool_]) -> None:
+        """Put vertices `(k,)` onto the edge of their pad, which holds them."""
+        plate, ring = body.plates[self.wall], body.cloud.rings[self.wall][caught]
+        local = plate.local(body.points[ring])
+        centre = self._centres[self.pad[caught]]
+        offset = local[:, :2] - centre
+        local[:, :2] = centre + (self.edges[self.pad[caught]] / np.linalg.norm(offset, axis=1))[:, None] * offset
+        body.points[ring] = plate.place(local)
+        self.state[caught] = PINNED
 
     def _behind(self, body: Body, offset: Floats) -> NDArray[np.bool_]:
-        """Whether the pad is behind the line, where the liquid is; one before it is stepped onto, not caught at."""
+        """Whether the pad is behind the line, where the liquid is, of vertices at offsets `(k, 2)` from its centre."""
         outward, _ = self.outward(body)
         return (offset * (outward @ body.plates[self.wall].frame.T)[:, :2]).sum(axis=1) > 0.0
-
-    def _catch(self, body: Body, local: Floats, caught: NDArray[np.bool_]) -> None:
-        """Put vertices onto the edge of their pad and hold them there; `local (k, 3)` is where they are [m]."""
-        offset, radius = self._offset(local)
-        self.state[caught] = PINNED
-        local[caught, :2] += (self.edges[self.pad][caught] / radius[caught] - 1.0)[:, None] * offset[caught]
-        body.points[body.cloud.rings[self.wall][caught]] = body.plates[self.wall].place(local[caught])
 
     def _nearest(self, local: Floats) -> Indices:
         """The pad whose edge is nearest to each vertex, or that it is deepest inside of, `(k,)`."""
@@ -194,29 +210,3 @@ class ContactLine:
         """Offset of each vertex from the centre of its pad `(k, 2)`, and its length `(k,)` [m]."""
         offset = local[:, :2] - self._centres[self.pad]
         return offset, np.linalg.norm(offset, axis=1)
-
-
-def _sectors(local: Floats) -> Floats:
-    """Areas of the triangles between the origin and each segment of a closed line, `(k,)` [m^2]; `local (k, 2)`."""
-    x, y = local.T
-    return 0.5 * (x * np.roll(y, -1) - y * np.roll(x, -1))
-
-
-def _sectors_gradient(local: Floats, weight: Floats) -> Floats:
-    """Gradient of the sum of `_sectors` times weights `(k,)`, `(k, 2)` [m]."""
-    after, before = np.roll(local, -1, axis=0), np.roll(local, 1, axis=0)
-    ahead, behind = weight[:, None], np.roll(weight, 1)[:, None]
-    across = ahead * after - behind * before
-    return 0.5 * np.column_stack((across[:, 1], -across[:, 0]))
-
-
-def _turns_gradient(local: Floats, weight: Floats) -> Floats:
-    """Gradient of the sum of `_turns` times weights `(k,)`, `(k, 2)` [1/m]."""
-    around = np.column_stack((-local[:, 1], local[:, 0])) / (local**2).sum(axis=1)[:, None]
-    return (np.roll(weight, 1) - weight)[:, None] * around
-
-
-def _turns(local: Floats) -> Floats:
-    """Angles about the origin under which each segment of a closed line is seen, `(k,)` [rad]; `local (k, 2)`."""
-    after = np.roll(local, -1, axis=0)
-    return np.arctan2(2.0 * _sectors(local), (local * after).sum(axis=1))

@@ -42,17 +42,31 @@ class Wetting:
 
     def contact_cosines(self, body: Body) -> list[Floats]:
         """Cosines of the contact angles at the vertices of each contact line, from the balance of forces."""
-        load = self._load(body)
+        load, _ = self._load(body)
         return [line.contact_cosine(body, load, self.coefficient) for line in self.lines]
 
     def update(self, body: Body) -> None:
         """Release and catch vertices at the edges of the wetted discs."""
-        load = self._load(body)
+        load, pressure = self._load(body)
         for line in self.lines:
             line.update(body, load, self.coefficient)
+            near = line.near_edges(body, load, self.coefficient)
+            if near.any():
+                self._catch(body, line, near, pressure)
 
-    def _load(self, body: Body) -> Floats:
-        """All forces but the walls', `(n, 3)` [N], with the mean capillary pressure of the surface.
+    def _catch(self, body: Body, line: ContactLine, near: NDArray[np.bool_], pressure: float) -> None:
+        """Put vertices `(k,)` of a line onto the edge next to them, unless that raises the energy at equal volume."""
+
+        def level() -> float:
+            return self.energy(body) + sum(other.energy(body) for other in self.others) - pressure * body.volume()[0]
+
+        points, state, before = body.points.copy(), line.state.copy(), level()
+        line.catch(body, near)
+        if level() > before:
+            body.points, line.state = points, state
+
+    def _load(self, body: Body) -> tuple[Floats, float]:
+        """All forces but the walls', `(n, 3)` [N], with the mean capillary pressure of the surface, and this [Pa].
 
         The pressure p is the least-squares solution of f + p a = 0 over the vertices off the contact lines; the
         pressure of the solve would bring the accelerations of a violent start into the contact angle.
@@ -63,4 +77,4 @@ class Wetting:
         off_lines[body.cloud.wall >= 0] = False
         a = gradient[off_lines]
         pressure = -float((force[off_lines] * a).sum() / (a**2).sum())
-        return force + pressure * gradient
+        return force + pressure * gradient, pressure
