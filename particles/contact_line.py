@@ -99,7 +99,7 @@ class ContactLine:
         beyond, change = self._around(local, index).beyond()
         return float(self._mask_cosine * area.sum()) + beyond, self._mask_cosine * gradient + change
 
-    def _around(self, local: Floats, index: Indices) -> Around:
+    def _around(self, local: Floats, index: NDArray[np.int64]) -> Around:
         """The line around the whole body as the pads see it; `local (m, 2)` [m], `index (m,)` vertices of the part."""
         pad, free = self.pad[index], self.state[index] != PINNED
         return Around(
