@@ -9,7 +9,6 @@ from particles.body import Body
 from particles.cloud import equal_area_radius
 from particles.plate import Pad
 from particles.symmetry import share, unit, whole_points
-from particles.wetted_area import Around, enclosed_gradient, sectors, turns
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int32]
@@ -32,6 +31,7 @@ class ContactLine:
         edges: `(m,)` radii of the vertices on the edge of each pad [m].
         pad: `(k,)` the pad whose edge is nearest to each vertex.
         state: `(k,)` PINNED, ON_PAD or ON_MASK.
+        constant: what the formula of `cosine_area` has jumped by where states changed [m^2].
     """
 
     def __init__(self, wall: int, pads: Sequence[Pad], mask_angle: float, local: Floats, corners: Floats) -> None:
@@ -50,6 +50,7 @@ class ContactLine:
         self.edges = equal_area_radius(radii, corners)
         self._square = np.where(np.isfinite(radii), radii, 0.0) ** 2
         self._pad_cosine, self._mask_cosine = np.cos([pad.angle for pad in pads]), float(np.cos(mask_angle))
+        self.constant = 0.0
         self.pad = self._nearest(local)
         distance = self._offset(local)[1]
         edge = self.edges[self.pad]
@@ -78,38 +79,42 @@ class ContactLine:
     def cosine_area(self, body: Body) -> float:
         """Integral of cos(theta) over the wetted area [m^2], zero for a line along the edges of the pads it surrounds.
 
-        Continuous where an edge catches or releases a vertex. On a uniform wall it is that of the whole wetted area.
+        On a uniform wall it is that of the whole wetted area. Where a vertex leaves an edge or is caught by one it does
+        not change: nothing has moved.
         """
-        return self._cosine_area(body)[0] / body.cloud.parts
+        return (self._level(body) + self.constant) / body.cloud.parts
 
     def cosine_area_gradient(self, body: Body) -> Floats:
         """Gradient of `cosine_area` by the vertices of the line, `(k, 3)` [m]."""
-        ring, whole = body.cloud.rings[self.wall], self._cosine_area(body)[1] @ body.plates[self.wall].frame[:2]
-        return whole[: len(ring)] * share(body.cloud)[ring][:, None]
-
-    def _cosine_area(self, body: Body) -> tuple[float, Floats]:
-        """Integral for the line around the whole body [m^2], and its gradient in the plate's frame `(m, 2)` [m]."""
+        ring, plate = body.cloud.rings[self.wall], body.plates[self.wall]
         points, index = whole_points(body.cloud, body.points, self.wall)
-        local = body.plates[self.wall].local(points)[:, :2]
-        area, gradient = sectors(local), enclosed_gradient(local)
-        if not self.has_edge:
-            return float(self._pad_cosine[0] * area.sum()), float(self._pad_cosine[0]) * gradient
-        for square, centre in zip(self._square, self._centres, strict=True):
-            area -= 0.5 * square * turns(local - centre)
-        beyond, change = self._around(local, index).beyond()
-        return float(self._mask_cosine * area.sum()) + beyond, self._mask_cosine * gradient + change
+        local, pad = plate.local(points)[:, :2], self.pad[index]
+        own, weight = local - self._centres[pad], self._beyond_mask(index)
+        level = self._mask_cosine * _sectors_gradient(local, np.ones(len(local))) + _sectors_gradient(own, weight)
+        if self.has_edge:  # the angles about the pads that are surrounded add up to whole turns
+            level -= 0.5 * _turns_gradient(own, self._square[pad] * weight)
+        return (level @ plate.frame[:2])[: len(ring)] * share(body.cloud)[ring][:, None]
 
-    def _around(self, local: Floats, index: NDArray[np.int64]) -> Around:
-        """The line around the whole body as the pads see it; `local (m, 2)` [m], `index (m,)` vertices of the part."""
-        pad, free = self.pad[index], self.state[index] != PINNED
-        return Around(
-            local=local - self._centres[pad],
-            same=pad == np.roll(pad, -1),
-            edge=self.edges[pad],
-            square=self._square[pad],
-            weight=np.where(free, self.cosine()[index] - self._mask_cosine, 0.0),
-            step=self._pad_cosine[pad] - self._mask_cosine,
-        )
+    def _level(self, body: Body) -> float:
+        """The integral for the line around the whole body [m^2], but for a constant.
+
+        An area next to a pinned vertex belongs to the free one. A segment between pinned vertices has no cosine: where
+        they are not evenly spaced, it has not the area of its part of the edge, and this jumps as one of them leaves.
+        """
+        points, index = whole_points(body.cloud, body.points, self.wall)
+        local, pad = body.plates[self.wall].local(points)[:, :2], self.pad[index]
+        turns = np.array([_turns(local - centre).sum() for centre in self._centres])
+        total = self._mask_cosine * (_sectors(local).sum() - 0.5 * self._square @ turns)
+        own = local - self._centres[pad]
+        beyond = _sectors(own) - 0.5 * self._square[pad] * _turns(own)
+        return float(total + self._beyond_mask(index) @ beyond)
+
+    def _beyond_mask(self, index: NDArray[np.int64]) -> Floats:
+        """Mean cosine of the free ends of each segment, less that of the mask; 0 from one pad to another, `(k,)`."""
+        cosine, free = self.cosine()[index], (self.state[index] != PINNED).astype(float)
+        mean = (cosine + np.roll(cosine, -1)) / np.maximum(1.0, free + np.roll(free, -1))
+        pad = self.pad[index]
+        return np.where(pad == np.roll(pad, -1), mean - self._mask_cosine, 0.0)
 
     def pinned(self, body: Body) -> Indices:
         """The pinned vertices."""
@@ -147,17 +152,20 @@ class ContactLine:
         """
         ring, plate = body.cloud.rings[self.wall], body.plates[self.wall]
         cosine, local = self.contact_cosine(body, load, coefficient), plate.local(body.points[ring])
-        self.pad = np.where(self.state == ON_MASK, self._nearest(local), self.pad)
+        state, pad = self.state.copy(), np.where(self.state == ON_MASK, self._nearest(local), self.pad)
+        self._change(body, state, pad)
         offset, radius = self._offset(local)
-        edge, pad_cosine = self.edges[self.pad], self._pad_cosine[self.pad]
+        edge, pad_cosine = self.edges[pad], self._pad_cosine[pad]
         # Behind the line is the pad that the liquid covers; one before it is stepped onto, not caught at.
         before = ~self._behind(body, offset)
-        on_pad, on_mask, held = (self.state == which for which in (ON_PAD, ON_MASK, PINNED))
+        on_pad, on_mask, held = (state == which for which in (ON_PAD, ON_MASK, PINNED))
         self.stop_at_edges(body)
-        self.state[on_mask & before & (radius < edge)] = ON_PAD
-        self.state[on_pad & before & (radius > edge)] = ON_MASK
-        self.state[held & (cosine > pad_cosine + RELEASE_MARGIN)] = ON_PAD
-        self.state[held & (cosine < self._mask_cosine - RELEASE_MARGIN)] = ON_MASK
+        state = self.state.copy()
+        state[on_mask & before & (radius < edge)] = ON_PAD
+        state[on_pad & before & (radius > edge)] = ON_MASK
+        state[held & (cosine > pad_cosine + RELEASE_MARGIN)] = ON_PAD
+        state[held & (cosine < self._mask_cosine - RELEASE_MARGIN)] = ON_MASK
+        self._change(body, state, pad)
 
     def near_edges(self, body: Body, load: Floats, coefficient: float) -> NDArray[np.bool_]:
         """Whether a vertex is close to an edge that would hold it `(k,)`; arguments as `contact_cosine`."""
@@ -194,7 +202,14 @@ class ContactLine:
         offset = local[:, :2] - centre
         local[:, :2] = centre + (self.edges[self.pad[caught]] / np.linalg.norm(offset, axis=1))[:, None] * offset
         body.points[ring] = plate.place(local)
-        self.state[caught] = PINNED
+        self._change(body, np.where(caught, PINNED, self.state).astype(np.int8), self.pad)
+
+    def _change(self, body: Body, state: NDArray[np.int8], pad: Indices) -> None:
+        """Give the vertices other states and pads: nothing moves, and no energy changes."""
+        if (state != self.state).any() or (pad != self.pad).any():
+            before = self._level(body)
+            self.state, self.pad = state, pad
+            self.constant += before - self._level(body)
 
     def _behind(self, body: Body, offset: Floats) -> NDArray[np.bool_]:
         """Whether the pad is behind the line, where the liquid is, of vertices at offsets `(k, 2)` from its centre."""
@@ -210,3 +225,28 @@ class ContactLine:
         """Offset of each vertex from the centre of its pad `(k, 2)`, and its length `(k,)` [m]."""
         offset = local[:, :2] - self._centres[self.pad]
         return offset, np.linalg.norm(offset, axis=1)
+
+
+def _sectors(local: Floats) -> Floats:
+    """Areas of the triangles between the origin and each segment of a closed line, `(k,)` [m^2]; `local (k, 2)`."""
+    x, y = local.T
+    return 0.5 * (x * np.roll(y, -1) - y * np.roll(x, -1))
+
+
+def _sectors_gradient(local: Floats, weight: Floats) -> Floats:
+    """Gradient of the sum of `_sectors` times weights `(k,)`, `(k, 2)` [m]."""
+    ahead, behind = weight[:, None], np.roll(weight, 1)[:, None]
+    across = ahead * np.roll(local, -1, axis=0) - behind * np.roll(local, 1, axis=0)
+    return 0.5 * np.column_stack((across[:, 1], -across[:, 0]))
+
+
+def _turns(local: Floats) -> Floats:
+    """Angles about the origin under which each segment of a closed line is seen, `(k,)` [rad]; `local (k, 2)`."""
+    after = np.roll(local, -1, axis=0)
+    return np.arctan2(2.0 * _sectors(local), (local * after).sum(axis=1))
+
+
+def _turns_gradient(local: Floats, weight: Floats) -> Floats:
+    """Gradient of the sum of `_turns` times weights `(k,)`, `(k, 2)` [1/m]."""
+    around = np.column_stack((-local[:, 1], local[:, 0])) / (local**2).sum(axis=1)[:, None]
+    return (np.roll(weight, 1) - weight)[:, None] * around

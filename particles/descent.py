@@ -39,23 +39,23 @@ class Start:
 
     Attributes:
         body: as it was.
-        held: state and pad of the vertices of each contact line.
+        held: state and pad of the vertices of each contact line, and the constant of its energy.
     """
 
     body: Body
-    held: tuple[tuple[NDArray[np.int8], Indices], ...]
+    held: tuple[tuple[NDArray[np.int8], Indices, float], ...]
 
     @classmethod
     def of(cls, body: Body, lines: Sequence[ContactLine]) -> "Start":
         """Remember where a body is."""
-        return cls(replace(body), tuple((line.state.copy(), line.pad) for line in lines))
+        return cls(replace(body), tuple((line.state.copy(), line.pad, line.constant) for line in lines))
 
     def restore(self, body: Body, lines: Sequence[ContactLine]) -> None:
         """Put the body back."""
         for entry in fields(body):
             setattr(body, entry.name, getattr(self.body, entry.name))
-        for line, (state, pad) in zip(lines, self.held, strict=True):
-            line.state, line.pad = state.copy(), pad
+        for line, (state, pad, constant) in zip(lines, self.held, strict=True):
+            line.state, line.pad, line.constant = state.copy(), pad, constant
 
 
 @dataclass(frozen=True, slots=True)

@@ -60,10 +60,10 @@ class Wetting:
         def level() -> float:
             return self.energy(body) + sum(other.energy(body) for other in self.others) - pressure * body.volume()[0]
 
-        points, state, before = body.points.copy(), line.state.copy(), level()
+        points, state, constant, before = body.points.copy(), line.state.copy(), line.constant, level()
         line.catch(body, near)
         if level() > before:
-            body.points, line.state = points, state
+            body.points, line.state, line.constant = points, state, constant
 
     def _load(self, body: Body) -> tuple[Floats, float]:
         """All forces but the walls', `(n, 3)` [N], with the mean capillary pressure of the surface, and this [Pa].
