@@ -34,28 +34,44 @@ LEFT_OVER = 0.01
 
 
 @dataclass(frozen=True, slots=True)
+class Held:
+    """What edges hold: state and pad of the vertices of each contact line, and the constant of its energy."""
+
+    lines: tuple[tuple[NDArray[np.int8], Indices, float], ...]
+
+    @classmethod
+    def of(cls, lines: Sequence[ContactLine]) -> "Held":
+        """Remember how lines are."""
+        return cls(tuple((line.state.copy(), line.pad, line.constant) for line in lines))
+
+    def restore(self, lines: Sequence[ContactLine]) -> None:
+        """Make lines as they were."""
+        for line, (state, pad, constant) in zip(lines, self.lines, strict=True):
+            line.state, line.pad, line.constant = state.copy(), pad, constant
+
+
+@dataclass(frozen=True, slots=True)
 class Start:
     """Where a step began, to begin it again: a step makes new arrays.
 
     Attributes:
         body: as it was.
-        held: state and pad of the vertices of each contact line, and the constant of its energy.
+        held: what edges held.
     """
 
     body: Body
-    held: tuple[tuple[NDArray[np.int8], Indices, float], ...]
+    held: Held
 
     @classmethod
     def of(cls, body: Body, lines: Sequence[ContactLine]) -> "Start":
         """Remember where a body is."""
-        return cls(replace(body), tuple((line.state.copy(), line.pad, line.constant) for line in lines))
+        return cls(replace(body), Held.of(lines))
 
     def restore(self, body: Body, lines: Sequence[ContactLine]) -> None:
         """Put the body back."""
         for entry in fields(body):
             setattr(body, entry.name, getattr(self.body, entry.name))
-        for line, (state, pad, constant) in zip(lines, self.held, strict=True):
-            line.state, line.pad, line.constant = state.copy(), pad, constant
+        self.held.restore(lines)
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,17 +111,18 @@ def _is_driven(body: Body, physics: Physics, time_step: float) -> bool:
 
 
 def even_out(body: Body, physics: Physics, volume: float, evening: Evening) -> int | None:
-    """Flip edges and smooth the surface as far as the energy permits, and correct the volume [m^3].
+    """Flip edges and smooth the surface as far as the energy permits; correct the volume [m^3], stop lines at edges.
 
     Returns:
         The number of flips; None where the energy is too high even without flips and smoothing.
     """
-    cloud, triangles, points = body.cloud, body.triangles, body.points.copy()
+    cloud, triangles, points, held = body.cloud, body.triangles, body.points, Held.of(physics.lines)
     if evening.flips:
         lines = (*cloud.rings, *(on for _, on in surface_planes(cloud)))
         body.triangles, flips = flip_to_delaunay(points, triangles, lines)
         if _smooth(body, physics, volume, evening):
             return flips
+        held.restore(physics.lines)
         body.points, body.triangles = points, triangles
         if not flips:
             return None
@@ -114,11 +131,15 @@ def even_out(body: Body, physics: Physics, volume: float, evening: Evening) -> i
 
 def _smooth(body: Body, physics: Physics, volume: float, evening: Evening) -> bool:
     """Smooth as far as the energy permits, at a volume [m^3]; return whether it permits any."""
-    start, offset = body.points, _offset(body, physics, evening.passes)
+    start, offset, held = body.points, _offset(body, physics, evening.passes), Held.of(physics.lines)
 
     def excess(share: float) -> float:
+        held.restore(physics.lines)
         body.points = start + share * offset
         correct_volume(body, physics, volume)
+        for line in physics.lines:
+            line.stop_at_edges(body)
+        correct_volume(body, physics, volume)  # of the vertices that were caught
         return physics.energy(body) - evening.highest
 
     if np.isinf(evening.highest):

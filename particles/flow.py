@@ -100,8 +100,6 @@ class LiquidFlow:
         while True:
             motion = self._accelerate(prepared)
             body.move(self.time_step.size, motion.transport, motion.twists)
-            for line in self.physics.lines:
-                line.stop_at_edges(body)
             passes, flipping = self.solver.smoothing_passes, self.steps % FLIP_INTERVAL == 0
             flips = even_out(body, self.physics, self.volume, Evening(passes, flipping, highest))
             if flips is not None:

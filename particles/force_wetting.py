@@ -50,18 +50,17 @@ class Wetting:
         load, pressure = self._load(body)
         for line in self.lines:
             line.update(body, load, self.coefficient)
-            near = line.near_edges(body, load, self.coefficient)
-            if near.any():
-                self._catch(body, line, near, pressure)
+            for vertex in np.flatnonzero(line.near_edges(body, load, self.coefficient)):
+                self._catch(body, line, int(vertex), pressure)
 
-    def _catch(self, body: Body, line: ContactLine, near: NDArray[np.bool_], pressure: float) -> None:
-        """Put vertices `(k,)` of a line onto the edge next to them, unless that raises the energy at equal volume."""
+    def _catch(self, body: Body, line: ContactLine, vertex: int, pressure: float) -> None:
+        """Put a vertex of a line onto the edge next to it, unless that raises the energy at equal volume."""
 
         def level() -> float:
             return self.energy(body) + sum(other.energy(body) for other in self.others) - pressure * body.volume()[0]
 
         points, state, constant, before = body.points.copy(), line.state.copy(), line.constant, level()
-        line.catch(body, near)
+        line.catch(body, np.arange(len(state)) == vertex)
         if level() > before:
             body.points, line.state, line.constant = points, state, constant
 
