@@ -32,6 +32,7 @@ class ContactLine:
         pad: `(k,)` the pad whose edge is nearest to each vertex.
         state: `(k,)` PINNED, ON_PAD or ON_MASK.
         constant: what the formula of `cosine_area` has jumped by where states changed [m^2].
+        stopped: `(k,)` whether a vertex was caught at the end of the last step; the edge holds it in the next one.
     """
 
     def __init__(self, wall: int, pads: Sequence[Pad], mask_angle: float, local: Floats, corners: Floats) -> None:
@@ -50,7 +51,7 @@ class ContactLine:
         self.edges = equal_area_radius(radii, corners)
         self._square = np.where(np.isfinite(radii), radii, 0.0) ** 2
         self._pad_cosine, self._mask_cosine = np.cos([pad.angle for pad in pads]), float(np.cos(mask_angle))
-        self.constant = 0.0
+        self.constant, self.stopped = 0.0, np.zeros(len(local), bool)
         self.pad = self._nearest(local)
         distance = self._offset(local)[1]
         edge = self.edges[self.pad]
@@ -159,8 +160,9 @@ class ContactLine:
         # Behind the line is the pad that the liquid covers; one before it is stepped onto, not caught at.
         before = ~self._behind(body, offset)
         on_pad, on_mask, held = (state == which for which in (ON_PAD, ON_MASK, PINNED))
+        held &= ~self.stopped
         self.stop_at_edges(body)
-        state = self.state.copy()
+        state, self.stopped = self.state.copy(), np.zeros_like(self.stopped)
         state[on_mask & before & (radius < edge)] = ON_PAD
         state[on_pad & before & (radius > edge)] = ON_MASK
         state[held & (cosine > pad_cosine + RELEASE_MARGIN)] = ON_PAD
@@ -192,7 +194,9 @@ class ContactLine:
         edge = self.edges[self.pad]
         crossed = ((self.state == ON_PAD) & (radius >= edge)) | ((self.state == ON_MASK) & (radius <= edge))
         if crossed.any():
-            self.catch(body, crossed & self._behind(body, offset))
+            crossed &= self._behind(body, offset)
+            self.catch(body, crossed)
+            self.stopped = self.stopped | crossed
 
     def catch(self, body: Body, caught: NDArray[np.bool_]) -> None:
         """Put vertices `(k,)` onto the edge of their pad, which holds them."""

@@ -35,19 +35,19 @@ LEFT_OVER = 0.01
 
 @dataclass(frozen=True, slots=True)
 class Held:
-    """What edges hold: state and pad of the vertices of each contact line, and the constant of its energy."""
+    """What edges hold: of each contact line the states and pads of the vertices, which were stopped, its constant."""
 
-    lines: tuple[tuple[NDArray[np.int8], Indices, float], ...]
+    lines: tuple[tuple[NDArray[np.int8], Indices, NDArray[np.bool_], float], ...]
 
     @classmethod
     def of(cls, lines: Sequence[ContactLine]) -> "Held":
         """Remember how lines are."""
-        return cls(tuple((line.state.copy(), line.pad, line.constant) for line in lines))
+        return cls(tuple((line.state.copy(), line.pad, line.stopped, line.constant) for line in lines))
 
     def restore(self, lines: Sequence[ContactLine]) -> None:
         """Make lines as they were."""
-        for line, (state, pad, constant) in zip(lines, self.lines, strict=True):
-            line.state, line.pad, line.constant = state.copy(), pad, constant
+        for line, (state, pad, stopped, constant) in zip(lines, self.lines, strict=True):
+            line.state, line.pad, line.stopped, line.constant = state.copy(), pad, stopped, constant
 
 
 @dataclass(frozen=True, slots=True)

@@ -93,19 +93,31 @@ class LiquidFlow:
         return record
 
     def _descend(self) -> tuple[Motion, int]:
-        """Move, with a smaller step where the energy would rise; return the motion and the number of flips."""
+        """Move so that the energy does not rise; return the motion and the number of flips."""
         body, start = self.body, Start.of(self.body, self.physics.lines)
         highest = highest_energy(body, self.physics, self.solver, self.time_step.size)
-        prepared = self.solver.prepare(body, self.physics, self.neighbours)
+        evening = Evening(self.solver.smoothing_passes, self.steps % FLIP_INTERVAL == 0, highest)
+        attempted = [event.attempt(body) for event in self.physics.events]
+        if any(attempted):
+            correct_volume(body, self.physics, self.volume)
+            done = self._move(evening)
+            if done is not None:
+                return done
+            start.restore(body, self.physics.lines)
         while True:
-            motion = self._accelerate(prepared)
-            body.move(self.time_step.size, motion.transport, motion.twists)
-            passes, flipping = self.solver.smoothing_passes, self.steps % FLIP_INTERVAL == 0
-            flips = even_out(body, self.physics, self.volume, Evening(passes, flipping, highest))
-            if flips is not None:
-                return motion, flips
+            done = self._move(evening)
+            if done is not None:
+                return done
             start.restore(body, self.physics.lines)
             self.time_step.cut_for_energy()
+
+    def _move(self, evening: Evening) -> tuple[Motion, int] | None:
+        """Move the body by one step; None where its energy is too high after it."""
+        body = self.body
+        motion = self._accelerate(self.solver.prepare(body, self.physics, self.neighbours))
+        body.move(self.time_step.size, motion.transport, motion.twists)
+        flips = even_out(body, self.physics, self.volume, evening)
+        return None if flips is None else (motion, flips)
 
     def _accelerate(self, prepared: PreparedStep) -> Motion:
         """Solve for velocity and pressure, again with a smaller step where a particle would move too far."""

@@ -42,30 +42,30 @@ class Wetting:
 
     def contact_cosines(self, body: Body) -> list[Floats]:
         """Cosines of the contact angles at the vertices of each contact line, from the balance of forces."""
-        load, _ = self._load(body)
+        load = self._load(body)
         return [line.contact_cosine(body, load, self.coefficient) for line in self.lines]
 
     def update(self, body: Body) -> None:
-        """Release and catch vertices at the edges of the wetted discs."""
-        load, pressure = self._load(body)
+        """Release vertices at the edges of the wetted discs, hold those that have crossed one."""
+        load = self._load(body)
         for line in self.lines:
             line.update(body, load, self.coefficient)
-            for vertex in np.flatnonzero(line.near_edges(body, load, self.coefficient)):
-                self._catch(body, line, int(vertex), pressure)
 
-    def _catch(self, body: Body, line: ContactLine, vertex: int, pressure: float) -> None:
-        """Put a vertex of a line onto the edge next to it, unless that raises the energy at equal volume."""
+    def attempt(self, body: Body) -> bool:
+        """Put vertices close to an edge that would hold them onto it; return whether there were any.
 
-        def level() -> float:
-            return self.energy(body) + sum(other.energy(body) for other in self.others) - pressure * body.volume()[0]
+        Alone this dents the surface: it pays where the step that follows gains more than it takes.
+        """
+        load, found = self._load(body), False
+        for line in self.lines:
+            near = line.near_edges(body, load, self.coefficient)
+            if near.any():
+                line.catch(body, near)
+                found = True
+        return found
 
-        points, state, constant, before = body.points.copy(), line.state.copy(), line.constant, level()
-        line.catch(body, np.arange(len(state)) == vertex)
-        if level() > before:
-            body.points, line.state, line.constant = points, state, constant
-
-    def _load(self, body: Body) -> tuple[Floats, float]:
-        """All forces but the walls', `(n, 3)` [N], with the mean capillary pressure of the surface, and this [Pa].
+    def _load(self, body: Body) -> Floats:
+        """All forces but the walls', `(n, 3)` [N], with the mean capillary pressure of the surface.
 
         The pressure p is the least-squares solution of f + p a = 0 over the vertices off the contact lines; the
         pressure of the solve would bring the accelerations of a violent start into the contact angle.
@@ -76,4 +76,4 @@ class Wetting:
         off_lines[body.cloud.wall >= 0] = False
         a = gradient[off_lines]
         pressure = -float((force[off_lines] * a).sum() / (a**2).sum())
-        return force + pressure * gradient, pressure
+        return force + pressure * gradient

@@ -53,7 +53,10 @@ class Event(Protocol):
     """A discrete change before a step."""
 
     def update(self, body: Body) -> None:
-        """Change the state of the body's boundary."""
+        """Change the state of the body's boundary where that changes no energy."""
+
+    def attempt(self, body: Body) -> bool:
+        """Change it where a step may make up for the energy, which is else undone; return whether it did."""
 
 
 @dataclass(frozen=True, slots=True)

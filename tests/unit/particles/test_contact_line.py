@@ -72,17 +72,31 @@ def test_a_vertex_near_the_edge_is_caught_where_the_edge_would_hold_it(body):
     assert np.linalg.norm(body.points[ring], axis=1) == pytest.approx(line.edges[0])
 
 
-@pytest.mark.parametrize(("slope", "caught"), [(1e3, True), (-1e3, False)])
-def test_an_edge_catches_a_vertex_near_it_only_where_the_energy_does_not_rise(body, slope, caught):
-    """The edge would hold the vertex, and what else acts on the surface takes or gives energy on the way there."""
-    line, vertex = line_on(body), body.cloud.rings[0][4]
-    line.state[4] = ON_MASK
-    body.points[vertex, :2] *= 1.005
-    load, before = load_of_angle(body, line, np.radians(140.0)), body.points[vertex].copy()
-    surface = SimpleNamespace(force=lambda _: load, energy=lambda body: slope * np.linalg.norm(body.points[vertex]))
-    Wetting(1.0, (line,), (surface,)).update(body)
-    assert line.state[4] == (PINNED if caught else ON_MASK)
-    assert (body.points[vertex] == before).all() != caught
+def test_a_vertex_that_a_step_stopped_at_an_edge_is_held_for_the_next_one(body):
+    """While the others arrive: the angle of the first that is stopped is no longer that of the moving line."""
+    line, ring = line_on(body, ON_MASK), body.cloud.rings[0]
+    body.points[ring, :2] *= 1.03
+    body.points[ring[4], :2] *= 0.97 / 1.03
+    line.stop_at_edges(body)
+    assert (np.flatnonzero(line.state == PINNED) == [4]).all()
+    assert np.linalg.norm(body.points[ring[4]]) == pytest.approx(line.edges[0])
+    released = load_of_angle(body, line, np.radians(155.0))
+    line.update(body, released, 1.0)
+    assert line.state[4] == PINNED
+    line.update(body, released, 1.0)
+    assert line.state[4] == ON_MASK
+
+
+def test_vertices_near_an_edge_are_put_onto_it_on_trial(body):
+    line, ring = line_on(body, ON_MASK), body.cloud.rings[0]
+    body.points[ring, :2] *= 1.005
+    load = load_of_angle(body, line, np.radians(140.0))
+    wetting = Wetting(1.0, (line,), (SimpleNamespace(force=lambda _: load),))
+    wetting.update(body)
+    assert (line.state == ON_MASK).all()
+    assert wetting.attempt(body)
+    assert (line.state == PINNED).all()
+    assert not wetting.attempt(body)
 
 
 def test_contact_cosine_inverts_the_pull(body):

@@ -1,6 +1,7 @@
 """Smoothing and flips take no more energy than a step has given."""
 
-from dataclasses import replace
+from copy import deepcopy
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,12 +12,15 @@ from particles.cloud import free_box_cloud, joint_cloud
 from particles.contact_line import ON_PAD, PINNED, ContactLine
 from particles.contact_line_hysteresis import HystereticLine
 from particles.descent import Evening, Start, correct_volume, even_out, highest_energy
+from particles.flow import LiquidFlow
 from particles.force_surface_tension import SurfaceTension
 from particles.geometry import JointGeometry
-from particles.mass import Inertia
+from particles.mass import Inertia, Mass
 from particles.physics import Physics
 from particles.plate import Pad, Plate
 from particles.plate_motion import Travel
+from particles.relaxation import Relaxation
+from particles.time_step import TimeStep
 
 RADII, GAP = (0.75, 1.46), 1.0
 TENSION = (SurfaceTension(2.0),)
@@ -103,6 +107,42 @@ def test_momentum_plates_that_are_moved_and_friction_may_raise_the_energy():
     ):
         assert highest_energy(body, driven, DESCENDS, 1.0) == np.inf
     assert highest_energy(body, physics, SimpleNamespace(descends=False), 1.0) == np.inf
+
+
+@dataclass
+class Edge:
+    """An event on trial that pulls a vertex out of the surface, by more than a step makes up for or less."""
+
+    pull: float
+    attempts: int = 0
+
+    def update(self, body):
+        """Nothing."""
+
+    def attempt(self, body):
+        self.attempts += 1
+        top = body.points[: body.cloud.surface_count, 2].argmax()
+        body.points = body.points + self.pull * np.eye(3)[2] * (np.arange(len(body.points)) == top)[:, None]
+        return True
+
+
+@pytest.mark.parametrize(("pull", "kept"), [(1e-6, True), (0.1, False)])
+def test_what_is_on_trial_is_undone_where_the_step_does_not_make_up_for_it(pull, kept):
+    body, physics = drop()
+    flow = LiquidFlow(
+        body, replace(physics, operators=(Mass(1.0), *TENSION)), TimeStep(0.05, 0.2, 0.05), Relaxation(1.0)
+    )
+    for _ in range(30):
+        flow.step()
+    plain, edge, energy = deepcopy(flow), Edge(pull), flow.physics.energy(body)
+    flow.physics = replace(flow.physics, events=(edge,))
+    flow.step()
+    plain.step()
+    assert edge.attempts == 1
+    assert flow.physics.energy(flow.body) <= energy * (1.0 + 1e-9)
+    surface = slice(body.cloud.surface_count)
+    assert (flow.body.points[surface] == plain.body.points[surface]).all() != kept
+    assert flow.time_step.binding != "energy"
 
 
 def test_a_step_that_begins_again_starts_where_it_did():
