@@ -5,7 +5,7 @@ correct the volume along its gradient; shift the interior. Each of these lives i
 ends each step with no more energy than it had (`descent`).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -100,10 +100,12 @@ class LiquidFlow:
         attempted = [event.attempt(body) for event in self.physics.events]
         if any(attempted):
             correct_volume(body, self.physics, self.volume)
+            time_step = replace(self.time_step)
             done = self._move(evening)
             if done is not None:
                 return done
             start.restore(body, self.physics.lines)
+            self.time_step = time_step
         while True:
             done = self._move(evening)
             if done is not None:

@@ -141,7 +141,7 @@ def test_what_is_on_trial_is_undone_where_the_step_does_not_make_up_for_it(pull,
     assert edge.attempts == 1
     assert flow.physics.energy(flow.body) <= energy * (1.0 + 1e-9)
     surface = slice(body.cloud.surface_count)
-    assert (flow.body.points[surface] == plain.body.points[surface]).all() != kept
+    assert (np.abs(flow.body.points - plain.body.points)[surface].max() < 1e-12) != kept
     assert flow.time_step.binding != "energy"
 
 
