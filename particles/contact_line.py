@@ -205,7 +205,9 @@ class ContactLine:
         centre = self._centres[self.pad[caught]]
         offset = local[:, :2] - centre
         local[:, :2] = centre + (self.edges[self.pad[caught]] / np.linalg.norm(offset, axis=1))[:, None] * offset
-        body.points[ring] = plate.place(local)
+        points = body.points.copy()  # others may remember where the body was
+        points[ring] = plate.place(local)
+        body.points = points
         self._change(body, np.where(caught, PINNED, self.state).astype(np.int8), self.pad)
 
     def _change(self, body: Body, state: NDArray[np.int8], pad: Indices) -> None:

@@ -6,6 +6,7 @@ import pytest
 from particles.body import Body
 from particles.cloud import box_cloud, equal_area_radius, joint_cloud
 from particles.contact_line import ON_MASK, ON_PAD, PINNED, ContactLine
+from particles.descent import Start
 from particles.force_wetting import Wetting
 from particles.geometry import JointGeometry
 from particles.metrics import verdict
@@ -94,9 +95,13 @@ def test_vertices_near_an_edge_are_put_onto_it_on_trial(body):
     wetting = Wetting(1.0, (line,), (SimpleNamespace(force=lambda _: load),))
     wetting.update(body)
     assert (line.state == ON_MASK).all()
+    before, start = body.points.copy(), Start.of(body, (line,))
     assert wetting.attempt(body)
     assert (line.state == PINNED).all()
     assert not wetting.attempt(body)
+    start.restore(body, (line,))
+    assert (body.points == before).all()
+    assert (line.state == ON_MASK).all()
 
 
 def test_contact_cosine_inverts_the_pull(body):
