@@ -6,6 +6,8 @@ from numpy.typing import NDArray
 from particles.body import Body
 from particles.contact_line import ON_MASK, ON_PAD, PINNED, RELEASE_MARGIN, ContactLine
 from particles.plate import Pad
+from particles.surface_measure import ring_area_gradient
+from particles.symmetry import share, whole_points
 
 Floats = NDArray[np.float64]
 
@@ -32,6 +34,17 @@ class HystereticLine(ContactLine):
             wall, (Pad((0.0, 0.0), np.inf, receding_angle),), advancing_angle, local, np.array([len(local)])
         )
         self.state[:] = PINNED
+
+    @property
+    def has_energy(self) -> bool:
+        """None: what a line that stands and moves takes is friction."""
+        return False
+
+    def cosine_area_gradient(self, body: Body) -> Floats:
+        """Force over the surface tension: the angle that acts on each vertex times the gradient of the wetted area."""
+        ring, (points, index) = body.cloud.rings[self.wall], whole_points(body.cloud, body.points, self.wall)
+        whole = ring_area_gradient(points, np.arange(len(index), dtype=np.int32))[: len(ring)]
+        return (self.cosine() * share(body.cloud)[ring])[:, None] * whole
 
     def update(self, body: Body, load: Floats, coefficient: float) -> None:
         """Let vertices stand that moved against their sense, release those whose angle passed one of the two.

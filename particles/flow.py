@@ -1,11 +1,12 @@
 """One implicit step of molten solder, Lagrangian Navier-Stokes (Hu et al., eqs 1-7).
 
 A step: contact line events; forces; saddle-point solve for velocity and pressure; move; smooth and flip the surface;
-shift the interior; correct the volume along its gradient. Each of these lives in its own module.
+correct the volume along its gradient; shift the interior. Each of these lives in its own module. A body that relaxes
+ends each step with no more energy than it had (`descent`).
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -13,19 +14,17 @@ from numpy.typing import NDArray
 
 from particles.body import Body
 from particles.cloud import Cloud
+from particles.descent import Evening, Start, correct_volume, even_out, highest_energy
 from particles.interior_shift import interior_shift
 from particles.neighbours import NeighbourList
 from particles.physics import Physics
 from particles.plate import Pad, Plate
-from particles.step_solver import Motion, StepSolver
-from particles.surface_quality import flip_to_delaunay, smoothing_offsets
-from particles.symmetry import surface_planes
+from particles.step_solver import Motion, PreparedStep, StepSolver
 from particles.time_step import StepCollapsed, TimeStep
 
 Floats = NDArray[np.float64]
 
 SKIN = 0.2
-VOLUME_PASSES = 2
 FLIP_INTERVAL = 2
 FLOW_RECORDS = (Body, Cloud, Plate, Pad, TimeStep)  # that a saved flow consists of
 SAVED = ("body", "time_step", "volume", "time", "steps")
@@ -103,12 +102,12 @@ class LiquidFlow:
         body = self.body
         for event in self.physics.events:
             event.update(body)
+        correct_volume(body, self.physics, self.volume)  # events move the vertices that they catch
         self.neighbours.update(body.points)
-        motion = self._accelerate()
         before = body.points[: body.cloud.surface_count].copy()
-        body.move(self.time_step.size, motion.transport, motion.twists)
-        flips = self._keep_quality()
-        self._correct_volume()
+        motion, flips = self._descend()
+        self.neighbours.update(body.points)
+        body.points[body.cloud.surface_count :] += interior_shift(body, self.neighbours)
         self.steps += 1
         self.time += self.time_step.size
         record = self._record(before, flips, motion.iterations)
@@ -116,10 +115,38 @@ class LiquidFlow:
         self.time_step.grow(motion.top_speed if self.physics.momenta else 0.0)
         return record
 
-    def _accelerate(self) -> Motion:
+    def _descend(self) -> tuple[Motion, int]:
+        """Move so that the energy does not rise; return the motion and the number of flips."""
+        body, start = self.body, Start.of(self.body, self.physics.lines)
+        highest = highest_energy(body, self.physics, self.solver, self.time_step.size)
+        evening = Evening(self.solver.smoothing_passes, self.steps % FLIP_INTERVAL == 0, highest)
+        attempted = [event.attempt(body) for event in self.physics.events]
+        if any(attempted):
+            correct_volume(body, self.physics, self.volume)
+            time_step = replace(self.time_step)
+            done = self._move(evening)
+            if done is not None:
+                return done
+            start.restore(body, self.physics.lines)
+            self.time_step = time_step
+        while True:
+            done = self._move(evening)
+            if done is not None:
+                return done
+            start.restore(body, self.physics.lines)
+            self.time_step.cut_for_energy()
+
+    def _move(self, evening: Evening) -> tuple[Motion, int] | None:
+        """Move the body by one step; None where its energy is too high after it."""
+        body = self.body
+        motion = self._accelerate(self.solver.prepare(body, self.physics, self.neighbours))
+        body.move(self.time_step.size, motion.transport, motion.twists)
+        flips = even_out(body, self.physics, self.volume, evening)
+        return None if flips is None else (motion, flips)
+
+    def _accelerate(self, prepared: PreparedStep) -> Motion:
         """Solve for velocity and pressure, again with a smaller step where a particle would move too far."""
         body = self.body
-        prepared = self.solver.prepare(body, self.physics, self.neighbours)
         while True:
             motion = prepared.solve(self.time_step.size, self.volume)
             if self._accepts(motion):
@@ -137,30 +164,6 @@ class LiquidFlow:
             place = ", ".join(f"{coordinate:.4g}" for coordinate in self.body.points[particle])
             where = f"step {self.steps + 1} at time {self.time:.4g} s, particle {particle} at ({place}) m"
             raise StepCollapsed(f"{where}: {error}") from error
-
-    def _keep_quality(self) -> int:
-        """Flip and smooth the surface, shift the interior; return the number of flips."""
-        body, cloud = self.body, self.body.cloud
-        flips, planes = 0, surface_planes(cloud)
-        if self.steps % FLIP_INTERVAL == 0:
-            body.triangles, flips = flip_to_delaunay(
-                body.points, body.triangles, (*cloud.rings, *(on for _, on in planes))
-            )
-        count, surface = cloud.surface_count, body.surface()
-        for _ in range(self.solver.smoothing_passes):
-            offset = smoothing_offsets(surface.points, surface.triangles, count, cloud.rings, planes)
-            surface.points = surface.points + self.physics.admit(surface, offset)
-        body.points[:count] = surface.points
-        self.neighbours.update(body.points)
-        body.points[count:] += interior_shift(body, self.neighbours)
-        return flips
-
-    def _correct_volume(self) -> None:
-        """Newton steps along the gradient of the volume."""
-        for _ in range(VOLUME_PASSES):
-            volume, gradient = self.body.volume()
-            gradient = self.physics.admit(self.body, gradient)
-            self.body.points += (self.volume - volume) / (gradient**2).sum() * gradient
 
     def _record(self, before: Floats, flips: int, iterations: int) -> StepRecord:
         body, size, count = self.body, self.time_step.size, len(before)

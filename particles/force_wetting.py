@@ -33,11 +33,11 @@ class Wetting:
         return -self.coefficient * sum(line.cosine_area(body) for line in self.lines)
 
     def force(self, body: Body) -> Floats:
-        """Force gamma cos(theta) dA_wet/dx on the contact lines, `(n, 3)` [N]."""
+        """Force -dE/dx on the contact lines, gamma cos(theta) dA_wet/dx where one angle acts, `(n, 3)` [N]."""
         force = np.zeros_like(body.points)
         for line in self.lines:
             ring = body.cloud.rings[line.wall]
-            force[ring] += self.coefficient * line.cosine()[:, None] * line.area_gradient(body)
+            force[ring] += self.coefficient * line.cosine_area_gradient(body)
         return force
 
     def contact_cosines(self, body: Body) -> list[Floats]:
@@ -46,10 +46,23 @@ class Wetting:
         return [line.contact_cosine(body, load, self.coefficient) for line in self.lines]
 
     def update(self, body: Body) -> None:
-        """Release and catch vertices at the edges of the wetted discs."""
+        """Release vertices at the edges of the wetted discs, hold those that have crossed one."""
         load = self._load(body)
         for line in self.lines:
             line.update(body, load, self.coefficient)
+
+    def attempt(self, body: Body) -> bool:
+        """Put vertices close to an edge that would hold them onto it; return whether there were any.
+
+        Alone this dents the surface: it pays where the step that follows gains more than it takes.
+        """
+        load, found = self._load(body), False
+        for line in self.lines:
+            near = line.near_edges(body, load, self.coefficient)
+            if near.any():
+                line.catch(body, near)
+                found = True
+        return found
 
     def _load(self, body: Body) -> Floats:
         """All forces but the walls', `(n, 3)` [N], with the mean capillary pressure of the surface.

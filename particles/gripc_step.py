@@ -51,6 +51,11 @@ class GripcStep:
         """How often the triangles are evened out after a step: the liquid takes them along."""
         return 1
 
+    @property
+    def descends(self) -> bool:
+        """No: its pressure is explicit, and it loses volume."""
+        return False
+
     def prepare(self, body: Body, physics: Physics, _neighbours: NeighbourList) -> "PreparedGripcStep":
         """Fit the operators at the current positions.
 

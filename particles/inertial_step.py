@@ -117,6 +117,11 @@ class InertialStep:
         """How often the triangles are evened out after a step: the liquid takes them along."""
         return 1
 
+    @property
+    def descends(self) -> bool:
+        """Always: viscosity and mass only slow down what the forces drive."""
+        return True
+
     def prepare(self, body: Body, physics: Physics, _neighbours: NeighbourList) -> "PreparedInertialStep":
         """Start a step; tetrahedra need no neighbour list."""
         return self.start(body, physics)

@@ -25,7 +25,7 @@ class Force(Protocol):
         """Energy [J]."""
 
     def force(self, body: Body) -> Floats:
-        """Force -dE/dx, `(n, 3)` [N]; gravity's to second order in the spacing."""
+        """Force -dE/dx, `(n, 3)` [N]: the gradient of this very energy, so that a step along it lowers it."""
 
 
 class Operator(Protocol):
@@ -53,7 +53,10 @@ class Event(Protocol):
     """A discrete change before a step."""
 
     def update(self, body: Body) -> None:
-        """Change the state of the body's boundary."""
+        """Change the state of the body's boundary where that changes no energy."""
+
+    def attempt(self, body: Body) -> bool:
+        """Change it where a step may make up for the energy, which is else undone; return whether it did."""
 
 
 @dataclass(frozen=True, slots=True)

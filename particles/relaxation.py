@@ -61,6 +61,11 @@ class Relaxation:
         """How often the triangles are evened out after a step."""
         return SMOOTHING_PASSES
 
+    @property
+    def descends(self) -> bool:
+        """Always: the step goes along the forces."""
+        return True
+
     def prepare(self, body: Body, physics: Physics, neighbours: NeighbourList) -> "PreparedRelaxation":
         """Build the equations of the surface and the operators of the potential flow."""
         if self.centre is None and not body.plates and not body.cloud.symmetry:

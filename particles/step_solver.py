@@ -62,6 +62,10 @@ class StepSolver(Protocol):
     def smoothing_passes(self) -> int:
         """How often the triangles are evened out after a step."""
 
+    @property
+    def descends(self) -> bool:
+        """Whether a short enough step without momentum lowers the energy."""
+
     def prepare(self, body: Body, physics: Physics, neighbours: NeighbourList) -> PreparedStep:
         """Build what does not depend on the size of the step."""
 

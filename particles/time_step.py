@@ -1,4 +1,4 @@
-"""Adaptive time step: bounded by the displacement in a step and by a multiple of the capillary limit."""
+"""Adaptive time step: bounded by the displacement in a step, the energy, and a multiple of the capillary limit."""
 
 from dataclasses import dataclass
 
@@ -14,7 +14,7 @@ SMALLEST_SHARE = 1e-9
 
 
 class StepCollapsed(RuntimeError):
-    """No time step is small enough for the particles to move by less than a quarter of their spacing."""
+    """No time step is so small that particles move by less than a quarter of their spacing and energy does not rise."""
 
 
 def capillary_limit(density: float, spacing: float, surface_tension: float) -> float:
@@ -30,7 +30,7 @@ class TimeStep:
         largest: upper bound, a multiple of the capillary limit [s].
         spacing: particle spacing [m].
         size: current step [s].
-        binding: "capillary multiple", "growth" or "displacement".
+        binding: "capillary multiple", "growth", "displacement" or "energy".
     """
 
     largest: float
@@ -47,14 +47,25 @@ class TimeStep:
         displacement = speed * self.size
         if displacement <= LARGEST_DISPLACEMENT * self.spacing:
             return True
+        moves = f"the fastest particle still moves {displacement / self.spacing:.2g} spacings in it"
+        self._cut(max(0.25, SAFETY * LARGEST_DISPLACEMENT * self.spacing / displacement), "displacement", moves)
+        return False
+
+    def cut_for_energy(self) -> None:
+        """Cut a step that raises the energy; a short enough one does not.
+
+        Raises:
+            StepCollapsed: the step would be 1e-9 of its upper bound.
+        """
+        self._cut(0.5, "energy", "the energy still rises in it")
+
+    def _cut(self, share: float, binding: str, trouble: str) -> None:
         if not self.size > SMALLEST_SHARE * self.largest:
             raise StepCollapsed(
-                f"the time step was cut to {self.size:.2e} s, {SMALLEST_SHARE:g} of its upper bound, and the fastest "
-                f"particle still moves {displacement / self.spacing:.2g} spacings in it: the flow is unstable"
+                f"the time step was cut to {self.size:.2e} s, {SMALLEST_SHARE:g} of its upper bound, and {trouble}: "
+                "the flow is unstable"
             )
-        self.size *= max(0.25, SAFETY * LARGEST_DISPLACEMENT * self.spacing / displacement)
-        self.binding = "displacement"
-        return False
+        self.size, self.binding = share * self.size, binding
 
     def grow(self, speed: float) -> None:
         """Grow after an accepted step, up to the bound and as far as a largest particle speed [m/s] allows."""

@@ -19,7 +19,7 @@ def cylinder(fill, gap, radius=RADIUS):
 
 
 def check_energy_falls(energy):
-    assert np.diff(energy).max() < 1e-4 * abs(energy[0])
+    assert np.diff(energy).max() < 1e-9 * abs(energy[0])
 
 
 def check(shape, verdict):

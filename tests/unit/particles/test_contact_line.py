@@ -6,11 +6,12 @@ import pytest
 from particles.body import Body
 from particles.cloud import box_cloud, equal_area_radius, joint_cloud
 from particles.contact_line import ON_MASK, ON_PAD, PINNED, ContactLine
+from particles.descent import Start
 from particles.force_wetting import Wetting
 from particles.geometry import JointGeometry
 from particles.metrics import verdict
 from particles.plate import Pad, Plate
-from particles.surface_measure import ring_area, ring_area_gradient
+from particles.surface_measure import ring_area
 
 PAD, MASK = np.radians(5.0), np.radians(148.0)
 
@@ -64,10 +65,43 @@ def test_a_vertex_that_crosses_the_edge_is_caught_there(body, state, factor):
 def test_a_vertex_near_the_edge_is_caught_where_the_edge_would_hold_it(body):
     line, ring = line_on(body, ON_MASK), body.cloud.rings[0]
     body.points[ring, :2] *= 1.005
-    line.update(body, load_of_angle(body, line, np.radians(150.0)), 1.0)
-    assert (line.state == ON_MASK).all()
-    line.update(body, load_of_angle(body, line, np.radians(140.0)), 1.0)
+    assert not line.near_edges(body, load_of_angle(body, line, np.radians(150.0)), 1.0).any()
+    near = line.near_edges(body, load_of_angle(body, line, np.radians(140.0)), 1.0)
+    assert near.all()
+    line.catch(body, near)
     assert (line.state == PINNED).all()
+    assert np.linalg.norm(body.points[ring], axis=1) == pytest.approx(line.edges[0])
+
+
+def test_a_vertex_that_a_step_stopped_at_an_edge_is_held_for_the_next_one(body):
+    """While the others arrive: the angle of the first that is stopped is no longer that of the moving line."""
+    line, ring = line_on(body, ON_MASK), body.cloud.rings[0]
+    body.points[ring, :2] *= 1.03
+    body.points[ring[4], :2] *= 0.97 / 1.03
+    line.stop_at_edges(body)
+    assert (np.flatnonzero(line.state == PINNED) == [4]).all()
+    assert np.linalg.norm(body.points[ring[4]]) == pytest.approx(line.edges[0])
+    released = load_of_angle(body, line, np.radians(155.0))
+    line.update(body, released, 1.0)
+    assert line.state[4] == PINNED
+    line.update(body, released, 1.0)
+    assert line.state[4] == ON_MASK
+
+
+def test_vertices_near_an_edge_are_put_onto_it_on_trial(body):
+    line, ring = line_on(body, ON_MASK), body.cloud.rings[0]
+    body.points[ring, :2] *= 1.005
+    load = load_of_angle(body, line, np.radians(140.0))
+    wetting = Wetting(1.0, (line,), (SimpleNamespace(force=lambda _: load),))
+    wetting.update(body)
+    assert (line.state == ON_MASK).all()
+    before, start = body.points.copy(), Start.of(body, (line,))
+    assert wetting.attempt(body)
+    assert (line.state == PINNED).all()
+    assert not wetting.attempt(body)
+    start.restore(body, (line,))
+    assert (body.points == before).all()
+    assert (line.state == ON_MASK).all()
 
 
 def test_contact_cosine_inverts_the_pull(body):
@@ -107,6 +141,43 @@ def test_wetting_energy_is_continuous_at_the_edge_and_falls_along_the_force(body
     assert float((force * field).sum()) == pytest.approx(-(energies[0] - energies[1]) / 2e-6, rel=1e-6)
 
 
+@pytest.mark.parametrize("degrees", [2.0, 155.0])
+def test_wetting_energy_does_not_jump_where_an_edge_releases_and_catches_a_vertex_of_an_uneven_line(body, degrees):
+    """Vertices that left an edge and came back are no longer evenly spaced along it."""
+    line, ring = line_on(body, pad=np.radians(40.0)), body.cloud.rings[0]
+    angle = 2.0 * np.pi * (np.arange(len(ring)) + 0.2 * np.sin(np.arange(len(ring)))) / len(ring)
+    body.points[ring, :2] = line.edges[0] * np.column_stack((np.cos(angle), np.sin(angle)))
+    wetting, load = Wetting(2.0, (line,), ()), load_of_angle(body, line, np.radians(90.0))
+    held = wetting.energy(body)
+    load[ring[3:9]] = load_of_angle(body, line, np.radians(degrees))[ring[3:9]]
+    line.update(body, load, 1.0)
+    assert (line.state[4:8] != PINNED).all()
+    assert wetting.energy(body) == pytest.approx(held, abs=1e-14)
+    line.catch(body, line.state != PINNED)
+    assert wetting.energy(body) == pytest.approx(held, abs=1e-14)
+
+
+def test_wetting_force_is_the_gradient_of_its_energy_where_vertices_differ():
+    """Vertices on the pad, on the mask and at the edge, in any order, on a plate that leans."""
+    body = Body.at_rest(joint_cloud(JointGeometry(1.0, 0.8, 0.6, (0.3, 0.0), (0.0, 0.1)), 2.2, 0.2))
+    random = np.random.default_rng(3)
+    ring, plate = body.cloud.rings[1], body.plates[1]
+    local = plate.local(body.points[ring])
+    line = ContactLine(1, (Pad((0, 0), 0.6, PAD),), MASK, local, np.array([len(ring)]))
+    line.state[:] = random.integers(PINNED, ON_MASK + 1, len(ring))
+    side = np.select([line.state == ON_PAD, line.state == ON_MASK], [-1.0, 1.0], 0.0)
+    local[:, :2] *= (1.0 + 0.05 * side * random.random(len(ring)))[:, None]
+    points = body.points.copy()
+    points[ring] = plate.place(local)
+    wetting, field = Wetting(2.0, (line,), ()), np.zeros_like(points)
+    field[ring] = random.normal(size=(len(ring), 2)) @ plate.frame[:2]
+    energies = []
+    for step in (1e-6, -1e-6, 0.0):
+        body.points = points + step * field
+        energies.append(wetting.energy(body))
+    assert float((wetting.force(body) * field).sum()) == pytest.approx(-(energies[0] - energies[1]) / 2e-6, rel=1e-6)
+
+
 def stadium(half_length, radius, count):
     """Points `(4 count, 3)` along a stadium about (-half_length, 0) and (half_length, 0), counter-clockwise."""
     angle = np.linspace(-0.5, 0.5, count, endpoint=False) * np.pi
@@ -142,7 +213,7 @@ def test_the_energy_around_two_pads_falls_along_the_force():
     assert (line.state == ON_MASK).all()
     area = 4.0 * 0.6 + np.pi * 0.36 - 2.0 * np.pi * 0.25
     assert line.cosine_area(body) == pytest.approx(np.cos(MASK) * area, rel=3e-3)
-    force = np.cos(MASK) * ring_area_gradient(points, body.cloud.rings[0])
+    force = line.cosine_area_gradient(body)
     field = 1e-6 * np.random.default_rng(1).normal(size=points.shape) * (1.0, 1.0, 0.0)
     areas = []
     for sign in (1.0, -1.0):

@@ -17,3 +17,12 @@ def test_a_cut_step_keeps_particles_within_a_quarter_of_the_spacing():
         pass
     assert step.size <= 0.25e-4
     assert step.binding == "displacement"
+
+
+def test_a_step_that_raises_the_energy_is_halved_but_not_for_ever():
+    step = TimeStep(largest=1.0, spacing=1.0, size=1.0)
+    step.cut_for_energy()
+    assert (step.size, step.binding) == (0.5, "energy")
+    with pytest.raises(StepCollapsed, match="the energy still rises"):
+        for _ in range(40):
+            step.cut_for_energy()
