@@ -5,6 +5,7 @@ Exit code 0 when the results are written; 1, with a message on standard error, w
 
 import os
 import sys
+import traceback
 
 if __name__ == "__main__":
     # Waiting ranks of Open MPI spin; on a machine that does other work too, they should let it have the core. Read at
@@ -12,6 +13,12 @@ if __name__ == "__main__":
     os.environ.setdefault("OMPI_MCA_mpi_yield_when_idle", "1")
     from mpi4py import MPI
 
-    from fem.program import main
+    try:
+        from fem.program import main
 
-    sys.exit(main(MPI.COMM_WORLD, sys.argv[1:]))
+        code = main(MPI.COMM_WORLD, sys.argv[1:])
+    except BaseException as error:  # an interrupt, or a library that cannot be loaded: the other ranks would wait
+        why = "interrupted" if isinstance(error, KeyboardInterrupt) else f"\n{traceback.format_exc().rstrip()}"
+        print(f"error: rank {MPI.COMM_WORLD.rank}: {why}", file=sys.stderr, flush=True)
+        MPI.COMM_WORLD.Abort(1)
+    sys.exit(code)

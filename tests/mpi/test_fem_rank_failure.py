@@ -1,16 +1,20 @@
 """A rank that dies, raises or stops ends all ranks, with its message and where the run could continue."""
 
 import json
+import os
 import re
 import subprocess
+import sys
 import time
 from pathlib import Path
 
 import pytest
 
+from fem.own_job import own_environment
 from fem.status_board import ERROR
 from tests.support.fem_models import write_small_assembly
 from tests.support.fem_program import run_python
+from workflow.launch import mpi_command
 
 # The program, but rank 1 does something in a window or in set-up; standard error is told of where it is.
 SCRIPT = """
@@ -116,3 +120,23 @@ def test_misfortune_in_set_up_ends_all(assembly, tmp_path):
     said = errors_of(assembly, tmp_path / "checkpoints", "raise", "set-up")
     assert "ZeroDivisionError: broken rank" in said
     assert "checkpoint:" not in said
+
+
+@pytest.mark.parametrize(
+    ("raised", "words"), [("KeyboardInterrupt()", "rank 1: interrupted"), ("ImportError('libx')", "libx")]
+)
+def test_a_rank_that_fails_while_it_loads_libraries_ends_all(tmp_path, raised, words):
+    """Found by an interrupt at a random time: the other rank waited for it without end."""
+    (tmp_path / "sitecustomize.py").write_text(
+        "import os, sys\n"
+        "class Broken:\n"
+        "    def find_spec(self, name, *_):\n"
+        "        if name == 'fem.program' and os.environ.get('OMPI_COMM_WORLD_RANK') == '1':\n"
+        f"            raise {raised}\n"
+        "sys.meta_path.insert(0, Broken())\n"
+    )
+    environment = own_environment(os.environ) | {"PYTHONPATH": os.pathsep.join([str(tmp_path), os.getcwd()])}
+    line = mpi_command(2, [sys.executable, "-m", "fem", str(tmp_path / "absent.json")], True)
+    ended = subprocess.run(line, env=environment, capture_output=True, text=True, timeout=60, check=False)
+    assert ended.returncode != 0
+    assert loses_words() or words in ended.stderr
