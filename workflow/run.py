@@ -1,6 +1,7 @@
 """The commands run, report, verify and clean: what they do with a run folder, and what the user is told."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 from workflow.case_kind import Case
@@ -41,7 +42,8 @@ def run_case(store: Store, point: Point, until: str, machine: Machine, *, force:
         for name in show_products(store, point):
             console.print(f"put back {store.folder / name}")
         if any(verdict.stale for verdict in wanted.values()):
-            run_points(store, [point], until, machine, lock)
+            watched = replace(machine, each_second=machine.each_second or _shower(store, point))
+            run_points(store, [point], until, watched, lock)
         else:
             console.print(f"nothing to do: {store.folder} is up to date")
         failure = failure_of(store, point, until)
@@ -141,6 +143,19 @@ def clean(folder: Path, name: str, *, unused: bool = False, force: bool = False)
     console.print(f"removed {folder}" if not folder.exists() else f"removed all products from {folder}")
     if left:
         console.print(f"kept what is not the program's: {', '.join(left)}")
+
+
+def _shower(store: Store, point: Point) -> Callable[[], None]:
+    """Return what shows a product in the run folder soon after it was made, when it is called now and then."""
+    there = [0]
+
+    def show_new() -> None:
+        count = sum(store.has(point, stage) for stage in point.digests)
+        if count != there[0]:
+            there[0] = count
+            show_products(store, point)
+
+    return show_new
 
 
 def _tell_damage(verdicts: dict[str, Verdict], what: str = "it is made again") -> bool:
