@@ -12,8 +12,8 @@ from typing import Any, Generic, TypeVar
 from workflow.case_kind import Case
 from workflow.last_word import in_words, is_interrupt
 from workflow.stage_table import Stage
-from workflow.store.keys import compare, stage_inputs
-from workflow.store.product import publish, seal
+from workflow.store.keys import compare, product_key, stage_inputs
+from workflow.store.product import publish, read_record, seal
 from workflow.store.store import MESSAGE, TRACEBACK, reads
 from workflow.terminal import console, health_line
 
@@ -78,10 +78,12 @@ def run_stage(name: str, function: StageFunction, run: Run, product: Path) -> di
         The record: seconds, core_seconds, metrics, health, effects, continued, key, inputs, reads, files.
 
     Raises:
-        StageError: a file that the case names has changed while the stage was at work, or a product was not written.
+        StageError: a file that the case names has changed since the command began, or a product was not written.
     """
     stage, partial = run.case.pipeline[name], run.folder / f".{name}.partial"
     before = {"inputs": stage_inputs(run.case, stage), "reads": _reads(run, stage)}
+    key = product.name.rpartition("-")[2]
+    _check_key(run, stage, before["inputs"], key)
     _remove(partial)
     partial.mkdir(parents=True)
     start, used = time.perf_counter(), core_seconds()
@@ -93,7 +95,7 @@ def run_stage(name: str, function: StageFunction, run: Run, product: Path) -> di
         "health": findings.health,
         "effects": findings.effects,
         "continued": findings.continued,
-        "key": product.name.rpartition("-")[2],
+        "key": key,
     }
     _check(run, stage, before, partial)
     record = seal(partial, record | before)
@@ -104,6 +106,13 @@ def run_stage(name: str, function: StageFunction, run: Run, product: Path) -> di
 
 def _reads(run: Run, stage: Stage) -> dict[str, str | None]:
     return reads({one.name: run.folder / one.name for one in run.case.pipeline.stages}, run.case, stage)
+
+
+def _check_key(run: Run, stage: Stage, inputs: dict, key: str) -> None:
+    """See to it that what a stage finds is what its product is named after, when the command began."""
+    follows = [(read_record(run.folder / name) or {}).get("key") for name in stage.follows]
+    if None not in follows and product_key(run.case, stage, inputs, follows) != key:
+        raise StageError("a file that the case names, or the program, has changed since the command began; run it again")
 
 
 def _check(run: Run, stage: Stage, before: dict, partial: Path) -> None:
