@@ -1,7 +1,6 @@
 """Running one stage: a fresh partial folder, a record of what was used and found, a rename when all is there."""
 
 import resource
-import shutil
 import time
 import traceback
 from collections.abc import Callable
@@ -13,7 +12,7 @@ from workflow.case_kind import Case
 from workflow.last_word import in_words, is_interrupt
 from workflow.stage_table import Stage
 from workflow.store.keys import compare, product_key, stage_inputs
-from workflow.store.product import publish, read_record, seal
+from workflow.store.product import discard, publish, read_record, seal
 from workflow.store.store import MESSAGE, TRACEBACK, reads
 from workflow.terminal import console, health_line
 
@@ -84,7 +83,7 @@ def run_stage(name: str, function: StageFunction, run: Run, product: Path) -> di
     before = {"inputs": stage_inputs(run.case, stage), "reads": _reads(run, stage)}
     key = product.name.rpartition("-")[2]
     _check_key(run, stage, before["inputs"], key)
-    _remove(partial)
+    discard(partial)
     partial.mkdir(parents=True)
     start, used = time.perf_counter(), core_seconds()
     findings = function(run, partial)
@@ -100,7 +99,7 @@ def run_stage(name: str, function: StageFunction, run: Run, product: Path) -> di
     _check(run, stage, before, partial)
     record = seal(partial, record | before)
     publish(partial, product)
-    _remove(run.checkpoints(name))
+    discard(run.checkpoints(name))
     return record
 
 
@@ -112,7 +111,7 @@ def _check_key(run: Run, stage: Stage, inputs: dict, key: str) -> None:
     """See to it that what a stage finds is what its product is named after, when the command began."""
     follows = [(read_record(run.folder / name) or {}).get("key") for name in stage.follows]
     if None not in follows and product_key(run.case, stage, inputs, follows) != key:
-        raise StageError("a file that the case names, or the program, has changed since the command began; run it again")
+        raise StageError("a file of the case, or the program, has changed since the command began; run it again")
 
 
 def _check(run: Run, stage: Stage, before: dict, partial: Path) -> None:
@@ -163,8 +162,3 @@ def _write_message(name: str, folder: Path, error: Exception) -> None:
         (folder / MESSAGE).write_text(told, encoding="utf-8")
     except OSError:
         console.print(f"stage {name} failed: {told}", soft_wrap=True)
-
-
-def _remove(folder: Path) -> None:
-    if folder.exists():
-        shutil.rmtree(folder)

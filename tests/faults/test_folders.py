@@ -18,9 +18,7 @@ def test_a_folder_of_any_name_will_do(tmp_path):
         assert result.returncode == 0, result.stdout + result.stderr
         assert words in result.stdout
     assert (folder / "report.html").is_file()
-    assert [path.name for path in tmp_path.iterdir()] == [
-        ODD.partition("/")[0]
-    ]
+    assert [path.name for path in tmp_path.iterdir()] == [ODD.partition("/")[0]]
     for command in ("status", "verify", "plan", "report", "clean"):
         result = run_drop(folder, command, cwd=tmp_path)
         assert result.returncode == 0, command + result.stdout + result.stderr
