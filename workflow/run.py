@@ -11,7 +11,7 @@ from workflow.store.point import Point
 from workflow.store.product import discard
 from workflow.store.state import Verdict, examine, failed_checks, why_stale
 from workflow.store.store import TRACEBACK, Store, read_case_of_run
-from workflow.store.view import adopt, remove_unused, withdraw_all
+from workflow.store.view import adopt, not_as_put, remove_unused, withdraw_all
 from workflow.terminal import console, print_error
 
 WHAT = "run"  # a run folder holds
@@ -106,10 +106,10 @@ def _adopt_report(store: Store, folder: Path, case: Case, write: Callable[[Path,
 
 
 def verify(store: Store, point: Point) -> bool:
-    """Look at every file of a run, and tell what is damaged or missing.
+    """Look at every file of a run, in its store and in its folder, and tell what is damaged or missing.
 
     Returns:
-        Whether every product is there and as it was written.
+        Whether every product is there and as it was written, and so is what the run folder shows.
     """
     verdicts = examine(store, point)
     for name, verdict in verdicts.items():
@@ -122,7 +122,10 @@ def verify(store: Store, point: Point) -> bool:
         else:
             record = store.record(point, name) or {"files": {}}
             console.print(f"ok     {name:<11} {len(record['files']) + 1} files")
-    return not any(verdict.stale for verdict in verdicts.values())
+    lost = not_as_put(store, store.folder)
+    for told in lost:
+        print_error(f"{told}; `reflowshock run` puts it back")
+    return not lost and not any(verdict.stale for verdict in verdicts.values())
 
 
 def clean(folder: Path, name: str, *, unused: bool = False, force: bool = False) -> None:

@@ -1,6 +1,7 @@
 """Folders of any name, folders of somebody else, names that lead elsewhere."""
 
 import os
+import shutil
 import subprocess
 import sys
 
@@ -35,6 +36,38 @@ def test_products_of_another_time_are_products(tmp_path):
     other = run_drop(folder, "run", "--set", "drop.contact_angle=70 deg")
     assert other.returncode == 0, other.stderr
     assert "ok     reflow" in other.stdout
+
+
+def test_a_folder_that_cannot_be_taken_is_told_before_anything(tmp_path):
+    (tmp_path / "file").write_text("mine")
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine/notes.txt").write_text("mine")
+    long = "/".join(["d" * 200] * 25)
+    for out, words in (("file", "is not a folder"), ("mine", "has files"), (".", "has files"), ("/", "has files")):
+        result = run_drop(out, "plan", cwd=tmp_path)
+        assert result.returncode == 2 and words in result.stderr
+    for command, code in (("plan", 2), ("run", 2), ("status", 1), ("clean", 2)):
+        result = run_drop(long, command, cwd=tmp_path)
+        assert result.returncode == code, command
+        assert result.stderr.count("\n") == 1 and "ile name too long" in result.stderr
+    assert sorted(path.name for path in tmp_path.rglob("*")) == ["file", "mine", "notes.txt"]
+
+
+def test_a_report_does_not_replace_a_users(tmp_path):
+    """Where products are missing, the report is no product, and what a user has put in its place is set aside."""
+    folder = tmp_path / "run"
+    assert run_drop(folder, "run", "--until", "reflow").returncode == 0
+    (folder / "report.html").write_text("mine")
+    for path in folder.glob(".store/products/reflow-*"):
+        shutil.rmtree(path)
+    for _ in range(2):
+        assert run_drop(folder, "report").returncode == 0
+        assert (folder / "report.html.kept-1").read_text() == "mine"
+        assert (folder / "report.html").read_text().startswith("<!")
+        assert not (folder / "report.html.kept-2").exists()
+    (folder / "report.html").unlink()
+    verified = run_drop(folder, "verify")
+    assert verified.returncode == 1 and f"{folder}/report.html is missing" in verified.stderr
 
 
 @pytest.mark.parametrize("name", ["../../esc", "a/b", "..", ".", "a\n", "x" * 5000, "/etc", "-x y"])

@@ -104,6 +104,15 @@ def adopt(store: Store, folder: Path, made: Path) -> None:
         path.rename(folder / name)
 
 
+def not_as_put(store: Store, folder: Path) -> list[str]:
+    """List the files that the program has put into a run folder and that are missing, or others now, in words."""
+    return [
+        f"{folder / name} is {'not as it was written' if os.path.lexists(folder / name) else 'missing'}"
+        for name, shown in listed(store, folder).items()
+        if not _holds(folder, name, shown)
+    ]
+
+
 def withdraw_all(store: Store, folder: Path) -> None:
     """Remove all that the program has put into a run folder, and folders that are empty then."""
     for name, shown in listed(store, folder).items():

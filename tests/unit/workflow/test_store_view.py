@@ -15,7 +15,7 @@ from workflow.store.point import Point
 from workflow.store.product import discard
 from workflow.store.state import examine
 from workflow.store.store import Store
-from workflow.store.view import remove_unused, withdraw_all
+from workflow.store.view import not_as_put, remove_unused, withdraw_all
 
 POINT = Point({}, read_case(SMALL_CASE))
 OTHER = Point({}, read_case(SMALL_CASE, ["shock.peak_acceleration=1000 G"]))
@@ -232,6 +232,34 @@ def test_a_folder_of_somebody_else_is_left_alone(tmp_path, names, words):
         with pytest.raises(CaseError, match=words), locked(tmp_path, "run", "small", force):
             pass
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted(names)
+
+
+def test_no_run_folder_is_made_in_a_store(store):
+    folder = store.home / "products/mine"
+    with pytest.raises(CaseError, match=r"is in a folder \.store"), locked(folder, "run", "small"):
+        pass
+    assert not folder.exists()
+
+
+def test_a_mark_that_was_being_written_is_no_users(tmp_path):
+    (tmp_path / ".reflowshock.partial").write_text("{")
+    with locked(tmp_path, "run", "small"):
+        pass
+    assert remove_own(tmp_path) == []
+
+
+def test_what_the_run_folder_lacks_is_told(store):
+    assert not_as_put(store, store.folder) == []
+    (store.folder / "report.html").unlink()
+    (store.folder / "summary.json").unlink()
+    (store.folder / "summary.json").write_text("mine")
+    told = not_as_put(store, store.folder)
+    assert sorted(line.removeprefix(f"{store.folder}/") for line in told) == [
+        "report.html is missing",
+        "summary.json is not as it was written",
+    ]
+    show_products(store, POINT)
+    assert not_as_put(store, store.folder) == []
 
 
 def test_a_run_folder_has_one_user(tmp_path):
