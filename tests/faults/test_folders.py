@@ -8,6 +8,8 @@ import sys
 import pytest
 
 from tests.support.faults import DROP, SMALL_DROP, run_drop
+from tests.support.workflow_command import wait_until
+from workflow.store.engine import SNAKEFILE
 
 ODD = "Drop test #3: a\n\"b' {c} [/x] $(touch pwned) %d *é;\\ -e"
 
@@ -80,3 +82,20 @@ def test_names_do_not_lead_out_of_a_folder(tmp_path, name):
     assert result.returncode == 2, result.stdout + result.stderr
     assert len(result.stderr) < 2000
     assert [path.name for path in tmp_path.iterdir()] == ["case.toml"]
+
+
+def test_plain_snakemake_holds_the_folder_and_shows_no_old_report(tmp_path):
+    folder = tmp_path / "run"
+    assert run_drop(folder).returncode == 0
+    line = [sys.executable, "-m", "snakemake", "-s", str(SNAKEFILE), "--cores", "1", "--config", f"case={DROP}"]
+    line += [f"out={folder}", 'set=["drop.particles_per_edge=5", "solder.numerics.max_steps=1"]']
+    dry = subprocess.run([*line, "-n"], capture_output=True, text=True, timeout=60, check=False, cwd=tmp_path)
+    assert dry.returncode == 0 and (folder / "report.html").exists()
+    process = subprocess.Popen(line, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, cwd=tmp_path)
+    wait_until(lambda: list(folder.glob(".store/work/reflow-*/.reflow.partial")) or process.poll() is not None)
+    assert process.poll() is None
+    assert not (folder / "report.html").exists()
+    assert "another run is at work" in run_drop(folder).stderr
+    assert process.wait(timeout=60) == 1
+    assert not (folder / "report.html").exists()
+    assert "nothing to do" in run_drop(folder).stdout and (folder / "report.html").exists()
