@@ -13,7 +13,7 @@ from workflow.case import available_cores, read_case
 from workflow.cluster.executor import JOBS, ExecutorName, executor_for
 from workflow.environment import prepare
 from workflow.last_word import answer, heed_signals, last_word, remember_run_folder
-from workflow.store.folders import read_mark
+from workflow.store.folders import check_folder, read_mark
 from workflow.store.point import Point
 from workflow.store.store import Store, read_case_of_run
 from workflow.terminal import console, print_error
@@ -81,8 +81,11 @@ def plan(
 ) -> None:
     """Show what a run would do and cost; runs nothing."""
     from workflow.plan import show_plan
+    from workflow.run import WHAT
 
-    show_plan(*_load(case, settings, out, oversubscribe, force), console)
+    store, point = _load(case, settings, out, oversubscribe, force)
+    check_folder(store.folder, WHAT, point.case.case.name, force)
+    show_plan(store, point, console)
 
 
 @app.command()
@@ -101,13 +104,14 @@ def run(
     """Run what is missing, stale or damaged."""
     from workflow.gate import ask_if_long
     from workflow.plan import predicted_seconds
-    from workflow.run import run_case
+    from workflow.run import WHAT, run_case
     from workflow.store.batch import machine_of
 
     store, point = _load(case, settings, out, oversubscribe or executor != ExecutorName.LOCAL, force)
     if until not in point.case.pipeline.names:
         allowed = ", ".join(point.case.pipeline.names)
         raise typer.BadParameter(f"'{until}' is no stage of this case; allowed: {allowed}", param_hint="--until")
+    check_folder(store.folder, WHAT, point.case.case.name, force)
     machine = machine_of(executor_for(executor, profile, cores, oversubscribe, [point.case]), one_run=True)
     if executor == ExecutorName.LOCAL:
         seconds = predicted_seconds(store, point, until)

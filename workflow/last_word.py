@@ -194,8 +194,9 @@ def is_interrupt(error: BaseException | None) -> bool:
 
 def _keep(details: str) -> Path | None:
     """Write details to the logs of the run, else to a temporary file; return which, or None where neither can be."""
-    folder = _known.get("folder")
-    places = [folder / LOGS] if folder is not None and folder.is_dir() else []
+    folder, places = _known.get("folder"), []
+    with suppress(OSError):  # a name that is too long
+        places += [folder / LOGS] if folder is not None and folder.is_dir() else []
     with suppress(OSError):
         places.append(Path(tempfile.gettempdir()))
     for place in places:

@@ -9,9 +9,10 @@ from workflow.stage_runner import Run, execute
 from workflow.store.batch import Machine, failure_of, run_points, show_products
 from workflow.store.folders import locked, read_mark, remove_own
 from workflow.store.point import Point
+from workflow.store.product import discard
 from workflow.store.state import Verdict, examine, failed_checks, why_stale
 from workflow.store.store import TRACEBACK, Store, read_case_of_run
-from workflow.store.view import adopt, remove_unused, withdraw_all
+from workflow.store.view import adopt, not_as_put, remove_unused, withdraw_all
 from workflow.terminal import console, print_error
 
 WHAT = "run"  # a run folder holds
@@ -84,23 +85,33 @@ def report_again(folder: Path, name: str, write: Callable[[Path, Case, Path], ob
             return False
         if any(verdict.stale for verdict in upstream.values()):
             show_products(store, point)
-            write(folder, case, folder)
-            adopt(store, folder, case.pipeline[REPORT].on_top)
+            _adopt_report(store, folder, case, write)
             return True
         store.prepare_work(point, REPORT)
         work = store.work_folder(point, REPORT)
         done = execute(REPORT, stage, Run(work, case, 1), store.product(point, REPORT))
         show_products(store, point)
+        store.drop_work(point, REPORT)
     if not done and (failure := failure_of(store, point, REPORT)):
         _tell_failure(store, point, *failure)
     return done
 
 
+def _adopt_report(store: Store, folder: Path, case: Case, write: Callable[[Path, Case, Path], object]) -> None:
+    """Write a report that is no product, and put it into the run folder when it is complete."""
+    made = store.home / "work" / REPORT
+    discard(made)
+    made.mkdir(parents=True)
+    write(folder, case, made)
+    adopt(store, folder, made)
+    discard(made)
+
+
 def verify(store: Store, point: Point) -> bool:
-    """Look at every file of a run, and tell what is damaged or missing.
+    """Look at every file of a run, in its store and in its folder, and tell what is damaged or missing.
 
     Returns:
-        Whether every product is there and as it was written.
+        Whether every product is there and as it was written, and so is what the run folder shows.
     """
     verdicts = examine(store, point)
     for name, verdict in verdicts.items():
@@ -113,7 +124,10 @@ def verify(store: Store, point: Point) -> bool:
         else:
             record = store.record(point, name) or {"files": {}}
             console.print(f"ok     {name:<11} {len(record['files']) + 1} files")
-    return not any(verdict.stale for verdict in verdicts.values())
+    lost = not_as_put(store, store.folder)
+    for told in lost:
+        print_error(f"{told}; `reflowshock run` puts it back")
+    return not lost and not any(verdict.stale for verdict in verdicts.values())
 
 
 def clean(folder: Path, name: str, *, unused: bool = False, force: bool = False) -> None:

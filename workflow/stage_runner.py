@@ -1,7 +1,6 @@
 """Running one stage: a fresh partial folder, a record of what was used and found, a rename when all is there."""
 
 import resource
-import shutil
 import time
 import traceback
 from collections.abc import Callable
@@ -12,8 +11,8 @@ from typing import Any, Generic, TypeVar
 from workflow.case_kind import Case
 from workflow.last_word import in_words, is_interrupt
 from workflow.stage_table import Stage
-from workflow.store.keys import compare, stage_inputs
-from workflow.store.product import publish, seal
+from workflow.store.keys import compare, product_key, stage_inputs
+from workflow.store.product import discard, publish, read_record, seal
 from workflow.store.store import MESSAGE, TRACEBACK, reads
 from workflow.terminal import console, health_line
 
@@ -78,11 +77,13 @@ def run_stage(name: str, function: StageFunction, run: Run, product: Path) -> di
         The record: seconds, core_seconds, metrics, health, effects, continued, key, inputs, reads, files.
 
     Raises:
-        StageError: a file that the case names has changed while the stage was at work, or a product was not written.
+        StageError: a file that the case names has changed since the command began, or a product was not written.
     """
     stage, partial = run.case.pipeline[name], run.folder / f".{name}.partial"
     before = {"inputs": stage_inputs(run.case, stage), "reads": _reads(run, stage)}
-    _remove(partial)
+    key = product.name.rpartition("-")[2]
+    _check_key(run, stage, before["inputs"], key)
+    discard(partial)
     partial.mkdir(parents=True)
     start, used = time.perf_counter(), core_seconds()
     findings = function(run, partial)
@@ -93,17 +94,24 @@ def run_stage(name: str, function: StageFunction, run: Run, product: Path) -> di
         "health": findings.health,
         "effects": findings.effects,
         "continued": findings.continued,
-        "key": product.name.rpartition("-")[2],
+        "key": key,
     }
     _check(run, stage, before, partial)
     record = seal(partial, record | before)
     publish(partial, product)
-    _remove(run.checkpoints(name))
+    discard(run.checkpoints(name))
     return record
 
 
 def _reads(run: Run, stage: Stage) -> dict[str, str | None]:
     return reads({one.name: run.folder / one.name for one in run.case.pipeline.stages}, run.case, stage)
+
+
+def _check_key(run: Run, stage: Stage, inputs: dict, key: str) -> None:
+    """See to it that what a stage finds is what its product is named after, when the command began."""
+    follows = [(read_record(run.folder / name) or {}).get("key") for name in stage.follows]
+    if None not in follows and product_key(run.case, stage, inputs, follows) != key:
+        raise StageError("a file of the case, or the program, has changed since the command began; run it again")
 
 
 def _check(run: Run, stage: Stage, before: dict, partial: Path) -> None:
@@ -154,8 +162,3 @@ def _write_message(name: str, folder: Path, error: Exception) -> None:
         (folder / MESSAGE).write_text(told, encoding="utf-8")
     except OSError:
         console.print(f"stage {name} failed: {told}", soft_wrap=True)
-
-
-def _remove(folder: Path) -> None:
-    if folder.exists():
-        shutil.rmtree(folder)

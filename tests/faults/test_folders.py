@@ -1,12 +1,15 @@
 """Folders of any name, folders of somebody else, names that lead elsewhere."""
 
 import os
+import shutil
 import subprocess
 import sys
 
 import pytest
 
 from tests.support.faults import DROP, SMALL_DROP, run_drop
+from tests.support.workflow_command import wait_until
+from workflow.store.engine import SNAKEFILE
 
 ODD = "Drop test #3: a\n\"b' {c} [/x] $(touch pwned) %d *é;\\ -e"
 
@@ -37,6 +40,38 @@ def test_products_of_another_time_are_products(tmp_path):
     assert "ok     reflow" in other.stdout
 
 
+def test_a_folder_that_cannot_be_taken_is_told_before_anything(tmp_path):
+    (tmp_path / "file").write_text("mine")
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine/notes.txt").write_text("mine")
+    long = "/".join(["d" * 200] * 25)
+    for out, words in (("file", "is not a folder"), ("mine", "has files"), (".", "has files"), ("/", "has files")):
+        result = run_drop(out, "plan", cwd=tmp_path)
+        assert result.returncode == 2 and words in result.stderr
+    for command, code in (("plan", 2), ("run", 2), ("status", 1), ("clean", 2)):
+        result = run_drop(long, command, cwd=tmp_path)
+        assert result.returncode == code, command
+        assert result.stderr.count("\n") == 1 and "ile name too long" in result.stderr
+    assert sorted(path.name for path in tmp_path.rglob("*")) == ["file", "mine", "notes.txt"]
+
+
+def test_a_report_does_not_replace_a_users(tmp_path):
+    """Where products are missing, the report is no product, and what a user has put in its place is set aside."""
+    folder = tmp_path / "run"
+    assert run_drop(folder, "run", "--until", "reflow").returncode == 0
+    (folder / "report.html").write_text("mine")
+    for path in folder.glob(".store/products/reflow-*"):
+        shutil.rmtree(path)
+    for _ in range(2):
+        assert run_drop(folder, "report").returncode == 0
+        assert (folder / "report.html.kept-1").read_text() == "mine"
+        assert (folder / "report.html").read_text().startswith("<!")
+        assert not (folder / "report.html.kept-2").exists()
+    (folder / "report.html").unlink()
+    verified = run_drop(folder, "verify")
+    assert verified.returncode == 1 and f"{folder}/report.html is missing" in verified.stderr
+
+
 @pytest.mark.parametrize("name", ["../../esc", "a/b", "..", ".", "a\n", "x" * 5000, "/etc", "-x y"])
 def test_names_do_not_lead_out_of_a_folder(tmp_path, name):
     text = f'[scales."{name}"]\n'.replace("\n", "\\n", name.count("\n"))
@@ -47,3 +82,20 @@ def test_names_do_not_lead_out_of_a_folder(tmp_path, name):
     assert result.returncode == 2, result.stdout + result.stderr
     assert len(result.stderr) < 2000
     assert [path.name for path in tmp_path.iterdir()] == ["case.toml"]
+
+
+def test_plain_snakemake_holds_the_folder_and_shows_no_old_report(tmp_path):
+    folder = tmp_path / "run"
+    assert run_drop(folder).returncode == 0
+    line = [sys.executable, "-m", "snakemake", "-s", str(SNAKEFILE), "--cores", "1", "--config", f"case={DROP}"]
+    line += [f"out={folder}", 'set=["drop.particles_per_edge=5", "solder.numerics.max_steps=1"]']
+    dry = subprocess.run([*line, "-n"], capture_output=True, text=True, timeout=60, check=False, cwd=tmp_path)
+    assert dry.returncode == 0 and (folder / "report.html").exists()
+    process = subprocess.Popen(line, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, cwd=tmp_path)
+    wait_until(lambda: list(folder.glob(".store/work/reflow-*/.reflow.partial")) or process.poll() is not None)
+    assert process.poll() is None
+    assert not (folder / "report.html").exists()
+    assert "another run is at work" in run_drop(folder).stderr
+    assert process.wait(timeout=60) == 1
+    assert not (folder / "report.html").exists()
+    assert "nothing to do" in run_drop(folder).stdout and (folder / "report.html").exists()

@@ -55,7 +55,7 @@ def test_a_study_is_computed_once_and_survives_a_kill(tmp_path):
 
     summary = json.loads((store.run_folder(good) / "summary.json").read_text())
     stage, run = STAGE_FUNCTIONS["drop"]["reflow"], Run(tmp_path / "run", good.case, cores=1)
-    record = run_stage("reflow", stage, run, tmp_path / "product")
+    record = run_stage("reflow", stage, run, tmp_path / store.product(good, "reflow").name)
     assert untimed(summary) == untimed(record)
     found = store.record(good, "reflow")
     assert found is not None

@@ -1,7 +1,6 @@
 """Making products: one Snakemake job for each that is missing; those that fail leave the others finished."""
 
 import json
-import shutil
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -11,6 +10,7 @@ from workflow.cluster.executor import Executor, Jobs, Local, Slurm
 from workflow.cluster.job_output import JobOutput, failures_of
 from workflow.store.engine import SAID, last_words, snakemake
 from workflow.store.point import Point
+from workflow.store.product import discard
 from workflow.store.state import Verdict, examine, why_stale
 from workflow.store.store import Store
 from workflow.store.view import show
@@ -192,7 +192,7 @@ def _untold(store: Store, point: Point, stage: str, verdict: Verdict) -> str:
 
 def _run(store: Store, jobs: Sequence[Job], machine: Machine, lock: int) -> bool:
     """Run Snakemake once for some jobs; what jobs of a cluster say is shown as it comes."""
-    shutil.rmtree(store.home / BATCH, ignore_errors=True)
+    discard(store.home / BATCH)
     (store.home / BATCH / "logs").mkdir(parents=True)
     for job in jobs:
         store.prepare_work(job.point, job.stage)

@@ -1,7 +1,7 @@
 """What Snakemake needs to run a case without the command line: the jobs of a run, written into its store."""
 
-import shutil
 from collections.abc import Mapping
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +9,10 @@ from workflow.case import read_case
 from workflow.store.batch import BATCH, Machine, missing, write_jobs
 from workflow.store.folders import locked
 from workflow.store.point import Point
+from workflow.store.product import discard
 from workflow.store.store import Store
+
+_held = ExitStack()  # the lock of the run folder, until Snakemake ends: its jobs are at work in it
 
 
 def prepare_run(config: Mapping[str, Any], cores: int) -> tuple[Store, Point]:
@@ -27,10 +30,10 @@ def prepare_run(config: Mapping[str, Any], cores: int) -> tuple[Store, Point]:
     case = read_case(Path(config["case"]), config.get("set", []), oversubscribe)
     folder = Path(config.get("out", f"runs/{case.run_name}")).resolve()
     store, point = Store(folder, one_run=True), Point({}, case)
-    with locked(folder, "run", case.case.name):
-        jobs = missing(store, [point], case.pipeline.names[-1])
-        shutil.rmtree(store.home / BATCH, ignore_errors=True)
-        for job in jobs:
-            store.prepare_work(point, job.stage)
-        write_jobs(store, jobs, Machine(cores, exclusive=True, oversubscribe=oversubscribe, live=True))
+    _held.enter_context(locked(folder, "run", case.case.name))
+    jobs = missing(store, [point], case.pipeline.names[-1])
+    discard(store.home / BATCH)
+    for job in jobs:
+        store.prepare_work(point, job.stage)
+    write_jobs(store, jobs, Machine(cores, exclusive=True, oversubscribe=oversubscribe, live=True))
     return store, point

@@ -14,6 +14,7 @@ from workflow.store.store import HOME
 
 MARK = ".reflowshock.json"
 LOCK = ".lock"
+PARTIAL = ".reflowshock.partial"  # a mark that was being written when the program was killed
 UNKNOWN = {"holds": "run", "name": "a case that is not known, since its mark is damaged"}
 
 
@@ -34,9 +35,13 @@ def check_folder(folder: Path, what: str, name: str, force: bool = False) -> Non
         CaseError: it is a file, has files of somebody else, or holds another case or study.
     """
     try:
-        if not os.path.lexists(folder):
-            return
+        folder.lstat()
         names = {path.name for path in folder.iterdir()}
+    except FileNotFoundError:
+        if HOME in folder.resolve().parts:
+            words = f"is in a folder {HOME}, of which the program removes files"
+            raise _refused(folder, words, "a folder elsewhere") from None
+        return
     except NotADirectoryError as error:
         raise _refused(folder, "is not a folder", "a folder, or the name of a new one") from error
     except OSError as error:
@@ -44,7 +49,7 @@ def check_folder(folder: Path, what: str, name: str, force: bool = False) -> Non
     mark = read_mark(folder)
     if mark is None and {"inputs", "stages"} & names and ".snakemake" in names:
         raise _refused(folder, "was written by an earlier version of reflowshock", "another folder, or remove it")
-    if mark is None and names - {LOCK}:
+    if mark is None and names - {LOCK, PARTIAL}:
         raise _refused(folder, "has files that are not the program's", "an empty folder, or the name of a new one")
     if mark is not None and (mark["holds"], mark["name"]) != (what, name) and not force:
         held = f"holds the {mark['holds']} of {mark['name']}, not the {what} of {name}"
@@ -108,7 +113,7 @@ def remove_own(folder: Path) -> list[str]:
         raise _refused(folder / HOME, "is a link", "a folder; remove the link yourself")
     with suppress(FileNotFoundError):
         shutil.rmtree(folder / HOME)
-    for name in (MARK, LOCK):
+    for name in (MARK, LOCK, PARTIAL):
         (folder / name).unlink(missing_ok=True)
     left = sorted(path.name for path in folder.iterdir())
     if not left and folder.resolve() not in (Path.cwd(), *Path.cwd().parents):
@@ -121,7 +126,7 @@ def _mark(folder: Path, what: str, name: str) -> None:
     path = folder / MARK
     if read_mark(folder) == {"holds": what, "name": name}:
         return
-    partial = path.with_suffix(".partial")
+    partial = folder / PARTIAL
     partial.write_text(json.dumps(content) + "\n", encoding="utf-8")
     partial.replace(path)
 

@@ -2,7 +2,7 @@
 
 import hashlib
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -40,14 +40,21 @@ def product_keys(case: Case) -> dict[str, str]:
     """
     found: dict[str, str] = {}
     for stage in case.pipeline.stages:
-        content = {
-            "version": __version__,
-            "stage": f"{case.kind} {stage.name}",
-            "inputs": stage_inputs(case, stage),
-            "follows": [found[name] for name in stage.follows],
-        }
-        found[stage.name] = digest_of(content)[:DIGITS]
+        found[stage.name] = product_key(case, stage, stage_inputs(case, stage), [found[name] for name in stage.follows])
     return found
+
+
+def product_key(case: Case, stage: Stage, inputs: dict, follows: Sequence[str | None]) -> str:
+    """Return the key of a product.
+
+    Args:
+        case: the case.
+        stage: whose product it is.
+        inputs: of the stage.
+        follows: keys of the products of the stages that it follows.
+    """
+    content = {"version": __version__, "stage": f"{case.kind} {stage.name}", "inputs": inputs, "follows": follows}
+    return digest_of(content)[:DIGITS]
 
 
 def inputs_digest(case: Case) -> str:

@@ -44,15 +44,23 @@ def seal(folder: Path, record: dict) -> dict:
 def publish(made: Path, product: Path) -> None:
     """Move what a stage has made and sealed to its place, at once; what is there already goes."""
     product.parent.mkdir(parents=True, exist_ok=True)
-    if product.exists():
+    if os.path.lexists(product):
         old = made.with_name(f".{product.name}.old")
-        shutil.rmtree(old, ignore_errors=True)
+        discard(old)
         product.rename(old)
         made.rename(product)
-        shutil.rmtree(old)
+        discard(old)
     else:
         made.rename(product)
     _sync(product.parent)
+
+
+def discard(path: Path) -> None:
+    """Remove what stands at a path of the store, if anything does; a link, not what it leads to."""
+    if path.is_symlink() or not path.is_dir():
+        path.unlink(missing_ok=True)
+    else:
+        shutil.rmtree(path)
 
 
 def read_record(product: Path) -> dict | None:

@@ -2,7 +2,6 @@
 
 import json
 import os
-import shutil
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,7 +12,7 @@ from workflow.problems import CaseError, Problem
 from workflow.stage_table import Stage
 from workflow.store.keys import digest_of
 from workflow.store.point import Point
-from workflow.store.product import RECORD, SEAL, content_digest, read_record
+from workflow.store.product import RECORD, SEAL, content_digest, discard, read_record
 
 HOME = ".store"  # in a run folder, or in the folder of a study
 CASE = "inputs/case.json"
@@ -70,10 +69,13 @@ class Store:
         Why it failed when it was last tried is forgotten.
         """
         folder = self.work_folder(point, stage)
+        for place in (folder, self._message(point, stage).parent):
+            if place.is_symlink() or place.is_file():
+                place.unlink()
         folder.mkdir(parents=True, exist_ok=True)
         for before in point.case.pipeline.upstream(stage)[:-1]:
             link = folder / before.name
-            link.unlink(missing_ok=True)
+            discard(link)
             link.symlink_to(os.path.relpath(self.product(point, before.name), folder))
         write_case(folder, point.case)
         self._message(point, stage).unlink(missing_ok=True)
@@ -82,7 +84,7 @@ class Store:
         """Remove the run folder in which a product was to be made, if its stage has left nothing in it."""
         folder = self.work_folder(point, stage)
         if folder.is_dir() and not any((folder / f".{stage}.{kind}").exists() for kind in ("partial", "checkpoints")):
-            shutil.rmtree(folder)
+            discard(folder)
 
     def message(self, point: Point, stage: str) -> str | None:
         """Return why a stage failed when it was last tried; None where it did not, or was not tried."""

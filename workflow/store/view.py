@@ -11,9 +11,10 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
+from workflow.stage_table import PAGE
 from workflow.store.point import Point
-from workflow.store.product import RECORD, file_digest, read_record
-from workflow.store.store import CASE, HOME, Store, write_case
+from workflow.store.product import RECORD, discard, file_digest, read_record
+from workflow.store.store import CASE, Store, write_case
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,13 +39,14 @@ def show(store: Store, point: Point, stages: Iterable[str]) -> list[str]:
     folder = store.run_folder(point)
     wanted = _wanted(store, point, set(stages))
     before = listed(store, folder)
+    _make_way(folder, CASE)
     write_case(folder, point.case)
     for name in before.keys() - wanted.keys():
-        _withdraw(store, folder / name, before[name])
+        _withdraw(store, folder, name, before[name])
     _write_list(store, folder, wanted)
-    lost = [name for name, shown in wanted.items() if before.get(name) == shown and not _shows(folder / name, shown)]
+    lost = [name for name, shown in wanted.items() if before.get(name) == shown and not _holds(folder, name, shown)]
     for name, shown in wanted.items():
-        _put(store, folder / name, shown, before.get(name, shown))
+        _put(store, folder, name, shown, before.get(name, shown))
     return lost
 
 
@@ -58,16 +60,20 @@ def listed(store: Store, folder: Path) -> dict[str, Shown]:
 
 
 def _recognised(store: Store, folder: Path) -> dict[str, Shown]:
-    """Return the files of a run folder that hold the same as files of products, where the list of them is lost."""
-    known: dict[str, Shown] = {}
+    """Return the files of a run folder that show files of products, where the list of them is lost.
+
+    They have the names that products are shown under: a copy that a user has made under another name is the user's.
+    """
+    known = []
     for product in (store.home / "products").glob("*"):
         files = (read_record(product) or {"files": {}})["files"]
         if (product / RECORD).is_file():
             files = files | {RECORD: file_digest(product / RECORD)}
-        known |= {digest: Shown(f"products/{product.name}/{name}", digest) for name, digest in files.items()}
-    own = [path for path in folder.rglob("*") if path.is_file() and HOME not in path.relative_to(folder).parts]
-    digests = {path.relative_to(folder).as_posix(): file_digest(path) for path in own}
-    return {name: known[digest] for name, digest in digests.items() if digest in known}
+        stage = product.name.rpartition("-")[0]
+        for name, digest in files.items():
+            shown = Shown(f"products/{product.name}/{name}", digest)
+            known += [(place, shown) for place in (f"{stage}/{name}", *(one for one in PAGE if one == name))]
+    return {name: shown for name, shown in known if _holds(folder, name, shown)}
 
 
 def shown_records(store: Store, point: Point) -> dict[str, dict]:
@@ -78,28 +84,52 @@ def shown_records(store: Store, point: Point) -> dict[str, dict]:
     return {name: record for name, record in records.items() if record is not None}
 
 
-def adopt(store: Store, folder: Path, names: Iterable[str]) -> None:
-    """List files that were written into a run folder, and are of no product, as the program's."""
-    own = {name: Shown(f"views/none/{name}", file_digest(folder / name)) for name in names}
-    _write_list(store, folder, listed(store, folder) | own)
+def adopt(store: Store, folder: Path, made: Path) -> None:
+    """Move files that are of no product to the top of a run folder, and list them as the program's.
+
+    Args:
+        store: of the run folder.
+        folder: the run folder; what a user has put there under their names is set aside.
+        made: the folder that holds them, and nothing else.
+    """
+    files = {path.name: path for path in made.iterdir()}
+    before = listed(store, folder)
+    own = {name: Shown(f"views/none/{name}", file_digest(path)) for name, path in files.items()}
+    for name in own.keys() & before.keys():
+        _withdraw(store, folder, name, before[name])
+    _write_list(store, folder, before | own)
+    for name, path in files.items():
+        if os.path.lexists(folder / name):
+            _set_aside(folder / name)
+        path.rename(folder / name)
+
+
+def not_as_put(store: Store, folder: Path) -> list[str]:
+    """List the files that the program has put into a run folder and that are missing, or others now, in words."""
+    return [
+        f"{folder / name} is {'not as it was written' if os.path.lexists(folder / name) else 'missing'}"
+        for name, shown in listed(store, folder).items()
+        if not _holds(folder, name, shown)
+    ]
 
 
 def withdraw_all(store: Store, folder: Path) -> None:
     """Remove all that the program has put into a run folder, and folders that are empty then."""
     for name, shown in listed(store, folder).items():
-        _withdraw(store, folder / name, shown)
-    (folder / CASE).unlink(missing_ok=True)
-    _remove_empty(folder / CASE, folder)
+        _withdraw(store, folder, name, shown)
+    if (folder / CASE).is_file() and not _is_behind_link(folder, CASE):
+        (folder / CASE).unlink()
+        _remove_empty(folder / CASE, folder)
 
 
 def remove_unused(store: Store) -> int:
     """Remove products that no run folder shows, and what is left of work that was broken off; return how many."""
-    lists = [json.loads(path.read_text(encoding="utf-8")) for path in (store.home / "views").glob("*.json")]
-    shown = {Path(source).parts[1] for table in lists for source, _ in table.values()}
+    folders = [store.folder, *(store.folder / "points").glob("*")]
+    shown = {Path(one.source).parts[1] for folder in folders for one in listed(store, folder).values()}
     unused = [path for path in (store.home / "products").glob("*") if path.name not in shown]
     unused += (store.home / "work").glob("*")
     for path in unused:
-        shutil.rmtree(path)
+        discard(path)
     return len(unused)
 
 
@@ -134,17 +164,15 @@ def _wanted(store: Store, point: Point, stages: set[str]) -> dict[str, Shown]:
     return found
 
 
-def _put(store: Store, path: Path, shown: Shown, before: Shown) -> None:
-    """Let a path show a file of the store; what stands there and is none of the program's is set aside."""
-    source = store.home / shown.source
-    if _same(path, source) or _shows(path, shown):
+def _put(store: Store, folder: Path, name: str, shown: Shown, before: Shown) -> None:
+    """Let a name in a run folder show a file of the store; what stands there and is a user's is set aside."""
+    if _holds(folder, name, shown):
         return
-    _withdraw(store, path, before)
+    _withdraw(store, folder, name, before)
+    _make_way(folder, name)
+    path, source = folder / name, store.home / shown.source
     if os.path.lexists(path):
         _set_aside(path)
-    for parent in reversed(path.relative_to(store.folder).parents):
-        if (place := store.folder / parent).is_symlink() or place.is_file():
-            _set_aside(place)
     path.parent.mkdir(parents=True, exist_ok=True)
     try:
         os.link(source, path)
@@ -152,11 +180,24 @@ def _put(store: Store, path: Path, shown: Shown, before: Shown) -> None:
         shutil.copy2(source, path)
 
 
-def _withdraw(store: Store, path: Path, shown: Shown) -> None:
-    """Remove a file that the program has put there; one that a user has put in its place stays."""
-    if _same(path, store.home / shown.source) or _shows(path, shown):
+def _make_way(folder: Path, name: str) -> None:
+    """Set aside what stands where the folders of a file belong, and is none or leads elsewhere; or a folder for it."""
+    for parent in reversed(_parents(name)):
+        place = folder / parent
+        if place.is_symlink() or (place.exists() and not place.is_dir()):
+            _set_aside(place)
+    if (folder / name).is_dir():
+        _set_aside(folder / name)
+
+
+def _withdraw(store: Store, folder: Path, name: str, shown: Shown) -> None:
+    """Remove a file that the program has put there; one that a user has put in its place, or written into, stays."""
+    path = folder / name
+    if _holds(folder, name, shown):
         path.unlink()
         _remove_empty(path, store.folder)
+    elif not _is_behind_link(folder, name) and _same(path, store.home / shown.source):
+        _set_aside(path)  # by an editor that keeps the file, so that the product has changed, too
 
 
 def _remove_empty(path: Path, top: Path) -> None:
@@ -174,6 +215,21 @@ def _set_aside(path: Path) -> None:
     while os.path.lexists(aside := path.with_name(f"{path.name}.kept-{number}")):
         number += 1
     path.rename(aside)
+
+
+def _holds(folder: Path, name: str, shown: Shown) -> bool:
+    """Whether a run folder has what the program has put there under a name; none behind a link is."""
+    return not _is_behind_link(folder, name) and _shows(folder / name, shown)
+
+
+def _is_behind_link(folder: Path, name: str) -> bool:
+    """Whether a folder in which a file of a run folder would be is a link, which only a user makes."""
+    return any((folder / parent).is_symlink() for parent in _parents(name))
+
+
+def _parents(name: str) -> tuple[Path, ...]:
+    """Return the folders of a file of a run folder, the nearest first, without the run folder itself."""
+    return tuple(Path(name).parents)[:-1]
 
 
 def _same(path: Path, source: Path) -> bool:

@@ -8,12 +8,13 @@ from pathlib import Path
 
 import pytest
 
-from tests.support.products import record_of
+from tests.support.products import make, record_of
 from tests.support.workflow_command import SMALL_CASE
 from workflow.case import read_case
 from workflow.check_text import against_limit
 from workflow.stage_runner import Findings, Run, StageError, execute, run_stage
-from workflow.store.store import MESSAGE, TRACEBACK
+from workflow.store.point import Point
+from workflow.store.store import MESSAGE, TRACEBACK, Store
 
 
 @pytest.fixture
@@ -107,6 +108,22 @@ def test_a_file_of_the_case_that_changes_while_a_stage_is_at_work_is_noticed(run
 
     with pytest.raises(StageError, match=r"package\.surfaces\.A1: the file has changed"):
         run_stage("surface", change, run, product)
+
+
+def test_a_file_of_the_case_that_changes_before_a_stage_begins_is_noticed(tmp_path):
+    """The product is named after what the file held when the command began."""
+    surface = tmp_path / "A1.stl"
+    surface.write_text("first")
+    case = read_case(SMALL_CASE)
+    given = case.package.model_copy(update={"surfaces": {"A1": str(surface)}})
+    store, point = Store(tmp_path / "run", one_run=True), Point({}, case.model_copy(update={"package": given}))
+    make(store, point, ("geometry",))
+    surface.write_text("second")
+    with pytest.raises(StageError, match=r"a file of the case.*has changed since the command"):
+        make(store, point, ("reflow",))
+    assert not store.product(point, "reflow").exists()
+    surface.write_text("first")
+    make(store, point, point.case.pipeline.names[1:])
 
 
 def test_an_interrupt_that_compiled_code_wraps_is_one(run, product):

@@ -12,9 +12,10 @@ from workflow.problems import CaseError
 from workflow.store.batch import show_products
 from workflow.store.folders import RunFolderBusy, locked, remove_own
 from workflow.store.point import Point
+from workflow.store.product import discard
 from workflow.store.state import examine
 from workflow.store.store import Store
-from workflow.store.view import remove_unused, withdraw_all
+from workflow.store.view import not_as_put, remove_unused, withdraw_all
 
 POINT = Point({}, read_case(SMALL_CASE))
 OTHER = Point({}, read_case(SMALL_CASE, ["shock.peak_acceleration=1000 G"]))
@@ -76,6 +77,87 @@ def test_files_of_a_user_stay(store):
     withdraw_all(store, store.folder)
     assert remove_own(store.folder) == ["notes.txt", "report.html.kept-1", "shock"]
     assert all(path.read_text() == "mine" for path in mine)
+
+
+def test_what_a_user_writes_into_a_product_is_set_aside(store):
+    """Some editors keep the file, and write into the product with it."""
+    (store.folder / "summary.json").write_text("mine")
+    show_products(store, POINT)
+    assert not (store.folder / "report.html").exists()
+    assert (store.folder / "summary.json.kept-1").read_text() == "mine"
+    make(store, POINT, ["report"])
+    assert show_products(store, POINT) == []
+    assert (store.folder / "summary.json").read_text() == "report/summary.json"
+    assert (store.folder / "summary.json.kept-1").read_text() == "mine"
+
+
+@pytest.mark.parametrize("clean", [True, False])
+def test_copies_behind_a_link_are_a_users(store, tmp_path, clean):
+    copy = shutil.copytree(store.folder / "shock", tmp_path / "copy")
+    (copy / "notes.txt").write_text("mine")
+    before = sorted(path.name for path in copy.iterdir())
+    shutil.rmtree(store.folder / "shock")
+    (store.folder / "shock").symlink_to(copy)
+    if clean:
+        withdraw_all(store, store.folder)
+        assert remove_own(store.folder) == ["shock"]
+    else:
+        assert show_products(store, POINT) == ["shock/stage.json"]
+        assert (store.folder / "shock.kept-1").is_symlink() and not (store.folder / "shock").is_symlink()
+    assert sorted(path.name for path in copy.iterdir()) == before
+
+
+def test_a_run_folder_may_be_a_link(store, tmp_path):
+    link = tmp_path / "link"
+    link.symlink_to(store.folder)
+    (store.folder / "report.html").unlink()
+    linked = Store(link, one_run=True)
+    assert show_products(linked, POINT) == ["report.html"]
+    assert link.is_symlink() and (store.folder / "report.html").is_file()
+
+
+@pytest.mark.parametrize("harm", ["", None])
+def test_copies_of_a_user_stay_where_the_list_is_lost(store, harm):
+    mine = store.folder / "monday.html"
+    mine.write_bytes((store.folder / "report.html").read_bytes())
+    view = store.home / "views/run.json"
+    view.unlink() if harm is None else view.write_text(harm)
+    assert remove_unused(store) == 0
+    show_products(store, OTHER)
+    assert mine.read_text() == "report/report.html" and not (store.folder / "report.html").exists()
+
+
+def test_a_users_inputs_are_set_aside_or_left(store, tmp_path):
+    shutil.rmtree(store.folder / "inputs")
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine/case.json").write_text("mine")
+    (store.folder / "inputs").symlink_to(tmp_path / "mine")
+    withdraw_all(store, store.folder)
+    assert (tmp_path / "mine/case.json").read_text() == "mine"
+    show_products(store, POINT)
+    assert (store.folder / "inputs.kept-1").is_symlink() and (store.folder / "inputs/case.json").is_file()
+    assert (tmp_path / "mine/case.json").read_text() == "mine"
+
+
+@pytest.mark.parametrize("place", ["product", "work", "partial", "link"])
+@pytest.mark.parametrize("kind", ["file", "link", "folder"])
+def test_whatever_stands_where_a_product_is_made_gives_way(store, tmp_path, place, kind):
+    product, work = store.product(POINT, "surface"), store.work_folder(POINT, "surface")
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine/notes.txt").write_text("mine")
+    path = {"product": product, "work": work, "partial": work / ".surface.partial", "link": work / "reflow"}[place]
+    discard(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    if kind == "file":
+        path.write_text("?")
+    elif kind == "link":
+        path.symlink_to(tmp_path / "mine")
+    else:
+        shutil.copytree(tmp_path / "mine", path)
+    make(store, POINT, ["surface"])
+    assert not any(verdict.stale for verdict in examine(store, POINT).values())
+    assert not product.is_symlink()
+    assert [file.name for file in (tmp_path / "mine").iterdir()] == ["notes.txt"]
 
 
 def test_all_is_removed_where_nothing_is_a_users(store, monkeypatch):
@@ -150,6 +232,34 @@ def test_a_folder_of_somebody_else_is_left_alone(tmp_path, names, words):
         with pytest.raises(CaseError, match=words), locked(tmp_path, "run", "small", force):
             pass
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted(names)
+
+
+def test_no_run_folder_is_made_in_a_store(store):
+    folder = store.home / "products/mine"
+    with pytest.raises(CaseError, match=r"is in a folder \.store"), locked(folder, "run", "small"):
+        pass
+    assert not folder.exists()
+
+
+def test_a_mark_that_was_being_written_is_no_users(tmp_path):
+    (tmp_path / ".reflowshock.partial").write_text("{")
+    with locked(tmp_path, "run", "small"):
+        pass
+    assert remove_own(tmp_path) == []
+
+
+def test_what_the_run_folder_lacks_is_told(store):
+    assert not_as_put(store, store.folder) == []
+    (store.folder / "report.html").unlink()
+    (store.folder / "summary.json").unlink()
+    (store.folder / "summary.json").write_text("mine")
+    told = not_as_put(store, store.folder)
+    assert sorted(line.removeprefix(f"{store.folder}/") for line in told) == [
+        "report.html is missing",
+        "summary.json is not as it was written",
+    ]
+    show_products(store, POINT)
+    assert not_as_put(store, store.folder) == []
 
 
 def test_a_run_folder_has_one_user(tmp_path):
