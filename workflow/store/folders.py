@@ -133,7 +133,7 @@ def _mark(folder: Path, what: str, name: str) -> None:
 
 def _clear_store(folder: Path) -> None:
     """Remove files that stand where folders of the store belong, in which only the program has written."""
-    for name in ("", "products", "work", "views"):
+    for name in ("", "products", "work", "views", ".snakemake"):
         if (place := folder / HOME / name).is_file():
             discard(place)
 

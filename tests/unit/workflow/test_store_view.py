@@ -117,7 +117,6 @@ def test_a_run_folder_may_be_a_link(store, tmp_path):
     assert link.is_symlink() and (store.folder / "report.html").is_file()
 
 
-@pytest.mark.parametrize("harm", ["", None])
 def test_what_is_shown_no_more_goes_before_the_list_forgets_it(store, monkeypatch):
     """However early the program is killed, no old product is taken for a user's file."""
 
@@ -134,6 +133,7 @@ def test_what_is_shown_no_more_goes_before_the_list_forgets_it(store, monkeypatc
     assert not list(store.folder.rglob("*.kept-*"))
 
 
+@pytest.mark.parametrize("harm", ["", None])
 def test_copies_of_a_user_stay_where_the_list_is_lost(store, harm):
     mine = store.folder / "monday.html"
     mine.write_bytes((store.folder / "report.html").read_bytes())
