@@ -16,6 +16,8 @@ from workflow.store.point import Point
 from workflow.store.product import RECORD, discard, file_digest, read_record
 from workflow.store.store import CASE, Store, write_case
 
+NO_PRODUCT = "views/none"  # in place of the product that a file is of
+
 
 @dataclass(frozen=True, slots=True)
 class Shown:
@@ -41,12 +43,13 @@ def show(store: Store, point: Point, stages: Iterable[str]) -> list[str]:
     before = listed(store, folder)
     _make_way(folder, CASE)
     write_case(folder, point.case)
-    for name in before.keys() - wanted.keys():
-        _withdraw(store, folder, name, before[name])
+    for name, shown in before.items():
+        if wanted.get(name) != shown:
+            _withdraw(store, folder, name, shown)
     _write_list(store, folder, wanted)
     lost = [name for name, shown in wanted.items() if before.get(name) == shown and not _holds(folder, name, shown)]
     for name, shown in wanted.items():
-        _put(store, folder, name, shown, before.get(name, shown))
+        _put(store, folder, name, shown)
     return lost
 
 
@@ -85,21 +88,22 @@ def shown_records(store: Store, point: Point) -> dict[str, dict]:
 
 
 def adopt(store: Store, folder: Path, made: Path) -> None:
-    """Move files that are of no product to the top of a run folder, and list them as the program's.
+    """Move files that are of no product to the top of a folder, and list them as the program's; such from before go.
 
     Args:
-        store: of the run folder.
-        folder: the run folder; what a user has put there under their names is set aside.
+        store: of the folder.
+        folder: of a run or study; what a user has put there under their names is set aside.
         made: the folder that holds them, and nothing else.
     """
     files = {path.name: path for path in made.iterdir()}
     before = listed(store, folder)
-    own = {name: Shown(f"views/none/{name}", file_digest(path)) for name, path in files.items()}
-    for name in own.keys() & before.keys():
-        _withdraw(store, folder, name, before[name])
+    own = {name: Shown(f"{NO_PRODUCT}/{name}", file_digest(path)) for name, path in files.items()}
+    for name, shown in list(before.items()):
+        if name in own or shown.source.startswith(NO_PRODUCT):
+            _withdraw(store, folder, name, before.pop(name))
     _write_list(store, folder, before | own)
     for name, path in files.items():
-        if os.path.lexists(folder / name):
+        if os.path.lexists(folder / name) and not _holds(folder, name, own[name]):
             _set_aside(folder / name)
         path.rename(folder / name)
 
@@ -143,6 +147,8 @@ def _write_list(store: Store, folder: Path, wanted: dict[str, Shown]) -> None:
     partial = path.with_suffix(".partial")
     table = {name: [shown.source, shown.digest] for name, shown in wanted.items()}
     partial.write_text(json.dumps(table, indent=1) + "\n", encoding="utf-8")
+    if path.is_dir():
+        discard(path)
     partial.replace(path)
 
 
@@ -164,11 +170,10 @@ def _wanted(store: Store, point: Point, stages: set[str]) -> dict[str, Shown]:
     return found
 
 
-def _put(store: Store, folder: Path, name: str, shown: Shown, before: Shown) -> None:
+def _put(store: Store, folder: Path, name: str, shown: Shown) -> None:
     """Let a name in a run folder show a file of the store; what stands there and is a user's is set aside."""
     if _holds(folder, name, shown):
         return
-    _withdraw(store, folder, name, before)
     _make_way(folder, name)
     path, source = folder / name, store.home / shown.source
     if os.path.lexists(path):
