@@ -3,13 +3,13 @@
 import fcntl
 import json
 import os
-import shutil
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 
 from workflow import __version__
 from workflow.problems import CaseError, Problem
+from workflow.store.product import discard
 from workflow.store.store import HOME
 
 MARK = ".reflowshock.json"
@@ -98,6 +98,7 @@ def locked(folder: Path, what: str, name: str, force: bool = False) -> Iterator[
         except BlockingIOError as error:
             raise RunFolderBusy(f"another run is at work in {folder}") from error
         _mark(folder, what, name)
+        _clear_store(folder)
         yield descriptor
     finally:
         os.close(descriptor)
@@ -111,8 +112,7 @@ def remove_own(folder: Path) -> list[str]:
     """
     if (folder / HOME).is_symlink():
         raise _refused(folder / HOME, "is a link", "a folder; remove the link yourself")
-    with suppress(FileNotFoundError):
-        shutil.rmtree(folder / HOME)
+    discard(folder / HOME)
     for name in (MARK, LOCK, PARTIAL):
         (folder / name).unlink(missing_ok=True)
     left = sorted(path.name for path in folder.iterdir())
@@ -129,6 +129,13 @@ def _mark(folder: Path, what: str, name: str) -> None:
     partial = folder / PARTIAL
     partial.write_text(json.dumps(content) + "\n", encoding="utf-8")
     partial.replace(path)
+
+
+def _clear_store(folder: Path) -> None:
+    """Remove files that stand where folders of the store belong, in which only the program has written."""
+    for name in ("", "products", "work", "views", ".snakemake"):
+        if (place := folder / HOME / name).is_file():
+            discard(place)
 
 
 def _refused(folder: Path, message: str, allowed: str) -> CaseError:

@@ -41,12 +41,13 @@ def show(store: Store, point: Point, stages: Iterable[str]) -> list[str]:
     before = listed(store, folder)
     _make_way(folder, CASE)
     write_case(folder, point.case)
-    for name in before.keys() - wanted.keys():
-        _withdraw(store, folder, name, before[name])
+    for name, shown in before.items():
+        if wanted.get(name) != shown:
+            _withdraw(store, folder, name, shown)
     _write_list(store, folder, wanted)
     lost = [name for name, shown in wanted.items() if before.get(name) == shown and not _holds(folder, name, shown)]
     for name, shown in wanted.items():
-        _put(store, folder, name, shown, before.get(name, shown))
+        _put(store, folder, name, shown)
     return lost
 
 
@@ -143,6 +144,8 @@ def _write_list(store: Store, folder: Path, wanted: dict[str, Shown]) -> None:
     partial = path.with_suffix(".partial")
     table = {name: [shown.source, shown.digest] for name, shown in wanted.items()}
     partial.write_text(json.dumps(table, indent=1) + "\n", encoding="utf-8")
+    if path.is_dir():
+        discard(path)
     partial.replace(path)
 
 
@@ -164,11 +167,10 @@ def _wanted(store: Store, point: Point, stages: set[str]) -> dict[str, Shown]:
     return found
 
 
-def _put(store: Store, folder: Path, name: str, shown: Shown, before: Shown) -> None:
+def _put(store: Store, folder: Path, name: str, shown: Shown) -> None:
     """Let a name in a run folder show a file of the store; what stands there and is a user's is set aside."""
     if _holds(folder, name, shown):
         return
-    _withdraw(store, folder, name, before)
     _make_way(folder, name)
     path, source = folder / name, store.home / shown.source
     if os.path.lexists(path):

@@ -9,6 +9,7 @@ from tests.support.products import make
 from tests.support.workflow_command import SMALL_CASE
 from workflow.case import read_case
 from workflow.problems import CaseError
+from workflow.store import view
 from workflow.store.batch import show_products
 from workflow.store.folders import RunFolderBusy, locked, remove_own
 from workflow.store.point import Point
@@ -116,12 +117,28 @@ def test_a_run_folder_may_be_a_link(store, tmp_path):
     assert link.is_symlink() and (store.folder / "report.html").is_file()
 
 
+def test_what_is_shown_no_more_goes_before_the_list_forgets_it(store, monkeypatch):
+    """However early the program is killed, no old product is taken for a user's file."""
+
+    def kill(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    make(store, POINT, ["report"], content=" again")
+    with monkeypatch.context() as patched, pytest.raises(KeyboardInterrupt):
+        patched.setattr(view, "_write_list", kill)
+        show_products(store, POINT)
+    assert not (store.folder / "report.html").exists()
+    show_products(store, POINT)
+    assert (store.folder / "report.html").read_text() == "report/report.html again"
+    assert not list(store.folder.rglob("*.kept-*"))
+
+
 @pytest.mark.parametrize("harm", ["", None])
 def test_copies_of_a_user_stay_where_the_list_is_lost(store, harm):
     mine = store.folder / "monday.html"
     mine.write_bytes((store.folder / "report.html").read_bytes())
-    view = store.home / "views/run.json"
-    view.unlink() if harm is None else view.write_text(harm)
+    names = store.home / "views/run.json"
+    names.unlink() if harm is None else names.write_text(harm)
     assert remove_unused(store) == 0
     show_products(store, OTHER)
     assert mine.read_text() == "report/report.html" and not (store.folder / "report.html").exists()
@@ -158,6 +175,27 @@ def test_whatever_stands_where_a_product_is_made_gives_way(store, tmp_path, plac
     assert not any(verdict.stale for verdict in examine(store, POINT).values())
     assert not product.is_symlink()
     assert [file.name for file in (tmp_path / "mine").iterdir()] == ["notes.txt"]
+
+
+@pytest.mark.parametrize("name", [".store", ".store/products", ".store/work", ".store/views"])
+def test_a_file_where_a_folder_of_the_store_belongs_gives_way(store, name):
+    discard(store.folder / name)
+    (store.folder / name).write_text("?")
+    with locked(store.folder, "run", "small"):
+        for stage in NAMES:
+            if not store.has(POINT, stage):
+                make(store, POINT, [stage])
+        show_products(store, POINT)
+    assert not any(verdict.stale for verdict in examine(store, POINT).values())
+    assert not_as_put(store, store.folder) == []
+
+
+def test_a_folder_where_the_list_belongs_gives_way(store):
+    names = store.home / "views/run.json"
+    names.unlink()
+    names.mkdir()
+    assert show_products(store, POINT) == []
+    assert names.is_file()
 
 
 def test_all_is_removed_where_nothing_is_a_users(store, monkeypatch):
