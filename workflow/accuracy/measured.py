@@ -161,7 +161,7 @@ def read_accuracy(path: Path) -> Accuracy | None:
         return None
     try:
         return _accuracy(json.loads(path.read_text(encoding="utf-8")))
-    except (KeyError, TypeError, json.JSONDecodeError):
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
         return None
 
 

@@ -16,6 +16,8 @@ from workflow.store.point import Point
 from workflow.store.product import RECORD, discard, file_digest, read_record
 from workflow.store.store import CASE, Store, write_case
 
+NO_PRODUCT = "views/none"  # in place of the product that a file is of
+
 
 @dataclass(frozen=True, slots=True)
 class Shown:
@@ -86,21 +88,22 @@ def shown_records(store: Store, point: Point) -> dict[str, dict]:
 
 
 def adopt(store: Store, folder: Path, made: Path) -> None:
-    """Move files that are of no product to the top of a run folder, and list them as the program's.
+    """Move files that are of no product to the top of a folder, and list them as the program's; such from before go.
 
     Args:
-        store: of the run folder.
-        folder: the run folder; what a user has put there under their names is set aside.
+        store: of the folder.
+        folder: of a run or study; what a user has put there under their names is set aside.
         made: the folder that holds them, and nothing else.
     """
     files = {path.name: path for path in made.iterdir()}
     before = listed(store, folder)
-    own = {name: Shown(f"views/none/{name}", file_digest(path)) for name, path in files.items()}
-    for name in own.keys() & before.keys():
-        _withdraw(store, folder, name, before[name])
+    own = {name: Shown(f"{NO_PRODUCT}/{name}", file_digest(path)) for name, path in files.items()}
+    for name, shown in list(before.items()):
+        if name in own or shown.source.startswith(NO_PRODUCT):
+            _withdraw(store, folder, name, before.pop(name))
     _write_list(store, folder, before | own)
     for name, path in files.items():
-        if os.path.lexists(folder / name):
+        if os.path.lexists(folder / name) and not _holds(folder, name, own[name]):
             _set_aside(folder / name)
         path.rename(folder / name)
 

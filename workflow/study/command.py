@@ -14,7 +14,9 @@ from workflow.progress import progress_bar
 from workflow.store.batch import Machine, missing, run_points, show_products
 from workflow.store.folders import locked
 from workflow.store.point import Point, PointsError, read_possible_points
+from workflow.store.product import discard
 from workflow.store.store import Store
+from workflow.store.view import adopt
 from workflow.study import tables
 from workflow.study.main_effects import is_number
 from workflow.study.outlook import outlook
@@ -131,11 +133,21 @@ def run_study(points: Points, store: Store, machine: Machine, *, force: bool = F
                 show_products(store, point)
             failed = {}
         rows = results(points, store, failed)
-        from workflow.study.page import write_results
-
-        write_results(store.folder, points.study, rows)
+        _write_results(store, points.study, rows)
     show_results(points.study, rows, store.folder)
     return has_metrics(points.study, rows) and all(row.verdict in (HEALTHY, IMPOSSIBLE) for row in rows)
+
+
+def _write_results(store: Store, study: Study, rows: Sequence[Row]) -> None:
+    """Write the results of a study beside its store; what a user has changed in earlier ones is set aside."""
+    from workflow.study.page import write_results
+
+    made = store.home / "work" / "results"
+    discard(made)
+    made.mkdir(parents=True)
+    write_results(made, study, rows)
+    adopt(store, store.folder, made)
+    discard(made)
 
 
 def results(points: Points, store: Store, failed: dict[str, str]) -> list[Row]:

@@ -133,6 +133,28 @@ def test_what_is_shown_no_more_goes_before_the_list_forgets_it(store, monkeypatc
     assert not list(store.folder.rglob("*.kept-*"))
 
 
+def test_what_is_of_no_product_does_not_replace_a_users(store):
+    def adopted(text: str, *names: str) -> None:
+        made = store.home / "work/made"
+        made.mkdir(parents=True)
+        for name in names:
+            (made / name).write_text(text)
+        view.adopt(store, store.folder, made)
+        made.rmdir()
+
+    (store.folder / "results.csv").write_text("mine")
+    adopted("first", "results.csv", "picture.png")
+    assert (store.folder / "results.csv.kept-1").read_text() == "mine"
+    (store.folder / "results.csv").write_text("mine, too")
+    adopted("second", "results.csv")
+    assert (store.folder / "results.csv").read_text() == "second"
+    assert (store.folder / "results.csv.kept-2").read_text() == "mine, too"
+    assert not (store.folder / "picture.png").exists() and (store.folder / "report.html").exists()
+    adopted("third", "results.csv")
+    assert len(list(store.folder.glob("results.csv*"))) == 3
+    assert show_products(store, POINT) == [] and not (store.folder / "results.csv").exists()
+
+
 @pytest.mark.parametrize("harm", ["", None])
 def test_copies_of_a_user_stay_where_the_list_is_lost(store, harm):
     mine = store.folder / "monday.html"
