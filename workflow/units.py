@@ -12,6 +12,7 @@ QUANTITY = re.compile(
     r"\s*(?P<number>[-+]?(?:[0-9]{1,400}(?:\.[0-9]{0,400})?|\.[0-9]{1,400})(?:[eE][-+]?[0-9]{1,9})?)"
     r"\s*(?P<unit>(?:\S(?:.*\S)?)?)\s*"
 )
+COMMA = re.compile(r",\s*[0-9]")  # after the digits of a number: decimals, or thousands
 FACTOR = r"[^\W\d]\w*(?:(?:\^|\*\*)-?\d)?"
 UNIT = re.compile(rf"(?:1?\s*/\s*)?{FACTOR}(?:\s*[*/]\s*{FACTOR})*")
 FLOAT_MAX, LARGEST_EXPONENT = 1.0e308, 1000
@@ -60,6 +61,8 @@ def to_si(text: object, unit: str) -> float:
     match = QUANTITY.fullmatch(text) if len(text) <= LONGEST else None
     if match is None:
         raise UnitError(f'is not a number and a unit, such as "1 {unit}"')
+    if COMMA.match(match["unit"]):
+        raise UnitError(f'has a comma in its number; write decimals with a point, as "1.5 {unit}", and 1000 without')
     if not match["unit"]:
         raise UnitError(f'needs a unit, such as "{match["number"]} {unit}"')
     parsed = _parse_unit(match["unit"], unit)

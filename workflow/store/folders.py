@@ -97,6 +97,8 @@ def locked(folder: Path, what: str, name: str, force: bool = False) -> Iterator[
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError as error:
             raise RunFolderBusy(f"another run is at work in {folder}") from error
+        if not _is_there(folder / LOCK, descriptor):
+            raise RunFolderBusy(f"another command has just removed {folder}; try again")
         _mark(folder, what, name)
         _clear_store(folder)
         yield descriptor
@@ -129,6 +131,13 @@ def _mark(folder: Path, what: str, name: str) -> None:
     partial = folder / PARTIAL
     partial.write_text(json.dumps(content) + "\n", encoding="utf-8")
     partial.replace(path)
+
+
+def _is_there(lock: Path, descriptor: int) -> bool:
+    """Whether a lock that is held is still the one that others would try to hold."""
+    with suppress(FileNotFoundError):
+        return os.path.samestat(lock.stat(), os.fstat(descriptor))
+    return False
 
 
 def _clear_store(folder: Path) -> None:

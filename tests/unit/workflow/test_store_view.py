@@ -1,5 +1,6 @@
 """Run folders: they show products by name, keep what is a user's, and are cleaned of the program's files only."""
 
+import fcntl
 import os
 import shutil
 
@@ -327,6 +328,19 @@ def test_a_run_folder_has_one_user(tmp_path):
     with first, pytest.raises(RunFolderBusy, match="another run is at work"), second:
         pass
     with locked(tmp_path, "run", "a"):
+        pass
+
+
+def test_a_lock_that_was_removed_meanwhile_is_none(tmp_path, monkeypatch):
+    """As when a folder is cleaned between the opening of its lock and the holding of it."""
+    folder, take = tmp_path / "run", fcntl.flock
+
+    def clean_first(descriptor: int, how: int) -> None:
+        (folder / ".lock").unlink()
+        take(descriptor, how)
+
+    monkeypatch.setattr(fcntl, "flock", clean_first)
+    with pytest.raises(RunFolderBusy, match="try again"), locked(folder, "run", "a"):
         pass
 
 

@@ -57,6 +57,8 @@ def test_quantities_become_si(text, unit, value):
         ("1 kg", "is a mass; expected a length, e.g. in mm"),
         ("1 deg", "is an angle; expected a length"),
         ("1 mmm", '"mmm" is not a known unit'),
+        ("1,5 mm", 'has a comma in its number; write decimals with a point, as "1.5 mm"'),
+        ("1,500.0 G", "has a comma in its number"),
         ("1 2 mm", '"2 mm" is not a unit'),
         ("1 mm/", '"mm/" is not a unit'),
         ("1 mm^1e9", "is not a unit"),
