@@ -25,6 +25,13 @@ test-long: setup  ## the expensive sweeps: 50 interrupts, damage, random hard ca
 test-debian13:  ## run every test on Debian 13 too, in a chroot; compare results (root)
 	@.ci/debian13
 
+test-golden: setup  ## run every case with this checkout and with the commit BASE: equal to the bit
+	@git worktree add --force --detach build/golden/base $(BASE)
+	$(PYTHON) -m tests.same_results run build/golden/before --every --checkout build/golden/base
+	$(PYTHON) -m tests.same_results run build/golden/after --every
+	@git worktree remove --force build/golden/base
+	$(PYTHON) -m tests.same_results compare build/golden/before build/golden/after --every --exactly
+
 test-mpi: setup  ## run the tests that start several MPI ranks
 	$(PYTHON) -m pytest tests/mpi
 
@@ -39,5 +46,5 @@ clean:  ## remove runs and caches (keeps .venv)
 	rm -rf runs build *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
 	find . -name __pycache__ -not -path './.venv/*' -prune -exec rm -rf {} +
 
-.PHONY: help setup demo test test-long test-debian13 test-mpi lint bench clean
+.PHONY: help setup demo test test-long test-debian13 test-golden test-mpi lint bench clean
 .DEFAULT_GOAL := help

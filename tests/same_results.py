@@ -1,0 +1,183 @@
+"""Small cases of every kind, run by two systems or two checkouts, whose results must agree.
+
+    python -m tests.same_results run FOLDER [--checkout FOLDER]
+    python -m tests.same_results compare FOLDER FOLDER [--exactly]
+
+Two systems: metrics agree to a relative difference of 1e-6; those without a unit also if they differ by less than 1e-6
+(errors and residuals are near zero, and what they are relative to is one). Two checkouts on one system: every metric
+and every array of histories, shapes and meshes is equal to the bit; on two ranks, whose shares of the mesh follow
+speeds measured at the start, to 1e-6. Words and counts are the same. Only what the machine decides is left out: times,
+speeds, shares of time, and how its library of solvers stores a factor.
+"""
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+ROOT = Path(__file__).resolve().parents[1]
+TOLERANCE = 1e-6
+MEASURED_UNITS = {"1/s", "MB", "B"}
+MEASURED = ("seconds", "time_ratio", "per_second", "factor_", "busy_share", "coupling_overhead")
+HEATED = (
+    "warpage.corner=0 mm", "thermal.melting=100 degC", "thermal.peak=200 degC", "thermal.solidification=200 degC",
+    "thermal.steps=1", "thermal.effects.solder_force=on", "solder.numerics.time_step_limit=100",
+)  # fmt: skip
+# A drop in which solder that has cooled hardly flows would amplify rounding: its plastic work starts with the drop.
+COOLED = (
+    "thermal.effects.residual_stress=on", "thermal.effects.flexible=off", "materials.solder=SAC405",
+    "shock.peak_acceleration=15000 G",
+)  # fmt: skip
+QUICK = ("scale=quick",)
+COARSE_DROP = ("drop.particles_per_edge=7",)
+COARSE_BOARD = (
+    "structure.cells=[12,8]", "dynamics.duration=0.5 ms", "dynamics.modes=3", "dynamics.numerics.field_samples=4",
+    "dynamics.numerics.implicit_step=2.5 us",
+)  # fmt: skip
+CASES = {
+    "drop": ("tests/pipeline/small.toml", ()),
+    "heated": ("tests/pipeline/small.toml", HEATED),
+    "cooled": ("tests/pipeline/small.toml", COOLED),
+    "structure": ("tests/pipeline/structure.toml", ()),
+    "jedec_board": ("cases/jedec_board/case.toml", COARSE_BOARD),
+    "bar_wave": ("cases/bar_wave/case.toml", ("structure.layers.lower.cells=150", "structure.layers.upper.cells=90")),
+    "cantilever": ("cases/cantilever/case.toml", ("structure.layers.strip.thickness=1 mm", "dynamics.duration=7 ms")),
+    "sessile_drop": ("cases/sessile_drop/case.toml", COARSE_DROP),
+    "bga_ball": ("cases/bga_ball/case.toml", COARSE_DROP),
+    "laplace_drop": ("cases/laplace_drop/case.toml", COARSE_DROP),
+    "solder_joint": ("cases/solder_joint/case.toml", ("joint.spacing=0.06 mm",)),
+}
+EVERY_CASE = CASES | {
+    "drop_2_ranks": ("tests/pipeline/small.toml", ("shock.ranks.total=2",)),
+    "structure_2_ranks": ("tests/pipeline/structure.toml", ("dynamics.ranks=2",)),
+    "coalescence": ("cases/coalescence/case.toml", ("drops.spacing=0.14 mm",)),
+    "oscillating_drop": ("cases/oscillating_drop/case.toml", ()),
+    "two_scale_bar": ("cases/two_scale_bar/case.toml", ()),
+    "bga_drop": ("cases/bga_drop/case.toml", QUICK),
+    "hu_bga_reflow": ("cases/hu_bga_reflow/case.toml", QUICK),
+}
+
+
+def run_cases(folder: Path, checkout: Path, names: list[str]) -> int:
+    """Run the cases by the program of a checkout, each in a folder of its own; return how many have no summary."""
+    missing = 0
+    for name in names:
+        path, settings = EVERY_CASE[name]
+        line = [sys.executable, "-m", "workflow", "run", str(checkout / path), "--out", str(folder.resolve() / name)]
+        line += [item for setting in settings for item in ("--set", setting)]
+        begin, environment = time.perf_counter(), os.environ | {"PYTHONPATH": str(checkout)}
+        result = subprocess.run(line, capture_output=True, text=True, cwd=checkout, env=environment, check=False)
+        complete = (folder / name / "summary.json").exists()
+        print(f"{name:18}{time.perf_counter() - begin:6.0f} s  {'ran' if complete else 'FAILED'}", flush=True)
+        if not complete:
+            missing += 1
+            print(result.stdout + result.stderr)
+    return missing
+
+
+def differences(first: dict, second: dict) -> Iterator[tuple[str, object, object, float]]:
+    """Yield each metric of two summaries with both values and their difference in units of what is allowed."""
+    first, second = first["metrics"], second["metrics"]
+    for name in sorted(first.keys() | second.keys()):
+        unit = (first.get(name) or second[name])["unit"]
+        if unit in MEASURED_UNITS or any(word in name for word in MEASURED):
+            continue
+        ours, theirs = (metrics.get(name, {}).get("value") for metrics in (first, second))
+        if isinstance(ours, float | int) and isinstance(theirs, float | int):
+            scale = max(abs(ours), abs(theirs), 0.0 if unit else 1.0)
+            excess = abs(ours - theirs) / (TOLERANCE * scale) if scale else 0.0
+        else:
+            excess = 0.0 if ours == theirs else float("inf")
+        yield name, ours, theirs, excess
+
+
+def compare(first: Path, second: Path, names: list[str]) -> int:
+    """Print how far the results of two systems are apart; return how many metrics differ by more than allowed."""
+    count = 0
+    for name in names:
+        ours, theirs = (json.loads((folder / name / "summary.json").read_text()) for folder in (first, second))
+        found = list(differences(ours, theirs))
+        worst = max(found, key=lambda item: item[3])
+        print(f"{name:18}{len(found):4} metrics, most apart {worst[0]}: {worst[3] * TOLERANCE:.1e}")
+        for metric, value, other, excess in found:
+            if not excess <= 1.0:  # nan is no agreement
+                count += 1
+                print(f"    {metric}: {value} and {other}, {excess * TOLERANCE:.1e} apart")
+    return count
+
+
+def arrays(folder: Path) -> Iterator[tuple[str, np.ndarray]]:
+    """Yield the arrays of a run folder: histories, shapes, meshes (their text), by file and name in it."""
+    for path in sorted(folder.rglob("*")):
+        file = str(path.relative_to(folder))
+        if ".store" in path.parts or not path.is_file():
+            continue
+        if path.suffix == ".npz":
+            with np.load(path) as data:
+                yield from ((f"{file}:{name}", data[name]) for name in data.files)
+        elif path.suffix == ".h5":
+            with h5py.File(path) as data:
+                names: list[str] = []
+                data.visit(names.append)
+                sets = [name for name in names if isinstance(data[name], h5py.Dataset)]
+                yield from ((f"{file}:{name}", np.asarray(data[name])) for name in sets)
+        elif path.suffix == ".msh":
+            yield file, np.frombuffer(path.read_bytes(), np.uint8)
+
+
+def compare_exactly(first: Path, second: Path, names: list[str]) -> int:
+    """Print which arrays and metrics of two checkouts differ at all; return how many do."""
+    count = 0
+    for name in names:
+        tolerance = TOLERANCE if name.endswith("_ranks") else 0.0
+        ours, theirs = (dict(arrays(folder / name)) for folder in (first, second))
+        apart = {key: distance(ours.get(key), theirs.get(key)) for key in ours.keys() | theirs.keys()}
+        summaries = (json.loads((folder / name / "summary.json").read_text()) for folder in (first, second))
+        apart |= {metric: excess * TOLERANCE for metric, _, _, excess in differences(*summaries)}
+        different = {key: value for key, value in apart.items() if not value <= tolerance}
+        print(
+            f"{name:18}{len(apart):4} arrays and metrics, {len(different)} differ, at most by {max(apart.values()):.1e}"
+        )
+        for key in sorted(different):
+            print(f"    {key}: {different[key]:.1e} apart")
+        count += len(different)
+    return count
+
+
+def distance(first: np.ndarray | None, second: np.ndarray | None) -> float:
+    """Return the largest difference of two arrays over their largest value; infinite where they cannot be compared."""
+    if first is None or second is None or first.shape != second.shape or first.dtype != second.dtype:
+        return float("inf")
+    if np.array_equal(first, second, equal_nan=first.dtype.kind == "f"):
+        return 0.0
+    if first.dtype.kind != "f":
+        return float("inf")
+    return float(np.nanmax(np.abs(first - second)) / np.nanmax(np.abs(first)))
+
+
+def main() -> int:
+    """Read the command line."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("command", choices=("run", "compare"))
+    parser.add_argument("folders", nargs="+", type=Path)
+    parser.add_argument("--only", nargs="+", choices=EVERY_CASE, help="cases, instead of all")
+    parser.add_argument("--every", action="store_true", help="all cases, those of two ranks and long ones too")
+    parser.add_argument("--checkout", type=Path, default=ROOT, help="whose program runs the cases")
+    parser.add_argument("--exactly", action="store_true", help="equal to the bit, arrays too")
+    arguments = parser.parse_args()
+    names = arguments.only or list(EVERY_CASE if arguments.every else CASES)
+    if arguments.command == "run":
+        return 1 if run_cases(arguments.folders[0], arguments.checkout.resolve(), names) else 0
+    comparison = compare_exactly if arguments.exactly else compare
+    return 1 if comparison(*arguments.folders, names) else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
