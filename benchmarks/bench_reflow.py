@@ -11,12 +11,12 @@ from time import perf_counter
 
 import numpy as np
 
-from particles.geometry import JointGeometry
-from particles.mls import SUPPORT, derivatives
-from particles.neighbours import NeighbourList
-from particles.parameters import Solder, SolderNumerics
-from particles.reflow import solve_joint
-from particles.rest import NoRest
+from particles.core.geometry import JointGeometry
+from particles.core.neighbours import NeighbourList
+from particles.ispg.mls import SUPPORT, derivatives
+from particles.parameters.solder import Solder, SolderNumerics
+from particles.scenes.reflow import solve_joint
+from particles.steps.rest import NoRest
 
 RESULTS = Path(__file__).parent / "results" / "reflow.json"
 BALL, RADIUS, MM = 0.0724e-9, 0.24e-3, 1e-3
@@ -70,7 +70,7 @@ def derivative_errors(basis: str, count: int) -> dict:
 
 
 def cost_of_a_step(rows: list[dict]) -> dict:
-    """Fit seconds a step = a + b n, the model of `particles.estimate`."""
+    """Fit seconds a step = a + b n, the model of `particles.parameters.estimate`."""
     rows = [row for row in rows if "seconds" in row]
     slope, constant = np.polyfit([row["particles"] for row in rows], [row["seconds"] / row["steps"] for row in rows], 1)
     return {"seconds_per_step": float(constant), "seconds_per_step_and_particle": float(slope)}

@@ -1,6 +1,6 @@
 """What effects cost: a step with each on against one with it off, in turns; the ratios are what plans tell as shares.
 
-Writes benchmarks/results/effects.json, and the table of the registry, workflow/effect_registry/costs.json.
+Writes benchmarks/results/effects.json, and the table of the registry, workflow/effects/costs.json.
 """
 
 import json
@@ -9,18 +9,18 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from benchmarks.support import turns
-from fem.damping import RayleighDamping
-from fem.force import Kinematics, force_terms
-from fem.loads import DOWN, BodyAcceleration, Load
+from fem.forces.force import Kinematics, force_terms
+from fem.loads.damping import RayleighDamping
+from fem.loads.load import DOWN, BodyAcceleration, Load
 from fem.materials.library import FR4, SAC305
 from fem.materials.parameters import Material
-from fem.pulse import STANDARD_GRAVITY, Constant, HalfSine
+from fem.problem.pulse import STANDARD_GRAVITY, Constant, HalfSine
 from fem.trials.bodies import dns_body, motion_of
 from fem.trials.grids import grid, mesh_of, on
-from particles.cloud import box_cloud
-from particles.parameters import Solder
-from particles.reflow import contact_line, start_flow
-from workflow.effect_registry.costs import MEASURED
+from particles.core.cloud import box_cloud
+from particles.parameters.solder import Solder
+from particles.scenes.reflow import contact_line, start_flow
+from workflow.effects.costs import MEASURED
 
 CELLS, PER_EDGE, STRETCH = (40, 20, 4), 11, 2.0e-3
 PULSE = BodyAcceleration(DOWN, HalfSine(1.5e4, 5e-4))

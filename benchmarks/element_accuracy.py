@@ -25,19 +25,19 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 import numpy as np
 from mpi4py import MPI
 
-from fem.body import Body, Response, make_body, make_pieces
+from fem.division.tables import prepare
+from fem.dynamics.central_difference import Motion
+from fem.dynamics.implicit import ImplicitMotion
 from fem.elements.element import critical_steps
-from fem.facet import area_vectors
-from fem.factorisation import Factorisation
-from fem.force import Kinematics
-from fem.global_matrix import Equations
-from fem.implicit import ImplicitMotion
-from fem.local_mesh import distribute
+from fem.forces.force import Kinematics
 from fem.materials.parameters import Isotropic
-from fem.mesh import MeshData, boundary_facets
-from fem.modal import natural_modes
-from fem.motion import Motion
-from fem.scene import prepare
+from fem.mesh.facet import area_vectors
+from fem.mesh.mesh import MeshData, boundary_facets
+from fem.model.body import Body, Response, make_body, make_pieces
+from fem.model.factorisation import Factorisation
+from fem.model.global_matrix import Equations
+from fem.parallel.local_mesh import distribute
+from fem.statics.modal import natural_modes
 from fem.trials.boxes import KINDS, box
 from fem.trials.grids import CYCLIC
 

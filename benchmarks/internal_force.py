@@ -33,8 +33,8 @@ from benchmarks.support import turns
 from benchmarks.support.cube import SOLDER, STEEL, cube, elements_of, random_displacement
 from fem import dolfinx_api
 from fem.elements.element import CHUNK, Elements, element_stiffness
-from fem.force import ForceTerm, Kinematics, force_terms
-from fem.mesh import MeshData
+from fem.forces.force import ForceTerm, Kinematics, force_terms
+from fem.mesh.mesh import MeshData
 from fem.trials.bodies import dns_body, motion_of
 
 KINDS = ("incompatible_modes", "one_point")

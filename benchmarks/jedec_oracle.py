@@ -24,22 +24,22 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 import numpy as np
 from mpi4py import MPI
 
-from fem.compare_structures import solver_differences
-from fem.factor_cost import box_factor
-from fem.factorisation import Factorisation
-from fem.global_matrix import Equations
-from fem.implicit import ImplicitMotion
-from fem.inputs import INPUT, StructureInput
+from fem.dynamics.implicit import ImplicitMotion
+from fem.estimates.factor_cost import box_factor
+from fem.estimates.solver_cost import forecast_solvers
 from fem.materials.library import FR4
-from fem.solver_cost import forecast_solvers
-from fem.structure.crew import make_participant
-from fem.structure.model import build_structure
-from fem.structure.pulses import pulse_durations, pulses_of
-from fem.structure.run import make_history
+from fem.model.factorisation import Factorisation
+from fem.model.global_matrix import Equations
+from fem.output.compare_structures import solver_differences
+from fem.problem.inputs import INPUT, StructureInput
+from fem.problem.structure_pulses import pulse_durations, pulses_of
+from fem.run.structure_participants import make_participant
+from fem.run.structure_run import make_history
+from fem.setup.structure_model import build_structure
 from fem.trials.bodies import dns_body
 from fem.trials.grids import grid, mesh_of
-from meshing.box import write_box
-from meshing.box_plan import Box, BoxHoles, BoxLayer
+from meshing.board.box import write_box
+from meshing.board.box_plan import Box, BoxHoles, BoxLayer
 
 RESULTS = Path(__file__).parent / "results" / "jedec_oracle.json"
 LENGTH, WIDTH, THICKNESS, SPACING, HOLE = 132e-3, 77e-3, 1e-3, (105e-3, 71e-3), 3e-3

@@ -21,9 +21,9 @@ import numpy as np
 
 from benchmarks.support import turns
 from benchmarks.support.cube import STEEL, cube, elements_of
-from fem.force_assembled import AssembledElements
-from fem.force_congruent import CongruentElements
-from fem.mesh import MeshData
+from fem.forces.force_assembled import AssembledElements
+from fem.forces.force_congruent import CongruentElements
+from fem.mesh.mesh import MeshData
 from fem.trials.bodies import dns_body, motion_of
 
 FOLDER = Path(__file__).parents[1] / "build" / "peers"

@@ -21,15 +21,15 @@ from mpi4py import MPI
 
 from benchmarks.support import turns
 from benchmarks.support.drop_scene import DropScene
-from fem.communicators import Communicators
 from fem.coupling.stopwatch import Stopwatch
-from fem.inputs import RunInput
-from fem.march import run_window
-from fem.model import build_models, divided_scene
-from fem.own_job import own_environment
-from fem.parameters import Ranks
-from fem.run import make_crew, place
-from workflow.launch import mpi_command
+from fem.parallel.communicators import Communicators
+from fem.parallel.own_job import own_environment
+from fem.problem.inputs import RunInput
+from fem.problem.parameters import Ranks
+from fem.run.shock_run import make_crew, place
+from fem.run.time_loop import run_window
+from fem.setup.shock_models import build_models, divided_scene
+from workflow.process.launch import mpi_command
 
 SCHEMES = ("held_velocity", "local_steps")
 WINDOWS, FASTEST = 300, 15

@@ -24,15 +24,15 @@ from mpi4py import MPI
 
 from benchmarks.support import turns
 from benchmarks.support.cube import STEEL, cube
-from fem.body import make_body, make_pieces
-from fem.loads import Load, half_sine_drop
-from fem.local_mesh import distribute
+from fem.division.tables import prepare
+from fem.dynamics.central_difference import Motion
+from fem.loads.load import Load, half_sine_drop
 from fem.materials.roles import Materials
-from fem.motion import Motion
-from fem.own_job import own_environment
-from fem.scene import prepare
+from fem.model.body import make_body, make_pieces
+from fem.parallel.local_mesh import distribute
+from fem.parallel.own_job import own_environment
 from fem.trials.bodies import motion_of
-from workflow.launch import mpi_command
+from workflow.process.launch import mpi_command
 
 ROUNDS, CALLS = 40, 10
 FRACTION = 0.5  # of the critical step

@@ -25,22 +25,22 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from fem import dolfinx_api
-from fem.factorisation import Factorisation
 from fem.materials.elasticity import elasticity_matrix
 from fem.materials.library import FR4, SILICON
 from fem.materials.roles import Materials
-from fem.mesh import MeshData, append, without_unused_nodes
-from fem.thermal.pads import Pads
-from fem.thermal.parameters import Thermal
-from fem.thermal.scene import thermal_tables
-from fem.thermal.state import Assembly
-from fem.thermal.structure import ThermalStructure
-from fem.thermal.thermoelastic import Thermoelastic
+from fem.mesh.mesh import MeshData, append, without_unused_nodes
+from fem.model.factorisation import Factorisation
+from fem.problem.thermal import Thermal
+from fem.statics.pads import Pads
+from fem.statics.scene import thermal_tables
+from fem.statics.state import Assembly
+from fem.statics.structure import ThermalStructure
+from fem.statics.thermoelastic import Thermoelastic
 from fem.trials.grids import grid, mesh_of, on
-from meshing.assembly import write_assembly
-from meshing.heated_assembly import write_heated_assembly
-from meshing.pads import pad_table
-from workflow.case import read_case
+from meshing.board.assembly import write_assembly
+from meshing.board.heated_assembly import write_heated_assembly
+from meshing.board.pads import pad_table
+from workflow.pipeline.reader import read_case
 
 RESULTS = Path(__file__).parent / "results" / "thermal.json"
 CASE = Path(__file__).parents[1] / "cases" / "bga_drop" / "case.toml"

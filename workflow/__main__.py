@@ -1,13 +1,13 @@
 """``python -m workflow`` is the command ``reflowshock``; what happens while the program loads is told, too."""
 
-from workflow.last_word import heed_signals, last_word
+from workflow.process.last_word import heed_signals, last_word
 
 
 def main() -> None:
     """Prepare the process, then load and run the command line."""
     with last_word():
         heed_signals()
-        from workflow.environment import begin_again_in_utf8, prepare
+        from workflow.process.environment import begin_again_in_utf8, prepare
 
         begin_again_in_utf8()
         prepare()  # before any library is loaded

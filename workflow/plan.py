@@ -5,16 +5,17 @@ from collections.abc import Mapping
 from rich.console import Console
 from rich.table import Table
 
-from workflow.board_drop_case import BoardDropCase, PackageCase
-from workflow.case import available_cores
-from workflow.case_kind import FULL, Case
-from workflow.effect_registry.page import effects_table
-from workflow.fields import display, leaves
-from workflow.forecast import Forecast, forecast
-from workflow.plan_table import duration, new_table, short
-from workflow.scene_forecast import SceneForecast, forecast_scene
-from workflow.shock_forecast import ShockForecast
-from workflow.stage_forecast import stage_seconds
+from workflow.board_drop.case import BoardDropCase, PackageCase
+from workflow.board_drop.forecast import Forecast, forecast
+from workflow.board_drop.shock_forecast import ShockForecast
+from workflow.case.fields import display, leaves
+from workflow.case.kind import FULL, Case
+from workflow.effects.page import effects_table
+from workflow.pipeline.reader import available_cores
+from workflow.pipeline.stage_forecast import stage_seconds
+from workflow.process.plan_table import duration, new_table, short
+from workflow.process.terminal import styled
+from workflow.solder.forecast import SceneForecast, forecast_scene
 from workflow.store.keys import Change
 from workflow.store.point import Point
 from workflow.store.state import Verdict, examine, why_stale
@@ -22,10 +23,9 @@ from workflow.store.store import Store
 from workflow.structure import plan as structure_plan
 from workflow.structure.case import StructureCase
 from workflow.structure.forecast import StructureForecast, forecast_structure
-from workflow.terminal import styled
 
 LONGEST_LIST = 4
-REFLOW_SPEED = "Costs assume the reflow speed in particles/estimate.py, as benchmarks/ measured it."
+REFLOW_SPEED = "Costs assume the reflow speed in particles/parameters/estimate.py, as benchmarks/ measured it."
 SCHEMES = {
     "energy": "least energy of the tracked surface at exactly the volume",
     "inertia": "tetrahedra that move with the liquid, second order in space and time; cost of all steps allowed",
@@ -46,9 +46,11 @@ def show_plan(store: Store, point: Point, console: Console) -> None:
             console.print(styled("\n[dim]{}", REFLOW_SPEED))
             return
         console.print(_shock(case, outlook.shock))
-        rate = f"{outlook.shock.updates_per_second:.1e} element updates per second and rank (fem/estimate.py)"
+        rate = f"{outlook.shock.updates_per_second:.1e} element updates per second and rank (fem/estimates/estimate.py)"
         console.print(styled("\n[dim]Costs assume {}", rate))
-        console.print(styled("[dim]and the reflow speed in particles/estimate.py, both as benchmarks/ measured them."))
+        console.print(
+            styled("[dim]and the reflow speed in particles/parameters/estimate.py, both as benchmarks/ measured them.")
+        )
     elif isinstance(case, StructureCase):
         motion = forecast_structure(case)
         _show(store, point, motion, console, "motion")
@@ -113,7 +115,7 @@ def reason(verdict: Verdict, case: Case) -> str:
 
 def predicted_seconds(store: Store, point: Point, until: str) -> float:
     """Predict the wall time [s] of all that has to be made up to a stage, corrected by what accuracy measured here."""
-    from workflow.accuracy.calibration import calibration_of
+    from workflow.convergence.calibration import calibration_of
 
     known, seconds = calibration_of(point.case), stage_seconds(point.case)
     verdicts = examine(store, point)
@@ -124,7 +126,7 @@ def predicted_seconds(store: Store, point: Point, until: str) -> float:
 
 def foreseen_costs(case: Case, seconds: Mapping[str, float]) -> dict[str, str]:
     """Write the predicted wall time of stages; corrected by what the command accuracy measured here."""
-    from workflow.accuracy.calibration import calibration_of
+    from workflow.convergence.calibration import calibration_of
 
     known, texts = calibration_of(case), {}
     for stage, foreseen in seconds.items():

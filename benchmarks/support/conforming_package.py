@@ -9,7 +9,7 @@ import numpy as np
 from fem.materials.library import COPPER, SAC405, SILICON
 from fem.materials.parameters import Isotropic
 from fem.materials.roles import Materials
-from fem.mesh import MeshData, boundary_facets, without_unused_nodes
+from fem.mesh.mesh import MeshData, boundary_facets, without_unused_nodes
 from fem.trials.grids import CYCLIC, grid, mesh_of, on
 
 # Peers take isotropic materials in this comparison: a board of the in-plane stiffness of FR4.

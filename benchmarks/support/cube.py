@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from fem.box_step import diagonal_tetrahedra
+from fem.elements.box_step import diagonal_tetrahedra
 from fem.elements.element import Elements
 from fem.materials.parameters import Isotropic, JohnsonCook, Material
-from fem.mesh import MeshData
+from fem.mesh.mesh import MeshData
 from fem.trials.boxes import KINDS, with_middles
 from fem.trials.boxes import elements_of as material_elements
 from fem.trials.grids import grid, mesh_of

@@ -11,8 +11,8 @@ import subprocess
 import sys
 from pathlib import Path
 
-from workflow.accuracy.measured import FILE, read_accuracy
-from workflow.accuracy.page import PICTURE, markdown
+from workflow.convergence.measured import FILE, read_accuracy
+from workflow.convergence.page import PICTURE, markdown
 
 ROOT = Path(__file__).resolve().parents[2]
 BEGIN, END = "<!-- accuracy: written by benchmarks/support/publish_accuracy.py -->", "<!-- accuracy: end -->"

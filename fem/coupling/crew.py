@@ -5,14 +5,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fem.body import Body
-from fem.communicators import Communicators, Role
 from fem.coupling.scheme import Scheme
 from fem.coupling.self_check import SelfCheck, self_check
-from fem.estimate import WindowPlan
-from fem.exchange import CutChannels, MessageClock
-from fem.loads import Load
-from fem.participant import Participant
+from fem.dynamics.participant import Participant
+from fem.estimates.estimate import WindowPlan
+from fem.loads.load import Load
+from fem.model.body import Body
+from fem.parallel.communicators import Communicators, Role
+from fem.parallel.exchange import CutChannels, MessageClock
 
 
 class Crew(NamedTuple):

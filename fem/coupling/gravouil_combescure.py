@@ -22,16 +22,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.body import Body
-from fem.communicators import Role
 from fem.coupling.held_velocity import Answered, local_cut
-from fem.estimate import WindowPlan
-from fem.exchange import CutChannels
+from fem.dynamics.central_difference import Motion
+from fem.dynamics.participant import Continued, uncut_motion
+from fem.estimates.estimate import WindowPlan
 from fem.kernels.coupling import link_velocities
-from fem.loads import Load
-from fem.motion import Motion
-from fem.participant import Continued, uncut_motion
-from fem.portable import Rows, State
+from fem.loads.load import Load
+from fem.model.body import Body
+from fem.parallel.communicators import Role
+from fem.parallel.exchange import CutChannels
+from fem.parallel.portable import Rows, State
 
 
 class GravouilCombescure:

@@ -13,15 +13,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.body import Body
-from fem.communicators import Role
 from fem.coupling.held_velocity import WindowMotion, counted_cut, local_cut
-from fem.estimate import WindowPlan
-from fem.exchange import CutChannels
-from fem.loads import Load
-from fem.motion import Motion
-from fem.participant import Continued
-from fem.portable import Rows, State
+from fem.dynamics.central_difference import Motion
+from fem.dynamics.participant import Continued
+from fem.estimates.estimate import WindowPlan
+from fem.loads.load import Load
+from fem.model.body import Body
+from fem.parallel.communicators import Role
+from fem.parallel.exchange import CutChannels
+from fem.parallel.portable import Rows, State
 
 
 class Impulse:

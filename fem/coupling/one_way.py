@@ -11,13 +11,13 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.body import Body
-from fem.communicators import Role
 from fem.coupling.held_velocity import Driven
-from fem.estimate import WindowPlan
-from fem.exchange import CutChannels
-from fem.loads import Kept, Load
-from fem.participant import Alone, uncut_motion
+from fem.dynamics.participant import Alone, uncut_motion
+from fem.estimates.estimate import WindowPlan
+from fem.loads.load import Kept, Load
+from fem.model.body import Body
+from fem.parallel.communicators import Role
+from fem.parallel.exchange import CutChannels
 
 
 class OneWay:

@@ -10,9 +10,11 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from fem.checkpoint_files import warn
-from fem.coupling.division import SchemeName
-from fem.coupling.placement import (
+from fem.coupling.speeds import FAMILIES, Kind, StepCost, families, measured_costs, measured_latency, samples, speeds_of
+from fem.division.division import SchemeName
+from fem.division.tables import Tables
+from fem.division.whole import Treatment
+from fem.estimates.placement import (
     Alternative,
     ModelCost,
     Placement,
@@ -22,19 +24,17 @@ from fem.coupling.placement import (
     model_seconds,
     shared,
 )
-from fem.coupling.speeds import FAMILIES, Kind, StepCost, families, measured_costs, measured_latency, samples, speeds_of
-from fem.coupling.whole import Treatment
-from fem.data_file import write_at_once
 from fem.materials.elasticity import materials_of_parts
 from fem.materials.parameters import Material
 from fem.materials.roles import Materials
-from fem.mesh import MeshData
-from fem.parameters import Ranks
-from fem.partition import partition
-from fem.scene import Tables
+from fem.mesh.mesh import MeshData
+from fem.parallel.checkpoint_files import warn
+from fem.parallel.data_file import write_at_once
+from fem.parallel.partition import partition
+from fem.problem.parameters import Ranks
 
 if TYPE_CHECKING:
-    from fem.model import Divided
+    from fem.setup.shock_models import Divided
 
 CALLS = 2.5e-5  # [s] of the interpreter in a step of a motion
 KEPT = "speeds.json"

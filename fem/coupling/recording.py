@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem.errors import RecordingError
-from fem.exchange import CutChannels, MessageClock, Messages
+from fem.parallel.exchange import CutChannels, MessageClock, Messages
 
 CHANNELS, WAYS = ("velocities", "forces"), ("sent", "received")
 

@@ -3,17 +3,17 @@
 from dataclasses import replace
 from typing import Literal, Protocol
 
-from fem.body import Body
-from fem.communicators import Role
-from fem.coupling.division import SchemeName
 from fem.coupling.gravouil_combescure import GravouilCombescure
 from fem.coupling.held_velocity import HeldVelocity
 from fem.coupling.impulse import Impulse
 from fem.coupling.one_way import OneWay
-from fem.estimate import WindowPlan
-from fem.exchange import CutChannels
-from fem.loads import Load
-from fem.participant import Participant
+from fem.division.division import SchemeName
+from fem.dynamics.participant import Participant
+from fem.estimates.estimate import WindowPlan
+from fem.loads.load import Load
+from fem.model.body import Body
+from fem.parallel.communicators import Role
+from fem.parallel.exchange import CutChannels
 
 Direction = Literal["two_way", "one_way"]
 

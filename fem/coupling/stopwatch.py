@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from fem.coupling.placement import Role
-from fem.exchange import MessageClock
+from fem.estimates.placement import Role
+from fem.parallel.exchange import MessageClock
 
 
 class Stopwatch:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem.elements.element import CHUNK, Elements, classes, element_geometry
-from fem.stress import mean_strain
+from fem.elements.stress import mean_strain
 
 
 @dataclass(frozen=True, slots=True)

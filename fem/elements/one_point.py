@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from fem.elements.hexahedron import HEXAHEDRON
 from fem.elements.kind import Geometry
+from fem.elements.strain import strain_matrix
 from fem.kernels.hexahedron import SIDES
-from fem.strain import strain_matrix
 
 HOURGLASS = np.column_stack([SIDES[:, 1] * SIDES[:, 2], SIDES[:, 2] * SIDES[:, 0], SIDES[:, 0] * SIDES[:, 1]])
 HOURGLASS = np.column_stack([HOURGLASS, SIDES.prod(axis=1)]) / np.sqrt(8.0)

@@ -1,4 +1,4 @@
-"""Numba kernels of substeps inside a step; see ``fem.levels.force``.
+"""Numba kernels of substeps inside a step; see ``fem.model.step_levels``.
 
 A level has its state in ``(3, n, 3)``: displacement [m], force [N], weighted sum of forces [N].
 """

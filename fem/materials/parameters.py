@@ -1,6 +1,6 @@
 """Parameters of materials: elasticity of three symmetries, thermal expansion, plasticity of Johnson and Cook.
 
-All values are SI floats; see ``meshing.parameters`` for what the unit strings mean.
+All values are SI floats; see ``meshing.board.parameters`` for what the unit strings mean.
 """
 
 import math
@@ -9,7 +9,7 @@ from typing import Annotated, ClassVar, Literal, NamedTuple, Self
 from pydantic import Field, ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
 
-from fem.parameters import Parameters
+from fem.problem.parameters import Parameters
 
 Pressure = Annotated[float, "GPa"]
 Stress = Annotated[float, "MPa"]

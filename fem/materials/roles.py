@@ -9,7 +9,7 @@ from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from fem.materials.library import COPPER, FR4, LIBRARY, SAC405, SILICON
 from fem.materials.parameters import Material
-from fem.parameters import Parameters
+from fem.problem.parameters import Parameters
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,9 +7,9 @@ from scipy.integrate import trapezoid
 
 from fem.elements.element import critical_steps, element_geometry
 from fem.elements.kind import ElementKind
-from fem.facet import area_vectors
 from fem.materials.parameters import Isotropic, JohnsonCook, Material
-from fem.mesh import boundary_facets
+from fem.mesh.facet import area_vectors
+from fem.mesh.mesh import boundary_facets
 from fem.trials.bodies import force_of, nonlinear
 from fem.trials.boxes import KINDS, box, elements_of, mass_of, solve
 from fem.trials.distortion import laminate

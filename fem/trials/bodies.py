@@ -3,18 +3,18 @@
 import numpy as np
 from mpi4py import MPI
 
-from fem.body import Body, Pieces, Response, make_body, make_pieces
+from fem.division.tables import Tables, prepare
+from fem.dynamics.central_difference import Motion
 from fem.elements.element import Elements
-from fem.force_nonlinear import NonlinearElements
+from fem.forces.force_nonlinear import NonlinearElements
 from fem.kernels.nonlinear import Path
 from fem.kernels.plasticity import plastic_constants
-from fem.local_mesh import distribute
 from fem.materials.library import FR4
 from fem.materials.parameters import Material
 from fem.materials.roles import Materials
-from fem.mesh import MeshData
-from fem.motion import Motion
-from fem.scene import Tables, prepare
+from fem.mesh.mesh import MeshData
+from fem.model.body import Body, Pieces, Response, make_body, make_pieces
+from fem.parallel.local_mesh import distribute
 
 
 def dns_pieces(mesh: MeshData, materials: Materials) -> tuple[Pieces, Tables]:

@@ -6,7 +6,7 @@ import numpy as np
 import scipy.sparse
 from scipy.sparse.linalg import eigsh, splu
 
-from fem.box_step import diagonal_tetrahedra
+from fem.elements.box_step import diagonal_tetrahedra
 from fem.elements.element import Elements, element_geometry, element_kind, element_stiffness, lumped_mass
 from fem.elements.kind import ElementKind
 from fem.elements.tetrahedron import EDGES

@@ -7,25 +7,25 @@ from typing import NamedTuple, Protocol, cast
 import numpy as np
 from mpi4py import MPI
 
-from fem.body import Body, Pieces, Response, make_body, make_pieces
-from fem.communicators import Role
-from fem.coupling.division import Division
 from fem.coupling.gravouil_combescure import GravouilCombescure
 from fem.coupling.held_velocity import Answered
 from fem.coupling.impulse import Impulse
 from fem.coupling.scheme import Scheme
-from fem.estimate import WindowPlan
-from fem.exchange import CutChannels
-from fem.ledger import ENERGIES, ledger_sums
-from fem.loads import Load
-from fem.local_mesh import distribute
+from fem.division.division import Division
+from fem.division.tables import ModelInput, Tables, model_inputs
+from fem.dynamics.central_difference import Motion
+from fem.dynamics.energy_balance import ENERGIES, ledger_sums
+from fem.dynamics.participant import Participant
+from fem.estimates.estimate import WindowPlan
+from fem.loads.load import Load
 from fem.materials.roles import Materials
-from fem.mesh import MeshData
-from fem.motion import Motion
-from fem.parameters import Coupling
-from fem.participant import Participant
-from fem.scene import ModelInput, Tables, model_inputs
-from fem.tie import net_load
+from fem.mesh.mesh import MeshData
+from fem.mesh.tie import net_load
+from fem.model.body import Body, Pieces, Response, make_body, make_pieces
+from fem.parallel.communicators import Role
+from fem.parallel.exchange import CutChannels
+from fem.parallel.local_mesh import distribute
+from fem.problem.parameters import Coupling
 from fem.trials.divided import Divide, checked, surveyed
 
 MANY = 1e5  # elements that each of a mesh stands for where costs are weighed, so that levels are worth while

@@ -5,7 +5,7 @@ from scipy.optimize import brentq
 
 from fem.elements.element import Elements
 from fem.materials.parameters import Isotropic, Material, Orthotropic
-from fem.mesh_quality import scaled_jacobians
+from fem.mesh.mesh_quality import scaled_jacobians
 from fem.trials.boxes import KINDS, box, elements_of
 from fem.trials.grids import Line, grid
 from fem.trials.parameters import Elastic

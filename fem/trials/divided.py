@@ -2,17 +2,17 @@
 
 from collections.abc import Callable
 
-from fem.coupling.checks import check_division
-from fem.coupling.divide import divide
-from fem.coupling.division import Division
-from fem.coupling.rules import Rules
-from fem.coupling.whole import Survey, Treatment, Whole, survey
+from fem.division.checks import check_division
+from fem.division.divide import divide
+from fem.division.division import Division
+from fem.division.rules import Rules
+from fem.division.tables import joined
+from fem.division.whole import Survey, Treatment, Whole, survey
 from fem.materials.elasticity import role_of_part
 from fem.materials.parameters import Material
 from fem.materials.roles import Materials
-from fem.mesh import MeshData
-from fem.parameters import Coupling
-from fem.scene import joined
+from fem.mesh.mesh import MeshData
+from fem.problem.parameters import Coupling
 
 Divide = Callable[[Whole, Survey, Rules], Division]
 DEFAULTS, HELD = Materials(), Coupling(scheme="held_velocity")

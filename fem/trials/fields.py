@@ -7,10 +7,10 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from fem.elements.element import Elements, element_geometry
-from fem.force import linear_terms
-from fem.force_nonlinear import NonlinearElements
-from fem.mesh import boundary_facets
-from fem.stress import element_stress, symmetric
+from fem.elements.stress import element_stress, symmetric
+from fem.forces.force import linear_terms
+from fem.forces.force_nonlinear import NonlinearElements
+from fem.mesh.mesh import boundary_facets
 from fem.trials.bodies import force_of, nonlinear
 from fem.trials.distortion import body_of, laminate
 from fem.trials.metals import LINEAR_HARDENING

@@ -3,21 +3,21 @@
 import numpy as np
 from mpi4py import MPI
 
-from fem.body import Pieces, Response, make_body, make_pieces
-from fem.damping import RayleighDamping
-from fem.estimate import WindowPlan, damped_critical_step
-from fem.ledger import Ledger, ledger_sums
-from fem.loads import Load
-from fem.local_mesh import distribute
+from fem.division.tables import Tables, prepare
+from fem.dynamics.central_difference import Motion
+from fem.dynamics.energy_balance import Ledger, ledger_sums
+from fem.dynamics.participant import Alone, uncut_motion
+from fem.estimates.estimate import WindowPlan, damped_critical_step
+from fem.loads.damping import RayleighDamping
+from fem.loads.load import Load
 from fem.materials.library import COPPER
 from fem.materials.roles import Materials
-from fem.mesh import MeshData
-from fem.motion import Motion
-from fem.participant import Alone, uncut_motion
-from fem.power_iteration import highest_frequency
-from fem.scene import Tables, prepare
-from fem.steps import mass_factor
-from fem.tie import net_load
+from fem.mesh.mesh import MeshData
+from fem.mesh.tie import net_load
+from fem.model.body import Pieces, Response, make_body, make_pieces
+from fem.model.power_iteration import highest_frequency
+from fem.model.steps import mass_factor
+from fem.parallel.local_mesh import distribute
 from fem.trials.distortion import YOUNG, distorted, laminate
 from fem.trials.grids import mesh_of
 from fem.trials.parameters import Flight

@@ -4,11 +4,11 @@ from collections.abc import Callable
 
 import numpy as np
 
-from fem.body import Body, Response
-from fem.force import Kinematics
+from fem.dynamics.central_difference import Motion
+from fem.forces.force import Kinematics
 from fem.materials.parameters import Material
-from fem.mesh import MeshData
-from fem.motion import Motion
+from fem.mesh.mesh import MeshData
+from fem.model.body import Body, Response
 from fem.trials.bodies import motion_of, nonlinear_body
 from fem.trials.grids import grid, mesh_of, on
 from fem.trials.metals import SOLDER

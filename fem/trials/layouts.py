@@ -4,8 +4,8 @@ import numpy as np
 
 from fem.coupling.scheme import scheme_of
 from fem.materials.roles import Materials
-from fem.mesh import MeshData, append
-from fem.parameters import Coupling
+from fem.mesh.mesh import MeshData, append
+from fem.problem.parameters import Coupling
 from fem.trials.coupled import Coupled, models_of
 from fem.trials.grids import grid, joint_mesh, mesh_of, on
 from fem.trials.pairs import FRACTION

@@ -3,9 +3,9 @@
 import numpy as np
 
 from fem.elements.element import element_geometry
+from fem.elements.stress import mean_strain
 from fem.materials.parameters import Isotropic
-from fem.mesh import boundary_facets
-from fem.stress import mean_strain
+from fem.mesh.mesh import boundary_facets
 from fem.trials.boxes import KINDS, box, elements_of, mass_of, solve
 from fem.trials.parameters import Order
 

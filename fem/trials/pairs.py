@@ -7,18 +7,18 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.body import Body
 from fem.coupling.held_velocity import Answered, HeldVelocity, Macro
 from fem.coupling.scheme import scheme_of
-from fem.estimate import WindowPlan
-from fem.exchange import CutChannels
-from fem.loads import Load
+from fem.dynamics.central_difference import Motion
+from fem.estimates.estimate import WindowPlan
+from fem.loads.load import Load
 from fem.materials.library import FR4
 from fem.materials.parameters import Isotropic, Orthotropic
 from fem.materials.roles import Materials
-from fem.mesh import MeshData, append
-from fem.motion import Motion
-from fem.parameters import Coupling
+from fem.mesh.mesh import MeshData, append
+from fem.model.body import Body
+from fem.parallel.exchange import CutChannels
+from fem.problem.parameters import Coupling
 from fem.trials.coupled import Coupled, Models, models_of
 from fem.trials.divided import surveyed
 from fem.trials.grids import grid, mesh_of, on

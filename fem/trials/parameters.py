@@ -1,13 +1,13 @@
 """Parameters of the trials of elements and of coupled models.
 
-All values are SI floats; see ``meshing.parameters`` for what the unit strings mean.
+All values are SI floats; see ``meshing.board.parameters`` for what the unit strings mean.
 """
 
 from typing import Annotated, Literal
 
 from pydantic import Field
 
-from fem.parameters import Parameters
+from fem.problem.parameters import Parameters
 
 Element = Literal["incompatible_modes", "one_point", "tetrahedron", "tetrahedron_quadratic"]
 Hexahedron = Literal["incompatible_modes", "one_point"]

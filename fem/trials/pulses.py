@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from fem.coupling.checks import check_pulses
-from fem.loads import BodyAcceleration
-from fem.mesh import MeshData
-from fem.pulse import Constant, HalfSine, Haversine, Pulse, Tabulated
+from fem.division.checks import check_pulses
+from fem.loads.load import BodyAcceleration
+from fem.mesh.mesh import MeshData
+from fem.problem.pulse import Constant, HalfSine, Haversine, Pulse, Tabulated
 from fem.trials.bodies import dns_body, motion_of
 from fem.trials.grids import grid, mesh_of
 from fem.trials.parameters import PulseTrial

@@ -7,7 +7,7 @@ from fem.materials.elasticity import elasticity_matrix
 from fem.materials.library import FR4
 from fem.materials.parameters import Isotropic
 from fem.materials.roles import Materials
-from fem.mesh import MeshData, append
+from fem.mesh.mesh import MeshData, append
 from fem.trials.coupled import Coupled, models_of
 from fem.trials.divided import surveyed
 from fem.trials.grids import grid, mesh_of, on

@@ -3,12 +3,12 @@
 import numpy as np
 from mpi4py import MPI
 
-from fem.body import Body, make_body, make_pieces
-from fem.local_mesh import distribute
+from fem.division.tables import prepare
+from fem.elements.stress import element_stress
 from fem.materials.roles import Materials
-from fem.mesh import MeshData, append
-from fem.scene import prepare
-from fem.stress import element_stress
+from fem.mesh.mesh import MeshData, append
+from fem.model.body import Body, make_body, make_pieces
+from fem.parallel.local_mesh import distribute
 from fem.trials.boxes import stiffness_matrix
 from fem.trials.distortion import YOUNG, distorted, laminate
 from fem.trials.grids import mesh_of, on

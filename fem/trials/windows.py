@@ -7,11 +7,11 @@ from mpi4py import MPI
 
 from fem.coupling.scheme import scheme_of
 from fem.coupling.self_check import self_check
-from fem.exchange import CutChannels
 from fem.materials.library import FR4, SAC405
 from fem.materials.roles import Materials
-from fem.parameters import Coupling
-from fem.portable import values
+from fem.parallel.exchange import CutChannels
+from fem.parallel.portable import values
+from fem.problem.parameters import Coupling
 from fem.trials.coupled import Coupled, Models, models_of
 from fem.trials.pairs import FRACTION, SCHEMES, SIZE, Pair
 from fem.trials.parameters import PairRun, PairTransfer, PairTrial, Yielding

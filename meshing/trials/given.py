@@ -6,15 +6,15 @@ from pathlib import Path
 import meshio
 import numpy as np
 
-from meshing.pads import PadSite, pad_table
-from meshing.parameters import Warpage
-from meshing.solder_mesh import mesh_joint
-from meshing.surface import ClosedSurface
+from meshing.board.pads import PadSite, pad_table
+from meshing.board.parameters import Warpage
+from meshing.joint.solder_mesh import mesh_joint
+from meshing.surface.closed_surface import ClosedSurface
+from meshing.surface.user_surface import load_surface
 from meshing.trials.faults import FAULTS
 from meshing.trials.joints import Meshed
 from meshing.trials.models import MM, board, package, side_of
 from meshing.trials.surfaces import barrel
-from meshing.user_surface import load_surface
 
 NAME = "A4"
 

@@ -5,14 +5,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from meshing.hexahedra import scaled_jacobian, volumes
-from meshing.joint_mesh import JointMesh, joint_quality
-from meshing.joint_place import Underside as Placed
-from meshing.pad_planes import PadPlanes
-from meshing.pads import PadSite, lift, pad_table
-from meshing.parameters import JointNumerics, Warpage
-from meshing.solder_mesh import mesh_bridge, mesh_joint
-from meshing.surface import ClosedSurface, enclosed_volume, pad_planes
+from meshing.board.pad_planes import PadPlanes
+from meshing.board.pads import PadSite, lift, pad_table
+from meshing.board.parameters import JointNumerics, Warpage
+from meshing.core.hexahedra import scaled_jacobian, volumes
+from meshing.joint.joint_mesh import JointMesh, joint_quality
+from meshing.joint.joint_place import Underside as Placed
+from meshing.joint.solder_mesh import mesh_bridge, mesh_joint
+from meshing.surface.closed_surface import ClosedSurface, enclosed_volume, pad_planes
 from meshing.trials.models import MM, board, package, side_of
 from meshing.trials.surfaces import barrel
 

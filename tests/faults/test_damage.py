@@ -11,7 +11,7 @@ import pytest
 from tests.support.faults import SEED, answers, run_drop
 from tests.support.products import make
 from tests.support.workflow_command import SMALL_CASE
-from workflow.case import read_case
+from workflow.pipeline.reader import read_case
 from workflow.store.batch import show_products
 from workflow.store.point import Point
 from workflow.store.state import examine

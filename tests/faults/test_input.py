@@ -12,10 +12,10 @@ import pytest
 from rich.console import Console
 
 from tests.support.workflow_command import SMALL_CASE
-from workflow.case import read_case
-from workflow.case_text import templates
+from workflow.case.problems import CaseError
+from workflow.pipeline.reader import read_case
+from workflow.pipeline.template import templates
 from workflow.plan import show_plan
-from workflow.problems import CaseError
 from workflow.study.study_file import read_study
 
 SEED = 20261122

@@ -8,16 +8,16 @@ SCRIPT = """
 import contextlib, json, sys
 import numpy as np
 from mpi4py import MPI
-from fem.body import Response, make_body, make_pieces
-from fem.communicators import Communicators
+from fem.model.body import Response, make_body, make_pieces
+from fem.parallel.communicators import Communicators
 from fem.coupling.crew import couple
-from fem.coupling.placement import shared
+from fem.estimates.placement import shared
 from fem.coupling.scheme import scheme_of
-from fem.local_mesh import distribute
+from fem.parallel.local_mesh import distribute
 from fem.materials.roles import Materials
-from fem.mesh import append
-from fem.parameters import Coupling
-from fem.scene import model_inputs
+from fem.mesh.mesh import append
+from fem.problem.parameters import Coupling
+from fem.division.tables import model_inputs
 from tests.stability.test_fem_division import board, joint
 from fem.trials.divided import checked, surveyed
 

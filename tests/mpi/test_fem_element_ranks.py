@@ -11,15 +11,15 @@ import json, sys
 from pathlib import Path
 import numpy as np
 from mpi4py import MPI
-from fem.body import make_body, make_pieces
-from fem.energy import Energy
-from fem.fields import Fields
-from fem.loads import half_sine_drop
-from fem.local_mesh import distribute
+from fem.model.body import make_body, make_pieces
+from fem.forces.energy import Energy
+from fem.output.fields import Fields
+from fem.loads.load import half_sine_drop
+from fem.parallel.local_mesh import distribute
 from fem.materials.roles import Materials
-from fem.mesh import MeshData
-from fem.motion import Motion
-from fem.scene import prepare
+from fem.mesh.mesh import MeshData
+from fem.dynamics.central_difference import Motion
+from fem.division.tables import prepare
 from fem.trials.boxes import KINDS, box
 
 comm, result = MPI.COMM_WORLD, {}

@@ -8,15 +8,15 @@ SCRIPT = """
 import json, sys
 import numpy as np
 from mpi4py import MPI
-from fem.body import make_body, make_pieces
-from fem.global_matrix import Equations
-from fem.implicit import ImplicitMotion
-from fem.loads import half_sine_drop
-from fem.local_mesh import distribute
-from fem.mesh import append
-from fem.modal import natural_modes
+from fem.model.body import make_body, make_pieces
+from fem.model.global_matrix import Equations
+from fem.dynamics.implicit import ImplicitMotion
+from fem.loads.load import half_sine_drop
+from fem.parallel.local_mesh import distribute
+from fem.mesh.mesh import append
+from fem.statics.modal import natural_modes
 from fem.materials.roles import Materials
-from fem.scene import prepare
+from fem.division.tables import prepare
 from tests.support.fem_models import small_assembly
 
 comm = MPI.COMM_WORLD

@@ -10,18 +10,18 @@ from pathlib import Path
 
 import pytest
 
-from fem.own_job import own_environment
-from fem.status_board import ERROR
+from fem.parallel.own_job import own_environment
+from fem.parallel.status_board import ERROR
 from tests.support.fem_models import write_small_assembly
 from tests.support.fem_program import run_python
-from workflow.launch import mpi_command
+from workflow.process.launch import mpi_command
 
 # The program, but rank 1 does something in a window or in set-up; standard error is told of where it is.
 SCRIPT = """
 import os, signal, sys, time
 from pathlib import Path
 from mpi4py import MPI
-import fem.march, fem.program, fem.run
+import fem.run.time_loop, fem.run.program, fem.run.shock_run
 from fem.errors import InvertedElementError
 
 world, what, where = MPI.COMM_WORLD, sys.argv[2], sys.argv[3]
@@ -45,10 +45,10 @@ def broken(real):
     return call
 
 if where == "set-up":
-    fem.run.make_history = broken(fem.run.make_history)
+    fem.run.shock_run.make_history = broken(fem.run.shock_run.make_history)
 else:
-    fem.march.run_window = broken(fem.march.run_window)
-sys.exit(fem.program.main(world, sys.argv[1:2]))
+    fem.run.time_loop.run_window = broken(fem.run.time_loop.run_window)
+sys.exit(fem.run.program.main(world, sys.argv[1:2]))
 """
 
 
@@ -131,7 +131,7 @@ def test_a_rank_that_fails_while_it_loads_libraries_ends_all(tmp_path, raised, w
         "import os, sys\n"
         "class Broken:\n"
         "    def find_spec(self, name, *_):\n"
-        "        if name == 'fem.program' and os.environ.get('OMPI_COMM_WORLD_RANK') == '1':\n"
+        "        if name == 'fem.run.program' and os.environ.get('OMPI_COMM_WORLD_RANK') == '1':\n"
         f"            raise {raised}\n"
         "sys.meta_path.insert(0, Broken())\n"
     )

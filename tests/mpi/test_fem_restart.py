@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fem.checkpoint import Checkpoints
-from fem.portable import Same, State
+from fem.parallel.checkpoint import Checkpoints
+from fem.parallel.portable import Same, State
 from tests.support.fem_models import write_small_assembly
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -6,13 +6,13 @@ import numpy as np
 import psutil
 import pytest
 
-from particles.geometry import JointGeometry
-from particles.parameters import Solder, SolderNumerics
+from particles.core.geometry import JointGeometry
+from particles.parameters.solder import Solder, SolderNumerics
 from tests.support import rank_work
+from workflow.board_drop.reflow_pool import Job
 from workflow.reflow.pool import ReflowError
 from workflow.reflow.processes import Processes
 from workflow.reflow.ranks import Ranks
-from workflow.reflow_pool import Job
 
 SOLDER = Solder(volume=7.2e-11, numerics=SolderNumerics(spacing=1.2e-4))
 PLACES = {

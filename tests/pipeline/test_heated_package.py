@@ -9,9 +9,9 @@ import meshio
 import numpy as np
 import pytest
 
-from meshing.displacement import read_computed
-from meshing.package_side import PackageSide
-from meshing.pads import read_pads
+from meshing.board.displacement import read_computed
+from meshing.board.package_side import PackageSide
+from meshing.board.pads import read_pads
 from tests.support.mesh_file import MeshFile
 
 CASE = Path(__file__).resolve().parents[2] / "cases/hu_bga_reflow/case.toml"

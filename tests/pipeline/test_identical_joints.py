@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from tests.support.workflow_command import SMALL_CASE, reflowshock
-from workflow.case import read_case
-from workflow.identical_joints import identical_sphere
-from workflow.problems import CaseError
+from workflow.board_drop.identical_joints import identical_sphere
+from workflow.case.problems import CaseError
+from workflow.pipeline.reader import read_case
 
 SETTINGS = ("shock.identical_joints=true", "shock.coupling.fine_joints=['A4']", "shock.numerics.modes=['two_scale']")
 

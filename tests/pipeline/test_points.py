@@ -11,7 +11,7 @@ import psutil
 import pytest
 
 from tests.support.workflow_command import wait_until
-from workflow.stage_runner import Run, run_stage
+from workflow.pipeline.stage_runner import Run, run_stage
 from workflow.stages import STAGE_FUNCTIONS
 from workflow.store.batch import Machine, missing, run_points
 from workflow.store.folders import locked

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from tests.support.workflow_command import SMALL_CASE
-from workflow.case import read_case
-from workflow.problems import CaseError
-from workflow.shock_cooling import begun
-from workflow.stage_runner import Findings, Run
+from workflow.board_drop.shock_cooling import begun
+from workflow.case.problems import CaseError
+from workflow.pipeline.reader import read_case
+from workflow.pipeline.stage_runner import Findings, Run
 from workflow.stages import shock
 
 COOLED = ("thermal.effects.residual_stress=on", "thermal.effects.flexible=off", "materials.solder=SAC405")

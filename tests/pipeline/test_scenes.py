@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from particles.drop_at_rest import drop_to_rest
-from particles.products import read_body
-from particles.reflow import solve_joint
+from particles.scenes.drop_at_rest import drop_to_rest
+from particles.scenes.products import read_body
+from particles.scenes.reflow import solve_joint
 from tests.support.workflow_command import break_off
-from workflow.case import read_case
-from workflow.scene_cases import DropCase, JointCase
+from workflow.pipeline.reader import read_case
+from workflow.solder.case import DropCase, JointCase
 
 CASES = Path(__file__).resolve().parents[2] / "cases"
 COARSE_DROP, COARSE_JOINT = "drop.particles_per_edge=7", "joint.spacing=0.06 mm"

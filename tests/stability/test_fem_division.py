@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fem.coupling.buffer import touching
-from fem.coupling.checks import check_division
-from fem.coupling.divide import cut_nodes, divide, held
 from fem.coupling.scheme import scheme_of
 from fem.coupling.self_check import self_check
+from fem.division.buffer import touching
+from fem.division.checks import check_division
+from fem.division.divide import cut_nodes, divide, held
 from fem.errors import CutError
-from fem.exchange import CutChannels
 from fem.materials.roles import Materials
-from fem.mesh import MeshData, append
-from fem.parameters import Coupling
+from fem.mesh.mesh import MeshData, append
+from fem.parallel.exchange import CutChannels
+from fem.problem.parameters import Coupling
 from fem.trials.coupled import Coupled, models_of
 from fem.trials.divided import surveyed
 from fem.trials.layouts import board, copper_cut, corner, joint, overhang, two_regions

@@ -6,8 +6,8 @@ import pytest
 from fem.coupling.scheme import scheme_of
 from fem.materials.library import SAC405
 from fem.materials.roles import Materials
-from fem.parameters import Coupling
-from fem.tie import net_load
+from fem.mesh.tie import net_load
+from fem.problem.parameters import Coupling
 from fem.trials.coupled import Coupled, models_of
 from fem.trials.pairs import FRACTION, SIZE, Pair
 

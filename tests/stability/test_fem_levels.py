@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fem.damping import RayleighDamping
-from fem.levels import chebyshev
-from fem.levels.chebyshev import Substeps
-from fem.levels.choose import Pace, governing_steps, least_steps
+from fem.division import chebyshev
+from fem.division.chebyshev import Substeps
+from fem.division.choose_levels import Pace, governing_steps, least_steps
+from fem.dynamics.central_difference import Motion
+from fem.loads.damping import RayleighDamping
 from fem.materials.library import SAC405
 from fem.materials.parameters import Isotropic
 from fem.materials.roles import Materials
-from fem.motion import Motion
-from fem.power_iteration import highest_frequency
-from fem.tie import Tie
+from fem.mesh.tie import Tie
+from fem.model.power_iteration import highest_frequency
 from tests.support.fem_levels import joint_on_board, levelled
 
 ELEMENTS, SAMPLES = 12, 60

@@ -6,7 +6,7 @@ import pytest
 from fem.errors import InvertedElementError
 from fem.materials.library import FR4
 from fem.materials.parameters import Isotropic, JohnsonCook
-from fem.mesh import MeshData
+from fem.mesh.mesh import MeshData
 from fem.trials.grids import grid, mesh_of, on
 from fem.trials.impact import explicit, imbalance, march, rod
 from fem.trials.metals import SOLDER

@@ -4,19 +4,19 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fem.body import Body
-from fem.damping import RayleighDamping
+from fem.dynamics.central_difference import Motion
+from fem.dynamics.energy_balance import Ledger, ledger_sums
+from fem.dynamics.participant import Alone, uncut_motion
 from fem.errors import EnergyError
-from fem.estimate import WindowPlan, damped_critical_step
-from fem.ledger import Ledger, ledger_sums
-from fem.loads import BodyAcceleration, Load
+from fem.estimates.estimate import WindowPlan, damped_critical_step
+from fem.loads.damping import RayleighDamping
+from fem.loads.load import BodyAcceleration, Load
 from fem.materials.parameters import Isotropic
 from fem.materials.roles import Materials
-from fem.mesh import MeshData
-from fem.motion import Motion
-from fem.participant import Alone, uncut_motion
-from fem.power_iteration import highest_frequency
-from fem.pulse import HalfSine
+from fem.mesh.mesh import MeshData
+from fem.model.body import Body
+from fem.model.power_iteration import highest_frequency
+from fem.problem.pulse import HalfSine
 from fem.trials.bodies import dns_body
 from fem.trials.grids import grid, mesh_of, on
 

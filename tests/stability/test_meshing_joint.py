@@ -4,13 +4,13 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from meshing.assembly import write_assembly
-from meshing.checks import problems
-from meshing.estimate import count_elements
-from meshing.joints_file import write_joints
-from meshing.pads import pad_table
-from meshing.parameters import Warpage
-from meshing.solder_mesh import joint_quality, mesh_joint
+from meshing.board.assembly import write_assembly
+from meshing.board.checks import problems
+from meshing.board.estimate import count_elements
+from meshing.board.pads import pad_table
+from meshing.board.parameters import Warpage
+from meshing.joint.joints_file import write_joints
+from meshing.joint.solder_mesh import joint_quality, mesh_joint
 from meshing.trials.joints import mesh_warped
 from meshing.trials.models import MM, board, package, side_of
 from meshing.trials.surfaces import barrel

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from meshing.pad_planes import PadPlanes
-from meshing.solder_mesh import JointMeshError, mesh_joint
+from meshing.board.pad_planes import PadPlanes
+from meshing.joint.solder_mesh import JointMeshError, mesh_joint
 from meshing.trials.joints import Underside, sites_of
 from meshing.trials.models import package
 from tests.support.many_joints import COUNTS, barrel, mesh, outcome, samples

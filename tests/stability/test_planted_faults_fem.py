@@ -4,11 +4,12 @@ from pathlib import Path
 
 import pytest
 
-from fem.coupling import held_velocity, whole
-from fem.force_assembled import AssembledElements
-from fem.force_nonlinear import NonlinearElements
+from fem.coupling import held_velocity
+from fem.division import whole
+from fem.forces.force_assembled import AssembledElements
+from fem.forces.force_nonlinear import NonlinearElements
 from fem.trials import flight
-from workflow.case_text import CASES
+from workflow.pipeline.template import CASES
 from workflow.stress_test.hard_case import HardCase, read_hard_cases
 from workflow.stress_test.verdict import attempt
 

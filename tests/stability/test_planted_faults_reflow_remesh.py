@@ -4,11 +4,12 @@ from dataclasses import replace
 
 import pytest
 
-from meshing import levels, user_surface
-from meshing.joint_place import JointPlace
-from particles.force_gravity import Gravity
-from particles.force_wetting import Wetting
-from particles.inertial_flow import InertialFlow
+from meshing.joint import levels
+from meshing.joint.joint_place import JointPlace
+from meshing.surface import user_surface
+from particles.physics.force_gravity import Gravity
+from particles.physics.force_wetting import Wetting
+from particles.steps.inertial_flow import InertialFlow
 from workflow.stress_test.command import HARD
 from workflow.stress_test.hard_case import read_hard_cases
 from workflow.stress_test.verdict import attempt

@@ -2,11 +2,11 @@
 
 from math import isfinite
 
-from particles.drop_at_rest import flow_to_rest
-from particles.flow import LiquidFlow
-from particles.parameters import Solder
-from particles.rest import Run
-from particles.scenes import Drop
+from particles.parameters.scenes import Drop
+from particles.parameters.solder import Solder
+from particles.scenes.drop_at_rest import flow_to_rest
+from particles.steps.flow import LiquidFlow
+from particles.steps.rest import Run
 
 
 def solve_drop(solder: Solder, count: int, pad_radius: float = float("inf")) -> tuple[LiquidFlow, Run]:

@@ -10,21 +10,21 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from fem.body import Body, Response
-from fem.loads import DOWN, BodyAcceleration, Load
+from fem.dynamics.central_difference import Motion
+from fem.loads.load import DOWN, BodyAcceleration, Load
+from fem.loads.shock_loads import shock_loads
 from fem.materials.library import FR4
 from fem.materials.parameters import Material
-from fem.motion import Motion
-from fem.parameters import Shock
-from fem.pulse import HalfSine
-from fem.shock_loads import shock_loads
+from fem.model.body import Body, Response
+from fem.problem.parameters import Shock
+from fem.problem.pulse import HalfSine
 from fem.trials.bodies import dns_body, motion_of, nonlinear_body
 from fem.trials.grids import grid, mesh_of, on
-from particles.cloud import box_cloud
-from particles.flow import LiquidFlow
-from particles.parameters import Solder
-from particles.physics import Physics
-from particles.reflow import contact_line, start_flow
+from particles.core.cloud import box_cloud
+from particles.parameters.solder import Solder
+from particles.physics.physics import Physics
+from particles.scenes.reflow import contact_line, start_flow
+from particles.steps.flow import LiquidFlow
 
 __all__ = ["DOWN", "BodyAcceleration", "HalfSine", "motion_of"]
 G = 9.80665

@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 from mpi4py import MPI
 
-from fem.inputs import INPUT, StructureInput
 from fem.materials.elasticity import elasticity_matrix
 from fem.materials.library import LIBRARY
-from fem.structure.run import run_structure
-from meshing.box import write_box
-from meshing.box_plan import Box, BoxLayer
+from fem.problem.inputs import INPUT, StructureInput
+from fem.run.structure_run import run_structure
+from meshing.board.box import write_box
+from meshing.board.box_plan import Box, BoxLayer
 
 HELD = {f"{axis}_{end}": {"on": f"{axis}_{end}", "hold": [axis]} for axis in "xy" for end in ("min", "max")}
 PEAK = 1e6  # [Pa]

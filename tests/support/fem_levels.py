@@ -5,14 +5,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from mpi4py import MPI
 
-from fem.body import Body, Response, make_body, make_pieces
+from fem.division.chebyshev import stabilisation
+from fem.division.choose_levels import Pace, governing_steps, least_steps
+from fem.division.tables import prepare
 from fem.elements.element import element_stiffness
-from fem.levels.chebyshev import stabilisation
-from fem.levels.choose import Pace, governing_steps, least_steps
-from fem.local_mesh import distribute
 from fem.materials.roles import Materials
-from fem.mesh import MeshData, append
-from fem.scene import prepare
+from fem.mesh.mesh import MeshData, append
+from fem.model.body import Body, Response, make_body, make_pieces
+from fem.parallel.local_mesh import distribute
 from fem.trials.grids import grid, joint_mesh, mesh_of, on
 
 EDGE = 1.5e-3

@@ -5,8 +5,8 @@ from pathlib import Path
 import gmsh
 import numpy as np
 
-from fem.elements.cell_shape import TENSOR_ORDER
-from fem.mesh import MeshData, append, without_unused_nodes
+from fem.cell_shape import TENSOR_ORDER
+from fem.mesh.mesh import MeshData, append, without_unused_nodes
 from fem.trials.grids import COPPER, GAP, grid, joint_mesh, mesh_of, on
 
 # Of cells and facets with so many nodes: Gmsh's type, and its order of our nodes.

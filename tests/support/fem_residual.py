@@ -6,16 +6,16 @@ from dataclasses import dataclass
 import numpy as np
 from mpi4py import MPI
 
-from fem.body import Body, Response, make_body, make_pieces
-from fem.local_mesh import distribute
+from fem.division.tables import joined, model_inputs
 from fem.materials.parameters import Material
-from fem.mesh import MeshData
-from fem.residual.cooling import pinned
-from fem.residual.equilibrium import Equilibrium, Statics, thermal_force
-from fem.residual.initial_state import begun
-from fem.scene import joined, model_inputs
-from fem.stress_recovery import StressRecovery
-from fem.supports import SYMMETRY
+from fem.mesh.mesh import MeshData
+from fem.mesh.supports import SYMMETRY
+from fem.model.body import Body, Response, make_body, make_pieces
+from fem.model.stress_recovery import StressRecovery
+from fem.parallel.local_mesh import distribute
+from fem.statics.cooling import pinned
+from fem.statics.equilibrium import Equilibrium, Statics, thermal_force
+from fem.statics.initial_state import begun
 from fem.trials.grids import grid, mesh_of, on
 
 SMALL = Response()

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from fem.inputs import INPUT, StructureInput
-from fem.mesh import MeshData
+from fem.mesh.mesh import MeshData
+from fem.problem.inputs import INPUT, StructureInput
 from fem.trials.grids import grid, mesh_of, on
 from tests.support.fem_models import write_msh
 

@@ -2,11 +2,11 @@
 
 from collections.abc import Sequence
 
-from fem.coupling.divide import divide
 from fem.coupling.held_velocity import HeldVelocity
-from fem.loads import Load
+from fem.division.divide import divide
+from fem.loads.load import Load
 from fem.materials.roles import Materials
-from fem.mesh import MeshData
+from fem.mesh.mesh import MeshData
 from fem.trials.coupled import Coupled, models_of
 from fem.trials.divided import HELD, Divide
 

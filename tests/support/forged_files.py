@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from particles.data_file import FORMAT
+from particles.core.data_file import FORMAT
 
 
 class Marking:

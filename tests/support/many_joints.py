@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from meshing.joint_mesh import JointMesh
-from meshing.pads import PadSite
-from meshing.solder_mesh import JointMeshError, joint_quality
-from meshing.surface import ClosedSurface, close_surface, pad_planes
+from meshing.board.pads import PadSite
+from meshing.joint.joint_mesh import JointMesh
+from meshing.joint.solder_mesh import JointMeshError, joint_quality
+from meshing.surface.closed_surface import ClosedSurface, close_surface, pad_planes
 from meshing.trials import level_sets, surfaces
 from meshing.trials.joints import measured, mesh_at, sites_of
 from meshing.trials.level_sets import bridged_pair, with_void

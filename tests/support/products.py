@@ -4,7 +4,7 @@ import shutil
 from collections.abc import Iterable
 from pathlib import Path
 
-from workflow.stage_runner import Findings, Run, run_stage
+from workflow.pipeline.stage_runner import Findings, Run, run_stage
 from workflow.store.point import Point
 from workflow.store.product import seal
 from workflow.store.store import Store

@@ -6,8 +6,8 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from workflow import reflow_pool
-from workflow.reflow_pool import Job, records
+from workflow.board_drop import reflow_pool
+from workflow.board_drop.reflow_pool import Job, records
 
 __all__ = ["records"]
 

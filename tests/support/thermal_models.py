@@ -9,11 +9,11 @@ from mpi4py import MPI
 
 from fem.materials.parameters import Isotropic
 from fem.materials.roles import Materials
-from fem.mesh import MeshData, append
-from fem.thermal.pads import Pads
-from fem.thermal.parameters import Thermal
-from fem.thermal.state import Assembly
-from fem.thermal.structure import ThermalStructure
+from fem.mesh.mesh import MeshData, append
+from fem.problem.thermal import Thermal
+from fem.statics.pads import Pads
+from fem.statics.state import Assembly
+from fem.statics.structure import ThermalStructure
 from fem.trials.grids import COPPER, GAP, grid, mesh_of, on
 from tests.support.fem_models import SITES, write_msh, write_small_assembly
 

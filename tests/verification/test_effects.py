@@ -13,28 +13,28 @@ from mpi4py import MPI
 
 from fem.coupling.one_way import OneWay
 from fem.coupling.scheme import scheme_of
-from fem.effects import NEGLIGIBLE_STIFFENING, NEGLIGIBLE_WEIGHT, called_for, damping, weight
-from fem.force import force_terms
-from fem.force_nonlinear import NonlinearElements
+from fem.estimates.effects import NEGLIGIBLE_STIFFENING, NEGLIGIBLE_WEIGHT, called_for, damping, weight
+from fem.forces.force import force_terms
+from fem.forces.force_nonlinear import NonlinearElements
 from fem.kernels.plasticity import plastic_constants
-from fem.materials.failure import failure_criteria, judge
+from fem.loads.pretension import Pretension
 from fem.materials.library import FR4, SAC305, SILICON
-from fem.parameters import Damping, Failure, JointCoupling
-from fem.residual.pretension import Pretension
-from fem.steps import mass_factor
-from fem.supports import held_components
-from fem.thermal.parameters import Thermal
-from fem.thermal.plates import RigidPlates
-from fem.thermal.structure import ThermalStructure
+from fem.mesh.supports import held_components
+from fem.model.steps import mass_factor
+from fem.output.failure import failure_criteria, judge
+from fem.problem.parameters import Damping, Failure, JointCoupling
+from fem.problem.thermal import Thermal
+from fem.statics.plates import RigidPlates
+from fem.statics.structure import ThermalStructure
 from fem.trials.grids import grid, mesh_of
-from particles.effects import NEGLIGIBLE_SHAPE_CHANGE, decide, decide_drop, drop_numbers
-from particles.parameters import SolderEffects
+from particles.parameters.effects import NEGLIGIBLE_SHAPE_CHANGE, decide, decide_drop, drop_numbers
+from particles.parameters.solder import SolderEffects
 from tests.support import effect_switches as scene
 from tests.support.drops import solve_drop
 from tests.support.fem_residual import cooled, layered
 from tests.support.thermal_models import small_structure
-from workflow.effect_registry.registry import registry
-from workflow.fine_joints import needs_coarse_joints
+from workflow.board_drop.fine_joints import needs_coarse_joints
+from workflow.effects.registry import registry
 from workflow.reflow.between import open_structure
 from workflow.reflow.load_steps import load_steps
 
@@ -194,7 +194,7 @@ def _(_effect, _folder):
     body, step = scene.strip()
     assert not [term for term in body.terms if isinstance(term, Pretension)]
     called = steps_of(scene.motion_of(body, step))
-    assert not [key for key in called if key[0].startswith("fem.residual")]
+    assert not [key for key in called if key[0].startswith("fem.statics")]
 
 
 @on("residual_stress")

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from fem.elements.element import Elements, element_geometry
-from fem.force import force_terms
+from fem.elements.stress import element_stress
+from fem.forces.force import force_terms
 from fem.materials.elasticity import elasticity_matrix
 from fem.materials.library import FR4, SAC405
 from fem.materials.parameters import Isotropic
-from fem.stress import element_stress
 from fem.trials.bodies import dns_body
 from fem.trials.grids import grid, mesh_of, on
 from tests.support.fem_bodies import dense_stiffness

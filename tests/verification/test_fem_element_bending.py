@@ -5,7 +5,7 @@ import pytest
 
 from fem.materials.library import FR4
 from fem.materials.parameters import Isotropic, Material
-from fem.mesh_quality import scaled_jacobians
+from fem.mesh.mesh_quality import scaled_jacobians
 from fem.trials.bending import beam, tip
 from fem.trials.boxes import KINDS, box, elements_of, frequencies
 

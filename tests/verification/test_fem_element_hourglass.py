@@ -5,7 +5,7 @@ import pytest
 
 from fem.elements.element import Elements, element_kind
 from fem.elements.one_point import ONE_POINT, hourglass_control
-from fem.force import force_terms
+from fem.forces.force import force_terms
 from fem.materials.elasticity import elasticity_matrix
 from fem.materials.library import FR4
 from fem.trials.grids import grid

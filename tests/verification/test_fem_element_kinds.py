@@ -6,13 +6,13 @@ import scipy.sparse
 from scipy.sparse.linalg import eigsh
 
 from fem.elements.element import Elements, critical_steps, element_geometry
-from fem.facet import area_vectors
-from fem.force import linear_terms
+from fem.elements.stress import element_stress, mean_strain
+from fem.forces.force import linear_terms
 from fem.materials.library import FR4, SAC405
 from fem.materials.parameters import Isotropic
-from fem.mesh import boundary_facets
-from fem.mesh_quality import scaled_jacobians
-from fem.stress import element_stress, mean_strain
+from fem.mesh.facet import area_vectors
+from fem.mesh.mesh import boundary_facets
+from fem.mesh.mesh_quality import scaled_jacobians
 from fem.trials.boxes import KINDS, box, elements_of, mass_of, solve, stiffness_matrix
 from fem.trials.grids import CYCLIC
 from fem.trials.order import orders_in_h

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from fem.facet_areas import outward_areas, outward_facets
-from fem.follower_pressure import FollowerPressure
-from fem.loads import NodalForces
-from fem.mesh import MeshData
-from fem.motion import Motion
-from fem.pulse import Constant
+from fem.dynamics.central_difference import Motion
+from fem.loads.follower_pressure import FollowerPressure
+from fem.loads.load import NodalForces
+from fem.mesh.facet_areas import outward_areas, outward_facets
+from fem.mesh.mesh import MeshData
+from fem.problem.pulse import Constant
 from fem.trials.bodies import dns_body, motion_of
 from fem.trials.grids import grid, mesh_of, on
 from tests.support.fem_bodies import STEEL

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fem.body import Body
+from fem.dynamics.implicit import ImplicitMotion
 from fem.errors import AgreedError
-from fem.implicit import ImplicitMotion
-from fem.loads import half_sine_drop
+from fem.loads.load import half_sine_drop
 from fem.materials.roles import Materials
-from fem.mesh import append
+from fem.mesh.mesh import append
+from fem.model.body import Body
 from fem.trials.bodies import dns_body, motion_of
 from fem.trials.grids import grid, mesh_of
 from tests.support.fem_bodies import STEEL

@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fem import portable
-from fem.body import Body
-from fem.damping import RayleighDamping
-from fem.global_matrix import Equations
-from fem.implicit import ImplicitMotion
-from fem.loads import Load
-from fem.mesh import MeshData
-from fem.modal import natural_modes
-from fem.moving import Moving
-from fem.parameters import Damping
+from fem.dynamics.implicit import ImplicitMotion
+from fem.dynamics.moving import Moving
+from fem.loads.damping import RayleighDamping
+from fem.loads.load import Load
+from fem.mesh.mesh import MeshData
+from fem.model.body import Body
+from fem.model.global_matrix import Equations
+from fem.parallel import portable
+from fem.problem.parameters import Damping
+from fem.statics.modal import natural_modes
 from fem.trials.bodies import dns_body, motion_of
 from tests.support.fem_bodies import STEEL
 from tests.verification.test_fem_loads import bar, largest_imbalance, loads_of

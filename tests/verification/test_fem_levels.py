@@ -7,14 +7,14 @@ import pytest
 import scipy.linalg
 from mpi4py import MPI
 
-from fem.coupling.division import Division
 from fem.coupling.scheme import scheme_of
-from fem.estimate import WindowPlan
-from fem.levels.force import Levels, LocalSteps
+from fem.division.division import Division
+from fem.division.tables import joined, model_inputs
+from fem.dynamics.central_difference import Motion
+from fem.estimates.estimate import WindowPlan
 from fem.materials.roles import Materials
-from fem.motion import Motion
-from fem.scene import joined, model_inputs
-from fem.tie import net_load
+from fem.mesh.tie import net_load
+from fem.model.step_levels import Levels, LocalSteps
 from fem.trials.bodies import motion_of
 from fem.trials.coupled import Coupled, Models, pieces_of
 from tests.support.fem_bodies import dense_stiffness

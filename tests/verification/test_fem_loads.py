@@ -4,17 +4,17 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fem.body import Body
-from fem.damping import RayleighDamping
-from fem.estimate import damped_critical_step
-from fem.facet_areas import outward_areas
-from fem.large_mass import LargeMass
-from fem.loads import BodyAcceleration, Load, NodalForces, PrescribedMotion
+from fem.dynamics.central_difference import Motion
+from fem.estimates.estimate import damped_critical_step
+from fem.loads.damping import RayleighDamping
+from fem.loads.large_mass import LargeMass
+from fem.loads.load import BodyAcceleration, Load, NodalForces, PrescribedMotion
 from fem.materials.parameters import Isotropic
-from fem.mesh import MeshData
-from fem.motion import Motion
-from fem.parameters import Damping
-from fem.pulse import Constant, HalfSine
+from fem.mesh.facet_areas import outward_areas
+from fem.mesh.mesh import MeshData
+from fem.model.body import Body
+from fem.problem.parameters import Damping
+from fem.problem.pulse import Constant, HalfSine
 from fem.trials.bodies import dns_body, motion_of
 from fem.trials.grids import grid, mesh_of, on
 from tests.support.fem_bodies import STEEL

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fem import modal
-from fem.body import Body
-from fem.global_matrix import Equations
 from fem.materials.library import FR4
-from fem.modal import natural_modes
+from fem.model.body import Body
+from fem.model.global_matrix import Equations
+from fem.statics import modal
+from fem.statics.modal import natural_modes
 from fem.trials.bodies import dns_body
 from fem.trials.grids import grid, mesh_of
 from tests.support.fem_bodies import STEEL

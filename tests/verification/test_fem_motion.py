@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from fem.loads import half_sine_drop
-from fem.mesh import MeshData
+from fem.loads.load import half_sine_drop
+from fem.mesh.mesh import MeshData
 from fem.trials.bodies import dns_body, motion_of
 from fem.trials.grids import grid, mesh_of, on
 from tests.support.fem_bodies import STEEL

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from fem.force_nonlinear import NonlinearElements
+from fem.elements.stress import symmetric
+from fem.forces.force_nonlinear import NonlinearElements
 from fem.materials.library import FR4
 from fem.materials.parameters import Isotropic, Material
-from fem.stress import symmetric
 from fem.trials.bending import bent_moment
 from fem.trials.bodies import force_of, nonlinear
 from fem.trials.boxes import KINDS, box, elements_of

@@ -4,15 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from fem.body import Pieces
 from fem.coupling.held_velocity import HeldVelocity
 from fem.coupling.one_way import OneWay
-from fem.ledger import Ledger, ledger_sums
-from fem.loads import half_sine_drop
+from fem.division.tables import Tables, model_inputs
+from fem.dynamics.energy_balance import Ledger, ledger_sums
+from fem.loads.load import half_sine_drop
 from fem.materials.library import SAC405
 from fem.materials.roles import Materials
-from fem.parameters import Coupling
-from fem.scene import Tables, model_inputs
+from fem.model.body import Pieces
+from fem.problem.parameters import Coupling
 from fem.trials.bodies import motion_of
 from fem.trials.coupled import Coupled, Models, models_of, pieces_of
 from fem.trials.divided import surveyed

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fem.compare_structures import solver_differences
-from fem.mesh import MeshData
-from fem.structure.run import run_structure
+from fem.mesh.mesh import MeshData
+from fem.output.compare_structures import solver_differences
+from fem.run.structure_run import run_structure
 from fem.trials.grids import grid, mesh_of, on
 from tests.support.fem_structures import structure_input
 

@@ -5,13 +5,13 @@ import pytest
 from scipy.optimize import brentq
 
 from fem.elements.element import Elements, element_kind
-from fem.force_nonlinear import NonlinearElements
+from fem.forces.force_nonlinear import NonlinearElements
 from fem.kernels.nonlinear import Path
 from fem.kernels.plasticity import plastic_constants
 from fem.materials.elasticity import elasticity_matrix
 from fem.materials.library import FR4
 from fem.materials.parameters import Isotropic, JohnsonCook
-from fem.residual.hencky import HenckyElements
+from fem.statics.hencky import HenckyElements
 from tests.support.fem_residual import cooled, layered
 
 CHANGE = -192.0

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from fem.dynamics.energy_balance import Ledger
 from fem.errors import EnergyError
-from fem.ledger import Ledger
-from fem.portable import values
+from fem.parallel.portable import values
 from fem.trials.bodies import dns_body, motion_of
 from fem.trials.coupled import Coupled
 from fem.trials.pairs import SCHEMES, Pair

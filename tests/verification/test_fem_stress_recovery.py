@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from fem.body import Response
+from fem.elements.stress import symmetric
 from fem.materials.elasticity import elasticity_matrix
 from fem.materials.library import FR4
 from fem.materials.parameters import Isotropic
-from fem.stress import symmetric
-from fem.stress_recovery import StressRecovery
+from fem.model.body import Response
+from fem.model.stress_recovery import StressRecovery
 from fem.trials.bodies import motion_of, nonlinear_body
 from fem.trials.grids import grid, mesh_of
 from fem.trials.metals import LINEAR_HARDENING

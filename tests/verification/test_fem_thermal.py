@@ -9,11 +9,11 @@ from mpi4py import MPI
 from fem.materials.library import FR4
 from fem.materials.parameters import Isotropic
 from fem.materials.roles import Materials
-from fem.mesh import append, select
-from fem.thermal.parameters import Thermal
-from fem.thermal.rigid import RigidMotions
-from fem.thermal.state import Assembly
-from fem.thermal.structure import ThermalStructure
+from fem.mesh.mesh import append, select
+from fem.problem.thermal import Thermal
+from fem.statics.rigid import RigidMotions
+from fem.statics.state import Assembly
+from fem.statics.structure import ThermalStructure
 from fem.trials.grids import grid, mesh_of, on
 from tests.support.fem_models import write_msh
 from tests.support.thermal_models import (

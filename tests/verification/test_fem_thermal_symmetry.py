@@ -7,13 +7,13 @@ import pytest
 from mpi4py import MPI
 
 from fem.materials.roles import Materials
-from fem.thermal.pads import Pads
-from fem.thermal.parameters import Thermal
-from fem.thermal.state import Assembly, State
-from fem.thermal.structure import ThermalStructure
-from meshing.heated_assembly import write_heated_assembly
-from meshing.pads import pad_table
-from meshing.parameters import Warpage
+from fem.problem.thermal import Thermal
+from fem.statics.pads import Pads
+from fem.statics.state import Assembly, State
+from fem.statics.structure import ThermalStructure
+from meshing.board.heated_assembly import write_heated_assembly
+from meshing.board.pads import pad_table
+from meshing.board.parameters import Warpage
 from meshing.trials.models import MM, PLATE, board, package
 
 MOVED = Thermal(package="moved", corner_displacement=-5e-5)

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fem.damping import RayleighDamping
-from fem.facet_areas import outward_areas
-from fem.large_mass import LargeMass
-from fem.loads import BodyAcceleration, Load, NodalForces, PrescribedMotion
+from fem.loads.damping import RayleighDamping
+from fem.loads.large_mass import LargeMass
+from fem.loads.load import BodyAcceleration, Load, NodalForces, PrescribedMotion
 from fem.materials.parameters import Isotropic
 from fem.materials.roles import Materials
-from fem.mesh import MeshData
-from fem.pulse import HalfSine, Tabulated
+from fem.mesh.facet_areas import outward_areas
+from fem.mesh.mesh import MeshData
+from fem.problem.pulse import HalfSine, Tabulated
 from fem.trials.bodies import dns_body, motion_of
 from fem.trials.grids import grid, mesh_of, on
 from tests.support.fem_bodies import STEEL

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from fem.ledger import Ledger, ledger_sums
-from fem.loads import half_sine_drop
+from fem.dynamics.energy_balance import Ledger, ledger_sums
+from fem.loads.load import half_sine_drop
 from fem.materials.library import SAC405
 from fem.materials.roles import Materials
-from fem.mesh import MeshData, append
+from fem.mesh.mesh import MeshData, append
 from fem.trials.bodies import dns_body, motion_of
 from tests.support.fem_division import by_patch
 from tests.support.fem_models import board_mesh, small_assembly

@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fem.compare import relative_error
 from fem.materials.elasticity import elasticity_matrix
 from fem.materials.library import LIBRARY
-from fem.pulse import Haversine
+from fem.output.compare import relative_error
+from fem.problem.pulse import Haversine
 from tests.support.fem_bars import PEAK, bar_layers, run_bar, speed_of, write_bar
 from workflow.structure.exact_layers import Layers
 

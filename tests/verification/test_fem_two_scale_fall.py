@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from fem.coupling.scheme import scheme_of
-from fem.loads import half_sine_drop
+from fem.loads.load import half_sine_drop
 from fem.materials.roles import Materials
-from fem.mesh import append
-from fem.parameters import Coupling
+from fem.mesh.mesh import append
+from fem.problem.parameters import Coupling
 from fem.trials.coupled import Coupled, models_of
 from tests.support.fem_models import small_assembly
 

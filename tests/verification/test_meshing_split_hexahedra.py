@@ -5,17 +5,17 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from fem.elements.cell_shape import TENSOR_ORDER
+from fem.cell_shape import TENSOR_ORDER
 from fem.elements.element import critical_steps, element_geometry
-from fem.estimate import box_critical_step
+from fem.estimates.estimate import box_critical_step
 from fem.materials.library import LIBRARY
 from fem.trials.boxes import KINDS, elements_of, frequencies, solve
-from meshing.free_form import free_form_solder
-from meshing.hexahedra import quad_areas, shortest_lengths
-from meshing.parameters import JointNumerics
-from meshing.solder import Solder
-from meshing.swept import swept_solder
-from meshing.tetrahedra import fill_apart
+from meshing.board.parameters import JointNumerics
+from meshing.core.hexahedra import quad_areas, shortest_lengths
+from meshing.joint.free_form import free_form_solder
+from meshing.joint.solder import Solder
+from meshing.joint.swept import swept_solder
+from meshing.joint.tetrahedra import fill_apart
 from meshing.trials.models import MM
 from meshing.trials.surfaces import barrel
 

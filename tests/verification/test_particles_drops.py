@@ -6,13 +6,13 @@ from math import inf
 import numpy as np
 import pytest
 
-from particles.cloud import box_cloud
-from particles.cloud_level_set import cloud_from_level_set
-from particles.drops import OverlappingDrops, run_drops
-from particles.parameters import Solder, SolderNumerics
-from particles.profile import fit_profile
-from particles.reflow import contact_line, start_flow, stop_rule
-from particles.surface_measure import centre_of_volume
+from particles.core.cloud import box_cloud
+from particles.core.surface_measure import centre_of_volume
+from particles.parameters.solder import Solder, SolderNumerics
+from particles.scenes.drops import OverlappingDrops, run_drops
+from particles.scenes.reflow import contact_line, start_flow, stop_rule
+from particles.surface.cloud_level_set import cloud_from_level_set
+from particles.surface.profile import fit_profile
 from tests.support.level_sets import ball, cap_radius, grid_around_ball
 
 ANGLE = np.radians(60.0)

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from meshing.surface import close_rings, measure
-from particles.carried_joint import carried_shape, carry_joint
-from particles.checkpoint import Checkpoint
-from particles.geometry import JointGeometry
-from particles.parameters import Solder, SolderNumerics
-from workflow.board_drop_case import LARGE_STEPS
+from meshing.surface.closed_surface import close_rings, measure
+from particles.core.checkpoint import Checkpoint
+from particles.core.geometry import JointGeometry
+from particles.parameters.solder import Solder, SolderNumerics
+from particles.scenes.carried_joint import carried_shape, carry_joint
+from workflow.board_drop.case import LARGE_STEPS
 
 PAD = 0.24e-3
 PLACES = [

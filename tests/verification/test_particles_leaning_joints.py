@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from particles.geometry import LARGEST_WIDTH_CHANGE, JointGeometry
-from particles.metrics import width_change_bound
-from particles.parameters import Solder, SolderNumerics
-from particles.reflow import solve_joint
-from particles.young_laplace import joint_meridian
+from particles.core.geometry import LARGEST_WIDTH_CHANGE, JointGeometry
+from particles.parameters.solder import Solder, SolderNumerics
+from particles.reference.young_laplace import joint_meridian
+from particles.scenes.metrics import width_change_bound
+from particles.scenes.reflow import solve_joint
 
 REFERENCE = json.loads((Path(__file__).parent / "references" / "surface_evolver.json").read_text())["leaning_joints"]
 MM, GAMMA = 1e-3, 0.4985

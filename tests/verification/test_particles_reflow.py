@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from particles.geometry import JointGeometry
-from particles.metrics import mean_angle, verdict
-from particles.parameters import Solder, SolderEffects, SolderNumerics
-from particles.profile import fit_profile
-from particles.reflow import solve_joint
-from particles.young_laplace import joint_meridian, sessile_meridian
+from particles.core.geometry import JointGeometry
+from particles.parameters.solder import Solder, SolderEffects, SolderNumerics
+from particles.reference.young_laplace import joint_meridian, sessile_meridian
+from particles.scenes.metrics import mean_angle, verdict
+from particles.scenes.reflow import solve_joint
+from particles.surface.profile import fit_profile
 from tests.support.drops import solve_drop
 
 BALL, RADIUS, GAMMA = 0.0724e-9, 0.24e-3, 0.4985

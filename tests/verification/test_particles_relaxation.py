@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from particles.cloud import box_cloud
-from particles.flow import LiquidFlow
-from particles.parameters import Solder, SolderEffects, SolderNumerics
-from particles.reflow import contact_line, start_flow
+from particles.core.cloud import box_cloud
+from particles.parameters.solder import Solder, SolderEffects, SolderNumerics
+from particles.scenes.reflow import contact_line, start_flow
+from particles.steps.flow import LiquidFlow
 
 EFFECTS = {"surface_tension": True, "wall_adhesion": True, "gravity": False, "inertia": False, "viscosity": False}
 

@@ -5,15 +5,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from fem.thermal.parameters import KELVIN, Thermal
-from particles.geometry import JointGeometry
-from particles.joint_stiffness import stiffness_estimate
-from particles.parameters import Solder, SolderNumerics
-from particles.young_laplace import joint_meridian
+from fem.problem.thermal import KELVIN, Thermal
+from particles.core.geometry import JointGeometry
+from particles.parameters.solder import Solder, SolderNumerics
+from particles.reference.young_laplace import joint_meridian
+from particles.scenes.joint_stiffness import stiffness_estimate
 from tests.support.reflow_structures import NAMES, Bow, joints_here, rigid_modes
 from tests.support.workflow_command import SMALL_CASE
-from workflow.case import read_case
-from workflow.problems import CaseError
+from workflow.case.problems import CaseError
+from workflow.pipeline.reader import read_case
 from workflow.reflow.coupling import Coupling, NotInBalance, placed
 from workflow.reflow.load_steps import LoadStep, load_steps
 from workflow.reflow.start import floating_height, scale_of, start

@@ -6,7 +6,7 @@ from scipy.integrate import trapezoid
 
 from fem.materials.elasticity import elasticity_matrix
 from fem.materials.parameters import Isotropic
-from fem.pulse import HalfSine, Haversine
+from fem.problem.pulse import HalfSine, Haversine
 from workflow.structure import exact_bar, exact_cantilever, exact_layers
 
 BARS = exact_bar.Bars((0.1, 0.1), (70e9, 200e9), (2700.0, 8000.0), 8e-6)

@@ -5,10 +5,10 @@ from collections.abc import Iterator, Sequence
 from importlib.util import find_spec
 
 from fem.names import nearest
-from workflow.case_kind import Case
+from workflow.case.kind import Case
+from workflow.case.problems import CaseError, Problem
 from workflow.cluster.profile import FILE, Profile
 from workflow.cluster.queue import NoAnswer, Partition, partitions
-from workflow.problems import CaseError, Problem
 
 PLUGIN = "snakemake_executor_plugin_slurm"
 

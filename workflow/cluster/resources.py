@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from math import ceil
 from typing import Any
 
-from workflow.board_drop_case import PackageCase
-from workflow.case import available_cores
-from workflow.case_kind import Case
+from workflow.board_drop.case import PackageCase
+from workflow.case.kind import Case
+from workflow.pipeline.reader import available_cores
 from workflow.structure.case import StructureCase
 
 # Short and serial: they run beside the command, not as jobs.
@@ -96,8 +96,8 @@ def _size(case: Case) -> _Size:
 
 
 def _of_package(case: PackageCase) -> _Size:
-    from fem.solver_cost import cooling_cost
-    from workflow.forecast import forecast
+    from fem.estimates.solver_cost import cooling_cost
+    from workflow.board_drop.forecast import forecast
 
     outlook = forecast(case)
     joints = max(1, outlook.distinct)
@@ -120,7 +120,7 @@ def _of_structure(case: StructureCase) -> _Size:
 
 
 def _of_scene(case: Case) -> _Size:
-    from workflow.scene_forecast import forecast_scene
+    from workflow.solder.forecast import forecast_scene
 
     outlook: Any = forecast_scene(case)
     return _Size(outlook.seconds, 1, BYTES_OF_PARTICLE * outlook.particles)

@@ -7,8 +7,8 @@ import os
 import sys
 from pathlib import Path
 
-from fem.own_job import own_environment
-from workflow.kernel_cache import keep_kernels_by_source
+from fem.parallel.own_job import own_environment
+from workflow.process.kernel_cache import keep_kernels_by_source
 from workflow.reflow.rank import find, main
 
 if __name__ == "__main__":

@@ -7,18 +7,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fem.thermal.parameters import Thermal
+from fem.problem.thermal import Thermal
 
 if TYPE_CHECKING:
-    from fem.thermal.state import Structure
-    from meshing.pads import PadSite
-    from workflow.board_drop_case import PackageCase
+    from fem.statics.state import Structure
+    from meshing.board.pads import PadSite
+    from workflow.board_drop.case import PackageCase
 
 
 def thermal_effects(case: "PackageCase", thermal: Thermal) -> dict:
-    """Decide which effects act between solder and structure; see `fem.thermal.effects.decide`."""
-    from fem.thermal.effects import PackageSizes, decide
-    from meshing.pads import corner_axis
+    """Decide which effects act between solder and structure; see `fem.estimates.thermal_effects.decide`."""
+    from fem.estimates.thermal_effects import PackageSizes, decide
+    from meshing.board.pads import corner_axis
 
     package, board = case.package, case.board
     sizes = PackageSizes(
@@ -47,10 +47,10 @@ def open_structure(
         pads: between them.
         flexible: whether they bend.
     """
-    from fem.thermal.pads import Pads
-    from fem.thermal.plates import RigidPlates
-    from fem.thermal.process import StructureProcess
-    from fem.thermal.state import Assembly
+    from fem.statics.pads import Pads
+    from fem.statics.plates import RigidPlates
+    from fem.statics.process import StructureProcess
+    from fem.statics.state import Assembly
 
     lower = np.array([(pad.x, pad.y, pad.z_board) for pad in pads])
     upper = lower + np.array([(*pad.offset, pad.gap) for pad in pads])
@@ -62,7 +62,7 @@ def open_structure(
 
 def frozen_displacement(case: "PackageCase", structure: "Structure", displacement: np.ndarray) -> np.ndarray:
     """Return the displacement `(n, 3)` with the lift of a prescribed warpage: rigid plates have it from the start."""
-    from meshing.pads import lift
+    from meshing.board.pads import lift
 
     raised = displacement.copy()
     x, y = structure.points[:, :2].T

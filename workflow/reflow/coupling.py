@@ -20,8 +20,8 @@ from workflow.reflow.load_steps import LoadStep
 from workflow.reflow.rigid_balance import RigidBalance
 
 if TYPE_CHECKING:
-    from fem.thermal.state import State, Structure
-    from particles.geometry import JointGeometry
+    from fem.statics.state import State, Structure
+    from particles.core.geometry import JointGeometry
 
 Floats = NDArray[np.float64]
 
@@ -199,7 +199,7 @@ def placed(drawn: "Mapping[str, JointGeometry]", pad_motion: Floats) -> "dict[st
         drawn: joint name -> geometry as drawn.
         pad_motion: `(joints, 2, 6)` [m, rad].
     """
-    from particles.plate import joint_plates, placed_geometry
+    from particles.core.plate import joint_plates, placed_geometry
 
     return {
         name: placed_geometry(

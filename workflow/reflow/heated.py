@@ -7,12 +7,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-import fem.thermal as thermal_package
-from fem.checkpoint_files import digest_of_files
-from fem.thermal.parameters import KELVIN, Thermal
-from workflow.board_drop_case import PackageCase
-from workflow.findings import at_most, metric
-from workflow.progress import ProgressBar, progress_bar
+import fem.statics as statics
+from fem.parallel.checkpoint_files import digest_of_files
+from fem.problem.thermal import KELVIN, Thermal
+from workflow.board_drop.case import PackageCase
+from workflow.board_drop.findings import at_most, metric
+from workflow.board_drop.reflow_pool import Alike, joint_geometries
+from workflow.pipeline.stage_runner import Run
+from workflow.process.progress import ProgressBar, progress_bar
 from workflow.reflow.array import JointArray, Left, Source
 from workflow.reflow.between import frozen_displacement, open_structure, thermal_effects
 from workflow.reflow.coupling import Coupled, Coupling, Exchange, placed
@@ -22,14 +24,12 @@ from workflow.reflow.open_pool import open_pool
 from workflow.reflow.pool import Shares
 from workflow.reflow.rigid_balance import RigidBalance
 from workflow.reflow.start import scale_of, start
-from workflow.reflow_pool import Alike, joint_geometries
-from workflow.stage_runner import Run
 
 if TYPE_CHECKING:
-    from fem.thermal.state import Structure
-    from meshing.pads import PadSite
-    from particles.geometry import JointGeometry
-    from particles.shape import JointShape
+    from fem.statics.state import Structure
+    from meshing.board.pads import PadSite
+    from particles.core.geometry import JointGeometry
+    from particles.steps.shape import JointShape
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,16 +125,16 @@ def _nothing(structure: "Structure") -> tuple[np.ndarray, np.ndarray]:
 
 def all_inputs(case: PackageCase, pads: "list[PadSite]") -> tuple:
     """All that a coupled reflow depends on: case, pads, and the sources of what is saved of it."""
-    folders = (Path(__file__).parent, Path(thermal_package.__file__).parent)
+    folders = (Path(__file__).parent, Path(statics.__file__).parent)
     sources = digest_of_files(*(path for folder in folders for path in sorted(folder.glob("*.py"))))
     return case.package, case.board, case.warpage, case.solder, case.materials, case.thermal, pads, sources
 
 
 def _records() -> tuple[type, ...]:
     """What the file of a coupling consists of."""
-    from fem.thermal.state import State
-    from particles.geometry import JointGeometry
-    from particles.orientation import Orientation
+    from fem.statics.state import State
+    from particles.core.geometry import JointGeometry
+    from particles.scenes.orientation import Orientation
 
     return Coupled, RigidBalance, State, Exchange, Left, Source, Alike, JointGeometry, Orientation
 
@@ -144,7 +144,7 @@ class Saved:
 
     def __init__(self, folder: Path, inputs: tuple) -> None:
         """Name the file and all that it depends on."""
-        from particles.checkpoint import Checkpoint
+        from particles.core.checkpoint import Checkpoint
 
         self._file = Checkpoint(folder / "coupling", inputs)
 

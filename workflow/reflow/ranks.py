@@ -13,8 +13,8 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from particles.data_file import NotData, read_data, write_data
-from workflow.launch import DIE_WITH_PARENT, LaunchError, launch, mpi_command
+from particles.core.data_file import NotData, read_data, write_data
+from workflow.process.launch import DIE_WITH_PARENT, LaunchError, launch, mpi_command
 from workflow.reflow.pool import Job, ReflowError, Report, Result, Shares
 from workflow.reflow.rank import JOB, RESULT, TAKEN, Done, name_of, records_of
 

@@ -13,7 +13,7 @@ from workflow.report.pictures import new_plotter, save
 from workflow.report.tables import number, percent, quantity
 
 if TYPE_CHECKING:
-    from particles.shape import JointShape, Snapshot
+    from particles.steps.shape import JointShape, Snapshot
 
 SMALLEST_RANGE = 0.01
 DEGREE = np.pi / 180.0

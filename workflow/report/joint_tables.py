@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from workflow.products import read_json
+from workflow.process.products import read_json
 from workflow.report.histories import at_pads
 from workflow.report.joint_records import Column, Record, by_shape, record_table
 from workflow.report.tables import mega, micro, number, percent

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from workflow.products import read_json
+from workflow.process.products import read_json
 from workflow.report import joint_tables, mesh_tables
 from workflow.report.joint_records import bridge_records, joint_records
 
@@ -51,7 +51,7 @@ def _add_bridge(run_folder: Path, context: dict) -> None:
     """Add the picture of two joints that became one, the only shape under two names."""
     if not any(joint["verdict"] == "bridged" for joint in read_json(run_folder / "reflow/joints.json").values()):
         return
-    from particles.products import read_shapes
+    from particles.scenes.products import read_shapes
     from workflow.report.body import render_stages
     from workflow.report.pictures import embedded
 

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from workflow.products import read_json
+from workflow.process.products import read_json
 from workflow.report.joint_records import Column, Record, by_shape, record_table
 from workflow.report.tables import micro, nano, number, percent
 

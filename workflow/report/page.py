@@ -6,9 +6,9 @@ from pathlib import Path
 from workflow.report import tables
 from workflow.report.joints import add_joints
 from workflow.report.scenes import add_scene
+from workflow.report.summary import collect_summary, write_summary
 from workflow.report.template import template_environment
 from workflow.structure.case import StructureCase
-from workflow.summary import collect_summary, write_summary
 
 TEMPLATES = Path(__file__).parent / "templates"
 
@@ -18,7 +18,7 @@ def write_report(run_folder: Path, case, folder: Path) -> dict:
 
     Args:
         run_folder: folder of the run; stages that have not run are left out of the page.
-        case: the resolved case (``workflow.case.Case``).
+        case: the resolved case (``workflow.pipeline.reader.Case``).
         folder: where they are written.
 
     Returns:
@@ -63,7 +63,7 @@ def _context(run_folder: Path, case, summary: dict) -> dict:
     if preview.exists():
         context["pictures"]["preview"] = base64.b64encode(preview.read_bytes()).decode()
     _add_sections(run_folder, case, context, summary)
-    from workflow.accuracy.page import section_for
+    from workflow.convergence.page import section_for
 
     context["accuracy"] = section_for(run_folder, case)
     return context

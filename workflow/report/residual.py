@@ -5,7 +5,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from workflow.products import read_json
+from workflow.process.products import read_json
 from workflow.report.tables import mega, micro, number, quantity
 
 FOLDERS = ("residual_two_scale", "residual_dns", "residual")  # of modes with fine joints of their own, or of all modes

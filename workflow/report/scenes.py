@@ -8,7 +8,7 @@ def add_scene(run_folder: Path, kind: str, context: dict, summary: dict) -> None
     """Add what is told of a scene of solder alone."""
     if not (run_folder / "reflow" / "shape.h5").exists():
         return
-    from particles.products import read_body
+    from particles.scenes.products import read_body
     from workflow.report import body as report_body
     from workflow.report.pictures import embedded
 

@@ -5,8 +5,8 @@ from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 
-from workflow import findings
-from workflow.board_drop_case import BoardDropCase
+from workflow.board_drop import findings
+from workflow.board_drop.case import BoardDropCase
 from workflow.report import joint_tables, tables
 from workflow.report.histories import MODES, late_peak, read_modes
 from workflow.report.joint_records import joint_records
@@ -68,7 +68,7 @@ def margins(result: Mapping) -> list[dict]:
 
 def kinematics_note(metrics: dict, kinematics: str) -> str:
     """Say what small kinematics leave out, where that matters; else nothing."""
-    from fem.kinematics import NEGLIGIBLE_STRAIN
+    from fem.materials.kinematics import NEGLIGIBLE_STRAIN
 
     left_out = metrics.get("peak_neglected_strain", {}).get("value", 0.0)
     if kinematics == "finite" or left_out <= NEGLIGIBLE_STRAIN:
@@ -127,9 +127,9 @@ def _add_interface(shock: Path, context: dict) -> None:
 
 def _add_two_scales(run_folder: Path, case: BoardDropCase, context: dict, results: dict[str, dict]) -> None:
     """Add how the models are coupled, where they are."""
-    from workflow.fine_joints import read_fine_joints
+    from workflow.board_drop.fine_joints import read_fine_joints
+    from workflow.board_drop.shock_forecast import implicit_seconds
     from workflow.report import two_scales as scales
-    from workflow.shock_forecast import implicit_seconds
 
     result = results.get("two_scale")
     if result is None:

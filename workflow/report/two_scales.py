@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from workflow.fine_joints import FineJoints
+from workflow.board_drop.fine_joints import FineJoints
 from workflow.report.tables import nano, number, quantity
 
 Record = Mapping[str, Any]

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.tri import LinearTriInterpolator, Triangulation
 from numpy.typing import NDArray
 
-from fem.thermal.parameters import KELVIN
+from fem.problem.thermal import KELVIN
 from workflow.report.curves import MICRO, MILLI, STYLE, svg
 from workflow.report.tables import number
 

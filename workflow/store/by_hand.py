@@ -5,7 +5,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
-from workflow.case import read_case
+from workflow.pipeline.reader import read_case
 from workflow.store.batch import BATCH, Machine, missing, write_jobs
 from workflow.store.folders import locked
 from workflow.store.point import Point

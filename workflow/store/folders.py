@@ -8,7 +8,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from workflow import __version__
-from workflow.problems import CaseError, Problem
+from workflow.case.problems import CaseError, Problem
 from workflow.store.product import discard
 from workflow.store.store import HOME
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from workflow import __version__
-from workflow.case_kind import Case
-from workflow.stage_table import Stage
+from workflow.case.kind import Case
+from workflow.case.stage_table import Stage
 
 DIGITS = 12  # hexadecimal: two of a million products are alike with a probability of 0.2 %
 

@@ -4,9 +4,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from workflow.case import SETTING, read_case
-from workflow.case_kind import Case
-from workflow.problems import CaseError
+from workflow.case.kind import Case
+from workflow.case.problems import CaseError
+from workflow.pipeline.reader import SETTING, read_case
 from workflow.store.keys import product_keys
 
 

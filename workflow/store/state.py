@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from workflow.check_text import against_limit
+from workflow.case.check_text import against_limit
 from workflow.store.keys import Change, compare, stage_inputs
 from workflow.store.point import Point
 from workflow.store.product import damage

@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from workflow.case import kind_of
-from workflow.case_kind import Case
-from workflow.problems import CaseError, Problem
-from workflow.stage_table import Stage
+from workflow.case.kind import Case
+from workflow.case.problems import CaseError, Problem
+from workflow.case.stage_table import Stage
+from workflow.pipeline.reader import kind_of
 from workflow.store.keys import digest_of
 from workflow.store.point import Point
 from workflow.store.product import RECORD, SEAL, content_digest, discard, read_record

@@ -11,7 +11,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from workflow.stage_table import PAGE
+from workflow.case.stage_table import PAGE
 from workflow.store.point import Point
 from workflow.store.product import RECORD, discard, file_digest, read_record
 from workflow.store.store import CASE, Store, write_case

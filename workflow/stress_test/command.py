@@ -5,8 +5,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fem.names import nearest
-from workflow.case_text import CASES
-from workflow.problems import CaseError, Problem
+from workflow.case.problems import CaseError, Problem
+from workflow.pipeline.template import CASES
+from workflow.process.terminal import console
 from workflow.store.folders import locked
 from workflow.stress_test.families import FAMILIES, random_trials
 from workflow.stress_test.hard_case import HardCase, read_hard_cases
@@ -15,7 +16,6 @@ from workflow.stress_test.results import write_results
 from workflow.stress_test.sample import Sample, try_sample
 from workflow.stress_test.verdict import Verdict
 from workflow.stress_test.verdict_text import show_sample, show_table, show_verdict
-from workflow.terminal import console
 
 HARD = CASES / "hard"
 RANDOM_COUNT = 200

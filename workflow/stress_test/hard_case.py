@@ -10,16 +10,16 @@ from typing import Annotated, Any
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from fem.names import nearest
-from workflow import fields
-from workflow.case import set_value
-from workflow.problems import CaseError, Problem
-from workflow.scales import dotted
+from workflow.case import fields
+from workflow.case.problems import CaseError, Problem
+from workflow.case.scales import dotted
+from workflow.case.toml_file import read_toml
+from workflow.case.units import UnitError
+from workflow.case.validation import translate
+from workflow.pipeline.reader import set_value
 from workflow.stress_test.bound import Bound, read_bound
 from workflow.stress_test.families import FAMILIES, trials
 from workflow.stress_test.trial import Trial
-from workflow.toml_file import read_toml
-from workflow.units import UnitError
-from workflow.validation import translate
 
 DEADLINE = 300.0
 FREE_TABLES = ("parameters", "vary", "bounds")

@@ -4,11 +4,11 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field
 
-from meshing.parameters import JointNumerics, Parameters
+from meshing.board.parameters import JointNumerics, Parameters
 from workflow.stress_test.trial import Measured, Refused, Trial
 
 if TYPE_CHECKING:
-    from meshing.surface import ClosedSurface
+    from meshing.surface.closed_surface import ClosedSurface
     from meshing.trials.joints import Meshed
 
 PI = 3.14159265
@@ -132,7 +132,7 @@ def body(parameters: BodyTrial) -> dict[str, Measured]:
     """Mesh a body."""
     from math import tan
 
-    from meshing.solder_mesh import JointMeshError
+    from meshing.joint.solder_mesh import JointMeshError
     from meshing.trials.joints import mesh_at, sites_of
     from meshing.trials.surfaces import laid_between
 
@@ -147,7 +147,7 @@ def body(parameters: BodyTrial) -> dict[str, Measured]:
 
 def warped(parameters: WarpedTrial) -> dict[str, Measured]:
     """Mesh a joint under a warped package."""
-    from meshing.solder_mesh import JointMeshError
+    from meshing.joint.solder_mesh import JointMeshError
     from meshing.trials.joints import mesh_warped
 
     discs = parameters.lower, parameters.upper
@@ -160,7 +160,7 @@ def warped(parameters: WarpedTrial) -> dict[str, Measured]:
 
 def given(parameters: GivenTrial) -> dict[str, Measured]:
     """Read a triangulation from a file and mesh it."""
-    from meshing.surface import SurfaceError, enclosed_volume
+    from meshing.surface.closed_surface import SurfaceError, enclosed_volume
     from meshing.trials.given import load_given, mesh_given
 
     try:

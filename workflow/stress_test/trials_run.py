@@ -10,10 +10,10 @@ from pathlib import Path
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from fem.own_job import own_environment
-from workflow.case import read_case
-from workflow.problems import CaseError, as_toml
-from workflow.scales import dotted
+from fem.parallel.own_job import own_environment
+from workflow.case.problems import CaseError, as_toml
+from workflow.case.scales import dotted
+from workflow.pipeline.reader import read_case
 from workflow.stress_test.trial import Measured, Trial
 
 LAST_LINES = 3

@@ -4,14 +4,14 @@ from pathlib import Path
 
 from pydantic import Field
 
-from fem.structure.parameters import StructureScene
-from meshing.box_plan import Box, BoxHoles, BoxLayer
-from workflow.case_kind import Case
-from workflow.problems import Problem
-from workflow.pulse_files import unreadable_pulses
-from workflow.stage_table import STRUCTURE
+from fem.problem.structure import StructureScene
+from meshing.board.box_plan import Box, BoxHoles, BoxLayer
+from workflow.case.kind import Case
+from workflow.case.problems import Problem
+from workflow.case.pulse_files import unreadable_pulses
+from workflow.case.stage_table import STRUCTURE
+from workflow.case.toml_file import beside
 from workflow.structure.references import AnyReference, reference_problems
-from workflow.toml_file import beside
 
 
 class StructureCase(StructureScene, Case):
@@ -35,7 +35,7 @@ class StructureCase(StructureScene, Case):
     @property
     def pulse_tables(self) -> dict[str, tuple[Path, str]]:
         """Tables of loads."""
-        from fem.structure.pulses import QUANTITY
+        from fem.problem.structure_pulses import QUANTITY
 
         return {
             f"loads.{name}.table": (Path(load.table), QUANTITY[load.kind])
@@ -65,8 +65,8 @@ class StructureCase(StructureScene, Case):
 
     def problems(self) -> list[Problem]:
         """Find what does not fit together: materials, places, facet sets, loads, references."""
-        from fem.structure import checks as structure_checks
-        from meshing.box_checks import box_problems
+        from fem.problem import structure_checks
+        from meshing.board.box_checks import box_problems
 
         boxes = [Problem(found.key, found.message, found.value, found.allowed) for found in box_problems(self.box)]
         scenes = [

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from workflow.findings import at_least, at_most, in_words_continued, metric
-from workflow.plan_table import short
-from workflow.problems import Problem
-from workflow.stage_runner import Findings
+from workflow.board_drop.findings import at_least, at_most, in_words_continued, metric
+from workflow.case.problems import Problem
+from workflow.pipeline.stage_runner import Findings
+from workflow.process.plan_table import short
 from workflow.structure import exact_bar, exact_cantilever, exact_layers
 from workflow.structure.case import StructureCase
 from workflow.structure.references import BarWave, Cantilever, FrequencyRange, LayeredBar
@@ -50,7 +50,7 @@ def of_comparison(case: StructureCase, folders: Mapping[str, Path]) -> Findings:
         case: the case.
         folders: folder of each solver's products, the one whose figures count first.
     """
-    from fem.compare_structures import solver_differences
+    from fem.output.compare_structures import solver_differences
 
     histories = {solver: read_history(folder) for solver, folder in folders.items()}
     metrics: dict = {}
@@ -225,7 +225,7 @@ def _waves(case: StructureCase, reference: BarWave | LayeredBar, motion: Motion)
 
 
 def _pulse_of(case: StructureCase, name: str) -> exact_layers.Pulse:
-    from fem.structure.pulses import pulse_durations, pulse_of
+    from fem.problem.structure_pulses import pulse_durations, pulse_of
 
     load = case.loads[name]
     pulse = pulse_of(load)

@@ -3,8 +3,8 @@
 import json
 from pathlib import Path
 
-from workflow.fem_launch import run_fem
-from workflow.stage_runner import Run
+from workflow.pipeline.stage_runner import Run
+from workflow.process.fem_launch import run_fem
 from workflow.structure.case import StructureCase
 
 SOLVERS = ("explicit", "implicit", "dns")

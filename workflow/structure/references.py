@@ -6,8 +6,8 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from fem.names import nearest
-from fem.structure.parameters import Pressure, StructureScene
-from workflow.problems import Problem
+from fem.problem.structure import Pressure, StructureScene
+from workflow.case.problems import Problem
 
 
 class Reference(BaseModel):

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from workflow.plan_table import short
+from workflow.process.plan_table import short
 from workflow.report import two_scales
 from workflow.report.tables import costs, number, percent, quantity
 from workflow.structure import curves as structure_curves

@@ -8,9 +8,10 @@ from pathlib import Path
 from rich.table import Table
 
 from fem.names import nearest
-from workflow.plan_table import duration, new_table
-from workflow.problems import CaseError
-from workflow.progress import progress_bar
+from workflow.case.problems import CaseError
+from workflow.process.plan_table import duration, new_table
+from workflow.process.progress import progress_bar
+from workflow.process.terminal import console, print_error
 from workflow.store.batch import Machine, missing, run_points, show_products
 from workflow.store.folders import locked
 from workflow.store.point import Point, PointsError, read_possible_points
@@ -23,7 +24,6 @@ from workflow.study.outlook import outlook
 from workflow.study.progress import teller
 from workflow.study.results import HEALTHY, IMPOSSIBLE, Row, row_of
 from workflow.study.study_file import Study, read_study
-from workflow.terminal import console, print_error
 
 LAST = "report"
 WHAT = "study"  # its folder holds

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 
-from workflow.problems import Problem
+from workflow.case.problems import Problem
 from workflow.study.hypercube import Hypercube
 from workflow.study.setting_text import as_text, between
 

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from workflow.stage_forecast import stage_seconds
+from workflow.pipeline.stage_forecast import stage_seconds
 from workflow.store.batch import Job
 from workflow.store.point import Point
 

@@ -3,12 +3,12 @@
 import time
 from collections.abc import Callable, Sequence
 
-from workflow.plan_table import duration
-from workflow.progress import ProgressBar
+from workflow.process.plan_table import duration
+from workflow.process.progress import ProgressBar
+from workflow.process.terminal import console
 from workflow.store.batch import Job
 from workflow.store.point import Point
 from workflow.store.store import Store
-from workflow.terminal import console
 
 
 def teller(

@@ -6,12 +6,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from workflow.case import display_values
-from workflow.check_text import against_limit
+from workflow.case.check_text import against_limit
+from workflow.case.units import QUANTITY
+from workflow.pipeline.reader import display_values
 from workflow.store.point import Point
 from workflow.store.store import Store
 from workflow.study.study_file import Study
-from workflow.units import QUANTITY
 
 HEALTHY, UNHEALTHY, FAILED, IMPOSSIBLE = "healthy", "unhealthy", "failed", "impossible"
 Value = str | float | int | bool | None

@@ -3,7 +3,7 @@
 import json
 import tomllib
 
-from workflow.units import QUANTITY
+from workflow.case.units import QUANTITY
 
 DIGITS = 6
 

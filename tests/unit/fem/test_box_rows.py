@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from fem.box_rows import BoxRows
 from fem.elements.element import Elements, element_kind, element_stiffness
-from fem.force_congruent import CongruentElements
+from fem.forces.box_rows import BoxRows
+from fem.forces.force_congruent import CongruentElements
 from fem.kernels.box_rows import LONGEST
 from fem.materials.elasticity import elasticity_matrix
 from fem.materials.library import FR4, SAC405

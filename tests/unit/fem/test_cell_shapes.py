@@ -5,20 +5,20 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fem.body import make_body, make_pieces
-from fem.elements.cell_shape import HEXAHEDRON, TETRAHEDRON, TETRAHEDRON_QUADRATIC
+from fem.cell_shape import HEXAHEDRON, TETRAHEDRON, TETRAHEDRON_QUADRATIC
+from fem.division.tables import prepare
 from fem.elements.tetrahedron import EDGES
 from fem.errors import MeshError
-from fem.facet import area_vectors
-from fem.facet_areas import outward_areas
-from fem.fields import Fields
 from fem.kernels.hexahedron import SIDES
-from fem.local_mesh import distribute
 from fem.materials.roles import Materials
-from fem.mesh import append, boundary_facets, cells_of_facets
-from fem.mesh_file import read_mesh
-from fem.mesh_quality import scaled_jacobians
-from fem.scene import prepare
+from fem.mesh.facet import area_vectors
+from fem.mesh.facet_areas import outward_areas
+from fem.mesh.mesh import append, boundary_facets, cells_of_facets
+from fem.mesh.mesh_file import read_mesh
+from fem.mesh.mesh_quality import scaled_jacobians
+from fem.model.body import make_body, make_pieces
+from fem.output.fields import Fields
+from fem.parallel.local_mesh import distribute
 
 SIZE = np.array([3.0, 2.0, 1.0])
 SHAPES = [HEXAHEDRON, TETRAHEDRON, TETRAHEDRON_QUADRATIC]

@@ -5,12 +5,12 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from fem.damping import RayleighDamping
+from fem.dynamics.central_difference import Motion
 from fem.kernels.damping import add_damping, power
 from fem.kernels.motion import STRIP
-from fem.loads import BodyAcceleration
-from fem.motion import Motion
-from fem.pulse import Constant
+from fem.loads.damping import RayleighDamping
+from fem.loads.load import BodyAcceleration
+from fem.problem.pulse import Constant
 from fem.trials.bodies import dns_body, motion_of
 from fem.trials.grids import grid, mesh_of, on
 from tests.support.fem_bodies import STEEL, dense_stiffness

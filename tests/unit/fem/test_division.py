@@ -5,17 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fem.coupling.buffer import grown
-from fem.coupling.checks import check_division
-from fem.coupling.divide import divide, scheme_for
-from fem.coupling.split import cut_between, part_of
+from fem.division.buffer import grown
+from fem.division.checks import check_division
+from fem.division.divide import divide, scheme_for
+from fem.division.split import cut_between, part_of
+from fem.division.tables import model_inputs
 from fem.errors import CutError
 from fem.materials.library import SAC305
 from fem.materials.roles import Materials
-from fem.mesh import append
-from fem.parameters import Coupling
-from fem.scene import model_inputs
-from fem.steps import steps_of_division
+from fem.mesh.mesh import append
+from fem.model.steps import steps_of_division
+from fem.problem.parameters import Coupling
 from fem.trials.divided import surveyed
 from tests.support.fem_models import small_assembly
 

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from fem.dynamics.energy_balance import Ledger
 from fem.errors import StepError
-from fem.ledger import Ledger
-from fem.march import GUARD
-from fem.structure.model import build_structure
-from fem.structure.run import run_structure
+from fem.run.structure_run import run_structure
+from fem.run.time_loop import GUARD
+from fem.setup.structure_model import build_structure
 from tests.support.fem_structures import structure_input
 
 

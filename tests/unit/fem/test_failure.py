@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from fem.materials.effects import failure_effect, material_effects
-from fem.materials.failure import failed_joints, failure_criteria, judge, worst
+from fem.estimates.material_effects import failure_effect, material_effects
 from fem.materials.library import SAC305, SILICON, SNPB
 from fem.materials.roles import Materials
-from fem.parameters import Failure
+from fem.output.failure import failed_joints, failure_criteria, judge, worst
+from fem.problem.parameters import Failure
 
 HISTORY = {
     "joints": np.array(["A1", "A2"]),

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from fem.elements.kind import ElementKind
-from fem.force import linear_terms
-from fem.force_assembled import AssembledElements
-from fem.force_congruent import FEW
+from fem.forces.force import linear_terms
+from fem.forces.force_assembled import AssembledElements
+from fem.forces.force_congruent import FEW
 from fem.trials.boxes import KINDS, elements_of
 from fem.trials.grids import grid
 from tests.support.fem_bodies import STEEL

@@ -3,12 +3,12 @@ import pytest
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from fem.body import Body
 from fem.errors import AgreedError
-from fem.factorisation import Factorisation
-from fem.global_matrix import Equations
 from fem.materials.roles import Materials
-from fem.mesh import append
+from fem.mesh.mesh import append
+from fem.model.body import Body
+from fem.model.factorisation import Factorisation
+from fem.model.global_matrix import Equations
 from fem.trials.bodies import dns_body
 from tests.support.fem_bodies import STEEL, dense_stiffness
 from tests.support.fem_models import bar, small_assembly

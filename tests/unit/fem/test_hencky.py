@@ -5,14 +5,14 @@ import pytest
 from scipy.optimize import brentq
 
 from fem.elements.element import Elements, element_kind, element_stiffness
+from fem.elements.stress import symmetric, voigt
 from fem.errors import MeshError
 from fem.kernels.hencky import Law, hencky
 from fem.kernels.plasticity import plastic_constants
 from fem.materials.elasticity import elasticity_matrix
 from fem.materials.library import FR4, SAC405
 from fem.materials.parameters import Isotropic, JohnsonCook
-from fem.residual.hencky import HenckyElements
-from fem.stress import symmetric, voigt
+from fem.statics.hencky import HenckyElements
 from fem.trials.bodies import force_of, nonlinear
 
 IDEAL = SAC405.model_copy(update={"plasticity": JohnsonCook(A=30e6)})

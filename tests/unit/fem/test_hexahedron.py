@@ -5,9 +5,9 @@ import pytest
 
 from fem.elements.element import Elements, critical_steps, element_geometry, element_stiffness, lumped_mass
 from fem.errors import MeshError
-from fem.estimate import box_critical_step
-from fem.force_assembled import AssembledElements
-from fem.force_congruent import CongruentElements, is_box, parity_blocks
+from fem.estimates.estimate import box_critical_step
+from fem.forces.force_assembled import AssembledElements
+from fem.forces.force_congruent import CongruentElements, is_box, parity_blocks
 from fem.kernels.hexahedron import GAUSS, SIDES, shape_derivatives
 from fem.materials.elasticity import elasticity_matrix
 from fem.materials.library import COPPER, FR4, SAC405, SILICON

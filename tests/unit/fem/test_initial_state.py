@@ -5,15 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fem import portable
-from fem.body import Body, Response
-from fem.damping import RayleighDamping
-from fem.ledger import Ledger
+from fem.dynamics.central_difference import Motion
+from fem.dynamics.energy_balance import Ledger
+from fem.loads.damping import RayleighDamping
+from fem.loads.pretension import Pretension
 from fem.materials.library import FR4, SAC405, SILICON
-from fem.motion import Motion
-from fem.residual.pins import pins, rigid_motions
-from fem.residual.pretension import Pretension
-from fem.stress_recovery import StressRecovery
+from fem.model.body import Body, Response
+from fem.model.stress_recovery import StressRecovery
+from fem.parallel import portable
+from fem.statics.pins import pins, rigid_motions
 from fem.trials.bodies import motion_of
 from tests.support.fem_residual import Cooled, cooled, layered
 

@@ -7,18 +7,18 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-import fem.march
-from fem.compare import compare_histories
-from fem.estimate import WindowPlan, shortened
-from fem.inputs import RunInput
-from fem.interface import picture_windows
-from fem.mesh import append
-from fem.parameters import Shock
-from fem.run import run
-from fem.scene import joined
-from fem.shock_checks import problems
+import fem.run.time_loop
+from fem.division.tables import joined
+from fem.estimates.estimate import WindowPlan, shortened
+from fem.mesh.mesh import append
+from fem.mesh.watch_table import whole_watch
+from fem.output.compare import compare_histories
+from fem.output.interface import picture_windows
+from fem.problem.inputs import RunInput
+from fem.problem.parameters import Shock
+from fem.problem.shock_checks import problems
+from fem.run.shock_run import run
 from fem.trials.grids import COPPER, GAP
-from fem.watch_table import whole_watch
 from tests.support.fem_models import SITES, small_assembly, write_small_assembly
 
 TIMES = 4e-6, 1e-5
@@ -110,7 +110,7 @@ class Killed(Exception):
 
 
 def test_broken_run_has_the_same_pictures(files, two_scale, monkeypatch):
-    real, left = fem.march.run_window, iter(range(80))
+    real, left = fem.run.time_loop.run_window, iter(range(80))
 
     def run_window(crew, stopwatch) -> None:
         if next(left, None) is None:
@@ -119,7 +119,7 @@ def test_broken_run_has_the_same_pictures(files, two_scale, monkeypatch):
 
     kept = {"checkpoints": files / "checkpoints", "numerics": {"checkpoint_seconds": 1e-9}}
     with monkeypatch.context() as patch:
-        patch.setattr(fem.march, "run_window", run_window)
+        patch.setattr(fem.run.time_loop, "run_window", run_window)
         with pytest.raises(Killed):
             results(files, "broken", "two_scale", **kept)
     broken = arrays(results(files, "broken", "two_scale", **kept) / "interface.npz")

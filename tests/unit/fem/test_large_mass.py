@@ -8,9 +8,9 @@ import pytest
 from mpi4py import MPI
 
 from fem.errors import AgreedError
-from fem.inputs import RunInput
-from fem.mesh import append
-from fem.run import run
+from fem.mesh.mesh import append
+from fem.problem.inputs import RunInput
+from fem.run.shock_run import run
 from tests.support.fem_models import BOARD_X, BOARD_Y, small_assembly, write_msh
 
 SIZE = 0.5e-3

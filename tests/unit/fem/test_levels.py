@@ -8,19 +8,19 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from fem.division.chebyshev import Substeps
+from fem.division.choose_levels import Pace, choose_levels, governing_steps
+from fem.dynamics.central_difference import Motion
 from fem.elements.one_point import ONE_POINT
-from fem.energy import Energy
 from fem.errors import LevelError
-from fem.force import linear_terms
-from fem.levels.chebyshev import Substeps
-from fem.levels.choose import Pace, choose_levels, governing_steps
-from fem.levels.force import Levels, LocalSteps, check_elastic, levels_of
-from fem.loads import PrescribedMotion
+from fem.forces.energy import Energy
+from fem.forces.force import linear_terms
+from fem.loads.load import PrescribedMotion
 from fem.materials.library import FR4, SAC405
 from fem.materials.roles import Materials
-from fem.motion import Motion
-from fem.pulse import HalfSine
-from fem.tie import Tie, net_load
+from fem.mesh.tie import Tie, net_load
+from fem.model.step_levels import Levels, LocalSteps, check_elastic, levels_of
+from fem.problem.pulse import HalfSine
 from tests.support.fem_bodies import dense_stiffness
 from tests.support.fem_levels import Levelled, dense_effective_stiffness, joint_on_board, levelled
 

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from fem.coupling.checks import check_division
-from fem.coupling.divide import divide
-from fem.cut import find_cut
+from fem.division.checks import check_division
+from fem.division.divide import divide
+from fem.division.tables import prepare
 from fem.errors import CutError, MeshError
-from fem.mesh import MeshData, append, boundary_facets, cells_of_facets, merge_nodes, select
-from fem.mesh_file import read_mesh
-from fem.scene import prepare
+from fem.mesh.coupling_interface import find_cut
+from fem.mesh.mesh import MeshData, append, boundary_facets, cells_of_facets, merge_nodes, select
+from fem.mesh.mesh_file import read_mesh
 from fem.trials.divided import surveyed
 from fem.trials.grids import grid, mesh_of
 from tests.support.fem_models import board_mesh, small_assembly, write_msh

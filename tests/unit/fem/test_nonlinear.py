@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 
 from fem.elements.one_point import hourglass_control
+from fem.elements.stress import von_mises
 from fem.errors import InvertedElementError
-from fem.force import force_terms, linear_terms
-from fem.force_nonlinear import NonlinearElements
+from fem.forces.force import force_terms, linear_terms
+from fem.forces.force_nonlinear import NonlinearElements
+from fem.forces.nonlinear_blocks import TEN_NODES, elastic_constants
 from fem.kernels.nonlinear import Path
 from fem.kernels.plasticity import yield_stress
 from fem.materials.library import FR4
-from fem.nonlinear_blocks import TEN_NODES, elastic_constants
-from fem.stress import von_mises
 from fem.trials.bodies import force_of, nonlinear
 from fem.trials.boxes import KINDS, box, elements_of
 from fem.trials.metals import SOLDER

@@ -9,10 +9,10 @@ import pytest
 from mpi4py import MPI
 
 from fem.errors import AgreedError
-from fem.inputs import RunInput
-from fem.mesh import append
-from fem.run import run
-from fem.shock_checks import problems
+from fem.mesh.mesh import append
+from fem.problem.inputs import RunInput
+from fem.problem.shock_checks import problems
+from fem.run.shock_run import run
 from fem.trials.grids import joint_mesh
 from tests.support.fem_models import SITES, write_msh, write_small_assembly
 

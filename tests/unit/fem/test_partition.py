@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fem.partition import partition
+from fem.parallel.partition import partition
 from fem.trials.grids import grid, mesh_of
 
 

@@ -8,13 +8,13 @@ import pytest
 from mpi4py import MPI
 from pydantic import ValidationError
 
-from fem.communicators import Communicators
-from fem.coupling.placement import ModelCost, WindowCost, alternatives, disjoint, least_seconds, shared, window_seconds
 from fem.coupling.planner import Load, Measured, keep, kept, plan_from, plan_ranks, words
 from fem.coupling.speeds import Kind, StepCost, families, line_through, sample_terms, seconds_of_step, speeds_of
-from fem.estimate import WindowPlan, predict_seconds
+from fem.estimates.estimate import WindowPlan, predict_seconds
+from fem.estimates.placement import ModelCost, WindowCost, alternatives, disjoint, least_seconds, shared, window_seconds
 from fem.materials.library import LIBRARY
-from fem.parameters import Ranks
+from fem.parallel.communicators import Communicators
+from fem.problem.parameters import Ranks
 from fem.trials.grids import grid, joint_mesh, mesh_of
 
 EVEN = WindowCost(ModelCost(1e-3, 0.0, 1), ModelCost(1e-3, 0.0, 8), 1e-5)

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fem.mesh import append
-from fem.power_iteration import highest_frequency, margin_after, random_normal, steps_for
+from fem.mesh.mesh import append
+from fem.model.power_iteration import highest_frequency, margin_after, random_normal, steps_for
 from fem.trials.bodies import dns_body
 from tests.support.fem_bodies import dense_stiffness
 from tests.support.fem_models import bar, small_assembly

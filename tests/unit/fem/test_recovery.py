@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from fem.errors import MeshError
-from fem.recovery import fit, patch
-from fem.watch_points import point_table
+from fem.mesh.recovery import fit, patch
+from fem.output.watch_points import point_table
 from tests.support.fem_structures import LENGTH, THICKNESS, strip_mesh
 
 SURFACE = (0.0, -4e-3 / 3, THICKNESS)

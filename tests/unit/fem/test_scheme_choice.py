@@ -2,9 +2,9 @@
 
 import pytest
 
-from fem.coupling.choice import choose_scheme
 from fem.coupling.one_way import OneWay
 from fem.coupling.scheme import scheme_of
+from fem.division.choice import choose_scheme
 
 
 @pytest.mark.parametrize(

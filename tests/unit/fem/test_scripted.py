@@ -9,10 +9,10 @@ from fem.coupling.held_velocity import HeldVelocity, local_cut
 from fem.coupling.one_way import OneWay
 from fem.coupling.recording import record, replay, save_recording
 from fem.coupling.scripted import ScriptedDriver, ScriptedMacro, ScriptedMeso, scripted_cut
+from fem.dynamics.participant import uncut_motion
 from fem.errors import RecordingError
-from fem.exchange import CutChannels
-from fem.loads import half_sine_drop
-from fem.participant import uncut_motion
+from fem.loads.load import half_sine_drop
+from fem.parallel.exchange import CutChannels
 from fem.trials.pairs import SCHEMES, Pair
 
 WINDOWS = 20

@@ -5,16 +5,16 @@ import pytest
 from mpi4py import MPI
 from pydantic import ValidationError
 
-from fem import shock_checks
-from fem.body import Body
+from fem.dynamics.energy_balance import SUMS, Ledger
 from fem.errors import EnergyError, LoadError
-from fem.large_mass import LargeMass
-from fem.ledger import SUMS, Ledger
-from fem.loads import BodyAcceleration, PrescribedMotion
-from fem.mesh import MeshData
-from fem.parameters import Damping, Shock
-from fem.pulse import Constant
-from fem.shock_pulse import shock_pulse
+from fem.loads.large_mass import LargeMass
+from fem.loads.load import BodyAcceleration, PrescribedMotion
+from fem.mesh.mesh import MeshData
+from fem.model.body import Body
+from fem.problem import shock_checks
+from fem.problem.parameters import Damping, Shock
+from fem.problem.pulse import Constant
+from fem.problem.shock_pulse import shock_pulse
 from fem.trials.bodies import dns_body, motion_of
 from fem.trials.grids import grid, mesh_of, on
 from tests.support.fem_bodies import STEEL

@@ -2,9 +2,9 @@ import math
 
 import pytest
 
-from fem.factor_cost import box_factor
-from fem.solver_cost import forecast_solvers, plate_nodes
-from fem.structure.parameters import StructureScene
+from fem.estimates.factor_cost import box_factor
+from fem.estimates.solver_cost import forecast_solvers, plate_nodes
+from fem.problem.structure import StructureScene
 from tests.support.fem_structures import structure_tables_of
 
 # Unknowns of three MUMPS factorisations by benchmarks/jedec_oracle.py: operations, entries.

@@ -5,7 +5,7 @@ import time
 import pytest
 
 from fem.coupling.stopwatch import Stopwatch
-from fem.exchange import MessageClock
+from fem.parallel.exchange import MessageClock
 
 
 class TwoRanks:

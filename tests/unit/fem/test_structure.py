@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fem.compare_structures import solver_differences
 from fem.errors import AgreedError, EnergyError
-from fem.follower_pressure import FollowerPressure
-from fem.loads import NodalForces
-from fem.program import main
-from fem.structure.loads import structure_loads
-from fem.structure.model import build_structure
-from fem.structure.pulses import pulses_of
-from fem.structure.run import run_structure
+from fem.loads.follower_pressure import FollowerPressure
+from fem.loads.load import NodalForces
+from fem.loads.structure_loads import structure_loads
+from fem.output.compare_structures import solver_differences
+from fem.problem.structure_pulses import pulses_of
+from fem.run.program import main
+from fem.run.structure_run import run_structure
+from fem.setup.structure_model import build_structure
 from tests.support.fem_structures import (
     LENGTH,
     STEEL,

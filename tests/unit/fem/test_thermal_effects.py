@@ -7,18 +7,18 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from fem.estimates.thermal_effects import NEGLIGIBLE, PackageSizes, decide, solder_force_number, warpage_number
 from fem.materials.library import FR4, SILICON
 from fem.materials.roles import Materials
-from fem.thermal.effects import NEGLIGIBLE, PackageSizes, decide, solder_force_number, warpage_number
-from fem.thermal.pads import Pads
-from fem.thermal.parameters import Thermal
-from fem.thermal.plates import RigidPlates
-from fem.thermal.state import Assembly
-from fem.thermal.structure import ThermalStructure
+from fem.problem.thermal import Thermal
+from fem.statics.pads import Pads
+from fem.statics.plates import RigidPlates
+from fem.statics.state import Assembly
+from fem.statics.structure import ThermalStructure
 from fem.trials.grids import GAP
-from meshing.heated_assembly import write_heated_assembly
-from meshing.pads import pad_table
-from meshing.parameters import Warpage
+from meshing.board.heated_assembly import write_heated_assembly
+from meshing.board.pads import pad_table
+from meshing.board.parameters import Warpage
 from meshing.trials.models import MM, board, package
 from tests.support.thermal_models import REFERENCE, Layers, pads_at, small_structure, structure_of
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from fem.errors import TieError
-from fem.mesh import MeshData, append
-from fem.tie import Tie, check_tie, closest_facets, net_load, project, tie_joints
+from fem.mesh.mesh import MeshData, append
+from fem.mesh.tie import Tie, check_tie, closest_facets, net_load, project, tie_joints
 from fem.trials.grids import joint_mesh
 from tests.support.fem_models import package_mesh, small_assembly
 

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from fem.body import warm_up
 from fem.elements.element import Elements
-from fem.force import force_terms
+from fem.forces.force import force_terms
 from fem.materials.elasticity import elasticity_matrix
 from fem.materials.library import SAC305
+from fem.model.body import warm_up
 from fem.trials.grids import grid
 
 

@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 
-from meshing.assembly import write_assembly
-from meshing.estimate import count_elements
-from meshing.hexahedra import scaled_jacobian
-from meshing.parameters import Warpage
+from meshing.board.assembly import write_assembly
+from meshing.board.estimate import count_elements
+from meshing.board.parameters import Warpage
+from meshing.core.hexahedra import scaled_jacobian
 from meshing.trials.models import MM, PLATE, board, package
 from tests.support.mesh_file import MeshFile
 

@@ -1,7 +1,7 @@
 import pytest
 
-from meshing.checks import problems
-from meshing.parameters import Warpage
+from meshing.board.checks import problems
+from meshing.board.parameters import Warpage
 from meshing.trials.models import MM, board, package
 
 

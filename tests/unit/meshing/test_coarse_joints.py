@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from meshing.hexahedra import quad_areas, volumes
-from meshing.pads import pad_table
-from meshing.parameters import Warpage
-from meshing.solder_mesh import JointMeshError, joint_quality, mesh_coarse_joint, mesh_joint
-from meshing.surface import enclosed_volume
+from meshing.board.pads import pad_table
+from meshing.board.parameters import Warpage
+from meshing.core.hexahedra import quad_areas, volumes
+from meshing.joint.solder_mesh import JointMeshError, joint_quality, mesh_coarse_joint, mesh_joint
+from meshing.surface.closed_surface import enclosed_volume
 from meshing.trials.models import MM, PLATE, board, package, side_of
 from meshing.trials.surfaces import barrel
 

@@ -6,13 +6,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from fem.coupling.fine_joints import copied_joints, copies, with_coarse_joints
-from fem.mesh import MeshData, append
-from fem.mesh_file import read_mesh
-from meshing.joints_file import write_joints
-from meshing.pads import pad_table
-from meshing.parameters import Warpage
-from meshing.solder_mesh import joint_quality, mesh_coarse_or_fine, mesh_joint
+from fem.division.fine_joints import copied_joints, copies, with_coarse_joints
+from fem.mesh.mesh import MeshData, append
+from fem.mesh.mesh_file import read_mesh
+from meshing.board.pads import pad_table
+from meshing.board.parameters import Warpage
+from meshing.joint.joints_file import write_joints
+from meshing.joint.solder_mesh import joint_quality, mesh_coarse_or_fine, mesh_joint
 from meshing.trials.models import MM, board, package, side_of
 from meshing.trials.surfaces import barrel
 from workflow.report import mesh_tables

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from meshing.assembly import write_assembly
-from meshing.displaced_assembly import ContactError, write_displaced_assembly
-from meshing.displacement import DisplacementError, computed, prescribed
-from meshing.package_side import PackageSide, underside
-from meshing.pads import lift
-from meshing.parameters import Warpage
-from meshing.structured_face import NotStructuredError, StructuredFace
+from meshing.board.assembly import write_assembly
+from meshing.board.displaced_assembly import ContactError, write_displaced_assembly
+from meshing.board.displacement import DisplacementError, computed, prescribed
+from meshing.board.package_side import PackageSide, underside
+from meshing.board.pads import lift
+from meshing.board.parameters import Warpage
+from meshing.core.structured_face import NotStructuredError, StructuredFace
 from meshing.trials.models import MM, PLATE, board, package
 from tests.support.mesh_file import MeshFile
 

@@ -4,14 +4,14 @@ import gmsh
 import numpy as np
 import pytest
 
-from meshing.gmsh_session import gmsh_model
-from meshing.hexahedra import boundary_quads, quad_areas, scaled_jacobian, volumes
-from meshing.joints_file import write_joints
-from meshing.pads import pad_table
-from meshing.parameters import Warpage
-from meshing.quadratic_tetrahedra import write_tetrahedra
-from meshing.solder_mesh import joint_quality, mesh_bridge, mesh_joint
-from meshing.surface import enclosed_volume
+from meshing.board.pads import pad_table
+from meshing.board.parameters import Warpage
+from meshing.core.gmsh_session import gmsh_model
+from meshing.core.hexahedra import boundary_quads, quad_areas, scaled_jacobian, volumes
+from meshing.core.quadratic_tetrahedra import write_tetrahedra
+from meshing.joint.joints_file import write_joints
+from meshing.joint.solder_mesh import joint_quality, mesh_bridge, mesh_joint
+from meshing.surface.closed_surface import enclosed_volume
 from meshing.trials.level_sets import bridged_pair, with_void
 from meshing.trials.models import MM, board, package, side_of
 from meshing.trials.surfaces import barrel

@@ -4,8 +4,8 @@ import meshio
 import numpy as np
 import pytest
 
-from meshing.assembly import write_assembly
-from meshing.heated_assembly import write_heated_assembly
+from meshing.board.assembly import write_assembly
+from meshing.board.heated_assembly import write_heated_assembly
 from meshing.trials.models import MM, PLATE, board, package
 
 

@@ -3,12 +3,12 @@ import meshio
 import numpy as np
 import pytest
 
-from meshing.gmsh_session import gmsh_model
-from meshing.hexahedra import volumes
-from meshing.joints_file import write_joints
-from meshing.pads import pad_table
-from meshing.parameters import Warpage
-from meshing.solder_mesh import joint_quality, mesh_joint
+from meshing.board.pads import pad_table
+from meshing.board.parameters import Warpage
+from meshing.core.gmsh_session import gmsh_model
+from meshing.core.hexahedra import volumes
+from meshing.joint.joints_file import write_joints
+from meshing.joint.solder_mesh import joint_quality, mesh_joint
 from meshing.trials.models import MM, board, package, side_of
 from meshing.trials.surfaces import barrel
 

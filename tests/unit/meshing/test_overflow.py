@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from meshing.joint_mesh import JointMeshError
-from meshing.pads import PadSite
-from meshing.solder_mesh import mesh_joint
-from meshing.surface import ClosedSurface, pad_planes
+from meshing.board.pads import PadSite
+from meshing.joint.joint_mesh import JointMeshError
+from meshing.joint.solder_mesh import mesh_joint
+from meshing.surface.closed_surface import ClosedSurface, pad_planes
 from meshing.trials.joints import Underside
 from meshing.trials.models import MM, package
 from meshing.trials.surfaces import barrel, laid_between

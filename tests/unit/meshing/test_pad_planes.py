@@ -3,8 +3,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from meshing.pad_planes import PadPlanes
-from meshing.surface import enclosed_volume, measure, pad_planes
+from meshing.board.pad_planes import PadPlanes
+from meshing.surface.closed_surface import enclosed_volume, measure, pad_planes
 from meshing.trials.models import MM
 from meshing.trials.surfaces import barrel, laid_between
 

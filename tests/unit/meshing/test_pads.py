@@ -1,8 +1,8 @@
 import pytest
 from scipy.spatial.transform import Rotation
 
-from meshing.pads import has_rim, joint_name, pad_table, read_pads, row_name, write_pads
-from meshing.parameters import Warpage
+from meshing.board.pads import has_rim, joint_name, pad_table, read_pads, row_name, write_pads
+from meshing.board.parameters import Warpage
 from meshing.trials.models import MM, board, package
 
 

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from meshing.plan import Interval, board_plan, footprint, package_plan, patch
+from meshing.board.plan import Interval, board_plan, footprint, package_plan, patch
 from meshing.trials.models import MM, board, package
 
 
@@ -19,7 +19,7 @@ def test_graded_lines_keep_their_ratio():
 def test_the_shortest_of_very_many_cells_is_known_without_their_lines(monkeypatch, ratio):
     interval = Interval(1.0, 8.0, 3000, ratio)
     laid_out = interval.smallest()
-    monkeypatch.setattr("meshing.plan.MOST_LINES", 10)
+    monkeypatch.setattr("meshing.board.plan.MOST_LINES", 10)
     assert interval.smallest() == pytest.approx(laid_out, rel=1e-9)
     assert Interval(0.0, 1.0, 10**12).smallest() == 1e-12
 

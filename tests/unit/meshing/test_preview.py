@@ -2,8 +2,8 @@ import matplotlib.image
 import numpy as np
 import pytest
 
-from meshing.assembly import write_assembly
-from meshing.preview import COLOURS, colour, write_preview
+from meshing.board.assembly import write_assembly
+from meshing.core.preview import COLOURS, colour, write_preview
 from meshing.trials.models import board, package
 
 

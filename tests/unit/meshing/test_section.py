@@ -3,8 +3,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from meshing.butterfly import butterfly
-from meshing.section import cut_segments, radius_by_angle, section_area, section_centroid
+from meshing.core.section import cut_segments, radius_by_angle, section_area, section_centroid
+from meshing.joint.butterfly import butterfly
 from meshing.trials.surfaces import revolve
 
 

@@ -4,12 +4,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from meshing.hexahedra import quad_areas, volumes
-from meshing.joint_place import JointPlace
-from meshing.pads import lift, pad_table
-from meshing.parameters import Warpage
-from meshing.solder_mesh import JointMeshError, joint_quality, mesh_joint
-from meshing.surface import close_surface
+from meshing.board.pads import lift, pad_table
+from meshing.board.parameters import Warpage
+from meshing.core.hexahedra import quad_areas, volumes
+from meshing.joint.joint_place import JointPlace
+from meshing.joint.solder_mesh import JointMeshError, joint_quality, mesh_joint
+from meshing.surface.closed_surface import close_surface
 from meshing.trials.models import MM, PLATE, board, package, side_of
 from meshing.trials.surfaces import barrel, revolve
 

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from meshing.sphere_surface import sphere_surface
-from meshing.surface import FREE, enclosed_volume, measure
+from meshing.surface.closed_surface import FREE, enclosed_volume, measure
+from meshing.surface.sphere_surface import sphere_surface
+from meshing.surface.truncated_sphere import TruncatedSphere
 from meshing.trials.models import MM
-from meshing.truncated_sphere import TruncatedSphere
 
 
 @pytest.mark.parametrize(("board", "package", "volume"), [(0.24, 0.24, 0.0724), (0.3, 0.2, 0.09), (0.24, 0.24, 0.03)])

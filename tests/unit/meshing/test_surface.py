@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from meshing.surface import (
+from meshing.surface.closed_surface import (
     BOARD_PAD,
     FREE,
     PACKAGE_PAD,

@@ -1,12 +1,12 @@
 import numpy as np
 import pytest
 
-from particles.admissible import Admissible
-from particles.body import Body
-from particles.cloud import joint_cloud
-from particles.geometry import JointGeometry
-from particles.plate import Plate
-from particles.plate_motion import LIFT, SHIFT, TURN, Floating, Travel
+from particles.core.body import Body
+from particles.core.cloud import joint_cloud
+from particles.core.geometry import JointGeometry
+from particles.core.plate import Plate
+from particles.physics.plate_motion import LIFT, SHIFT, TURN, Floating, Travel
+from particles.steps.admissible import Admissible
 
 SPEED = 0.5
 

@@ -3,15 +3,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from particles.body import Body
-from particles.cloud import box_cloud, equal_area_radius, joint_cloud
-from particles.contact_line import ON_MASK, ON_PAD, PINNED, ContactLine
-from particles.descent import Start
-from particles.force_wetting import Wetting
-from particles.geometry import JointGeometry
-from particles.metrics import verdict
-from particles.plate import Pad, Plate
-from particles.surface_measure import ring_area
+from particles.core.body import Body
+from particles.core.cloud import box_cloud, equal_area_radius, joint_cloud
+from particles.core.geometry import JointGeometry
+from particles.core.plate import Pad, Plate
+from particles.core.surface_measure import ring_area
+from particles.physics.force_wetting import Wetting
+from particles.scenes.metrics import verdict
+from particles.steps.descent import Start
+from particles.surface.contact_line import ON_MASK, ON_PAD, PINNED, ContactLine
 
 PAD, MASK = np.radians(5.0), np.radians(148.0)
 

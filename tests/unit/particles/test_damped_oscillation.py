@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from particles.damped_oscillation import fit_oscillation
+from particles.reference.damped_oscillation import fit_oscillation
 
 TIME = np.linspace(0.0, 3.0, 200)
 

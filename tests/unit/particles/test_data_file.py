@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import fem.data_file
-from particles import data_file
-from particles.data_file import NotData, columns, read_data, read_header, rows, write_data
-from particles.parameters import Solder, SolderNumerics
+import fem.parallel.data_file
+from particles.core import data_file
+from particles.core.data_file import NotData, columns, read_data, read_header, rows, write_data
+from particles.parameters.solder import Solder, SolderNumerics
 from tests.support.forged_files import DAMAGES, forged_array, with_digest
 
 
@@ -26,7 +26,7 @@ class Cart:
 
 
 def test_both_packages_have_the_same_file():
-    assert Path(data_file.__file__).read_bytes() == Path(fem.data_file.__file__).read_bytes()
+    assert Path(data_file.__file__).read_bytes() == Path(fem.parallel.data_file.__file__).read_bytes()
 
 
 def test_a_value_comes_back_as_it_was(tmp_path):

@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 
-from particles.ghosts import mirror
-from particles.mls import derivatives
-from particles.neighbours import NeighbourList
-from particles.plate import Plate
+from particles.core.neighbours import NeighbourList
+from particles.core.plate import Plate
+from particles.ispg.ghosts import mirror
+from particles.ispg.mls import derivatives
 
 REACH = 0.3
 

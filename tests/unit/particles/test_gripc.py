@@ -4,22 +4,22 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from particles.body import Body
-from particles.cloud import box_cloud
-from particles.collocation import collocate
-from particles.contact_line import ContactLine
-from particles.force_surface_tension import SurfaceTension
-from particles.gripc_step import GripcStep
-from particles.incompressibility import SolveFailed
-from particles.krylov import solve_gmres
-from particles.mass import Mass
-from particles.neighbours import NeighbourList
-from particles.physics import Physics
-from particles.plate import Plate
-from particles.plate_motion import PlateMotion
-from particles.pressure_poisson import Poisson, correct_pressure
-from particles.surface_pressure import force_pressure, viscous_pressure
-from particles.velocity_smoothing import Velocities, smooth
+from particles.core.body import Body
+from particles.core.cloud import box_cloud
+from particles.core.neighbours import NeighbourList
+from particles.core.plate import Plate
+from particles.discretisation.incompressibility import SolveFailed
+from particles.discretisation.krylov import solve_gmres
+from particles.ispg.collocation import collocate
+from particles.ispg.gripc_step import GripcStep
+from particles.ispg.pressure_poisson import Poisson, correct_pressure
+from particles.ispg.surface_pressure import force_pressure, viscous_pressure
+from particles.ispg.velocity_smoothing import Velocities, smooth
+from particles.physics.force_surface_tension import SurfaceTension
+from particles.physics.mass import Mass
+from particles.physics.physics import Physics
+from particles.physics.plate_motion import PlateMotion
+from particles.surface.contact_line import ContactLine
 
 
 @pytest.fixture(scope="module")

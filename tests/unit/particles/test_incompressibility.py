@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from particles.incompressibility import SaddlePoint, SolveFailed, solve
+from particles.discretisation.incompressibility import SaddlePoint, SolveFailed, solve
 
 
 def problem(size=60, rows=20, seed=11):

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from particles.body import Body
-from particles.cloud import joint_cloud
-from particles.geometry import JointGeometry
-from particles.inertial_flow import InertialFlow
-from particles.mass import Inertia, Mass
-from particles.physics import Physics
-from particles.plate import Plate
-from particles.plate_motion import Travel
+from particles.core.body import Body
+from particles.core.cloud import joint_cloud
+from particles.core.geometry import JointGeometry
+from particles.core.plate import Plate
+from particles.physics.mass import Inertia, Mass
+from particles.physics.physics import Physics
+from particles.physics.plate_motion import Travel
+from particles.steps.inertial_flow import InertialFlow
 
 
 def test_a_plate_arrives_exactly_and_rests():

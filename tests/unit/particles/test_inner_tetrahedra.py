@@ -3,16 +3,16 @@
 import numpy as np
 import pytest
 
-from particles.body import Body
-from particles.cloud import box_cloud, joint_cloud
-from particles.cloud_sphere import sphere_cloud
-from particles.discretisation_tetrahedra import LinearTetrahedra
-from particles.field_transfer import Transfer, interpolation
-from particles.geometry import JointGeometry
-from particles.inner_tetrahedra import fill
-from particles.surface_measure import wall_corners
-from particles.tetrahedra import cell_volumes, volume_gradients
-from particles.winding_number import winding_numbers
+from particles.core.body import Body
+from particles.core.cloud import box_cloud, joint_cloud
+from particles.core.cloud_sphere import sphere_cloud
+from particles.core.geometry import JointGeometry
+from particles.core.surface_measure import wall_corners
+from particles.core.tetrahedra import cell_volumes, volume_gradients
+from particles.core.winding_number import winding_numbers
+from particles.discretisation.discretisation_tetrahedra import LinearTetrahedra
+from particles.discretisation.field_transfer import Transfer, interpolation
+from particles.discretisation.inner_tetrahedra import fill
 
 CLOUDS = {
     "ball": lambda: sphere_cloud(1.0, 3),

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from particles.neighbours import NeighbourList, find_neighbours
+from particles.core.neighbours import NeighbourList, find_neighbours
 
 
 def brute_force(points, radius):

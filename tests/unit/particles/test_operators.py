@@ -3,16 +3,16 @@
 import numpy as np
 import pytest
 
-from particles.body import Body
-from particles.cloud import box_cloud
-from particles.discretisation_tetrahedra import LinearTetrahedra
-from particles.force_surface_tension import SurfaceTension
-from particles.inner_tetrahedra import fill
-from particles.interior_shift import SMALLEST_DEPTH, interior_shift
-from particles.mass import Inertia, Mass
-from particles.neighbours import NeighbourList
-from particles.time_step import TimeStep, capillary_limit
-from particles.viscosity import Viscosity
+from particles.core.body import Body
+from particles.core.cloud import box_cloud
+from particles.core.neighbours import NeighbourList
+from particles.discretisation.discretisation_tetrahedra import LinearTetrahedra
+from particles.discretisation.inner_tetrahedra import fill
+from particles.physics.force_surface_tension import SurfaceTension
+from particles.physics.mass import Inertia, Mass
+from particles.physics.viscosity import Viscosity
+from particles.steps.interior_shift import SMALLEST_DEPTH, interior_shift
+from particles.steps.time_step import TimeStep, capillary_limit
 
 
 @pytest.fixture

@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from particles.cloud import joint_cloud
-from particles.geometry import JointGeometry
-from particles.plate import Plate, joint_plates, placed_geometry, slide
+from particles.core.cloud import joint_cloud
+from particles.core.geometry import JointGeometry
+from particles.core.plate import Plate, joint_plates, placed_geometry, slide
 
 SEED = 11
 

@@ -1,12 +1,12 @@
 import numpy as np
 import pytest
 
-from particles.body import Body
-from particles.cloud import box_cloud
-from particles.lagged_multigrid import LaggedMultigrid
-from particles.neighbours import NeighbourList
-from particles.potential_flow import LEAK, PotentialFlow
-from particles.relaxation import SUPPORT
+from particles.core.body import Body
+from particles.core.cloud import box_cloud
+from particles.core.neighbours import NeighbourList
+from particles.discretisation.lagged_multigrid import LaggedMultigrid
+from particles.steps.potential_flow import LEAK, PotentialFlow
+from particles.steps.relaxation import SUPPORT
 
 
 def shaken_flow(count, seed=17):

@@ -1,11 +1,10 @@
 import numpy as np
 import pytest
 
-from particles.body import Body
-from particles.cloud import box_cloud, joint_cloud
-from particles.force_gravity import Gravity
-from particles.geometry import JointGeometry
-from particles.surface_measure import (
+from particles.core.body import Body
+from particles.core.cloud import box_cloud, joint_cloud
+from particles.core.geometry import JointGeometry
+from particles.core.surface_measure import (
     cotangent_laplacian,
     enclosed_volume,
     ring_area,
@@ -13,6 +12,7 @@ from particles.surface_measure import (
     surface_area,
     volume_and_gradient,
 )
+from particles.physics.force_gravity import Gravity
 
 CLOUDS = [box_cloud(1.0, 5), joint_cloud(JointGeometry(1.0, 0.8, 0.6), 1.9, 0.25)]
 

@@ -5,12 +5,12 @@ from math import inf
 import numpy as np
 import pytest
 
-from particles.body import Body
-from particles.cloud import box_cloud
-from particles.parameters import Solder, SolderNumerics
-from particles.physics import Physics
-from particles.reflow import build_physics, contact_line, start_flow
-from particles.symmetry import cut, on_plane, share, whole_points
+from particles.core.body import Body
+from particles.core.cloud import box_cloud
+from particles.core.symmetry import cut, on_plane, share, whole_points
+from particles.parameters.solder import Solder, SolderNumerics
+from particles.physics.physics import Physics
+from particles.scenes.reflow import build_physics, contact_line, start_flow
 
 SOLDER = Solder(volume=1e-9, pad_contact_angle=np.radians(60.0), numerics=SolderNumerics(spacing=1e-4))
 ON = {"surface_tension": True, "gravity": True, "wall_adhesion": True, "viscosity": False, "inertia": False}

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from particles.backward_difference import BackwardDifference
-from particles.body import Body
-from particles.cloud_sphere import geodesic_sphere, sphere_cloud
-from particles.discretisation_tetrahedra import LinearTetrahedra
-from particles.surface_measure import enclosed_volume
-from particles.tetrahedra import boundary_triangles, cell_volumes, tetrahedralise, volume_gradients
-from particles.viscosity import Viscosity
+from particles.core.body import Body
+from particles.core.cloud_sphere import geodesic_sphere, sphere_cloud
+from particles.core.surface_measure import enclosed_volume
+from particles.core.tetrahedra import boundary_triangles, cell_volumes, tetrahedralise, volume_gradients
+from particles.discretisation.backward_difference import BackwardDifference
+from particles.discretisation.discretisation_tetrahedra import LinearTetrahedra
+from particles.physics.viscosity import Viscosity
 
 
 @pytest.fixture

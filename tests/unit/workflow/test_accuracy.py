@@ -6,18 +6,18 @@ from pathlib import Path
 import pytest
 
 from tests.support.products import record_of
-from workflow.accuracy import command
-from workflow.accuracy.calibration import calibration, calibration_of, default_folder
-from workflow.accuracy.climb import AGAIN
-from workflow.accuracy.command import Wish, keeps_promise, measure, read_wish, unproved
-from workflow.accuracy.ladders import ladder_of
-from workflow.accuracy.measured import StageCost, read_accuracy
-from workflow.accuracy.page import section, section_for, write_pages
-from workflow.accuracy.tables import as_lines, as_options, legend, on_front, runs
-from workflow.case import read_case
+from workflow.case.problems import CaseError
 from workflow.cli import main
+from workflow.convergence import command
+from workflow.convergence.calibration import calibration, calibration_of, default_folder
+from workflow.convergence.command import Wish, keeps_promise, measure, read_wish, unproved
+from workflow.convergence.kinds import ladder_of
+from workflow.convergence.measured import StageCost, read_accuracy
+from workflow.convergence.page import section, section_for, write_pages
+from workflow.convergence.runs import AGAIN
+from workflow.convergence.tables import as_lines, as_options, legend, on_front, runs
+from workflow.pipeline.reader import read_case
 from workflow.plan import foreseen_costs
-from workflow.problems import CaseError
 from workflow.store.store import MESSAGE
 from workflow.store.view import show
 

@@ -5,10 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from workflow.accuracy.errors import Error, Quantity, errors_of, richardson
-from workflow.accuracy.ladder import Knob, Ladder, Rung
-from workflow.accuracy.machine import this_machine
-from workflow.accuracy.measured import (
+from workflow.convergence.errors import Error, Quantity, errors_of, richardson
+from workflow.convergence.machine import this_machine
+from workflow.convergence.measured import (
     Accuracy,
     Measurement,
     Recommended,
@@ -17,10 +16,11 @@ from workflow.accuracy.measured import (
     read_accuracy,
     write_accuracy,
 )
-from workflow.accuracy.orders import fit_cost, fit_error
-from workflow.accuracy.pareto import front
-from workflow.accuracy.recommend import Goal, recommend
-from workflow.case_text import CASES
+from workflow.convergence.orders import fit_cost, fit_error
+from workflow.convergence.pareto import front
+from workflow.convergence.recommend import Goal, recommend
+from workflow.convergence.series import Knob, Ladder, Rung
+from workflow.pipeline.template import CASES
 
 SIZES = (0.4, 0.2, 0.1, 0.05)
 

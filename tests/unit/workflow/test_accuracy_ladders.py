@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 
 from tests.support.workflow_command import SMALL_CASE
-from workflow.accuracy.errors import Error, errors_of
-from workflow.accuracy.histories import at_same_times
-from workflow.accuracy.ladder import Knob, Ladder, Rung
-from workflow.accuracy.measured import Measurement, StageCost, fits_of
-from workflow.accuracy.packages import SAME_MESH, package_ladder
-from workflow.accuracy.recommend import Goal, recommend
-from workflow.accuracy.structures import structure_ladder
-from workflow.case import read_case
-from workflow.case_text import CASES
-from workflow.problems import CaseError
+from workflow.case.problems import CaseError
+from workflow.convergence.errors import Error, errors_of
+from workflow.convergence.histories import at_same_times
+from workflow.convergence.measured import Measurement, StageCost, fits_of
+from workflow.convergence.packages import SAME_MESH, package_ladder
+from workflow.convergence.recommend import Goal, recommend
+from workflow.convergence.series import Knob, Ladder, Rung
+from workflow.convergence.structures import structure_ladder
+from workflow.pipeline.reader import read_case
+from workflow.pipeline.template import CASES
 from workflow.structure.findings import exact_velocities, wave_points
 
 

@@ -7,8 +7,8 @@ import pytest
 
 from fem.materials.library import SAC305
 from tests.support.workflow_command import SMALL_CASE
-from workflow.case import available_cores, display_values, read_case
-from workflow.problems import CaseError
+from workflow.case.problems import CaseError
+from workflow.pipeline.reader import available_cores, display_values, read_case
 
 BAD_VALUES = {
     "unknown key": (

@@ -10,8 +10,8 @@ import pytest
 
 from tests.support.workflow_command import command_line
 from workflow import cli
-from workflow.case import display_values, read_case
-from workflow.schema import case_schema
+from workflow.pipeline.reader import display_values, read_case
+from workflow.pipeline.schema import case_schema
 from workflow.store.folders import locked
 
 CASE = Path(__file__).resolve().parents[3] / "cases" / "bga_drop" / "case.toml"

@@ -5,15 +5,15 @@ from pathlib import Path
 
 import pytest
 
-from workflow.case import read_case
+from workflow.case.problems import CaseError
 from workflow.cluster import checks, queue
 from workflow.cluster.executor import ExecutorName, Local, Slurm, executor_for
 from workflow.cluster.job_output import JobOutput, failures_of
 from workflow.cluster.profile import FILE, SHIPPED, Profile, read_profile
 from workflow.cluster.queue import Partition, jobs_in, partitions
 from workflow.cluster.resources import stage_resources
-from workflow.launch import LAUNCHER, mpi_command
-from workflow.problems import CaseError
+from workflow.pipeline.reader import read_case
+from workflow.process.launch import LAUNCHER, mpi_command
 
 CASES = Path(__file__).resolve().parents[3] / "cases"
 SAID = """\

@@ -7,8 +7,8 @@ import threading
 
 import pytest
 
-from workflow import environment
-from workflow.environment import EnvironmentProblem, check_limits, check_ranks, complete, private_folder
+from workflow.process import environment
+from workflow.process.environment import EnvironmentProblem, check_limits, check_ranks, complete, private_folder
 
 
 @pytest.fixture

@@ -4,9 +4,7 @@ import numpy as np
 import pytest
 
 from tests.support.workflow_command import SMALL_CASE
-from workflow.case import read_case
-from workflow.case_text import case_text
-from workflow.fine_joints import (
+from workflow.board_drop.fine_joints import (
     FineJoints,
     coarse_joints_effect,
     most_stressed,
@@ -14,7 +12,9 @@ from workflow.fine_joints import (
     read_fine_joints,
     write_fine_joints,
 )
-from workflow.problems import CaseError
+from workflow.case.problems import CaseError
+from workflow.pipeline.reader import read_case
+from workflow.pipeline.template import case_text
 
 FAULTS = {
     "shock.coupling.fine_joints=['A9']": ("no such joint", "A3 to B4", "did you mean A4?"),

@@ -8,17 +8,17 @@ import pytest
 from rich.console import Console
 
 from tests.support.workflow_command import SMALL_CASE
-from workflow import gate
-from workflow.board_drop_case import PackageCase
-from workflow.case import KINDS, read_case
-from workflow.case_text import templates
-from workflow.fields import display, leaves, unit_of
-from workflow.gate import Leave, ask_if_long, bytes_text, machine_memory, needed_memory, too_large
-from workflow.names import is_name
-from workflow.problems import CaseError
-from workflow.schema import _reachable
-from workflow.toml_places import Place, Places
-from workflow.units import to_si
+from workflow.board_drop.case import PackageCase
+from workflow.case.fields import display, leaves, unit_of
+from workflow.case.names import is_name
+from workflow.case.problems import CaseError
+from workflow.case.toml_places import Place, Places
+from workflow.case.units import to_si
+from workflow.pipeline import gate
+from workflow.pipeline.gate import Leave, ask_if_long, bytes_text, machine_memory, needed_memory, too_large
+from workflow.pipeline.reader import KINDS, read_case
+from workflow.pipeline.schema import _reachable
+from workflow.pipeline.template import templates
 
 STRUCTURE = SMALL_CASE.parent / "structure.toml"
 GOOD_NAMES = ("a", "bga_drop", "1", "A-1.b_2", "x" * 64)

@@ -6,18 +6,18 @@ import meshio
 import numpy as np
 import pytest
 
-from meshing.pads import pad_table, write_pads
-from meshing.parameters import Warpage
+from meshing.board.pads import pad_table, write_pads
+from meshing.board.parameters import Warpage
 from meshing.trials.models import MM
 from meshing.trials.surfaces import barrel
 from tests.support.workflow_command import SMALL_CASE
-from workflow import findings
-from workflow.case import read_case
-from workflow.forecast import forecast
+from workflow.board_drop import findings
+from workflow.board_drop.forecast import forecast
+from workflow.pipeline.reader import read_case
+from workflow.pipeline.stage_runner import Run
 from workflow.reflow.stage import reflow
 from workflow.report import joint_tables
 from workflow.report.joint_records import joint_records
-from workflow.stage_runner import Run
 from workflow.store.keys import stage_inputs
 
 NAMES = ("A3", "A4", "B3", "B4")

@@ -10,25 +10,25 @@ import meshio
 import numpy as np
 import pytest
 
-from meshing.assembly import write_assembly
-from meshing.outlines import outlines
-from meshing.pads import pad_table, write_pads
-from meshing.parameters import Warpage
-from meshing.surface import enclosed_volume, read_surface
+from meshing.board.assembly import write_assembly
+from meshing.board.pads import pad_table, write_pads
+from meshing.board.parameters import Warpage
+from meshing.core.outlines import outlines
+from meshing.surface.closed_surface import enclosed_volume, read_surface
 from meshing.trials.level_sets import bridged_pair
 from meshing.trials.models import MM
 from meshing.trials.surfaces import barrel, revolve
-from particles.products import write_shapes
-from particles.shape import JointShape, Snapshot
+from particles.scenes.products import write_shapes
+from particles.steps.shape import JointShape, Snapshot
 from tests.support.workflow_command import SMALL_CASE
-from workflow import findings
-from workflow.case import display_values, read_case
-from workflow.case_text import case_text
-from workflow.joint_meshes import mesh_real_joints
-from workflow.joint_surfaces import write_surfaces
-from workflow.problems import CaseError
-from workflow.products import write_json
-from workflow.stage_runner import Run
+from workflow.board_drop import findings
+from workflow.board_drop.joint_meshes import mesh_real_joints
+from workflow.board_drop.joint_surfaces import write_surfaces
+from workflow.case.problems import CaseError
+from workflow.pipeline.reader import display_values, read_case
+from workflow.pipeline.stage_runner import Run
+from workflow.pipeline.template import case_text
+from workflow.process.products import write_json
 from workflow.store.keys import stage_inputs
 
 

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from workflow.case import display_values, read_case
-from workflow.problems import CaseError
+from workflow.case.problems import CaseError
+from workflow.pipeline.reader import display_values, read_case
 
 STRUCTURE = Path(__file__).resolve().parents[2] / "pipeline" / "structure.toml"
 LAMINATE = (

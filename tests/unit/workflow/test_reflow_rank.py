@@ -5,14 +5,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from particles.carried_joint import Carried
-from particles.data_file import read_data, write_data
-from particles.geometry import JointGeometry
-from particles.parameters import Solder
-from particles.shape import JointShape, Snapshot
+from particles.core.data_file import read_data, write_data
+from particles.core.geometry import JointGeometry
+from particles.parameters.solder import Solder
+from particles.scenes.carried_joint import Carried
+from particles.steps.shape import JointShape, Snapshot
 from tests.support import rank_work
 from tests.support.forged_files import DAMAGES
-from workflow import reflow_pool
+from workflow.board_drop import reflow_pool
 from workflow.reflow import array, rank
 from workflow.reflow.pool import ReflowError
 from workflow.reflow.rank import JOB, RESULT, Done, find, name_of, records_of

@@ -2,9 +2,9 @@
 
 from types import SimpleNamespace
 
-from meshing.pads import pad_table
+from meshing.board.pads import pad_table
 from tests.support.workflow_command import SMALL_CASE
-from workflow.case import read_case
+from workflow.pipeline.reader import read_case
 from workflow.reflow.heated import Saved, all_inputs
 
 HEATED = ["warpage.corner=0 mm", "thermal.peak=245 degC"]

@@ -5,11 +5,11 @@ import json
 import numpy as np
 import pytest
 
-from fem.materials.failure import failure_criteria, judge
-from fem.parameters import Failure
+from fem.output.failure import failure_criteria, judge
+from fem.problem.parameters import Failure
 from tests.support.products import record_of
 from tests.support.workflow_command import SMALL_CASE
-from workflow.case import read_case
+from workflow.pipeline.reader import read_case
 from workflow.report import body as report_body
 from workflow.report import joint_tables, tables
 from workflow.report.array_map import array_map
@@ -17,8 +17,8 @@ from workflow.report.curves import energy_curves, history_curves
 from workflow.report.histories import late_peak
 from workflow.report.pictures import exaggeration
 from workflow.report.shock import ranking_mode
+from workflow.report.summary import collect_summary, write_summary
 from workflow.store.keys import inputs_digest
-from workflow.summary import collect_summary, write_summary
 
 JOINT = {"standoff": 3.2e-4, "max_width": 5.5e-4}
 

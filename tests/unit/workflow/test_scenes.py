@@ -7,13 +7,13 @@ import jsonschema
 import pytest
 
 from tests.support.workflow_command import WHO_COMPUTES
-from workflow.board_drop_case import BoardDropCase
-from workflow.case import display_values, read_case
-from workflow.case_text import templates, write_new_case
-from workflow.problems import CaseError
-from workflow.scene_cases import DropCase, JointCase
-from workflow.scene_forecast import forecast_scene
-from workflow.schema import case_schema
+from workflow.board_drop.case import BoardDropCase
+from workflow.case.problems import CaseError
+from workflow.pipeline.reader import display_values, read_case
+from workflow.pipeline.schema import case_schema
+from workflow.pipeline.template import templates, write_new_case
+from workflow.solder.case import DropCase, JointCase
+from workflow.solder.forecast import forecast_scene
 from workflow.store.keys import stage_inputs
 
 CASES = Path(__file__).resolve().parents[3] / "cases"

@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from tests.support.workflow_command import SMALL_CASE
-from workflow.case import read_case
-from workflow.problems import CaseError
+from workflow.case.problems import CaseError
+from workflow.pipeline.reader import read_case
 
 PULSE = 'peak_acceleration = "1500 G"\npulse_duration = "0.02 ms"\n'
 

@@ -3,9 +3,9 @@
 import json
 
 from tests.support.workflow_command import SMALL_CASE
-from workflow.case import read_case
-from workflow.shock_cooling import with_cooling
-from workflow.stage_runner import Findings
+from workflow.board_drop.shock_cooling import with_cooling
+from workflow.pipeline.reader import read_case
+from workflow.pipeline.stage_runner import Findings
 
 COOLED = ["thermal.effects.residual_stress=on", "thermal.effects.flexible=off", "materials.solder=SAC405"]
 

@@ -4,10 +4,10 @@ from itertools import pairwise
 
 import pytest
 
-from meshing.estimate import count_elements
+from meshing.board.estimate import count_elements
 from tests.support.workflow_command import SMALL_CASE
-from workflow.case import read_case
-from workflow.shock_forecast import forecast_parts, forecast_shock, implicit_seconds, two_scale_parts
+from workflow.board_drop.shock_forecast import forecast_parts, forecast_shock, implicit_seconds, two_scale_parts
+from workflow.pipeline.reader import read_case
 
 
 def foreseen(*settings: str):

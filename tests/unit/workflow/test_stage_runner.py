@@ -10,9 +10,9 @@ import pytest
 
 from tests.support.products import make, record_of
 from tests.support.workflow_command import SMALL_CASE
-from workflow.case import read_case
-from workflow.check_text import against_limit
-from workflow.stage_runner import Findings, Run, StageError, execute, run_stage
+from workflow.case.check_text import against_limit
+from workflow.pipeline.reader import read_case
+from workflow.pipeline.stage_runner import Findings, Run, StageError, execute, run_stage
 from workflow.store.point import Point
 from workflow.store.store import MESSAGE, TRACEBACK, Store
 

@@ -4,11 +4,11 @@ import pytest
 
 from tests.support.products import make
 from tests.support.workflow_command import SMALL_CASE, WHO_COMPUTES
-from workflow.case import read_case
-from workflow.fields import leaves
-from workflow.problems import CaseError
-from workflow.stage_runner import Findings
-from workflow.stage_table import BOARD_DROP
+from workflow.case.fields import leaves
+from workflow.case.problems import CaseError
+from workflow.case.stage_table import BOARD_DROP
+from workflow.pipeline.reader import read_case
+from workflow.pipeline.stage_runner import Findings
 from workflow.store.batch import missing, show_products
 from workflow.store.keys import compare, stage_inputs
 from workflow.store.point import Point

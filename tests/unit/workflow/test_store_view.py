@@ -8,8 +8,8 @@ import pytest
 
 from tests.support.products import make
 from tests.support.workflow_command import SMALL_CASE
-from workflow.case import read_case
-from workflow.problems import CaseError
+from workflow.case.problems import CaseError
+from workflow.pipeline.reader import read_case
 from workflow.store import view
 from workflow.store.batch import show_products
 from workflow.store.folders import RunFolderBusy, locked, remove_own

@@ -19,9 +19,10 @@ from hypothesis import strategies as st
 from pydantic import Field
 
 from fem.trials.parameters import Impact, PairRun, Turns
-from particles.parameters import Parameters
+from particles.parameters.solder import Parameters
 from tests.support.workflow_command import wait_until
-from workflow.problems import CaseError
+from workflow.case.problems import CaseError
+from workflow.case.units import UnitError
 from workflow.stress_test import families, hard_case, sample
 from workflow.stress_test.bound import read_bound
 from workflow.stress_test.case_file import hard_case_text
@@ -34,7 +35,6 @@ from workflow.stress_test.results import write_results
 from workflow.stress_test.sample import try_sample
 from workflow.stress_test.trial import Measured, Refused, Trial
 from workflow.stress_test.verdict import attempt
-from workflow.units import UnitError
 
 
 class Rod(Parameters):

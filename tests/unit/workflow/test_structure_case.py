@@ -6,10 +6,10 @@ from pathlib import Path
 import jsonschema
 import pytest
 
-from workflow.case import display_values, read_case
-from workflow.case_text import case_text, templates
-from workflow.problems import CaseError
-from workflow.schema import case_schema
+from workflow.case.problems import CaseError
+from workflow.pipeline.reader import display_values, read_case
+from workflow.pipeline.schema import case_schema
+from workflow.pipeline.template import case_text, templates
 from workflow.store.keys import compare, stage_inputs
 from workflow.structure.forecast import forecast_structure
 from workflow.structure.report import meshed_part

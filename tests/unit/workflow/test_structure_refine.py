@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from workflow.case import read_case
-from workflow.case_text import CASES
-from workflow.problems import CaseError
+from workflow.case.problems import CaseError
+from workflow.pipeline.reader import read_case
+from workflow.pipeline.template import CASES
 from workflow.structure.findings import Motion, compared_with_references, layers_of
 from workflow.structure.forecast import forecast_structure
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from tests.support.workflow_command import SMALL_CASE
-from workflow.problems import CaseError
-from workflow.stage_forecast import stage_seconds
+from workflow.case.problems import CaseError
+from workflow.pipeline.stage_forecast import stage_seconds
 from workflow.store.batch import Machine, missing
 from workflow.store.point import PointsError
 from workflow.store.store import Store

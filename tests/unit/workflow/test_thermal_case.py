@@ -6,9 +6,9 @@ import pytest
 
 from fem.materials.library import FR4, LIBRARY
 from tests.support.workflow_command import SMALL_CASE
-from workflow.case import display_values, read_case
-from workflow.case_text import case_text
-from workflow.problems import CaseError
+from workflow.case.problems import CaseError
+from workflow.pipeline.reader import display_values, read_case
+from workflow.pipeline.template import case_text
 
 PAPER = ['thermal.peak="200 degC"', 'thermal.melting="25 degC"', 'thermal.solidification="200 degC"']
 MOVED = ['thermal.package="moved"', 'thermal.corner_displacement="-0.1 mm"']

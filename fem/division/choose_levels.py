@@ -1,0 +1,161 @@
+"""Which level each element takes its steps at, and how many steps: least predicted cost of a window."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem.division.chebyshev import Substeps
+from fem.errors import LevelError
+from fem.mesh.tie import Tie
+
+SUBSTEP_COST = 500.0  # updates of boxes in the time of one substep without elements: kernel calls, messages
+LARGEST_RATIO = 64
+ROUNDING = 1e-12
+
+
+@dataclass(frozen=True, slots=True)
+class Pace:
+    """What the steps of a window follow.
+
+    Attributes:
+        steps: ``(ne,)`` critical step of each element [s].
+        cost: ``(ne,)`` cost of an update of each element, in those of a box.
+        window: Step of level 0 [s].
+        fraction: Largest step over critical step, the latter without damping.
+        stiffness: beta of damping [s].
+    """
+
+    steps: NDArray[np.float64]
+    cost: NDArray[np.float64]
+    window: float
+    fraction: float
+    stiffness: float = 0.0
+
+    @property
+    def damping(self) -> float:
+        """Return beta over the window."""
+        return self.stiffness / self.window
+
+    @property
+    def outermost(self) -> float:
+        """Return the smallest step [s], times the fraction, of an element that takes the window.
+
+        Damping needs DT^2 (1 + 2 beta / DT) below the square of the critical step; inside levels it is their nu that
+        makes room for it.
+        """
+        return self.window * math.sqrt(1.0 + 2.0 * self.fraction * self.damping)
+
+
+def choose_levels(
+    cells: NDArray[np.int32], tie: Tie, pace: Pace, most: int
+) -> tuple[NDArray[np.int32], tuple[int, ...]]:
+    """Choose the levels of all elements of a mesh.
+
+    A level has all nodes of the elements that need its step, masters of slaves among them, and all elements of these
+    nodes: so it grows by one layer of elements that could take larger steps.
+
+    Args:
+        cells: ``(ne, k)``.
+        tie: Its slaves and masters.
+        pace: Steps and cost of the elements.
+        most: Largest number of levels below the window, at least 1.
+
+    Returns:
+        Level of each element ``(ne,)`` int32, 0 for the window; steps of level k + 1 in one of level k, empty where
+        all elements take the window.
+
+    Raises:
+        LevelError: The elements need more than ``LARGEST_RATIO`` steps of a level.
+    """
+    needed = governing_steps(cells, tie, pace.fraction * pace.steps)
+    if needed.min() >= pace.outermost * (1.0 - ROUNDING):
+        return np.zeros(len(cells), np.int32), ()
+    order = np.argsort(needed)
+    cost = np.concatenate([[0.0], np.cumsum(pace.cost[order])])
+    candidates = list(all_ratios(pace, pace.window / needed.min(), (), most))
+    if not candidates:
+        raise LevelError(
+            f"the window {pace.window:.3e} s is {pace.window / needed.min():.3g} times the smallest step of an element,"
+            f" {needed.min():.3e} s: allowed are {LARGEST_RATIO} steps a level, and {most} levels"
+        )
+    ratios = candidates[int(np.argmin(window_costs(candidates, needed[order], cost, pace)))]
+    return np.sum(needed[:, None] < least_steps(ratios, pace)[:-1], axis=1, dtype=np.int32), ratios
+
+
+def governing_steps(cells: NDArray[np.int32], tie: Tie, steps: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return for each element the smallest of the steps ``(ne,)`` of all elements that share a node with it.
+
+    Slaves stand for their masters. The level of an element is that of the largest at one of its nodes, which is that
+    of the smallest step at this node.
+    """
+    node = np.full(int(max(cells.max(), tie.master.max(initial=0), tie.slave.max(initial=0))) + 1, np.inf)
+    np.minimum.at(node, cells.ravel(), np.repeat(steps, cells.shape[1]))
+    np.minimum.at(node, tie.master.ravel(), np.repeat(node[tie.slave], tie.master.shape[1]))
+    node[tie.slave] = node[tie.master].min(axis=1)
+    return node[cells].min(axis=1)
+
+
+def least_steps(ratios: tuple[int, ...], pace: Pace) -> NDArray[np.float64]:
+    """Return the smallest critical step times the fraction that levels 0, 1, ... bear: ``(levels + 1,)`` [s]."""
+    counts = np.cumprod(ratios)
+    reaches = [reach_of(ratio, level, pace.damping) for level, ratio in enumerate(ratios, 1)]
+    return np.array([pace.outermost, *(pace.window / (counts * reaches))]) * (1.0 - ROUNDING)
+
+
+@cache
+def reach_of(ratio: int, level: int, damping: float) -> float:
+    """Return how far the substeps of a level reach, of those of leapfrog."""
+    return Substeps.of(ratio, level, damping).reach
+
+
+def all_ratios(pace: Pace, needed: float, inner: tuple[int, ...], most: int) -> Iterator[tuple[int, ...]]:
+    """Yield ratios of one to ``most`` levels that make ``needed`` steps of a window.
+
+    Args:
+        pace: What the steps follow.
+        needed: Step of level 0 over the smallest one.
+        inner: Ratios of the levels around.
+        most: Levels that may follow.
+    """
+    level = len(inner) + 1
+    for ratio in range(2, LARGEST_RATIO + 1):
+        reached = ratio * reach_of(ratio, level, pace.damping)
+        if reached >= needed * (1.0 - ROUNDING):
+            yield (*inner, ratio)
+            return
+        if most > 1 and needed / ratio <= LARGEST_RATIO ** (most - 1):
+            yield from all_ratios(pace, needed / ratio, (*inner, ratio), most - 1)
+
+
+def window_costs(
+    candidates: list[tuple[int, ...]], needed: NDArray[np.float64], cost: NDArray[np.float64], pace: Pace
+) -> NDArray[np.float64]:
+    """Return the cost of a window for each candidate: elements of each level times their steps, and of each substep.
+
+    There may be a quarter of a million: those of as many levels are taken at once.
+
+    Args:
+        candidates: Ratios of the levels.
+        needed: ``(ne,)`` step that each element needs, ascending [s].
+        cost: ``(ne + 1,)`` sum of the costs of an update of the first elements.
+        pace: What the steps follow.
+    """
+    totals = np.empty(len(candidates))
+    lengths = np.array([len(ratios) for ratios in candidates])
+    for length in np.unique(lengths):
+        rows = np.flatnonzero(lengths == length)
+        ratios = np.array([candidates[row] for row in rows])
+        counts = np.cumprod(ratios, axis=1)
+        least = np.full(ratios.shape, pace.outermost)
+        for level in range(1, length):
+            reach = {ratio: reach_of(ratio, level, pace.damping) for ratio in range(2, LARGEST_RATIO + 1)}
+            reaches = np.array([reach.get(ratio, 1.0) for ratio in range(LARGEST_RATIO + 1)])
+            least[:, level] = pace.window / (counts[:, level - 1] * reaches[ratios[:, level - 1]])
+        finer = cost[np.searchsorted(needed, least * (1.0 - ROUNDING))]
+        beyond = np.concatenate([finer[:, 1:], np.zeros((len(rows), 1))], axis=1)
+        totals[rows] = (counts * (finer - beyond + SUBSTEP_COST)).sum(axis=1) - finer[:, 0]
+    return totals

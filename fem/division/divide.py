@@ -1,0 +1,123 @@
+"""The choice of models, levels and window from the cells of a whole mesh and their critical steps."""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem.division.buffer import grown, nodes_of, touching
+from fem.division.chebyshev import LARGEST_DAMPING
+from fem.division.choice import Choice, choose_scheme
+from fem.division.divide_levels import by_levels
+from fem.division.division import Division, SchemeName
+from fem.division.rules import Rules
+from fem.division.whole import Survey, Whole
+from fem.estimates.estimate import damped_critical_step
+
+
+def divide(whole: Whole, survey: Survey, rules: Rules) -> Division:
+    """Choose scheme, models, levels and window; ``checks.check_division`` says whether they can be coupled.
+
+    Raises:
+        LevelError: Steps that differ by more than levels bridge.
+    """
+    choice = scheme_for(whole, survey, rules)
+    if rules.copied is not None and rules.copy is not None:
+        return replace(submodel(whole, survey, rules, rules.copied, rules.copy), why=choice.why)
+    divided = {
+        "held_velocity": by_buffer,
+        "impulse": carried,
+        "gravouil_combescure": at_ties,
+        "local_steps": by_levels,
+    }
+    return replace(divided[choice.scheme](whole, survey, rules), why=choice.why)
+
+
+def scheme_for(whole: Whole, survey: Survey, rules: Rules) -> Choice:
+    """Return the scheme that the user wants, or that the scene calls for, and why."""
+    wanted = rules.coupling.scheme
+    if rules.copied is not None:
+        return Choice("held_velocity", "coupling.direction = one_way: nothing comes back that could grow")
+    if wanted != "auto":
+        return Choice(wanted, f"coupling.scheme = {wanted}")
+    coarse_step = float(survey.step[rules.coarse].min(initial=np.inf))
+    light = rules.stiffness <= LARGEST_DAMPING * rules.fraction * coarse_step
+    linear = bool(survey.linear.all())
+    choice = choose_scheme(linear and light, bool(by_buffer(whole, survey, rules).macro.any()))
+    if linear and not light:
+        return Choice(choice.scheme, f"stiffness-proportional damping of {rules.stiffness:.3g} s leaves no local steps")
+    return choice
+
+
+def seeds_of(whole: Whole, fine: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return the nodes ``(n,)`` of fine cells ``(ne,)``, and those that they are tied to."""
+    nodes = nodes_of(whole.mesh.cells, fine, len(whole.mesh.points))
+    nodes[whole.tie.master[nodes[whole.tie.slave]]] = True
+    return nodes
+
+
+def by_buffer(whole: Whole, survey: Survey, rules: Rules) -> Division:
+    """Give the meso model all that is no board, and some layers of board around it: held velocity.
+
+    The window follows the macro model and all cells that touch the cut (PHYSICS 4).
+    """
+    cells = whole.mesh.cells
+    buffer = grown(cells, seeds_of(whole, ~rules.coarse), rules.coarse, rules.coupling.buffer_layers)
+    return held(whole, survey, rules, ~rules.coarse | buffer)
+
+
+def carried(whole: Whole, survey: Survey, rules: Rules) -> Division:
+    """Give the models the cells that they have with held velocity; the cut is the meso model's: impulses."""
+    return replace(by_buffer(whole, survey, rules), scheme="impulse")
+
+
+def held(whole: Whole, survey: Survey, rules: Rules, meso: NDArray[np.bool_]) -> Division:
+    """Return the division of held velocity whose meso model has given cells ``(ne,)``."""
+    slow = ~meso | touching(whole.mesh.cells, cut_nodes(whole.mesh.cells, meso, len(whole.mesh.points)))
+    return two_steps("held_velocity", rules, (~meso, meso), (slow, survey.step))
+
+
+def submodel(
+    whole: Whole, survey: Survey, rules: Rules, copied: NDArray[np.bool_], copy: NDArray[np.bool_]
+) -> Division:
+    """Give the meso model fine cells ``(ne,)`` and layers of all around them; the macro model has all, them as copies.
+
+    Layers grow through ties, too: another joint on the same element is in the meso model as coarse as it is.
+    """
+    cells, meso = whole.mesh.cells, copied.copy()
+    for _ in range(rules.coupling.buffer_layers):
+        nodes = seeds_of(whole, meso)
+        nodes[whole.tie.slave[nodes[whole.tie.master].any(axis=1)]] = True
+        meso |= ~copied & ~copy & touching(cells, nodes)
+    division = two_steps("held_velocity", rules, (~copied, meso), (~copied, survey.step))
+    return replace(division, copy=copy)
+
+
+def cut_nodes(cells: NDArray[np.int32], meso: NDArray[np.bool_], count: int) -> NDArray[np.bool_]:
+    """Return which of ``count`` nodes cells of both sides have."""
+    return nodes_of(cells, meso, count) & nodes_of(cells, ~meso, count)
+
+
+def at_ties(_whole: Whole, survey: Survey, rules: Rules) -> Division:
+    """Give the meso model all that is no board: Gravouil-Combescure, whose cut are the nodes tied to."""
+    return two_steps("gravouil_combescure", rules, (rules.coarse, ~rules.coarse), (rules.coarse, survey.step))
+
+
+def two_steps(
+    scheme: SchemeName,
+    rules: Rules,
+    models: tuple[NDArray[np.bool_], NDArray[np.bool_]],
+    steps: tuple[NDArray[np.bool_], NDArray[np.float64]],
+) -> Division:
+    """Return the division of a scheme whose models take one step each.
+
+    Args:
+        scheme: Its name.
+        rules: What it follows.
+        models: ``(ne,)`` cells of macro and meso model.
+        steps: ``(ne,)`` cells that the window follows; critical steps of all cells [s].
+    """
+    slow, critical = steps
+    damped = damped_critical_step(critical, rules.stiffness)
+    plan = rules.plan(float(damped[slow if slow.any() else ...].min()), float(damped.min()))
+    return Division(scheme, *models, np.zeros(len(critical), np.int32), (), plan)

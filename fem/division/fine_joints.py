@@ -1,0 +1,97 @@
+"""Which joints of a scene are fine: all others have the coarse mesh."""
+
+from collections.abc import Collection
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem.errors import MeshError
+from fem.mesh.mesh import MeshData, append, select
+from fem.mesh.mesh_file import read_mesh, read_meshes
+from fem.mesh.watch_table import joint_names
+from fem.names import nearest
+from fem.problem.inputs import SceneInput
+
+COPY = "_coarse@"
+KEY = "shock.coupling.fine_joints"
+
+
+def read_scene(request: SceneInput) -> MeshData:
+    """Read the meshes of a run, each joint fine or coarse as it asks for.
+
+    Raises:
+        MeshError: As ``with_coarse_joints``, or joints are to be coarse and no file has them.
+    """
+    fine = request.shock.coupling.fine_joints
+    mesh = read_meshes(request.meshes)
+    if request.one_way:
+        coarse, names = read_coarse(request.coarse_joints), joint_names(mesh) if fine == "all" else fine
+        return append([with_coarse_joints(mesh, coarse, names), copies(coarse, names)])
+    if fine == "all":
+        return mesh
+    if isinstance(fine, str):
+        raise MeshError(f'{KEY} = "{fine}" names no joint: a run takes a list of names, or "all"')
+    return with_coarse_joints(mesh, read_coarse(request.coarse_joints), fine)
+
+
+def read_coarse(path: Path | None) -> MeshData:
+    """Read the mesh of coarse joints.
+
+    Raises:
+        MeshError: There is none.
+    """
+    if path is None:
+        raise MeshError(f"{KEY} leaves out some joints, and there is no file of coarse joints (coarse_joints)")
+    return read_mesh(path)
+
+
+def with_coarse_joints(mesh: MeshData, coarse: MeshData, fine: Collection[str]) -> MeshData:
+    """Replace all joints of a mesh but the fine ones by those of another; all keep their order.
+
+    Raises:
+        MeshError: An unknown joint, no fine joint at all, or one that neither is fine nor has a coarse mesh.
+    """
+    joints, known = joint_names(mesh), joint_names(coarse)
+    unknown = sorted(set(fine) - set(joints))
+    if unknown:
+        hint = nearest(unknown[0], joints)
+        asked = f"; did you mean {hint}?" if hint else ""
+        raise MeshError(f"{KEY}: the mesh has no joint {unknown[0]}, allowed: {', '.join(joints)}{asked}")
+    if not fine:
+        raise MeshError(f"{KEY} is empty: no joint would be fine, allowed: {', '.join(joints)}")
+    others = [name for name in joints if name not in fine]
+    missing = [name for name in others if name not in known]
+    if missing:
+        raise MeshError(f"{missing[0]} is not fine and has no coarse mesh; coarse joints: {', '.join(known) or 'none'}")
+    kept, _ = select(mesh, lambda part: joint_of(part) not in others)
+    return append([kept, select(coarse, lambda part: joint_of(part) in others)[0]]) if others else mesh
+
+
+def copies(coarse: MeshData, fine: Collection[str]) -> MeshData:
+    """Return coarse joints that stand beside fine ones, as a driving model has them: named apart, and not watched.
+
+    Raises:
+        MeshError: A fine joint has no coarse mesh.
+    """
+    missing = sorted(set(fine) - set(joint_names(coarse)))
+    if missing:
+        raise MeshError(f"{missing[0]} has no coarse mesh, as shock.coupling.direction = one_way needs")
+    chosen, _ = select(coarse, lambda part: joint_of(part) in fine)
+    names = tuple(name.replace("@", COPY) for name in chosen.part_names)
+    return replace(
+        chosen, part_names=names, facets={k: v for k, v in chosen.facets.items() if not k.startswith("pad_")}
+    )
+
+
+def copied_joints(mesh: MeshData) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Return the cells ``(ne,)`` of fine joints that have a coarse copy beside them, and of these copies."""
+    copy = mesh.in_parts(lambda name: COPY in name)
+    copied = {joint_of(mesh.part_names[part]) for part in np.unique(mesh.part[copy])}
+    return mesh.in_parts(lambda name: joint_of(name) in copied) & ~copy, copy
+
+
+def joint_of(part: str) -> str:
+    """Return the joint that a part belongs to, empty where it is no joint's."""
+    return part.partition("@")[2]

@@ -1,0 +1,29 @@
+"""What a run tells of its coupling: ``coupling`` in ``result.json``."""
+
+from typing import Any
+
+import numpy as np
+
+from fem.division.division import Division
+from fem.division.whole import Survey
+
+
+def coupling_record(division: Division, survey: Survey, cut_nodes: int) -> dict[str, Any]:
+    """Return scheme and why, share of the meso model, nodes of the cut, levels of time steps with their elements."""
+    plan = division.plan
+    held = division.scheme != "local_steps"
+    level = division.meso.astype(np.int32) if held else division.level
+    steps = [plan.window, plan.step] if held else (plan.window / np.cumprod([1, *division.ratios])).tolist()
+    cost = np.array([float(survey.cost[level == k].sum()) / step for k, step in enumerate(steps)])
+    return {
+        "scheme": division.scheme,
+        "why": division.why,
+        "m": plan.substeps,
+        "ratios": [plan.substeps] if held else list(division.ratios),
+        "meso_share": float(division.meso.mean()),
+        "cut_nodes": cut_nodes,
+        "levels": [
+            {"step": step, "elements": int(np.sum(level == k)), "cost_share": float(share)}
+            for k, (step, share) in enumerate(zip(steps, cost / cost.sum(), strict=True))
+        ],
+    }

@@ -1,0 +1,137 @@
+"""From the mesh of a structure to its tables: the work of one rank before anything is distributed."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem.division.tables import Tables
+from fem.division.whole import Whole
+from fem.errors import LoadError, MeshError
+from fem.estimates.material_effects import plastic_laws
+from fem.mesh.facet_areas import OutwardFacets, facet_set, outward_areas, outward_facets
+from fem.mesh.mesh import MeshData
+from fem.mesh.tie import tie_joints
+from fem.output.watch_points import PointTable, point_table
+from fem.problem.structure import AXES, InputG, PrescribedMotion, Pressure, StructureScene
+
+NODES = {"hexahedron": 8, "tetrahedron": 4, "tetrahedron_quadratic": 10}
+
+
+@dataclass(frozen=True, slots=True)
+class StructureTables(Tables):
+    """Tables of a structure.
+
+    Attributes:
+        nodes_of: Name -> nodes of a facet set that supports or motions act on.
+        areas: Name -> nodes and outward areas of a facet set under pressure, see ``facet_areas.outward_areas``.
+        pressed: Name -> the same facet set, for a pressure that follows it.
+        watch: Watch points and supports.
+    """
+
+    nodes_of: dict[str, NDArray[np.integer]]
+    areas: dict[str, tuple[NDArray[np.integer], NDArray[np.float64]]]
+    pressed: dict[str, OutwardFacets]
+    watch: PointTable
+
+
+def tied(mesh: MeshData, scene: StructureScene) -> Whole:
+    """Tie the layers of a structure whose elements differ.
+
+    Raises:
+        MeshError: Cells of another shape, layers without elements or elements without layers.
+        TieError: Layers whose elements differ do not touch.
+    """
+    check_layers(mesh, scene)
+    return Whole(*tie_joints(mesh))
+
+
+def structure_tables(whole: Whole, scene: StructureScene) -> StructureTables:
+    """Build the tables of a structure.
+
+    Raises:
+        MeshError: Watch points outside.
+        LoadError: A facet set without facets, or a prescribed motion of what is held.
+    """
+    mesh, tie = whole.mesh, whole.tie
+    moved = [load.on for load in scene.loads.values() if isinstance(load, PrescribedMotion)]
+    sets = [*(support.on for support in scene.supports.values()), *moved]
+    nodes_of: dict[str, NDArray[np.integer]] = {}
+    for name in sets:  # slaves follow their masters
+        nodes_of[name] = np.setdiff1d(facet_set(mesh, name), tie.slave)
+    pressed = {load.on for load in scene.loads.values() if isinstance(load, Pressure)}
+    held = held_by_supports(mesh, scene)
+    check_motions(scene, nodes_of, held)
+    check_shaken(scene, nodes_of, held)
+    points = {name: point.at for name, point in scene.watch.items()}
+    supports = {
+        name: (nodes_of[support.on], np.isin(list(AXES), support.hold)) for name, support in scene.supports.items()
+    }
+    return StructureTables.undivided(
+        whole,
+        held,
+        nodes_of=nodes_of,
+        areas={name: outward_areas(mesh, name) for name in sorted(pressed)},
+        pressed={name: outward_facets(mesh, name) for name in sorted(pressed)},
+        watch=point_table(mesh, points, supports, yields=bool(plastic_laws(scene.layer_materials))),
+    )
+
+
+def check_layers(mesh: MeshData, scene: StructureScene) -> None:
+    """Compare the cells and the parts of the mesh with elements and layers; errors as ``tied``."""
+    element = scene.structure.element
+    if mesh.shape.nodes != NODES[element]:
+        raise MeshError(
+            f"structure.element = {element} has {NODES[element]} nodes, the cells of the mesh ({mesh.shape.name}) have"
+            f" {mesh.shape.nodes}"
+        )
+    layers, parts = set(scene.structure.layers), set(mesh.part_names)
+    if layers != parts:
+        empty, foreign = ", ".join(sorted(layers - parts)), ", ".join(sorted(parts - layers))
+        raise MeshError(
+            f"layers and parts of the mesh differ: layers without elements: {empty or 'none'}; parts that are no layer:"
+            f" {foreign or 'none'}"
+        )
+
+
+def check_motions(scene: StructureScene, nodes_of: dict[str, NDArray[np.integer]], held: NDArray[np.bool_]) -> None:
+    """Refuse prescribed motions of held components ``(n, 3)``; errors as ``structure_tables``."""
+    for name, load in scene.loads.items():
+        if not isinstance(load, PrescribedMotion):
+            continue
+        nodes = nodes_of[load.on]
+        count = int(held[nodes, AXES.index(load.component)].sum())
+        if count:
+            raise LoadError(
+                f"loads.{name} moves {load.on} along {load.component}, where a support or a plane of symmetry holds"
+                f" {count} of its {len(nodes)} nodes"
+            )
+
+
+def check_shaken(scene: StructureScene, nodes_of: dict[str, NDArray[np.integer]], held: NDArray[np.bool_]) -> None:
+    """Refuse a large mass on components ``(n, 3)`` that are held in space; errors as ``structure_tables``."""
+    for name in shaken_supports(scene):
+        nodes = nodes_of[scene.supports[name].on]
+        count = int(held[nodes].any(axis=1).sum())
+        if count:
+            raise LoadError(
+                f"a large mass cannot move supports.{name}: another support or a plane of symmetry holds {count} of its"
+                f" {len(nodes)} nodes; method = direct can"
+            )
+
+
+def shaken_supports(scene: StructureScene) -> list[str]:
+    """Return the supports that a large mass moves: those that hold all components, where an input-G asks for it."""
+    by_mass = any(isinstance(load, InputG) and load.method == "large_mass" for load in scene.loads.values())
+    return [name for name, support in scene.supports.items() if by_mass and set(support.hold) == set(AXES)]
+
+
+def held_by_supports(mesh: MeshData, scene: StructureScene) -> NDArray[np.bool_]:
+    """Return ``(n, 3)``: components that supports and planes of symmetry hold at zero."""
+    shaken = shaken_supports(scene)
+    rules = [(support.on, support.hold) for name, support in scene.supports.items() if name not in shaken]
+    rules += [(f"{axis}_min", (axis,)) for axis in scene.structure.symmetry]
+    held = np.zeros((len(mesh.points), 3), dtype=bool)
+    for name, components in rules:
+        held[np.ix_(np.unique(facet_set(mesh, name)), np.array([AXES.index(axis) for axis in components]))] = True
+    return held

@@ -1,0 +1,109 @@
+"""The whole mesh of a run before it is divided: its ties, and what each of its elements is like."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem.elements.element import critical_steps, element_geometry
+from fem.elements.hexahedron import HEXAHEDRON
+from fem.elements.mesh_elements import elements_of
+from fem.errors import StepError
+from fem.estimates.estimate import BOARD_ADVANTAGE, UPDATES_PER_SECOND
+from fem.estimates.solver_cost import NONLINEAR_RATE
+from fem.forces.force import Kinematics
+from fem.forces.force_congruent import is_box
+from fem.materials.elasticity import materials_of_parts
+from fem.materials.parameters import Material
+from fem.materials.roles import Materials
+from fem.mesh.mesh import MeshData
+from fem.mesh.tie import Tie
+
+
+@dataclass(frozen=True, slots=True)
+class Whole:
+    """A mesh whose parts share nodes or are tied, slaves moved onto their facets by at most ``moved`` [m]."""
+
+    mesh: MeshData
+    tie: Tie
+    moved: float
+
+
+@dataclass(frozen=True, slots=True)
+class Treatment:
+    """How elements are computed: formulation of hexahedra, kinematics, roles whose masses are scaled."""
+
+    formulation: str = HEXAHEDRON.name
+    kinematics: Kinematics = "small"
+    mass_scaled: Sequence[str] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Survey:
+    """What the elements of a mesh are like.
+
+    Attributes:
+        role: ``(ne,)`` material role.
+        plain_step: ``(ne,)`` critical step of each element on its own, without mass scaling [s].
+        factor: ``(ne,)`` factor of mass scaling on the density.
+        mass: ``(ne,)`` [kg] without it.
+        linear: ``(ne,)`` whether its force is linear in the displacement.
+        cost: ``(ne,)`` cost of an update over that of a box.
+    """
+
+    role: NDArray[np.str_]
+    plain_step: NDArray[np.float64]
+    factor: NDArray[np.float64]
+    mass: NDArray[np.float64]
+    linear: NDArray[np.bool_]
+    cost: NDArray[np.float64]
+
+    @property
+    def step(self) -> NDArray[np.float64]:
+        """Return the critical step ``(ne,)`` [s] of each element on its own, with mass scaling."""
+        return self.plain_step * np.sqrt(self.factor)
+
+    @property
+    def added_mass(self) -> NDArray[np.float64]:
+        """Return the mass ``(ne,)`` [kg] that scaling adds."""
+        return self.mass * (self.factor - 1.0)
+
+
+def survey(mesh: MeshData, materials: Materials | Mapping[str, Material], treatment: Treatment) -> Survey:
+    """Find out what the elements of a mesh are like.
+
+    Raises:
+        MeshError: An element is turned inside out.
+        StepError: Every role is mass scaled.
+    """
+    names, assigned = materials_of_parts(mesh.part_names, materials)
+    elements = elements_of(mesh.points, mesh.cells, mesh.part, assigned, treatment.formulation)
+    geometry = element_geometry(elements.points, elements.cells)
+    step = critical_steps(elements, geometry.nodal_volume)
+    role = np.array(names)[mesh.part]
+    elastic = np.array([material.plasticity is None for material in assigned])[mesh.part]
+    linear = elastic & (treatment.kinematics == "small")
+    path_cost = UPDATES_PER_SECOND / NONLINEAR_RATE[elements.kind.name]
+    box = is_box(mesh.points[mesh.cells])
+    return Survey(
+        role=role,
+        plain_step=step,
+        factor=mass_factors(role, step, treatment.mass_scaled),
+        mass=elements.density * geometry.volume,
+        linear=linear,
+        cost=np.where(linear, np.where(box, 1.0, BOARD_ADVANTAGE), BOARD_ADVANTAGE * path_cost),
+    )
+
+
+def mass_factors(role: NDArray[np.str_], step: NDArray[np.float64], scaled: Sequence[str]) -> NDArray[np.float64]:
+    """Return the factor ``(ne,)`` on the density that raises the critical steps ``(ne,)`` of some roles to the others'.
+
+    Raises:
+        StepError: Every role is mass scaled.
+    """
+    chosen = np.isin(role, scaled)
+    target = float(step[~chosen].min(initial=np.inf))
+    if not np.isfinite(target):
+        raise StepError(f"numerics.mass_scaled = {tuple(scaled)} leaves no role to take the step from")
+    return np.where(chosen, np.maximum(1.0, (target / step) ** 2), 1.0)

@@ -1,0 +1,1 @@
+"""Time integration, participants, energy balance, histories; start with `central_difference.py`."""

@@ -1,0 +1,199 @@
+"""Central differences on one rank: velocities live half a step behind displacements."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem.forces.force_nonlinear import NonlinearElements
+from fem.kernels.motion import advance
+from fem.loads.load import FineSupports, Load, Loaded
+from fem.model.body import Body
+from fem.model.step_levels import levels_of
+from fem.parallel.portable import Rows, Same, Shares, State, Sum
+
+
+class Motion(Loaded):
+    """The state of one model on one rank, and its step.
+
+    Half-kick, drift, force, half-kick, written with the velocity half a step back: v += dt (f / m + g), u += dt v.
+    Nodes that several ranks hold are updated by each of them, from equal sums of forces.
+
+    Attributes:
+        displacement: ``(n, 3)`` [m] at ``time``.
+        velocity: ``(n, 3)`` [m/s] at ``time - dt / 2``.
+        force: ``(n, 3)`` [N] at ``time``, summed over ranks, slaves' moved to their masters; without body force.
+        slave_force: ``(ns, 3)`` [N] of this rank's elements on the slaves, before it is moved.
+        gravity: ``(3,)`` [m/s^2], sum of the loads' accelerations at ``time``.
+        mobility: ``(n, 3)`` [1/kg] inverse masses, zero where the velocity is prescribed.
+        ledger_mass: ``(n,)`` [kg] that counts in the ledger of this rank.
+    """
+
+    def __init__(
+        self, body: Body, loads: Sequence[Load], step: float, held: NDArray[np.integer], extra_mass: NDArray[np.float64]
+    ) -> None:
+        """Start at rest.
+
+        Args:
+            body: The model.
+            loads: What acts on it; damping comes last, since it needs all other forces.
+            step: dt [s].
+            held: Local nodes whose velocity another model prescribes; their mass is in that model's ledger.
+            extra_mass: ``(n,)`` [kg] that another model adds at the cut.
+        """
+        self.body, self.step, self.time, self._body_work = body, step, 0.0, 0.0
+        carried = [FineSupports()] if levels_of(body.terms) else []
+        self._loads = sorted([*loads, *carried], key=lambda load: load.account == "damping")
+        mass = body.mass + extra_mass
+        free = body.free.copy()
+        free[held] = False
+        self.mobility = np.where(free, 1.0 / np.where(mass > 0.0, mass, np.inf)[:, None], 0.0)
+        self.ledger_mass = np.where(body.shared.owned, mass, 0.0)
+        self.ledger_mass[held] = 0.0
+        self._state = np.zeros((3, len(mass), 3))
+        self.displacement, self.velocity, self.force = self._state
+        self._tied = len(body.tie.slave) > 0
+        self.slave_force = np.zeros((len(body.tie.slave), 3))
+        self.gravity = self.body_acceleration(0.0)
+        for load in self._loads:
+            load.begin(self)
+        for levels in levels_of(body.terms):
+            levels.follow(self.mobility)
+        for load in self._loads:
+            load.carry(body)
+        for load in self._loads:
+            load.add(self)
+        for load in self._loads:
+            load.drive(self.velocity, -step)
+        self.velocity -= 0.5 * step * self.acceleration()
+
+    @property
+    def external_work(self) -> float:
+        """Return the work of all loads on this rank's share of the mass [J]."""
+        return self._body_work + sum(load.work for load in self._loads if load.account == "external")
+
+    @property
+    def damping_energy(self) -> float:
+        """Return the energy that damping has taken from this rank's share [J]."""
+        return -sum(load.work for load in self._loads if load.account == "damping")
+
+    def hold(self, nodes: NDArray[np.integer], component: int) -> None:
+        """Let a velocity component of local nodes no longer follow from forces."""
+        self.mobility[nodes, component] = 0.0
+
+    def add_mass(self, nodes: NDArray[np.integer], mass: NDArray[np.float64]) -> None:
+        """Add masses ``(k,)`` [kg] that the ledger does not count to local nodes, all of whose components are free."""
+        self.mobility[nodes] = 1.0 / (1.0 / self.mobility[nodes] + mass[:, None])
+
+    def launch(self, velocity: NDArray[np.float64]) -> None:
+        """Give all free components an initial velocity ``(3,)`` [m/s], which damping feels; before the first step."""
+        before = self.acceleration()
+        self.velocity += np.where(self.mobility > 0.0, velocity, 0.0)
+        for load in self._loads:
+            if load.account == "damping":
+                load.remove(self.force)
+                load.add(self)
+        self.velocity -= 0.5 * self.step * (self.acceleration() - before)
+
+    def advance(self) -> None:
+        """Move from ``time`` to ``time + dt``, slaves with their masters; the force is then out of date."""
+        for load in self._loads:
+            load.drive(self.velocity, self.time)
+        advance(self._state, self.mobility, self.gravity, self.step)
+        for load in self._loads:
+            load.collect(self)
+        if self._tied:
+            self.body.tie.spread(self.displacement)
+        self.time += self.step
+        before, self.gravity = self.gravity, self.body_acceleration(self.time)
+        mean = 0.5 * (before + self.gravity)
+        if mean.any():
+            self._body_work += self.step * float(mean @ (self.ledger_mass @ self.velocity))
+
+    def update_force(self) -> None:
+        """Evaluate the force at the present displacement, summed over ranks; once a step, for terms with a path."""
+        self.force.fill(0.0)
+        for term in self.body.terms:
+            term.add(self.displacement, self.force)
+        if self._tied:
+            np.take(self.force, self.body.tie.slave, axis=0, out=self.slave_force)
+            self.body.tie.gather(self.force)
+        self.body.shared.add(self.force)
+        for load in self._loads:
+            load.add(self)
+        for load in self._loads:
+            load.collect(self)
+
+    def acceleration(self, nodes: NDArray[np.integer] | slice = slice(None)) -> NDArray[np.float64]:
+        """Return the acceleration ``(k, 3)`` [m/s^2] of some local nodes, zero where it does not follow from forces."""
+        inverse = self.mobility[nodes]
+        moved = self.force[nodes] * inverse
+        return moved + np.where(inverse > 0.0, self.gravity, 0.0) if self.gravity.any() else moved
+
+    def kinetic_energy(self) -> float:
+        """Return the kinetic energy [J] of this rank's share at ``time``: v(t - dt/2) . M v(t + dt/2) / 2.
+
+        With this product its change over a step is exactly the work of the forces (central differences conserve it
+        together with the strain energy), while m v^2 / 2 of the mean velocity is larger by m (a dt)^2 / 8.
+        """
+        return 0.5 * float(np.einsum("n,ni,ni->", self.ledger_mass, self.velocity, self._following_velocity()))
+
+    def present_velocity(self) -> NDArray[np.float64]:
+        """Return the velocity ``(n, 3)`` [m/s] at ``time``, half a step after ``velocity``; not that of slaves."""
+        return 0.5 * (self.velocity + self._following_velocity())
+
+    def _following_velocity(self) -> NDArray[np.float64]:
+        """Return the velocity ``(n, 3)`` [m/s] at ``time + dt / 2``."""
+        following = self.velocity + self.step * self.acceleration()
+        for load in self._loads:
+            load.drive(following, self.time)
+        return following
+
+    def reaction(self) -> NDArray[np.float64]:
+        """Return the forces ``(n, 3)`` [N] of supports and prescribed motion on the nodes that this rank counts."""
+        force = self.force.copy()
+        for load in self._loads:
+            load.release(force)
+        acceleration = (self._following_velocity() - self.velocity) / self.step - self.gravity
+        return self.ledger_mass[:, None] * acceleration - force
+
+    def step_energy(self, foreign: NDArray[np.float64]) -> float:
+        """Return dt^2 f . M^-1 f / 8 [J] of this rank's share, f the internal force.
+
+        For f = -K u this is (dt omega / 2)^2 times the strain energy in each mode of frequency omega: where the sum is
+        larger than the strain energy, the step is above 2 / omega of a mode that moves, and that mode grows.
+
+        Args:
+            foreign: ``(n, 3)`` [N], part of the force that is not this model's.
+        """
+        force = self.force - foreign
+        for load in self._loads:
+            load.remove(force)
+        owned = self.body.shared.owned
+        return 0.125 * self.step**2 * float(owned @ np.einsum("ni,ni,ni->n", force, force, self.mobility))
+
+    def state(self) -> State:
+        """Return all that changes with time, for a checkpoint."""
+        local, tie = self.body.local, self.body.tie
+        nodal = {"displacement": self.displacement, "velocity": self.velocity, "force": self.force}
+        rows = {name: Rows(local.nodes, value) for name, value in nodal.items()}
+        at_slaves = Shares(local.nodes[tie.slave], self.slave_force, self.body.shared.owned[tie.slave])
+        loads = {str(k): load.state(self.body) for k, load in enumerate(self._loads)}
+        paths = {str(k): term.state(local.cell_numbers) for k, term in enumerate(self._terms_with_path())}
+        told: State = {"gravity": Same(self.gravity), "time": Same(self.time), "body_work": Sum(self._body_work)}
+        return {**rows, **told, "slave_force": at_slaves, "paths": paths, "loads": loads}
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Continue from the values of what ``state`` returned, in a motion that was built alike."""
+        for name in ("displacement", "velocity", "force", "slave_force"):
+            getattr(self, name)[:] = state[name]
+        self.gravity, self.time, self._body_work = state["gravity"], state["time"], state["body_work"]
+        for k, term in enumerate(self._terms_with_path()):
+            term.restore(state["paths"][str(k)])
+        for k, load in enumerate(self._loads):
+            load.restore(state["loads"][str(k)])
+
+    def _terms_with_path(self) -> list[NonlinearElements]:
+        """Return the force terms whose history must be kept; the same ones in the same order on all ranks with any."""
+        return [term for term in self.body.terms if isinstance(term, NonlinearElements)]

@@ -1,0 +1,83 @@
+"""History samples: ranks of all models combine their parts, rank 0 of the run keeps them."""
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from fem.dynamics.energy_balance import Ledger, ledger_sums
+from fem.dynamics.participant import Participant
+from fem.dynamics.watch import Watch
+from fem.parallel.communicators import Role
+from fem.parallel.data_file import columns, fields_of, rows
+from fem.parallel.portable import Log, Same, State
+from fem.parallel.whereabouts import HERE
+
+SIDE: dict[Role, float] = {"macro": 1.0, "meso": -1.0, "dns": 0.0, "structure": 0.0}
+Signal = Callable[[float], float]
+
+
+class History:
+    """Samples of the watch points, the ledger and given functions of time, equal on all ranks."""
+
+    def __init__(
+        self, world: MPI.Comm, watches: Mapping[Role, Watch], ledger: Ledger, signals: Mapping[str, Signal]
+    ) -> None:
+        """Start an empty history; ``watches`` are those of the models on this rank."""
+        self.ledger = ledger
+        self._world, self._watches, self._signals = world, watches, signals
+        self._watch = next(iter(watches.values()))
+        self._rows: list[dict[str, NDArray[np.float64] | float]] = []
+
+    def sample(self, crew: Mapping[Role, Participant]) -> None:
+        """Add a sample; collective over all models.
+
+        Args:
+            crew: The models on this rank.
+
+        Raises:
+            EnergyError: On every rank, see ``Ledger.judge``.
+        """
+        energies = self.check(crew)
+        sums, maxima = [], []
+        for role, participant in crew.items():
+            time = participant.motion.time
+            watched, largest = self._watches[role].sample(participant.motion)
+            sums.append(watched)
+            maxima.append(largest)
+        total, most = self._combine(np.sum(sums, axis=0)), self._combine(np.max(maxima, axis=0), MPI.MAX)
+        if self._world.rank == 0:
+            signals = {name: signal(time) for name, signal in self._signals.items()}
+            self._rows.append({"time": time, **signals, **self._watch.row(total, most), **energies})
+
+    def check(self, crew: Mapping[Role, Participant]) -> dict[str, float]:
+        """Judge the energies without a sample, and return them; collective over all models; errors as ``sample``."""
+        ledgers = [ledger_sums(participant, SIDE[role]) for role, participant in crew.items()]
+        time = next(iter(crew.values())).motion.time
+        return self.ledger.judge(self._combine(np.sum(ledgers, axis=0)), time)
+
+    def state(self) -> State:
+        """Return ledger and samples, for a checkpoint."""
+        return {"ledger": Same(fields_of(self.ledger)), "rows": Log(columns(self._rows))}
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Continue from the values of what ``state`` returned."""
+        self.ledger, self._rows = Ledger(**state["ledger"]), rows(state["rows"])
+
+    def _combine(self, part: NDArray[np.float64], operation: MPI.Op = MPI.SUM) -> NDArray[np.float64]:
+        result = np.empty_like(part)
+        HERE.wait_for("the sums of a sample, with all ranks")
+        self._world.Allreduce(part, result, operation)
+        HERE.go_on()
+        return result
+
+    def arrays(self) -> dict[str, NDArray]:
+        """Return all samples as arrays, by name; on rank 0."""
+        return columns(self._rows) | self._watch.labels
+
+    def write(self, directory: Path) -> None:
+        """Write ``history.npz``; on rank 0."""
+        np.savez(directory / "history.npz", **self.arrays())

@@ -1,0 +1,310 @@
+"""Implicit time integration of linear elastic models: Newmark's method with the HHT-alpha average of forces.
+
+    M a' = (1 + alpha) (F' - C v' - K u') - alpha (F - C v - K u),
+    u' = u + h v + h^2 ((1/2 - beta) a + beta a'),   v' = v + h ((1 - gamma) a + gamma a'),
+    beta = (1 - alpha)^2 / 4,   gamma = 1/2 - alpha                       (Hilber, Hughes & Taylor, EESD 5, 1977)
+
+Second order and stable at any step for -1/3 <= alpha <= 0. alpha = 0 is the trapezoidal rule, which keeps the energy of
+a linear model to the last digits whatever the step: the default, because an oracle's balance then shows every mistake.
+Negative alpha damps what the step does not resolve, for loads that start with a jump.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, cast
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from fem.dynamics.central_difference import Motion
+from fem.forces.force_assembled import AssembledElements
+from fem.forces.force_congruent import CongruentElements
+from fem.loads.damping import RayleighDamping
+from fem.loads.load import Load, Loaded
+from fem.model.body import Body
+from fem.model.factorisation import Factorisation
+from fem.model.global_matrix import Equations
+from fem.parallel.agreement import agreed
+from fem.parallel.portable import Rows, Same, Shares, State, Sum
+
+
+@dataclass(frozen=True, slots=True)
+class Scheme:
+    """Coefficients of one step: h [s], alpha."""
+
+    step: float
+    alpha: float
+
+    def __post_init__(self) -> None:
+        """Raise ``ValueError`` where they are out of range."""
+        if not self.step > 0.0:
+            raise ValueError(f"the implicit time step is {self.step:g} s, must be > 0")
+        if not -1.0 / 3.0 <= self.alpha <= 0.0:
+            raise ValueError(f"alpha of the HHT method is {self.alpha:g}, allowed are -1/3 to 0")
+
+    @property
+    def beta(self) -> float:
+        """Return Newmark's beta."""
+        return 0.25 * (1.0 - self.alpha) ** 2
+
+    @property
+    def gamma(self) -> float:
+        """Return Newmark's gamma."""
+        return 0.5 - self.alpha
+
+
+class ImplicitMotion(Loaded):
+    """The state of one model on one rank, and its step; the surface of ``motion.Motion``.
+
+    Attributes:
+        body: The model.
+        step: h [s].
+        time: [s].
+        displacement: ``(n, 3)`` [m] at ``time``.
+        velocity: ``(n, 3)`` [m/s] at ``time``.
+        force: ``(n, 3)`` [N] at ``time`` after ``update_force``, summed over ranks, without body force.
+        slave_force: ``(ns, 3)`` [N] of this rank's elements on the slaves, before it is moved.
+        gravity: ``(3,)`` [m/s^2], sum of the loads' accelerations at ``time``.
+        ledger_mass: ``(n,)`` [kg] that counts in the ledger of this rank.
+        factor: The factored matrix of a step.
+    """
+
+    def __init__(self, comm: MPI.Comm, body: Body, loads: Sequence[Load], step: float, alpha: float = 0.0) -> None:
+        """Start at rest; collective.
+
+        Args:
+            comm: Communicator of the model.
+            body: The model.
+            loads: What acts on it.
+            step: h [s].
+            alpha: Of the HHT method, from -1/3 to 0.
+
+        Raises:
+            ValueError: Step or alpha out of range.
+            AgreedError: A material or kinematics is not linear, or memory ran out; on every rank.
+        """
+        self._scheme = Scheme(step, alpha)
+        agreed(comm, lambda: check_linear(body))
+        self.body, self.step, self.time = body, step, 0.0
+        self._loads = [load for load in loads if not isinstance(load, RayleighDamping)]
+        damping = [load for load in loads if isinstance(load, RayleighDamping)]
+        self._mass_damping = sum(load.mass for load in damping)
+        self._stiffness_damping = sum(load.stiffness for load in damping)
+        count, owned = len(body.mass), body.shared.owned
+        self._state = np.zeros((6, count, 3))
+        self.displacement, self.velocity, self.force, self._acceleration, self._drag, self._nodal = self._state
+        self.slave_force = np.zeros((len(body.tie.slave), 3))
+        self.ledger_mass = np.where(owned, body.mass, 0.0)
+        self._extra, self._free = np.zeros(count), body.free.copy()
+        self.gravity = self.body_acceleration(0.0)
+        for load in self._loads:
+            load.begin(cast(Motion, self))
+        self._prescribed = body.free & ~self._free
+        self._equations = Equations.of(comm, replace(body, free=self._free))
+        self.factor = self._factorise()
+        self._works = np.zeros(3)  # of external forces, by damping, of the start
+        self._begin()
+
+    def _factorise(self) -> Factorisation:
+        """Return the factor of M + (1 + alpha) (gamma h C + beta h^2 K), C = a M + b K; collective."""
+        h, scheme = self.step, self._scheme
+        weight = 1.0 + scheme.alpha
+        mass = self._equations.vector(np.repeat(self.body.mass[:, None], 3, axis=1))
+        extra = self._equations.vector(np.repeat(self._extra[:, None], 3, axis=1))
+        matrix = self._equations.stiffness()
+        matrix.scale(weight * (scheme.beta * h**2 + scheme.gamma * h * self._stiffness_damping))
+        scaled = mass * (1.0 + weight * scheme.gamma * h * self._mass_damping) + extra
+        matrix.setDiagonal(matrix.getDiagonal() + scaled)
+        self._right, self._solution = mass, extra
+        return Factorisation(matrix)
+
+    def hold(self, nodes: NDArray[np.integer], component: int) -> None:
+        """Let a velocity component of local nodes no longer follow from forces."""
+        self._free[nodes, component] = False
+
+    def add_mass(self, nodes: NDArray[np.integer], mass: NDArray[np.float64]) -> None:
+        """Add masses ``(k,)`` [kg] that the ledger does not count to local nodes."""
+        self._extra[nodes] += mass
+
+    def launch(self, velocity: NDArray[np.float64]) -> None:
+        """Give all free components an initial velocity ``(3,)`` [m/s]; before the first step."""
+        self.velocity += np.where(self._free, velocity, 0.0)
+        self.restart()
+
+    def _begin(self) -> None:
+        """Take the loads and prescribed velocities of time zero."""
+        for load in self._loads:
+            load.add(cast(Motion, self))
+        self._nodal[:] = self.force
+        mean, following = self._driven(-self.step), self._driven(0.0)
+        self.velocity += 0.5 * (mean + following)
+        self.restart()
+
+    def restart(self) -> None:
+        """Take displacement and velocity as they are now for the state at ``time``, the start of the ledger."""
+        self._update_force()
+        mass = (self.body.mass + self._extra)[:, None]
+        self._acceleration[:] = np.where(self._free, self._total_force() / np.where(mass > 0.0, mass, np.inf), 0.0)
+        self._before = self._ledger_fields()
+        self._older = self._total_force()
+        self._works[:] = 0.0, 0.0, self._stored_apart()
+
+    def advance(self) -> None:
+        """Move from ``time`` to ``time + h``; the force is then out of date. Collective."""
+        h, scheme, before = self.step, self._scheme, self._total_force()
+        mean, following = self._driven(self.time), self._driven(self.time + h)
+        start = self.displacement[self._prescribed]
+        self.displacement += h * self.velocity + h**2 * (0.5 - scheme.beta) * self._acceleration
+        self.velocity += h * (1.0 - scheme.gamma) * self._acceleration
+        self.displacement[self._prescribed] = start + h * mean[self._prescribed]
+        self.velocity[self._prescribed] = 0.5 * (mean + following)[self._prescribed]
+        self.time += h
+        self.gravity = self.body_acceleration(self.time)
+        self.force.fill(0.0)
+        for load in self._loads:
+            load.add(cast(Motion, self))
+        self._nodal[:] = self.force
+        self._update_force()  # of the predicted motion
+        right = (1.0 + scheme.alpha) * self._total_force() - scheme.alpha * before
+        self._right.array = right[self._equations.own]
+        self.factor.solve(self._right, self._solution)
+        self._equations.spread(self._solution, self._acceleration)
+        self.displacement += h**2 * scheme.beta * self._acceleration
+        self.velocity += h * scheme.gamma * self._acceleration
+        self._acceleration[self._prescribed] = ((following - mean) / h)[self._prescribed]
+
+    def update_force(self) -> None:
+        """Evaluate the force of the motion at ``time``, summed over ranks, and the work of the step before."""
+        self._update_force()
+        before, self._before = self._before, self._ledger_fields()
+        change, mean = self._before - before, 0.5 * (before + self._before)
+        solved, prescribed = self._equations.own, self._prescribed & self.body.shared.owned[:, None]
+        moved, held = change[0], mean[4] + mean[5]
+        self._works[0] += float(mean[3][solved] @ moved[solved] - held[prescribed] @ moved[prescribed])
+        self._works[1] -= float(np.sum((mean[4] * moved)[self.body.shared.owned])) + self._gain(change, mean)
+        self._older = before[3:].sum(axis=0)
+
+    def _gain(self, change: NDArray[np.float64], mean: NDArray[np.float64]) -> float:
+        """Return the energy [J] that alpha adds to this rank's share in a step (negative: it takes some).
+
+        With R all forces but inertia, bars for means over the step and D for changes, Newmark's formulas give
+        D(v.Mv)/2 - R_bar.Du = h v_bar.(M a_bar - R_bar + (gamma - 1/2) M Da) - h^2 (beta - gamma/2) R_bar.Da, and the
+        HHT method M a_bar - R_bar = alpha (R' - R_older) / 2, older by two steps.
+
+        Args:
+            change: ``(6, n, 3)`` change of ``_ledger_fields`` over the step.
+            mean: Their means.
+        """
+        h, scheme, solved = self.step, self._scheme, self._equations.own
+        if not scheme.alpha:
+            return 0.0
+        mass = (self.body.mass + self._extra)[:, None]
+        unbalanced = 0.5 * scheme.alpha * (self._before[3:].sum(axis=0) - self._older)
+        unbalanced += (scheme.gamma - 0.5) * mass * change[2]
+        apart = h**2 * (scheme.beta - 0.5 * scheme.gamma) * mean[3:].sum(axis=0) * change[2]
+        return float(np.sum((h * mean[1] * unbalanced - apart)[solved]))
+
+    def _ledger_fields(self) -> NDArray[np.float64]:
+        """Return displacement, velocity, acceleration, forces of loads, damping, elements: ``(6, n, 3)``."""
+        elastic = self.force - self._nodal - self._drag
+        external = self._total_force() - elastic - self._drag
+        return np.array([self.displacement, self.velocity, self._acceleration, external, self._drag, elastic])
+
+    def _stored_apart(self) -> float:
+        """Return the kinetic energy [J] of prescribed components less that of masses the ledger does not count."""
+        owned = self.body.shared.owned[:, None]
+        mass = np.where(self._prescribed, self.body.mass[:, None], 0.0) - self._extra[:, None]
+        return 0.5 * float(np.sum(np.where(owned, mass, 0.0) * self.velocity**2))
+
+    def _driven(self, time: float) -> NDArray[np.float64]:
+        """Return the mean velocity ``(n, 3)`` [m/s] of prescribed components over the step that begins at a time."""
+        velocity = np.zeros_like(self.velocity)
+        for load in self._loads:
+            load.drive(velocity, time)
+        return velocity
+
+    def _total_force(self) -> NDArray[np.float64]:
+        """Return all forces but inertia ``(n, 3)`` [N]."""
+        return self.force + (self.body.mass + self._extra)[:, None] * self.gravity
+
+    def _update_force(self) -> None:
+        """Write the force of elements, damping and nodal loads; slaves go with their masters."""
+        self.body.tie.spread(self.displacement)
+        self.body.tie.spread(self.velocity)
+        self.slave_force = self._add_internal(self.displacement, self.force)
+        self._drag[:] = -self._mass_damping * self.body.mass[:, None] * self.velocity
+        if self._stiffness_damping:
+            elastic = np.empty_like(self._drag)
+            self._add_internal(self.velocity, elastic)
+            self._drag += self._stiffness_damping * elastic
+        self.force += self._drag + self._nodal
+
+    def _add_internal(self, field: NDArray[np.float64], force: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Write -K times a field into ``force``, summed over ranks; return this rank's part at the slaves."""
+        force.fill(0.0)
+        for term in self.body.terms:
+            term.add(field, force)
+        at_slaves = force[self.body.tie.slave]
+        self.body.tie.gather(force)
+        self.body.shared.add(force)
+        return at_slaves
+
+    def present_velocity(self) -> NDArray[np.float64]:
+        """Return the velocity ``(n, 3)`` [m/s] at ``time``."""
+        return self.velocity
+
+    @property
+    def external_work(self) -> float:
+        """Return the work of all loads on this rank's share [J]; of a large mass, what it passes on."""
+        return float(self._works[0] + self._stored_apart() - self._works[2])
+
+    @property
+    def damping_energy(self) -> float:
+        """Return the energy that damping and a negative alpha have taken from this rank's share [J]."""
+        return float(self._works[1])
+
+    def reaction(self) -> NDArray[np.float64]:
+        """Return the forces ``(n, 3)`` [N] of supports and prescribed motion on the nodes that this rank counts."""
+        force = self.force.copy()
+        for load in self._loads:
+            load.release(force)
+        return self.ledger_mass[:, None] * (self._acceleration - self.gravity) - force
+
+    def kinetic_energy(self) -> float:
+        """Return the kinetic energy [J] of this rank's share."""
+        return 0.5 * float(self.ledger_mass @ np.sum(self.velocity**2, axis=1))
+
+    def step_energy(self, foreign: NDArray[np.float64]) -> float:
+        """Return zero: no step is too large for stability."""
+        return 0.0
+
+    def state(self) -> State:
+        """Return all that changes with time, for a checkpoint."""
+        nodes, tie = self.body.local.nodes, self.body.tie
+        nodal = {"state": self._state.transpose(1, 0, 2), "before": self._before.transpose(1, 0, 2)}
+        rows = {name: Rows(nodes, value) for name, value in (nodal | {"older": self._older}).items()}
+        at_slaves = Shares(nodes[tie.slave], self.slave_force, self.body.shared.owned[tie.slave])
+        loads = {str(k): load.state(self.body) for k, load in enumerate(self._loads)}
+        told: State = {"time": Same(self.time), "works": Sum(self._works)}
+        return {**rows, **told, "slave_force": at_slaves, "loads": loads}
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Continue from the values of what ``state`` returned, in a motion that was built alike."""
+        self._state[:], self._works[:] = state["state"].transpose(1, 0, 2), state["works"]
+        self._before = state["before"].transpose(1, 0, 2)
+        self.slave_force, self._older, self.time = state["slave_force"], state["older"], state["time"]
+        self.gravity = self.body_acceleration(self.time)
+        for k, load in enumerate(self._loads):
+            load.restore(state["loads"][str(k)])
+
+
+def check_linear(body: Body) -> None:
+    """Raise ``ValueError`` where the force of an element is not a matrix times the displacement."""
+    foreign = [term for term in body.terms if not isinstance(term, CongruentElements | AssembledElements)]
+    if foreign:
+        names = ", ".join(type(term).__name__ for term in foreign)
+        raise ValueError(
+            f"the implicit solver is linear and cannot take {names}: materials must be elastic and kinematics small, or"
+            " the solver explicit"
+        )

@@ -1,0 +1,1 @@
+"""Effects, time steps and cost before anything is meshed. Plain NumPy."""

@@ -1,0 +1,145 @@
+"""Cost of explicit and implicit steps of a structure before it is meshed: which is cheaper, what only one can do."""
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+from fem.estimates.estimate import largest_implicit_step
+from fem.estimates.factor_cost import box_factor
+from fem.estimates.material_effects import plastic_laws
+from fem.problem.structure import Dynamics, StructureScene
+
+# Measured by benchmarks/jedec_oracle.py on one core of an AMD EPYC (AVX-512), Debian 12: element updates per second of
+# whole explicit steps, linear and with plasticity or finite rotations; MUMPS 5.5 on the BLAS that Debian installs (an
+# optimised one factors five to seven times faster).
+LINEAR_RATE = {
+    "incompatible_modes": 5.0e7,
+    "one_point": 5.0e7,
+    "tetrahedron": 9.0e7,
+    "tetrahedron_quadratic": 9.0e6,
+}
+NONLINEAR_RATE = {
+    "incompatible_modes": 7.5e5,
+    "one_point": 8.0e6,
+    "tetrahedron": 1.3e7,
+    "tetrahedron_quadratic": 4.5e6,
+}
+FACTOR_RATE = 3.0e9  # operations per second of the factorisation
+SOLVE_RATE = 6.0e8  # entries of the factor per second of a solution
+ASSEMBLY_SECONDS = 2.0e-5  # [s] an equation
+EXPLICIT_OVERHEAD, IMPLICIT_OVERHEAD = 2.5e-5, 4.0e-4  # [s] a step, interpreter
+IMPLICIT_UPDATE = 3.0e-7  # [s] a step and node: forces, vectors, ledger
+# Cooling of joints that yield: a few Newton steps, each with some ten products.
+COOLING_TANGENTS, COOLING_SOLUTIONS = 10, 120
+TANGENT_RATE = 1.0e4  # elements that yield a second
+PLATE_LAYERS = 4  # of the plate that stands for a package on its board: those of the board
+ENTRY_MEMORY, EQUATION_MEMORY = 11.0, 3.0e3  # [B] factor; matrix while it is assembled
+ELEMENT_MEMORY, NODE_MEMORY = 300.0, 500.0  # [B] explicit
+
+
+@dataclass(frozen=True, slots=True)
+class SolverCost:
+    """Cost of one solver on one core: steps, seconds in all, seconds before the first step, memory [B]."""
+
+    steps: int
+    seconds: float
+    setup: float
+    memory: float
+
+
+@dataclass(frozen=True, slots=True)
+class SolverForecast:
+    """Costs of both solvers.
+
+    Attributes:
+        explicit: Cost of explicit steps.
+        implicit: Cost of implicit steps, of the linear model where the scene is not linear.
+        only_explicit: What of the scene only the explicit solver can do; empty where either can.
+    """
+
+    explicit: SolverCost
+    implicit: SolverCost
+    only_explicit: tuple[str, ...]
+
+    @property
+    def cheaper(self) -> str:
+        """Return the name of the solver that takes less time."""
+        return "explicit" if self.explicit.seconds <= self.implicit.seconds else "implicit"
+
+    @property
+    def sentence(self) -> str:
+        """Say which solver to take, and why."""
+        if self.only_explicit:
+            return f"Only the explicit solver does {', '.join(self.only_explicit)}."
+        costs = {"explicit": self.explicit.seconds, "implicit": self.implicit.seconds}
+        ratio = max(costs.values()) / min(costs.values())
+        chosen = f"{self.cheaper.capitalize()} steps are {ratio:.2g} times cheaper here"
+        return f"{chosen}; yielding, finite rotations and two-scale runs need explicit ones."
+
+
+def forecast_solvers(scene: StructureScene, elements: int, explicit_steps: int, implicit_steps: int) -> SolverForecast:
+    """Predict the cost of both solvers on one core.
+
+    Args:
+        scene: The structure.
+        elements: Number of elements of its mesh.
+        explicit_steps: Steps of the explicit solver.
+        implicit_steps: Steps of the implicit solver, see ``implicit_step``.
+    """
+    nodes = node_counts(scene)
+    reasons = nonlinearities(scene)
+    structure = scene.structure
+    kind = structure.formulation if structure.element == "hexahedron" else structure.element
+    rate = (NONLINEAR_RATE if reasons else LINEAR_RATE)[kind]
+    return SolverForecast(
+        explicit_cost(elements, math.prod(nodes), explicit_steps, rate), implicit_cost(nodes, implicit_steps), reasons
+    )
+
+
+def explicit_cost(elements: int, nodes: int, steps: int, rate: float) -> SolverCost:
+    """Predict the cost of explicit steps at a rate of element updates per second."""
+    memory = ELEMENT_MEMORY * elements + NODE_MEMORY * nodes
+    return SolverCost(steps, steps * (elements / rate + EXPLICIT_OVERHEAD), 0.0, memory)
+
+
+def implicit_cost(nodes: tuple[int, int, int], steps: int) -> SolverCost:
+    """Predict the cost of implicit steps of a box of nodes: one factorisation, and a solution a step."""
+    factor, equations = box_factor(nodes), 3 * math.prod(nodes)
+    setup = factor.operations / FACTOR_RATE + ASSEMBLY_SECONDS * equations
+    step = factor.entries / SOLVE_RATE + IMPLICIT_UPDATE * math.prod(nodes) + IMPLICIT_OVERHEAD
+    seconds = setup + steps * step
+    return SolverCost(steps, seconds, setup, ENTRY_MEMORY * factor.entries + EQUATION_MEMORY * equations)
+
+
+def cooling_cost(elements: int, yielding: int) -> SolverCost:
+    """Predict the cost of residual stress: one factor of so many hexahedra, of which some yield, and its solutions."""
+    solutions = COOLING_SOLUTIONS if yielding else 1
+    cost = implicit_cost(plate_nodes(elements), solutions)
+    return replace(cost, seconds=cost.seconds + COOLING_TANGENTS * yielding / TANGENT_RATE)
+
+
+def plate_nodes(elements: int) -> tuple[int, int, int]:
+    """Return the nodes of a square plate of so many hexahedra, as board and package with their joints make one."""
+    side = max(1, round(math.sqrt(elements / PLATE_LAYERS)))
+    return side + 1, side + 1, PLATE_LAYERS + 1
+
+
+def node_counts(scene: StructureScene) -> tuple[int, int, int]:
+    """Return the nodes along each side of the box; those that rings around holes add are left out."""
+    structure = scene.structure.refined
+    layers = sum(layer.cells for layer in structure.layers.values())
+    order = 2 if structure.element == "tetrahedron_quadratic" else 1
+    return order * structure.cells[0] + 1, order * structure.cells[1] + 1, order * layers + 1
+
+
+def nonlinearities(scene: StructureScene) -> tuple[str, ...]:
+    """Return what makes a scene nonlinear, in words."""
+    plastic = ", ".join(plastic_laws(scene.layer_materials))
+    reasons = [f"plasticity (layers {plastic})"] if plastic else []
+    finite = scene.dynamics.kinematics == "finite"
+    return tuple(reasons + (["finite rotations (dynamics.kinematics)"] if finite else []))
+
+
+def implicit_step(dynamics: Dynamics, pulses: Iterable[float]) -> float:
+    """Return the largest implicit step [s]: as given, or that of ``estimate.largest_implicit_step``."""
+    return dynamics.numerics.implicit_step or largest_implicit_step(dynamics.duration, pulses)

@@ -1,0 +1,1 @@
+"""Internal forces of elements: congruent boxes, assembled blocks, nonlinear; start with `force.py`."""

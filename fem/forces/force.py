@@ -1,0 +1,66 @@
+"""Internal force terms: the contract, and the choice of one for the elements of a mesh."""
+
+from collections.abc import Sequence
+from typing import Literal, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem.elements.element import Elements
+from fem.forces.energy import Energy
+from fem.forces.force_assembled import AssembledElements
+from fem.forces.force_congruent import CongruentElements, in_rows
+from fem.forces.force_nonlinear import NonlinearElements
+from fem.kernels.nonlinear import Path
+from fem.kernels.plasticity import FIRST_YIELD, plastic_constants
+from fem.materials.parameters import Material
+
+Kinematics = Literal["small", "finite"]
+
+
+class ForceTerm(Protocol):
+    """A part of the internal force."""
+
+    @property
+    def history(self) -> dict[str, NDArray]:
+        """Return the arrays to write and restore in place for a restart; none where force follows from displacement."""
+
+    def add(self, displacement: NDArray[np.float64], force: NDArray[np.float64]) -> None:
+        """Subtract the internal force ``(n, 3)`` [N] at a displacement ``(n, 3)`` [m].
+
+        A term with a path takes the step from the displacement of the call before: call it exactly once a step.
+        """
+
+    def energy(self, displacement: NDArray[np.float64]) -> Energy:
+        """Return the energies [J] of this rank's elements at the displacement of the latest ``add``."""
+
+
+def force_terms(
+    elements: Elements, materials: Sequence[Material], kinematics: Kinematics = "small", step: float = np.inf
+) -> list[ForceTerm]:
+    """Return the force terms of elements: linear ones, and one with a path where the scene calls for it.
+
+    Args:
+        elements: The elements.
+        materials: Material of each index of ``elements.elasticity``.
+        kinematics: Whether rotations and strains are small.
+        step: dt [s], of laws that depend on the rate; infinity stands for slow.
+    """
+    plastic = np.array([plastic_constants(material) for material in materials])
+    finite = kinematics == "finite"
+    nonlinear = np.isfinite(plastic[elements.material, FIRST_YIELD]) | finite
+    terms = linear_terms(elements.subset(~nonlinear))
+    if nonlinear.any():
+        terms.append(NonlinearElements.build(elements, np.flatnonzero(nonlinear), plastic, Path(finite, step)))
+    return terms
+
+
+def linear_terms(elements: Elements) -> list[ForceTerm]:
+    """Return the force terms of elements that stay elastic and turn little: boxes share stiffnesses."""
+    box = in_rows(elements)
+    terms: list[ForceTerm] = []
+    if box.any():
+        terms.append(CongruentElements.build(elements.subset(box)))
+    if not box.all():
+        terms.append(AssembledElements.build(elements.subset(~box)))
+    return terms

@@ -1,0 +1,52 @@
+"""Internal force of elements of any kind and shape: one assembled matrix of 3 x 3 blocks."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import scipy.sparse
+from numpy.typing import NDArray
+
+from fem.elements.element import CHUNK, Elements, element_stiffness
+from fem.elements.mean_strain import MeanStrain
+from fem.forces.energy import Energy, linear_energy
+from fem.kernels.force import add_block_force, assemble_upper_blocks
+
+
+@dataclass(frozen=True, slots=True)
+class AssembledElements:
+    """Upper triangle of a stiffness in block rows; see ``kernels.force.add_block_force`` for the arrays."""
+
+    pointer: NDArray[np.int32]
+    columns: NDArray[np.int32]
+    blocks: NDArray[np.float64]
+    mean: MeanStrain | None = None
+    history: dict[str, NDArray] = field(default_factory=dict)
+
+    @classmethod
+    def build(cls, elements: Elements) -> "AssembledElements":
+        """Assemble the stiffness of the elements."""
+        pointer, columns = upper_pattern(elements.cells, len(elements.points))
+        blocks = np.zeros((len(columns), 3, 3))
+        for start in range(0, len(elements.cells), CHUNK):
+            some = elements.subset(np.arange(start, min(start + CHUNK, len(elements.cells))))
+            assemble_upper_blocks(some.cells, element_stiffness(some), pointer, columns, blocks)
+        return cls(pointer, columns, blocks, MeanStrain.of(elements))
+
+    def add(self, displacement: NDArray[np.float64], force: NDArray[np.float64]) -> None:
+        """Subtract K u from the force."""
+        add_block_force(self.pointer, self.columns, self.blocks, displacement, force)
+
+    def energy(self, displacement: NDArray[np.float64]) -> Energy:
+        """Return the strain energy."""
+        return linear_energy(self, displacement, self.mean)
+
+
+def upper_pattern(cells: NDArray[np.int32], count: int) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """Return row pointers and sorted columns of the upper triangle of the node graph of ``count`` nodes."""
+    membership = scipy.sparse.csr_matrix(
+        (np.ones(cells.size, np.int32), (cells.ravel(), np.repeat(np.arange(len(cells)), cells.shape[1]))),
+        shape=(count, len(cells)),
+    )
+    graph = scipy.sparse.triu(membership @ membership.T, format="csr")
+    graph.sort_indices()
+    return graph.indptr.astype(np.int32), graph.indices.astype(np.int32)

@@ -1,0 +1,123 @@
+"""Internal force of boxes: one stiffness per shape and material, diagonalised by symmetry.
+
+A box of a material whose axes it shares has three mirror planes. In the Walsh-Hadamard basis of its eight nodes
+the 24 x 24 stiffness falls into eight blocks of 3 x 3, one per parity: the modes of component c with parity p have
+the index p XOR 2^c. A product costs 216 multiplications and additions instead of 1152, with one small table per shape,
+and half of them are shared by the neighbours in a row of boxes (``box_rows``, ``kernels.box_rows``).
+"""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem.elements.element import Elements, classes, element_stiffness
+from fem.elements.mean_strain import MeanStrain
+from fem.forces.box_rows import BoxRows
+from fem.forces.energy import Energy, linear_energy
+from fem.kernels.box_rows import PAD, add_row_forces, read_lines, subtract_lines
+
+SIGNS = np.array([[(-1.0) ** bin(p & a).count("1") for a in range(8)] for p in range(8)])
+UPPER = np.triu_indices(3)
+VOIGT = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))
+TURNS = ((0, 1, 2), (1, 2, 0), (2, 0, 1))  # proper rotations that bring each axis to the front
+BOX_TOLERANCE = 1e-9
+FEW = 64  # boxes whose assembled matrices cost no more than the calls of a term of their own
+
+
+@dataclass(frozen=True, slots=True)
+class CongruentElements:
+    """Boxes that share stiffnesses, in rows along the axis that has the longest ones.
+
+    Attributes:
+        axes: ``(3,)`` coordinate directions in the order of the rows' frame.
+        nodes: ``(p,)`` int32, node at each position of the lines.
+        rows: ``(nr, 6)`` int32, see ``kernels.box_rows.add_row_forces``.
+        blocks: ``(ns, 8, 6)`` [N/m], in the rows' frame.
+        lines: ``(2, 3, p + PAD)`` displacements [m] and forces [N] at the positions, between calls of no meaning.
+        mean: Mean strains of elements with hourglass control.
+        history: Empty.
+    """
+
+    axes: NDArray[np.int64]
+    nodes: NDArray[np.int32]
+    rows: NDArray[np.int32]
+    blocks: NDArray[np.float64]
+    lines: NDArray[np.float64]
+    mean: MeanStrain | None = None
+    history: dict[str, NDArray] = field(default_factory=dict)
+
+    @classmethod
+    def build(cls, elements: Elements) -> "CongruentElements":
+        """Group boxes (``is_box``) into classes and rows, and diagonalise the stiffness of each class."""
+        first, shape = classes(replace(aligned(elements), density=np.zeros(len(elements.cells))))
+        candidates = []
+        for axes in TURNS:
+            ahead = aligned(turned(elements, axes))
+            candidates.append((ahead, axes, BoxRows.find(ahead.points, ahead.cells, shape)))
+        ahead, axes, found = min(candidates, key=lambda candidate: len(candidate[2].rows))
+        blocks = parity_blocks(element_stiffness(ahead.subset(first)))
+        lines = np.zeros((2, 3, len(found.nodes) + PAD))
+        return cls(np.array(axes), found.nodes, found.rows, blocks, lines, MeanStrain.of(elements))
+
+    def add(self, displacement: NDArray[np.float64], force: NDArray[np.float64]) -> None:
+        """Subtract K u from the force."""
+        read_lines(self.nodes, self.axes, displacement, self.lines[0])
+        add_row_forces(self.rows, self.blocks, self.lines[0], self.lines[1])
+        subtract_lines(self.nodes, self.axes, self.lines[1], force)
+
+    def energy(self, displacement: NDArray[np.float64]) -> Energy:
+        """Return the strain energy."""
+        return linear_energy(self, displacement, self.mean)
+
+
+def turned(elements: Elements, axes: tuple[int, int, int]) -> Elements:
+    """Return elements in a frame whose directions are the given coordinate directions."""
+    voigt = [VOIGT.index((min(axes[i], axes[j]), max(axes[i], axes[j]))) for i, j in VOIGT]
+    elasticity = np.ascontiguousarray(elements.elasticity[:, voigt][:, :, voigt])
+    return replace(elements, points=np.ascontiguousarray(elements.points[:, axes]), elasticity=elasticity)
+
+
+def is_box(corners: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Return which elements ``(ne, k, 3)`` are hexahedral boxes along the axes, whichever way they are numbered."""
+    if corners.shape[1] != 8:
+        return np.zeros(len(corners), dtype=bool)
+    low, high = corners.min(axis=1, keepdims=True), corners.max(axis=1, keepdims=True)
+    size = high - low
+    upper = corners > 0.5 * (low + high)
+    off = np.abs(corners - np.where(upper, high, low)) > BOX_TOLERANCE * size
+    position = upper @ np.array([1, 2, 4])
+    complete = np.all(np.sort(position, axis=1) == np.arange(8), axis=1)
+    return complete & ~off.any(axis=(1, 2))
+
+
+def in_rows(elements: Elements) -> NDArray[np.bool_]:
+    """Return which elements ``(ne,)`` are worth a term of boxes: boxes, unless they are few among others."""
+    box = is_box(elements.points[elements.cells])
+    return box if box.all() or np.sum(box) >= FEW else np.zeros_like(box)
+
+
+def aligned(elements: Elements) -> Elements:
+    """Return boxes renumbered so that bit d of a local index is the side in coordinate direction d."""
+    corners = elements.points[elements.cells]
+    upper = corners > 0.5 * (corners.min(axis=1, keepdims=True) + corners.max(axis=1, keepdims=True))
+    order = np.argsort(upper @ np.array([1, 2, 4]), axis=1)
+    cells = np.take_along_axis(elements.cells, order, axis=1)
+    return replace(elements, cells=cells)
+
+
+def parity_blocks(stiffness: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the 3 x 3 blocks of box stiffnesses ``(ns, 24, 24)`` in symmetric storage, over 8: ``(ns, 8, 6)`` [N/m].
+
+    Raises:
+        ValueError: A stiffness lacks the mirror symmetry of a box.
+    """
+    tensor = stiffness.reshape(-1, 8, 3, 8, 3)
+    modes = np.einsum("pa,saibj,qb->spiqj", SIGNS, tensor, SIGNS, optimize=True) / 8.0
+    parity, axes = np.arange(8)[:, None], np.arange(3)
+    index = parity ^ (1 << axes)
+    blocks = modes[:, index[:, :, None], axes[None, :, None], index[:, None, :], axes[None, None, :]]
+    lost = np.sqrt(np.maximum(np.sum(modes**2, axis=(1, 2, 3, 4)) - np.sum(blocks**2, axis=(1, 2, 3)), 0.0))
+    if np.any(lost > 1e-6 * np.sqrt(np.sum(modes**2, axis=(1, 2, 3, 4)))):
+        raise ValueError("a stiffness without the mirror symmetry of a box cannot be split into parity blocks")
+    return np.ascontiguousarray(blocks[:, :, UPPER[0], UPPER[1]] / 8.0)

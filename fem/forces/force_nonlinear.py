@@ -1,0 +1,161 @@
+"""Internal force of elements that yield or turn: a path at each integration point.
+
+A 4-node tetrahedron has one constant strain: where it flows at constant volume it is too stiff, as at nu = 0.5
+(locking); use the 10-node one (four points, straight edges) or hexahedra for parts that yield.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem.elements.element import Elements
+from fem.elements.hexahedron import HEXAHEDRON
+from fem.errors import InvertedElementError
+from fem.forces.energy import Energy
+from fem.forces.nonlinear_blocks import Lanes, arrange, gradient_blocks, hexahedron_blocks
+from fem.kernels.lanes import LANES
+from fem.kernels.nonlinear import Path
+from fem.kernels.nonlinear_gradient import FINE, Blocks, add_gradient_force
+from fem.kernels.nonlinear_hexahedron import HexahedronBlocks, add_hexahedron_force
+from fem.parallel.portable import Rows
+
+
+@dataclass(frozen=True, slots=True)
+class NonlinearElements:
+    """Elements with a path.
+
+    Attributes:
+        elements: The elements.
+        numbers: ``(ne,)`` their numbers among all elements of the rank.
+        finite: Whether rotations and strains are finite.
+        lanes: Their order.
+        blocks: What the kernel works on.
+        kernel: Subtracts the force at a displacement; returns ``FINE`` or the block with an inverted element.
+        history: State, plastic work [J], and what else has a path.
+    """
+
+    elements: Elements
+    numbers: NDArray[np.int64]
+    finite: bool
+    lanes: Lanes
+    blocks: Blocks | HexahedronBlocks
+    kernel: Callable[[NDArray[np.float64], NDArray[np.float64]], int]
+    history: dict[str, NDArray]
+
+    @classmethod
+    def build(
+        cls, everything: Elements, chosen: NDArray[np.int64], plastic: NDArray[np.float64], path: Path
+    ) -> "NonlinearElements":
+        """Start from rest, without stress.
+
+        Args:
+            everything: The elements of a rank.
+            chosen: ``(ne,)`` which of them.
+            plastic: ``(nm, 6)`` rows of ``kernels.plasticity.plastic_constants``.
+            path: Kinematics and step.
+        """
+        elements = everything.subset(chosen)
+        lanes, finite = arrange(elements), path.finite
+        if elements.kind.name == HEXAHEDRON.name:
+            full = hexahedron_blocks(elements, lanes, plastic, finite)
+            history = {"state": full.state, "work": full.plastic_work, "hourglass": full.hourglass_energy}
+            history |= {"modes": full.modes, "residual": full.residual}
+            kernel = partial(add_hexahedron_force, full, path)
+            return cls(elements, chosen, finite, lanes, full, kernel, history)
+        blocks = gradient_blocks(elements, lanes, plastic, finite)
+        history = {"state": blocks.state, "work": blocks.plastic_work, "hourglass": blocks.hourglass_energy}
+        history |= {"slip": blocks.slip}
+        kernel = partial(add_gradient_force, blocks, tuple(range(elements.kind.nodes)), path)
+        return cls(elements, chosen, finite, lanes, blocks, kernel, history)
+
+    def add(self, displacement: NDArray[np.float64], force: NDArray[np.float64]) -> None:
+        """Subtract the internal force; the path goes on by a step.
+
+        Raises:
+            InvertedElementError: An element is turned inside out.
+        """
+        block = self.kernel(displacement, force)
+        if block != FINE:
+            raise self._inverted(self.lanes.element[block], displacement)
+
+    def energy(self, displacement: NDArray[np.float64]) -> Energy:
+        """Return the energies at the latest ``add``."""
+        blocks, valid = self.blocks, self.lanes.valid
+        return Energy(
+            strain=float(elastic_energy(blocks, self.elements.elasticity)[valid].sum()),
+            plastic=float(blocks.plastic_work[valid].sum()),
+            hourglass=float(blocks.hourglass_energy[valid].sum()),
+        )
+
+    def state(self, cells: NDArray[np.int64]) -> dict[str, Rows]:
+        """Return the history by element, for a checkpoint; ``cells`` are the input numbers of the rank's elements."""
+        block, lane = np.nonzero(self.lanes.valid)
+        numbers = cells[self.numbers[self.lanes.element[block, lane]]]
+        return {name: Rows(numbers, by_lane(values)[block, lane]) for name, values in self.history.items()}
+
+    def restore(self, state: Mapping[str, NDArray[np.float64]]) -> None:
+        """Continue from the values of what ``state`` returned; lanes that repeat an element get its history, too."""
+        block, lane = np.nonzero(self.lanes.valid)
+        row = np.empty(len(self.numbers), np.int64)
+        row[self.lanes.element[block, lane]] = np.arange(len(block))
+        for name, values in self.history.items():
+            by_lane(values)[...] = state[name][row[self.lanes.element]]
+
+    def means(self, places: NDArray[np.integer]) -> "Means":
+        """Return mean values over some elements; ``places (k,)`` are positions among this term's elements."""
+        block, lane = np.nonzero(self.lanes.valid)
+        row = np.empty(len(self.numbers), np.int64)
+        row[self.lanes.element[block, lane]] = np.arange(len(block))
+        block, lane = block[row[places]], lane[row[places]]
+        blocks = self.blocks
+        points = blocks.state.shape[1]
+        state = blocks.state.reshape(len(blocks.state), points, -1, LANES)[block, :, :, lane]
+        weight = blocks.weight[blocks.pattern[block]].reshape(-1, points, LANES)[np.arange(len(block)), :, lane]
+        mean = np.einsum("km,kmc->kc", weight, state) / weight.sum(axis=1)[:, None]
+        return Means(mean[:, :6], mean[:, 12], blocks.plastic_work[block, lane] / weight.sum(axis=1))
+
+    def _inverted(self, places: NDArray[np.int64], displacement: NDArray[np.float64]) -> InvertedElementError:
+        """Return the error that names the worst of some elements."""
+        elements = self.elements
+        cells = elements.cells[places]
+        lowest = elements.kind.geometry((elements.points + displacement)[cells]).lowest
+        worst = int(np.argmin(lowest))
+        place = ", ".join(f"{value:.6g}" for value in elements.points[cells[worst]].mean(axis=0))
+        modes = "; its corners are not, so its incompatible modes have grown: formulation = one_point has none"
+        return InvertedElementError(
+            f"element {self.numbers[places[worst]]}, at first near ({place}) m, is turned inside out (lowest Jacobian"
+            f" determinant {lowest[worst]:.3e} m^3{modes if lowest[worst] > 0.0 else ''})"
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Means:
+    """Volume averages over elements.
+
+    Attributes:
+        stress: ``(k, 6)`` [Pa] Kirchhoff stress in the frame that turns with the body.
+        plastic_strain: ``(k,)`` equivalent plastic strain.
+        plastic_work: ``(k,)`` [J/m^3].
+    """
+
+    stress: NDArray[np.float64]
+    plastic_strain: NDArray[np.float64]
+    plastic_work: NDArray[np.float64]
+
+
+def by_lane(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return a view ``(nb, 16, m)`` or ``(nb, 16, p, m)`` of an array of blocks whose lanes are innermost."""
+    split = values.reshape(*values.shape[:-1], -1, LANES)
+    return np.moveaxis(split, -1, 1)
+
+
+def elastic_energy(blocks: Blocks | HexahedronBlocks, elasticity: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the elastic energy s : C^-1 : s / 2 of each lane ``(nb, 16)`` [J]."""
+    points = blocks.state.shape[1]
+    stress = blocks.state.reshape(len(blocks.state), points, -1, LANES)[:, :, :6]
+    strain = np.einsum("bij,bmjl->bmil", np.linalg.inv(elasticity)[blocks.material], stress, optimize=True)
+    weight = blocks.weight[blocks.pattern].reshape(-1, points, LANES)
+    return np.asarray(0.5 * np.einsum("bmil,bmil,bml->bl", stress, strain, weight, optimize=True))

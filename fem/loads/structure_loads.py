@@ -1,0 +1,52 @@
+"""Loads and damping of a structure: from their parameters to the objects that act on a motion."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from fem.division.structure_tables import StructureTables, shaken_supports
+from fem.loads.damping import RayleighDamping
+from fem.loads.follower_pressure import FollowerPressure
+from fem.loads.large_mass import LargeMass
+from fem.loads.load import BodyAcceleration, Load, NodalForces, PrescribedMotion
+from fem.model.body import Body
+from fem.problem.parameters import Damping
+from fem.problem.pulse import Pulse
+from fem.problem.structure import AXES, Gravity, InputG, Pressure, StructureScene
+
+
+def structure_loads(
+    comm: MPI.Comm, body: Body, tables: StructureTables, scene: StructureScene, pulses: Mapping[str, Pulse]
+) -> list[Load]:
+    """Return the loads of a structure on this rank, in the order of the scene; collective."""
+    made: list[Load] = []
+    for name, load in scene.loads.items():
+        pulse = pulses[name]
+        if isinstance(load, Pressure) and scene.dynamics.kinematics == "finite":
+            made.append(FollowerPressure.build(body, tables.pressed[load.on], pulse))
+        elif isinstance(load, Pressure):
+            nodes, areas = tables.areas[load.on]
+            made.append(NodalForces.build(body, nodes, -areas, pulse))
+        elif isinstance(load, InputG) and load.method == "large_mass":
+            shaken = [tables.nodes_of[scene.supports[support].on] for support in shaken_supports(scene)]
+            nodes = np.unique(np.concatenate(shaken))
+            made.append(LargeMass.build(comm, body, nodes, (-unit(load.direction), pulse)))
+        elif isinstance(load, InputG | Gravity):
+            push = -1.0 if isinstance(load, InputG) else 1.0  # seen from the supports, the body is pushed the other way
+            made.append(BodyAcceleration(push * unit(load.direction), pulse))
+        else:
+            local = body.local.locate(tables.nodes_of[load.on])
+            made.append(PrescribedMotion(local[local >= 0], AXES.index(load.component), pulse))
+    return made
+
+
+def unit(direction: tuple[float, float, float]) -> NDArray[np.float64]:
+    """Return a vector ``(3,)`` of length one."""
+    return np.array(direction) / np.linalg.norm(direction)
+
+
+def damping_loads(damping: Damping, body: Body) -> list[Load]:
+    """Return the damping of a structure, an empty list where there is none."""
+    return [RayleighDamping.build(body, damping.coefficients)] if any(damping.coefficients) else []

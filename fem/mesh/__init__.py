@@ -1,0 +1,1 @@
+"""Meshes before they are distributed: parts, facets, ties, the coupling interface, watch tables."""

@@ -1,0 +1,57 @@
+"""The cut between the macro model (``board``) and the meso model: node-matching, inside the board."""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from fem.errors import CutError
+from fem.mesh.mesh import MeshData, boundary_facets
+
+MATCH = 1e-6  # of the shortest edge of the cut
+MACRO, PATCH = "board", "board_patch"
+
+
+def find_cut(mesh: MeshData) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """Match the patch's faces inside the board with the board's nodes.
+
+    Returns:
+        Node numbers of the macro side and of the meso side, ``(nc,)`` each; equal where the parts share nodes, empty
+        where the mesh has only one of the two parts.
+
+    Raises:
+        CutError: A node of the patch has no partner in the board.
+    """
+    board, patch = mesh.cells[mesh.in_parts(MACRO.__eq__)], mesh.cells[mesh.in_parts(PATCH.__eq__)]
+    if not len(board) or not len(patch):
+        return np.empty(0, np.int32), np.empty(0, np.int32)
+    facets = inner_facets(mesh.points, board, patch)
+    meso = np.unique(facets).astype(np.int32)
+    edges = mesh.points[facets[:, [1, 2]]] - mesh.points[facets[:, [0, 0]]]
+    tolerance = MATCH * float(np.linalg.norm(edges, axis=2).min())
+    candidates = np.unique(boundary_facets(board)).astype(np.int32)
+    distance, nearest = cKDTree(mesh.points[candidates]).query(mesh.points[meso])
+    if distance.max() > tolerance:
+        position = ", ".join(f"{value:.6g}" for value in mesh.points[meso[np.argmax(distance)]])
+        raise CutError(
+            f"{np.sum(distance > tolerance)} of {len(meso)} nodes of {PATCH} on the cut have no partner in {MACRO}: the"
+            f" one at ({position}) m is {distance.max():.3e} m away, allowed are {tolerance:.3e} m"
+        )
+    return candidates[nearest], meso
+
+
+def inner_facets(points: NDArray[np.float64], board: NDArray[np.int32], patch: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Return the boundary facets of the patch that are not on a plane that bounds board and patch together.
+
+    Raises:
+        CutError: There is none: board and patch do not touch.
+    """
+    both = points[np.unique(np.concatenate([board.ravel(), patch.ravel()]))]
+    low, high = both.min(axis=0), both.max(axis=0)
+    facets = boundary_facets(patch)
+    corners = points[facets]
+    off = MATCH * (high - low).min()
+    outer = (np.abs(corners - low) < off).all(axis=1) | (np.abs(corners - high) < off).all(axis=1)
+    inner = facets[~outer.any(axis=1)]
+    if not len(inner):
+        raise CutError(f"no face of {PATCH} lies inside the board: there is no cut")
+    return inner

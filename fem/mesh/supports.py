@@ -1,0 +1,22 @@
+"""Supports in the frame of the drop table: which displacement components are held at zero."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem.mesh.mesh import MeshData
+
+# Facet set -> components held: bolted mounting holes; symmetry planes normal to x and y.
+HELD = {"mounting_holes": (0, 1, 2), "symmetry_x": (0,), "symmetry_y": (1,)}
+
+
+SYMMETRY = {name: components for name, components in HELD.items() if name != "mounting_holes"}
+
+
+def held_components(mesh: MeshData, rules: Mapping[str, Sequence[int]] = HELD) -> NDArray[np.bool_]:
+    """Return ``(n, 3)``: whether a node's displacement component is held; ``rules`` are as ``HELD``."""
+    held = np.zeros((len(mesh.points), 3), dtype=bool)
+    for name, components in rules.items():
+        held[np.ix_(mesh.facet_nodes(name), np.array(components))] = True
+    return held

@@ -1,0 +1,181 @@
+"""Tie of joints to facets that do not match them: u_slave = N u_master, f_master += N^T f_slave.
+
+N holds the bilinear shape functions of the closest facet at the slave's projection. Slaves are moved onto their facet
+first (a joint's end is flat, a warped substrate is not), so that rigid rotations and moments carry over exactly.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.sparse
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from fem.cell_shape import HEXAHEDRON
+from fem.errors import TieError
+from fem.kernels.motion import gather_from_slaves, spread_to_slaves
+from fem.mesh.mesh import MeshData
+
+CORNERS = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+TOLERANCE = 0.02  # of the facet's size: distance of a slave from its facet
+CANDIDATES = 9  # facets whose centres are nearest: a node and all its neighbours on a structured face
+NEWTON_STEPS = 12
+EXACT = 1e-12
+
+
+@dataclass(frozen=True, slots=True)
+class Tie:
+    """Rows of N: node numbers of slaves ``(ns,)`` and masters ``(ns, 4)`` int32, weights ``(ns, 4)``."""
+
+    slave: NDArray[np.int32]
+    master: NDArray[np.int32]
+    weight: NDArray[np.float64]
+
+    @classmethod
+    def none(cls) -> "Tie":
+        """Return the tie of a model without joints."""
+        return cls(np.empty(0, np.int32), np.empty((0, 4), np.int32), np.empty((0, 4)))
+
+    def spread(self, values: NDArray[np.float64]) -> None:
+        """Overwrite the slaves' rows of ``values (n, 3)`` with N times the masters' rows."""
+        spread_to_slaves(self.slave, self.master, self.weight, values)
+
+    def gather(self, values: NDArray[np.float64]) -> None:
+        """Move the slaves' rows of ``values (n, 3)`` to the masters: add N^T of them, then zero them."""
+        gather_from_slaves(self.slave, self.master, self.weight, values)
+
+    def matrix(self, count: int) -> scipy.sparse.csr_matrix:
+        """Return T ``(count, count)``: the values of all nodes from those of all but slaves."""
+        rest = np.setdiff1d(np.arange(count), self.slave)
+        row = np.concatenate([rest, np.repeat(self.slave, self.master.shape[1])])
+        column = np.concatenate([rest, self.master.ravel()])
+        weight = np.concatenate([np.ones(len(rest)), self.weight.ravel()])
+        return scipy.sparse.csr_matrix((weight, (row, column)), shape=(count, count))
+
+
+def tie_joints(mesh: MeshData) -> tuple[MeshData, Tie, float]:
+    """Tie the ends of all joints: ``foot@..`` to ``board_side``, ``head@..`` to ``package_side``.
+
+    Layers that differ are tied alike: ``slave@..`` to ``master@..`` of the same name.
+
+    Returns:
+        The mesh with its slaves moved onto their facets, the tie, and the largest such move [m].
+
+    Raises:
+        TieError: The mesh has joints but no hexahedra, or a node has no facet within the tolerance, is tied twice, or
+            is both slave and master.
+    """
+    if mesh.shape is not HEXAHEDRON and any("@" in name for name in mesh.facets):
+        raise TieError(f"joints are tied to quadrilateral facets only: the mesh needs hexahedra, not {mesh.shape.name}")
+    ends = [(name, name.replace("slave@", "master@", 1)) for name in mesh.facets if name.startswith("slave@")]
+    ends += [(name, "board_side") for name in mesh.facets if name.startswith("foot@")]
+    ends += [(name, "package_side") for name in mesh.facets if name.startswith("head@")]
+    ties = [tie_end(mesh, end, side) for end, side in ends if len(mesh.facets[end])]
+    if not ties:
+        return mesh, Tie.none(), 0.0
+    tie = Tie(*(np.concatenate([getattr(item, name) for item in ties]) for name in ("slave", "master", "weight")))
+    both = np.intersect1d(tie.slave, tie.master)
+    if len(both) or len(np.unique(tie.slave)) < len(tie.slave):
+        raise TieError(
+            f"{len(both)} nodes are slave and master of ties, or a node is tied twice; each end needs its own"
+        )
+    points = mesh.points.copy()
+    tie.spread(points)
+    moved = float(np.linalg.norm(points - mesh.points, axis=1).max())
+    check_tie(tie, points)
+    return replace(mesh, points=points), tie, moved
+
+
+def tie_end(mesh: MeshData, end: str, side: str) -> Tie:
+    """Tie the nodes of one end of a joint to the facets of a side; errors as ``tie_joints``."""
+    facets = mesh.facets_of(side)
+    if not len(facets):
+        raise TieError(f"{end} has no facet to be tied to: the facet set {side} is empty")
+    slaves = mesh.facet_nodes(end)
+    facet, xi, distance = closest_facets(mesh.points[slaves], mesh.points[facets])
+    size = np.linalg.norm(np.ptp(mesh.points[facets[facet]], axis=1), axis=1)
+    worst = int(np.argmax(distance / size))
+    if distance[worst] > TOLERANCE * size[worst]:
+        position = ", ".join(f"{value:.6g}" for value in mesh.points[slaves[worst]])
+        raise TieError(
+            f"{end}: the node at ({position}) m is {distance[worst]:.3e} m away from {side}, allowed are"
+            f" {TOLERANCE * size[worst]:.3e} m ({TOLERANCE:g} of the facet)"
+        )
+    return Tie(slaves.astype(np.int32), facets[facet].astype(np.int32), bilinear(xi))
+
+
+def bilinear(xi: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the four shape functions of a quadrilateral at ``xi (m, 2)``: ``(m, 4)``."""
+    return 0.25 * np.prod(1.0 + xi[:, None, :] * CORNERS, axis=2)
+
+
+def bilinear_derivatives(xi: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the derivatives of the shape functions of a quadrilateral at ``xi (m, 2)``: ``(m, 4, 2)``."""
+    return 0.25 * CORNERS * (1.0 + xi[:, None, ::-1] * CORNERS[:, ::-1])
+
+
+def closest_facets(
+    points: NDArray[np.float64], corners: NDArray[np.float64]
+) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+    """Find the closest of some quadrilaterals ``(nf, 4, 3)`` to each point ``(m, 3)``.
+
+    Returns:
+        Facet ``(m,)``, reference coordinates of the closest point inside it ``(m, 2)``, distance ``(m,)`` [m].
+    """
+    count = min(CANDIDATES, len(corners))
+    _, near = cKDTree(corners.mean(axis=1)).query(points, k=count)
+    near = near.reshape(len(points), count)
+    xi, distance = project(np.repeat(points, count, axis=0), corners[near.ravel()])
+    distance = distance.reshape(len(points), count)
+    best = np.argmin(distance, axis=1)
+    chosen = np.arange(len(points)), best
+    return near[chosen], xi.reshape(len(points), count, 2)[chosen], distance[chosen]
+
+
+def project(
+    points: NDArray[np.float64], corners: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Project points ``(m, 3)`` on quadrilaterals ``(m, 4, 3)``, one each: Gauss-Newton, then clipped to the inside.
+
+    Returns:
+        Reference coordinates ``(m, 2)`` and distances ``(m,)`` [m].
+    """
+    xi = np.zeros((len(points), 2))
+    for _ in range(NEWTON_STEPS):
+        residual = points - np.einsum("ma,mai->mi", bilinear(xi), corners)
+        tangent = np.einsum("mad,mai->mid", bilinear_derivatives(xi), corners)
+        normal = np.einsum("mid,mie->mde", tangent, tangent)
+        step = np.linalg.solve(normal, np.einsum("mid,mi->md", tangent, residual)[:, :, None])[:, :, 0]
+        xi = np.clip(xi + step, -3.0, 3.0)  # far candidates need no answer, only a finite one
+    xi = np.clip(xi, -1.0, 1.0)
+    return xi, np.linalg.norm(points - np.einsum("ma,mai->mi", bilinear(xi), corners), axis=1)
+
+
+def check_tie(tie: Tie, points: NDArray[np.float64]) -> None:
+    """Check a tie on its points: partition of unity, linear fields, net force and moment of unit forces.
+
+    Raises:
+        TieError: One of them is not exact to 1e-12.
+    """
+    unity = float(np.abs(tie.weight.sum(axis=1) - 1.0).max())
+    size = float(np.ptp(points, axis=0).max())
+    linear = points @ np.array([[0.3, -1.0, 0.5], [1.0, 0.2, -0.7], [-0.4, 0.6, 1.0]])
+    interpolated = linear.copy()
+    tie.spread(interpolated)
+    field = float(np.abs(interpolated - linear).max()) / size
+    force = np.zeros_like(points)
+    force[tie.slave] = np.sin(np.arange(3 * len(tie.slave))).reshape(-1, 3)
+    before = net_load(points, force)
+    tie.gather(force)
+    scale = np.array([1.0] * 3 + [size] * 3) * len(tie.slave)
+    load = float(np.abs((net_load(points, force) - before) / scale).max())
+    if max(unity, field, load) > EXACT:
+        raise TieError(
+            f"tie of {len(tie.slave)} nodes is not exact to {EXACT:g}: partition of unity {unity:.2e}, linear field"
+            f" {field:.2e}, net force and moment {load:.2e}"
+        )
+
+
+def net_load(points: NDArray[np.float64], force: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the net force [N] and its moment about the origin [N m]: ``(6,)``."""
+    return np.concatenate([force.sum(axis=0), np.cross(points, force).sum(axis=0)])

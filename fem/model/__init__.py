@@ -1,0 +1,1 @@
+"""One model on one rank: body, mass, step levels, critical steps; start with `body.py`."""

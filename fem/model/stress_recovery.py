@@ -1,0 +1,95 @@
+"""Mean stress, strain and plastic flow of elements: from the displacement, or from what a path has left."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem.elements.stress import element_stress, mean_strain, symmetric, voigt
+from fem.forces.force_nonlinear import NonlinearElements
+from fem.model.body import Body
+from fem.parallel.local_mesh import positions
+
+
+class StressRecovery:
+    """Averages over some elements of a rank.
+
+    Linear elements follow their elastic law, beside the stress that they begin with. Where strains and rotations are
+    finite, stress is the Cauchy stress, turned by the rotation R of the element's mean deformation R U, and strain is
+    U - 1.
+    """
+
+    def __init__(self, body: Body, chosen: NDArray[np.integer]) -> None:
+        """Take the elements ``chosen (k,)`` of a body."""
+        elements = body.elements.subset(chosen)
+        self._cells, self._gradient = elements.cells, body.geometry.gradient[chosen]
+        self._elasticity = elements.elasticity[elements.material]
+        self._initial = 0.0 if body.initial_stress is None else body.initial_stress[chosen]
+        self._stored: list[tuple[NonlinearElements, NDArray[np.int64], NDArray[np.int32]]] = []
+        self._finite = np.zeros(len(chosen), dtype=bool)
+        for term in body.terms:
+            if isinstance(term, NonlinearElements):
+                place = positions(term.numbers, chosen)
+                rows = np.flatnonzero(place >= 0)
+                self._stored.append((term, rows, place[rows]))
+                self._finite[rows] = term.finite
+
+    def stress(self, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the stresses ``(k, 6)`` [Pa] at a displacement ``(n, 3)`` [m]."""
+        local = displacement[self._cells]
+        result = element_stress(self._gradient, self._elasticity, local) + self._initial
+        for term, rows, places in self._stored:
+            result[rows] = term.means(places).stress
+        finite = self._finite
+        if finite.any():
+            deformation = np.eye(3) + self._displacement_gradient(displacement, finite)
+            rotation, _ = polar(deformation)
+            turned = rotation @ symmetric(result[finite]) @ rotation.transpose(0, 2, 1)
+            result[finite] = voigt(turned / np.linalg.det(deformation)[:, None, None])
+        return result
+
+    def strain(self, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the strains ``(k, 6)`` at a displacement ``(n, 3)`` [m], shear as engineering strain."""
+        local = displacement[self._cells]
+        result = mean_strain(self._gradient, local)
+        finite = self._finite
+        if finite.any():
+            deformation = np.eye(3) + self._displacement_gradient(displacement, finite)
+            _, stretch = polar(deformation)
+            result[finite] = voigt(stretch - np.eye(3)) * [1.0, 1.0, 1.0, 2.0, 2.0, 2.0]
+        return result
+
+    def neglected_strain(self, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the largest strain ``(k,)`` that small kinematics leaves out, zero where kinematics are finite.
+
+        It is the greatest eigenvalue of h^T h / 2, the part of Green's strain that is quadratic in the displacement
+        gradient h: what a rotation would stretch a body whose ends are held.
+        """
+        result = np.zeros(len(self._cells))
+        small = ~self._finite
+        if small.any():
+            gradient = self._displacement_gradient(displacement, small)
+            result[small] = 0.5 * np.linalg.eigvalsh(gradient.transpose(0, 2, 1) @ gradient)[:, -1]
+        return result
+
+    def _displacement_gradient(self, displacement: NDArray[np.float64], rows: NDArray[np.bool_]) -> NDArray[np.float64]:
+        """Return the mean displacement gradients ``(r, 3, 3)`` of some elements."""
+        return np.einsum("kai,kaj->kij", displacement[self._cells[rows]], self._gradient[rows])
+
+    def plastic_strain(self) -> NDArray[np.float64]:
+        """Return the equivalent plastic strains ``(k,)``, zero where a material does not yield."""
+        result = np.zeros(len(self._cells))
+        for term, rows, places in self._stored:
+            result[rows] = term.means(places).plastic_strain
+        return result
+
+    def plastic_work(self) -> NDArray[np.float64]:
+        """Return the plastic work densities ``(k,)`` [J/m^3], zero where a material does not yield."""
+        result = np.zeros(len(self._cells))
+        for term, rows, places in self._stored:
+            result[rows] = term.means(places).plastic_work
+        return result
+
+
+def polar(deformation: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return rotation and stretch ``(k, 3, 3)`` of deformations F = R U with positive determinants."""
+    left, values, right = np.linalg.svd(deformation)
+    return left @ right, right.transpose(0, 2, 1) @ (values[:, :, None] * right)

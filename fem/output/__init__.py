@@ -1,0 +1,1 @@
+"""Fields, histories, watch points, results and their comparison."""

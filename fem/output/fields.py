@@ -1,0 +1,106 @@
+"""Fields for ParaView: displacement, and per cell von Mises stress [Pa], neglected and plastic strain, and part."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import dolfinx.fem
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from fem import dolfinx_api
+from fem.elements.stress import von_mises
+from fem.model.body import Body
+from fem.model.stress_recovery import StressRecovery
+from fem.parallel.portable import Rows, Same, State
+
+
+@dataclass(frozen=True, slots=True)
+class FieldSample:
+    """The fields of one rank at a time.
+
+    Attributes:
+        time: [s].
+        displacement: ``(n, 3)`` [m].
+        cells: Cell field -> values ``(ne,)``.
+    """
+
+    time: float
+    displacement: NDArray[np.float64]
+    cells: dict[str, NDArray[np.float64]]
+
+
+class Fields:
+    """A time series of one model's fields.
+
+    Attributes:
+        peaks: Cell field -> part -> largest value in a local element at the times written so far.
+    """
+
+    def __init__(self, comm: MPI.Comm, body: Body, part: NDArray[np.integer], path: Path, yields: bool = False) -> None:
+        """Open a file for the model on ``comm``; collective.
+
+        Args:
+            comm: Communicator of the model.
+            body: The model.
+            part: ``(ne,)`` part of each local cell.
+            path: ``.pvd`` file.
+            yields: Whether to write the plastic strain; the same on all ranks.
+        """
+        mesh = body.local.mesh
+        space, cells = dolfinx_api.vector_space(mesh), dolfinx_api.cell_space(mesh)
+        names = ("von_mises", "neglected_strain", *(("plastic_strain",) if yields else ()))
+        self._displacement = dolfinx.fem.Function(space, name="displacement")
+        self._cell_functions = {name: dolfinx.fem.Function(cells, name=name) for name in names}
+        self._part = dolfinx.fem.Function(cells, name="part")
+        self._cell_dofs = dolfinx_api.cell_dofs(cells)[:, 0]
+        self._part.x.array[self._cell_dofs] = part
+        # Vertices of a cell have the same order in geometry and dofmap, whatever their numbers.
+        self._dofs, first = np.unique(dolfinx_api.cell_dofs(space), return_index=True)
+        self._nodes = body.local.cells.ravel()[first]
+        self._recovery = StressRecovery(body, np.arange(len(body.elements.cells)))
+        self._file = dolfinx_api.FieldFile(comm, path)
+        self._local, self._local_part = body.local, part
+        self.peaks = {name: dict.fromkeys(np.unique(part).tolist(), 0.0) for name in names}
+
+    def sample(self, displacement: NDArray[np.float64], time: float) -> FieldSample:
+        """Return the fields at a displacement ``(n, 3)`` [m] and a time [s]."""
+        cells = {
+            "von_mises": von_mises(self._recovery.stress(displacement)),
+            "neglected_strain": self._recovery.neglected_strain(displacement),
+        }
+        if "plastic_strain" in self._cell_functions:
+            cells["plastic_strain"] = self._recovery.plastic_strain()
+        return FieldSample(time, displacement.copy(), cells)
+
+    def state(self, sample: FieldSample) -> State:
+        """Return a sample for a checkpoint."""
+        cells = {name: Rows(self._local.cell_numbers, value) for name, value in sample.cells.items()}
+        return {"time": Same(sample.time), "displacement": Rows(self._local.nodes, sample.displacement), "cells": cells}
+
+    def write(self, sample: FieldSample) -> None:
+        """Append a sample; collective over the model."""
+        self._displacement.x.array.reshape(-1, 3)[self._dofs] = sample.displacement[self._nodes]
+        for name, function in self._cell_functions.items():
+            values, peaks = sample.cells[name], self.peaks[name]
+            function.x.array[self._cell_dofs] = values
+            for part, peak in peaks.items():
+                peaks[part] = max(peak, float(values[self._local_part == part].max()))
+        self._file.write([self._displacement, *self._cell_functions.values(), self._part], sample.time)
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
+
+
+def element_peaks(world: MPI.Comm, files: Iterable[Fields], parts: Sequence[str]) -> dict[str, dict[str, float]]:
+    """Return the largest value of each cell field in each part, over all models and field samples; collective."""
+    found = [file.peaks for file in files]
+    return {
+        field: {
+            name: world.allreduce(max(peaks[field].get(part, 0.0) for peaks in found), MPI.MAX)
+            for part, name in enumerate(parts)
+        }
+        for field in found[0]
+    }

@@ -1,0 +1,87 @@
+"""Natural modes of a structure as products: frequencies in ``modes.json``, shapes for ParaView."""
+
+import json
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from fem.division.structure_tables import shaken_supports
+from fem.errors import AgreedError
+from fem.model.body import Body
+from fem.model.global_matrix import Equations
+from fem.output.fields import Fields
+from fem.problem.inputs import StructureInput
+from fem.problem.structure import AXES, PrescribedMotion
+from fem.setup.structure_model import StructureModel
+from fem.statics.modal import Modes, natural_modes
+
+SHOWN = 0.05  # largest displacement of a shape in a field file, in lengths of the structure
+
+
+@dataclass(frozen=True, slots=True)
+class ModeTable:
+    """Natural modes without their shapes.
+
+    Attributes:
+        frequency: ``(k,)`` [Hz], ascending.
+        mass_fraction: ``(k, 3)`` of the mass that moves with each mode when the supports are shaken along x, y, z.
+    """
+
+    frequency: NDArray[np.float64]
+    mass_fraction: NDArray[np.float64]
+
+
+def find_modes(comm: MPI.Comm, model: StructureModel, request: StructureInput) -> ModeTable | None:
+    """Find and write the natural modes that a run is asked for, None where it is not; collective.
+
+    Raises:
+        AgreedError: More modes are wanted than there are; on every rank.
+    """
+    if not request.finds_modes:
+        return None
+    body = at_rest_supports(model, request)
+    try:
+        modes = natural_modes(Equations.of(comm, body), request.dynamics.modes)
+    except ValueError as error:  # every rank counts the same equations
+        raise AgreedError(f"dynamics.modes: {error}") from error
+    table = ModeTable(modes.frequency, modes.effective_mass / (model.steps.model_mass + model.steps.added_mass))
+    if comm.rank == 0:
+        (request.output / "modes.json").write_text(json.dumps(mode_rows(table), indent=1), encoding="utf-8")
+    write_shapes(comm, replace(model, body=body), request, modes)
+    return table
+
+
+def at_rest_supports(model: StructureModel, request: StructureInput) -> Body:
+    """Return the body with all held that a large mass or a prescribed motion moves."""
+    moved = [(request.supports[name].on, slice(None)) for name in shaken_supports(request)]
+    loads = [load for load in request.loads.values() if isinstance(load, PrescribedMotion)]
+    free = model.body.free.copy()
+    for on, components in [*moved, *((load.on, AXES.index(load.component)) for load in loads)]:
+        nodes = model.body.local.locate(model.tables.nodes_of[on])
+        free[nodes[nodes >= 0], components] = False
+    return replace(model.body, free=free)
+
+
+def mode_rows(table: ModeTable) -> list[dict[str, Any]]:
+    """Return the modes as records, each with the direction along which it takes up most mass."""
+    return [
+        {
+            "mode": number,
+            "frequency": float(frequency),
+            "mass_fraction": dict(zip("xyz", fraction.tolist(), strict=True)),
+        }
+        for number, (frequency, fraction) in enumerate(zip(table.frequency, table.mass_fraction, strict=True), start=1)
+    ]
+
+
+def write_shapes(comm: MPI.Comm, model: StructureModel, request: StructureInput, modes: Modes) -> None:
+    """Write ``modes.pvd``: the shape of mode k, at a size that can be seen, at "time" k; collective."""
+    part = model.tables.part[model.body.local.cell_numbers]
+    fields = Fields(comm, model.body, part, request.output / "modes.pvd")
+    for number, shape in enumerate(modes.shape, start=1):
+        largest = comm.allreduce(float(np.abs(shape).max(initial=0.0)), MPI.MAX)
+        fields.write(fields.sample(shape * (SHOWN * request.structure.length / largest), float(number)))
+    fields.close()

@@ -1,0 +1,1 @@
+"""Ranks: who has what, messages, checkpoints, and what happens when one fails."""

@@ -1,0 +1,266 @@
+"""Messages between ranks: sums over nodes that several ranks hold, and the channel across the cut."""
+
+import time
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from fem.kernels.motion import pack, sum_in_rank_order, unpack
+from fem.parallel.whereabouts import HERE
+
+SHARED_TAG, CHANNEL_TAG = 11, 12
+
+
+@dataclass(slots=True)
+class MessageClock:
+    """Seconds that a rank spent on messages: ``packing`` and unpacking, ``waiting`` for them."""
+
+    packing: float = 0.0
+    waiting: float = 0.0
+
+    def count(self, begin: float, packed: float, arrived: float) -> None:
+        """Count a message that was begun, packed and complete at given times, and unpacked now [s]."""
+        self.packing += packed - begin + time.perf_counter() - arrived
+        self.waiting += arrived - packed
+
+
+def holders(comm: MPI.Comm, nodes: NDArray[np.integer]) -> list[NDArray[np.int64]]:
+    """Find which nodes this rank shares with which other rank.
+
+    Each node number has a home rank (number modulo size) where its holders meet: no rank ever sees all nodes.
+
+    Args:
+        comm: Communicator of the model.
+        nodes: ``(n,)`` node numbers of this rank, each once.
+
+    Returns:
+        Per rank the shared node numbers, ascending; empty for this rank itself.
+    """
+    nodes = np.sort(np.asarray(nodes, np.int64))
+    arrived = comm.alltoall([nodes[nodes % comm.size == home] for home in range(comm.size)])
+    number = np.concatenate(arrived)
+    rank = np.repeat(np.arange(comm.size), [len(part) for part in arrived])
+    order = np.lexsort((rank, number))
+    number, rank = number[order], rank[order]
+    pairs = [np.empty((0, 3), np.int64)]
+    for distance in range(1, min(comm.size, len(number))):  # holders of a node are neighbours in the sorted table
+        same = np.flatnonzero(number[distance:] == number[:-distance])
+        pairs.append(np.column_stack([number[same], rank[same], rank[same + distance]]))
+        pairs.append(np.column_stack([number[same], rank[same + distance], rank[same]]))
+    table = np.concatenate(pairs)
+    shared = np.concatenate(comm.alltoall([table[table[:, 1] == holder][:, [0, 2]] for holder in range(comm.size)]))
+    return [np.sort(shared[shared[:, 1] == other, 0]) for other in range(comm.size)]
+
+
+class SharedNodes:
+    """Sums over the copies of nodes that several ranks hold: one message per neighbour, buffers kept.
+
+    Attributes:
+        owned: ``(n,)``: whether this rank is the lowest that holds the node.
+        clock: Time spent on its messages.
+    """
+
+    def __init__(self, comm: MPI.Comm, nodes: NDArray[np.integer], clock: MessageClock | None = None) -> None:
+        """Find the copies of the nodes ``(n,)`` of this rank, and prepare the messages; a clock may serve several."""
+        self.clock = clock or MessageClock()
+        shared = holders(comm, nodes)
+        order = np.argsort(nodes)
+        local = [order[np.searchsorted(nodes, numbers, sorter=order)].astype(np.int32) for numbers in shared]
+        self.owned = np.ones(len(nodes), dtype=bool)
+        for other in range(comm.rank):
+            self.owned[local[other]] = False
+        self._rows = np.concatenate(local)
+        self._sent, self._received = np.empty((len(self._rows), 3)), np.empty((len(self._rows), 3))
+        self._requests = []
+        start = 0
+        for other, rows in enumerate(local):
+            part = slice(start, start + len(rows))
+            start += len(rows)
+            if len(rows):
+                self._requests.append(comm.Recv_init(self._received[part], other, SHARED_TAG))
+                self._requests.append(comm.Send_init(self._sent[part], other, SHARED_TAG))
+        neighbours = [other for other, rows in enumerate(local) if len(rows)]
+        self._mark = f"the sum over shared nodes with {HERE.names(comm, neighbours)}"
+        ranks = np.repeat(np.arange(comm.size), [len(rows) for rows in local])
+        self._nodes, self._pointer, self._source = rank_order(self._rows, ranks, comm.rank)
+
+    def add(self, values: NDArray[np.float64]) -> None:
+        """Replace shared rows of ``values (n, 3)`` by the sum over all ranks that hold them."""
+        if self._requests:
+            begin = time.perf_counter()
+            pack(values, self._rows, self._sent)
+            packed = time.perf_counter()
+            HERE.wait_for(self._mark)
+            MPI.Prequest.Startall(self._requests)
+            MPI.Prequest.Waitall(self._requests)
+            HERE.go_on()
+            arrived = time.perf_counter()
+            sum_in_rank_order(self._nodes, self._pointer, self._source, self._received, values)
+            self.clock.count(begin, packed, arrived)
+
+    @property
+    def exchanged(self) -> bool:
+        """Return whether another rank holds any of the nodes."""
+        return bool(self._requests)
+
+    def free(self) -> None:
+        """Free the persistent requests."""
+        for request in self._requests:
+            request.Free()
+        self._requests = []
+
+
+def rank_order(
+    rows: NDArray[np.int32], ranks: NDArray[np.int64], own: int
+) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int32]]:
+    """Order the received parts of each shared node by rank, this rank's own part among them.
+
+    Args:
+        rows: ``(k,)`` local node of each received row.
+        ranks: ``(k,)`` rank that sends it.
+        own: This rank.
+
+    Returns:
+        Nodes ``(m,)``, pointer ``(m + 1,)`` and sources of ``kernels.motion.sum_in_rank_order``.
+    """
+    nodes = np.unique(rows)
+    node = np.concatenate([rows, nodes])
+    rank = np.concatenate([ranks, np.full(len(nodes), own)])
+    source = np.concatenate([np.arange(len(rows)), np.full(len(nodes), -1)])
+    order = np.lexsort((rank, node))
+    pointer = np.concatenate([[0], np.cumsum(np.bincount(np.searchsorted(nodes, node), minlength=len(nodes)))])
+    return nodes.astype(np.int32), pointer.astype(np.int32), source[order].astype(np.int32)
+
+
+class Messages(Protocol):
+    """What a participant asks of a channel."""
+
+    @property
+    def clock(self) -> MessageClock:
+        """Return the time spent on its messages."""
+
+    def send(self, values: NDArray[np.float64]) -> None:
+        """Send the cut rows of ``values (n, 3)``."""
+
+    def receive(self, values: NDArray[np.float64]) -> None:
+        """Receive the cut rows of ``values (n, 3)``."""
+
+    def free(self) -> None:
+        """Give back what it needs."""
+
+
+class Channel:
+    """Messages of cut values ``(., 3)`` from the ranks of one model to those of another.
+
+    A rank may carry one model or both; what it can copy from itself is no message. Else the lowest rank that holds a
+    cut node of the source sends it to every rank that holds it of the target.
+
+    Attributes:
+        clock: Time spent on its messages.
+    """
+
+    def __init__(
+        self, comm: MPI.Comm, source: NDArray[np.int32], target: NDArray[np.int32], receiver_waits: bool
+    ) -> None:
+        """Agree on who sends what; collective over all models.
+
+        Args:
+            comm: Communicator of all models.
+            source: ``(nc,)`` local node of each cut node in the sending model, -1 where this rank has none.
+            target: The same in the receiving model.
+            receiver_waits: Whether receivers are already waiting when this rank sends: it carries one model only.
+        """
+        self.clock = MessageClock()
+        self._receiver_waits = receiver_waits
+        sources = np.array(comm.allgather(source >= 0)).reshape(comm.size, -1)
+        targets = np.array(comm.allgather(target >= 0)).reshape(comm.size, -1)
+        sender = np.where(sources, np.arange(comm.size)[:, None], np.argmax(sources, axis=0))
+        out = [np.flatnonzero(targets[other] & (sender[other] == comm.rank)) for other in range(comm.size)]
+        into = [np.flatnonzero(targets[comm.rank] & (sender[comm.rank] == other)) for other in range(comm.size)]
+        self._out_rows, self._in_rows = source[np.concatenate(out)], target[np.concatenate(into)]
+        self._sent, self._received = np.empty((len(self._out_rows), 3)), np.empty((len(self._in_rows), 3))
+        sent, received = split_rows(self._sent, out), split_rows(self._received, into)
+        self._own = sent[comm.rank], received[comm.rank]
+        others = [other for other in range(comm.size) if other != comm.rank]
+        self._sends = [comm.Send_init(sent[k], k, CHANNEL_TAG) for k in others if len(sent[k])]
+        self._receives = [comm.Recv_init(received[k], k, CHANNEL_TAG) for k in others if len(received[k])]
+        takers, givers = ([k for k in others if len(rows[k])] for rows in (sent, received))
+        self._taken = f"values of the cut to be taken by {HERE.names(comm, takers)}"
+        self._given = f"values of the cut from {HERE.names(comm, givers)}"
+
+    def send(self, values: NDArray[np.float64]) -> None:
+        """Send the cut rows of ``values (n, 3)``.
+
+        A large message makes no progress while its sender computes, so this waits until it is taken, where receivers
+        are waiting for it. Ranks that carry both models receive at a later turn: waiting for them would never end.
+        """
+        begin = time.perf_counter()
+        pack(values, self._out_rows, self._sent)
+        packed = time.perf_counter()
+        MPI.Prequest.Startall(self._sends)
+        if self._receiver_waits:
+            HERE.wait_for(self._taken)
+            MPI.Prequest.Waitall(self._sends)
+            HERE.go_on()
+        self.clock.count(begin, packed, time.perf_counter())
+
+    def receive(self, values: NDArray[np.float64]) -> None:
+        """Receive the cut rows of ``values (n, 3)``."""
+        begin = time.perf_counter()
+        MPI.Prequest.Startall(self._receives)
+        self._own[1][:] = self._own[0]
+        packed = time.perf_counter()
+        HERE.wait_for(self._given)
+        MPI.Prequest.Waitall(self._receives)
+        MPI.Prequest.Waitall(self._sends)
+        HERE.go_on()
+        arrived = time.perf_counter()
+        unpack(self._received, self._in_rows, values)
+        self.clock.count(begin, packed, arrived)
+
+    def free(self) -> None:
+        """Free the persistent requests."""
+        for request in self._sends + self._receives:
+            request.Free()
+        self._sends, self._receives = [], []
+
+
+def split_rows(buffer: NDArray[np.float64], parts: list[NDArray[np.int64]]) -> list[NDArray[np.float64]]:
+    """Return the consecutive rows of a buffer that belong to each part, as views."""
+    ends = np.cumsum([len(part) for part in parts])
+    return [buffer[end - len(part) : end] for part, end in zip(parts, ends, strict=True)]
+
+
+@dataclass(frozen=True, slots=True)
+class CutChannels:
+    """The two channels of a window: velocities to the meso model, forces to the macro model."""
+
+    velocities: Messages
+    forces: Messages
+
+    @classmethod
+    def open(
+        cls, comm: MPI.Comm, macro: NDArray[np.int32], meso: NDArray[np.int32], receiver_waits: bool
+    ) -> "CutChannels":
+        """Open both; collective over all models.
+
+        Args:
+            comm: Communicator of all models.
+            macro: ``(nc,)`` local node of each cut node in this rank's macro model, -1 where it has none.
+            meso: The same in its meso model.
+            receiver_waits: See ``Channel``.
+        """
+        return cls(Channel(comm, macro, meso, receiver_waits), Channel(comm, meso, macro, receiver_waits))
+
+    @property
+    def clocks(self) -> list[MessageClock]:
+        """Return the clocks of both."""
+        return [self.velocities.clock, self.forces.clock]
+
+    def free(self) -> None:
+        """Free both."""
+        self.velocities.free()
+        self.forces.free()

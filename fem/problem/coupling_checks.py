@@ -1,0 +1,78 @@
+"""Coupled models of a structure that cannot be: names, and what needs one model. Loads neither numba nor DOLFINx."""
+
+from collections.abc import Iterator
+
+from fem.problem.problem import Problem, unknown_name
+from fem.problem.structure import InputG, LayerCoupling, StructureScene
+
+KEY = "dynamics.coupling"
+
+
+def coupling_problems(scene: StructureScene) -> Iterator[Problem]:
+    """Find what does not go with two models; nothing where there is one."""
+    coupling = scene.dynamics.coupling
+    if coupling is None:
+        if scene.dynamics.solver == "dns":
+            message = "is one model instead of two that are coupled"
+            yield Problem("dynamics.solver", "dns", message, f"explicit, implicit, both, or a table {KEY}")
+        return
+    yield from _fine(coupling, scene)
+    yield from _scheme(coupling, scene)
+    yield from _ranks(coupling, scene.dynamics.ranks)
+    yield from _one_model(scene)
+
+
+def _fine(coupling: LayerCoupling, scene: StructureScene) -> Iterator[Problem]:
+    layers = scene.structure.layers
+    for name in coupling.fine:
+        yield from unknown_name(f"{KEY}.fine", name, layers, "layer")
+    if layers and set(coupling.fine) >= set(layers):
+        yield Problem(f"{KEY}.fine", list(coupling.fine), "leaves no layer to the macro model", "fewer layers")
+    if scene.structure.element != "hexahedron":
+        yield Problem(f"{KEY}", None, f"couples hexahedra, the element is {scene.structure.element}", "hexahedron")
+
+
+def _scheme(coupling: LayerCoupling, scene: StructureScene) -> Iterator[Problem]:
+    if coupling.direction == "one_way":
+        message = "needs a coarse mesh of the fine part, too, which only a package has"
+        yield Problem(f"{KEY}.direction", "one_way", message, "two_way")
+    materials = {name: scene.known_materials.get(layer.material) for name, layer in scene.structure.layers.items()}
+    plastic = [name for name, material in materials.items() if material and material.plasticity is not None]
+    if coupling.scheme == "local_steps" and (plastic or scene.dynamics.kinematics == "finite"):
+        why = f"layers that yield: {', '.join(plastic)}" if plastic else "dynamics.kinematics = finite"
+        message = f"needs elastic layers at small strains, there are {why}"
+        yield Problem(f"{KEY}.scheme", "local_steps", message, "held_velocity, impulse, gravouil_combescure, auto")
+
+
+def _ranks(coupling: LayerCoupling, ranks: int) -> Iterator[Problem]:
+    if coupling.placement == "disjoint" and ranks < 2:
+        yield Problem(
+            f"{KEY}.placement", "disjoint", "needs a rank for each model", "auto, shared; dynamics.ranks >= 2"
+        )
+    if coupling.macro_ranks is not None and coupling.placement != "disjoint":
+        yield Problem(f"{KEY}.macro_ranks", coupling.macro_ranks, "is for placement = disjoint", "none")
+    elif coupling.macro_ranks is not None and coupling.macro_ranks >= ranks:
+        message = "leaves no rank for the meso model"
+        yield Problem(f"{KEY}.macro_ranks", coupling.macro_ranks, message, f"< {ranks}, dynamics.ranks")
+
+
+def _one_model(scene: StructureScene) -> Iterator[Problem]:
+    """Yield what only one model can do."""
+    dynamics = scene.dynamics
+    if dynamics.solver == "implicit":
+        yield Problem("dynamics.solver", "implicit", "couples nothing", "explicit or both, or no dynamics.coupling")
+    if (
+        dynamics.modes
+        and dynamics.solver not in ("both", "dns")
+        and not (dynamics.coupling and dynamics.coupling.compare)
+    ):
+        yield Problem("dynamics.modes", dynamics.modes, "are those of one model", f"0, or {KEY}.compare = true")
+    if dynamics.numerics.explicit_step is not None:
+        message = "is the step of one model, two have a window and smaller steps"
+        yield Problem("dynamics.numerics.explicit_step", f"{dynamics.numerics.explicit_step:g} s", message, "none")
+    if dynamics.numerics.critical_step != "element":
+        message = "is for one model: windows rest on the steps of elements"
+        yield Problem("dynamics.numerics.critical_step", dynamics.numerics.critical_step, message, "element")
+    for name, load in scene.loads.items():
+        if isinstance(load, InputG) and load.method == "large_mass":
+            yield Problem(f"loads.{name}.method", "large_mass", "moves one model", "direct")

@@ -1,0 +1,182 @@
+"""Parameters of the drop shock: pulse, coupling, ranks.
+
+All values are SI floats; see ``meshing.board.parameters`` for what the unit strings mean.
+"""
+
+import math
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator
+from pydantic_core import PydanticCustomError
+
+MOST_RANKS = 100_000  # of one run
+MOST_LEVELS = 4  # below the window, that "auto" tries
+ServiceCondition = Literal["A", "B", "C", "D", "E", "F", "G", "H"]
+
+
+class Parameters(BaseModel):
+    """Base of all parameter models: immutable, unknown keys are errors."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class Ranks(Parameters):
+    """MPI ranks of a run, and which of them work on which model.
+
+    ``disjoint`` gives each model ranks of its own, which work at the same time: the macro model ``macro`` of them.
+    ``shared`` gives both models to all ranks, which take turns. ``auto`` takes what is predicted to be fastest, from
+    speeds that are measured when the run begins.
+    """
+
+    total: int = Field(2, ge=1, le=MOST_RANKS)
+    placement: Literal["auto", "disjoint", "shared"] = "auto"
+    macro: int | None = Field(None, ge=1, le=MOST_RANKS)
+
+    @field_validator("placement")
+    @classmethod
+    def _ranks_for_each(cls, value: str, info: ValidationInfo) -> str:
+        if value == "disjoint" and info.data.get("total", 2) < 2:
+            raise PydanticCustomError("inadmissible", "needs a rank for each model", {"allowed": "auto, shared"})
+        return value
+
+    @field_validator("macro")
+    @classmethod
+    def _rank_for_meso(cls, value: int | None, info: ValidationInfo) -> int | None:
+        if value is not None and info.data.get("placement", "disjoint") != "disjoint":
+            raise PydanticCustomError("inadmissible", "is for placement = disjoint", {"allowed": "none"})
+        if value is not None and value >= info.data.get("total", math.inf):
+            allowed = f"< {info.data['total']}, shock.ranks.total"
+            raise PydanticCustomError("inadmissible", "leaves no rank for the meso model", {"allowed": allowed})
+        return value
+
+
+class Coupling(Parameters):
+    """How two models are coupled; ``auto`` takes local steps where all that is fine is linear, else held velocity.
+
+    Where no buffer fits, ``auto`` takes ``gravouil_combescure``, which needs none. ``impulse`` has the buffer of held
+    velocity and keeps momentum exactly; its models wait for each other. ``one_way`` drives the meso model by the macro
+    model, which takes nothing back. ``levels`` are those of the meso model's steps below the window. ``buffer_layers``
+    of board elements lie between joints and a cut of held velocity.
+    """
+
+    scheme: Literal["auto", "held_velocity", "local_steps", "impulse", "gravouil_combescure"] = "auto"
+    direction: Literal["two_way", "one_way"] = "two_way"
+    levels: Literal["auto"] | Annotated[int, Field(ge=1)] = "auto"
+    buffer_layers: int = Field(2, ge=2, le=20)
+
+    @field_validator("levels")
+    @classmethod
+    def _of_local_steps(cls, value: int | str, info: ValidationInfo) -> int | str:
+        scheme = info.data.get("scheme", "auto")
+        if value != "auto" and scheme not in ("auto", "local_steps"):
+            raise PydanticCustomError("inadmissible", f"does not go with scheme = {scheme}", {"allowed": "auto"})
+        return value
+
+    @property
+    def most_levels(self) -> int:
+        """Return how many levels below the window may be tried."""
+        return MOST_LEVELS if self.levels == "auto" else self.levels
+
+
+class JointCoupling(Coupling):
+    """The coupling of a package on a board; joints that are not fine have the coarse mesh.
+
+    ``fine_joints`` are all, those named, or as many as ``critical_joints`` of the most stressed ones of a coarse run.
+    """
+
+    fine_joints: Literal["all", "critical"] | tuple[str, ...] = "all"
+    critical_joints: int = Field(3, ge=1)
+
+
+class Damping(Parameters):
+    """Rayleigh damping C = alpha M + beta K, given as coefficients or as ratios of critical damping at a frequency."""
+
+    mass_coefficient: Annotated[float, "Hz"] = Field(0.0, ge=0)
+    stiffness_coefficient: Annotated[float, "us"] = Field(0.0, ge=0)
+    mass_ratio: float = Field(0.0, ge=0, lt=1)
+    stiffness_ratio: float = Field(0.0, ge=0, lt=1)
+    frequency: Annotated[float | None, "Hz"] = Field(None, gt=0)
+
+    @property
+    def coefficients(self) -> tuple[float, float]:
+        """Return alpha [1/s] and beta [s]; a mode of angular frequency w has the ratio alpha / (2 w) + beta w / 2."""
+        angular = 2.0 * math.pi * (self.frequency or math.inf)
+        by_mass = 2.0 * angular * self.mass_ratio if self.mass_ratio else 0.0
+        return self.mass_coefficient + by_mass, self.stiffness_coefficient + 2.0 * self.stiffness_ratio / angular
+
+
+class ShockNumerics(Parameters):
+    """How the shock is computed; implicit steps are for elastic materials, at most from sample to sample.
+
+    ``kinematics`` and ``formulation`` of hexahedra as for a structure. Elastic hexahedra are the same in both
+    formulations; those that yield are seven to eight times cheaper with one point, a few per cent stronger in bending.
+    Kinematics that are ``auto`` are finite where the board's deflection calls for it.
+    ``dns_duration`` ends the DNS before the shock does: the modes are compared over the time that both have.
+    """
+
+    modes: tuple[Literal["two_scale", "dns"], ...] = ("two_scale", "dns")
+    dns_solver: Literal["explicit", "implicit"] = "explicit"
+    dns_duration: Annotated[float | None, "ms"] = Field(None, gt=0)
+    step_fraction: float = Field(0.9, gt=0, le=0.95)
+    critical_step: Literal["element", "power_iteration"] = "element"
+    kinematics: Literal["auto", "small", "finite"] = "small"
+    formulation: Literal["incompatible_modes", "one_point"] = "incompatible_modes"
+    mass_scaled: tuple[Literal["board", "substrate", "die", "copper", "solder"], ...] = ()
+    history_samples: int = Field(600, ge=2)
+    field_samples: int = Field(12, ge=2)
+    energy_balance_limit: float = Field(0.02, gt=0)
+    checkpoint_seconds: Annotated[float, "s"] = Field(60.0, gt=0)
+    watchdog_seconds: Annotated[float, "s"] = Field(60.0, gt=0)
+
+    @field_validator("kinematics")
+    @classmethod
+    def _fit_the_solver(cls, value: str, info: ValidationInfo) -> str:
+        if value == "finite" and info.data.get("dns_solver") == "implicit":
+            allowed = "small, or dns_solver = explicit"
+            raise PydanticCustomError(
+                "inadmissible", "is not for implicit steps, which are linear", {"allowed": allowed}
+            )
+        return value
+
+    @property
+    def decided_kinematics(self) -> Literal["small", "finite"]:
+        """Return the kinematics of a run, which only a case decides that are ``auto``; ValueError until it has."""
+        if self.kinematics == "auto":
+            raise ValueError("shock.numerics.kinematics = auto is decided by the case, before a run")
+        return self.kinematics
+
+
+class Failure(Parameters):
+    """What the solder at the pads of a joint may bear; a criterion without a limit is not computed.
+
+    ``peel_stress`` is the average over a pad, ``plastic_work_density`` that of the layer of elements at it.
+    """
+
+    peel_stress: Annotated[float | None, "MPa"] = Field(None, gt=0)
+    plastic_work_density: Annotated[float | None, "kJ/m^3"] = Field(None, gt=0)
+
+
+class Shock(Parameters):
+    """Input-G at the mounting holes, package facing down (JESD22-B111; H 4.4).
+
+    The pulse is that of a JEDEC service condition, or a half sine of ``peak_acceleration`` and ``pulse_duration``, or a
+    table of times and accelerations (CSV). ``method`` gives it to the board as body acceleration, its holes held, or
+    to a large mass at the holes. Gravity is left out by ``auto`` where it is less than a thousandth of the peak. The
+    stress at the joints' upper interface is kept at ``picture_times``. ``identical_joints`` repeats the shock under a
+    flat package on truncated spheres of the solder's volume: what the joints' own shapes change is the difference.
+    """
+
+    service_condition: ServiceCondition | None = None
+    peak_acceleration: Annotated[float | None, "G"] = Field(None, gt=0)
+    pulse_duration: Annotated[float | None, "ms"] = Field(None, gt=0)
+    table: str | None = None
+    duration: Annotated[float, "ms"] = Field(gt=0)
+    picture_times: Annotated[tuple[Annotated[float, Field(ge=0)], ...], "ms"] = ()
+    identical_joints: bool = False
+    method: Literal["direct", "large_mass"] = "direct"
+    gravity: Literal["auto", "on", "off"] = "auto"
+    damping: Damping = Damping()
+    failure: Failure = Failure()
+    ranks: Ranks = Ranks()
+    coupling: JointCoupling = JointCoupling()
+    numerics: ShockNumerics = ShockNumerics()

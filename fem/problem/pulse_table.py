@@ -1,0 +1,169 @@
+"""Pulses from CSV files: two columns, time and value, whose header names the units."""
+
+import csv
+import math
+import re
+import warnings
+from collections.abc import Iterator, Sequence
+from difflib import get_close_matches
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem.errors import PulseError
+from fem.problem.pulse import STANDARD_GRAVITY, Tabulated
+
+MOST_LINES = 1_500_000
+LONGEST = 60  # characters of a cell in an error
+TIMES = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+QUANTITIES: dict[str, dict[str, float]] = {
+    "acceleration": {"m/s^2": 1.0, "mm/s^2": 1e-3, "G": STANDARD_GRAVITY},
+    "pressure": {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9},
+    "velocity": {"m/s": 1.0, "mm/s": 1e-3, "mm/ms": 1.0},
+}
+
+
+def read_pulse(path: Path, quantity: str) -> Tabulated:
+    """Read a tabulated pulse, e.g. ``time [ms], acceleration [G]`` and then rows of two numbers.
+
+    Args:
+        path: CSV file; empty lines and lines that start with ``#`` are skipped.
+        quantity: What the second column must be, a key of ``QUANTITIES``.
+
+    Returns:
+        The pulse in SI units; the same one, unless the file has changed since.
+
+    Raises:
+        PulseError: The file cannot be read, its header names no known unit, a row is not two finite numbers, times are
+            negative or do not increase, or there are fewer than two rows; with the line.
+    """
+    try:
+        found = path.stat()
+    except (OSError, ValueError) as error:
+        raise PulseError(f"{path}: {getattr(error, 'strerror', None) or error}") from error
+    pulse = _pulse_or_error(path, quantity, (found.st_mtime_ns, found.st_size, found.st_ino))
+    if isinstance(pulse, PulseError):
+        raise pulse
+    return pulse
+
+
+@lru_cache(maxsize=4)
+def _pulse_or_error(path: Path, quantity: str, version: tuple[int, int, int]) -> Tabulated | PulseError:
+    """Read a pulse of a version of its file, which a plan asks for many times; or return what is wrong with it."""
+    try:
+        return _pulse_of(path, quantity)
+    except PulseError as error:
+        return error
+
+
+def _pulse_of(path: Path, quantity: str) -> Tabulated:
+    """Read a pulse; errors as ``read_pulse``."""
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except OSError as error:
+        raise PulseError(f"{path}: {error.strerror or error}") from error
+    except UnicodeDecodeError as error:
+        raise PulseError(f"{path}: is not a text in UTF-8") from error
+    if text.count("\n") > MOST_LINES:
+        raise PulseError(f"{path}: has more than {MOST_LINES} lines")
+    table = _read_at_once(path, text, quantity)
+    if table is None:
+        table = _read_rows(path, text, quantity)
+    return Tabulated(table[:, 0].copy(), table[:, 1].copy())
+
+
+def _read_at_once(path: Path, text: str, quantity: str) -> NDArray[np.float64] | None:
+    """Return times and values ``(n, 2)`` in SI of a table without faults; None where a row has to be looked at."""
+    lines = text.splitlines()
+    head = next((k for k, line in enumerate(lines) if line.strip(", \t") and not line.lstrip().startswith("#")), None)
+    if head is None:
+        return None
+    try:
+        titles = [cell.strip() for cell in next(csv.reader(lines[head : head + 1]))]
+        scales = read_header(path, head + 1, titles, quantity)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")  # a table without rows
+            table = np.loadtxt(lines[head + 1 :], delimiter=",", comments="#", ndmin=2)
+    except (ValueError, csv.Error, UserWarning):
+        return None
+    if table.shape[0] < 2 or table.shape[1] != 2 or not np.isfinite(table).all():
+        return None
+    table *= scales
+    is_increasing = table[0, 0] >= 0.0 and bool((np.diff(table[:, 0]) > 0.0).all())
+    return table if is_increasing and np.isfinite(table).all() else None
+
+
+def _read_rows(path: Path, text: str, quantity: str) -> NDArray[np.float64]:
+    """Return times and values ``(n, 2)`` in SI, read row by row up to the first fault; errors as ``read_pulse``."""
+    rows = _content(path, text)
+    number, row = next(rows, (0, []))
+    scales = read_header(path, number, [cell.strip() for cell in row], quantity) if row else (1.0, 1.0)
+    lines, table = [], []
+    for number, row in rows:
+        lines.append(number)
+        table.append(read_row(path, number, row, scales))
+    if len(table) < 2:
+        count = len(table) + (number > 0)
+        raise PulseError(f"{path}: a header and at least two rows are needed, found {count} lines with content")
+    found = np.array(table)
+    check_times(path, lines, found[:, 0])
+    return found
+
+
+def _content(path: Path, text: str) -> Iterator[tuple[int, list[str]]]:
+    """Yield number and cells of each line that is neither empty nor a comment."""
+    try:
+        for number, row in enumerate(csv.reader(text.splitlines()), start=1):
+            if any(map(str.strip, row)) and not row[0].lstrip().startswith("#"):
+                yield number, row
+    except csv.Error as error:
+        raise PulseError(f"{path}: is not a table of comma separated values: {error}") from error
+
+
+def read_header(path: Path, number: int, row: Sequence[str], quantity: str) -> tuple[float, float]:
+    """Return the factors that make SI values of both columns; errors as ``read_pulse``."""
+    if len(row) != 2:
+        raise PulseError(f"{path}, line {number}: the header must name two columns, found {len(row)}")
+    return read_unit(path, number, row[0], TIMES), read_unit(path, number, row[1], QUANTITIES[quantity])
+
+
+def read_unit(path: Path, number: int, title: str, units: dict[str, float]) -> float:
+    """Return the factor of the unit in brackets at the end of a column's title."""
+    found = re.search(r"[\[(]\s*([^\])]+?)\s*[\])]$", title)
+    unit = found.group(1) if found else ""
+    if unit not in units:
+        near = get_close_matches(unit, units, n=1, cutoff=0.3)
+        hint = f"; did you mean [{near[0]}]?" if near else ""
+        raise PulseError(
+            f"{path}, line {number}: column {shown(title)!r} needs its unit in brackets, "
+            f"one of {', '.join(units)}{hint}"
+        )
+    return units[unit]
+
+
+def read_row(path: Path, number: int, row: Sequence[str], scales: tuple[float, float]) -> tuple[float, float]:
+    """Return the two numbers of a row in SI; errors as ``read_pulse``."""
+    try:
+        time, value = (float(cell) * scale for cell, scale in zip(row, scales, strict=True))
+    except ValueError:
+        raise PulseError(f"{path}, line {number}: two numbers are needed, found {shown(', '.join(row))}") from None
+    if not (math.isfinite(time) and math.isfinite(value)):
+        raise PulseError(f"{path}, line {number}: {shown(', '.join(row))} is not finite")
+    return time, value
+
+
+def check_times(path: Path, lines: Sequence[int], times: np.ndarray) -> None:
+    """Refuse times ``(n,)`` [s] that are negative or do not increase; errors as ``read_pulse``."""
+    if times[0] < 0.0:
+        raise PulseError(f"{path}, line {lines[0]}: time {times[0]:g} s is before the start, times must be >= 0")
+    wrong = np.flatnonzero(np.diff(times) <= 0.0)
+    if len(wrong):
+        k = int(wrong[0])
+        raise PulseError(f"{path}, line {lines[k + 1]}: times must increase, {times[k + 1]:g} s follows {times[k]:g} s")
+
+
+def shown(text: str) -> str:
+    """Cut a text that would fill the terminal."""
+    return text if len(text) <= LONGEST else f"{text[: LONGEST - 1]}…"

@@ -1,0 +1,48 @@
+"""The course of a drop shock: from its parameters to the acceleration of the table. Loads no MPI: plans read it."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from fem.estimates.effects import Effect, weight
+from fem.problem.parameters import Shock
+from fem.problem.pulse import STANDARD_GRAVITY, HalfSine, Pulse, Tabulated, service_condition
+from fem.problem.pulse_table import read_pulse
+
+
+@dataclass(frozen=True, slots=True)
+class ShockPulse:
+    """The course of the shock, and whether weight acts beside it.
+
+    Attributes:
+        pulse: Upward acceleration of the table [m/s^2].
+        source: Where it comes from, in words.
+        gravity: Whether weight acts, and why, as an effect.
+    """
+
+    pulse: Pulse
+    source: str
+    gravity: Effect
+
+
+def shock_pulse(shock: Shock) -> ShockPulse:
+    """Return the pulse of a shock.
+
+    Raises:
+        PulseError: A table cannot be read.
+    """
+    pulse, source = input_pulse(shock)
+    peak = float(np.abs(pulse.values).max()) if isinstance(pulse, Tabulated) else pulse.peak
+    return ShockPulse(pulse, source, weight(shock.gravity, peak, STANDARD_GRAVITY))
+
+
+def input_pulse(shock: Shock) -> tuple[HalfSine | Tabulated, str]:
+    """Return the acceleration of the drop table [m/s^2], and where it comes from; errors as ``shock_pulse``."""
+    if shock.table is not None:
+        return read_pulse(Path(shock.table), "acceleration"), f"table {Path(shock.table).name}"
+    if shock.service_condition is not None:
+        return service_condition(shock.service_condition), f"JEDEC service condition {shock.service_condition}"
+    if shock.peak_acceleration is None or shock.pulse_duration is None:
+        raise ValueError("a shock needs peak_acceleration and pulse_duration, a service_condition, or a table")
+    return HalfSine(shock.peak_acceleration, shock.pulse_duration), "half sine"

@@ -1,0 +1,99 @@
+"""Parameters of the reflow's temperatures: the process, what holds the package, which effects are called for.
+
+All values are SI floats; see ``meshing.board.parameters`` for what the unit strings mean.
+"""
+
+from typing import Annotated, Literal
+
+from pydantic import Field, ValidationInfo, field_validator
+from pydantic_core import PydanticCustomError
+
+from fem.materials.parameters import Temperature
+from fem.problem.parameters import Parameters
+
+KELVIN = 273.15
+Switch = Literal["auto", "on", "off"]
+
+
+class ThermalEffects(Parameters):
+    """Which effects act between solder and structure.
+
+    ``flexible``: board and package bend (off: rigid plates). ``solder_force``: the solder's force bends them in turn
+    (off: one way). ``auto`` decides from what either would change of the gaps. ``residual_stress``: what cooling from
+    solidification leaves in the joints is where the shock begins.
+    """
+
+    flexible: Switch = "auto"
+    solder_force: Switch = "auto"
+    residual_stress: Literal["off", "on"] = "off"
+
+
+class Thermal(Parameters):
+    """The reflow's course of temperatures; without it nothing warms up and the plates are rigid.
+
+    At ``reference`` all parts are flat and free of stress. In ``steps`` load steps they are heated to ``peak``; the
+    solder is liquid from ``melting`` on (H 4.3: from the start, ``melting = reference``). On cooling its shape freezes
+    at ``solidification``, and all go down to ``final``. The package floats on the solder, or the die's corner is moved
+    by ``corner_displacement`` upwards, in proportion to the temperature. ``tolerance`` limits the force that is out of
+    balance between solder and structure, relative to the solder's. Temperatures of Sn-Ag-Cu: liquid from 217 degC on,
+    peaks of 235 to 250 degC (J-STD-020).
+    """
+
+    reference: Temperature = Field(25.0 + KELVIN, gt=0)
+    peak: Temperature = Field(245.0 + KELVIN, gt=0)
+    melting: Temperature = Field(217.0 + KELVIN, gt=0, validate_default=True)
+    solidification: Temperature = Field(217.0 + KELVIN, gt=0, validate_default=True)
+    final: Temperature = Field(25.0 + KELVIN, gt=0, validate_default=True)
+    steps: int = Field(7, ge=1, le=200)
+    package: Literal["floating", "moved"] = "floating"
+    corner_displacement: Annotated[float | None, "mm"] = Field(None, validate_default=True)
+    tolerance: float = Field(1e-3, gt=0, le=0.1)
+    effects: ThermalEffects = ThermalEffects()
+
+    @field_validator("peak")
+    @classmethod
+    def _is_heated(cls, value: float, info: ValidationInfo) -> float:
+        return in_range(value, info, "reference", None)
+
+    @field_validator("melting")
+    @classmethod
+    def _melts_on_heating(cls, value: float, info: ValidationInfo) -> float:
+        return in_range(value, info, "reference", "peak")
+
+    @field_validator("solidification")
+    @classmethod
+    def _solidifies_on_cooling(cls, value: float, info: ValidationInfo) -> float:
+        return in_range(value, info, None, "peak")
+
+    @field_validator("final")
+    @classmethod
+    def _is_solid_in_the_end(cls, value: float, info: ValidationInfo) -> float:
+        return in_range(value, info, None, "solidification")
+
+    @field_validator("corner_displacement")
+    @classmethod
+    def _moves_the_package(cls, value: float | None, info: ValidationInfo) -> float | None:
+        package = info.data.get("package")
+        if package == "floating" and value is not None:
+            raise PydanticCustomError("inadmissible", "does not go with package = floating", {"allowed": "moved"})
+        if package == "moved" and value is None:
+            message = "is missing: how far package = moved moves the die's corner"
+            raise PydanticCustomError("inadmissible", message, {"allowed": 'any length, e.g. "-0.1 mm"'})
+        return value
+
+    def corner(self, temperature: float) -> float:
+        """Return the displacement of the die's corner [m] at a temperature [K], in proportion to it on both ways."""
+        if self.corner_displacement is None:
+            return 0.0
+        if self.peak == self.reference:
+            return self.corner_displacement
+        return self.corner_displacement * (temperature - self.reference) / (self.peak - self.reference)
+
+
+def in_range(value: float, info: ValidationInfo, low: str | None, high: str | None) -> float:
+    """Return a temperature that lies between two others, given by name, where those are valid themselves."""
+    bounds = [(sign, name, info.data[name]) for sign, name in ((">=", low), ("<=", high)) if name in info.data]
+    if all(value >= bound if sign == ">=" else value <= bound for sign, _, bound in bounds):
+        return value
+    allowed = " and ".join(f"{sign} {bound - KELVIN:.6g} degC, the {name}" for sign, name, bound in bounds)
+    raise PydanticCustomError("inadmissible", "is out of range", {"allowed": allowed})

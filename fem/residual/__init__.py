@@ -1,1 +1,0 @@
-"""Residual stress of cooling: the static problem, and the state in which a shock begins."""

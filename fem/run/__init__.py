@@ -1,0 +1,1 @@
+"""What every rank does, in order; start with `program.py`."""

@@ -1,0 +1,63 @@
+"""The program that each rank runs: read the input, run the shock, end all ranks when one fails or waits too long."""
+
+import json
+import sys
+import traceback
+from pathlib import Path
+
+from mpi4py import MPI
+
+from fem.errors import AgreedError, EnergyError, InvertedElementError, RankError
+from fem.parallel.agreement import agreed
+from fem.parallel.watchdog import Watchdog
+from fem.problem.inputs import INPUT, CoolingInput, RunInput, StructureInput
+from fem.problem.structure_checks import check
+from fem.run.shock_run import run
+from fem.run.structure_run import run_structure
+from fem.statics.cooling import run_cooling
+
+
+def main(world: MPI.Comm, arguments: list[str]) -> int:
+    """Run the input file named by the only argument on all ranks of ``world``; return the exit code."""
+    try:
+        request = agreed(world, lambda: read_input(arguments))
+    except AgreedError as error:
+        if world.rank == 0:
+            print(f"error: {error}", file=sys.stderr, flush=True)
+        return 1
+    watchdog = Watchdog(world, request.output, request.watchdog_seconds)
+    try:
+        if isinstance(request, StructureInput):
+            run_structure(world, request)
+        elif isinstance(request, CoolingInput):
+            run_cooling(world, request)
+        else:
+            run(world, request)
+    except (AgreedError, EnergyError, RankError) as error:  # raised on every rank
+        if world.rank == 0:
+            watchdog.speak(str(error))
+        return 1
+    except InvertedElementError as error:
+        end_all(world, watchdog, str(error))
+    except Exception:
+        end_all(world, watchdog, f"\n{traceback.format_exc().rstrip()}")
+    finally:
+        watchdog.stop()
+    return 0
+
+
+def end_all(world: MPI.Comm, watchdog: Watchdog, message: str) -> None:
+    """Tell of an error that only this rank knows, and end the ranks that wait for it."""
+    watchdog.speak(f"rank {world.rank}: {message}")
+    world.Abort(1)
+
+
+def read_input(arguments: list[str]) -> RunInput | CoolingInput | StructureInput:
+    """Read and check the input file, and make the output directory."""
+    if len(arguments) != 1:
+        raise ValueError("usage: mpirun -n N python -m fem INPUT.json")
+    request = INPUT.validate_python(json.loads(Path(arguments[0]).read_text(encoding="utf-8")))
+    if isinstance(request, StructureInput):
+        check(request)
+    request.output.mkdir(parents=True, exist_ok=True)
+    return request

@@ -1,0 +1,158 @@
+"""One shock run, from meshes to results: what every rank does, in order."""
+
+import time
+from dataclasses import replace
+
+import numpy as np
+from mpi4py import MPI
+
+from fem.coupling.crew import Crew, couple
+from fem.coupling.planner import Plan, loads_of, plan_ranks
+from fem.coupling.scheme import scheme_of
+from fem.coupling.self_check import recorded
+from fem.coupling.stopwatch import Stopwatch
+from fem.division.checks import check_pulses
+from fem.division.division import SchemeName
+from fem.division.whole import Treatment
+from fem.dynamics.energy_balance import Ledger
+from fem.dynamics.history import History
+from fem.dynamics.implicit import ImplicitMotion
+from fem.dynamics.participant import Alone, uncut_motion
+from fem.estimates.estimate import WindowPlan, implicit_plan, largest_implicit_step, shortened
+from fem.estimates.placement import check_size
+from fem.loads.shock_loads import shock_loads
+from fem.materials.elasticity import materials_of_parts
+from fem.model.steps import Steps
+from fem.output.fields import Fields, element_peaks
+from fem.output.interface import InterfaceStress, picture_windows
+from fem.output.result import Found, Timings, write_result
+from fem.output.watch_joints import JointWatch
+from fem.parallel.agreement import agreed
+from fem.parallel.checkpoint import Checkpoints
+from fem.parallel.checkpoint_files import digest_of_files
+from fem.parallel.communicators import Communicators, Role
+from fem.problem.inputs import RunInput
+from fem.problem.parameters import Shock
+from fem.problem.pulse import Pulse
+from fem.problem.shock_pulse import shock_pulse
+from fem.problem.structure_pulses import pulse_durations
+from fem.run.time_loop import Outputs, march
+from fem.setup.shock_models import Divided, Model, build_models, divided_scene
+
+SPEEDS = 201  # times at which the largest velocity of the table is looked for
+NON_TRIVIAL = 1e-4  # of the energy that the pulse gives a free body: from there on the balance is judged
+
+
+def run(world: MPI.Comm, request: RunInput) -> None:
+    """Run one shock and write its results; collective over ``world``.
+
+    Raises:
+        AgreedError: Input or mesh that does not fit; on every rank.
+        RankError: Too few or too many ranks; on every rank.
+        EnergyError: Energies that do not balance; on every rank.
+    """
+    start = time.perf_counter()
+    if request.mode == "two_scale":
+        check_size(request.shock.ranks, world.size)
+    divided = divided_scene(world, request)
+    pulse = agreed(world, lambda: pulse_of(request, divided.steps.plan.window))
+    ranks = place(world, divided, request)
+    with Communicators(world, ranks.placement) as comms:
+        models, steps = build_models(comms, divided, request, ranks.cells)
+        steps = planned(steps, request, pulse)
+        crew, channels, checked = make_crew(comms, models, (steps, divided.scheme), request.shock)
+        stopwatch = Stopwatch({role: model.body.shared.clock for role, model in models.items()}, channels)
+        history = make_history(comms, models, steps, pulse, request)
+        numerics, fields = request.shock.numerics, make_fields(comms, models, request)
+        inputs = request.computed, steps.plan, digest_of_files(*request.files)
+        checkpoints = Checkpoints(comms.world, request.checkpoints, inputs, numerics.checkpoint_seconds)
+        pictures = make_pictures(comms, models, steps.plan, request.shock)
+        outputs = Outputs(history, fields, numerics.field_samples, checkpoints, pictures)
+        ready = time.perf_counter()
+        output_seconds = march(comms.world, crew, outputs, stopwatch)
+        seconds = time.perf_counter() - ready - output_seconds
+        first = checkpoints.continued or 0
+        balance = ranks.summary | stopwatch.summary(comms.world, steps.plan.windows - first)
+        timings = Timings(ready - start, seconds, output_seconds, balance, first)
+        coupling = divided.coupling | recorded(checked)
+        peaks = element_peaks(comms.world, fields.values(), next(iter(models.values())).tables.part_names)
+        write_result(comms, request, (models, steps, coupling), Found(history, peaks), timings)
+        for some in pictures:
+            some.write(request.output)
+        agreed(comms.world, lambda: None)
+
+
+def pulse_of(request: RunInput, window: float) -> Pulse:
+    """Return the pulse of a run whose window is given [s]; errors as ``shock_pulse`` and ``check_pulses``."""
+    pulse = shock_pulse(request.shock).pulse
+    if request.mode == "two_scale":
+        check_pulses(pulse_durations({"drop": pulse}), window, request.shock.numerics.step_fraction)
+    return pulse
+
+
+def planned(steps: Steps, request: RunInput, pulse: Pulse) -> Steps:
+    """Return the steps of a run that may be implicit, and of a DNS that may end early."""
+    if request.mode == "dns" and request.shock.numerics.dns_duration is not None:
+        steps = replace(steps, plan=shortened(steps.plan, request.shock.numerics.dns_duration))
+    if not request.implicit:
+        return steps
+    largest = largest_implicit_step(request.shock.duration, pulse_durations({"drop": pulse}))
+    return replace(steps, plan=implicit_plan(steps.plan, largest))
+
+
+def place(world: MPI.Comm, divided: Divided, request: RunInput) -> Plan:
+    """Choose which ranks carry which model and which cells, and say so; collective."""
+    numerics = request.shock.numerics
+    treatment = Treatment(numerics.formulation, numerics.decided_kinematics)
+    loads = loads_of(divided, request.materials, treatment)
+    return plan_ranks(world, loads, request.shock.ranks, request.checkpoints, divided.scheme)
+
+
+def make_crew(comms: Communicators, models: dict[Role, Model], chosen: tuple[Steps, SchemeName], shock: Shock) -> Crew:
+    """Return the participants of this rank, from the steps of the run and its scheme; collective."""
+    steps, name = chosen
+    plan, mass = steps.plan, steps.model_mass + steps.added_mass
+    bodies = {role: model.body for role, model in models.items()}
+    loads = {
+        role: shock_loads(comms.models[role], mass, model.body, model.tables, shock) for role, model in models.items()
+    }
+    if "dns" not in bodies:
+        return couple(comms, bodies, loads, plan, scheme_of(name, shock.coupling.direction))
+    model = bodies["dns"], loads["dns"], plan.step
+    implicit = shock.numerics.dns_solver == "implicit"
+    motion = ImplicitMotion(comms.models["dns"], *model) if implicit else uncut_motion(*model)
+    return Crew({"dns": Alone(motion, plan)}, [])
+
+
+def make_history(
+    comms: Communicators, models: dict[Role, Model], steps: Steps, pulse: Pulse, request: RunInput
+) -> History:
+    """Return the empty history of this run."""
+    shock, yields = request.shock, request.materials.solder.plasticity is not None
+    speed = max(abs(pulse.integral(time)) for time in np.linspace(0.0, shock.duration, SPEEDS))
+    mass, plan = steps.model_mass + steps.added_mass, steps.plan
+    trivial = NON_TRIVIAL * 0.5 * mass * speed**2
+    ledger = Ledger(shock.numerics.energy_balance_limit, trivial, plan.step, steps.smallest)
+    watches = {role: JointWatch(model.tables.watch, model.body, yields) for role, model in models.items()}
+    return History(comms.world, watches, ledger, {"base_acceleration": pulse.value})
+
+
+def make_pictures(
+    comms: Communicators, models: dict[Role, Model], plan: WindowPlan, shock: Shock
+) -> list[InterfaceStress]:
+    """Return what is taken at ``shock.picture_times``; nothing where none is given."""
+    if not shock.picture_times:
+        return []
+    tables = {role: (model.tables.interface, model.body) for role, model in models.items()}
+    return [InterfaceStress(comms.world, tables, picture_windows(shock.picture_times, plan))]
+
+
+def make_fields(comms: Communicators, models: dict[Role, Model], request: RunInput) -> dict[Role, Fields]:
+    """Open a field file per model of this rank; collective."""
+    made = {}
+    for role, model in models.items():
+        _, materials = materials_of_parts(model.tables.part_names, request.materials)
+        yields = any(material.plasticity is not None for material in materials)
+        part = model.tables.part[model.body.local.cell_numbers]
+        made[role] = Fields(comms.models[role], model.body, part, request.output / f"{role}.pvd", yields)
+    return made

@@ -1,0 +1,183 @@
+"""The march of all models through their windows: samples, fields, checkpoints, progress."""
+
+import json
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from mpi4py import MPI
+
+from fem.coupling.stopwatch import Stopwatch
+from fem.dynamics.history import History
+from fem.dynamics.participant import Participant
+from fem.errors import InvertedElementError
+from fem.output.fields import Fields, FieldSample
+from fem.parallel.checkpoint import Checkpoints
+from fem.parallel.communicators import Role
+from fem.parallel.portable import State
+from fem.parallel.whereabouts import HERE
+
+PROGRESS_INTERVAL = 0.5  # [s] between two progress lines
+FLATTENED = "the step is that of the undeformed body: where elements are pressed flat, step_fraction must be smaller"
+GUARD = 500  # steps between two looks at the energies, whatever the samples
+
+Crew = Mapping[Role, Participant]
+
+
+class Pictures(Protocol):
+    """Something that is taken of all models at some windows.
+
+    Attributes:
+        windows: At whose ends.
+    """
+
+    windows: frozenset[int]
+
+    def sample(self, crew: Crew) -> None:
+        """Take it now; collective over all models."""
+
+    def state(self) -> State:
+        """Return what was taken so far, for a checkpoint."""
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Continue from the values of what ``state`` returned."""
+
+
+@dataclass(frozen=True, slots=True)
+class Outputs:
+    """Where a run writes to.
+
+    Attributes:
+        history: Samples and ledger.
+        fields: A field file per model of this rank.
+        field_samples: How many times each of them is written.
+        checkpoints: From which the run continues, and to which it writes.
+        pictures: What else is taken, at windows of its own.
+    """
+
+    history: History
+    fields: dict[Role, Fields]
+    field_samples: int
+    checkpoints: Checkpoints
+    pictures: Sequence[Pictures] = ()
+
+
+def march(world: MPI.Comm, crew: Crew, outputs: Outputs, stopwatch: Stopwatch) -> float:
+    """Run all windows, from the latest checkpoint where there is one; return the seconds spent on fields. Collective.
+
+    Raises:
+        EnergyError: On every rank, see ``Ledger.judge``.
+    """
+    plan = next(iter(crew.values())).plan
+    field_windows = set(np.linspace(0, plan.windows, outputs.field_samples).round().astype(int).tolist())
+    told, output_seconds, first = time.perf_counter(), 0.0, 0
+    state = outputs.checkpoints.read(state_of(crew, outputs))
+    if state is not None and outputs.checkpoints.continued is not None:
+        first = outputs.checkpoints.continued + 1
+        output_seconds += resume(crew, outputs, state, [window for window in sorted(field_windows) if window < first])
+    for window in range(first, plan.windows + 1):
+        HERE.window = window
+        if window:
+            run_window(crew, stopwatch)
+        sampled = watch(crew, outputs, window)
+        if window in field_windows:
+            output_seconds += write_fields(crew, outputs, window)
+        if sampled and window < plan.windows and outputs.checkpoints.is_due():
+            save(crew, outputs, window)
+        if world.rank == 0 and time.perf_counter() - told > PROGRESS_INTERVAL:
+            told = time.perf_counter()
+            print(json.dumps({"progress": window / plan.windows, "time": time_of(crew)}), flush=True)
+    HERE.slow = "writes the results"
+    for file in outputs.fields.values():
+        file.close()
+    return output_seconds
+
+
+def watch(crew: Crew, outputs: Outputs, window: int) -> bool:
+    """Take what is due after a window; return whether there was a sample. Errors as ``march``."""
+    plan = next(iter(crew.values())).plan
+    sampled = window % plan.stride == 0 or window == plan.windows
+    if sampled:
+        outputs.history.sample(crew)
+    elif window % max(1, GUARD // plan.substeps) == 0:
+        outputs.history.check(crew)
+    for pictures in outputs.pictures:
+        if window in pictures.windows:
+            pictures.sample(crew)
+    return sampled
+
+
+def run_window(crew: Crew, stopwatch: Stopwatch) -> None:
+    """Advance all models of this rank by one window, each at its turn.
+
+    Raises:
+        InvertedElementError: On the rank that has the element, with the time.
+    """
+    stopwatch.start()
+    try:
+        for role, participant in crew.items():
+            participant.begin_window()
+            stopwatch.lap(role)
+        for role, participant in crew.items():
+            participant.finish_window()
+            stopwatch.lap(role)
+        HERE.slow = ""  # from here on all kernels are compiled
+    except InvertedElementError as error:
+        raise InvertedElementError(f"time {time_of(crew):.6e} s: {error}; {FLATTENED}") from error
+
+
+def time_of(crew: Crew) -> float:
+    """Return the time [s] that the models have reached."""
+    return next(iter(crew.values())).motion.time
+
+
+def write_fields(crew: Crew, outputs: Outputs, window: int) -> float:
+    """Write the fields of all models of this rank, and keep them for a restart; return the seconds it took."""
+    begin = time.perf_counter()
+    with HERE.busy("writes fields"):
+        for role, participant in crew.items():
+            fields = outputs.fields[role]
+            sample = sample_fields(participant, fields)
+            fields.write(sample)
+            outputs.checkpoints.keep(f"{role}-{window}", {role: fields.state(sample)})
+    return time.perf_counter() - begin
+
+
+def sample_fields(participant: Participant, fields: Fields) -> FieldSample:
+    """Return the fields of a model as they are now."""
+    motion = participant.motion
+    return fields.sample(motion.displacement - motion.base_displacement(), motion.time)
+
+
+def state_of(crew: Crew, outputs: Outputs) -> State:
+    """Return all that changes with time on this rank."""
+    models: dict[str, State] = {role: participant.state() for role, participant in crew.items()}
+    pictures = {f"pictures-{k}": some.state() for k, some in enumerate(outputs.pictures)}
+    return models | {"history": outputs.history.state()} | pictures
+
+
+def save(crew: Crew, outputs: Outputs, window: int) -> None:
+    """Write a checkpoint at the end of a window."""
+    with HERE.busy("writes a checkpoint"):
+        outputs.checkpoints.write(window, time_of(crew), state_of(crew, outputs))
+
+
+def resume(crew: Crew, outputs: Outputs, state: dict[str, Any], field_windows: list[int]) -> float:
+    """Continue from a checkpoint, and write its earlier fields anew; return the seconds that these took."""
+    checkpoints = outputs.checkpoints
+    for role, participant in crew.items():
+        participant.restore(state[role])
+    outputs.history.restore(state["history"])
+    for k, pictures in enumerate(outputs.pictures):
+        pictures.restore(state[f"pictures-{k}"])
+    begin = time.perf_counter()
+    like = {role: outputs.fields[role].state(sample_fields(crew[role], outputs.fields[role])) for role in crew}
+    for window in field_windows:
+        for role in crew:
+            kept = checkpoints.kept(f"{role}-{window}", {role: like[role]})
+            outputs.fields[role].write(FieldSample(**kept[role]))
+    if checkpoints.moved and checkpoints.continued is not None:
+        save(crew, outputs, checkpoints.continued)
+    return time.perf_counter() - begin

@@ -1,0 +1,1 @@
+"""Quasi-static problems: reflow temperatures, cooling, residual stress, modes."""

@@ -1,0 +1,108 @@
+"""One run of cooling, from meshes to the state in which a shock begins: what every rank does, in order."""
+
+import time
+from dataclasses import replace
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from fem import dolfinx_api
+from fem.division.fine_joints import read_scene
+from fem.division.tables import JointTables, ModelInput, joined, model_inputs
+from fem.division.whole import Whole
+from fem.dynamics.participant import uncut_motion
+from fem.mesh.mesh import MeshData
+from fem.mesh.supports import SYMMETRY
+from fem.model.body import Body, Pieces, Response, make_body, make_pieces
+from fem.parallel.agreement import agreed
+from fem.parallel.local_mesh import distribute
+from fem.parallel.whereabouts import HERE
+from fem.problem.inputs import CoolingInput
+from fem.statics.cooling_report import Unbalanced, write_cooling
+from fem.statics.equilibrium import Equilibrium, Statics
+from fem.statics.initial_state import Cooling, begun
+from fem.statics.pins import pins
+
+
+def run_cooling(world: MPI.Comm, request: CoolingInput) -> None:
+    """Cool the whole model and write displacement, stress and result; collective over ``world``.
+
+    The board lies free: only planes of symmetry hold it, and pins that bear nothing. So what it is screwed to
+    afterwards holds it as it then is.
+
+    Raises:
+        AgreedError: Input or mesh that does not fit, or no equilibrium; on every rank.
+    """
+    start = time.perf_counter()
+    scene = agreed(world, lambda: pinned_scene(request) if world.rank == 0 else None)
+    tables: JointTables = world.bcast(scene[1].tables if scene else None)
+    HERE.slow = "cools the model"
+    pieces = distributed(world, scene[1].mesh if scene else None, tables, request)
+    ones = np.ones(len(pieces.steps))
+    body = make_body(world, pieces, tables, ones, Response())
+    statics = Statics(world, body, pieces.materials, request.change)
+    found, memory = statics.solve(), statics.memory
+    statics.free()
+    loaded = begun(body, pieces.materials, found.displacement, request.change, path=True)
+    rest, seconds = unbalanced_force(world, loaded, statics.scale), time.perf_counter() - start
+    unbalanced = Unbalanced(found.residuals, rest, found.products, memory, seconds)
+    whole = scene[0] if scene else None
+    displacement = whole_displacement(world, body, found, scene)
+    cooling = Cooling(whole.mesh.points, displacement, request.change) if whole and displacement is not None else None
+    write_cooling(world, request, (whole, cooling), (loaded, tables), unbalanced)
+    agreed(world, lambda: None)
+
+
+Scene = tuple[Whole, ModelInput[JointTables]]
+
+
+def pinned_scene(request: CoolingInput) -> Scene:
+    """Read all meshes as one model on its planes of symmetry, its other rigid motions pinned."""
+    whole = joined(read_scene(request))
+    return whole, pinned(model_inputs(whole, "dns", SYMMETRY)["dns"])
+
+
+def pinned(item: ModelInput[JointTables]) -> ModelInput[JointTables]:
+    """Return a model whose rigid motions that nothing holds are pinned."""
+    tables = item.tables
+    held, usable = np.zeros((tables.nodes, 3), dtype=bool), np.zeros(tables.nodes, dtype=bool)
+    held[tables.held_nodes] = tables.held
+    usable[item.mesh.cells] = True
+    usable[tables.tie.slave] = False
+    held[pins(item.mesh.points, held, usable)] = True
+    nodes = np.flatnonzero(held.any(axis=1))
+    return replace(item, tables=replace(tables, held_nodes=nodes, held=held[nodes]))
+
+
+def distributed(world: MPI.Comm, mesh: MeshData | None, tables: JointTables, request: CoolingInput) -> Pieces:
+    """Give each rank its elements; collective."""
+    dolfinx_api.compile_ahead(world, mesh.points[mesh.cells[0]] if mesh else None)
+    local = distribute(world, mesh)
+    formulation = request.shock.numerics.formulation
+    return agreed(world, lambda: make_pieces(local, tables, request.materials, formulation))
+
+
+def unbalanced_force(world: MPI.Comm, body: Body, scale: float) -> float:
+    """Return what forces of the shock's own terms are out of balance at its beginning, over a scale [N]; collective."""
+    motion = uncut_motion(body, [], 1.0)
+    motion.update_force()
+    own = body.free & body.shared.owned[:, None]
+    square = world.allreduce(float(np.sum(motion.force[own] ** 2)))
+    return float(np.sqrt(square)) / scale if scale > 0.0 else 0.0
+
+
+def whole_displacement(
+    world: MPI.Comm, body: Body, found: Equilibrium, scene: Scene | None
+) -> NDArray[np.float64] | None:
+    """Return the displacement ``(n, 3)`` [m] of all nodes of the whole mesh on rank 0, None elsewhere; collective."""
+    owned = body.shared.owned
+    parts = world.gather((body.local.nodes[owned], found.displacement[owned]))
+    if parts is None or scene is None:
+        return None
+    whole, item = scene
+    own, result = np.zeros((item.tables.nodes, 3)), np.zeros_like(whole.mesh.points)
+    for nodes, values in parts:
+        own[nodes] = values
+    result[whole.mesh.cells[item.cells]] = own[item.mesh.cells]
+    return result

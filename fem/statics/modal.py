@@ -1,0 +1,120 @@
+"""Natural frequencies and mode shapes: K x = omega^2 M x by shift and inverse, with SLEPc or else with SciPy."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse
+import scipy.sparse.linalg
+from numpy.typing import NDArray
+from petsc4py import PETSc
+
+from fem.errors import AgreedError
+from fem.model.factorisation import make_direct
+from fem.model.global_matrix import Equations
+
+try:
+    from slepc4py import SLEPc  # type: ignore[import-untyped]
+except ImportError:
+    SLEPc = None
+
+# The shift lies below zero, so that the matrix to factor is positive definite even for a free body: by this fraction of
+# the largest omega^2. Smaller ones lose digits to its condition, larger ones bunch the wanted modes together.
+SHIFT = 1e-10
+TOLERANCE = 1e-9
+
+
+@dataclass(frozen=True, slots=True)
+class Modes:
+    """The lowest modes of a model.
+
+    Attributes:
+        frequency: ``(k,)`` [Hz], ascending; about zero for a rigid motion.
+        shape: ``(k, n, 3)`` [1/sqrt(kg)] at the nodes of this rank, x . M x = 1 over all ranks; of either sign.
+        effective_mass: ``(k, 3)`` [kg] that moves with each mode when the supports are shaken along x, y, z.
+    """
+
+    frequency: NDArray[np.float64]
+    shape: NDArray[np.float64]
+    effective_mass: NDArray[np.float64]
+
+
+def natural_modes(equations: Equations, count: int) -> Modes:
+    """Return the lowest modes of a model; collective.
+
+    Args:
+        equations: The model.
+        count: Modes wanted, fewer than there are equations.
+
+    Raises:
+        ValueError: ``count`` is out of range, or there are several ranks and no SLEPc.
+        AgreedError: Fewer modes converged than are wanted; on every rank.
+    """
+    if not 0 < count < equations.total:
+        raise ValueError(f"{count} modes are wanted, allowed are 1 to {equations.total - 1}")
+    solve = scipy_modes if SLEPc is None else slepc_modes
+    stiffness, mass = equations.stiffness(), equations.mass()
+    shift = -SHIFT * float((stiffness.getDiagonal() / mass).max()[1])
+    squared, vectors = solve(stiffness, mass, shift, count)
+    order = np.argsort(squared)
+    shapes = np.zeros((count, len(equations.body.mass), 3))
+    effective = np.zeros((count, 3))
+    for shape, moving, index in zip(shapes, effective, order, strict=True):
+        vector = vectors[index]
+        vector.scale(1.0 / np.sqrt((vector * mass).dot(vector)))
+        equations.spread(vector, shape)
+        moving[:] = momentum(equations, shape) ** 2
+    frequency = np.sqrt(np.maximum(squared[order], 0.0)) / (2.0 * np.pi)
+    return Modes(frequency, shapes, effective)
+
+
+def momentum(equations: Equations, shape: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the sum over all ranks of mass times shape: ``(3,)``."""
+    owned = equations.body.shared.owned
+    return np.asarray(equations.comm.allreduce(equations.body.mass[owned] @ shape[owned]))
+
+
+def slepc_modes(
+    stiffness: PETSc.Mat, mass: PETSc.Vec, shift: float, count: int
+) -> tuple[NDArray[np.float64], list[PETSc.Vec]]:
+    """Return squared circular frequencies [1/s^2] and vectors; Krylov-Schur on any number of ranks."""
+    solver = SLEPc.EPS().create(stiffness.comm)
+    solver.setOperators(stiffness, diagonal_matrix(mass))
+    solver.setProblemType(SLEPc.EPS.ProblemType.GHEP)
+    solver.setDimensions(count)
+    solver.setTolerances(TOLERANCE)
+    solver.setWhichEigenpairs(SLEPc.EPS.Which.TARGET_REAL)
+    solver.setTarget(shift)
+    transform = solver.getST()
+    transform.setType(SLEPc.ST.Type.SINVERT)
+    make_direct(transform.getKSP())
+    solver.solve()
+    if solver.getConverged() < count:
+        raise AgreedError(
+            f"{solver.getConverged()} of {count} modes converged, SLEPc says {solver.getConvergedReason()}"
+        )
+    vectors = [stiffness.createVecRight() for _ in range(count)]
+    values = [solver.getEigenpair(k, vector).real for k, vector in enumerate(vectors)]
+    return np.array(values), vectors
+
+
+def diagonal_matrix(diagonal: PETSc.Vec) -> PETSc.Mat:
+    """Return a diagonal matrix in compressed rows."""
+    matrix = PETSc.Mat().createAIJ((diagonal.sizes, diagonal.sizes), nnz=(1, 0), comm=diagonal.comm)
+    matrix.setDiagonal(diagonal)
+    matrix.assemble()
+    return matrix
+
+
+def scipy_modes(
+    stiffness: PETSc.Mat, mass: PETSc.Vec, shift: float, count: int
+) -> tuple[NDArray[np.float64], list[PETSc.Vec]]:
+    """Return the same with ARPACK and SuperLU, on one rank; slower, and with several times the fill."""
+    if stiffness.comm.size > 1:
+        raise ValueError("modes on several ranks need SLEPc (package python3-slepc4py-real)")
+    matrix = scipy.sparse.csr_matrix(stiffness.getValuesCSR()[::-1], shape=stiffness.size)
+    diagonal = scipy.sparse.diags(mass.array, format="csc")
+    values, columns = scipy.sparse.linalg.eigsh(matrix.tocsc(), count, diagonal, sigma=shift, tol=TOLERANCE)
+    vectors = [mass.duplicate() for _ in range(count)]
+    for vector, column in zip(vectors, columns.T, strict=True):
+        vector.array = column
+    return values, vectors

@@ -1,0 +1,73 @@
+"""Board and package that neither expand nor bend: for a reflow where nothing is flexible, but the package floats."""
+
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem.elements.element import element_geometry, lumped_mass
+from fem.elements.mesh_elements import elements_of
+from fem.materials.elasticity import materials_of_parts
+from fem.mesh.mesh_file import read_mesh
+from fem.statics.pads import pad_matrix
+from fem.statics.scene import connected, die_corners, thermal_tables
+from fem.statics.state import Assembly, RigidModes, State, check_loads
+
+
+class RigidPlates:
+    """``state.Structure`` of rigid plates; the package floats, or is lifted as its die's corners are.
+
+    Attributes:
+        points: ``(n, 3)`` [m] nodes as drawn, each once.
+        package: ``(n,)`` whether a node belongs to the package.
+        rigid_modes: Free motions of the package.
+    """
+
+    def __init__(self, assembly: Assembly) -> None:
+        """Read the mesh.
+
+        Raises:
+            MeshError: A mesh that does not fit the pads or the materials.
+        """
+        mesh = connected(read_mesh(assembly.mesh))
+        tables = thermal_tables(mesh, assembly.pads.centres[:, 1].mean(axis=0))
+        _, materials = materials_of_parts(mesh.part_names, assembly.materials)
+        elements = elements_of(mesh.points, mesh.cells, mesh.part, materials)
+        mass = lumped_mass(elements, element_geometry(mesh.points, mesh.cells).nodal_volume)
+        self.points, self.package = mesh.points, tables.package
+        self._pads = pad_matrix(mesh, assembly.pads)
+        self._moved = assembly.thermal.package == "moved"
+        motions = tables.motions[1]
+        fields = motions.fields(mesh.points) * tables.package[:, None]
+        corners = die_corners(mesh) if self._moved else np.empty(0, np.intp)
+        at_corners = fields[:, corners, 2]
+        held = np.abs(at_corners).max(axis=1, initial=0.0) > 0.0
+        weight = -assembly.gravity * fields[:, :, 2] @ mass
+        self._free = fields[~held]
+        self._held = fields[held]
+        self._shares, self._held_weight = np.linalg.pinv(at_corners[held]), weight[held]
+        names = tuple(name for name, stays in zip(motions.names, held, strict=True) if not stays)
+        pad_motion = [self._motion(field) for field in self._free]
+        shape = (len(names), len(assembly.pads.names), 2, 6)
+        self.rigid_modes = RigidModes(names, np.reshape(pad_motion, shape), weight[~held])
+
+    @cached_property
+    def _held_motion(self) -> NDArray[np.float64]:
+        """Return the motion of the pads for a unit of each motion that corners hold: ``(m, joints, 2, 6)``."""
+        return np.array([self._motion(field) for field in self._held]).reshape(
+            -1, *self.rigid_modes.pad_motion.shape[1:]
+        )
+
+    def solve(
+        self, temperature: float, corner: float, wrenches: NDArray[np.float64], rigid: NDArray[np.float64]
+    ) -> State:
+        """Return the state, see ``state.Structure``; the temperature changes nothing."""
+        check_loads(self.rigid_modes, wrenches, rigid)
+        displacement = np.tensordot(rigid, self._free, 1)
+        if self._moved:
+            displacement[self.package, 2] += corner
+        load = self._held_weight + np.tensordot(self._held_motion, wrenches, 3)
+        return State(displacement, self._motion(displacement), -self._shares @ load)
+
+    def _motion(self, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
+        return (self._pads @ displacement.ravel()).reshape(-1, 2, 6)

@@ -1,0 +1,157 @@
+"""Package and board while the solder is liquid: how temperature, weight and the solder's wrenches move the pads.
+
+Everything is linear in the loads, so a state is a sum of fields that are found once (a kelvin, the weight, a force at
+each corner of the die that is moved), the answer to the wrenches, and free rigid motions of the package.
+
+The board rests on its holes and sags between them under its weight. Heights count from the mean height of its pads, and
+what the solder pushes on the board in all is borne right there, in equal parts: a board that gave way as a whole, far
+softer than it bends under the package, would only shift the zero (H 4.3, 200 mm between the holes: by 0.5 mm) and make
+the exchange with the solder diverge. In balance that push is the package's weight, unless a tool moves the package.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from fem.mesh.mesh import MeshData
+from fem.mesh.mesh_file import read_mesh
+from fem.model.factorisation import FactorCost
+from fem.parallel.agreement import agreed
+from fem.statics.corners import Corners
+from fem.statics.pads import pad_matrix
+from fem.statics.scene import ThermalTables, connected, die_corners, thermal_tables
+from fem.statics.state import Assembly, RigidModes, State, check_loads
+from fem.statics.thermoelastic import Thermoelastic
+
+
+@dataclass(frozen=True, slots=True)
+class Tabulated:
+    """What rank 0 takes from the mesh, for all.
+
+    Attributes:
+        points: ``(n, 3)`` [m].
+        tables: Parts, supports, free motions.
+        pads: P of ``pads.pad_matrix``.
+        corners: ``(c,)`` nodes of the die's corners that are moved.
+    """
+
+    points: NDArray[np.float64]
+    tables: ThermalTables
+    pads: scipy.sparse.csr_matrix
+    corners: NDArray[np.intp]
+
+
+class ThermalStructure:
+    """Package and board, factored once; ``state.Structure``.
+
+    Attributes:
+        points: ``(n, 3)`` [m] nodes as drawn, each once.
+        package: ``(n,)`` whether a node belongs to the package.
+        rigid_modes: What free rigid motions of the package do to its pads.
+    """
+
+    def __init__(self, comm: MPI.Comm, found: Tabulated, mesh: MeshData | None, assembly: Assembly) -> None:
+        """Factor, and find what all states have in common; collective. Use ``build``."""
+        self._comm, self._thermal = comm, assembly.thermal
+        self.points, self.package = found.points, found.tables.package
+        self._model = Thermoelastic(comm, mesh, found.tables, assembly.materials)
+        local, owned = self._model.body.local, self._model.body.shared.owned
+        self._nodes, self._owned = local.nodes, owned
+        self._pads = found.pads[:, (3 * local.nodes[:, None] + np.arange(3)).ravel()]
+        self._package = self._model.space.fields[len(found.tables.motions[0].numbers) :]
+        weight = self._model.weight(assembly.gravity)
+        self._weight = self._load(weight)
+        self._kelvin, self._sag = (self._on_level(force) for force in (self._model.expansion, weight))
+        self._corners = Corners.of(self._model, local.locate(found.corners), self._package)
+        self._free = self._package[~self._corners.held]
+        names = np.array(found.tables.motions[1].names)[~self._corners.held]
+        motion = [self._motion(field) for field in self._free]
+        shape = (len(names), *self._motion(weight).shape)
+        self.rigid_modes = RigidModes(
+            tuple(map(str, names)), np.reshape(motion, shape), self._weight[~self._corners.held]
+        )
+
+    @classmethod
+    def build(cls, comm: MPI.Comm, assembly: Assembly) -> "ThermalStructure":
+        """Read board and package and factor their stiffness; collective.
+
+        Raises:
+            AgreedError: A mesh that does not fit the pads or the materials, or no memory; on every rank.
+        """
+        mesh = agreed(comm, lambda: connected(read_mesh(assembly.mesh)) if comm.rank == 0 else None)
+        found = agreed(comm, lambda: tabulate(mesh, assembly) if mesh else None)
+        return cls(comm, comm.bcast(found), mesh, assembly)
+
+    @property
+    def cost(self) -> FactorCost:
+        """Return what the factorisation took."""
+        return self._model.cost
+
+    @property
+    def equations(self) -> int:
+        """Return the number of equations."""
+        return self._model.equations
+
+    def solve(
+        self, temperature: float, corner: float, wrenches: NDArray[np.float64], rigid: NDArray[np.float64]
+    ) -> State:
+        """Return the state at a temperature [K], see ``state.Structure``; collective.
+
+        Raises:
+            ValueError: Wrenches or rigid motions that are not as many as joints and free motions, or not finite.
+        """
+        check_loads(self.rigid_modes, wrenches, rigid)
+        displacement = (temperature - self._thermal.reference) * self._kelvin + self._sag
+        load = self._weight
+        if self._thermal.effects.solder_force != "off" and np.any(wrenches):
+            force = (self._pads.T @ borne(wrenches).ravel()).reshape(-1, 3)
+            displacement += self._on_level(force)
+            load = load + self._load(force)
+        displacement, corner_force = self._corners.move(displacement, corner, load)
+        displacement += np.tensordot(rigid, self._free, 1)
+        return State(self._gathered(displacement), self._motion(displacement), corner_force)
+
+    def _on_level(self, force: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the displacement under forces, heights from the mean height of the board's pads; collective."""
+        displacement = self._model.displacement(force)
+        displacement[:, 2] -= self._motion(displacement)[:, 0, 2].mean() * ~self.package[self._nodes]
+        return displacement
+
+    def _load(self, force: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return forces along the free motions of the package, those that corners hold included; collective."""
+        work = self._model.space.work(force)
+        return work[len(work) - len(self._package) :]
+
+    def _motion(self, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the motion of the pads ``(joints, 2, 6)``; collective."""
+        mine = self._pads @ np.where(self._owned[:, None], displacement, 0.0).ravel()
+        return np.asarray(self._comm.allreduce(mine)).reshape(-1, 2, 6)
+
+    def _gathered(self, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the displacement at all nodes of the mesh; collective."""
+        whole = np.zeros_like(self.points)
+        whole[self._nodes[self._owned]] = displacement[self._owned]
+        if self._comm.size > 1:
+            self._comm.Allreduce(MPI.IN_PLACE, whole)
+        return whole
+
+
+def borne(wrenches: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return wrenches ``(joints, 2, 6)`` with the support of the board below its pads."""
+    supported = wrenches.copy()
+    supported[:, 0, 2] -= wrenches[:, 0, 2].mean()
+    return supported
+
+
+def tabulate(mesh: MeshData, assembly: Assembly) -> Tabulated:
+    """Read supports, pads and corners off a mesh.
+
+    Raises:
+        MeshError: Board, package, die or the sides for the pads are missing, or a pad reaches beyond its side.
+    """
+    centre = assembly.pads.centres[:, 1].mean(axis=0)
+    corners = die_corners(mesh) if assembly.thermal.package == "moved" else np.empty(0, np.intp)
+    return Tabulated(mesh.points, thermal_tables(mesh, centre), pad_matrix(mesh, assembly.pads), corners)

@@ -1,1 +1,0 @@
-"""One structure: a box of layers under supports and loads."""

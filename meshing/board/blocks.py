@@ -1,0 +1,136 @@
+"""Gmsh building blocks: a plan of transfinite rectangles, O-grids around round holes, layers extruded from it.
+
+Gmsh models are built in millimetres (its default tolerances suit them) and scaled to metres when written.
+"""
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import gmsh
+import numpy as np
+
+from meshing.board.plan import Interval, Plan
+
+MILLI = 1.0e-3
+TOLERANCE = 1.0e-9  # m, far below any length of a package
+Block = tuple[int, int]
+Surfaces = dict[Block, list[int]]
+
+
+@dataclass(frozen=True, slots=True)
+class RoundHole:
+    """A round hole in a block of the plan [m]; ``rings`` cells between the circle and the block's edge."""
+
+    radius: float
+    rings: int
+
+
+def plan_surfaces(plan: Plan, height: float, hole: RoundHole | None = None, recombine: bool = True) -> Surfaces:
+    """Add the plan as transfinite surfaces at z = height [m]: quadrilaterals if recombined, else triangles.
+
+    Returns:
+        Block (i, j) -> surface tags: one, or four around a hole.
+    """
+    geo = gmsh.model.geo
+    x, y = _breaks(plan.x), _breaks(plan.y)
+    points = {(i, j): geo.addPoint(a, b, height / MILLI) for i, a in enumerate(x) for j, b in enumerate(y)}
+    along_x = {
+        (i, j): _line(points[i, j], points[i + 1, j], part) for i, part in enumerate(plan.x) for j in range(len(y))
+    }
+    along_y = {
+        (i, j): _line(points[i, j], points[i, j + 1], part) for j, part in enumerate(plan.y) for i in range(len(x))
+    }
+    surfaces: Surfaces = {}
+    for i in range(len(plan.x)):
+        for j in range(len(plan.y)):
+            sides = [along_x[i, j], along_y[i + 1, j], -along_x[i, j + 1], -along_y[i, j]]
+            if hole and i in plan.hole_x and j in plan.hole_y:
+                corners = [points[i, j], points[i + 1, j], points[i + 1, j + 1], points[i, j + 1]]
+                counts = [plan.x[i].cells, plan.y[j].cells] * 2
+                centre = (0.5 * (x[i] + x[i + 1]), 0.5 * (y[j] + y[j + 1]), height / MILLI)
+                loops = _ring_around_hole(hole, centre, corners, list(zip(sides, counts, strict=True)))
+            else:
+                loops = [sides]
+            surfaces[i, j] = [_transfinite_surface(loop, recombine) for loop in loops]
+    return surfaces
+
+
+def extrude(surfaces: Surfaces, thickness: float, elements: int, recombine: bool = True) -> tuple[Surfaces, Surfaces]:
+    """Extrude surfaces upwards by ``thickness`` [m] in ``elements`` layers of hexahedra, or of tetrahedra.
+
+    Returns:
+        Volumes and upper surfaces, by block.
+    """
+    volumes: Surfaces = {}
+    tops: Surfaces = {}
+    for block, tags in surfaces.items():
+        results = [
+            gmsh.model.geo.extrude([(2, tag)], 0.0, 0.0, thickness / MILLI, [elements], recombine=recombine)
+            for tag in tags
+        ]
+        tops[block] = [result[0][1] for result in results]
+        volumes[block] = [result[1][1] for result in results]
+    return volumes, tops
+
+
+def _breaks(axis: tuple[Interval, ...]) -> list[float]:
+    return [part.start / MILLI for part in axis] + [axis[-1].end / MILLI]
+
+
+def _line(start: int, end: int, part: Interval) -> int:
+    line = gmsh.model.geo.addLine(start, end)
+    gmsh.model.geo.mesh.setTransfiniteCurve(line, part.cells + 1, "Progression", part.ratio)
+    return line
+
+
+def lies_within_hole(surface: int, centre: tuple[float, float], diameter: float) -> bool:
+    """Whether a surface lies within the square around the hole at the centre [m], or at one of its mirror images."""
+    x0, y0, _, x1, y1, _ = (value * MILLI for value in gmsh.model.getBoundingBox(2, surface))
+    off_centre = [abs(value) - centre[0] for value in (x0, x1)] + [abs(value) - centre[1] for value in (y0, y1)]
+    return max(map(abs, off_centre)) <= 0.5 * diameter + TOLERANCE
+
+
+def check_elements(name: str) -> None:
+    """Find out whether all volume elements of the mesh are the right way out.
+
+    Raises:
+        ValueError: one is not.
+    """
+    tags = np.concatenate(list(gmsh.model.mesh.getElements(3)[1]))
+    worst = gmsh.model.mesh.getElementQualities(tags, "minSJ").min()
+    if worst <= 0.0:
+        raise ValueError(f"{name}: smallest scaled Jacobian {worst:.3g}, allowed > 0")
+
+
+def count_elements(volumes: Iterable[int]) -> int:
+    """Number of elements of some volumes."""
+    return sum(len(tags) for volume in volumes for tags in gmsh.model.mesh.getElements(3, volume)[1])
+
+
+def _transfinite_surface(sides: list[int], recombine: bool) -> int:
+    geo = gmsh.model.geo
+    surface = geo.addPlaneSurface([geo.addCurveLoop(sides)])
+    geo.mesh.setTransfiniteSurface(surface, "Left" if recombine else "AlternateLeft")
+    if recombine:
+        geo.mesh.setRecombine(2, surface)
+    return surface
+
+
+def _ring_around_hole(
+    hole: RoundHole, centre: tuple[float, float, float], corners: list[int], sides: list[tuple[int, int]]
+) -> list[list[int]]:
+    """Outlines of four blocks between circle and square: spokes run from the circle's diagonals to the corners."""
+    geo = gmsh.model.geo
+    middle, radius = geo.addPoint(*centre), hole.radius / MILLI
+    angles = [math.pi * (1.25 + 0.5 * k) for k in range(4)]
+    rim = [geo.addPoint(centre[0] + radius * math.cos(a), centre[1] + radius * math.sin(a), centre[2]) for a in angles]
+    spokes = [geo.addLine(rim[k], corners[k]) for k in range(4)]
+    for spoke in spokes:
+        geo.mesh.setTransfiniteCurve(spoke, hole.rings + 1)
+    loops = []
+    for k, (side, cells) in enumerate(sides):
+        arc = geo.addCircleArc(rim[k], middle, rim[(k + 1) % 4])
+        geo.mesh.setTransfiniteCurve(arc, cells + 1)
+        loops.append([spokes[k], side, -spokes[(k + 1) % 4], -arc])
+    return loops

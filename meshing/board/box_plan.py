@@ -1,0 +1,142 @@
+"""A box of layers as data: its intervals, its elements counted without a mesh. Pure Python."""
+
+import math
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from meshing.board.estimate import PartEstimate
+from meshing.board.plan import Interval, Plan, uniform
+
+ElementKind = Literal["hexahedron", "tetrahedron", "tetrahedron_quadratic"]
+TETRAHEDRA = 6  # of which a box is made: two prisms of three
+RING_SQUARE = 2.0  # side of the square around a hole that is meshed as an O-grid, in diameters, if it fits
+ROOM = 1.6  # the same side, over the distance from the hole's axis to the nearest edge
+
+
+@dataclass(frozen=True, slots=True)
+class BoxLayer:
+    """A layer [m], ``cells`` elements thick, and ``in_plane`` along x and y if it differs from the box."""
+
+    name: str
+    thickness: float
+    cells: int
+    in_plane: tuple[int, int] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class BoxHoles:
+    """Four round holes through all layers, at (+-spacing / 2) [m]."""
+
+    spacing: tuple[float, float]
+    diameter: float
+
+
+@dataclass(frozen=True, slots=True)
+class Box:
+    """Layers upon each other from z = 0, centred on the z axis; with planes of symmetry, the halves at x, y >= 0.
+
+    Attributes:
+        size: length along x and width along y of the whole [m].
+        cells: elements along x and y, of what is meshed; around holes as near to that as divides the pieces.
+        layers: bottom to top.
+        symmetry: axes normal to planes of symmetry.
+        element: kind of element.
+        holes: holes, if there are any.
+    """
+
+    size: tuple[float, float]
+    cells: tuple[int, int]
+    layers: tuple[BoxLayer, ...]
+    symmetry: tuple[str, ...] = ()
+    element: ElementKind = "hexahedron"
+    holes: BoxHoles | None = None
+
+    @property
+    def square(self) -> float:
+        """Side of the square around a hole [m]."""
+        if self.holes is None:
+            return 0.0
+        insets = [0.5 * (size - spacing) for size, spacing in zip(self.size, self.holes.spacing, strict=True)]
+        return min(RING_SQUARE * self.holes.diameter, ROOM * min(insets))
+
+    @property
+    def rings(self) -> int:
+        """Elements between a hole and the edge of its square."""
+        if self.holes is None:
+            return 0
+        meshed = min(self.extent(axis) / self.cells[axis] for axis in (0, 1))
+        return max(1, round(0.5 * (self.square - self.holes.diameter) / meshed))
+
+    @property
+    def stacks(self) -> tuple["Box", ...]:
+        """Neighbouring layers whose elements match, bottom to top: each stack a box that shares no node with others."""
+        stacks: list[Box] = []
+        for layer in self.layers:
+            cells = layer.in_plane or self.cells
+            if stacks and stacks[-1].cells == cells:
+                stacks[-1] = replace(stacks[-1], layers=(*stacks[-1].layers, layer))
+            else:
+                stacks.append(replace(self, cells=cells, layers=(layer,)))
+        return tuple(stacks)
+
+    def is_halved(self, axis: int) -> bool:
+        """Whether a plane normal to an axis is one of symmetry."""
+        return "xy"[axis] in self.symmetry
+
+    def extent(self, axis: int) -> float:
+        """Length [m] along an axis of what is meshed."""
+        return self.size[axis] * (0.5 if self.is_halved(axis) else 1.0)
+
+
+def box_plan(box: Box) -> Plan:
+    """Cut the box along x and y: into equal cells, but for the squares around holes."""
+    axes = [_axis(box, axis) for axis in (0, 1)]
+    hole_x, hole_y = (frozenset(k for k, part in enumerate(axis) if _is_at_hole(box, i, part))
+                      for i, axis in enumerate(axes))  # fmt: skip
+    return Plan(axes[0], axes[1], hole_x, hole_y)
+
+
+def count_box(box: Box) -> dict[str, PartEstimate]:
+    """Count the elements of every layer, exactly; lengths are those of the smallest box of cells."""
+    return {name: part for stack in box.stacks for name, part in _count_stack(stack).items()}
+
+
+def _count_stack(box: Box) -> dict[str, PartEstimate]:
+    plan = box_plan(box)
+    cells = sum(part.cells for part in plan.x) * sum(part.cells for part in plan.y)
+    for i in plan.hole_x:
+        for j in plan.hole_y:
+            around = 2 * (plan.x[i].cells + plan.y[j].cells) * box.rings
+            cells += around - plan.x[i].cells * plan.y[j].cells
+    smallest = [min(part.smallest() for part in axis) for axis in (plan.x, plan.y)]
+    if box.holes is not None:
+        smallest = [min(length, _smallest_in_ring(box, plan)) for length in smallest]
+    each = 1 if box.element == "hexahedron" else TETRAHEDRA
+    return {
+        layer.name: PartEstimate(each * cells * layer.cells, (smallest[0], smallest[1], layer.thickness / layer.cells))
+        for layer in box.layers
+    }
+
+
+def _axis(box: Box, axis: int) -> tuple[Interval, ...]:
+    half = 0.5 * box.size[axis]
+    if box.holes is None:
+        return (Interval(0.0 if box.is_halved(axis) else -half, half, box.cells[axis]),)
+    size, hole = box.extent(axis) / box.cells[axis], 0.5 * box.holes.spacing[axis]
+    low, high = hole - 0.5 * box.square, hole + 0.5 * box.square
+    square = Interval(low, high, max(2, round(box.square / size)))
+    positive = (uniform(0.0, low, size), square, uniform(high, half, size))
+    return positive if box.is_halved(axis) else (*(part.mirrored() for part in reversed(positive)), *positive)
+
+
+def _is_at_hole(box: Box, axis: int, part: Interval) -> bool:
+    centre = 0.5 * abs(part.start + part.end)
+    return box.holes is not None and math.isclose(centre, 0.5 * box.holes.spacing[axis], rel_tol=1.0e-9)
+
+
+def _smallest_in_ring(box: Box, plan: Plan) -> float:
+    """Shortest edge [m] around a hole: radial, or along the circle."""
+    assert box.holes is not None
+    radial = 0.5 * (box.square - box.holes.diameter) / box.rings
+    around = 2 * (plan.x[max(plan.hole_x)].cells + plan.y[max(plan.hole_y)].cells)
+    return min(radial, math.pi * box.holes.diameter / around)

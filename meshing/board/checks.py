@@ -1,0 +1,163 @@
+"""Parameters of package, board and warpage that are each allowed but make no assembly together. Pure Python."""
+
+import difflib
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from meshing.board.pads import joint_name, lift, pad_table
+from meshing.board.parameters import Board, Package, Pad, Warpage
+from meshing.board.plan import hole_square, uniform
+
+SMALLEST_INSET = 0.75  # of a hole's diameter: leaves a quarter of it as a wall between hole and edge
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """One impossible value.
+
+    Attributes:
+        key: dotted key as in the case file.
+        value: the value with its unit.
+        allowed: the allowed range.
+        message: what is wrong.
+    """
+
+    key: str
+    value: str
+    allowed: str
+    message: str
+
+
+def problems(package: Package, board: Board, warpage: Warpage) -> list[Problem]:
+    """Find what cannot be built, before anything is meshed.
+
+    Args:
+        package: array, pads, layers.
+        board: sizes, holes, symmetry.
+        warpage: lift of the package.
+    """
+    return [
+        *_array(package),
+        *_symmetry(package, board),
+        *_pad("package.board_pad", package.board_pad, package),
+        *_pad("package.package_pad", package.package_pad, package),
+        *_layers(package, board),
+        *_holes(package, board),
+        *_gaps(package, board, warpage),
+        *_numerics(board),
+    ]
+
+
+def _array(package: Package) -> Iterator[Problem]:
+    """Depopulated names exist, and leave a joint."""
+    names = [joint_name(row, column) for row in range(package.rows) for column in range(package.columns)]
+    for name in sorted(set(package.depopulated) - set(names)):
+        near = difflib.get_close_matches(name.upper(), names, n=1, cutoff=0.0)[0]
+        message = f"no such joint, the nearest is {near}"
+        yield Problem("package.depopulated", name, f"{names[0]} to {names[-1]}", message)
+    if set(names) <= set(package.depopulated):
+        yield Problem("package.depopulated", f"{len(names)} joints", f"< {len(names)}", "no joint is left")
+
+
+def _symmetry(package: Package, board: Board) -> Iterator[Problem]:
+    """A quarter stands for the whole only if no joint lies on a plane of symmetry and depopulation is symmetric."""
+    if board.symmetry == "full":
+        return
+    for key, count in (("package.rows", package.rows), ("package.columns", package.columns)):
+        if count % 2:
+            message = "a joint would be cut by the symmetry plane of a quarter model"
+            yield Problem(key, str(count), 'even, or board.symmetry = "full"', message)
+    gone = set(package.depopulated)
+    for row in range(package.rows):
+        for column in range(package.columns):
+            name = joint_name(row, column)
+            mirrored = {joint_name(package.rows - 1 - row, column), joint_name(row, package.columns - 1 - column)}
+            if name in gone and not mirrored <= gone:
+                allowed = f'{", ".join(sorted(mirrored - gone))} too, or board.symmetry = "full"'
+                yield Problem("package.depopulated", name, allowed, "a quarter model needs symmetric depopulation")
+
+
+def _pad(key: str, pad: Pad, package: Package) -> Iterator[Problem]:
+    """Neighbouring pads stay apart; the definition says which of pad and opening is the smaller one."""
+    several = package.rows * package.columns > 1
+    for name, diameter in (("diameter", pad.diameter), ("mask_opening", pad.mask_opening)):
+        if several and diameter >= package.pitch:
+            message = "pads overlap" if name == "diameter" else "mask openings overlap"
+            yield Problem(f"{key}.{name}", _mm(diameter), f"< {_mm(package.pitch)}, the pitch", message)
+    if pad.definition == "SMD" and pad.mask_opening >= pad.diameter:
+        message = "a solder mask that defines the pad (SMD) covers its edge"
+        yield Problem(f"{key}.mask_opening", _mm(pad.mask_opening), f"< {_mm(pad.diameter)}, the diameter", message)
+    if pad.definition == "NSMD" and pad.mask_opening <= pad.diameter:
+        message = "a solder mask that does not define the pad (NSMD) leaves its edge free"
+        yield Problem(f"{key}.mask_opening", _mm(pad.mask_opening), f"> {_mm(pad.diameter)}, the diameter", message)
+
+
+def _layers(package: Package, board: Board) -> Iterator[Problem]:
+    """Array inside substrate, die inside substrate, substrate inside board."""
+    widest_pad = max(package.board_pad.diameter, package.package_pad.diameter)
+    for side, count in (("length", package.columns), ("width", package.rows)):
+        substrate, die, whole = getattr(package.substrate, side), getattr(package.die, side), getattr(board, side)
+        array = (count - 1) * package.pitch + widest_pad
+        if substrate < array:
+            message = "the array of pads reaches beyond the substrate"
+            yield Problem(f"package.substrate.{side}", _mm(substrate), f">= {_mm(array)}", message)
+        if die > substrate:
+            message = "the die is larger than its substrate"
+            yield Problem(f"package.die.{side}", _mm(die), f"<= {_mm(substrate)}", message)
+        if substrate >= whole:
+            message = "the package is larger than the board"
+            yield Problem(f"package.substrate.{side}", _mm(substrate), f"< {_mm(whole)}, the board's", message)
+
+
+def _holes(package: Package, board: Board) -> Iterator[Problem]:
+    """Holes lie inside the board, and the blocks around them beyond the package along both axes."""
+    smallest = SMALLEST_INSET * board.holes.diameter
+    for axis, side in (("x", "length"), ("y", "width")):
+        inset, whole = getattr(board.holes, f"inset_{axis}"), getattr(board, side)
+        taken = _taken_by_package(getattr(package.substrate, side), board) + 0.5 * hole_square(board)
+        largest = 0.5 * whole - taken
+        key, allowed = f"board.holes.inset_{axis}", f"{_mm(smallest)} to {_mm(largest)}"
+        if inset < smallest:
+            yield Problem(key, _mm(inset), allowed, "a mounting hole reaches beyond the board")
+        elif largest < smallest:
+            message = "too small for the package, its patch and the mounting holes beside each other"
+            yield Problem(f"board.{side}", _mm(whole), f">= {_mm(2.0 * (taken + inset))}", message)
+        elif inset > largest:
+            message = "a mounting hole lies under or beside the package: it needs strips of the board of its own"
+            yield Problem(key, _mm(inset), allowed, message)
+
+
+def _taken_by_package(side: float, board: Board) -> float:
+    """Half of the strip of the board that the package, its patch and one more element take [m]."""
+    size, margin = board.numerics.element_size, board.numerics.patch_margin
+    return 0.5 * side * (1.0 + (margin + 1) / uniform(0.0, 0.5 * side, size).cells)
+
+
+def _gaps(package: Package, board: Board, warpage: Warpage) -> Iterator[Problem]:
+    """The warped package stays above the board, and its pads above the board's pads."""
+    sites = pad_table(package, board, Warpage())
+    unit = Warpage(corner=1.0)
+    over_joints = max((float(lift(package, unit, site.x, site.y)) for site in sites), default=0.0)
+    over_package = float(lift(package, unit, 0.5 * package.substrate.length, 0.5 * package.substrate.width))
+    if over_package == 0.0 or warpage.corner >= 0.0:
+        return
+    room = package.standoff + 2.0 * package.copper.thickness
+    limit = -min(package.standoff / over_joints if over_joints else room / over_package, room / over_package)
+    if warpage.corner <= limit:
+        message = "the warped package would touch the board"
+        yield Problem("warpage.corner", _mm(warpage.corner), f"> {_mm(limit)}", message)
+
+
+def _numerics(board: Board) -> Iterator[Problem]:
+    numerics = board.numerics
+    if numerics.patch_layers >= numerics.layers:
+        allowed = f"< {numerics.layers}, the board's layers"
+        message = "the macro model needs a layer of the board below the patch"
+        yield Problem("board.numerics.patch_layers", str(numerics.patch_layers), allowed, message)
+    if numerics.coarse_size < numerics.element_size:
+        allowed = f">= {_mm(numerics.element_size)}, the element size"
+        yield Problem("board.numerics.coarse_size", _mm(numerics.coarse_size), allowed, "finer than the fine elements")
+
+
+def _mm(length: float) -> str:
+    return f"{1e3 * length:.4g} mm"

@@ -1,0 +1,137 @@
+"""Parameters of the geometry: array, pads, package, board, warpage.
+
+All values are SI floats. The second argument of ``Annotated`` is the unit in which a field is shown to a
+user; ``workflow.pipeline.reader`` converts the strings of a case file by it, once.
+"""
+
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+Length = Annotated[float, "mm"]
+
+
+class Parameters(BaseModel):
+    """Base of all parameter models: immutable, unknown keys are errors."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class Pad(Parameters):
+    """A circular copper pad and the opening of the solder mask above it.
+
+    SMD (solder mask defined): the opening is smaller than the pad and limits the solder.
+    NSMD: the opening is larger, the edge of the copper limits the solder.
+    """
+
+    diameter: Length = Field(gt=0)
+    mask_opening: Length = Field(gt=0)
+    definition: Literal["SMD", "NSMD"]
+
+    @property
+    def wetted_radius(self) -> float:
+        """Radius of the disc that solder can wet [m]."""
+        return 0.5 * min(self.diameter, self.mask_opening)
+
+
+class Copper(Parameters):
+    """Copper under and above the joints (H 4.3 draws it as thin plates, 0.02 mm)."""
+
+    thickness: Length = Field(2.0e-5, gt=0)
+    layout: Literal["pads", "plate"] = "pads"
+
+
+class Layer(Parameters):
+    """A rectangular, centred layer of the package: substrate or die."""
+
+    length: Length = Field(gt=0)
+    width: Length = Field(gt=0)
+    thickness: Length = Field(gt=0)
+    elements: int = Field(2, ge=1, le=20)
+
+
+class PackageNumerics(Parameters):
+    """How the package is meshed."""
+
+    element_size: Length = Field(5.0e-4, gt=0)
+
+
+class JointNumerics(Parameters):
+    """How a joint is meshed: butterfly cross-section swept from pad to pad."""
+
+    core: int = Field(2, ge=1, le=16)
+    rings: int = Field(1, ge=0, le=16)
+    layers: int = Field(6, ge=2, le=64)
+
+
+class Package(Parameters):
+    """A ball grid array package: the array of joints, substrate and die.
+
+    ``surfaces`` are files (STL, PLY, VTU; lengths in ``surface_unit``) of joints whose shape is given, by their names.
+    ``coarse_joint_numerics`` is for joints of a shock that are not fine: solder alone, also in place of their copper.
+    """
+
+    rows: int = Field(ge=1, le=100)
+    columns: int = Field(ge=1, le=100)
+    depopulated: tuple[str, ...] = ()
+    pitch: Length = Field(gt=0)
+    standoff: Length = Field(gt=0)
+    board_pad: Pad
+    package_pad: Pad
+    copper: Copper = Copper()
+    substrate: Layer
+    die: Layer
+    numerics: PackageNumerics = PackageNumerics()
+    joint_numerics: JointNumerics = JointNumerics()
+    coarse_joint_numerics: JointNumerics = JointNumerics(core=2, rings=0, layers=2)
+    surfaces: dict[str, str] = Field(default_factory=dict)
+    surface_unit: Literal["um", "mm", "m"] = "mm"
+
+
+class Holes(Parameters):
+    """Four mounting holes, one near each corner of the board."""
+
+    diameter: Length = Field(gt=0)
+    inset_x: Length = Field(gt=0)
+    inset_y: Length = Field(gt=0)
+
+
+class BoardNumerics(Parameters):
+    """How the board is meshed, and how much of it belongs to the meso model.
+
+    ``patch_layers`` layers of elements under the package, and ``patch_margin`` elements around its
+    footprint, are part of the meso model: the cut lies inside the FR4 (stability of the held-velocity scheme).
+    """
+
+    element_size: Length = Field(5.0e-4, gt=0)
+    coarse_size: Length = Field(2.0e-3, gt=0)
+    growth: float = Field(1.2, ge=1.01, le=2.0)
+    layers: int = Field(4, ge=1, le=40)
+    patch_layers: int = Field(2, ge=1, le=40)
+    patch_margin: int = Field(2, ge=1, le=20)
+
+
+class Board(Parameters):
+    """The printed circuit board, centred on the origin; its top face is z = 0."""
+
+    length: Length = Field(gt=0)
+    width: Length = Field(gt=0)
+    thickness: Length = Field(gt=0)
+    holes: Holes
+    symmetry: Literal["full", "quarter"] = "quarter"
+    numerics: BoardNumerics = BoardNumerics()
+
+
+class Warpage(Parameters):
+    """Prescribed warpage of the package: w(x, y) = corner (x^2 + y^2) / (x_c^2 + y_c^2), corner joint at (x_c, y_c)."""
+
+    corner: Length = 0.0
+
+    def height(self, x, y, corner_x: float, corner_y: float):
+        """Return the lift of the package's underside at (x, y) [m]; scalars or arrays [m]."""
+        return self.corner * (x**2 + y**2) / (corner_x**2 + corner_y**2)
+
+    def slope(self, x, y, corner_x: float, corner_y: float):
+        """Return the derivatives of the lift along x and y; scalars or arrays."""
+        twice = 2.0 * self.corner / (corner_x**2 + corner_y**2)
+        return twice * x, twice * y

@@ -1,0 +1,162 @@
+"""Plan view of board and package: intervals along x and y, shared by the mesh and by its estimate."""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from meshing.board.parameters import Board, BoardNumerics, Package
+
+MOST_LINES = 100_000
+
+
+@dataclass(frozen=True, slots=True)
+class Interval:
+    """A piece [start, end] [m] of an axis in ``cells``, each ``ratio`` times as long as the one before."""
+
+    start: float
+    end: float
+    cells: int
+    ratio: float = 1.0
+
+    def smallest(self) -> float:
+        """Length of the shortest cell [m]; the lines of more than are ever meshed are not laid out."""
+        if self.cells <= MOST_LINES:
+            return float(np.diff(self.lines()).min())
+        ratio = max(self.ratio, 1.0 / self.ratio)
+        share = 1.0 / self.cells if ratio == 1.0 else math.exp(-self.cells * math.log(ratio)) * (ratio - 1.0)
+        return (self.end - self.start) * share
+
+    def lines(self) -> np.ndarray:
+        """Grid lines from start to end, (cells + 1,) [m]."""
+        lengths = self.ratio ** np.arange(self.cells)
+        return self.start + (self.end - self.start) * np.concatenate([[0.0], lengths.cumsum()]) / lengths.sum()
+
+    def mirrored(self) -> "Interval":
+        """The interval reflected at the origin."""
+        return Interval(-self.end, -self.start, self.cells, 1.0 / self.ratio)
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """Intervals along both axes; ``hole_x`` and ``hole_y`` name those that the mounting holes occupy."""
+
+    x: tuple[Interval, ...]
+    y: tuple[Interval, ...]
+    hole_x: frozenset[int] = frozenset()
+    hole_y: frozenset[int] = frozenset()
+
+
+def board_plan(package: Package, board: Board) -> Plan:
+    """Cut the board: footprint, margin, graded, coarse, around the holes.
+
+    The footprint of the package lies on grid lines, and the margin of the meso model's patch on the next ones.
+    """
+    holes, numerics = board.holes, board.numerics
+    half = (0.5 * package.substrate.length, 0.5 * package.substrate.width)
+    ends = (0.5 * board.length, 0.5 * board.width)
+    insets = (holes.inset_x, holes.inset_y)
+    axes = []
+    for footprint, end, inset in zip(half, ends, insets, strict=True):
+        axes.append(_board_axis(footprint, end, end - inset, hole_square(board), numerics))
+    x, y = (tuple(axis) for axis in axes)
+    plan = Plan(x, y, frozenset({len(x) - 2}), frozenset({len(y) - 2}))
+    return plan if board.symmetry == "quarter" else _mirrored(plan)
+
+
+def package_plan(package: Package, board: Board) -> Plan:
+    """Cut the package so that the edges of the die lie on grid lines."""
+    plan = Plan(*package_axes(package))
+    return plan if board.symmetry == "quarter" else _mirrored(plan)
+
+
+def package_axes(package: Package) -> tuple[tuple[Interval, ...], tuple[Interval, ...]]:
+    """Cut the positive halves of the package's axes: under the die, and what of the substrate it leaves free."""
+    size, die, substrate = package.numerics.element_size, package.die, package.substrate
+    return (
+        _package_axis(0.5 * die.length, 0.5 * substrate.length, size),
+        _package_axis(0.5 * die.width, 0.5 * substrate.width, size),
+    )
+
+
+def hole_square(board: Board) -> float:
+    """Side of the square around a mounting hole that is meshed as an O-grid [m]: twice the diameter, if it fits."""
+    holes = board.holes
+    return min(2.0 * holes.diameter, 1.6 * min(holes.inset_x, holes.inset_y))
+
+
+def uniform(start: float, end: float, size: float) -> Interval:
+    """An interval of equal cells, as near to ``size`` as divides it."""
+    return Interval(start, end, max(1, round((end - start) / size)))
+
+
+def hole_rings(board: Board) -> int:
+    """Number of cells between a mounting hole and the edge of its square."""
+    ring = 0.5 * (hole_square(board) - board.holes.diameter)
+    return max(1, round(ring / board.numerics.coarse_size))
+
+
+def blocks_within(plan: Plan, length: float, width: float) -> set[tuple[int, int]]:
+    """Blocks (i, j) of the plan that lie inside a centred rectangle [m]."""
+    columns = _within(plan.x, 0.5 * length)
+    rows = _within(plan.y, 0.5 * width)
+    return {(i, j) for i in columns for j in rows}
+
+
+def footprint(plan: Plan, package: Package) -> set[tuple[int, int]]:
+    """Blocks of the board's plan that lie under the package."""
+    return blocks_within(plan, package.substrate.length, package.substrate.width)
+
+
+def patch(plan: Plan, package: Package) -> set[tuple[int, int]]:
+    """Blocks of the board's plan that lie under the package or in the margin around it."""
+    inside = footprint(plan, package)
+    columns, rows = ({block[axis] for block in inside} for axis in (0, 1))
+    return {(i, j) for i in _widened(columns) for j in _widened(rows)}
+
+
+def _within(axis: tuple[Interval, ...], limit: float) -> set[int]:
+    return {index for index, part in enumerate(axis) if max(abs(part.start), abs(part.end)) <= limit * (1.0 + 1e-9)}
+
+
+def _widened(indices: set[int]) -> range:
+    return range(max(min(indices) - 1, 0), max(indices) + 2)
+
+
+def _package_axis(die: float, substrate: float, size: float) -> tuple[Interval, ...]:
+    if math.isclose(die, substrate, rel_tol=1.0e-9):  # what rounding leaves between their edges is no block
+        return (uniform(0.0, substrate, size),)
+    return uniform(0.0, die, size), uniform(die, substrate, size)
+
+
+def _board_axis(footprint: float, end: float, hole: float, square: float, numerics: BoardNumerics) -> list[Interval]:
+    inner = uniform(0.0, footprint, numerics.element_size)
+    size = footprint / inner.cells
+    margin = Interval(footprint, footprint + numerics.patch_margin * size, numerics.patch_margin)
+    axis = [inner, margin, *_outward(margin.end, hole - 0.5 * square, size, numerics)]
+    axis.append(uniform(hole - 0.5 * square, hole + 0.5 * square, numerics.coarse_size))
+    axis[-1] = replace(axis[-1], cells=max(2, axis[-1].cells))
+    axis.append(uniform(hole + 0.5 * square, end, numerics.coarse_size))
+    return axis
+
+
+def _outward(start: float, end: float, size: float, numerics: BoardNumerics) -> list[Interval]:
+    """Grow the cells from ``size`` to the coarse size, then keep it."""
+    coarse, ratio = numerics.coarse_size, numerics.growth
+    cells = max(1, math.ceil(math.log(coarse / size) / math.log(ratio)))
+    grown = size * sum(ratio**k for k in range(1, cells + 1))
+    if start + grown >= end - coarse:
+        fitting = max(1, math.floor(math.log(1.0 + (end - start) * (ratio - 1.0) / (size * ratio)) / math.log(ratio)))
+        return [Interval(start, end, fitting, ratio)]
+    return [Interval(start, start + grown, cells, ratio), uniform(start + grown, end, coarse)]
+
+
+def _mirrored(plan: Plan) -> Plan:
+    def both(axis: tuple[Interval, ...]) -> tuple[Interval, ...]:
+        return tuple(part.mirrored() for part in reversed(axis)) + axis
+
+    def holes(axis: tuple[Interval, ...], indices: frozenset[int]) -> frozenset[int]:
+        count = len(axis)
+        return frozenset({count + index for index in indices} | {count - 1 - index for index in indices})
+
+    return Plan(both(plan.x), both(plan.y), holes(plan.x, plan.hole_x), holes(plan.y, plan.hole_y))

@@ -1,0 +1,1 @@
+"""Gmsh sessions, quality of elements, sections and outlines: what boards and joints share."""

@@ -1,0 +1,183 @@
+"""A joint's mesh in its place: solder and copper pads, named facets, quality; what misses its bars is an error."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from meshing.board.pads import PadSite, has_rim
+from meshing.core.hexahedra import quad_areas, scaled_jacobian, shortest_lengths, volumes
+from meshing.core.quadratic_tetrahedra import QuadraticTetrahedra, tetrahedra_quality
+from meshing.joint.joint_place import JointPlace
+from meshing.joint.solder import Solder, WettedFace
+
+MINIMUM_SCALED_JACOBIAN = 0.2
+LARGEST_ERROR = 3.0e-3  # of volume, standoff and contact areas
+
+
+class JointMeshError(ValueError):
+    """A joint that cannot be meshed to the required quality; names the joint, the value and the allowed range."""
+
+
+@dataclass(frozen=True, slots=True)
+class JointMesh:
+    """Hexahedra of one joint, or of several that are one body, in their place.
+
+    Attributes:
+        name: JEDEC name, or several joined by "+".
+        points: (n, 3) [m].
+        cells: part name -> (c, 8) int32.
+        facets: facet set name -> (f, 4) int32, seen from outside counter-clockwise.
+        volume_error: of the solder in its place against the body that it fills, relative.
+        section_scale: factor by which free outlines were scaled to keep the volume.
+        head_mismatch: largest distance by which its head was sheared to lie on the package's underside [m].
+        tetrahedra: of which it was made, in its place, if it is free-form.
+        record: what else is told of it: how it was made, its errors against the given surface.
+    """
+
+    name: str
+    points: np.ndarray
+    cells: dict[str, np.ndarray]
+    facets: dict[str, np.ndarray]
+    volume_error: float
+    section_scale: float
+    head_mismatch: float
+    tetrahedra: QuadraticTetrahedra | None = None
+    record: dict[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class _Pad:
+    """A copper pad: name of its joint, radius [m], and the nodes of its edge where it is wider than its solder."""
+
+    name: str
+    radius: float
+    rim: np.ndarray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+
+
+@dataclass(slots=True)
+class _Stack:
+    """A joint while its parts are put on each other."""
+
+    points: np.ndarray
+    cells: dict[str, np.ndarray]
+    facets: dict[str, np.ndarray]
+
+
+def build_joint(solder: Solder, sites: Sequence[PadSite], copper: float | None, place: JointPlace) -> JointMesh:
+    """Put a body of solder in its place and copper pads on its wetted faces.
+
+    Args:
+        solder: in its own frame.
+        sites: of the joints whose pads it wets: a face lies on the pad that is nearest.
+        copper: thickness of the pads [m]; none where solder sits on plates, or fills the place of copper.
+        place: from the own frame to the assembly.
+
+    Raises:
+        JointMeshError: a scaled Jacobian is too small.
+    """
+    own, pads = solder.points, []
+    for face in solder.faces:
+        pad = _pad_of(solder, face, sites, place)
+        rim = np.empty((0, 3)) if copper is None else _rim(solder, face, pad.radius)
+        pads.append(replace(pad, rim=np.arange(len(own), len(own) + len(rim))))
+        own = np.vstack([own, rim])
+    name = place.site.name
+    stack = _Stack(place(own), {f"solder@{name}": solder.cells}, {})
+    for face, pad in zip(solder.faces, pads, strict=True):
+        _add_pad(stack, face, pad, copper)
+    cells = {part: hexahedra.astype(np.int32) for part, hexahedra in stack.cells.items()}
+    facets = {part: quads.astype(np.int32) for part, quads in stack.facets.items()}
+    _check_quality(stack.points, cells)
+    heads = np.concatenate([np.unique(face.quads) for face in solder.faces if face.side == "package"])
+    volume = float(volumes(stack.points, cells[f"solder@{name}"]).sum())
+    tetrahedra = solder.tetrahedra and replace(solder.tetrahedra, points=place(solder.tetrahedra.points))
+    return JointMesh(
+        name=name,
+        points=stack.points,
+        cells=cells,
+        facets=facets,
+        volume_error=abs(volume / solder.volume - 1.0),
+        section_scale=solder.scale,
+        head_mismatch=float(np.abs(place.rise(solder.points[heads])).max()),
+        tetrahedra=tetrahedra,
+        record={"tetrahedra": tetrahedra_quality(tetrahedra, solder.volume)} if tetrahedra else {},
+    )
+
+
+def check_errors(mesh: JointMesh, errors: dict[str, float], largest_deviation: float) -> None:
+    """Raise JointMeshError where volume, standoff, contact areas or shape [m] are too far from the given surface's."""
+    limits = dict.fromkeys(("volume_error", "standoff_error", "contact_area_error"), LARGEST_ERROR)
+    limits["shape_deviation"] = largest_deviation
+    for name, value in {"volume_error": mesh.volume_error, **errors}.items():
+        if not value <= limits[name]:
+            raise JointMeshError(f"{name} {value:.3g}, allowed <= {limits[name]:.3g}")
+
+
+def joint_quality(mesh: JointMesh) -> dict:
+    """Return the quality of a joint mesh.
+
+    Returns:
+        volume_error, section_scale, head_mismatch (see ``JointMesh``), minimum_scaled_jacobian, smallest_length:
+        material role -> volume over largest face of the thinnest element [m], and what the mesh's record holds.
+    """
+    lengths: dict[str, float] = {}
+    for part, cells in mesh.cells.items():
+        role = part.split("@")[0].split("_")[0]
+        lengths[role] = min(lengths.get(role, math.inf), float(shortest_lengths(mesh.points, cells).min()))
+    return {
+        "volume_error": mesh.volume_error,
+        "section_scale": mesh.section_scale,
+        "head_mismatch": mesh.head_mismatch,
+        "minimum_scaled_jacobian": min(
+            float(scaled_jacobian(mesh.points, cells).min()) for cells in mesh.cells.values()
+        ),
+        "smallest_length": lengths,
+        **mesh.record,
+    }
+
+
+def _pad_of(solder: Solder, face: WettedFace, sites: Sequence[PadSite], place: JointPlace) -> _Pad:
+    """Find the pad that a face lies on."""
+    centre = place(solder.points[face.rim]).mean(axis=0)
+    site = min(sites, key=lambda site: math.dist((site.x, site.y), centre[:2]))
+    return _Pad(site.name, site.pad_radius_board if face.side == "board" else site.pad_radius_package)
+
+
+def _rim(solder: Solder, face: WettedFace, pad_radius: float) -> np.ndarray:
+    """Return the nodes (r, 3) of a copper pad's edge in its plane, none where the solder covers the pad."""
+    wetted_radius = math.sqrt(quad_areas(solder.points, face.quads).sum() / math.pi)
+    if not has_rim(pad_radius, wetted_radius):
+        return np.empty((0, 3))
+    outline = solder.points[face.rim]
+    centre = outline.mean(axis=0)
+    rim = centre + pad_radius / wetted_radius * (outline - centre)
+    rim[:, 2] = 0.0 if face.side == "board" else solder.planes.height(rim[:, 0], rim[:, 1])
+    return rim
+
+
+def _add_pad(stack: _Stack, face: WettedFace, pad: _Pad, copper: float | None) -> None:
+    """Name a wetted face, and put copper on it as wide as its rim reaches."""
+    board, quads = face.side == "board", face.quads
+    end = "foot" if board else "head"
+    facets = {f"pad_{face.side}@{pad.name}": quads, f"{end}@{pad.name}": quads}
+    if copper is not None:
+        if len(pad.rim):
+            around = np.column_stack([face.rim, pad.rim, np.roll(pad.rim, -1), np.roll(face.rim, -1)])
+            quads = np.vstack([quads, around])
+        nodes, local = np.unique(quads, return_inverse=True)
+        beyond = len(stack.points) + local.reshape(quads.shape)
+        step = [0.0, 0.0, -copper if board else copper]
+        stack.points = np.vstack([stack.points, stack.points[nodes] + step])
+        stack.cells[f"copper_{face.side}@{pad.name}"] = np.hstack([beyond, quads] if board else [quads, beyond])
+        facets[f"{end}@{pad.name}"] = beyond
+    stack.facets |= {name: faces[:, ::-1] if board else faces for name, faces in facets.items()}
+
+
+def _check_quality(points: np.ndarray, cells: dict[str, np.ndarray]) -> None:
+    for part, hexahedra in cells.items():
+        worst = float(scaled_jacobian(points, hexahedra).min())
+        if worst <= MINIMUM_SCALED_JACOBIAN:
+            raise JointMeshError(f"{part}: smallest scaled Jacobian {worst:.3f}, allowed > {MINIMUM_SCALED_JACOBIAN}")

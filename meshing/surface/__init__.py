@@ -1,0 +1,1 @@
+"""Closed surfaces of joints: from particles, from a formula, from a user's file."""

@@ -1,0 +1,33 @@
+"""A truncated sphere as the closed surface of a joint."""
+
+import math
+
+import numpy as np
+
+from meshing.surface.closed_surface import ClosedSurface, close_surface
+from meshing.surface.truncated_sphere import TruncatedSphere
+
+AROUND, LEVELS = 96, 97  # vertices of a circle, circles
+
+
+def sphere_surface(sphere: TruncatedSphere, around: int = AROUND, levels: int = LEVELS) -> ClosedSurface:
+    """Triangulate a truncated sphere in the joint's own frame; each section has the area of its circle.
+
+    Args:
+        sphere: the body.
+        around: vertices of a section.
+        levels: sections, equal steps of height apart.
+    """
+    heights = np.linspace(0.0, sphere.height, levels)
+    angles = 2.0 * math.pi * np.arange(around) / around
+    of_area = math.sqrt(angles[1] / math.sin(angles[1]))  # a polygon inscribed in a circle encloses less than it
+    radii = of_area * np.sqrt(sphere.radius**2 - (heights - sphere.centre) ** 2)
+    x, y = radii[:, None] * np.cos(angles), radii[:, None] * np.sin(angles)
+    points = np.stack([x, y, np.broadcast_to(heights[:, None], x.shape)], axis=-1).reshape(-1, 3)
+    ring = np.arange(around)
+    first = (np.arange(levels - 1)[:, None] * around + ring).ravel()
+    second = (np.arange(levels - 1)[:, None] * around + np.roll(ring, -1)).ravel()
+    triangles = np.vstack(
+        [np.column_stack([first, second, second + around]), np.column_stack([first, second + around, first + around])]
+    )
+    return close_surface(points, triangles, ring, (levels - 1) * around + ring)

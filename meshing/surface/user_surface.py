@@ -1,0 +1,234 @@
+"""Surfaces of joints from elsewhere, as X-ray tomography: read, checked, laid between their pads."""
+
+from contextlib import redirect_stderr, redirect_stdout
+from dataclasses import dataclass
+from functools import lru_cache
+from io import StringIO
+from pathlib import Path
+from typing import Literal
+
+import meshio
+import numpy as np
+
+from meshing.board.pad_planes import PadPlanes
+from meshing.board.pads import PadSite
+from meshing.core.outlines import pieces
+from meshing.surface.closed_surface import (
+    BOARD_PAD,
+    FREE,
+    PACKAGE_PAD,
+    ClosedSurface,
+    SurfaceError,
+    area_vectors,
+    check_surface,
+    volume_of,
+)
+from meshing.surface.surface_faults import check_triangulation
+
+Unit = Literal["um", "mm", "m"]
+UNITS: dict[Unit, float] = {"um": 1.0e-6, "mm": 1.0e-3, "m": 1.0}
+LARGEST = 1.0  # [m] of a vertex from the middle of all
+MOST_TRIANGLES = 200_000  # checked in about ten seconds
+SUFFIXES = (".stl", ".ply", ".vtu")
+CELLS = 1_000_002  # along the largest extent, in which vertices are one
+WELD = 1.0e-6  # of the largest extent: vertices nearer than this are one
+LEVEL = np.cos(np.radians(20.0))  # a pad's triangles face within 20 degrees of its normal
+FLAT = 0.02  # of the height: how far from its plane a pad's vertices may lie
+FITS = 4
+SMALLEST_PAD = 0.3  # of the wetted radius of the site
+GAP_RANGE = 0.1  # of the site's gap: how far the surface's may differ
+
+
+@dataclass(frozen=True, slots=True)
+class _End:
+    """A flat end: outward unit normal, a point of its plane, and its triangles (rows)."""
+
+    normal: np.ndarray
+    point: np.ndarray
+    rows: np.ndarray
+
+
+def load_surface(path: Path, unit: Unit, site: PadSite) -> ClosedSurface:
+    """Read a closed surface, find its pads and lay it between those of its site.
+
+    Its z axis points roughly from the board to the package, x and y are the board's. The lower flat end comes to z = 0,
+    its centre on the axis; where the upper end is not the site's plane, heights are stretched to it.
+
+    Args:
+        path: STL, PLY or VTU file of triangles.
+        unit: of its coordinates.
+        site: where the joint sits.
+
+    Raises:
+        SurfaceError: the file, what is wrong with it, where in its own coordinates, and what is allowed.
+    """
+    try:
+        points, triangles = closed_triangles(path, unit)
+        _check_height(points, unit, site)
+        return _between_pads(points, triangles, site)
+    except SurfaceError as error:
+        raise SurfaceError(f"surface of joint {site.name}, {path}: {error}") from error
+
+
+def file_volume(path: Path, unit: Unit) -> float:
+    """Return the volume [m^3] that a file that ``load_surface`` took encloses before its heights are stretched."""
+    return volume_of(*closed_triangles(path, unit))
+
+
+def closed_triangles(path: Path, unit: Unit) -> tuple[np.ndarray, np.ndarray]:
+    """Return vertices [m] and triangles of a file that enclose a body, wherever that is; errors as ``load_surface``."""
+    if path.suffix.lower() not in SUFFIXES:
+        raise SurfaceError(f"suffix {path.suffix or 'none'}, allowed {', '.join(SUFFIXES)}")
+    try:
+        found = path.stat()
+    except (OSError, ValueError) as error:
+        raise SurfaceError("no such file") from error
+    read = _read_version(path, unit, (found.st_mtime_ns, found.st_size, found.st_ino))
+    if isinstance(read, SurfaceError):
+        raise read
+    return read
+
+
+@lru_cache(maxsize=8)
+def _read_version(
+    path: Path, unit: Unit, version: tuple[int, int, int]
+) -> tuple[np.ndarray, np.ndarray] | SurfaceError:
+    """Read and check a version of a file, which several joints may name; or return what is wrong with it."""
+    try:
+        points, triangles = _welded(*_read(path, UNITS[unit]))
+        check_triangulation(points, triangles, UNITS[unit])
+        return points, triangles
+    except SurfaceError as error:
+        return error
+
+
+def _read(path: Path, scale: float) -> tuple[np.ndarray, np.ndarray]:
+    try:
+        with redirect_stdout(StringIO()), redirect_stderr(StringIO()), np.errstate(all="ignore"):  # meshio prints
+            mesh = meshio.read(path)
+    except (Exception, SystemExit) as error:  # whatever a reader makes of a broken file
+        kind = path.suffix[1:].upper()
+        raise SurfaceError(f"cannot be read as {kind}: it is damaged, cut off, or of another format") from error
+    others = sorted({block.type for block in mesh.cells} - {"triangle", "vertex", "line"})
+    if others or not len(mesh.cells_dict.get("triangle", ())):
+        raise SurfaceError(f"holds {', '.join(others) or 'no facets'}, allowed triangles")
+    points, triangles = np.asarray(mesh.points, float), mesh.cells_dict["triangle"].astype(np.int64)
+    _check_numbers(points, triangles)
+    _check_extent(scale * points[:, :3])
+    return scale * points[:, :3], triangles
+
+
+def _check_numbers(points: np.ndarray, triangles: np.ndarray) -> None:
+    """Refuse vertices that are no points, and triangles of vertices that are not there."""
+    if points.ndim != 2 or points.shape[1] < 3:
+        raise SurfaceError("has vertices without three coordinates")
+    if len(triangles) > MOST_TRIANGLES:
+        raise SurfaceError(f"has {len(triangles)} triangles, allowed up to {MOST_TRIANGLES}")
+    wrong = ((triangles < 0) | (triangles >= len(points))).any(axis=1)
+    if wrong.any():
+        row = int(np.argmax(wrong))
+        vertices = ", ".join(map(str, triangles[row]))
+        raise SurfaceError(f"triangle {row} has the vertices {vertices}, allowed 0 to {len(points) - 1}")
+    finite = np.isfinite(points[:, :3]).all(axis=1)
+    if not finite.all():
+        raise SurfaceError(f"vertex {int(np.argmin(finite))} has coordinates that are not numbers")
+
+
+def _check_extent(points: np.ndarray) -> None:
+    """Refuse vertices (n, 3) [m] far away from all others, beside which these would be one point."""
+    distance = np.abs(points - np.median(points, axis=0)).max(axis=1)
+    if distance.max() > LARGEST:
+        told = f"vertex {int(distance.argmax())} lies {distance.max():.3g} m away from the others"
+        raise SurfaceError(f"{told}, allowed up to {LARGEST:g} m")
+
+
+def _welded(points: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Make vertices that lie together one, and drop triangles that thereby vanish."""
+    extent = float(np.ptp(points[np.unique(triangles)], axis=0).max())
+    if extent == 0.0:
+        raise SurfaceError("all its vertices are one point")
+    cells = np.round((points - points[np.unique(triangles)].min(axis=0)) / (WELD * extent)).clip(-1, CELLS - 1)
+    cell = (cells.astype(np.int64) + 1) @ np.array([(CELLS + 1) ** 2, CELLS + 1, 1])
+    _, first, number = np.unique(cell, return_index=True, return_inverse=True)
+    merged = number[triangles]
+    whole = (merged != np.roll(merged, 1, axis=1)).all(axis=1)
+    if not whole.any():
+        raise SurfaceError(f"all its triangles are smaller than {WELD * extent:.3g} m, {WELD:g} of its extent")
+    used, compact = np.unique(merged[whole], return_inverse=True)
+    return points[first][used], compact.reshape(-1, 3)
+
+
+def _check_height(points: np.ndarray, unit: Unit, site: PadSite) -> None:
+    """Refuse a height that is no gap in this unit, and say in which it would be."""
+    height, (least, most) = float(np.ptp(points[:, 2])), (0.5 * site.gap, 2.0 * site.gap)
+    if least < height < most:
+        return
+    told = f"height {height:.4g} m with lengths in {unit}, allowed {least:.4g} to {most:.4g} m"
+    better = [name for name, value in UNITS.items() if least < height * value / UNITS[unit] < most]
+    raise SurfaceError(told + (f"; is it in {better[0]}?" if better else ""))
+
+
+def _between_pads(points: np.ndarray, triangles: np.ndarray, site: PadSite) -> ClosedSurface:
+    """Turn the lower end into z = 0, flatten both ends and stretch heights to the site's upper plane."""
+    lower = _flat_end(points, triangles, -1.0, site.wetted_radius_board)
+    points = (points - lower.point) @ _upright(-lower.normal).T
+    upper = _flat_end(points, triangles, 1.0, site.wetted_radius_package)
+    boundary = np.full(len(triangles), FREE, dtype=np.int32)
+    boundary[lower.rows], boundary[upper.rows] = BOARD_PAD, PACKAGE_PAD
+    planes = PadPlanes.fit(points, triangles[upper.rows])
+    if abs(planes.gap / site.gap - 1.0) > GAP_RANGE:
+        allowed = f"{(1.0 - GAP_RANGE) * site.gap:.4g} to {(1.0 + GAP_RANGE) * site.gap:.4g} m"
+        raise SurfaceError(f"its flat ends are {planes.gap:.4g} m apart, allowed {allowed}")
+    points[np.unique(triangles[lower.rows]), 2] = 0.0
+    top = np.unique(triangles[upper.rows])
+    points[top, 2] = planes.height(points[top, 0], points[top, 1])
+    target = PadPlanes(site.gap, np.array(site.offset), site_slope(site))
+    stretch = target.height(points[:, 0], points[:, 1]) / planes.height(points[:, 0], points[:, 1])
+    points[:, 2] *= stretch
+    surface = ClosedSurface(points, triangles.astype(np.int32), boundary)
+    check_surface(surface)
+    return surface
+
+
+def site_slope(site: PadSite) -> np.ndarray:
+    """Return the rise along x and y (2,) of a plane that was turned by the site's tilt."""
+    turn_x, turn_y = site.tilt
+    angle = float(np.hypot(turn_x, turn_y))
+    steep = np.tan(angle) / angle if angle else 1.0
+    return steep * np.array([-turn_y, turn_x])
+
+
+def _flat_end(points: np.ndarray, triangles: np.ndarray, upward: float, wetted_radius: float) -> _End:
+    """Find the flat end that faces up (1) or down (-1): a plane through what faces this way at the very end.
+
+    The plane is fitted again to the triangles in it, whose largest connected piece is the end.
+    """
+    areas = area_vectors(points, triangles)
+    sizes = np.linalg.norm(areas, axis=1)
+    normals, centres = areas / sizes[:, None], points[triangles].mean(axis=1)
+    height = float(np.ptp(points[:, 2]))
+    end = upward * (upward * points[:, 2]).max()
+    rows = np.flatnonzero((np.abs(centres[:, 2] - end) < 5.0 * FLAT * height) & (upward * normals[:, 2] > LEVEL))
+    for _ in range(FITS):
+        if not len(rows):
+            break
+        normal = areas[rows].sum(axis=0) / np.linalg.norm(areas[rows].sum(axis=0))
+        point = sizes[rows] @ centres[rows] / sizes[rows].sum()
+        off = np.abs((points[triangles] - point) @ normal).max(axis=1)
+        flat = np.flatnonzero((off < FLAT * height) & (normals @ normal > LEVEL))
+        rows = flat[pieces(triangles[flat])[0]] if len(flat) else flat
+    radius = float(np.sqrt(sizes[rows].sum() / np.pi)) if len(rows) else 0.0
+    if radius < SMALLEST_PAD * wetted_radius:
+        side = "upper" if upward > 0.0 else "lower"
+        allowed = f"allowed >= {SMALLEST_PAD * wetted_radius:.4g} m"
+        raise SurfaceError(
+            f"its {side} end, z = {end:.4g} m, is flat on a disc of radius {radius:.4g} m only, {allowed}"
+        )
+    return _End(normal, point, rows)
+
+
+def _upright(normal: np.ndarray) -> np.ndarray:
+    """Return the smallest rotation (3, 3) that takes a unit vector to the z axis (Rodrigues)."""
+    axis, cosine = np.cross(normal, [0.0, 0.0, 1.0]), normal[2]
+    cross = np.array([[0.0, -axis[2], axis[1]], [axis[2], 0.0, -axis[0]], [-axis[1], axis[0], 0.0]])
+    return np.eye(3) + cross + cross @ cross / (1.0 + cosine)

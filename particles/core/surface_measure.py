@@ -1,0 +1,154 @@
+"""Area and volume of a triangulated free surface that ends on flat walls, and their gradients.
+
+The liquid body is closed by the polygons of its contact lines, each of which lies in the plane of its wall.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+from scipy import sparse
+
+from particles.core.plate import Plate
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.int32]
+
+
+@njit(cache=True)
+def area_vector(points, i, j, k):
+    """Normal of a triangle, of twice its area [m^2]."""
+    ux, uy, uz = points[j, 0] - points[i, 0], points[j, 1] - points[i, 1], points[j, 2] - points[i, 2]
+    vx, vy, vz = points[k, 0] - points[i, 0], points[k, 1] - points[i, 1], points[k, 2] - points[i, 2]
+    return uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+
+
+@njit(cache=True)
+def surface_area(points, triangles):
+    """Area of the triangles [m^2]; `points (n, 3)`, `triangles (t, 3)`."""
+    total = 0.0
+    for t in range(triangles.shape[0]):
+        x, y, z = area_vector(points, triangles[t, 0], triangles[t, 1], triangles[t, 2])
+        total += np.sqrt(x * x + y * y + z * z)
+    return 0.5 * total
+
+
+@njit(cache=True)
+def _volume_and_gradient(points, triangles, gradient):
+    """Sum of the tetrahedra (origin, triangle); adds its gradient."""
+    total = 0.0
+    for t in range(triangles.shape[0]):
+        for k in range(3):
+            i, j, m = triangles[t, k], triangles[t, (k + 1) % 3], triangles[t, (k + 2) % 3]
+            cx = points[j, 1] * points[m, 2] - points[j, 2] * points[m, 1]
+            cy = points[j, 2] * points[m, 0] - points[j, 0] * points[m, 2]
+            cz = points[j, 0] * points[m, 1] - points[j, 1] * points[m, 0]
+            gradient[i, 0] += cx / 6.0
+            gradient[i, 1] += cy / 6.0
+            gradient[i, 2] += cz / 6.0
+            if k == 0:
+                total += (points[i, 0] * cx + points[i, 1] * cy + points[i, 2] * cz) / 6.0
+    return total
+
+
+def _area_vector(points: Floats, ring: Indices) -> Floats:
+    """Normal of the polygon of a contact line times its area, `(3,)` [m^2] (shoelace formula in space)."""
+    x = points[ring] - points[ring].mean(axis=0)
+    return 0.5 * np.cross(x, np.roll(x, -1, axis=0)).sum(axis=0)
+
+
+def ring_area(points: Floats, ring: Indices) -> float:
+    """Area of the plane polygon of a contact line [m^2]."""
+    return float(np.linalg.norm(_area_vector(points, ring)))
+
+
+def ring_area_gradient(points: Floats, ring: Indices) -> Floats:
+    """Gradient of `ring_area` with respect to the vertices of the ring, `(k, 3)` [m]."""
+    x, normal = points[ring], _area_vector(points, ring)
+    normal /= np.linalg.norm(normal)
+    return 0.5 * np.cross(np.roll(x, -1, axis=0) - np.roll(x, 1, axis=0), normal)
+
+
+def wall_corners(points: Floats, ring: Indices, plate: Plate) -> Floats:
+    """Triangles around the mean of a contact line that close the body on a wall, `(k, 3, 3)`, outward oriented."""
+    x = points[ring]
+    after = np.roll(x, -1, axis=0)
+    centre = np.broadcast_to(x.mean(axis=0), x.shape)
+    return np.stack((centre, x, after) if plate.side > 0.0 else (centre, after, x), axis=1)
+
+
+def volume_and_gradient(
+    points: Floats, triangles: Indices, rings: Sequence[Indices], plates: Sequence[Plate]
+) -> tuple[float, Floats]:
+    """Volume enclosed by the surface and the polygons of the contact lines [m^3], and its gradient `(n, 3)` [m^2].
+
+    Divergence theorem: 3 V = integral of x . n over the free surface and over the walls. A wall is where its contact
+    line is: the gradient's part along the wall's normal is the work of the pressure on the wall that moves.
+    """
+    gradient = np.zeros_like(points)
+    volume = _volume_and_gradient(points, triangles, gradient)
+    for ring, plate in zip(rings, plates, strict=True):
+        x, sixth = points[ring], plate.side / 6.0
+        centre, normals = x.mean(axis=0), np.cross(x, np.roll(x, -1, axis=0)).sum(axis=0)
+        volume += sixth * float(centre @ normals)
+        edges = np.roll(x, -1, axis=0) - np.roll(x, 1, axis=0)
+        gradient[ring] += sixth * (np.cross(edges, centre) + normals / len(ring))
+    return volume, gradient
+
+
+def centre_of_volume(points: Floats, triangles: Indices) -> Floats:
+    """Centre `(3,)` [m] of the volume in a closed surface, by tetrahedra with the origin."""
+    corner = points[triangles]
+    volumes = np.einsum("td,td->t", corner[:, 0], np.cross(corner[:, 1], corner[:, 2])) / 6.0
+    return (volumes @ corner.sum(axis=1)) / (4.0 * volumes.sum())
+
+
+@njit(cache=True)
+def surface_flux(points, triangles, velocity):
+    """Volume that each vertex of the surface sweeps in a unit of time, `(k,)` [m^3/s], for `velocity (k, 3)`.
+
+    A third of the area vectors of its triangles times the velocity: over a closed surface the sum is dV/dt.
+    """
+    flux = np.zeros(velocity.shape[0])
+    for t in range(triangles.shape[0]):
+        a, b, c = triangles[t]
+        x, y, z = area_vector(points, a, b, c)
+        for v in (a, b, c):
+            flux[v] += (x * velocity[v, 0] + y * velocity[v, 1] + z * velocity[v, 2]) / 6.0
+    return flux
+
+
+def enclosed_volume(points: Floats, triangles: Indices, rings: Sequence[Indices], plates: Sequence[Plate]) -> float:
+    """Volume enclosed by the surface and the walls [m^3]."""
+    return volume_and_gradient(points, triangles, rings, plates)[0]
+
+
+@njit(cache=True)
+def _cotangents(points, triangles):
+    """Cotangent of the angle at each corner of each triangle, `(t, 3)`."""
+    result = np.empty(triangles.shape)
+    for t in range(triangles.shape[0]):
+        for k in range(3):
+            a, b, c = triangles[t, k], triangles[t, (k + 1) % 3], triangles[t, (k + 2) % 3]
+            along = 0.0
+            for d in range(3):
+                along += (points[b, d] - points[a, d]) * (points[c, d] - points[a, d])
+            x, y, z = area_vector(points, a, b, c)
+            result[t, k] = along / np.sqrt(x * x + y * y + z * z)
+    return result
+
+
+def cotangent_laplacian(points: Floats, triangles: Indices, size: int) -> sparse.csr_matrix:
+    """Stiffness K of the surface Laplacian, `(size, size)`, no unit.
+
+    Symmetric, positive semidefinite; K x is exactly the gradient of the area of the triangulation
+    (Pinkall & Polthier 1993).
+    """
+    half = 0.5 * _cotangents(points, triangles)
+    i, j = np.roll(triangles, -1, axis=1).ravel(), np.roll(triangles, -2, axis=1).ravel()
+    weight = half.ravel()
+    rows = np.concatenate((i, j, i, j))
+    columns = np.concatenate((j, i, i, j))
+    values = np.concatenate((-weight, -weight, weight, weight))
+    return sparse.csr_matrix((values, (rows, columns)), shape=(size, size))

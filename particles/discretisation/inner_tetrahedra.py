@@ -1,0 +1,120 @@
+"""Tetrahedra that fill a body of any shape; their boundary off the walls is the tracked surface, face by face.
+
+Delaunay tetrahedra of all particles, less those outside the surface, have a boundary that differs from the surface
+where this is not Delaunay itself. The difference is a closed surface, or ends on a wall: its cone, tetrahedra from one
+of its vertices, is added. Some of these are inverted and count negatively, so that the volume and its gradient are
+exactly those of the surface.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse.csgraph import connected_components
+
+from particles.core.body import Body
+from particles.core.surface_measure import wall_corners
+from particles.core.tetrahedra import boundary_triangles, cell_volumes, tetrahedralise, thick_cells
+from particles.core.winding_number import winding_numbers
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.int32]
+Mask = NDArray[np.bool_]
+
+
+def fill(body: Body) -> Indices:
+    """Tetrahedra between the particles of a body, `(t, 4)`."""
+    cells = tetrahedralise(body.points, body.cloud.spacing)
+    wall = body.cloud.wall
+    cells = cells[~_on_one_wall(wall, cells)]
+    cells = cells[_inside(body, cells)]
+    faces = boundary_triangles(cells)
+    faces = faces[~_on_one_wall(wall, faces)]
+    difference, start = _difference(body.triangles, faces)
+    return cells if len(difference) == 0 else np.concatenate((cells, _cones(difference, start, wall)))
+
+
+def _on_one_wall(wall: NDArray[np.int8], simplices: Indices) -> Mask:
+    """Whether all corners lie on the same wall."""
+    walls = wall[simplices]
+    return (walls[:, 0] >= 0) & (walls == walls[:, :1]).all(axis=1)
+
+
+def _inside(body: Body, cells: Indices) -> Mask:
+    """Whether tetrahedra lie inside the surface; only those whose corners all lie on the boundary may not.
+
+    Flat ones among these count as outside: where one is inside, it is a cone.
+    """
+    cloud, points = body.cloud, body.points
+    bounding = (np.arange(len(points)) < cloud.surface_count) | (cloud.wall >= 0)
+    loose = ~bounding[cells].all(axis=1)
+    thick = thick_cells(cell_volumes(points, cells))
+    doubtful = thick[~loose[thick]]
+    walls = [wall_corners(points, *on_wall) for on_wall in zip(cloud.rings, body.plates, strict=True)]
+    corners = np.concatenate([points[body.triangles], *walls])
+    inside = loose
+    inside[doubtful] = winding_numbers(points[cells[doubtful]].mean(axis=1), corners) > 0.5
+    return inside
+
+
+def _oriented(triangles: Indices) -> Indices:
+    """The same triangles, each from its smallest vertex."""
+    first = np.argmin(triangles, axis=1)[:, None]
+    return np.take_along_axis(triangles, (first + np.arange(3)) % 3, axis=1)
+
+
+def _difference(triangles: Indices, others: Indices) -> tuple[Indices, int]:
+    """Triangles that are not among the others, then the others not among them, turned over; and where these start."""
+    both = np.concatenate((_oriented(triangles), _oriented(others)))
+    _, first, count = np.unique(both, axis=0, return_index=True, return_counts=True)
+    alone = np.sort(first[count == 1])
+    own = alone < len(triangles)
+    return np.concatenate((both[alone[own]], both[alone[~own]][:, ::-1])), int(own.sum())
+
+
+def _components(numbers: Indices, joins: Mask) -> Indices:
+    """Components of triangles, given the numbers of their edges `(t, 3)`, that are connected by the edges that join."""
+    triangle, number = np.repeat(np.arange(len(numbers)), 3), numbers.ravel()
+    keep = joins[number]
+    shares = sparse.csr_matrix((np.ones(keep.sum()), (triangle[keep], number[keep])), (len(numbers), len(joins)))
+    return connected_components(shares @ shares.T, directed=False)[1]
+
+
+def _parts(triangles: Indices, start: int) -> Indices:
+    """The closed part that each triangle of a difference belongs to, `(t,)`.
+
+    Two patches of the same corners, one of each surface, are a flipped edge or a few: a part of its own. So neighbours
+    that flip, as on a lattice, do not make one large part. What is left is parted where it is not connected.
+    """
+    edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    numbers = np.unique(edges, axis=0, return_inverse=True)[1].reshape(-1, 3)
+    own, other = (np.bincount(side.ravel(), minlength=numbers.max() + 1) for side in (numbers[:start], numbers[start:]))
+    patch = _components(numbers, (own == 0) | (other == 0))
+    mate = _mates(triangles, numbers, patch)
+    part, left = mate[patch], mate[patch] < 0
+    part[left] = len(triangles) + _components(numbers[left], np.ones(len(own), bool))
+    return np.unique(part, return_inverse=True)[1].reshape(-1)
+
+
+def _mates(triangles: Indices, numbers: Indices, patch: Indices) -> Indices:
+    """For each patch the smaller number of itself and the patch that closes it, -1 if no patch of its corners does."""
+    order = np.argsort(patch, kind="stable")
+    members = np.split(order, np.cumsum(np.bincount(patch))[:-1])
+    mate, known = np.full(len(members), -1), dict[bytes, int]()
+    for number, member in enumerate(members):
+        first = known.setdefault(np.unique(triangles[member]).tobytes(), number)
+        pair = numbers[np.concatenate((member, members[first]))]
+        if first != number and mate[first] < 0 and (np.unique(pair, return_counts=True)[1] == 2).all():
+            mate[number] = mate[first] = first
+    return mate
+
+
+def _cones(triangles: Indices, start: int, wall: NDArray[np.int8]) -> Indices:
+    """Tetrahedra between each part and its apex: the vertex of most of its triangles, on a wall if it can."""
+    part = _parts(triangles, start)
+    triangle = np.repeat(np.arange(len(triangles)), 3)
+    shape = (int(part.max()) + 1, len(wall))
+    votes = sparse.csr_matrix((np.ones(len(triangle)), (part[triangle], triangles.ravel())), shape=shape)
+    votes = votes + votes.multiply((wall >= 0)[None] * float(len(triangles)))
+    apex = np.asarray(votes.argmax(axis=1)).ravel()[part].astype(np.int32)
+    cones = np.column_stack((apex, triangles))
+    return cones[(triangles != apex[:, None]).all(axis=1)]

@@ -1,0 +1,161 @@
+"""Parameters of the solder that are each allowed but make no joint together. Loads neither numba nor PETSc."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import degrees, pi
+
+from particles.core.geometry import JointGeometry
+from particles.parameters.effects import Decision, acting_weight, decide_effects
+from particles.parameters.solder import Solder
+from particles.reference.young_laplace import NoMeridian, joint_meridian
+
+SPACINGS_IN_NECK = 2.0
+SPACINGS_IN_GAP = 3.0
+SPACINGS_IN_RADIUS = 2.0
+LARGEST_EXPLICIT = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """One impossible value.
+
+    Attributes:
+        key: dotted key as in the case file.
+        value: the value with its unit.
+        allowed: the allowed range.
+        message: what is wrong, and at which joint.
+    """
+
+    key: str
+    value: str
+    allowed: str
+    message: str
+
+
+def problems(solder: Solder, geometries: Mapping[str, JointGeometry], pitch: float) -> list[Problem]:
+    """Find what cannot work before anything runs.
+
+    Joints thin with their gap: of joints with equal discs only the smallest and the largest gap are examined.
+
+    Args:
+        solder: the solder.
+        geometries: joint name to geometry.
+        pitch: distance of neighbouring joints [m].
+    """
+    effects = decide_effects(next(iter(geometries.values())), solder)
+    found = scheme_problems(solder) + effect_problems(solder, effects) + _angle_problems(solder)
+    if found:
+        return found
+    by_discs: dict[tuple[float, float], list[str]] = {}
+    for name, geometry in geometries.items():
+        by_discs.setdefault((geometry.radius_board, geometry.radius_package), []).append(name)
+    for names in by_discs.values():
+        names.sort(key=lambda name: geometries[name].gap)
+        low, high = names[0], names[-1]
+        found += _spacing_problems(solder, low, geometries[low])
+        found += _too_much(solder, low, geometries[low], pitch)
+        found += _too_thin(solder, high, geometries[high])
+    return list({problem.key: problem for problem in found}.values())
+
+
+def scheme_problems(solder: Solder) -> list[Problem]:
+    """Find a time step, a basis or a wall that the scheme cannot take, and a wall that is not fully given."""
+    return _wall_problems(solder) + _time_step_problems(solder) + _basis_problems(solder)
+
+
+def effect_problems(solder: Solder, effects: Mapping[str, Decision]) -> list[Problem]:
+    """Find solder that never comes to rest, since without surface tension nothing gives it a shape."""
+    tension = effects["surface_tension"]
+    if tension["on"] or effects["inertia"]["on"]:
+        return []
+    message = f"nothing brings the solder to rest without surface tension; {tension['why']}"
+    return [Problem("solder.effects.surface_tension", solder.effects.surface_tension, "on", message)]
+
+
+def _wall_problems(solder: Solder) -> list[Problem]:
+    if solder.numerics.scheme == "gripc" and solder.wall != "free-slip":
+        return [Problem("solder.wall", solder.wall, "free-slip", 'liquid slides freely in scheme "gripc"')]
+    if (solder.wall == "slip") == (solder.slip_length is not None):
+        return []
+    value = "none" if solder.slip_length is None else mm(solder.slip_length)
+    message = 'the slip length belongs to wall = "slip", which needs it'
+    return [Problem("solder.slip_length", value, 'a length with wall = "slip", else none', message)]
+
+
+def _time_step_problems(solder: Solder) -> list[Problem]:
+    numerics = solder.numerics
+    if numerics.scheme != "gripc" or numerics.time_step_limit <= LARGEST_EXPLICIT:
+        return []
+    message = 'scheme "gripc" takes surface tension explicitly: no step above the capillary limit is stable'
+    key = "solder.numerics.time_step_limit"
+    return [Problem(key, f"{numerics.time_step_limit:g}", f"<= {LARGEST_EXPLICIT:g}", message)]
+
+
+def _basis_problems(solder: Solder) -> list[Problem]:
+    basis = solder.numerics.basis
+    if solder.numerics.scheme == "gripc" or basis == "quadratic":
+        return []
+    message = 'the scheme "energy" has no basis to choose'
+    return [Problem("solder.numerics.basis", basis, 'quadratic, or any with scheme = "gripc"', message)]
+
+
+def _angle_problems(solder: Solder) -> list[Problem]:
+    pad, mask = degrees(solder.pad_contact_angle), degrees(solder.mask_contact_angle)
+    if pad < mask:
+        return []
+    message = "the pad must be wetted better than the solder mask"
+    return [Problem("solder.pad_contact_angle", f"{pad:.4g} deg", f"< {mask:.4g} deg", message)]
+
+
+def _spacing_problems(solder: Solder, name: str, geometry: JointGeometry) -> list[Problem]:
+    spacing = solder.numerics.spacing
+    smallest_radius = min(geometry.radius_board, geometry.radius_package)
+    limit = min(geometry.gap / SPACINGS_IN_GAP, smallest_radius / SPACINGS_IN_RADIUS)
+    if spacing <= limit:
+        return []
+    message = f"too coarse for joint {name}: gap {mm(geometry.gap)}, smallest radius {mm(smallest_radius)}"
+    return [Problem("solder.numerics.spacing", mm(spacing), f"<= {mm(limit)}", message)]
+
+
+def _too_much(solder: Solder, name: str, geometry: JointGeometry, pitch: float) -> list[Problem]:
+    """More solder than there is room between the plates; less may still touch the neighbour, which the flow decides."""
+    limit = pitch**2 * geometry.gap
+    if solder.volume < limit:
+        return []
+    message = f"cannot fit: joint {name} has a gap of {mm(geometry.gap)} at the pitch of {mm(pitch)}"
+    return [Problem("solder.volume", mm3(solder.volume), f"< {mm3(limit)}", message)]
+
+
+def _too_thin(solder: Solder, name: str, geometry: JointGeometry) -> list[Problem]:
+    """A neck too thin for the particles. Where no neck spans the gap at all, the flow says that the joint is open."""
+    spacing, full = (
+        solder.numerics.spacing,
+        pi * geometry.gap * max(geometry.radius_board, geometry.radius_package) ** 2,
+    )
+    waist = None if solder.volume >= full else _waist(solder, geometry)
+    if waist is None or waist > SPACINGS_IN_NECK * spacing:
+        return []
+    limit = waist / SPACINGS_IN_NECK
+    message = f"too coarse for the neck of joint {name}, which is {mm(waist)} wide in its gap of {mm(geometry.gap)}"
+    return [Problem("solder.numerics.spacing", mm(spacing), f"< {mm(limit)}", message)]
+
+
+def _waist(solder: Solder, geometry: JointGeometry) -> float | None:
+    """Smallest diameter of the Young-Laplace joint [m]; none without equilibrium."""
+    discs = (geometry.radius_board, geometry.radius_package, geometry.gap)
+    limits = (solder.pad_contact_angle, solder.mask_contact_angle)
+    weight = acting_weight(solder, decide_effects(geometry, solder))
+    try:
+        return joint_meridian(solder.volume, *discs, solder.surface_tension, weight, angle_limits=limits).waist
+    except NoMeridian:
+        return None
+
+
+def mm(length: float) -> str:
+    """Write a length [m]."""
+    return f"{1e3 * length:.4g} mm"
+
+
+def mm3(volume: float) -> str:
+    """Write a volume [m^3]."""
+    return f"{1e9 * volume:.3g} mm^3"

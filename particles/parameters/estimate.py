@@ -1,0 +1,40 @@
+"""Particle count and cost of a reflow before it runs. Loads neither numba nor PETSc."""
+
+from particles.core.geometry import JointGeometry, joint_counts
+from particles.parameters.solder import Solder
+
+# Measured by benchmarks/bench_reflow_scale.py on one core of a 2-core x86-64 machine.
+SECONDS_PER_STEP = 0.02
+SECONDS_PER_STEP_AND_PARTICLE = 1e-5
+TYPICAL_STEPS = 8
+TYPICAL_STEPS_OF_DROP = 80
+# Steps with inertia factor a matrix of all particles; measured with 55 to 923 particles.
+SECONDS_PER_INERTIAL_STEP = 0.006
+SECONDS_PER_INERTIAL_STEP_OF_THOUSAND = 0.15
+INERTIAL_COST_EXPONENT = 1.5
+
+
+def particle_count(solder: Solder, geometry: JointGeometry) -> int:
+    """Number of particles of a joint: layers of concentric rings of 6 j particles."""
+    rings, layers = joint_counts(geometry, solder.volume, solder.numerics.spacing)
+    return layers * (1 + 3 * rings * (rings + 1))
+
+
+def reflow_seconds(solder: Solder, geometry: JointGeometry) -> float:
+    """Expected time of `solve_joint` on one core [s], from the measured cost of a step."""
+    return TYPICAL_STEPS * _seconds_per_step(particle_count(solder, geometry))
+
+
+def drop_seconds(particles: int) -> float:
+    """Expected time to bring a drop to rest on one core [s]."""
+    return TYPICAL_STEPS_OF_DROP * _seconds_per_step(particles)
+
+
+def inertial_seconds(particles: int, steps: int) -> float:
+    """Expected time of steps with inertia or viscosity on one core [s]."""
+    growing = SECONDS_PER_INERTIAL_STEP_OF_THOUSAND * (particles / 1000.0) ** INERTIAL_COST_EXPONENT
+    return steps * (SECONDS_PER_INERTIAL_STEP + growing)
+
+
+def _seconds_per_step(particles: int) -> float:
+    return SECONDS_PER_STEP + SECONDS_PER_STEP_AND_PARTICLE * particles

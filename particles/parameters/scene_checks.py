@@ -1,0 +1,266 @@
+"""Parameters of a scene that are each allowed but make no drop or joint together. Loads neither numba nor PETSc."""
+
+from dataclasses import replace
+from math import asin, degrees, inf, pi, sin
+from typing import Protocol
+
+from particles.parameters import checks
+from particles.parameters.checks import Problem, mm, mm3
+from particles.parameters.effects import acting_weight, decide_drop, decide_effects
+from particles.parameters.estimate import particle_count
+from particles.parameters.scene_drops import Drops
+from particles.parameters.scene_oscillation import Oscillation
+from particles.parameters.scenes import Drop, Joint
+from particles.parameters.solder import Solder
+from particles.reference.rayleigh import lamb_decay_rate, rayleigh_frequency
+from particles.reference.young_laplace import NoMeridian, joint_meridian, sessile_meridian
+
+FEWEST_PER_EDGE = 5
+MOST_PARTICLES = 200_000
+SPACINGS_IN_PAD = 2.0
+ROUNDING = 1e-9
+KEYS = {
+    "solder.volume": "joint.volume",
+    "solder.pad_contact_angle": "joint.pad_contact_angle",
+    "solder.numerics.spacing": "joint.spacing",
+}
+
+
+class HasWall(Protocol):
+    """A scene that may stand on a wall."""
+
+    @property
+    def is_free(self) -> bool:
+        """Whether there is no wall."""
+
+
+def drop_problems(drop: Drop, solder: Solder) -> list[Problem]:
+    """Find what cannot work before a drop runs."""
+    found = _flow_problems(drop, solder) or _resolution_problems(drop) or _symmetry_problems(drop, solder)
+    return found or _wall_problems(drop) or _pad_problems(drop) or free_problems(drop, solder)
+
+
+def pair_problems(pair: Drops, solder: Solder) -> list[Problem]:
+    """Find what cannot work before two drops run: too coarse, overlapping, or never or always in touch."""
+    found = _flow_problems(pair, solder) or free_problems(pair, solder) or _pair_resolution(pair)
+    return found or _distance_problems(pair, solder)
+
+
+def _flow_problems(scene: HasWall, solder: Solder) -> list[Problem]:
+    """Find a scheme that does not go with its numerics, and liquid that nothing brings to rest."""
+    return checks.scheme_problems(solder) + checks.effect_problems(solder, decide_drop(solder, scene.is_free))
+
+
+def _pair_resolution(pair: Drops) -> list[Problem]:
+    limit = min(pair.volumes) ** (1.0 / 3.0) / (FEWEST_PER_EDGE - 1)
+    if pair.spacing > limit:
+        message = f"too coarse for the smaller drop, of {mm3(min(pair.volumes))}"
+        return [Problem("drops.spacing", mm(pair.spacing), f"<= {mm(limit)}", message)]
+    return _too_many("drops", pair.spacing, pair.particles)
+
+
+def _distance_problems(pair: Drops, solder: Solder) -> list[Problem]:
+    """The centres must be so far apart that the drops do not overlap, and so near that they touch if they shall."""
+    apart, reach = _distances(pair, solder)
+    value, clear = mm(pair.distance), reach + 2.0 * pair.spacing
+    if pair.distance < apart:
+        return [Problem("drops.distance", value, f">= {mm(apart)}", "the drops overlap at the start")]
+    if pair.merge and pair.distance > reach:
+        message = "the drops are meant to become one, but do not reach each other"
+        return [Problem("drops.distance", value, f"{mm(apart)} to {mm(reach)}", message)]
+    if not pair.merge and pair.distance < clear:
+        message = "the drops are not meant to become one (drops.merge = false), but would touch"
+        return [Problem("drops.distance", value, f">= {mm(clear)}", message)]
+    return []
+
+
+def _distances(pair: Drops, solder: Solder) -> tuple[float, float]:
+    """Distance of centres at which the drops touch at the start, and up to which they touch at rest [m]."""
+    edges = [volume ** (1.0 / 3.0) for volume in pair.volumes]
+    if pair.contact_angle is None:
+        apart = sum(edge * (0.75 / pi) ** (1.0 / 3.0) for edge in edges)
+        return apart, apart + 0.5 * pair.spacing
+    weight = acting_weight(solder, decide_drop(solder, is_free=False))
+    rest = [sessile_meridian(v, pair.contact_angle, solder.surface_tension, weight) for v in pair.volumes]
+    return 0.5 * sum(edges), max(0.5 * sum(edges), 0.5 * sum(drop.max_width for drop in rest))
+
+
+def oscillation_problems(scene: Oscillation, solder: Solder) -> list[Problem]:
+    """Find a liquid so viscous that a drop of it creeps back to its sphere."""
+    decay = lamb_decay_rate(2, scene.radius, solder.density, solder.viscosity)
+    frequency = rayleigh_frequency(2, scene.radius, solder.density, solder.surface_tension)
+    if decay < frequency:
+        return []
+    value, limit = f"{solder.viscosity:.4g} Pa*s", f"< {solder.viscosity * frequency / decay:.4g} Pa*s"
+    message = "a drop that is so small and viscous does not swing"
+    return [Problem("solder.viscosity", value, limit, message)]
+
+
+def free_problems(scene: HasWall, solder: Solder) -> list[Problem]:
+    """Find effects that are asked for, but need a wall that a scene has not."""
+    if not scene.is_free:
+        return []
+    switches = {"gravity": solder.effects.gravity, "solder.effects.wall_adhesion": solder.effects.wall_adhesion}
+    message = "without a contact angle there is no wall: a free drop falls as a whole"
+    return [Problem(key, switch, "auto, off", message) for key, switch in switches.items() if switch == "on"]
+
+
+def joint_problems(joint: Joint, solder: Solder) -> list[Problem]:
+    """Find what cannot work before a joint runs: those of an array without neighbours, under the joint's own keys."""
+    if joint.offset >= joint.pad_bottom + joint.pad_top:
+        allowed = f"< {mm(joint.pad_bottom + joint.pad_top)}"
+        return [Problem("joint.offset", mm(joint.offset), allowed, "the pads do not overlap")]
+    found = checks.problems(solder, {"of the case": joint.geometry}, inf)
+    if found:
+        return [replace(problem, key=KEYS.get(problem.key, problem.key)) for problem in found]
+    found = _tilt_problems(joint) or _path_problems(joint) or _package_problems(joint)
+    found = found or _load_problems(joint, solder) or _motion_problems(joint, solder)
+    return found or _too_many("joint", joint.spacing, particle_count(solder, joint.geometry))
+
+
+def _tilt_problems(joint: Joint) -> list[Problem]:
+    """The edge of the tilted pad must stay above the lower plate, by a spacing at least."""
+    for key, place in (("joint.tilt", joint.geometry), *(("joint.path", place) for place in joint.places)):
+        drop, tilt, room = joint.pad_top * sin(abs(place.tilt[1])), place.tilt[1], place.gap - joint.spacing
+        if tilt and drop >= room:
+            message = f"the edge of the upper pad is {mm(drop)} lower than its centre, in a gap of {mm(place.gap)}"
+            return [Problem(key, deg(tilt), f"< {deg(asin(min(1.0, max(0.0, room / joint.pad_top))))}", message)]
+    return []
+
+
+def _path_problems(joint: Joint) -> list[Problem]:
+    if joint.path is None:
+        return []
+    if joint.package is not None:
+        message = "a package floats or is moved, not both"
+        return [Problem("joint.path", "", "joint.package or joint.path", message)]
+    if joint.places[-1] == joint.geometry:
+        message = "leads nowhere: it ends where it starts"
+        return [Problem("joint.path", "", "another standoff, offset or tilt", message)]
+    end, lowest = joint.places[-1], checks.SPACINGS_IN_GAP * joint.spacing
+    if end.gap < (1.0 - ROUNDING) * lowest:
+        message = f"too low for particles {mm(joint.spacing)} apart"
+        return [Problem("joint.path.standoff", mm(end.gap), f">= {mm(lowest)}", message)]
+    if end.offset[0] >= joint.pad_bottom + joint.pad_top:
+        allowed = f"< {mm(joint.pad_bottom + joint.pad_top)}"
+        return [Problem("joint.path.offset", mm(end.offset[0]), allowed, "the pads do not overlap")]
+    return []
+
+
+def _package_problems(joint: Joint) -> list[Problem]:
+    if joint.package is None or not {"shift", "turn"} <= set(joint.package.free):
+        return []
+    message = "free to shift and to turn, a package rolls off a single joint"
+    return [Problem("joint.package.free", ", ".join(joint.package.free), "lift with shift, or lift with turn", message)]
+
+
+def _load_problems(joint: Joint, solder: Solder) -> list[Problem]:
+    """The solder must bear the package at a gap that particles can fill."""
+    if joint.package is None or "lift" not in joint.package.free:
+        return []
+    lowest, limits = checks.SPACINGS_IN_GAP * joint.spacing, (joint.pad_contact_angle, joint.mask_contact_angle)
+    weight = acting_weight(solder, decide_effects(joint.geometry, solder))
+    discs = (joint.pad_bottom, joint.pad_top, lowest)
+    try:
+        largest = joint_meridian(joint.volume, *discs, solder.surface_tension, weight, angle_limits=limits).axial_force
+    except NoMeridian:
+        return []
+    if joint.package.load < largest:
+        return []
+    place = f"the package down to {mm(lowest)}, too low for particles {mm(joint.spacing)} apart"
+    if largest <= 0.0:
+        allowed = "more solder, or a smaller joint.spacing"
+        return [Problem("joint.volume", mm3(joint.volume), allowed, f"the solder alone pulls {place}")]
+    message = f"presses {place}"
+    return [Problem("joint.package.load", mn(joint.package.load), f"< {mn(largest)}", message)]
+
+
+def _motion_problems(joint: Joint, solder: Solder) -> list[Problem]:
+    """Find what does not go with a package that moves."""
+    if joint.package is None and joint.path is None:
+        return []
+    if solder.numerics.scheme == "gripc":
+        return [Problem("solder.numerics.scheme", "gripc", "energy", "the seed's scheme knows plates at rest only")]
+    inertia = decide_effects(joint.geometry, solder)["inertia"]
+    if joint.path is not None and inertia["on"]:
+        message = f"a package goes its path from rest to rest, its speed has no meaning; {inertia['why']}"
+        return [Problem("solder.effects.inertia", solder.effects.inertia, "off", message)]
+    return []
+
+
+def _resolution_problems(drop: Drop) -> list[Problem]:
+    if drop.spacing is None:
+        return []
+    if drop.particles_per_edge is not None:
+        message = f"drop.particles_per_edge = {drop.particles_per_edge} is given as well"
+        return [Problem("drop.spacing", mm(drop.spacing), "one of drop.spacing, drop.particles_per_edge", message)]
+    limit = drop.edge / (FEWEST_PER_EDGE - 1)
+    if drop.count < FEWEST_PER_EDGE:
+        message = f"too coarse for a drop that starts as a cube of {mm(drop.edge)}"
+        return [Problem("drop.spacing", mm(drop.spacing), f"<= {mm(limit)}", message)]
+    return _too_many("drop", drop.spacing, drop.particles)
+
+
+def _symmetry_problems(drop: Drop, solder: Solder) -> list[Problem]:
+    """Find what a part of a drop cannot do for the whole."""
+    if drop.symmetry == "none":
+        return []
+    key, effects = "drop.symmetry", decide_drop(solder, drop.is_free)
+    if drop.count % 2 == 0:
+        message = f"no particles lie in a plane of symmetry of {drop.count} along an edge"
+        return [Problem(key, drop.symmetry, "an odd number of particles along an edge", message)]
+    if solder.numerics.scheme == "gripc" or effects["inertia"]["on"] or effects["viscosity"]["on"]:
+        message = "only a drop on its way to rest can be cut, without inertia, viscosity and the seed's scheme"
+        return [Problem(key, drop.symmetry, "none", message)]
+    return []
+
+
+def _wall_problems(drop: Drop) -> list[Problem]:
+    """Find angles that do not go together, and a pad without its angle."""
+    given = {"receding_angle": drop.receding_angle, "advancing_angle": drop.advancing_angle}
+    angles = {f"drop.{name}": value for name, value in given.items() if value is not None}
+    key, value = next(iter(angles.items()), ("", 0.0))
+    if drop.contact_angle is not None and angles:
+        both = "drop.receding_angle and drop.advancing_angle, or drop.contact_angle"
+        return [Problem(key, deg(value), both, "a wall has hysteresis, or one contact angle")]
+    if len(angles) == 1:
+        return [Problem(key, deg(value), "drop.receding_angle with drop.advancing_angle", "one is given alone")]
+    if drop.hysteresis is not None and drop.hysteresis[0] >= drop.hysteresis[1]:
+        allowed = f"< {deg(drop.hysteresis[1])}, the advancing angle"
+        return [Problem(key, deg(value), allowed, "a line recedes at a smaller angle than it advances at")]
+    if drop.pad_radius is not None and drop.contact_angle is None:
+        message = "a pad has no hysteresis here, and needs a contact angle"
+        return [Problem("drop.pad_radius", mm(drop.pad_radius), "only with drop.contact_angle", message)]
+    return []
+
+
+def _pad_problems(drop: Drop) -> list[Problem]:
+    if drop.pad_radius is None or drop.contact_angle is None:
+        return []
+    pad, mask = degrees(drop.contact_angle), degrees(drop.mask_contact_angle)
+    if pad >= mask:
+        message = "the pad must be wetted better than the solder mask"
+        return [Problem("drop.contact_angle", f"{pad:.4g} deg", f"< {mask:.4g} deg", message)]
+    limit = SPACINGS_IN_PAD * drop.resolution
+    if drop.pad_radius < limit:
+        message = f"too small for a particle spacing of {mm(drop.resolution)}: volume {mm3(drop.volume)} cannot fit it"
+        return [Problem("drop.pad_radius", mm(drop.pad_radius), f">= {mm(limit)}", message)]
+    return []
+
+
+def _too_many(scene: str, spacing: float, count: int) -> list[Problem]:
+    if count <= MOST_PARTICLES:
+        return []
+    limit = spacing * (count / MOST_PARTICLES) ** (1.0 / 3.0)
+    message = f"would take {count} particles, more than {MOST_PARTICLES}: a volume that cannot fit, or too fine"
+    return [Problem(f"{scene}.spacing", mm(spacing), f">= {mm(limit)}", message)]
+
+
+def mn(force: float) -> str:
+    """Write a force [N]."""
+    return f"{1e3 * force:.4g} mN"
+
+
+def deg(angle: float) -> str:
+    """Write an angle [rad]."""
+    return f"{degrees(angle):.4g} deg"

@@ -1,0 +1,217 @@
+"""Scenes of one body of solder: a drop on a wall or pad, a joint between two pads. Their parameters in SI floats.
+
+A scene is resolved into the `Solder` and the geometry that the solvers take.
+"""
+
+import math
+from math import inf
+from typing import Annotated, Literal, Protocol
+
+from pydantic import Field
+
+from particles.core.geometry import JointGeometry
+from particles.parameters.scene_package import PI, FloatingPackage, PackagePath
+from particles.parameters.solder import (
+    FlowEffects,
+    FlowNumerics,
+    Parameters,
+    Solder,
+    SolderEffects,
+    SolderNumerics,
+    Switch,
+    Walls,
+)
+
+DEFAULT_PER_EDGE = 11
+
+# Hu et al. print 10 times the surface tension and 100 times the viscosity of molten SAC solder.
+PROPERTIES = {
+    "physical": {"density": 8930.0, "surface_tension": 0.4985, "viscosity": 2.27e-3},
+    "paper": {"density": 8930.0, "surface_tension": 4.985, "viscosity": 0.227},
+}
+
+
+class Drop(Parameters):
+    """A drop that starts as a cube on a wall: uniform, or a round pad in the solder mask (with ``pad_radius``).
+
+    A wall with hysteresis has ``receding_angle`` and ``advancing_angle`` in the place of ``contact_angle``. Without any
+    angle there is no wall: the drop is free and becomes a sphere.
+    Resolution: ``spacing`` or ``particles_per_edge`` of the cube, not both; 11 per edge if neither is given.
+    With ``symmetry`` only half or a quarter of the drop is computed; volume and results are those of the whole.
+    """
+
+    volume: Annotated[float, "mm^3"] = Field(gt=0)
+    contact_angle: Annotated[float | None, "deg"] = Field(None, gt=0, lt=PI)
+    receding_angle: Annotated[float | None, "deg"] = Field(None, gt=0, lt=PI)
+    advancing_angle: Annotated[float | None, "deg"] = Field(None, gt=0, lt=PI)
+    pad_radius: Annotated[float | None, "mm"] = Field(None, gt=0)
+    mask_contact_angle: Annotated[float, "deg"] = Field(math.radians(148.0), gt=0, lt=PI)
+    spacing: Annotated[float | None, "mm"] = Field(None, gt=0)
+    particles_per_edge: int | None = Field(None, ge=5, le=50)
+    symmetry: Literal["none", "half", "quarter"] = "none"
+
+    @property
+    def symmetry_axes(self) -> tuple[int, ...]:
+        """Axes of the planes of symmetry that the drop is cut by: 0 for x = 0, 1 for y = 0."""
+        return {"none": (), "half": (0,), "quarter": (0, 1)}[self.symmetry]
+
+    @property
+    def particles(self) -> int:
+        """Number of particles of the cube, or of the part of it that is computed."""
+        cuts = len(self.symmetry_axes)
+        return self.count ** (3 - cuts) * ((self.count + 1) // 2) ** cuts
+
+    @property
+    def edge(self) -> float:
+        """Edge of the cube that the drop starts as [m]."""
+        return self.volume ** (1.0 / 3.0)
+
+    @property
+    def count(self) -> int:
+        """Particles along an edge of the cube."""
+        if self.spacing is not None:
+            return max(2, 1 + round(self.edge / self.spacing))
+        return self.particles_per_edge or DEFAULT_PER_EDGE
+
+    @property
+    def resolution(self) -> float:
+        """Spacing of the particles at the start [m]."""
+        return self.edge / (self.count - 1)
+
+    @property
+    def edge_radius(self) -> float:
+        """Radius of the pad's edge [m], infinite on a uniform wall."""
+        return self.pad_radius or inf
+
+    @property
+    def hysteresis(self) -> tuple[float, float] | None:
+        """Receding and advancing angle [rad] of a wall with hysteresis."""
+        if self.receding_angle is None or self.advancing_angle is None:
+            return None
+        return self.receding_angle, self.advancing_angle
+
+    @property
+    def is_free(self) -> bool:
+        """Whether there is no wall."""
+        return self.contact_angle is None and self.hysteresis is None
+
+    @property
+    def contact_angles(self) -> dict[str, float]:
+        """Contact angles as the solder has them [rad]: of pad and mask."""
+        if self.contact_angle is None:
+            return {}
+        return {"pad_contact_angle": self.contact_angle, "mask_contact_angle": self.mask_contact_angle}
+
+
+class Joint(Parameters):
+    """A joint between two round pads, one above the other; its rims are pinned or slide by pad and mask angle.
+
+    The upper pad may be offset along x and tilted about y (its side at +x down). It holds still, unless there is a
+    table joint.package (it floats) or joint.path (it is moved).
+    """
+
+    volume: Annotated[float, "mm^3"] = Field(gt=0)
+    pad_bottom: Annotated[float, "mm"] = Field(gt=0)
+    pad_top: Annotated[float, "mm"] = Field(gt=0)
+    standoff: Annotated[float, "mm"] = Field(gt=0)
+    offset: Annotated[float, "mm"] = Field(0.0, ge=0)
+    tilt: Annotated[float, "deg"] = Field(0.0, gt=-PI / 6.0, lt=PI / 6.0)
+    pad_contact_angle: Annotated[float, "deg"] = Field(math.radians(5.0), gt=0, lt=PI)
+    mask_contact_angle: Annotated[float, "deg"] = Field(math.radians(148.0), gt=0, lt=PI)
+    spacing: Annotated[float, "mm"] = Field(4.0e-5, gt=0)
+    package: FloatingPackage | None = None
+    path: PackagePath | None = None
+
+    @property
+    def geometry(self) -> JointGeometry:
+        """Gap, pads, offset and tilt for the solver."""
+        return self.place(self.standoff, self.offset, self.tilt)
+
+    def place(self, standoff: float, offset: float, tilt: float) -> JointGeometry:
+        """The pads with the upper one elsewhere: standoff and offset [m], tilt [rad]."""
+        return JointGeometry(standoff, self.pad_bottom, self.pad_top, (offset, 0.0), (0.0, tilt))
+
+    @property
+    def places(self) -> list[JointGeometry]:
+        """Where the path leads, step by step; empty without one."""
+        if self.path is None:
+            return []
+        start = (self.standoff, self.offset, self.tilt)
+        given = (self.path.standoff, self.path.offset, self.path.tilt)
+        ways = [(a, a if b is None else b) for a, b in zip(start, given, strict=True)]
+        shares = [number / self.path.steps for number in range(1, self.path.steps + 1)]
+        return [self.place(*(a + share * (b - a) for a, b in ways)) for share in shares]
+
+    @property
+    def resolution(self) -> float:
+        """Spacing of the particles at the start [m]."""
+        return self.spacing
+
+    @property
+    def contact_angles(self) -> dict[str, float]:
+        """Contact angles as the solder has them [rad]: of pad and mask."""
+        return {"pad_contact_angle": self.pad_contact_angle, "mask_contact_angle": self.mask_contact_angle}
+
+
+class Scene(Protocol):
+    """What the solver has to know of a scene besides its geometry: volume [m^3], contact angles [rad], spacing [m]."""
+
+    @property
+    def volume(self) -> float: ...  # noqa: D102
+
+    @property
+    def contact_angles(self) -> dict[str, float]: ...  # noqa: D102
+
+    @property
+    def resolution(self) -> float: ...  # noqa: D102
+
+
+class Liquid(Parameters):
+    """A liquid by the name of a set of properties; a single value given here overrides that of the set.
+
+    The set physical is SAC solder; paper is what Hu et al. print, with 10 times the surface tension and 100 times
+    the viscosity.
+    """
+
+    parameters: Literal["physical", "paper"] = "physical"
+    density: Annotated[float | None, "kg/m^3"] = Field(None, gt=0)
+    surface_tension: Annotated[float | None, "N/m"] = Field(None, gt=0)
+    viscosity: Annotated[float | None, "Pa*s"] = Field(None, gt=0)
+
+    @property
+    def properties(self) -> dict[str, float]:
+        """Density, surface tension and viscosity."""
+        own = {name: getattr(self, name) for name in PROPERTIES["physical"] if getattr(self, name) is not None}
+        return PROPERTIES[self.parameters] | own
+
+
+class Fluid(Liquid, Walls):
+    """Molten solder by the name of a set of properties; a single value given here overrides that of the set.
+
+    The set physical is SAC solder; paper is what Hu et al. print, with 10 times the surface tension and 100 times
+    the viscosity.
+    """
+
+    gravity: Annotated[float, "m/s^2"] = Field(9.81, ge=0)
+    process_time: Annotated[float, "s"] = Field(60.0, gt=0)
+    effects: FlowEffects = FlowEffects()
+    numerics: FlowNumerics = FlowNumerics()
+
+    def resolve(self, scene: Scene, gravity: Switch) -> Solder:
+        """Return the solder of a scene, with the set's properties where none are given.
+
+        Args:
+            scene: volume and contact angles.
+            gravity: whether gravity acts.
+        """
+        return Solder(
+            volume=scene.volume,
+            gravity=self.gravity,
+            process_time=self.process_time,
+            wall=self.wall,
+            slip_length=self.slip_length,
+            effects=SolderEffects(gravity=gravity, **self.effects.model_dump()),
+            numerics=SolderNumerics(spacing=scene.resolution, **self.numerics.model_dump()),
+            **scene.contact_angles,
+            **self.properties,
+        )

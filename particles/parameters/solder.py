@@ -1,0 +1,86 @@
+"""Parameters of the molten solder and of the ISPG solver.
+
+All values are SI floats; see ``meshing.board.parameters`` for what the unit strings mean.
+"""
+
+import math
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+Switch = Literal["auto", "on", "off"]
+
+
+class Parameters(BaseModel):
+    """Base of all parameter models: immutable, unknown keys are errors."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class FlowNumerics(Parameters):
+    """How a reflow is computed, apart from its resolution.
+
+    The scheme energy moves to the least energy of the tracked surface at exactly the volume. The scheme gripc is the
+    pressure correction that Hu et al. print, kept for comparison: its time steps end at the capillary limit.
+    """
+
+    scheme: Literal["energy", "gripc"] = "energy"
+    basis: Literal["linear", "quadratic"] = "quadratic"
+    time_step_limit: float = Field(20.0, gt=0, le=100)
+    tolerance: float = Field(1.0e-6, gt=0, lt=1)
+    max_steps: int = Field(1000, ge=1)
+
+
+class SolderNumerics(FlowNumerics):
+    """How the reflow is computed."""
+
+    spacing: Annotated[float, "mm"] = Field(4.0e-5, gt=0)
+
+
+class Reflow(Parameters):
+    """Who computes the joints of an array: as many MPI ranks, or, without a number, processes on the cores given.
+
+    The joints are the same to the last bit. Ranks may be on several machines that see the run folder.
+    """
+
+    ranks: int | None = Field(None, ge=1, le=100_000)
+
+
+class FlowEffects(Parameters):
+    """Effects of a reflow but gravity: decided from dimensionless numbers (auto), or by the user."""
+
+    inertia: Switch = "auto"
+    viscosity: Switch = "auto"
+    surface_tension: Switch = "auto"
+    wall_adhesion: Switch = "auto"
+
+
+class Walls(Parameters):
+    """How liquid slides on walls where viscosity acts; contact lines move in any case.
+
+    The slip length belongs to wall = "slip" (Navier): the depth below the wall at which the flow would rest.
+    """
+
+    wall: Literal["free-slip", "no-slip", "slip"] = "free-slip"
+    slip_length: Annotated[float | None, "mm"] = Field(None, gt=0)
+
+
+class SolderEffects(FlowEffects):
+    """Effects of the reflow: decided from dimensionless numbers (auto), or by the user."""
+
+    gravity: Switch = "auto"
+
+
+class Solder(Walls):
+    """Molten solder: volume of a ball, fluid properties, contact angles, process."""
+
+    volume: Annotated[float, "mm^3"] = Field(gt=0)
+    density: Annotated[float, "kg/m^3"] = Field(8930.0, gt=0)
+    surface_tension: Annotated[float, "N/m"] = Field(0.4985, gt=0)
+    viscosity: Annotated[float, "Pa*s"] = Field(2.27e-3, gt=0)
+    pad_contact_angle: Annotated[float, "deg"] = Field(math.radians(5.0), gt=0, lt=3.14159265)
+    mask_contact_angle: Annotated[float, "deg"] = Field(math.radians(148.0), gt=0, lt=3.14159265)
+    gravity: Annotated[float, "m/s^2"] = Field(9.81, ge=0)
+    process_time: Annotated[float, "s"] = Field(60.0, gt=0)
+    effects: SolderEffects = SolderEffects()
+    numerics: SolderNumerics = SolderNumerics()

@@ -1,0 +1,1 @@
+"""What acts on a liquid body: a list of effects; start with `physics.py`."""

@@ -1,0 +1,1 @@
+"""Exact and independent solutions: Young-Laplace shapes, Rayleigh's oscillation."""

@@ -1,0 +1,88 @@
+"""Two joints that touch, flowed on as one body on the pads of both."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from particles.core.body import Body
+from particles.core.cloud import Cloud
+from particles.core.geometry import JointGeometry
+from particles.core.plate import Pad, Plate
+from particles.parameters.effects import decide_effects, switched
+from particles.parameters.solder import Solder
+from particles.scenes.drops import run_drops
+from particles.scenes.metrics import bridge_metrics
+from particles.scenes.rebuild import rebuild
+from particles.scenes.reflow import collect_shape, pad_lines, start_flow, stop_rule
+from particles.steps.flow import LiquidFlow
+from particles.steps.rest import run_to_rest
+from particles.steps.shape import JointShape, Snapshot
+
+SPACINGS_IN_GAP = 4
+
+
+def solve_bridge(
+    geometries: Sequence[JointGeometry], shapes: Sequence[JointShape], distance: float, solder: Solder
+) -> JointShape:
+    """Let two joints that touch flow into one and come to rest.
+
+    The particles are as coarse as a quarter of the gap. Where the gaps differ, both joints get their mean.
+
+    Args:
+        geometries: of both joints, coaxial.
+        shapes: both joints at rest by themselves.
+        distance: of their axes, along x [m].
+        solder: of one joint.
+
+    Returns:
+        The common body at rest, its origin midway between the axes; verdict "bridged".
+
+    Raises: as `run_drops`.
+    """
+    both = solder.model_copy(update={"volume": 2.0 * solder.volume})
+    effects = switched(decide_effects(geometries[0], solder))
+
+    def start(body: Body) -> LiquidFlow:
+        return start_flow(body.cloud, both, effects, pad_lines(body.cloud, both))
+
+    body = rebuild(*placed_joints(geometries, shapes, distance, solder))
+    rule = stop_rule(body.cloud, both, effects)
+    (drop,) = run_drops([start(body)], rule, start)
+    first = Snapshot(0.0, body.points, body.triangles)
+    run = run_to_rest(drop.flow, replace(rule, max_steps=drop.flow.steps + rule.max_steps))
+    run.snapshots.insert(0, first)
+    metrics = bridge_metrics(body.plates[-1].origin[2], both, drop.flow, run)
+    return replace(collect_shape(both, drop.flow, run, metrics), verdict="bridged")
+
+
+def placed_joints(
+    geometries: Sequence[JointGeometry], shapes: Sequence[JointShape], distance: float, solder: Solder
+) -> list[Body]:
+    """Two joints at rest, each in its place between plates that have the pads of both; arguments as above."""
+    gap = float(np.mean([geometry.gap for geometry in geometries]))
+    spacing = max(solder.numerics.spacing, gap / SPACINGS_IN_GAP)
+    walls, centres = _walls(geometries, distance, gap, solder.pad_contact_angle), (-0.5 * distance, 0.5 * distance)
+    return [_placed(shape, x, walls, spacing) for shape, x in zip(shapes, centres, strict=True)]
+
+
+def _walls(geometries: Sequence[JointGeometry], distance: float, gap: float, pad_angle: float) -> tuple[Plate, Plate]:
+    """Board and package, each with the pads of both joints."""
+    centres = ((-0.5 * distance, 0.0), (0.5 * distance, 0.0))
+    radii = zip(*((geometry.radius_board, geometry.radius_package) for geometry in geometries), strict=True)
+    board, package = [
+        tuple(Pad(centre, radius, pad_angle) for centre, radius in zip(centres, pair, strict=True)) for pair in radii
+    ]
+    lower, upper = Plate.horizontal(0.0), Plate.horizontal(gap, side=1.0)
+    return replace(lower, pads=board), replace(upper, pads=package)
+
+
+def _placed(shape: JointShape, x: float, walls: tuple[Plate, Plate], spacing: float) -> Body:
+    """A joint at rest at its place between the walls, stretched to their distance."""
+    points, gap = shape.points.copy(), walls[1].origin[2]
+    points[:, 2] *= gap / shape.metrics["standoff"][0]
+    for ring, plate in zip(shape.rings, walls, strict=True):
+        points[ring, 2] = plate.origin[2]
+    wall = np.select([points[:, 2] == plate.origin[2] for plate in walls], (0, 1), -1).astype(np.int8)
+    points[:, 0] += x
+    return Body.at_rest(Cloud(points, len(shape.surface_points), shape.triangles, shape.rings, walls, wall, spacing))

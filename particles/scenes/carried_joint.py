@@ -1,0 +1,129 @@
+"""A joint between plates that a structure moves: carried from place to place, kept in a file in between.
+
+The flow at rest in one place is where the next one begins, so that a further exchange with the structure costs a
+fraction of a first reflow. What is in the file is all that there is: any process may carry the joint on.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from particles.core.checkpoint import Checkpoint
+from particles.core.cloud import TooLittleSolder
+from particles.core.geometry import JointGeometry
+from particles.parameters.effects import decide_effects, switched
+from particles.parameters.solder import Solder
+from particles.physics.force_wetting import Wetting
+from particles.physics.plate_force import plate_wrench
+from particles.scenes.moving_joint import travel
+from particles.scenes.reflow import joint_flow, joint_shape, parted, solve_joint, start_joint, stop_rule
+from particles.steps.flow import LiquidFlow
+from particles.steps.rest import RECORDS, Run, StopRule, run_to_rest
+from particles.steps.shape import JointShape
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Carried:
+    """What a joint at rest does to its pads.
+
+    Attributes:
+        wrenches: `(2, 6)` force [N] and moment about the pad's centre [N m] on board and package, in the joint's frame.
+        steps: of this exchange.
+    """
+
+    wrenches: Floats
+    steps: int
+
+
+OPEN = Carried(np.zeros((2, 6)), 0)  # solder that does not span the gap pulls at nothing
+
+
+def carry_joint(
+    place: JointGeometry,
+    solder: Solder,
+    before: Checkpoint | None,
+    now: Checkpoint,
+    progress: Callable[[float], None] | None = None,
+) -> Carried:
+    """Let a joint come to rest in a place, quasi-statically.
+
+    Args:
+        place: gap, radii, offset and tilt.
+        solder: volume, fluid and numerics; `max_steps` holds for each place.
+        before: where it was left in the place before; None, or nothing in it, starts a reflow.
+        now: where this run continues from, to the last bit, and leaves its state.
+        progress: called with the fraction done.
+
+    Raises: as `solve_joint`, but for too little solder: an open joint does nothing to its pads.
+    """
+    known = None if before is None else before.read(RECORDS)
+    if known is not None:
+        if known["run"]["ruptured"]:
+            now.write(known)
+            return OPEN
+        flow = _resumed(known, place, solder)
+        rule = _rule(flow, place, solder)
+    else:
+        try:
+            flow, rule = start_joint(place, solder)
+        except TooLittleSolder:
+            return OPEN
+    flow.physics = replace(flow.physics, motions=(travel(place, flow),))
+    run = run_to_rest(flow, replace(rule, max_steps=flow.steps + rule.max_steps), progress, checkpoint=now)
+    return OPEN if run.ruptured else Carried(_wrenches(flow), len(run.records))
+
+
+def _resumed(known: Mapping[str, Any], place: JointGeometry, solder: Solder) -> LiquidFlow:
+    """The flow as it was left; its effects are still those that were decided for the gap at which it began."""
+    cloud = known["flow"]["body"].cloud
+    flow = joint_flow(cloud, replace(place, gap=float(cloud.plates[1].origin[2])), solder)
+    flow.restore(known["flow"])
+    return flow
+
+
+def _rule(flow: LiquidFlow, place: JointGeometry, solder: Solder) -> StopRule:
+    return stop_rule(flow.body.cloud, solder, switched(decide_effects(place, solder)))
+
+
+def _wrenches(flow: LiquidFlow) -> Floats:
+    """Wrenches on both plates `(2, 6)`."""
+    others = [force for force in flow.physics.forces if not isinstance(force, Wetting)]
+    return np.array([plate_wrench(flow.body, others, wall) for wall in (0, 1)])
+
+
+def carried_shape(place: JointGeometry, solder: Solder, first: Checkpoint, last: Checkpoint) -> JointShape:
+    """Return the shape of a joint in its last place, with the history of its first reflow and of its last exchange.
+
+    Args:
+        place: the last one.
+        solder: as carried.
+        first: where the reflow left it; may be the last.
+        last: where it was left in the last place; nothing in it where the joint was open from the start.
+
+    Raises: as `solve_joint`.
+    """
+    known = last.read(RECORDS)
+    if known is None:
+        return solve_joint(place, solder)
+    flow, run = _resumed(known, place, solder), Run.restored(known["run"])
+    begun = None if first.path == last.path else first.read(RECORDS)
+    whole = run if begun is None else _joined(Run.restored(begun["run"]), run)
+    shape = joint_shape(place, solder, flow, whole)
+    return parted(place, solder, flow, shape) if run.ruptured else shape
+
+
+def _joined(first: Run, last: Run) -> Run:
+    """A run and a later one as one."""
+    return Run(
+        records=first.records + last.records,
+        profiles=first.profiles + last.profiles,
+        snapshots=first.snapshots + last.snapshots[1:],
+        seconds=first.seconds + last.seconds,
+        ruptured=last.ruptured,
+        calm=last.calm,
+    )

@@ -1,0 +1,101 @@
+"""A drop of its own brought to rest: free, on a uniform wall with or without hysteresis, or on a pad in the mask."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from particles.core.checkpoint import Checkpoint
+from particles.core.cloud import Cloud, box_cloud, free_box_cloud
+from particles.core.symmetry import cut
+from particles.parameters.effects import Decision, acting_weight, decide_drop, switched
+from particles.parameters.scenes import Drop
+from particles.parameters.solder import Solder
+from particles.reference.young_laplace import Meridian, sessile_meridian, sphere_meridian
+from particles.scenes.metrics import Metrics, body_metrics, reference_drop, with_shape_error
+from particles.scenes.reflow import collect_shape, contact_line, start_flow, stop_rule
+from particles.steps.flow import LiquidFlow
+from particles.steps.rest import Run, run_to_rest
+from particles.steps.shape import JointShape
+from particles.surface.contact_line import ContactLine
+from particles.surface.contact_line_hysteresis import HystereticLine
+
+ANGLE_OF_CUBE = 0.5 * np.pi
+
+
+@dataclass(frozen=True, slots=True)
+class DropAtRest:
+    """A drop at rest, the effects that acted, and its exact meridian where there is one."""
+
+    shape: JointShape
+    effects: Mapping[str, Decision]
+    reference: Meridian | None
+
+
+def drop_to_rest(
+    drop: Drop,
+    solder: Solder,
+    progress: Callable[[float], None] | None = None,
+    checkpoint: Checkpoint | None = None,
+) -> DropAtRest:
+    """Let a cube of liquid flow until it is at rest.
+
+    Args:
+        drop: volume, wall and resolution.
+        solder: the same volume, fluid and process.
+        progress: called with the fraction done.
+        checkpoint: where the run continues from, to the last bit, and leaves its state.
+
+    Raises:
+        NoRest: no rest within `solder.numerics.max_steps`.
+        SolveFailed: a linear solve failed.
+    """
+    effects = decide_drop(solder, drop.is_free)
+    flow, run = flow_to_rest(drop, solder, progress, checkpoint)
+    is_known = drop.is_free or effects["wall_adhesion"]["on"]
+    reference = _reference(drop, solder, acting_weight(solder, effects)) if is_known else None
+    metrics = body_metrics(solder, reference, flow, run)
+    shape = collect_shape(solder, flow, run, metrics | _excess(drop, metrics))
+    return DropAtRest(with_shape_error(shape, solder, reference), effects, reference)
+
+
+def flow_to_rest(
+    drop: Drop,
+    solder: Solder,
+    progress: Callable[[float], None] | None = None,
+    checkpoint: Checkpoint | None = None,
+) -> tuple[LiquidFlow, Run]:
+    """The flow of a drop at rest, and its run; arguments and errors as `drop_to_rest`."""
+    acting = switched(decide_drop(solder, drop.is_free))
+    whole = free_box_cloud(drop.edge, drop.count) if drop.is_free else box_cloud(drop.edge, drop.count)
+    cloud = cut(whole, drop.symmetry_axes)
+    flow = start_flow(cloud, solder, acting, _contact_lines(drop, solder, cloud))
+    return flow, run_to_rest(flow, stop_rule(cloud, solder, acting), progress, checkpoint=checkpoint)
+
+
+def _contact_lines(drop: Drop, solder: Solder, cloud: Cloud) -> tuple[ContactLine, ...]:
+    if drop.is_free:
+        return ()
+    if drop.hysteresis is None:
+        return (contact_line(cloud, 0, drop.edge_radius, solder),)
+    return (HystereticLine(0, *drop.hysteresis, cloud.plates[0].local(cloud.points[cloud.rings[0]])),)
+
+
+def _reference(drop: Drop, solder: Solder, weight: float) -> Meridian | None:
+    """Exact meridian; with hysteresis where all of the line advances, since a cube stands at 90 degrees."""
+    if drop.is_free:
+        return sphere_meridian(solder.volume, solder.surface_tension)
+    if drop.hysteresis is None:
+        return reference_drop(solder, drop.edge_radius, weight)
+    if drop.hysteresis[1] >= ANGLE_OF_CUBE:
+        return None
+    return sessile_meridian(solder.volume, drop.hysteresis[1], solder.surface_tension, weight)
+
+
+def _excess(drop: Drop, metrics: Metrics) -> Metrics:
+    """How far contact angles lie outside those at which a line with hysteresis stands [deg]."""
+    if drop.hysteresis is None:
+        return {}
+    receding, advancing = np.degrees(drop.hysteresis)
+    below, above = receding - metrics["contact_angle_min"][0], metrics["contact_angle_max"][0] - advancing
+    return {"contact_angle_excess": (float(np.max([0.0, below, above])), "deg")}

@@ -1,0 +1,158 @@
+"""Several drops: each flows by itself until it is at rest; two that touch become one, collapsed ones are rebuilt."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import combinations
+from time import perf_counter
+from typing import Any
+
+from particles.core.body import Body
+from particles.core.checkpoint import Checkpoint
+from particles.core.data_file import columns, fields_of, rows
+from particles.scenes.rebuild import collapsing, overlap, rebuild, touch
+from particles.steps.flow import LiquidFlow, StepRecord
+from particles.steps.rest import CALM_STEPS, RECORDS, NoRest, StopRule, fraction_done, is_calm
+from particles.steps.shape import Snapshot
+
+LARGEST_OVERLAP = 0.5  # spacings
+
+
+class OverlappingDrops(ValueError):
+    """Drops that are in the same place before anything has flowed."""
+
+
+@dataclass(slots=True, eq=False)
+class Drop:
+    """A drop on its way to rest.
+
+    Attributes:
+        flow: the flow.
+        origins: numbers of the first drops that it is made of.
+        first: how it was when it was made.
+        parents: the drops that became this one, as they were when they touched.
+        records: its steps since it was made.
+        calm: its last steps that hardly moved it.
+        seconds: wall time of its steps [s].
+    """
+
+    flow: LiquidFlow
+    origins: tuple[int, ...]
+    first: Snapshot
+    parents: tuple["Drop", ...] = ()
+    records: list[StepRecord] = field(default_factory=list)
+    calm: int = 0
+    seconds: float = 0.0
+
+    @classmethod
+    def made(cls, flow: LiquidFlow, origins: tuple[int, ...], parents: tuple["Drop", ...] = ()) -> "Drop":
+        """Make a drop of a flow that has not moved yet."""
+        first = Snapshot(flow.time, flow.body.points.copy(), flow.body.triangles.copy())
+        return cls(flow, origins, first, parents)
+
+    def saved(self) -> dict[str, Any]:
+        """All of it, for a checkpoint."""
+        return fields_of(self) | {
+            "flow": self.flow.saved(),
+            "parents": [parent.saved() for parent in self.parents],
+            "records": columns([fields_of(record) for record in self.records]),
+        }
+
+    @classmethod
+    def restored(cls, saved: Mapping[str, Any], start: Callable[[Body], LiquidFlow]) -> "Drop":
+        """Make it again of what `saved` returned; `start` as for `run_drops`."""
+        flow = start(Body.at_rest(saved["flow"]["body"].cloud))
+        flow.restore(saved["flow"])
+        parents = tuple(cls.restored(parent, start) for parent in saved["parents"])
+        records = [StepRecord(**row) for row in rows(saved["records"])]
+        return cls(**{**saved, "flow": flow, "parents": parents, "records": records})
+
+    def step(self, rule: StopRule) -> None:
+        """Advance one time step."""
+        start = perf_counter()
+        self.records.append(self.flow.step())
+        self.seconds += perf_counter() - start
+        self.calm = self.calm + 1 if is_calm(self.records, rule) else 0
+
+    def moves(self, rule: StopRule) -> bool:
+        """Whether it is neither at rest nor at the end of the process."""
+        return self.calm < CALM_STEPS and self.flow.time < rule.end_time
+
+
+def run_drops(
+    flows: Sequence[LiquidFlow],
+    rule: StopRule,
+    start: Callable[[Body], LiquidFlow],
+    checkpoint: Checkpoint | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> list[Drop]:
+    """Let drops flow until all are at rest; the one that is behind in time goes first.
+
+    Args:
+        flows: a flow a drop, advanced in place.
+        rule: when a drop is at rest.
+        start: makes the flow of a body that two drops became.
+        checkpoint: where the run continues from, to the last bit, and leaves its state.
+        progress: called with the fraction done of the drop that has most to do.
+
+    Returns:
+        The drops that are left.
+
+    Raises:
+        OverlappingDrops: drops overlap at the start: they cannot both have their volume.
+        NoRest: a drop took too many steps.
+        CannotRebuild: drops touch, or one collapses, between walls.
+    """
+    saved = checkpoint.read(RECORDS) if checkpoint else None
+    drops = [Drop.restored(drop, start) for drop in saved or []] or _merge_touching(_apart(flows), start)
+    while moving := [drop for drop in drops if drop.moves(rule)]:
+        drop = min(moving, key=lambda candidate: candidate.flow.time)
+        if len(drop.records) >= rule.max_steps:
+            raise NoRest(f"drop {drop.origins} is not at rest after {rule.max_steps} steps (solder.numerics.max_steps)")
+        drop.step(rule)
+        if drop.moves(rule) and collapsing(drop.flow.body):
+            drop.flow = _restarted(start, drop)
+        drops = _merge_touching(drops, start)
+        if checkpoint is not None and checkpoint.is_due():
+            checkpoint.write([drop.saved() for drop in drops])
+        if progress is not None:
+            progress(min((fraction_done(one.records, rule) for one in drops if one.moves(rule)), default=1.0))
+    return drops
+
+
+def _apart(flows: Sequence[LiquidFlow]) -> list[Drop]:
+    """The drops at the start, which may touch, but not overlap by more than half a spacing."""
+    for (i, first), (j, second) in combinations(enumerate(flows), 2):
+        spacing = min(first.body.cloud.spacing, second.body.cloud.spacing)
+        depth = overlap(first.body, second.body)
+        if depth > LARGEST_OVERLAP * spacing:
+            raise OverlappingDrops(
+                f"drops {i} and {j} overlap by {depth:.3g} m at the start, allowed <= {LARGEST_OVERLAP * spacing:.3g} m"
+            )
+    return [Drop.made(flow, (number,)) for number, flow in enumerate(flows)]
+
+
+def _restarted(start: Callable[[Body], LiquidFlow], *drops: Drop) -> LiquidFlow:
+    """Flow of the body that drops become, from the time of the latest, with their momentum; steps are counted on."""
+    body = rebuild(*(drop.flow.body for drop in drops))
+    flow = start(body)
+    flow.body.velocity = body.velocity
+    flow.time = max(drop.flow.time for drop in drops)
+    flow.steps = max(drop.flow.steps for drop in drops)
+    return flow
+
+
+def _merge_touching(drops: list[Drop], start: Callable[[Body], LiquidFlow]) -> list[Drop]:
+    """Merge pairs of drops until none touch."""
+    while (pair := _touching(drops)) is not None:
+        rest = [drop for drop in drops if drop not in pair]
+        origins = sorted(pair[0].origins + pair[1].origins)
+        drops = [*rest, Drop.made(_restarted(start, *pair), tuple(origins), pair)]
+    return drops
+
+
+def _touching(drops: Sequence[Drop]) -> tuple[Drop, Drop] | None:
+    for number, first in enumerate(drops):
+        for second in drops[number + 1 :]:
+            if touch(first.flow.body, second.flow.body):
+                return first, second
+    return None

@@ -1,0 +1,221 @@
+"""A free drop with inertia: at rest (Laplace pressure) or swinging in its second mode (Rayleigh)."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from math import ceil, pi
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from particles.core.body import Body
+from particles.core.checkpoint import Checkpoint
+from particles.core.cloud_sphere import sphere_cloud
+from particles.core.data_file import fields_of
+from particles.parameters.solder import Solder
+from particles.reference.damped_oscillation import fit_oscillation
+from particles.reference.rayleigh import rayleigh_frequency, viscous_oscillation
+from particles.scenes.reflow import build_physics
+from particles.steps.flow import FLOW_RECORDS
+from particles.steps.inertial_flow import InertialFlow
+from particles.steps.shape import Snapshot
+from particles.surface.surface_quality import vertex_normals
+
+Floats = NDArray[np.float64]
+
+EFFECTS = {"surface_tension": True, "gravity": False, "wall_adhesion": False, "inertia": True}
+COLUMNS = ("time", "amplitude", "energy", "kinetic_energy", "volume", "momentum")
+# Ways to the rest of the polyhedron, whose vertices are not quite on a sphere; the step in radians of the second mode.
+SETTLING_STEP, SETTLING_STEPS = 3.0, 10
+SNAPSHOTS_PER_PERIOD = 8
+RECORDS = (*FLOW_RECORDS, Snapshot)  # that a swing consists of in a checkpoint
+SECOND_MOMENT = np.array([-1.0, -1.0, 2.0])
+
+
+@dataclass(frozen=True, slots=True)
+class FreeDrop:
+    """How a free drop moved.
+
+    Attributes:
+        points: `(n, 3)` particles at the end [m], the first `s` are the vertices of the surface.
+        velocity: `(n, 3)` at the end [m/s].
+        pressure: `(n,)` above ambient at the end [Pa].
+        surface_points: `(s, 3)` [m].
+        triangles: `(t, 3)` of the surface, outward oriented.
+        history: arrays of equal length, the start included: time [s], amplitude of the second mode over the radius,
+            energy (surface plus kinetic) [J], kinetic_energy [J], volume [m^3], momentum (its length) [kg m/s].
+        snapshots: the start, and each eighth of a Rayleigh period.
+        metrics: name to value and unit.
+    """
+
+    points: Floats
+    velocity: Floats
+    pressure: Floats
+    surface_points: Floats
+    triangles: NDArray[np.int32]
+    history: dict[str, Floats]
+    snapshots: list[Snapshot]
+    metrics: dict[str, tuple[float, str]]
+
+
+@dataclass(slots=True)
+class _Swing:
+    """State of a run: the flow, a row of the history for each step and the start, snapshots, wall time [s]."""
+
+    flow: InertialFlow
+    rows: list[tuple[float, ...]]
+    snapshots: list[Snapshot]
+    seconds: float = 0.0
+
+    @classmethod
+    def start(cls, flow: InertialFlow, solder: Solder) -> "_Swing":
+        """Start with the drop as it is."""
+        swing = cls(flow, [_sample(flow, solder, 0.0)], [])
+        swing.snap()
+        return swing
+
+    def saved(self) -> dict[str, Any]:
+        """All of it, for a checkpoint."""
+        return fields_of(self) | {"flow": self.flow.saved(), "rows": np.array(self.rows)}
+
+    @classmethod
+    def restored(cls, saved: Mapping[str, Any], solder: Solder) -> "_Swing":
+        """Make it again of what `saved` returned."""
+        flow = _flow(saved["flow"]["body"], solder)
+        flow.restore(saved["flow"])
+        return cls(**{**saved, "flow": flow, "rows": [tuple(row) for row in saved["rows"].tolist()]})
+
+    def snap(self) -> None:
+        """Keep the present shape."""
+        body = self.flow.body
+        self.snapshots.append(Snapshot(self.rows[-1][0], body.points.copy(), body.triangles.copy()))
+
+
+def solve_free_drop(  # noqa: PLR0913 - what swings and for how long, how it is run
+    solder: Solder,
+    amplitude: float = 0.0,
+    periods: float = 2.0,
+    steps_per_period: int = 100,
+    progress: Callable[[float], None] | None = None,
+    checkpoint: Checkpoint | None = None,
+) -> FreeDrop:
+    """Let a drop without walls and gravity swing in its second mode, or rest.
+
+    The ball starts with the velocity of the mode, linear in space: a start from a stretched shape would excite the
+    modes of the grid, too, whose phases part in the first period and look like damping.
+    The viscosity acts unless `solder.effects.viscosity` is "off"; the spacing is that of `solder.numerics`.
+
+    Args:
+        solder: volume and fluid.
+        amplitude: to which the velocity at the start swings the second mode, over the radius; 0 for a ball at rest.
+        periods: duration in Rayleigh periods of the second mode.
+        steps_per_period: time steps in one of them.
+        progress: called with the fraction done.
+        checkpoint: where the run continues from, to the last bit, and leaves its state.
+
+    Raises:
+        ValueError: the spacing leaves fewer than two shells.
+        SolveFailed: a linear solve failed.
+    """
+    saved = checkpoint.read(RECORDS) if checkpoint else None
+    swing = _Swing.restored(saved, solder) if saved else _Swing.start(_start(solder, amplitude), solder)
+    flow, rows = swing.flow, swing.rows
+    period = 2.0 * pi / rayleigh_frequency(2, _radius(solder), solder.density, solder.surface_tension)
+    steps, time_step = ceil(periods * steps_per_period), period / steps_per_period
+    for step in range(len(rows), steps + 1):
+        start = perf_counter()
+        flow.step(time_step)
+        rows.append(_sample(flow, solder, step * time_step))
+        swing.seconds += perf_counter() - start
+        if step % max(1, steps_per_period // SNAPSHOTS_PER_PERIOD) == 0:
+            swing.snap()
+        if checkpoint is not None and checkpoint.is_due():
+            checkpoint.write(swing.saved())
+        if progress is not None:
+            progress(step / steps)
+    body, count = flow.body, flow.body.cloud.surface_count
+    history = dict(zip(COLUMNS, np.array(rows).T, strict=True))
+    metrics = _rest_metrics(flow, solder, history)
+    metrics["particle_steps_per_second"] = (steps * len(body.points) / swing.seconds, "1/s")
+    if amplitude != 0.0:
+        metrics |= _swing_metrics(solder, history)
+    return FreeDrop(
+        points=body.points,
+        velocity=body.velocity,
+        pressure=body.pressure,
+        surface_points=body.points[:count],
+        triangles=body.triangles,
+        history=history,
+        snapshots=swing.snapshots,
+        metrics=metrics,
+    )
+
+
+def _radius(solder: Solder) -> float:
+    """Radius of the ball [m]."""
+    return float(np.cbrt(3.0 * solder.volume / (4.0 * pi)))
+
+
+def _start(solder: Solder, amplitude: float) -> InertialFlow:
+    """Set up the ball at rest and give it the velocity a omega/2 (-x, -y, 2 z), on its surface a omega R P2."""
+    radius, spacing = _radius(solder), solder.numerics.spacing
+    shells = round(radius / spacing)
+    if shells < 2:
+        raise ValueError(f"solder.numerics.spacing = {spacing:.4g} m must be below half the radius {radius:.4g} m")
+    ball = sphere_cloud(solder.volume, shells)
+    body = Body.at_rest(ball)
+    flow = _flow(body, solder)
+    omega = rayleigh_frequency(2, radius, solder.density, solder.surface_tension)
+    flow.settle(SETTLING_STEP / omega, SETTLING_STEPS)
+    body.velocity = 0.5 * amplitude * omega * SECOND_MOMENT * body.points
+    return flow
+
+
+def _flow(body: Body, solder: Solder) -> InertialFlow:
+    """Let a body flow."""
+    physics = build_physics(solder, EFFECTS | {"viscosity": solder.effects.viscosity != "off"}, ())
+    return InertialFlow(body, physics, solder.density)
+
+
+def _sample(flow: InertialFlow, solder: Solder, time: float) -> tuple[float, ...]:
+    """One row of the history."""
+    body, mass = flow.body, flow.mass
+    offset = body.points - (mass @ body.points).sum(axis=0) / mass.sum()
+    moment = SECOND_MOMENT @ (offset * (mass @ offset)).sum(axis=0) / mass.sum()
+    momentum = solder.density * (mass @ body.velocity)
+    kinetic = 0.5 * float((momentum * body.velocity).sum())
+    energy = flow.physics.energy(body) + kinetic
+    amplitude = 5.0 / 6.0 * float(moment) / _radius(solder) ** 2
+    return time, amplitude, energy, kinetic, body.volume()[0], float(np.linalg.norm(momentum.sum(axis=0)))
+
+
+def _rest_metrics(flow: InertialFlow, solder: Solder, history: dict[str, Floats]) -> dict[str, tuple[float, str]]:
+    """Pressure, remaining motion of the surface and volume at the end."""
+    body, weight = flow.body, np.asarray(flow.mass.sum(axis=0)).ravel()
+    mean = float(np.average(body.pressure, weights=weight))
+    scatter = float(np.sqrt(np.average((body.pressure - mean) ** 2, weights=weight)))
+    normals = vertex_normals(body.points, body.triangles, body.cloud.surface_count)
+    speed = float(np.abs((body.velocity[: len(normals)] * normals).sum(axis=1)).max())
+    return {
+        "mean_pressure": (mean, "Pa"),
+        "pressure_scatter": (scatter / mean, ""),
+        "mean_pressure_error": (mean * _radius(solder) / (2.0 * solder.surface_tension) - 1.0, ""),
+        "capillary_number_at_rest": (solder.viscosity * speed / solder.surface_tension, ""),
+        "volume_drift": (float(np.ptp(history["volume"]) / solder.volume), ""),
+        "particles": (float(len(body.points)), ""),
+    }
+
+
+def _swing_metrics(solder: Solder, history: dict[str, Floats]) -> dict[str, tuple[float, str]]:
+    """Period and decay rate of a fitted damped oscillation, and their errors against Reid's at this viscosity."""
+    radius = _radius(solder)
+    omega = rayleigh_frequency(2, radius, solder.density, solder.surface_tension)
+    exact_decay, exact_frequency = viscous_oscillation(2, omega, solder.viscosity / (solder.density * radius**2))
+    decay, frequency = fit_oscillation(history["time"], history["amplitude"], exact_frequency)
+    return {
+        "period": (2.0 * pi / frequency, "s"),
+        "decay_rate": (decay, "1/s"),
+        "period_error": (exact_frequency / frequency - 1.0, ""),
+        "decay_rate_error": (decay / exact_decay - 1.0, ""),
+    }

@@ -1,0 +1,151 @@
+"""A joint of its own brought to rest: its package holds still, floats, or is moved along a path."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import brentq
+
+from particles.core.checkpoint import Checkpoint
+from particles.core.geometry import JointGeometry
+from particles.parameters.effects import Decision, acting_weight, decide_effects
+from particles.parameters.scene_package import FloatingPackage
+from particles.parameters.scenes import Joint
+from particles.parameters.solder import Solder
+from particles.physics.plate_motion import LIFT, SHIFT, TURN, Floating
+from particles.reference.young_laplace import Meridian
+from particles.scenes.metrics import Metrics, reference_meridian, with_shape_error
+from particles.scenes.moving_joint import follow_path, settle_joint
+from particles.scenes.reflow import solve_joint
+from particles.steps.shape import JointShape
+
+DIRECTIONS = {"lift": LIFT, "shift": SHIFT, "turn": TURN}
+BRACKET = 0.2  # around the collapse height that was found, in which the exact one is sought
+ERRORS = ("width_error", "waist_error", "axial_force_error")
+OF_A_PLACE = ("max_width", "waist", "axial_force", *ERRORS)
+
+
+@dataclass(frozen=True, slots=True)
+class JointAtRest:
+    """A joint at rest.
+
+    Attributes:
+        shape: where the package ends.
+        effects: those that acted.
+        reference: the exact meridian there, where there is one.
+        places: of a path, the start included: SI values of each place and of the joint in it; else empty.
+    """
+
+    shape: JointShape
+    effects: Mapping[str, Decision]
+    reference: Meridian | None
+    places: list[dict]
+
+
+def joint_to_rest(
+    joint: Joint,
+    solder: Solder,
+    progress: Callable[[float], None] | None = None,
+    checkpoints: Callable[[int], Checkpoint] | None = None,
+) -> JointAtRest:
+    """Let the solder of a joint flow until it, and a package that floats, is at rest.
+
+    Args:
+        joint: volume, pads, package and resolution.
+        solder: the same volume, fluid and process.
+        progress: called with the fraction done.
+        checkpoints: gives the checkpoint of each place of a path by its number, of other joints that of place 0.
+
+    Raises: as `solve_joint`.
+    """
+    effects = decide_effects(joint.geometry, solder)
+    weight = acting_weight(solder, effects)
+    if joint.path is not None:
+        shapes = _along(joint, solder, progress, checkpoints)
+        geometries = [joint.geometry, *joint.places][: len(shapes)]
+        references = [reference_meridian(geometry, solder, weight) for geometry in geometries]
+        places = [_record(*place) for place in zip(geometries, shapes, references, strict=True)]
+        states = [shape.snapshots[-1] for shape in shapes[:-1]] or shapes[0].snapshots
+        shape = replace(shapes[-1], snapshots=states, metrics=shapes[-1].metrics | _worst(shapes))
+        return JointAtRest(with_shape_error(shape, solder, references[-1]), effects, references[-1], places)
+    first = None if checkpoints is None else checkpoints(0)
+    if joint.package is None:
+        shape = solve_joint(joint.geometry, solder, progress, checkpoint=first)
+        reference = reference_meridian(joint.geometry, solder, weight)
+        return JointAtRest(with_shape_error(shape, solder, reference), effects, reference, [])
+    shape = settle_joint(joint.geometry, solder, (floating(joint.package),), progress, first)
+    balance = _balance(joint, solder, weight, shape)
+    end = joint.place(shape.metrics["standoff"][0], 0.0, 0.0)
+    reference = reference_meridian(end, solder, weight) if "collapse_height_error" in balance else None
+    shape = replace(shape, metrics=shape.metrics | balance)
+    return JointAtRest(with_shape_error(shape, solder, reference), effects, reference, [])
+
+
+def floating(package: FloatingPackage) -> Floating:
+    """The motion of a package that floats."""
+    free = np.vstack([DIRECTIONS[name] for name in package.free])
+    return Floating(1, free, np.array([0.0, 0.0, -package.load]))
+
+
+def _along(
+    joint: Joint,
+    solder: Solder,
+    progress: Callable[[float], None] | None,
+    checkpoints: Callable[[int], Checkpoint] | None,
+) -> list[JointShape]:
+    """The joint at rest at the start and in each place of the path, as far as the neck holds."""
+    shapes = []
+    for shape in follow_path(joint.geometry, solder, joint.places, checkpoints):
+        shapes.append(shape)
+        if progress is not None:
+            progress(len(shapes) / (1 + len(joint.places)))
+    return shapes
+
+
+def _balance(joint: Joint, solder: Solder, weight: float, shape: JointShape) -> Metrics:
+    """Errors of a package that floats free to lift: of its force against the load, of its height against Young-Laplace.
+
+    The force's error is over pi gamma times the smaller pad's radius.
+    """
+    package = joint.package
+    if package is None or "lift" not in package.free:
+        return {}
+    scale = np.pi * solder.surface_tension * min(joint.pad_bottom, joint.pad_top)
+    error = (shape.metrics["axial_force"][0] - package.load) / scale
+    balance: Metrics = {"load": (package.load, "N"), "force_balance_error": (error, "")}
+    if np.isfinite(shape.metrics["width_error"][0]):
+        exact = collapse_height(joint, solder, weight, shape.metrics["standoff"][0])
+        balance["collapse_height_error"] = (shape.metrics["standoff"][0] / exact - 1.0, "")
+    return balance
+
+
+def collapse_height(joint: Joint, solder: Solder, weight: float, near: float) -> float:
+    """Standoff [m] at which the Young-Laplace joint carries the load, near a given one; nan where there is none."""
+    load = joint.package.load if joint.package else 0.0
+
+    def excess(standoff: float) -> float:
+        meridian = reference_meridian(joint.place(standoff, 0.0, 0.0), solder, weight)
+        return float("nan") if meridian is None else meridian.axial_force - load
+
+    low, high = (1.0 - BRACKET) * near, (1.0 + BRACKET) * near
+    if not excess(low) * excess(high) < 0.0:
+        return float("nan")
+    return float(brentq(excess, low, high, rtol=1e-6))
+
+
+def _record(geometry: JointGeometry, shape: JointShape, reference: Meridian | None) -> dict:
+    """Place, verdict, main metrics and the exact force, SI values; None where there is none."""
+    values = {name: shape.metrics[name][0] for name in OF_A_PLACE}
+    exact = {"axial_force_exact": float("nan") if reference is None else reference.axial_force}
+    known = {name: value if np.isfinite(value) else None for name, value in (values | exact).items()}
+    place = {"standoff": geometry.gap, "offset": geometry.offset[0], "tilt": geometry.tilt[1]}
+    return place | {"verdict": shape.verdict} | known
+
+
+def _worst(shapes: Sequence[JointShape]) -> Metrics:
+    """The largest errors of all places that have a reference, and how many places were reached."""
+    worst: Metrics = {"places": (float(len(shapes)), "")}
+    for name in ERRORS:
+        known = [shape.metrics[name][0] for shape in shapes if np.isfinite(shape.metrics[name][0])]
+        worst[name] = (max(known, key=abs, default=float("nan")), "")
+    return worst

@@ -1,0 +1,265 @@
+"""Numbers of a joint or drop at rest, and their comparison with the Young-Laplace reference."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from particles.core.body import Body
+from particles.core.geometry import LARGEST_WIDTH_CHANGE, JointGeometry
+from particles.core.surface_measure import ring_area
+from particles.core.symmetry import whole_points
+from particles.parameters.solder import Solder
+from particles.physics.force_gravity import Gravity
+from particles.physics.force_wetting import Wetting
+from particles.physics.physics import Force
+from particles.physics.plate_force import plate_wrench
+from particles.reference.young_laplace import Meridian, NoMeridian, joint_meridian, pad_meridian
+from particles.steps.flow import LiquidFlow
+from particles.steps.rest import Run
+from particles.steps.shape import JointShape
+from particles.steps.time_step import capillary_limit
+from particles.surface.contact_line import ON_MASK, ON_PAD, ContactLine
+from particles.surface.shape_error import shape_error
+
+Floats = NDArray[np.float64]
+Metrics = dict[str, tuple[float, str]]
+WIDTH_CHANGE, TILT_LEVER = 0.1, 2.0
+JOINT_NAMES = {
+    "height": "drop_height",
+    "height_error": "drop_height_error",
+    "max_width_error": "width_error",
+    "contact_radius": "contact_radius_board",
+    "contact_angle": "contact_angle_board",
+}
+
+
+def joint_metrics(geometry: JointGeometry, solder: Solder, flow: LiquidFlow, run: Run) -> Metrics:
+    """Collect the numbers of a joint at the end of its run: name to SI value and unit."""
+    reference = reference_meridian(geometry, solder, _weight(flow))
+    errors = _joint_errors(solder, flow, run, reference) | _width_error(geometry, solder, flow, run)
+    shape = _joint_shape(geometry, solder, flow, run) | errors
+    return _volume(solder, flow) | shape | _pressure(solder, flow, run, reference) | _cost_and_rest(solder, flow, run)
+
+
+def drop_metrics(solder: Solder, pad_radius: float, flow: LiquidFlow, run: Run) -> Metrics:
+    """Collect the numbers of a drop at the end of its run: name to SI value and unit.
+
+    Args:
+        solder: volume, contact angles and fluid.
+        pad_radius: radius of the pad [m], infinite for a uniform wall.
+        flow: the flow at its end.
+        run: how it came there.
+    """
+    return body_metrics(solder, reference_drop(solder, pad_radius, _weight(flow)), flow, run)
+
+
+def body_metrics(solder: Solder, reference: Meridian | None, flow: LiquidFlow, run: Run) -> Metrics:
+    """Collect the numbers of a drop, with its errors against a reference and its contact angle where it has them."""
+    profile = run.profiles[-1]
+    height, width = profile.drop_height(len(flow.body.cloud.rings)), profile.max_width
+    shape: Metrics = {"height": (height, "m"), "max_width": (width, "m")}
+    if reference is not None:
+        shape["height_error"] = (height / reference.height - 1.0, "")
+        shape["max_width_error"] = (width / reference.max_width - 1.0, "")
+    if flow.physics.lines:
+        shape |= _contact(solder, flow, reference)
+    return _volume(solder, flow) | shape | _pressure(solder, flow, run, reference) | _cost_and_rest(solder, flow, run)
+
+
+def with_shape_error(shape: JointShape, solder: Solder, reference: Meridian | None) -> JointShape:
+    """Add the error of the whole free surface, over the cube root of the volume, where there is an exact one."""
+    if reference is None or shape.verdict in ("open", "bridged"):
+        return shape
+    error = shape_error(shape.points, shape.triangles, reference) / float(np.cbrt(solder.volume))
+    return replace(shape, metrics=shape.metrics | {"shape_error": (error, "")})
+
+
+def _contact(solder: Solder, flow: LiquidFlow, reference: Meridian | None) -> Metrics:
+    """Radius of the wetted area; mean contact angle, the smallest and the largest along the line."""
+    cosines = _contact_cosines(solder, flow)[0]
+    angle, angles = mean_angle(cosines), np.degrees(np.arccos(np.clip(cosines, -1.0, 1.0)))
+    contact: Metrics = {
+        "contact_radius": (contact_radius(flow.body, 0), "m"),
+        "contact_angle": (angle, "deg"),
+        "contact_angle_min": (float(angles.min()), "deg"),
+        "contact_angle_max": (float(angles.max()), "deg"),
+    }
+    if reference is not None:
+        contact["contact_angle_error"] = (angle - float(np.degrees(reference.angle_board)), "deg")
+    return contact
+
+
+def open_metrics(geometry: JointGeometry, solder: Solder, flow: LiquidFlow, run: Run) -> Metrics:
+    """Collect the numbers of a joint whose solder is a drop on the board: those of the drop, under a joint's names."""
+    drop = drop_metrics(solder, geometry.radius_board, flow, run)
+    own = {JOINT_NAMES.get(name, name): number for name, number in drop.items()}
+    return own | {"standoff": (geometry.gap, "m"), "axial_force": (0.0, "N")}
+
+
+def bridge_metrics(gap: float, solder: Solder, flow: LiquidFlow, run: Run) -> Metrics:
+    """Collect the numbers of joints that became one body between plates a gap apart [m]: name to SI value and unit.
+
+    The volume of the solder is that of all joints together.
+    """
+    length = float(np.ptp(flow.body.points[:, 0]))
+    shape: Metrics = {"standoff": (gap, "m"), "length": (length, "m"), "axial_force": (axial_force(flow), "N")}
+    return _volume(solder, flow) | shape | _pressure(solder, flow, run, None) | _cost_and_rest(solder, flow, run)
+
+
+def _weight(flow: LiquidFlow) -> float:
+    """Weight of the unit volume that acts [N/m^3]; zero without gravity."""
+    return sum(force.weight for force in flow.physics.forces if isinstance(force, Gravity))
+
+
+def particle_pressure(flow: LiquidFlow) -> Floats:
+    """Pressure of the particles above ambient `(n,)` [Pa], with the hydrostatic part that acts as a surface force."""
+    return flow.body.pressure - _weight(flow) * flow.body.points[:, 2]
+
+
+def contact_radius(body: Body, wall: int) -> float:
+    """Radius of the disc that has the wetted area of a wall [m]."""
+    line = whole_points(body.cloud, body.points, wall)[0]
+    return float(np.sqrt(ring_area(line, np.arange(len(line), dtype=np.int32)) / np.pi))
+
+
+def mean_angle(cosines: Floats) -> float:
+    """Contact angle of a mean cosine [deg]."""
+    return float(np.degrees(np.arccos(np.clip(cosines.mean(), -1.0, 1.0))))
+
+
+def verdict(lines: Sequence[ContactLine], ruptured: bool) -> str:
+    """Judge a joint or drop: "open", "bridged", "overflow", "dewetted" or "ok"; a uniform wall has no edge to leave."""
+    if ruptured:
+        return "open"
+    if any(len(line.held_pads()) > 1 for line in lines):
+        return "bridged"
+    with_edge = [line for line in lines if line.has_edge]
+    if any((line.state == ON_MASK).any() for line in with_edge):
+        return "overflow"
+    return "dewetted" if any((line.state == ON_PAD).any() for line in with_edge) else "ok"
+
+
+def _contact_cosines(solder: Solder, flow: LiquidFlow) -> list[Floats]:
+    """Cosines of the contact angles along each contact line, by the balance of forces."""
+    return Wetting(solder.surface_tension, flow.physics.lines, _others(flow)).contact_cosines(flow.body)
+
+
+def _others(flow: LiquidFlow) -> tuple[Force, ...]:
+    """All forces but that of the walls."""
+    return tuple(force for force in flow.physics.forces if not isinstance(force, Wetting))
+
+
+def _volume(solder: Solder, flow: LiquidFlow) -> Metrics:
+    volume = flow.body.cloud.parts * flow.body.volume()[0]
+    return {"volume": (volume, "m^3"), "volume_drift": (volume / solder.volume - 1.0, "")}
+
+
+def _joint_shape(geometry: JointGeometry, solder: Solder, flow: LiquidFlow, run: Run) -> Metrics:
+    body, profile = flow.body, run.profiles[-1]
+    angles = _contact_cosines(solder, flow)
+    return {
+        "standoff": (geometry.gap, "m"),
+        "max_width": (profile.max_width, "m"),
+        "waist": (profile.waist, "m"),
+        "contact_radius_board": (contact_radius(body, 0), "m"),
+        "contact_radius_package": (contact_radius(body, 1), "m"),
+        "contact_angle_board": (mean_angle(angles[0]), "deg"),
+        "contact_angle_package": (mean_angle(angles[1]), "deg"),
+        "axial_force": (axial_force(flow), "N"),
+    }
+
+
+def _joint_errors(solder: Solder, flow: LiquidFlow, run: Run, reference: Meridian | None) -> Metrics:
+    """Errors against the reference, the force's over pi gamma times the smaller contact radius; nan without one."""
+    if reference is None:
+        return {name: (float("nan"), "") for name in ("waist_error", "axial_force_error")}
+    profile = run.profiles[-1]
+    scale = np.pi * solder.surface_tension * min(contact_radius(flow.body, wall) for wall in (0, 1))
+    return {
+        "waist_error": (profile.waist / reference.waist - 1.0, ""),
+        "axial_force_error": ((axial_force(flow) - reference.axial_force) / scale, ""),
+    }
+
+
+def _width_error(geometry: JointGeometry, solder: Solder, flow: LiquidFlow, run: Run) -> Metrics:
+    """Error of the width against the coaxial joint of the same gap, and how far that may be off; nan beyond a limit."""
+    bound, error = width_change_bound(geometry), float("nan")
+    if bound <= LARGEST_WIDTH_CHANGE:
+        upright = replace(geometry, offset=(0.0, 0.0), tilt=(0.0, 0.0))
+        reference = reference_meridian(upright, solder, _weight(flow))
+        if reference is not None:
+            error = run.profiles[-1].max_width / reference.max_width - 1.0
+    return {"width_error": (error, ""), "width_reference_error": (bound, "")}
+
+
+def axial_force(flow: LiquidFlow) -> float:
+    """Force of the liquid on the package along +z [N]."""
+    on_package = [wall for wall, plate in enumerate(flow.body.plates) if plate.side > 0.0]
+    return float(sum(plate_wrench(flow.body, _others(flow), wall)[2] for wall in on_package))
+
+
+def _pressure(solder: Solder, flow: LiquidFlow, run: Run, reference: Meridian | None) -> Metrics:
+    """Mean pressure of the particles below the surface, its error and its scatter.
+
+    The scatter is the standard deviation from the hydrostatic pressure, over the capillary pressure of a sphere of the
+    body's width.
+    """
+    body, first = flow.body, flow.body.cloud.surface_count
+    mean = float(particle_pressure(flow)[first:].mean())
+    capillary = 4.0 * solder.surface_tension / run.profiles[-1].max_width
+    metrics: Metrics = {"mean_pressure": (mean, "Pa")}
+    if reference is not None:
+        exact = reference.pressure - _weight(flow) * float(body.points[first:, 2].mean())
+        metrics["mean_pressure_error"] = (mean / exact - 1.0, "")
+    return metrics | {"pressure_scatter": (float(body.pressure[first:].std() / capillary), "")}
+
+
+def _cost_and_rest(solder: Solder, flow: LiquidFlow, run: Run) -> Metrics:
+    limit = capillary_limit(solder.density, flow.body.cloud.spacing, solder.surface_tension)
+    last, count = run.records[-1], len(flow.body.points)
+    return {
+        "at_rest": (float(run.at_rest), ""),
+        "capillary_number_at_rest": (solder.viscosity * last.speed / solder.surface_tension, ""),
+        "time_step_over_capillary_limit": (max(record.time_step for record in run.records) / limit, ""),
+        "particles": (float(count), ""),
+        "steps": (float(len(run.records)), ""),
+        "seconds": (run.seconds, "s"),
+        "particle_steps_per_second": (count * len(run.records) / run.seconds, "1/s"),
+    }
+
+
+def width_change_bound(geometry: JointGeometry) -> float:
+    """Bound on the relative change of a joint's width, at equal gap, by the package's offset and tilt.
+
+    By symmetry the change is of second order. The factors bound barrels and hourglasses of equal discs, 1.2 to 2.1
+    radii apart, to 0.3 radii and 5 deg; widths of Surface Evolver keep to them (test_particles_leaning_joints.py).
+    """
+    radius = min(geometry.radius_board, geometry.radius_package)
+    lean = float(np.hypot(*geometry.offset)) / radius + TILT_LEVER * float(np.hypot(*geometry.tilt))
+    return WIDTH_CHANGE * lean**2
+
+
+def reference_meridian(geometry: JointGeometry, solder: Solder, weight: float) -> Meridian | None:
+    """Young-Laplace meridian of a coaxial joint with Gibbs' condition at the edges; none without equilibrium."""
+    if not geometry.is_coaxial:
+        return None
+    try:
+        return joint_meridian(
+            solder.volume,
+            geometry.radius_board,
+            geometry.radius_package,
+            geometry.gap,
+            solder.surface_tension,
+            weight,
+            angle_limits=(solder.pad_contact_angle, solder.mask_contact_angle),
+        )
+    except NoMeridian:
+        return None
+
+
+def reference_drop(solder: Solder, pad_radius: float, weight: float) -> Meridian:
+    """Young-Laplace meridian of a drop on a pad in the mask, with Gibbs' condition at the pad's edge."""
+    limits = (solder.pad_contact_angle, solder.mask_contact_angle)
+    return pad_meridian(solder.volume, pad_radius, solder.surface_tension, weight, angle_limits=limits)

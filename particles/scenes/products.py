@@ -1,0 +1,108 @@
+"""Files of the reflow: the shapes as HDF5, and one joint's particles for ParaView. Nothing else here knows files."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import h5py
+import meshio
+import numpy as np
+
+from particles.reference.young_laplace import Meridian
+from particles.steps.shape import JointShape, Snapshot
+
+BODY = "body"
+REFERENCE = "reference"
+ARRAYS = ("points", "velocity", "pressure", "triangles")
+TIMES = (
+    "seconds",
+    "particle_steps_per_second",
+)  # of one run: in no product, so that the same shape gives the same file
+
+
+def write_shapes(path: Path | str, shapes: Mapping[str, JointShape]) -> None:
+    """Write shapes, one group each, with history, snapshots and metrics.
+
+    Args:
+        path: HDF5 file; replaced if it exists.
+        shapes: name to shape.
+    """
+    with h5py.File(path, "w") as file:
+        for name, shape in shapes.items():
+            _write_shape(file.create_group(name), shape)
+
+
+def _write_shape(group: h5py.Group, shape: JointShape) -> None:
+    group.attrs["verdict"] = shape.verdict
+    group.attrs["surface_count"] = len(shape.surface_points)
+    for name in ARRAYS:
+        group[name] = getattr(shape, name)
+    for wall, ring in enumerate(shape.rings):
+        group[f"rings/{wall}"] = ring
+    for name, column in shape.history.items():
+        text = column.dtype.kind == "U"
+        group[f"history/{name}"] = column.astype(h5py.string_dtype()) if text else column
+    for number, snapshot in enumerate(shape.snapshots):
+        place = group.create_group(f"snapshots/{number:04d}")
+        place.attrs["time"] = snapshot.time
+        place["points"], place["triangles"] = snapshot.points, snapshot.triangles
+    for name, (value, unit) in untimed(shape.metrics).items():
+        place = group.create_group(f"metrics/{name}")
+        place.attrs["value"], place.attrs["unit"] = value, unit
+
+
+def untimed(metrics: Mapping[str, tuple]) -> dict[str, tuple]:
+    """Return metrics that are the same whenever and wherever a shape is computed."""
+    return {name: metric for name, metric in metrics.items() if name not in TIMES}
+
+
+def write_body(folder: Path, shape: JointShape, reference: Meridian | None) -> None:
+    """Write one drop or joint: `shape.h5` with its exact meridian, where there is one, and `particles.vtu`."""
+    write_shapes(folder / "shape.h5", {BODY: shape})
+    if reference is not None:
+        with h5py.File(folder / "shape.h5", "a") as file:
+            file[REFERENCE] = np.stack((reference.r, reference.z))
+    write_particles(folder / "particles.vtu", shape)
+
+
+def read_body(folder: Path) -> tuple[JointShape, np.ndarray | None]:
+    """Read what `write_body` wrote: the shape, and radius and height `(2, k)` of the exact meridian [m]."""
+    with h5py.File(folder / "shape.h5", "r") as file:
+        return _read_shape(file[BODY]), file[REFERENCE][()] if REFERENCE in file else None
+
+
+def read_shapes(path: Path | str) -> dict[str, JointShape]:
+    """Read what `write_shapes` wrote."""
+    with h5py.File(path, "r") as file:
+        return {name: _read_shape(group) for name, group in file.items()}
+
+
+def _read_shape(group: h5py.Group) -> JointShape:
+    arrays = {name: group[name][()] for name in ARRAYS}
+    history = {}
+    for name, column in group["history"].items():
+        history[name] = column.asstr()[()].astype(str) if h5py.check_string_dtype(column.dtype) else column[()]
+    snapshots = [
+        Snapshot(float(place.attrs["time"]), place["points"][()], place["triangles"][()])
+        for _, place in sorted(group["snapshots"].items())
+    ]
+    metrics = {
+        name: (float(place.attrs["value"]), str(place.attrs["unit"])) for name, place in group["metrics"].items()
+    }
+    return JointShape(
+        **arrays,
+        rings=tuple(ring[()] for _, ring in sorted(group.get("rings", {}).items())),
+        surface_points=arrays["points"][: group.attrs["surface_count"]],
+        history=history,
+        snapshots=snapshots,
+        metrics=metrics,
+        verdict=str(group.attrs["verdict"]),
+    )
+
+
+def write_particles(path: Path | str, shape: JointShape) -> None:
+    """Write the particles at rest and the free surface as VTU: velocity, pressure, `surface` 1 on the free surface."""
+    count = len(shape.points)
+    cells = [("vertex", np.arange(count).reshape(-1, 1)), ("triangle", shape.triangles)]
+    surface = (np.arange(count) < len(shape.surface_points)).astype(float)
+    data = {"velocity": shape.velocity, "pressure": shape.pressure, "surface": surface}
+    meshio.Mesh(shape.points, cells, point_data=data).write(path, file_format="vtu")

@@ -1,0 +1,217 @@
+"""Reflow of one joint: from the wetted discs, the gap and the solder to the shape at rest."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from particles.core.body import Body
+from particles.core.checkpoint import Checkpoint
+from particles.core.cloud import Cloud, TooLittleSolder, box_cloud, joint_cloud
+from particles.core.geometry import JointGeometry
+from particles.core.plate import Pad
+from particles.core.symmetry import whole_line
+from particles.ispg.gripc_step import GripcStep
+from particles.parameters.effects import decide_effects, switched
+from particles.parameters.solder import Solder
+from particles.physics.force_gravity import Gravity
+from particles.physics.force_surface_tension import SurfaceTension
+from particles.physics.force_wetting import Wetting
+from particles.physics.mass import Inertia, Mass
+from particles.physics.physics import Event, Force, Hold, Momentum, Operator, Physics
+from particles.physics.viscosity import Viscosity
+from particles.physics.wall_friction import NavierSlip, NoSlip
+from particles.scenes.metrics import Metrics, joint_metrics, open_metrics, particle_pressure, verdict
+from particles.scenes.split import parted_shape, split_to_rest
+from particles.steps.flow import LiquidFlow
+from particles.steps.inertial_step import InertialStep
+from particles.steps.relaxation import Relaxation
+from particles.steps.rest import Run, StopRule, run_to_rest
+from particles.steps.shape import JointShape, Snapshot
+from particles.steps.step_solver import StepSolver
+from particles.steps.time_step import TimeStep, capillary_limit
+from particles.surface.contact_line import ContactLine
+
+__all__ = ["JointGeometry", "JointShape", "solve_joint"]
+
+CALM_CAPILLARY_TIMES = 20.0
+FEWEST_PER_EDGE = 5
+
+
+def solve_joint(
+    geometry: JointGeometry,
+    solder: Solder,
+    progress: Callable[[float], None] | None = None,
+    on_snapshot: Callable[[Snapshot], None] | None = None,
+    checkpoint: Checkpoint | None = None,
+) -> JointShape:
+    """Let molten solder flow between two wetted discs until it is at rest.
+
+    The solder starts as a double cone of its volume on both discs and flows by its effects (`decide_effects`). Too
+    little for such a cone is a drop on the board's disc; the joint is open. So is one whose neck collapses: a drop on
+    each disc.
+
+    Args:
+        geometry: gap and radii of the discs [m].
+        solder: volume, fluid and process.
+        progress: called with the fraction done.
+        on_snapshot: called with each new snapshot.
+        checkpoint: where the run continues from, to the last bit, and leaves its state.
+
+    Raises:
+        TooLittleSolder: no cone of the volume spans the gap, though a drop would reach the other disc.
+        NoRest: no rest within `solder.numerics.max_steps`.
+        SolveFailed: a linear solve failed.
+    """
+    try:
+        flow, rule = start_joint(geometry, solder)
+    except TooLittleSolder:
+        flow, rule = _start_on_board(geometry, solder)
+    run = run_to_rest(flow, rule, progress, on_snapshot, checkpoint)
+    if len(flow.body.cloud.rings) == 1:
+        return _open_shape(geometry, solder, flow, run)
+    shape = joint_shape(geometry, solder, flow, run)
+    return parted(geometry, solder, flow, shape) if run.ruptured else shape
+
+
+def parted(geometry: JointGeometry, solder: Solder, flow: LiquidFlow, shape: JointShape) -> JointShape:
+    """The shape of a joint whose neck has collapsed: a drop at rest on each pad; where that cannot be, as it is."""
+    effects = switched(decide_effects(geometry, solder)) | {"inertia": False, "viscosity": False}
+
+    def start(body: Body) -> LiquidFlow:
+        return start_flow(body.cloud, solder, effects, pad_lines(body.cloud, solder))
+
+    drops = split_to_rest(flow, stop_rule(flow.body.cloud, solder, effects), start)
+    return parted_shape(shape, drops) if drops else shape
+
+
+def _start_on_board(geometry: JointGeometry, solder: Solder) -> tuple[LiquidFlow, StopRule]:
+    """Set up the flow of a drop on the board's disc alone."""
+    edge = float(np.cbrt(solder.volume))
+    cloud = box_cloud(edge, max(FEWEST_PER_EDGE, 1 + round(edge / solder.numerics.spacing)))
+    effects = switched(decide_effects(geometry, solder))
+    lines = (contact_line(cloud, 0, geometry.radius_board, solder),)
+    return start_flow(cloud, solder, effects, lines), stop_rule(cloud, solder, effects)
+
+
+def _open_shape(geometry: JointGeometry, solder: Solder, flow: LiquidFlow, run: Run) -> JointShape:
+    """Collect the result of a joint whose solder stays on the board."""
+    height = run.records[-1].height
+    if height >= geometry.gap:
+        raise TooLittleSolder(f"a drop of {height:.4g} m reaches across the gap of {geometry.gap:.4g} m, no joint does")
+    return replace(collect_shape(solder, flow, run, open_metrics(geometry, solder, flow, run)), verdict="open")
+
+
+def start_joint(geometry: JointGeometry, solder: Solder) -> tuple[LiquidFlow, StopRule]:
+    """Set up the flow of a joint from its double cone, with the effects that are called for, and when it ends."""
+    cloud = joint_cloud(geometry, solder.volume, solder.numerics.spacing)
+    effects = switched(decide_effects(geometry, solder))
+    return joint_flow(cloud, geometry, solder), stop_rule(cloud, solder, effects)
+
+
+def joint_flow(cloud: Cloud, geometry: JointGeometry, solder: Solder) -> LiquidFlow:
+    """Set up the flow of a cloud that fills a joint, with the effects that are called for."""
+    radii = (geometry.radius_board, geometry.radius_package)
+    lines = tuple(contact_line(cloud, wall, radius, solder) for wall, radius in enumerate(radii))
+    return start_flow(cloud, solder, switched(decide_effects(geometry, solder)), lines)
+
+
+def contact_line(cloud: Cloud, wall: int, radius: float, solder: Solder) -> ContactLine:
+    """Set up the contact line around one pad, at the plate's origin, with its radius [m]."""
+    ring, pad = cloud.rings[wall], Pad((0.0, 0.0), radius, solder.pad_contact_angle)
+    local = cloud.plates[wall].local(cloud.points[ring])
+    corners = len(whole_line(cloud, len(ring))[0])
+    return ContactLine(wall, (pad,), solder.mask_contact_angle, local, np.array([corners]))
+
+
+def pad_lines(cloud: Cloud, solder: Solder) -> tuple[ContactLine, ...]:
+    """Set up the contact lines of a body made anew, on plates that know their pads."""
+    lines = []
+    for wall, (ring, plate) in enumerate(zip(cloud.rings, cloud.plates, strict=True)):
+        corners = np.array([pad.corners(cloud.spacing) for pad in plate.pads])
+        local = plate.local(cloud.points[ring])
+        lines.append(ContactLine(wall, plate.pads, solder.mask_contact_angle, local, corners))
+    return tuple(lines)
+
+
+def start_flow(cloud: Cloud, solder: Solder, effects: dict[str, bool], lines: tuple[ContactLine, ...]) -> LiquidFlow:
+    """Set up a flow from rest, with only the effects that are on."""
+    limit = capillary_limit(solder.density, cloud.spacing, solder.surface_tension)
+    largest = solder.numerics.time_step_limit * limit
+    physics = build_physics(solder, effects, lines)
+    solver = step_solver(solder, effects)
+    return LiquidFlow(Body.at_rest(cloud), physics, TimeStep(largest, cloud.spacing, largest), solver)
+
+
+def step_solver(solder: Solder, effects: dict[str, bool]) -> StepSolver:
+    """How steps are solved: by the seed's scheme, on tetrahedra where momentum is carried or shared, else to rest."""
+    if solder.numerics.scheme == "gripc":
+        return GripcStep(solder.numerics.basis)
+    if effects["inertia"] or effects["viscosity"]:
+        return InertialStep(solder.density)
+    return Relaxation(solder.density)
+
+
+def stop_rule(cloud: Cloud, solder: Solder, effects: dict[str, bool]) -> StopRule:
+    """When a reflow ends: at rest, or with inertia at the end of the process at the latest."""
+    calm_time = CALM_CAPILLARY_TIMES * capillary_limit(solder.density, cloud.spacing, solder.surface_tension)
+    end_time = solder.process_time if effects["inertia"] else float("inf")
+    return StopRule(solder.numerics.max_steps, solder.numerics.tolerance, calm_time, end_time)
+
+
+def build_physics(solder: Solder, effects: dict[str, bool], lines: tuple[ContactLine, ...]) -> Physics:
+    """Collect the effects that are on.
+
+    Args:
+        solder: fluid properties.
+        effects: name to on or off, as `decide_effects` decides.
+        lines: contact lines.
+    """
+    forces: list[Force] = []
+    operators: list[Operator] = [Mass(solder.density)]
+    momenta: list[Momentum] = []
+    events: list[Event] = []
+    if effects["surface_tension"]:
+        tension = SurfaceTension(solder.surface_tension)
+        forces.append(tension)
+        operators.append(tension)
+    if effects["gravity"]:
+        forces.append(Gravity(solder.density * solder.gravity))
+    if effects["wall_adhesion"]:
+        wetting = Wetting(solder.surface_tension, lines, tuple(forces))
+        forces.append(wetting)
+        events.append(wetting)
+    frictions: list[Operator] = []
+    holds: list[Hold] = []
+    if effects["viscosity"]:
+        operators.append(Viscosity(solder.viscosity))
+        if solder.wall == "slip" and solder.slip_length is not None:
+            frictions.append(NavierSlip(solder.viscosity / solder.slip_length))
+        if solder.wall == "no-slip":
+            holds.append(NoSlip())
+    if effects["inertia"]:
+        momenta.append(Inertia(solder.density))
+    lists = (tuple(forces), tuple(operators), tuple(momenta), tuple(events))
+    return Physics(*lists, lines, frictions=tuple(frictions), holds=tuple(holds))
+
+
+def joint_shape(geometry: JointGeometry, solder: Solder, flow: LiquidFlow, run: Run) -> JointShape:
+    """Collect the result of a run that ended with the plates at a geometry."""
+    return collect_shape(solder, flow, run, joint_metrics(geometry, solder, flow, run))
+
+
+def collect_shape(solder: Solder, flow: LiquidFlow, run: Run, metrics: Metrics) -> JointShape:
+    """Collect the result of a run."""
+    body, cloud = flow.body, flow.body.cloud
+    return JointShape(
+        points=body.points,
+        velocity=body.velocity,
+        pressure=particle_pressure(flow),
+        surface_points=body.points[: cloud.surface_count],
+        triangles=body.triangles,
+        rings=cloud.rings,
+        history=run.history(solder.viscosity / solder.surface_tension),
+        snapshots=run.snapshots,
+        metrics=metrics,
+        verdict=verdict(flow.physics.lines, run.ruptured),
+    )

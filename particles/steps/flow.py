@@ -1,0 +1,186 @@
+"""One implicit step of molten solder, Lagrangian Navier-Stokes (Hu et al., eqs 1-7).
+
+A step: contact line events; forces; saddle-point solve for velocity and pressure; move; smooth and flip the surface;
+correct the volume along its gradient; shift the interior. Each of these lives in its own module. A body that relaxes
+ends each step with no more energy than it had (`descent`).
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from particles.core.body import Body
+from particles.core.cloud import Cloud
+from particles.core.neighbours import NeighbourList
+from particles.core.plate import Pad, Plate
+from particles.physics.physics import Physics
+from particles.steps.descent import Evening, Start, correct_volume, even_out, highest_energy
+from particles.steps.interior_shift import interior_shift
+from particles.steps.step_solver import Motion, PreparedStep, StepSolver
+from particles.steps.time_step import StepCollapsed, TimeStep
+
+Floats = NDArray[np.float64]
+
+SKIN = 0.2
+FLIP_INTERVAL = 2
+FLOW_RECORDS = (Body, Cloud, Plate, Pad, TimeStep)  # that a saved flow consists of
+SAVED = ("body", "time_step", "volume", "time", "steps")
+
+
+@dataclass(frozen=True, slots=True)
+class StepRecord:
+    """What a step did.
+
+    Attributes:
+        step, time, time_step, binding: number, end and size of the step [s], and what bound its size.
+        height, volume, energy: of the body after the step [m, m^3, J].
+        speed: largest velocity of the surface along its normal, smoothing and correction included [m/s].
+        displacement: that velocity times the time step, over the spacing.
+        flips: edges flipped.
+        iterations: conjugate gradient steps of the pressure solve.
+    """
+
+    step: int
+    time: float
+    time_step: float
+    binding: str
+    height: float
+    volume: float
+    energy: float
+    speed: float
+    displacement: float
+    flips: int
+    iterations: int
+
+
+class LiquidFlow:
+    """A liquid body that flows under its physics."""
+
+    def __init__(self, body: Body, physics: Physics, time_step: TimeStep, solver: StepSolver) -> None:
+        """Set up the neighbour list of the solver and remember the volume to keep.
+
+        Args:
+            body: the liquid body; changed in place.
+            physics: what acts on it.
+            time_step: the step size control.
+            solver: of the motion in a step.
+        """
+        spacing = body.cloud.spacing
+        self.body, self.physics, self.time_step, self.solver = body, physics, time_step, solver
+        self.volume = body.volume()[0]
+        self.neighbours = NeighbourList(solver.support * spacing, SKIN * spacing)
+        self.time, self.steps = 0.0, 0
+
+    def saved(self) -> dict[str, Any]:
+        """All that a flow of the same physics needs to continue to the same bits, for a checkpoint."""
+        return {name: getattr(self, name) for name in SAVED} | {
+            "lines": [line.saved() for line in self.physics.lines],
+            "solver": self.solver.saved(),
+            "neighbours": self.neighbours.saved(),
+        }
+
+    def restore(self, saved: Mapping[str, Any]) -> None:
+        """Continue from what `saved` returned."""
+        for name in SAVED:
+            setattr(self, name, saved[name])
+        for line, kept in zip(self.physics.lines, saved["lines"], strict=True):
+            line.restore(kept)
+        self.solver.restore(saved["solver"])
+        self.neighbours.restore(saved["neighbours"])
+
+    def step(self) -> StepRecord:
+        """Advance one time step.
+
+        Raises:
+            SolveFailed: the linear solve failed.
+            FloatingPointError: a position is not finite.
+            StepCollapsed: a particle would move too far in the shortest step.
+        """
+        body = self.body
+        for event in self.physics.events:
+            event.update(body)
+        correct_volume(body, self.physics, self.volume)  # events move the vertices that they catch
+        self.neighbours.update(body.points)
+        before = body.points[: body.cloud.surface_count].copy()
+        motion, flips = self._descend()
+        self.neighbours.update(body.points)
+        body.points[body.cloud.surface_count :] += interior_shift(body, self.neighbours)
+        self.steps += 1
+        self.time += self.time_step.size
+        record = self._record(before, flips, motion.iterations)
+        # Where momentum is kept, the next step will be as fast.
+        self.time_step.grow(motion.top_speed if self.physics.momenta else 0.0)
+        return record
+
+    def _descend(self) -> tuple[Motion, int]:
+        """Move so that the energy does not rise; return the motion and the number of flips."""
+        body, start = self.body, Start.of(self.body, self.physics.lines)
+        highest = highest_energy(body, self.physics, self.solver, self.time_step.size)
+        evening = Evening(self.solver.smoothing_passes, self.steps % FLIP_INTERVAL == 0, highest)
+        attempted = [event.attempt(body) for event in self.physics.events]
+        if any(attempted):
+            correct_volume(body, self.physics, self.volume)
+            time_step = replace(self.time_step)
+            done = self._move(evening)
+            if done is not None:
+                return done
+            start.restore(body, self.physics.lines)
+            self.time_step = time_step
+        while True:
+            done = self._move(evening)
+            if done is not None:
+                return done
+            start.restore(body, self.physics.lines)
+            self.time_step.cut_for_energy()
+
+    def _move(self, evening: Evening) -> tuple[Motion, int] | None:
+        """Move the body by one step; None where its energy is too high after it."""
+        body = self.body
+        motion = self._accelerate(self.solver.prepare(body, self.physics, self.neighbours))
+        body.move(self.time_step.size, motion.transport, motion.twists)
+        flips = even_out(body, self.physics, self.volume, evening)
+        return None if flips is None else (motion, flips)
+
+    def _accelerate(self, prepared: PreparedStep) -> Motion:
+        """Solve for velocity and pressure, again with a smaller step where a particle would move too far."""
+        body = self.body
+        while True:
+            motion = prepared.solve(self.time_step.size, self.volume)
+            if self._accepts(motion):
+                break
+        body.velocity, body.pressure = motion.velocity, motion.pressure
+        body.surface_pressure = motion.surface_pressure
+        return motion
+
+    def _accepts(self, motion: Motion) -> bool:
+        """Whether no particle moves too far; an error that no step can mend tells where the particle is."""
+        try:
+            return self.time_step.accepts(motion.top_speed)
+        except StepCollapsed as error:
+            particle = int((motion.transport**2).sum(axis=1).argmax())
+            place = ", ".join(f"{coordinate:.4g}" for coordinate in self.body.points[particle])
+            where = f"step {self.steps + 1} at time {self.time:.4g} s, particle {particle} at ({place}) m"
+            raise StepCollapsed(f"{where}: {error}") from error
+
+    def _record(self, before: Floats, flips: int, iterations: int) -> StepRecord:
+        body, size, count = self.body, self.time_step.size, len(before)
+        volume, gradient = body.volume()
+        normal = self.physics.admit(body, gradient)[:count]
+        normal /= np.maximum(np.linalg.norm(normal, axis=1), np.finfo(float).tiny)[:, None]
+        moved = float(np.abs(((body.points[:count] - before) * normal).sum(axis=1)).max())
+        return StepRecord(
+            step=self.steps,
+            time=self.time,
+            time_step=size,
+            binding=self.time_step.binding,
+            height=float(np.ptp(body.points[:count, 2])),
+            volume=body.cloud.parts * volume,
+            energy=body.cloud.parts * self.physics.energy(body),
+            speed=moved / size,
+            displacement=moved / body.cloud.spacing,
+            flips=flips,
+            iterations=iterations,
+        )

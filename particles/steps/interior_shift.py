@@ -1,0 +1,114 @@
+"""Shifting of the particles below the surface: even spacing, and none pierces the surface."""
+
+import numpy as np
+from numba import njit, prange
+from numpy.typing import NDArray
+
+from particles.core.body import Body
+from particles.core.neighbours import NeighbourList
+from particles.core.plate import slide
+from particles.core.symmetry import fold, on_plane, unit
+from particles.surface.surface_quality import vertex_normals
+
+Floats = NDArray[np.float64]
+
+REPULSION_RANGE = 1.1
+REPULSION_STRENGTH = 0.15
+LARGEST_SHIFT = 0.1
+SMALLEST_DEPTH = 0.4
+SMALLEST_HEIGHT = 0.25
+
+
+@njit(cache=True, parallel=True)
+def _repulsion(rows, points, lists, reach):
+    """Sum of unit vectors away from the neighbours, weighed by 1 - r/reach, `(m, 3)`."""
+    offsets, indices = lists
+    result = np.zeros((rows.shape[0], 3))
+    for r in prange(rows.shape[0]):
+        i = rows[r]
+        for k in range(offsets[i], offsets[i + 1]):
+            j = indices[k]
+            x, y, z = points[i, 0] - points[j, 0], points[i, 1] - points[j, 1], points[i, 2] - points[j, 2]
+            square = x * x + y * y + z * z
+            if square < reach * reach:
+                distance = np.sqrt(square)
+                push = (1.0 - distance / reach) / distance
+                result[r, 0] += push * x
+                result[r, 1] += push * y
+                result[r, 2] += push * z
+    return result
+
+
+@njit(cache=True)
+def _nearest(i, points, lists, count):
+    """The neighbour of particle i among the first `count` particles that is closest to it, -1 if there is none."""
+    offsets, indices = lists
+    nearest, smallest = -1, np.inf
+    for k in range(offsets[i], offsets[i + 1]):
+        j = indices[k]
+        if j < count:
+            square = 0.0
+            for d in range(3):
+                square += (points[i, d] - points[j, d]) ** 2
+            if square < smallest:
+                nearest, smallest = j, square
+    return nearest
+
+
+@njit(cache=True, parallel=True)
+def _penetration(rows, points, lists, normals, depth):
+    """Displacement that puts a particle a depth below the tangent plane of its nearest surface vertex, `(m, 3)`."""
+    result = np.zeros((rows.shape[0], 3))
+    for r in prange(rows.shape[0]):
+        j = _nearest(rows[r], points, lists, normals.shape[0])
+        if j >= 0:
+            below = 0.0
+            for d in range(3):
+                below += (points[j, d] - points[rows[r], d]) * normals[j, d]
+            for d in range(3):
+                result[r, d] = -max(depth - below, 0.0) * normals[j, d]
+    return result
+
+
+def interior_shift(body: Body, neighbours: NeighbourList) -> Floats:
+    """Displacements of the particles below the surface, `(m, 3)` [m]; on a wall within the wall.
+
+    Args:
+        body: the liquid body.
+        neighbours: a valid list that reaches at least 1.1 spacings.
+    """
+    cloud, rows = body.cloud, body.interior
+    lists = (neighbours.offsets, neighbours.indices)
+    shift = _repulsion(rows, body.points, lists, REPULSION_RANGE * cloud.spacing) * (REPULSION_STRENGTH * cloud.spacing)
+    length = np.linalg.norm(shift, axis=1)
+    shift *= np.minimum(1.0, LARGEST_SHIFT * cloud.spacing / np.maximum(length, 1e-300))[:, None]
+    normals = unit(fold(cloud, vertex_normals(body.points, body.triangles, cloud.surface_count)))
+    shift += _penetration(rows, body.points, lists, normals, SMALLEST_DEPTH * cloud.spacing)
+    shift = fold(cloud, slide(body.plates, cloud.wall[rows], shift), cloud.surface_count)
+    shift += _away_from_plates(body, body.points[rows] + shift)
+    return shift + _away_from_symmetry(body, body.points[rows] + shift)
+
+
+def _away_from_plates(body: Body, points: Floats) -> Floats:
+    """Displacements `(m, 3)` [m] that put the particles below the surface, now at `points`, off the plates.
+
+    Where a drop spreads, the particles on its wall thin out and no longer keep those above them from passing through.
+    """
+    result = np.zeros_like(points)
+    loose = body.cloud.wall[body.interior] < 0
+    for plate in body.plates:
+        inward = -plate.side
+        height = inward * plate.local(points)[:, 2]
+        lift = np.where(loose, np.maximum(SMALLEST_HEIGHT * body.cloud.spacing - height, 0.0), 0.0)
+        result += inward * lift[:, None] * plate.normal
+    return result
+
+
+def _away_from_symmetry(body: Body, points: Floats) -> Floats:
+    """Displacements `(m, 3)` [m] that keep particles off the planes of symmetry, behind which are their images."""
+    result = np.zeros_like(points)
+    for axis in body.cloud.symmetry:
+        loose = ~on_plane(body.cloud, axis)[body.interior]
+        lift = np.maximum(SMALLEST_HEIGHT * body.cloud.spacing - points[:, axis], 0.0)
+        result[:, axis] = np.where(loose, lift, 0.0)
+    return result

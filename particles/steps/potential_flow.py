@@ -1,0 +1,216 @@
+"""Potential flow through the particles of a body: v = grad phi from the flux through its boundary.
+
+The discrete Laplacian is a graph: an edge of two particles conducts w_ij (phi_j - phi_i), so what flows into a particle
+flows out of another, and the sum of the fluxes is that through the boundary. With w = 3 (s_i + s_j) W and
+s = V / sum of W r^2 the sum over j is V times the Laplacian of phi (Cummins & Rudman 1999). At a plate, which nothing
+passes, each particle has its mirror image: phi is even there, and the gradient of particles near the plate is not
+extrapolated from one side.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit, prange
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse.csgraph import connected_components
+
+from particles.core.body import Body
+from particles.core.neighbours import NeighbourList
+
+Floats = NDArray[np.float64]
+
+# Share of its edges that each particle leaks: fixes the constant, also that of particles apart from the others.
+LEAK = 1e-6
+# Keeps the normal equations regular where the edges of a particle lie in a plane, or where it has none.
+RIDGE = 1e-9
+TINY = 1e-100
+
+
+@njit(cache=True)
+def _weight(square, support):
+    """Weight (1 - q^2)^3 of an edge, zero from the support radius on."""
+    q = square / (support * support)
+    return (1.0 - q) ** 3 if q < 1.0 else 0.0
+
+
+@njit(cache=True)
+def _image_offset(points, pair, height, normal):
+    """From particle i to the mirror image of j, which is twice its height away from it."""
+    i, j = pair
+    x = points[j, 0] - points[i, 0] - 2.0 * height * normal[0]
+    y = points[j, 1] - points[i, 1] - 2.0 * height * normal[1]
+    z = points[j, 2] - points[i, 2] - 2.0 * height * normal[2]
+    return x, y, z
+
+
+@njit(cache=True)
+def _edge(points, mirrors, pair, support):
+    """Weight of an edge and of those to the mirror images of its end; the same, times the squared lengths.
+
+    A particle on a plate is its own image and counts once.
+    """
+    heights, normals = mirrors
+    i, j = pair
+    square = 0.0
+    for d in range(3):
+        square += (points[j, d] - points[i, d]) ** 2
+    weight = _weight(square, support)
+    moment = weight * square
+    for p in range(heights.shape[0]):
+        height = heights[p, j]
+        if 0.0 < height < support and 0.0 < heights[p, i] < support:
+            x, y, z = _image_offset(points, pair, height, normals[p])
+            square = x * x + y * y + z * z
+            weight += _weight(square, support)
+            moment += _weight(square, support) * square
+    return weight, moment
+
+
+@njit(cache=True, parallel=True)
+def _moments(points, mirrors, lists, support):
+    """Sum of weight times squared length of each particle's edges, `(n,)` [m^2]."""
+    offsets, indices = lists
+    result = np.empty(points.shape[0])
+    for i in prange(points.shape[0]):
+        total = 0.0
+        for k in range(offsets[i], offsets[i + 1]):
+            total += _edge(points, mirrors, (i, indices[k]), support)[1]
+        result[i] = total
+    return result
+
+
+@njit(cache=True, parallel=True)
+def _rows(points, mirrors, lists, scale, support):
+    """Columns and values of the rows; the last entry of a row is its diagonal, one for a particle without edges."""
+    offsets, indices = lists
+    count = points.shape[0]
+    columns = np.empty(offsets[count] + count, np.int32)
+    values = np.empty(offsets[count] + count)
+    for i in prange(count):
+        at, total = offsets[i] + i, 0.0
+        for k in range(offsets[i], offsets[i + 1]):
+            j = indices[k]
+            value = 3.0 * (scale[i] + scale[j]) * _edge(points, mirrors, (i, j), support)[0]
+            columns[at], values[at] = j, -value
+            total += value
+            at += 1
+        columns[at], values[at] = i, (1.0 + LEAK) * total if total > 0.0 else 1.0
+    return columns, values
+
+
+@njit(cache=True)
+def _add_difference(sums, offset, difference, support):
+    """Add an edge to the normal equations of a gradient: its six moments and its right-hand side."""
+    x, y, z = offset
+    w = _weight(x * x + y * y + z * z, support)
+    sums[0] += w * x * x
+    sums[1] += w * x * y
+    sums[2] += w * x * z
+    sums[3] += w * y * y
+    sums[4] += w * y * z
+    sums[5] += w * z * z
+    sums[6] += w * difference * x
+    sums[7] += w * difference * y
+    sums[8] += w * difference * z
+
+
+@njit(cache=True)
+def _solve_symmetric(sums, result):
+    """Gradient from the normal equations, by the adjugate of the 3 x 3 matrix; zero across the plane of the edges."""
+    xx, xy, xz, yy, yz, zz, a, b, c = sums
+    ridge = RIDGE * (xx + yy + zz) + TINY
+    xx, yy, zz = xx + ridge, yy + ridge, zz + ridge
+    cxx, cxy, cxz = yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy
+    cyy, cyz, czz = xx * zz - xz * xz, xy * xz - xx * yz, xx * yy - xy * xy
+    determinant = xx * cxx + xy * cxy + xz * cxz
+    result[0] = (cxx * a + cxy * b + cxz * c) / determinant
+    result[1] = (cxy * a + cyy * b + cyz * c) / determinant
+    result[2] = (cxz * a + cyz * b + czz * c) / determinant
+
+
+@njit(cache=True)
+def _add_edges(points, mirrors, edge, support, sums):
+    """Add an edge, its ends and the difference of the field between them, and those to the mirror images."""
+    heights, normals = mirrors
+    i, j, difference = edge
+    if i != j:
+        offset = points[j, 0] - points[i, 0], points[j, 1] - points[i, 1], points[j, 2] - points[i, 2]
+        _add_difference(sums, offset, difference, support)
+    for p in range(heights.shape[0]):
+        if 0.0 < heights[p, j] < support and heights[p, i] < support:
+            image = _image_offset(points, (i, j), heights[p, j], normals[p])
+            _add_difference(sums, image, difference, support)
+
+
+@njit(cache=True, parallel=True)
+def _gradients(points, mirrors, lists, field, support):
+    """Least-squares gradient of the field at the particles from `lists[2]` on, `(m, 3)`."""
+    offsets, indices, first = lists
+    count = points.shape[0] - first
+    result, sums = np.empty((count, 3)), np.zeros((count, 9))
+    for r in prange(count):
+        i = first + r
+        for k in range(offsets[i], offsets[i + 1]):
+            j = indices[k]
+            _add_edges(points, mirrors, (i, j, field[j] - field[i]), support, sums[r])
+        _add_edges(points, mirrors, (i, i, 0.0), support, sums[r])
+        _solve_symmetric(sums[r], result[r])
+    return result
+
+
+def _mirrors(body: Body) -> tuple[Floats, Floats]:
+    """Heights above each plate and plane of symmetry `(p, n)` [m], zero on it, and their normals into the liquid."""
+    symmetry, local = body.cloud.symmetry, [plate.local(body.points)[:, 2] for plate in body.plates]
+    heights = [
+        np.where(body.cloud.wall == wall, 0.0, -plate.side * local[wall]) for wall, plate in enumerate(body.plates)
+    ] + [body.points[:, axis] for axis in symmetry]
+    normals = [-plate.side * plate.normal for plate in body.plates] + [np.eye(3)[axis] for axis in symmetry]
+    return np.array(heights).reshape(-1, len(body.points)), np.array(normals).reshape(-1, 3)
+
+
+@dataclass(frozen=True, slots=True)
+class PotentialFlow:
+    """Operators of the potential at the current positions.
+
+    Attributes:
+        laplacian: `(n, n)` [m], minus the Laplacian times volume, symmetric and (by a small leak) positive definite.
+    """
+
+    laplacian: sparse.csr_matrix
+    _body: Body
+    _neighbours: NeighbourList
+    _mirrors: tuple[Floats, Floats]
+
+    @classmethod
+    def of(cls, body: Body, neighbours: NeighbourList) -> "PotentialFlow":
+        """Build the operators.
+
+        Args:
+            body: the liquid body.
+            neighbours: a valid list; its radius is the support of the weights.
+        """
+        mirrors, lists = _mirrors(body), (neighbours.offsets, neighbours.indices)
+        moments = _moments(body.points, mirrors, lists, neighbours.radius)
+        scale = np.divide(body.volumes, moments, out=np.zeros_like(moments), where=moments > 0.0)
+        columns, values = _rows(body.points, mirrors, lists, scale, neighbours.radius)
+        starts = neighbours.offsets + np.arange(len(body.points) + 1, dtype=np.int32)
+        size = len(body.points)
+        laplacian = sparse.csr_matrix((values, columns, starts), shape=(size, size))
+        laplacian.eliminate_zeros()
+        return cls(laplacian, body, neighbours, mirrors)
+
+    def balanced(self, flux: Floats) -> Floats:
+        """Fluxes `(n,)` [m^3/s] less their mean, in each group of particles that is apart from the others.
+
+        In a film thinner than the particles are apart there are many: what flows between them has no way.
+        """
+        _, group = connected_components(self.laplacian, directed=False)
+        mean = np.bincount(group, flux) / np.bincount(group, self._body.volumes)
+        return flux - mean[group] * self._body.volumes
+
+    def velocity(self, potential: Floats) -> Floats:
+        """Gradient of a potential `(n,)` [m^2/s] at the particles below the surface, `(m, 3)` [m/s]."""
+        body, neighbours = self._body, self._neighbours
+        lists = (neighbours.offsets, neighbours.indices, body.cloud.surface_count)
+        return _gradients(body.points, self._mirrors, lists, potential, neighbours.radius)

@@ -1,0 +1,183 @@
+"""A step towards rest: the free surface relaxes at constant volume, the particles below it follow as potential flow.
+
+Without inertia and viscosity a step is no physical motion; all that counts is the energy, and that is of the surface:
+
+    A v = f + p a,     a . v = dV/dt
+
+with A the mass over the time step and the implicit surface tension, both of the surface's particles, and the pressure p
+of the body, one unknown. At rest f = -p a makes the discrete energy stationary. The flux of the surface's motion drives
+a potential flow inside, which keeps the particles evenly spread; its pressure vanishes at rest.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from particles.core.body import Body
+from particles.core.neighbours import NeighbourList
+from particles.core.plate import slide
+from particles.core.surface_measure import centre_of_volume, ring_area, surface_flux
+from particles.core.symmetry import fold
+from particles.discretisation.discretisation import Discretisation
+from particles.discretisation.lagged_multigrid import LaggedMultigrid
+from particles.discretisation.volume_constraint import solve_volume
+from particles.physics.physics import Physics
+from particles.steps.potential_flow import PotentialFlow
+from particles.steps.step_equations import StepEquations
+from particles.steps.step_solver import Motion
+
+Floats = NDArray[np.float64]
+
+SUPPORT = 2.0
+# The surface moves along its normals and stretches its triangles unevenly, which biases the shape of least energy: one
+# pass leaves 0.05 % of the height of a cap at any spacing.
+SMOOTHING_PASSES = 12
+
+
+@dataclass(slots=True)
+class Relaxation:
+    """Relaxation towards rest.
+
+    Attributes:
+        density: [kg/m^3].
+        centre: `(3,)` centre of volume of a body without walls and planes at its first step [m], else None.
+    """
+
+    density: float
+    centre: Floats | None = None
+    _multigrid: LaggedMultigrid = field(default_factory=LaggedMultigrid)
+
+    @property
+    def support(self) -> float:
+        """Radius of the neighbour list, in spacings."""
+        return SUPPORT
+
+    @property
+    def smoothing_passes(self) -> int:
+        """How often the triangles are evened out after a step."""
+        return SMOOTHING_PASSES
+
+    @property
+    def descends(self) -> bool:
+        """Always: the step goes along the forces."""
+        return True
+
+    def prepare(self, body: Body, physics: Physics, neighbours: NeighbourList) -> "PreparedRelaxation":
+        """Build the equations of the surface and the operators of the potential flow."""
+        if self.centre is None and not body.plates and not body.cloud.symmetry:
+            self.centre = centre_of_volume(body.points, body.triangles)
+        surface = body.surface()
+        equations = StepEquations(surface, physics, _volume_only(surface))
+        return PreparedRelaxation(self, body, equations, PotentialFlow.of(body, neighbours))
+
+    def saved(self) -> dict[str, Any]:
+        """What it remembers of earlier steps, for a checkpoint."""
+        return {"centre": self.centre, "multigrid": self._multigrid.saved()}
+
+    def restore(self, saved: Mapping[str, Any]) -> None:
+        """Continue from what `saved` returned."""
+        self.centre = saved["centre"]
+        self._multigrid.restore(saved["multigrid"])
+
+    def potential(self, flow: PotentialFlow, flux: Floats) -> tuple[Floats, int]:
+        """Potential `(n,)` [m^2/s] of the fluxes into the particles `(n,)` [m^3/s], and the iterations."""
+        return self._multigrid.solve(flow.laplacian, flow.balanced(flux))
+
+
+def _volume_only(surface: Body) -> Discretisation:
+    """The free surface alone: nothing to integrate inside, and the body's volume is the only constraint."""
+    nothing = sparse.csr_matrix((0, len(surface.points)))
+    return Discretisation(
+        gradient=(nothing, nothing, nothing),
+        weights=np.zeros(0),
+        mass=sparse.diags(surface.volumes, format="csr"),
+        constraint=sparse.csr_matrix(surface.volume()[1].T.ravel()),
+        volume_share=np.ones(1),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class PreparedRelaxation:
+    """A step from the current positions.
+
+    Attributes:
+        solver: that prepared it.
+        body: the liquid body.
+        equations: of its free surface.
+        flow: potential flow inside.
+    """
+
+    solver: Relaxation
+    body: Body
+    equations: StepEquations
+    flow: PotentialFlow
+
+    def solve(self, time_step: float, volume: float) -> Motion:
+        """Return the motion in a time step [s] that ends at a volume [m^3].
+
+        Raises:
+            SolveFailed: a linear solve failed.
+        """
+        body, density, count = self.body, self.solver.density, self.body.cloud.surface_count
+        solution = solve_volume(self.equations.problem(time_step, volume))
+        surface, twists = self.equations.expand(solution.velocity, time_step)
+        surface = surface + self._recall(surface, time_step)
+        potential, iterations = self.solver.potential(self.flow, _flux(body, surface, twists))
+        velocity = np.concatenate((surface, _limited(self._inside(potential, twists), surface)))
+        surface_pressure = float(solution.pressure[0])
+        pressure = surface_pressure - density / time_step * (potential - potential[:count].mean())
+        return Motion(velocity, velocity, pressure, surface_pressure, twists, iterations)
+
+    def _recall(self, surface: Floats, time_step: float) -> Floats:
+        """Velocity `(3,)` [m/s] that brings the centre of a free body back to where it was: no force moves it.
+
+        Each part of the surface passes its flux at its place, and V dc/dt is the integral of x v . n.
+        """
+        body = self.body
+        if self.solver.centre is None:
+            return np.zeros(3)
+        points, triangles = body.points[: body.cloud.surface_count], body.triangles
+        centre = centre_of_volume(points, triangles)
+        drift = surface_flux(points, triangles, surface) @ (points - centre) / body.volume()[0]
+        return (self.solver.centre - centre) / time_step - drift
+
+    def _inside(self, potential: Floats, twists: dict[int, Floats]) -> Floats:
+        """Velocities below the surface `(m, 3)` [m/s]; on a plate they slip along it and go with it."""
+        body, rows = self.body, self.body.interior
+        wall = body.cloud.wall[rows]
+        velocity = fold(body.cloud, slide(body.plates, wall, self.flow.velocity(potential)), body.cloud.surface_count)
+        for number, twist in twists.items():
+            on_plate = wall == number
+            carried = body.plates[number].rigid_velocity(twist, body.points[rows[on_plate]])
+            velocity[on_plate] += carried - slide(body.plates, wall[on_plate], carried)
+        return velocity
+
+
+def _limited(inside: Floats, surface: Floats) -> Floats:
+    """Velocities `(m, 3)` no faster than the surface: the speed of a potential flow is largest on its boundary.
+
+    Where a film is thinner than the particles are apart, their few neighbours do not keep this by themselves.
+    """
+    speed = np.linalg.norm(inside, axis=1)
+    largest = np.linalg.norm(surface, axis=1).max()
+    return inside * np.minimum(1.0, largest / np.maximum(speed, np.finfo(float).tiny))[:, None]
+
+
+def _flux(body: Body, surface: Floats, twists: dict[int, Floats]) -> Floats:
+    """Volume that the motion of the boundary takes up, particle by particle `(n,)` [m^3/s].
+
+    What the surface's particles pass is theirs, what a plate passes is spread over the particles on it.
+    """
+    flux = np.zeros(len(body.points))
+    flux[: body.cloud.surface_count] = surface_flux(body.points, body.triangles, surface)
+    for wall, twist in twists.items():
+        plate, ring, on_plate = body.plates[wall], body.cloud.rings[wall], body.cloud.wall == wall
+        centre = body.points[ring].mean(axis=0)[None]
+        outward = plate.side * float((plate.rigid_velocity(twist, centre) @ plate.normal)[0])
+        share = body.volumes * on_plate
+        flux += outward * ring_area(body.points, ring) * share / share.sum()
+    return flux

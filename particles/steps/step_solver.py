@@ -1,0 +1,76 @@
+"""What solves for the motion in a time step: a member of this family for each way to treat pressure and inertia."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from particles.core.body import Body
+from particles.core.neighbours import NeighbourList
+from particles.physics.physics import Physics
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """What happens in a time step.
+
+    Attributes:
+        velocity: `(n, 3)` of the particles at the end [m/s].
+        transport: `(n, 3)` their mean velocity, which takes them where they go [m/s].
+        pressure: `(n,)` above the ambient pressure [Pa].
+        surface_pressure: pressure that carries the volume constraint [Pa].
+        twists: `(6,)` of each plate that moves, by its index [m/s, rad/s].
+        iterations: of the pressure solve.
+    """
+
+    velocity: Floats
+    transport: Floats
+    pressure: Floats
+    surface_pressure: float
+    twists: dict[int, Floats]
+    iterations: int
+
+    @property
+    def top_speed(self) -> float:
+        """Mean speed of the fastest particle [m/s]."""
+        return float(np.sqrt((self.transport**2).sum(axis=1).max()))
+
+
+class PreparedStep(Protocol):
+    """A step from the body's current positions, for any size."""
+
+    def solve(self, time_step: float, volume: float) -> Motion:
+        """Return the motion in a time step [s] that ends at a volume [m^3].
+
+        Raises:
+            SolveFailed: the linear solve failed.
+        """
+
+
+class StepSolver(Protocol):
+    """How a step is solved."""
+
+    @property
+    def support(self) -> float:
+        """Radius of the neighbour list that it needs, in spacings."""
+
+    @property
+    def smoothing_passes(self) -> int:
+        """How often the triangles are evened out after a step."""
+
+    @property
+    def descends(self) -> bool:
+        """Whether a short enough step without momentum lowers the energy."""
+
+    def prepare(self, body: Body, physics: Physics, neighbours: NeighbourList) -> PreparedStep:
+        """Build what does not depend on the size of the step."""
+
+    def saved(self) -> dict[str, Any]:
+        """What it remembers of earlier steps, for a checkpoint."""
+
+    def restore(self, saved: Mapping[str, Any]) -> None:
+        """Continue from what `saved` returned."""

@@ -1,0 +1,1 @@
+"""The free surface: its triangles, level sets, profiles and contact lines."""

@@ -1,0 +1,163 @@
+"""Keeping the triangles of the tracked surface well shaped: tangential smoothing and Delaunay edge flips."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from particles.core.surface_measure import area_vector
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.int32]
+
+SMOOTHING = 0.3
+FLIP_MARGIN = 1e-2
+FLIP_PASSES = 4
+
+
+@njit(cache=True)
+def _angle(points, apex, i, j):
+    """Angle of a triangle at its apex."""
+    x, y, z = area_vector(points, apex, i, j)
+    along = 0.0
+    for d in range(3):
+        along += (points[i, d] - points[apex, d]) * (points[j, d] - points[apex, d])
+    return np.arctan2(np.sqrt(x * x + y * y + z * z), along)
+
+
+@njit(cache=True)
+def _folds(points, corners):
+    """Whether flipping the edge i j of the triangles p i j and q j i would fold the surface."""
+    p, q, i, j = corners
+    before, opposite = area_vector(points, p, i, j), area_vector(points, q, j, i)
+    first, second = area_vector(points, p, i, q), area_vector(points, p, q, j)
+    along_first, along_second = 0.0, 0.0
+    for d in range(3):
+        along_first += first[d] * (before[d] + opposite[d])
+        along_second += second[d] * (before[d] + opposite[d])
+    return along_first <= 0.0 or along_second <= 0.0
+
+
+@njit(cache=True)
+def _centroid_offsets(points, triangles, count):
+    """Area-weighted mean of the centroids of a vertex's triangles, minus the vertex; and the vertex normal."""
+    offset, normal, area = np.zeros((count, 3)), np.zeros((count, 3)), np.zeros(count)
+    for t in range(triangles.shape[0]):
+        a, b, c = triangles[t]
+        cross = area_vector(points, a, b, c)
+        size = np.sqrt(cross[0] ** 2 + cross[1] ** 2 + cross[2] ** 2)
+        for v in (a, b, c):
+            area[v] += size
+            for d in range(3):
+                centroid = (points[a, d] + points[b, d] + points[c, d]) / 3.0
+                offset[v, d] += size * (centroid - points[v, d])
+                normal[v, d] += cross[d]
+    for v in range(count):
+        length = np.sqrt(normal[v, 0] ** 2 + normal[v, 1] ** 2 + normal[v, 2] ** 2)
+        for d in range(3):
+            offset[v, d] /= area[v]
+            normal[v, d] /= length
+    return offset, normal
+
+
+def vertex_normals(points: Floats, triangles: Indices, count: int) -> Floats:
+    """Area-weighted outward unit normals of the first `count` particles, `(count, 3)`."""
+    return _centroid_offsets(points, triangles, count)[1]
+
+
+def smoothing_offsets(
+    points: Floats,
+    triangles: Indices,
+    count: int,
+    rings: Sequence[Indices],
+    planes: Sequence[tuple[int, Indices]] = (),
+) -> Floats:
+    """Tangential displacements `(count, 3)` [m] that even out the triangles and leave the shape.
+
+    Vertices of the free surface go towards the mean of their triangles' centroids within the tangent plane,
+    vertices of a contact line towards the middle of their neighbours along the line.
+
+    Args:
+        points: `(n, 3)` [m].
+        triangles: `(t, 3)`.
+        count: number of vertices.
+        rings: contact lines, which end on the planes of symmetry if there are any.
+        planes: axis of each plane of symmetry, and the vertices on it.
+    """
+    offset, normal = _centroid_offsets(points, triangles, count)
+    for axis, vertices in planes:  # the other half of their triangles is behind the plane
+        offset[vertices, axis] = normal[vertices, axis] = 0.0
+        normal[vertices] /= np.linalg.norm(normal[vertices], axis=1)[:, None]
+    offset -= (offset * normal).sum(axis=1)[:, None] * normal
+    for ring in rings:
+        before, after = points[np.roll(ring, 1)], points[np.roll(ring, -1)]
+        along = after - before
+        along /= np.linalg.norm(along, axis=1)[:, None]
+        middle = 0.5 * (before + after) - points[ring]
+        offset[ring] = (middle * along).sum(axis=1)[:, None] * along
+        if planes:
+            offset[ring[[0, -1]]] = 0.0
+    return SMOOTHING * offset
+
+
+@njit(cache=True)
+def _half_edges(triangles, count):
+    """Keys of the half edges opposite to each corner, sorted, with the half edge numbers."""
+    keys = np.empty(3 * triangles.shape[0], np.int64)
+    for t in range(triangles.shape[0]):
+        for k in range(3):
+            i, j = triangles[t, (k + 1) % 3], triangles[t, (k + 2) % 3]
+            keys[3 * t + k] = np.int64(min(i, j)) * count + max(i, j)
+    order = np.argsort(keys, kind="mergesort")
+    return keys[order], order
+
+
+@njit(cache=True)
+def _flip_pass(points, triangles, on_ring, margin):
+    """Flip edges whose opposite angles exceed pi, at most one edge a triangle; return the number of flips."""
+    keys, order = _half_edges(triangles, points.shape[0])
+    touched = np.zeros(triangles.shape[0], np.bool_)
+    flips = 0
+    for e in range(keys.shape[0] - 1):
+        if keys[e] != keys[e + 1]:
+            continue
+        s, t = order[e] // 3, order[e + 1] // 3
+        if touched[s] or touched[t]:
+            continue
+        p, q = triangles[s, order[e] % 3], triangles[t, order[e + 1] % 3]
+        i, j = triangles[s, (order[e] % 3 + 1) % 3], triangles[s, (order[e] % 3 + 2) % 3]
+        if _angle(points, p, i, j) + _angle(points, q, i, j) < np.pi + margin or (on_ring[p] and on_ring[q]):
+            continue
+        new_key = np.int64(min(p, q)) * points.shape[0] + max(p, q)
+        found = np.searchsorted(keys, new_key)
+        if found < keys.shape[0] and keys[found] == new_key:
+            continue
+        if _folds(points, (p, q, i, j)):
+            continue
+        triangles[s, 0], triangles[s, 1], triangles[s, 2] = p, i, q
+        triangles[t, 0], triangles[t, 1], triangles[t, 2] = p, q, j
+        touched[s] = touched[t] = True
+        flips += 1
+    return flips
+
+
+def flip_to_delaunay(points: Floats, triangles: Indices, rings: Sequence[Indices]) -> tuple[Indices, int]:
+    """Flip edges until the surface is intrinsically Delaunay up to a margin.
+
+    An edge is kept where the flip would join two vertices of contact lines, double an edge or fold the surface.
+
+    Returns:
+        The new triangles `(t, 3)` and the number of flips.
+    """
+    result = triangles.copy()
+    on_ring = np.zeros(len(points), np.bool_)
+    for ring in rings:
+        on_ring[ring] = True
+    total = 0
+    for _ in range(FLIP_PASSES):
+        flips = _flip_pass(points, result, on_ring, FLIP_MARGIN)
+        total += flips
+        if flips == 0:
+            break
+    return result, total

@@ -1,0 +1,1 @@
+"""A package on a board: its joints reflowed, then the board dropped."""

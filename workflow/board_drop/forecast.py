@@ -1,0 +1,135 @@
+"""Sizes, time steps and cost of a run, from its parameters alone."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+from fem.materials.roles import Materials
+from fem.problem.thermal import Thermal
+from workflow.board_drop import shock_cooling
+from workflow.board_drop.case import BoardDropCase, PackageCase
+from workflow.board_drop.reflow_pool import distinct_joints, joint_geometries
+from workflow.board_drop.shock_effects import shock_effects
+from workflow.board_drop.shock_forecast import (
+    PartForecast,
+    ShockForecast,
+    forecast_parts,
+    forecast_shock,
+    shorter_than_window,
+    two_scale_parts,
+)
+from workflow.case.problems import Problem
+from workflow.case.step_limit import too_many_steps
+from workflow.pipeline.reader import available_cores
+from workflow.reflow.forecast import forecast_heated
+
+
+@dataclass(frozen=True, slots=True)
+class Forecast:
+    """What a run will be like.
+
+    Attributes:
+        effects: effect -> {"on", "why"}; those of the reflow at the joint with the largest gap.
+        joints: number of joints.
+        distinct: number of joints that have to be computed.
+        particles: smallest and largest number of particles of a joint.
+        parts: part of the mesh -> its size and step in the shock; those of the two-scale run where there is one.
+        shock: time steps and wall time; None without a shock.
+        seconds: stage -> predicted wall time [s], where there is a prediction.
+        load_steps: of a reflow with temperatures, those with liquid solder; else 0.
+    """
+
+    effects: dict
+    joints: int
+    distinct: int
+    particles: tuple[int, int]
+    parts: dict[str, PartForecast]
+    shock: ShockForecast | None
+    seconds: dict[str, float]
+    load_steps: int = 0
+
+
+def forecast(case: PackageCase) -> Forecast:
+    """Predict sizes, time steps and cost of a run."""
+    from meshing.board.pads import pad_table
+    from particles.parameters.effects import decide_effects
+    from particles.parameters.estimate import particle_count, reflow_seconds
+
+    geometries = joint_geometries(pad_table(case.package, case.board, case.warpage))
+    given = () if case.thermal else case.package.surfaces
+    flowing = {name: geometry for name, geometry in geometries.items() if name not in given}
+    distinct = [group.geometry for group in distinct_joints(flowing)]
+    counts = [particle_count(case.solder, geometry) for geometry in distinct]
+    workers = max(1, min(available_cores(), len(distinct)))
+    of_reflow = Forecast(
+        effects=decide_effects(max(geometries.values(), key=lambda geometry: geometry.gap), case.solder),
+        joints=len(geometries),
+        distinct=len(distinct),
+        particles=(min(counts, default=0), max(counts, default=0)),
+        parts={},
+        shock=None,
+        seconds={"reflow": sum(reflow_seconds(case.solder, geometry) for geometry in distinct) / workers},
+    )
+    of_reflow = of_reflow if case.thermal is None else _heated(of_reflow, case, case.thermal)
+    return _with_shock(of_reflow, case) if isinstance(case, BoardDropCase) else of_reflow
+
+
+def _heated(of_reflow: Forecast, case: PackageCase, thermal: Thermal) -> Forecast:
+    """Foresee a reflow in load steps: how many joints the structure makes distinct is not known, all may be."""
+    heated = forecast_heated(case, thermal)
+    share = of_reflow.joints / of_reflow.distinct
+    return replace(
+        of_reflow,
+        effects=of_reflow.effects | heated.effects,
+        distinct=of_reflow.joints,
+        load_steps=len(heated.steps),
+        seconds={"reflow": of_reflow.seconds["reflow"] * share * heated.exchanges},
+    )
+
+
+def _with_shock(of_reflow: Forecast, case: BoardDropCase) -> Forecast:
+    told, case = shock_effects(case), case.decided
+    parts = forecast_parts(case)
+    shock = forecast_shock(case, parts)
+    numerics = case.shock.numerics
+    dns = shock.implicit if numerics.dns_solver == "implicit" else shock.dns
+    cooling, seconds = shock_cooling.forecast(case, parts)
+    modes = {"two_scale": shock.search + shock.two_scale, "dns": dns}
+    again = shock.two_scale if "two_scale" in numerics.modes else dns
+    identical = again if case.shock.identical_joints else 0.0
+    return replace(
+        of_reflow,
+        effects=of_reflow.effects | told | cooling,
+        parts=two_scale_parts(case) if "two_scale" in numerics.modes else parts,
+        shock=shock,
+        seconds=of_reflow.seconds | {"shock": identical + sum(modes[mode] for mode in numerics.modes) + seconds},
+    )
+
+
+def step_problems(case: BoardDropCase) -> Iterator[Problem]:
+    """Find more steps than any run takes, and what is over before two models meet again."""
+    import numpy as np
+
+    from fem.estimates.estimate import damped_critical_step
+
+    case = case.decided
+
+    with np.errstate(all="ignore"):
+        steps = [part.critical_step for part in forecast_parts(case).values() if not part.mass_scaled]
+        step = damped_critical_step(min(steps), case.shock.damping.coefficients[1]) if steps else math.inf
+    yield from (found := list(too_many_steps("shock.duration", case.shock.duration, step, "explicit")))
+    if not found and "two_scale" in case.shock.numerics.modes:
+        yield from shorter_than_window(case)
+
+
+def with_critical_step(quality: dict, materials: Materials) -> dict:
+    """Add the critical time step [s] to the quality of a joint mesh, from the shortest length in each material."""
+    import numpy as np
+
+    from fem.estimates.estimate import box_critical_step
+
+    steps = {
+        role: box_critical_step(getattr(materials, role), np.full(3, length))
+        for role, length in quality["smallest_length"].items()
+    }
+    return {**quality, "critical_time_step": min(steps.values()), "critical_time_steps": steps}

@@ -1,0 +1,81 @@
+"""What the real shapes of the joints change: the same shock with identical joints under a flat package."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from workflow.board_drop.findings import metric
+from workflow.case.problems import Problem
+from workflow.pipeline.stage_runner import Findings, Run
+from workflow.process.products import read_json
+
+if TYPE_CHECKING:
+    from meshing.surface.truncated_sphere import TruncatedSphere
+    from workflow.board_drop.case import BoardDropCase, PackageCase
+
+KEY, FOLDER = "shock.identical_joints", "identical"
+PREFIX = "identical_"  # begins the names of meshes and metrics of identical joints
+
+
+def identical_sphere(case: "PackageCase") -> "TruncatedSphere":
+    """Return the truncated sphere of the solder's volume between the wetted discs of the pads."""
+    from meshing.surface.truncated_sphere import TruncatedSphere
+
+    board, package = case.package.board_pad, case.package.package_pad
+    return TruncatedSphere.of_volume(case.solder.volume, board.wetted_radius, package.wetted_radius)
+
+
+def identical_joints_effect(case: "BoardDropCase") -> dict:
+    """Return whether the shock is repeated with identical joints, and why, as an effect."""
+    on = case.shock.identical_joints
+    why = f"{KEY} = {str(on).lower()}"
+    if on:
+        why += f": truncated spheres, {1e6 * identical_sphere(case).height:.4g} um high, under a flat package"
+    return {"identical_joints": {"on": on, "why": why}}
+
+
+def problems(case: "BoardDropCase") -> Iterator[Problem]:
+    """Find identical joints that would touch each other."""
+    package = case.package
+    if not case.shock.identical_joints or package.rows * package.columns == 1:
+        return
+    width = 2.0 * identical_sphere(case).radius
+    if width >= package.pitch:
+        message = f"needs truncated spheres apart from each other: they would be {1e3 * width:.4g} mm wide"
+        yield Problem(KEY, message, True, f"false, or a package.pitch > {1e3 * width:.4g} mm")
+
+
+def compared(found: Findings, run: "Run[BoardDropCase]", folder: Path, mode: str) -> Findings:
+    """Add what real shapes change in the critical joint's peak stress to what a shock has found.
+
+    Args:
+        found: metrics, health and effects of the shock with the real joints.
+        run: the run folder with the places in which the joints froze, the case.
+        folder: of the shock, with the run of a mode and that in ``identical``.
+        mode: whose run has the real joints.
+    """
+    from meshing.board.pads import read_pads
+
+    real, flat = (_peaks(folder / name / "history.npz") for name in (mode, FOLDER))
+    critical = max(real, key=real.__getitem__)
+    gaps = {site.name: site.gap for site in read_pads(run.folder / "reflow/pads.json")}
+    metrics = {
+        "shape_effect_on_peak_stress": metric(real[critical] / flat[critical] - 1.0),
+        "critical_joint_standoff": metric(gaps[critical], "m"),
+        "identical_joint_standoff": metric(identical_sphere(run.case).height, "m"),
+        "identical_critical_joint": metric(max(flat, key=flat.__getitem__)),
+        "identical_peak_von_mises": metric(flat[critical], "Pa"),
+    }
+    result = read_json(folder / FOLDER / "result.json")
+    health = {f"{FOLDER}_{name}": check for name, check in result["health"].items()}
+    return replace(found, metrics=found.metrics | metrics, health=found.health | health)
+
+
+def _peaks(history: Path) -> dict[str, float]:
+    import numpy as np
+
+    from workflow.report.histories import peaks
+
+    with np.load(history) as arrays:
+        return peaks(dict(arrays))

@@ -1,0 +1,50 @@
+"""The effects of a board's shock, decided before it runs: what acts, why, and what it is expected to change."""
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from fem.estimates.effects import damping, effect
+from fem.estimates.material_effects import failure_effect, material_effects
+from workflow.board_drop.board_deflection import expected_deflection, kinematics_effect, weight_effect
+from workflow.board_drop.fine_joints import coarse_joints_effect
+from workflow.board_drop.identical_joints import identical_joints_effect
+
+if TYPE_CHECKING:
+    from workflow.board_drop.case import BoardDropCase
+
+
+def shock_effects(case: "BoardDropCase") -> dict:
+    """Return effect -> {"on", "why"} and, where it is foreseen, "influence"."""
+    shock = case.shock
+    omega = expected_deflection(case).omega
+    return (
+        weight_effect(case)
+        | kinematics_effect(case)
+        | {"damping": damping(shock.damping.coefficients, omega, shock.duration)}
+        | material_effects(case.materials.by_role)
+        | failure_effect(shock.failure)
+        | coarse_joints_effect(shock.coupling)
+        | dict(_method(case))
+        | identical_joints_effect(case)
+    )
+
+
+def _method(case: "BoardDropCase") -> Iterator[tuple[str, dict]]:
+    """Yield what the models leave out or replace."""
+    shock, symmetry = case.shock, case.board.symmetry
+    coupled = "two_scale" in shock.numerics.modes
+    one_way = coupled and shock.coupling.direction == "one_way"
+    direction = f"shock.coupling.direction = {shock.coupling.direction}"
+    yield "one_way", effect(one_way, direction if coupled else "one model", None if one_way else 0.0)
+    scaled = shock.numerics.mass_scaled
+    yield "mass_scaling", effect(bool(scaled), f"shock.numerics.mass_scaled = {list(scaled)}")
+    yield "large_mass", effect(shock.method == "large_mass", f"shock.method = {shock.method}", 0.0)
+    yield "symmetry", effect(symmetry == "quarter", f"board.symmetry = {symmetry}", 0.0)
+
+
+def with_influence(found: dict, case: "BoardDropCase") -> dict:
+    """Return the effects of a run with what was foreseen of their influence."""
+    foreseen = shock_effects(case)
+    told = {name: foreseen.get(f"{name}_in_the_shock", foreseen.get(name, {})) for name in found}
+    expected = {name: {"influence": item["influence"]} if "influence" in item else {} for name, item in told.items()}
+    return {name: record | expected[name] for name, record in found.items()}

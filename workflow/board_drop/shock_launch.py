@@ -1,0 +1,84 @@
+"""The modes of the board's shock as runs of the package fem."""
+
+import json
+from pathlib import Path
+
+from fem.problem.parameters import JointCoupling
+from workflow.board_drop.case import BoardDropCase
+from workflow.board_drop.fine_joints import (
+    FineJoints,
+    most_stressed,
+    named_joints,
+    needs_coarse_joints,
+    write_fine_joints,
+)
+from workflow.board_drop.shock_cooling import begun
+from workflow.pipeline.stage_runner import Run
+from workflow.process.fem_launch import run_fem
+
+MODES = {"two_scale": "two-scale", "dns": "DNS"}
+IDENTICAL_TITLE = "identical joints"
+
+
+def find_fine_joints(run: Run[BoardDropCase], folder: Path) -> FineJoints:
+    """Return which joints the two-scale run has fine; where they are the critical ones, by a run with coarse joints.
+
+    That run is a two-scale run, too, in ``coarse``: of all runs the cheapest, since the board keeps its large step.
+    """
+    coupling, modes = run.case.shock.coupling, run.case.shock.numerics.modes
+    if coupling.fine_joints != "critical" or "two_scale" not in modes:
+        return named_joints(coupling)
+    all_coarse = coupling.model_copy(update={"fine_joints": "all", "direction": "two_way"})
+    request = _request(run, "two_scale", ("assembly", "coarse_joints"), all_coarse)
+    request["checkpoints"] = str(run.checkpoints("shock").resolve() / "coarse")
+    run_fem(run, folder / "coarse", request, "shock, coarse joints")
+    fine = most_stressed(folder / "coarse/history.npz", coupling.critical_joints)
+    write_fine_joints(folder, fine)
+    return fine
+
+
+def run_mode(run: Run[BoardDropCase], folder: Path, mode: str, fine: FineJoints, prefix: str = "") -> None:
+    """Run one mode of the shock on its MPI ranks, showing its progress.
+
+    Args:
+        run: run folder with assembly and joints, case, cores.
+        folder: where the mode's products go.
+        mode: "two_scale" or "dns", which has all joints fine.
+        fine: the fine joints of a two-scale run.
+        prefix: begins the names of the meshes, where they are not those of the real joints.
+
+    Raises:
+        LaunchError: the run failed; the message has its last words.
+    """
+    chosen = fine.names if mode == "two_scale" else "all"
+    coupling = run.case.shock.coupling.model_copy(update={"fine_joints": chosen})
+    request = _request(run, mode, (f"{prefix}assembly", f"{prefix}joints"), coupling)
+    if mode == "two_scale" and needs_coarse_joints(coupling):
+        request["coarse_joints"] = _mesh(run, f"{prefix}coarse_joints")
+    request["checkpoints"] = str(run.checkpoints("shock").resolve() / folder.name)
+    request = begun(run, folder.parent, request, prefix)
+    run_fem(run, folder, request, f"shock, {MODES[mode]}" + (f", {IDENTICAL_TITLE}" if prefix else ""))
+
+
+def _mesh(run: Run[BoardDropCase], name: str) -> str:
+    return str(run.folder.resolve() / f"solder_mesh/{name}.msh")
+
+
+def _request(run: Run[BoardDropCase], mode: str, meshes: tuple[str, ...], coupling: JointCoupling) -> dict:
+    """Return what the package fem reads as input of a run, but for its folders."""
+    shock = run.case.decided.shock.model_copy(update={"coupling": coupling})
+    return {
+        "mode": mode,
+        "meshes": [_mesh(run, name) for name in meshes],
+        "shock": shock.model_dump(mode="json"),
+        "materials": run.case.materials.model_dump(mode="json"),
+    }
+
+
+def read_results(folder: Path) -> dict[str, dict]:
+    """Return ``result.json`` of each mode that ran, two-scale first."""
+    return {
+        mode: json.loads((folder / mode / "result.json").read_text(encoding="utf-8"))
+        for mode in MODES
+        if (folder / mode).is_dir()
+    }

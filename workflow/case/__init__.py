@@ -1,0 +1,1 @@
+"""Case files: keys, units, ranges, names, places in the file, and problems with them."""

@@ -1,0 +1,204 @@
+"""Fields of parameter models: their units, ranges, nested models, and values in either form (text, SI)."""
+
+import math
+import types
+import typing
+from collections.abc import Iterator
+
+import annotated_types
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+
+from workflow.case.names import is_name, wrong_name
+from workflow.case.problems import Problem
+from workflow.case.units import UnitError, dimension, from_si, to_si
+
+BOUNDS: tuple[tuple[type, str, str], ...] = (
+    (annotated_types.Gt, "gt", ">"),
+    (annotated_types.Ge, "ge", ">="),
+    (annotated_types.Lt, "lt", "<"),
+    (annotated_types.Le, "le", "<="),
+)
+
+
+def unit_of(field: FieldInfo) -> str | None:
+    """Return the display unit of a field or of the items of its list, e.g. "mm"; None for numbers, names, tables."""
+    return next((item for item in _metadata(field) if isinstance(item, str)), None)
+
+
+def holds_named_tables(field: FieldInfo) -> bool:
+    """Whether the field's table holds tables by names that the user chooses, such as the layers of a structure."""
+    return typing.get_origin(field.annotation) is dict
+
+
+def models_of(field: FieldInfo) -> tuple[type[BaseModel], ...]:
+    """Return the parameter models that a field's table, or each of its named tables, may follow; empty for values."""
+    annotation = typing.get_args(field.annotation)[1] if holds_named_tables(field) else field.annotation
+    annotation = _bare(annotation)
+    members = typing.get_args(annotation) if _is_union(annotation) else (annotation,)
+    return tuple(member for member in map(_bare, members) if isinstance(member, type) and issubclass(member, BaseModel))
+
+
+def model_of(field: FieldInfo, table: dict) -> type[BaseModel] | None:
+    """Return the model that a given table follows: where there are several, the one of its ``kind``."""
+    models = models_of(field)
+    if len(models) < 2:
+        return models[0] if models else None
+    kind = table.get("kind", getattr(field.default, "kind", None))
+    return next((model for model in models if tag_of(model) == kind), None)
+
+
+def tag_of(model: type[BaseModel]) -> str:
+    """Return the ``kind`` that tells a model from the others that a table may follow."""
+    return str(typing.get_args(model.model_fields["kind"].annotation)[0])
+
+
+def alternatives(field: FieldInfo) -> tuple[FieldInfo, ...]:
+    """Return the kinds of value that a field takes, such as a name or a number; the field itself where it is one."""
+    members = typing.get_args(field.annotation) if _is_union(field.annotation) and not models_of(field) else ()
+    values = [member for member in members if member is not types.NoneType]
+    return tuple(map(FieldInfo.from_annotation, values)) if len(values) > 1 else (field,)
+
+
+def allowed(field: FieldInfo) -> str:
+    """Describe what a field takes: names, or a range in the user's unit."""
+    kinds = alternatives(field)
+    if len(kinds) > 1:
+        return ", or ".join(", ".join(literal_names(kind)) or allowed(kind) or "a list of names" for kind in kinds)
+    names = literal_names(field)
+    if names:
+        return _choice(field) + ", ".join(names)
+    if field.annotation is bool:
+        return "true or false"
+    unit = unit_of(field)
+    bounds = [
+        f"{sign} {from_si(getattr(item, attribute), unit, 6) if unit else f'{getattr(item, attribute):g}'}"
+        for item in _metadata(field)
+        for kind, attribute, sign in BOUNDS
+        if isinstance(item, kind)
+    ]
+    if bounds:
+        return " and ".join(bounds)
+    return f"any {dimension(unit)}, e.g. in {unit}" if unit else ""
+
+
+def literal_names(field: FieldInfo) -> tuple[str, ...]:
+    """Return the names that a field, or each item of its list, may take; empty where it is not so limited."""
+    annotation = field.annotation
+    if typing.get_origin(annotation) is tuple or _is_union(annotation):
+        annotation = typing.get_args(annotation)[0]
+    return typing.get_args(annotation) if typing.get_origin(annotation) is typing.Literal else ()
+
+
+def wanted_items(field: FieldInfo) -> str:
+    """Say how many items the list of a field must have."""
+    items = typing.get_args(field.annotation)
+    return "must be a list with at least one item" if Ellipsis in items else f"must be a list of {len(items)} items"
+
+
+def to_si_table(model: type[BaseModel], table: dict, prefix: str, problems: list[Problem]) -> dict:
+    """Convert a table of a case file to SI floats, field by field.
+
+    Args:
+        model: model that the table follows; keys that it does not know are left for it to refuse.
+        table: the table as TOML gives it.
+        prefix: dotted key of the table with its dot, or empty.
+        problems: list to which unit errors are added; their values become nan.
+
+    Returns:
+        The table in SI values. Tables with a default are completed by it, if they are of its kind.
+    """
+    return {
+        name: _to_si_value(model.model_fields[name], value, prefix + name, problems)
+        if name in model.model_fields
+        else value
+        for name, value in table.items()
+    }
+
+
+def _to_si_value(field: FieldInfo, value: object, key: str, problems: list[Problem]) -> object:
+    unit = unit_of(field)
+    if unit is not None and isinstance(value, list):
+        return tuple(_quantity(field, unit, (key, item), problems) for item in value)
+    if unit is not None:
+        return _quantity(field, unit, (key, value), problems)
+    if isinstance(value, dict) and holds_named_tables(field):
+        problems += [wrong_name(key, name) for name in value if not is_name(name)]
+        return {name: _of_table(field, item, f"{key}.{name}", problems) for name, item in value.items()}
+    if isinstance(value, dict):
+        return _of_table(field, value, key, problems)
+    return tuple(value) if isinstance(value, list) else value
+
+
+def _quantity(field: FieldInfo, unit: str, given: tuple[str, object], problems: list[Problem]) -> float:
+    """Convert the value of a key, ``given`` as (key, value); nan where it is no such quantity."""
+    key, value = given
+    try:
+        return to_si(value, unit)
+    except UnitError as error:
+        problems.append(Problem(key, str(error), value, allowed(field)))
+        return math.nan
+
+
+def _of_table(field: FieldInfo, value: object, key: str, problems: list[Problem]) -> object:
+    """Convert one table of a field; its model's ``kind`` and defaults are those of the field's default."""
+    if isinstance(value, dict):
+        model = model_of(field, value)
+        if model is None:
+            return value
+        defaults = field.default.model_dump() if isinstance(field.default, model) else {}
+        return defaults | to_si_table(model, value, key + ".", problems)
+    return value
+
+
+def leaves(parameters: BaseModel, prefix: str = "") -> Iterator[tuple[str, object, FieldInfo]]:
+    """Yield dotted key, SI value and field of every parameter, in the order of the models."""
+    for name, field in type(parameters).model_fields.items():
+        value = getattr(parameters, name)
+        if isinstance(value, BaseModel):
+            yield from leaves(value, f"{prefix}{name}.")
+        elif holds_named_tables(field):
+            for own_name, table in value.items():
+                if isinstance(table, BaseModel):
+                    yield from leaves(table, f"{prefix}{name}.{own_name}.")
+                else:
+                    yield f"{prefix}{name}.{own_name}", table, FieldInfo.from_annotation(type(table))
+        else:
+            yield prefix + name, value, field
+
+
+def display(value: object, field: FieldInfo) -> str:
+    """Write an SI value as a user would in a case file, without quotes."""
+    unit = unit_of(field)
+    if unit is not None and isinstance(value, float):
+        return from_si(value, unit)
+    if isinstance(value, tuple):
+        return "[" + ", ".join(display(item, field) for item in value) + "]"
+    return f"{value:.10g}" if isinstance(value, float) else str(value)
+
+
+def shown(value: object, field: FieldInfo | None) -> object:
+    """Write an SI value as its field is shown to users; other values, and none, stay as they are."""
+    return display(value, field) if value is not None and field is not None and unit_of(field) else value
+
+
+def _choice(field: FieldInfo) -> str:
+    return "any of " if typing.get_origin(field.annotation) is tuple else "one of "
+
+
+def _metadata(field: FieldInfo) -> Iterator[object]:
+    """Yield units and bounds of a field, or of the items of its list, which may be absent."""
+    yield from field.metadata
+    outer = typing.get_args(field.annotation)[:1]
+    for item in (*outer, *(inner for kind in outer for inner in typing.get_args(kind)[:1])):
+        for extra in getattr(item, "__metadata__", ()):
+            yield from extra.metadata if isinstance(extra, FieldInfo) else (extra,)
+
+
+def _bare(annotation: object) -> object:
+    """Return a type without its ``Annotated``."""
+    return typing.get_args(annotation)[0] if typing.get_origin(annotation) is typing.Annotated else annotation
+
+
+def _is_union(annotation: object) -> bool:
+    return typing.get_origin(annotation) in (typing.Union, types.UnionType)

@@ -1,0 +1,23 @@
+"""Names that users choose: of cases, scales, studies, layers, loads. They become names of files, and parts of keys."""
+
+import re
+from typing import Annotated
+
+from pydantic import Field
+
+from workflow.case.problems import Problem
+
+NAME = r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,63}$"
+NAMES = "letters, digits, _ . -, the first one a letter or digit, at most 64"
+_NAME = re.compile(NAME[1:-1])  # matched in full: $ would let a newline pass at the end
+Name = Annotated[str, Field(pattern=NAME)]
+
+
+def is_name(text: object) -> bool:
+    """Whether a text may be a name."""
+    return isinstance(text, str) and _NAME.fullmatch(text) is not None
+
+
+def wrong_name(key: str, text: object) -> Problem:
+    """Return the problem of a text that cannot be a name."""
+    return Problem(key, "is not a valid name", text, NAMES)

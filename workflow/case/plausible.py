@@ -1,0 +1,95 @@
+"""Which magnitudes a physical quantity can have: a slip of a unit or of a digit is told before anything runs."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from functools import cache
+
+from pydantic.fields import FieldInfo
+
+from workflow.case import fields
+from workflow.case.kind import Case
+from workflow.case.problems import Problem
+from workflow.case.pulse_files import largest_values
+from workflow.case.units import dimension, from_si, to_si
+
+FORCE = "--force"
+
+
+@dataclass(frozen=True, slots=True)
+class Range:
+    """The least and the greatest magnitude of a quantity, as text with a unit; zero is always plausible."""
+
+    low: str
+    high: str
+
+
+# By dimension: of everything that a package, its solder, its board or its drop can be.
+BY_DIMENSION = {
+    "length": Range("1 nm", "10 m"),
+    "volume": Range("1e-9 mm^3", "1 m^3"),
+    "time": Range("1 ns", "1e5 s"),
+    "velocity": Range("1 nm/s", "20 km/s"),
+    "acceleration": Range("1e-6 m/s^2", "1e7 G"),
+    "density": Range("0.1 kg/m^3", "3e4 kg/m^3"),
+    "pressure": Range("1 mPa", "10 TPa"),
+    "surface tension": Range("1e-3 N/m", "10 N/m"),
+    "viscosity": Range("1 uPa*s", "10 kPa*s"),
+    "temperature": Range("1 K", "5000 K"),
+    "thermal expansion": Range("1e-3 ppm/K", "1e4 ppm/K"),
+    "force": Range("1 pN", "1 MN"),
+    "frequency": Range("1e-6 Hz", "1e12 Hz"),
+    "angle": Range("1e-9 rad", "1 turn"),
+}
+# By the last name of a key, where that says more than the dimension.
+BY_NAME = {
+    "young_modulus*": Range("1 kPa", "10 TPa"),
+    "shear_modulus*": Range("1 Pa", "10 TPa"),
+    "stiffness_coefficient": Range("1e-18 s", "1 s"),
+    "explicit_step": Range("1e-15 s", "1 s"),
+    "implicit_step": Range("1e-15 s", "1e3 s"),
+}
+# Numbers without a unit; of those that are signed the whole range.
+NUMBERS = (1e-12, 1e6)
+SIGNED_NUMBERS = {"poisson_ratio": (-0.99, 0.4999)}  # of isotropic solids: nearer to 0.5 no explicit step is left
+
+
+def implausible(case: Case) -> Iterator[Problem]:
+    """Find values that nothing in a case of electronics can have."""
+    for key, value, field in fields.leaves(case):
+        for number in value if isinstance(value, tuple) else (value,):
+            if isinstance(number, int | float) and not isinstance(number, bool) and number != 0:
+                yield from _implausible(key, number, field)
+
+
+def implausible_tables(case: Case) -> Iterator[Problem]:
+    """Find tables of pulses that last too long, or whose values nothing can have."""
+    for key, unit, number in largest_values(case.pulse_tables):
+        found = BY_DIMENSION[dimension(unit)]
+        if number > to_si(found.high, unit):
+            message = f"has {from_si(number, unit, 6)} in it, which is not plausible"
+            yield Problem(key, message, None, f"up to {found.high}, or {FORCE}")
+
+
+def _implausible(key: str, number: float, field: FieldInfo) -> Iterator[Problem]:
+    unit, name = fields.unit_of(field), key.rpartition(".")[2]
+    if name in SIGNED_NUMBERS:
+        low, high = SIGNED_NUMBERS[name]
+        if not low <= number <= high:
+            yield Problem(key, "is not plausible", number, f"{low:g} to {high:g}, or {FORCE}")
+        return
+    if unit is None:
+        (low, high), told = NUMBERS, f"{NUMBERS[0]:g} to {NUMBERS[1]:g}"
+    else:
+        found = _range(name, unit)
+        low, high, told = to_si(found.low, unit), to_si(found.high, unit), f"{found.low} to {found.high}"
+    if not low <= abs(number) <= high:
+        shown = fields.display(float(number), field) if unit else number
+        yield Problem(key, "is not plausible", shown, f"{told} in magnitude, or {FORCE}")
+
+
+@cache
+def _range(name: str, unit: str) -> Range:
+    """Return the plausible magnitudes of a quantity, by the last name of its key and its unit."""
+    own = next((found for pattern, found in BY_NAME.items() if fnmatchcase(name, pattern)), None)
+    return own or BY_DIMENSION[dimension(unit)]

@@ -1,0 +1,40 @@
+"""Tables of pulses that a case names: whether they can be read, and how large what they hold is."""
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+from workflow.case.problems import Problem
+
+UNITS = {"acceleration": "m/s^2", "pressure": "Pa", "velocity": "m/s"}
+Tables = Mapping[str, tuple[Path, str]]
+
+
+def unreadable_pulses(tables: Tables) -> Iterator[Problem]:
+    """Find tables that cannot be read.
+
+    Args:
+        tables: key -> file, and the quantity of its second column.
+    """
+    from fem.errors import PulseError
+    from fem.problem.pulse_table import read_pulse
+
+    for key, (path, quantity) in tables.items():
+        try:
+            read_pulse(path, quantity)
+        except PulseError as error:
+            told = str(error).removeprefix(str(path)).lstrip(":, ")
+            yield Problem(key, told, str(path))
+
+
+def largest_values(tables: Tables) -> Iterator[tuple[str, str, float]]:
+    """Yield key, SI unit and magnitude of the last time and of the largest value of each table that can be read."""
+    from fem.errors import PulseError
+    from fem.problem.pulse_table import read_pulse
+
+    for key, (path, quantity) in tables.items():
+        try:
+            pulse = read_pulse(path, quantity)
+        except PulseError:
+            continue
+        yield key, "s", float(pulse.times[-1])
+        yield key, UNITS[quantity], float(abs(pulse.values).max())

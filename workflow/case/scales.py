@@ -1,0 +1,80 @@
+"""Scales: a case file at other sizes, each a table ``[scales.NAME]`` of dotted keys whose values replace the file's.
+
+scale = "full"                                   # or --set scale="quick"
+[scales.quick]
+"board.numerics.coarse_size" = "2 mm"
+"""
+
+from collections.abc import Iterator
+
+from fem.names import nearest
+from workflow.case.kind import FULL
+from workflow.case.names import is_name, wrong_name
+from workflow.case.problems import Problem, as_toml
+from workflow.case.toml_file import DEEPEST
+
+KEYS = 'a table of dotted keys, e.g. "board.numerics.coarse_size" = "2 mm"'
+
+
+def take_scales(table: dict, problems: list[Problem]) -> dict[str, dict[str, object]]:
+    """Take the scales out of a case file.
+
+    Args:
+        table: what the file says; loses ``scales``.
+        problems: list to which wrong tables are added.
+
+    Returns:
+        Name of a scale -> dotted key -> value.
+    """
+    given = table.pop("scales", {})
+    if not isinstance(given, dict):
+        problems.append(Problem("scales", "must be a table", given, "tables [scales.NAME]"))
+        return {}
+    scales = {}
+    for name, values in given.items():
+        if name == FULL:
+            problems.append(Problem(f"scales.{name}", "is the file as it is", None, "any other name"))
+        elif not is_name(name):
+            problems.append(wrong_name("scales", name))
+        elif not isinstance(values, dict):
+            problems.append(Problem(f"scales.{name}", "must be a table", values, KEYS))
+        else:
+            given = dict(dotted(values))
+            scales[name] = {key: value for key, value in given.items() if is_key(key)}
+            problems += [
+                Problem(f"scales.{name}.{key}", "is not a dotted key", value, KEYS)
+                for key, value in given.items()
+                if key not in scales[name]
+            ]
+    return scales
+
+
+def is_key(text: str) -> bool:
+    """Whether a text may be a dotted key."""
+    names = text.split(".")
+    return all(names) and len(names) <= DEEPEST
+
+
+def choose(name: object, scales: dict[str, dict[str, object]], problems: list[Problem]) -> dict[str, object]:
+    """Return the values of a scale by dotted key: of ``full`` none, of an unknown one none, which is a problem."""
+    if isinstance(name, str) and (name == FULL or name in scales):
+        return scales.get(name, {})
+    known = [FULL, *scales]
+    problems.append(Problem("scale", "unknown scale", name, "one of " + ", ".join(known), nearest(str(name), known)))
+    return {}
+
+
+def scales_text(scales: dict[str, dict[str, object]]) -> Iterator[str]:
+    """Write scales as tables of a case file, one text each."""
+    for name, values in scales.items():
+        lines = [f"{as_toml(key)} = {as_toml(value)}" for key, value in values.items()]
+        yield "\n".join([f'# What differs by --set scale="{name}".', f"[scales.{name}]", *lines, ""])
+
+
+def dotted(values: dict, prefix: str = "") -> Iterator[tuple[str, object]]:
+    """Yield dotted key and value of a table of tables."""
+    for key, value in values.items():
+        if isinstance(value, dict):
+            yield from dotted(value, f"{prefix}{key}.")
+        else:
+            yield prefix + key, value

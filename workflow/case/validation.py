@@ -1,0 +1,142 @@
+"""Validation errors of pydantic, said in the words of a case file."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+from pydantic.fields import FieldInfo
+from pydantic_core import ErrorDetails
+
+from fem.names import nearest
+from workflow.case import fields
+from workflow.case.names import wrong_name
+from workflow.case.problems import Problem
+
+RANGES = ("greater_than", "greater_than_equal", "less_than", "less_than_equal", "finite_number")
+
+
+def translate(model: type[BaseModel], error: ValidationError, table: dict, known: set[str]) -> list[Problem]:
+    """Translate validation errors.
+
+    Args:
+        model: the validated model.
+        error: what pydantic found.
+        table: what the user wrote.
+        known: keys of which a problem is already known; those are left out.
+
+    Returns:
+        One problem a key.
+    """
+    found: dict[str, Problem] = {}
+    for record in error.errors():
+        names = _names(model, record["loc"])
+        key = ".".join(names)
+        if key not in known:
+            is_explained = bool({"allowed", "names"} & record.get("ctx", {}).keys())
+            problem = _explained(names, record, table) if is_explained else _problem(model, names, record, table)
+            found.setdefault(key, problem)
+    return list(found.values())
+
+
+def _problem(root: type[BaseModel], names: list[str], record: ErrorDetails, table: dict) -> Problem:
+    key, value, kind, text = ".".join(names), _value(table, names), record["type"], record["msg"]
+    model, field = _field(root, names, table)
+    if kind == "extra_forbidden":
+        siblings = list(model.model_fields) if model else []
+        hint = nearest(names[-1], siblings)
+        prefix = "".join(name + "." for name in names[:-1])
+        return Problem(key, "unknown key", value, "one of " + ", ".join(siblings), hint and prefix + hint)
+    if field is None:
+        return Problem(key, text, value)
+    if kind in ("tuple_type", "too_short", "too_long") or (kind == "missing" and isinstance(record["loc"][-1], int)):
+        return Problem(key, fields.wanted_items(field), value, fields.allowed(field))
+    if kind == "missing":
+        return Problem(key, "is missing", None, fields.allowed(field))
+    if fields.models_of(field) and kind.startswith("union_tag"):
+        return _kind_problem(key, value, field)
+    if fields.models_of(field):
+        return Problem(key, "must be a table", value)
+    if kind == "literal_error":
+        message = "unknown name" if len(fields.alternatives(field)) == 1 else "is not among what is allowed"
+        return Problem(key, message, value, fields.allowed(field), _nearest_name(value, field))
+    if kind in RANGES:
+        return Problem(key, "is out of range", value, fields.allowed(field))
+    if kind == "string_pattern_mismatch":
+        return wrong_name(key, value)
+    return Problem(key, text[0].lower() + text[1:], value, fields.allowed(field))
+
+
+def _explained(names: list[str], record: ErrorDetails, table: dict) -> Problem:
+    """Pass on the error of a check that says itself what is allowed, or which names are."""
+    context, value = record["ctx"], _value(table, names)
+    choices = context.get("names", ())
+    allowed = context.get("allowed", "one of " + ", ".join(choices))
+    return Problem(".".join(names), record["msg"], value, allowed, nearest(str(value), choices))
+
+
+def _kind_problem(key: str, value: Any, field: FieldInfo) -> Problem:
+    """Say that a table has no ``kind``, or none that exists."""
+    kinds = [fields.tag_of(candidate) for candidate in fields.models_of(field)]
+    choice = "one of " + ", ".join(kinds)
+    if not isinstance(value, dict):
+        return Problem(key, "must be a table", value)
+    if "kind" not in value:
+        return Problem(f"{key}.kind", "is missing", None, choice)
+    given = str(value["kind"])
+    return Problem(f"{key}.kind", "unknown kind", given, choice, nearest(given, kinds))
+
+
+def _nearest_name(value: Any, field: FieldInfo) -> str:
+    """Valid name most like a wrong one, which may be an item of a list."""
+    valid = fields.literal_names(field)
+    wrong = [str(item) for item in (value if isinstance(value, list) else [value]) if item not in valid]
+    return nearest(wrong[0], valid) if wrong else ""
+
+
+def _names(model: type[BaseModel], location: Sequence[int | str]) -> list[str]:
+    """Drop from a pydantic location what is no key: tags and members of unions, positions in lists."""
+    names: list[str] = []
+    candidates: tuple[type[BaseModel], ...] = (model,)
+    is_own_name = False
+    for part in location:
+        if isinstance(part, int) or (not is_own_name and _is_tag(candidates, part)):
+            continue
+        names.append(part)
+        if is_own_name:
+            is_own_name = False
+            continue
+        field = next((c.model_fields[part] for c in candidates if part in c.model_fields), None)
+        if field is not None and len(fields.alternatives(field)) > 1:
+            return names
+        candidates = fields.models_of(field) if field else ()
+        is_own_name = field is not None and fields.holds_named_tables(field)
+    return names
+
+
+def _is_tag(candidates: tuple[type[BaseModel], ...], part: str) -> bool:
+    return len(candidates) > 1 and part in [fields.tag_of(candidate) for candidate in candidates]
+
+
+def _field(root: type[BaseModel], names: list[str], table: dict) -> tuple[type[BaseModel] | None, FieldInfo | None]:
+    """Return the model that a key's table follows, and the key's field in it."""
+    model: type[BaseModel] | None = root
+    field = None
+    given: Any = table
+    is_own_name = False
+    for position, name in enumerate(names):
+        given = given.get(name, {}) if isinstance(given, dict) else {}
+        if not is_own_name:
+            field = model.model_fields.get(name) if model else None
+        is_own_name = not is_own_name and field is not None and fields.holds_named_tables(field)
+        if field is not None and not is_own_name and position < len(names) - 1:
+            model = fields.model_of(field, given if isinstance(given, dict) else {})
+    return model, field
+
+
+def _value(table: dict, names: list[str]) -> Any:
+    value: Any = table
+    for name in names:
+        if not isinstance(value, dict) or name not in value:
+            return None
+        value = value[name]
+    return value

@@ -1,0 +1,157 @@
+"""Errors of answers: against an exact one, a chosen run, a Richardson extrapolation, or else the finest run."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+
+if TYPE_CHECKING:
+    from workflow.convergence.series import Rung
+
+Values = float | NDArray[np.float64]
+
+LARGEST_ORDER = 2.5  # that is believed: no method here is of more than second order
+ORDER_MARGIN = 0.5  # of an observed order from theory, beyond which runs are not yet fine enough to extrapolate from
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """An answer of a run.
+
+    Attributes:
+        value: a number or samples, at the same places in all runs.
+        exact: the exact answer at these places; None where it is not known. Of an error that the run has found
+            itself, zero.
+        scale: what a difference is divided by; None: the norm of the answer that it is compared with.
+        source: what the exact answer is, for readers: "spherical cap".
+    """
+
+    value: Values
+    exact: Values | None = None
+    scale: float | None = None
+    source: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Error:
+    """Error of an answer, and what it was compared with, for readers."""
+
+    value: float
+    against: str
+
+
+Answers = Mapping[str, Quantity]
+
+
+def errors_of(
+    answers: Mapping[str, Answers], rungs: Sequence["Rung"], main: Sequence["Rung"], order: float | None
+) -> dict[str, dict[str, Error]]:
+    """Find the errors of all runs.
+
+    Args:
+        answers: name of a rung that came to its end -> its answers.
+        rungs: all rungs.
+        main: those of the first knob, the coarsest first.
+        order: of the error in that knob's value by theory; None without one.
+
+    Returns:
+        Name of rung -> quantity -> error. A run that others are compared with has none of its own, nor one whose answer
+        is not finite.
+    """
+    found: dict[str, dict[str, Error]] = {}
+    for rung in rungs:
+        for quantity, answer in answers.get(rung.name, {}).items():
+            if answer.exact is not None and not rung.against:
+                error: Error | None = _exact(answer, answer.exact)
+            else:
+                error = _compared(quantity, rung, answers, _Reference.of(quantity, rung, answers, main, order))
+            if error is not None and math.isfinite(error.value):
+                found.setdefault(rung.name, {})[quantity] = error
+    return found
+
+
+@dataclass(frozen=True, slots=True)
+class _Reference:
+    """What is compared with: its value, in words, and the rung that it is, if it is one."""
+
+    value: Values
+    words: str
+    rung: str = ""
+
+    @classmethod
+    def of(
+        cls,
+        quantity: str,
+        rung: "Rung",
+        answers: Mapping[str, Answers],
+        main: Sequence["Rung"],
+        order: float | None,
+    ) -> "_Reference | None":
+        """Take the rung that is named, else an extrapolation of the three finest of the first knob, else the finest."""
+        # What a run has compared with an exact answer itself may be an error, no answer.
+        known = [one for one in main if (own := answers.get(one.name, {}).get(quantity)) and own.exact is None]
+        if rung.against:
+            answer = answers.get(rung.against, {}).get(quantity)
+            return None if answer is None else cls(answer.value, f"run {rung.against}", rung.against)
+        if not known:
+            return None
+        values = [answers[one.name][quantity].value for one in known]
+        limit = richardson([one.value or 0.0 for one in known[-3:]], values[-3:], order)
+        if limit is not None:
+            return cls(limit[0], f"Richardson, order {limit[1]:.2g}")
+        return cls(values[-1], f"finest run, {known[-1].name}", known[-1].name)
+
+
+def _exact(answer: Quantity, exact: Values) -> Error:
+    return Error(_difference(answer, exact), f"exact: {answer.source}" if answer.source else "exact")
+
+
+def _compared(
+    quantity: str, rung: "Rung", answers: Mapping[str, Answers], reference: _Reference | None
+) -> Error | None:
+    if reference is None or reference.rung == rung.name:
+        return None
+    return Error(_difference(answers[rung.name][quantity], reference.value), reference.words)
+
+
+def _difference(answer: Quantity, other: Values) -> float:
+    """Euclidean norm of a difference over the scale, or over that of the other answer; nan where that is nothing."""
+    scale = _norm(other) if answer.scale is None else answer.scale
+    return _norm(np.asarray(answer.value) - np.asarray(other)) / scale if scale else math.nan
+
+
+def _norm(values: Values) -> float:
+    return float(np.linalg.norm(np.atleast_1d(np.asarray(values))))
+
+
+def richardson(sizes: Sequence[float], values: Sequence[Values], order: float | None) -> tuple[Values, float] | None:
+    """Extrapolate the answers of three runs to size zero (Richardson).
+
+    Args:
+        sizes: the coarsest first.
+        values: the answers.
+        order: by theory; the observed one then has to be within 0.5 of it.
+
+    Returns:
+        The limit and the observed order; None where the runs show no order.
+    """
+    if len(sizes) != 3 or not sizes[0] > sizes[1] > sizes[2] > 0.0:
+        return None
+    coarse, fine = (np.asarray(values[k]) - np.asarray(values[k + 1]) for k in (0, 1))
+    if np.sum(coarse * fine) <= 0.0:
+        return None  # the answers swing
+    ratio = _norm(coarse) / _norm(fine)
+
+    def excess(power: float) -> float:
+        return (sizes[0] ** power - sizes[1] ** power) / (sizes[1] ** power - sizes[2] ** power) - ratio
+
+    if excess(ORDER_MARGIN) * excess(LARGEST_ORDER) > 0.0:
+        return None
+    observed = float(brentq(excess, ORDER_MARGIN, LARGEST_ORDER))
+    if order is not None and abs(observed - order) > ORDER_MARGIN:
+        return None
+    return values[2] - fine / ((sizes[1] / sizes[2]) ** observed - 1.0), observed

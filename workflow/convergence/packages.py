@@ -1,0 +1,221 @@
+"""Ladder of a package that is dropped: its mesh, joints, particles, and how joints and board are coupled."""
+
+from collections.abc import Callable, Iterator
+from math import floor
+from pathlib import Path
+from typing import Any
+
+from meshing.board.pads import pad_table
+from workflow.board_drop.case import BoardDropCase, PackageCase
+from workflow.board_drop.shock_forecast import implicit_seconds
+from workflow.board_drop.shock_launch import MODES
+from workflow.case.units import from_si
+from workflow.convergence.apart import apart
+from workflow.convergence.errors import Quantity
+from workflow.convergence.histories import at_same_times
+from workflow.convergence.series import Knob, Ladder, Rung
+from workflow.process.products import read_json
+from workflow.store.product import read_record
+
+REFINED = (2.0, 1.5, 1.0, 0.75, 0.5, 0.4, 0.25)  # sizes of elements over those of the case
+TWO_MODELS = (2.0, 1.5, 1.0, 0.75, 0.5)  # the same with two models
+ALONE, FINEST = (1.5, 1.0, 0.75), 0.5  # of board or joints alone, against the finest of them
+FINE = (1, 3)  # most stressed joints that are fine
+SAME_MESH = "all x 1"  # one model on the mesh of the case
+GRAIN = 0.05  # of sizes that are chosen between the measured ones
+SPACINGS, FINEST_SPACING = (2.0, 1.5, 1.25), 1.0  # of particles, over that of the case
+MESH, BOARD, JOINTS = "element size", "element size of board and package", "element size of joints"
+ROUNDING = 1e-9
+
+ERRORS = {
+    "stress_history": "von Mises stress of the critical joint, mean over its pads, L2 over time",
+    "peak_stress": "its peak",
+    "deflection": "deflection of board and die, L2 over time",
+}
+SIDES = ("von_mises_board", "von_mises_package")
+DEFLECTIONS = ("board_centre", "die_centre")
+
+TWO_SCALE = {"shock.numerics.modes": '["two_scale"]', "shock.identical_joints": "false"}
+TRUE_MASS = {"shock.numerics.mass_scaled": "[]"}  # of copper, whose step two models can do with
+
+Settings = dict[str, str]
+
+
+def package_ladder(case: PackageCase) -> Ladder:
+    """Vary what a package has: all of its shock where it is dropped, else the particles of its joints."""
+    if isinstance(case, BoardDropCase):
+        return _dropped(case)
+    errors = {"joint_width_error_max": "largest width, worst joint"}
+    return Ladder("reflow", ("reflow",), errors, _widths, (_particles(case, {}, (*SPACINGS, FINEST_SPACING)),))
+
+
+def _dropped(case: BoardDropCase) -> Ladder:
+    """Meshes by one model, in implicit steps where all is linear; then what two models on the case's mesh lose."""
+    whole = _one_model(case)
+    parts = [
+        apart(_board(case, whole), FINEST),
+        apart(_joints(case, whole), FINEST),
+        apart(_particles(case, whole, SPACINGS), FINEST_SPACING),
+    ]
+    knobs = (_mesh(case, whole), _critical(case), *(knob for knob, _ in parts))
+    choices = (*(finest for _, finest in parts), *_couplings(case))
+    return Ladder("shock", ("shock",), ERRORS, _motion, knobs, choices)
+
+
+def _widths(case: Any, run_folder: Path) -> dict[str, Quantity]:
+    record = read_record(run_folder / "reflow") or {"metrics": {}}
+    name = "joint_width_error_max"
+    return {name: Quantity(record["metrics"][name]["value"], 0.0, 1.0, "Young-Laplace")}
+
+
+def _motion(case: Any, run_folder: Path) -> dict[str, Quantity]:
+    """Histories of the joint whose stress is the largest, and of the board's and the die's centre."""
+    import numpy as np
+
+    folder = next(folder for mode in MODES if (folder := run_folder / "shock" / mode).is_dir())
+    with np.load(folder / "history.npz") as arrays:
+        history = dict(arrays)
+    result = read_json(folder / "result.json")
+    joint = list(history["joints"]).index(result["metrics"]["critical_joint"]["value"])
+    stress = {"time": history["time"], **{side: history[side][:, joint] for side in SIDES}}
+    duration, count = case.shock.duration, case.shock.numerics.history_samples + 1
+    peak = max(float(stress[side].max()) for side in SIDES)
+    return {
+        "stress_history": Quantity(at_same_times(stress, SIDES, duration, count)),
+        "peak_stress": Quantity(peak),
+        "deflection": Quantity(at_same_times(history, DEFLECTIONS, duration, count)),
+    }
+
+
+def _is_linear(case: BoardDropCase) -> bool:
+    return implicit_seconds(case) is not None and case.shock.numerics.kinematics == "small"
+
+
+def _one_model(case: BoardDropCase, solver: str = "") -> Settings:
+    """One model with all joints fine, copper at its true mass; in implicit steps, unless something is not linear."""
+    chosen = solver or ("implicit" if _is_linear(case) else "explicit")
+    return {
+        "shock.numerics.modes": '["dns"]',
+        "shock.numerics.dns_solver": chosen,
+        "shock.identical_joints": "false",
+        **TRUE_MASS,
+    }
+
+
+def _mesh(case: BoardDropCase, whole: Settings) -> Knob:
+    """All elements of board, package and joints."""
+    return _sized(MESH, "all", REFINED, lambda size: whole | _of_board(case, size) | _of_joints(case, size))
+
+
+def _critical(case: BoardDropCase) -> Knob:
+    """All elements, with two models of which one has the critical joint alone fine."""
+    fine = _fine(1)
+    return _sized(
+        f"{MESH}, one fine joint",
+        "1 fine",
+        TWO_MODELS,
+        lambda size: fine | _of_board(case, size) | _of_joints(case, size),
+    )
+
+
+def _fine(count: int) -> Settings:
+    """Two models, as many joints fine as are given, the most stressed ones."""
+    key = "shock.coupling"
+    return TWO_SCALE | {f"{key}.fine_joints": "critical", f"{key}.critical_joints": f"{count}"}
+
+
+def _board(case: BoardDropCase, whole: Settings) -> Knob:
+    """Elements of board and package, joints as they are."""
+    return _sized(BOARD, "board", ALONE, lambda size: whole | _of_board(case, size))
+
+
+def _joints(case: BoardDropCase, whole: Settings) -> Knob:
+    """Elements of joints, board and package as they are."""
+    return _sized(JOINTS, "joints", ALONE, lambda size: whole | _of_joints(case, size))
+
+
+def _particles(case: PackageCase, settings: Settings, values: tuple[float, ...]) -> Knob:
+    """Spacing of the particles of the joints, on which their shape depends."""
+    own = case.solder.numerics.spacing
+
+    def at(value: float) -> Rung:
+        spacing = from_si(value * own, "mm", digits=3)
+        return Rung(f"spacing {spacing}", "particle spacing", settings | {"solder.numerics.spacing": spacing}, value)
+
+    return Knob("particle spacing", values, at)
+
+
+def _sized(knob: str, word: str, sizes: tuple[float, ...], settings: Callable[[float], Settings]) -> Knob:
+    """A knob whose values are sizes over those of the case, as finely as ``GRAIN``."""
+
+    def at(value: float) -> Rung:
+        size = GRAIN * floor(value / GRAIN + ROUNDING)
+        return Rung(f"{word} x {size:.3g}", knob, settings(size), size)
+
+    return Knob(knob, sizes, at)
+
+
+def _of_board(case: BoardDropCase, size: float) -> dict[str, str]:
+    """Elements of board, substrate and die that are so many times as large."""
+    board, package = case.board.numerics, case.package
+    layers = _count(board.layers, size)
+    return {
+        "board.numerics.element_size": _length(size * board.element_size),
+        "board.numerics.coarse_size": _length(size * board.coarse_size),
+        "board.numerics.layers": f"{layers}",
+        "board.numerics.patch_layers": f"{max(1, round(layers * board.patch_layers / board.layers))}",
+        "package.numerics.element_size": _length(size * package.numerics.element_size),
+        "package.substrate.elements": f"{_count(package.substrate.elements, size)}",
+        "package.die.elements": f"{_count(package.die.elements, size)}",
+    }
+
+
+def _of_joints(case: BoardDropCase, size: float) -> dict[str, str]:
+    """Elements of fine joints that are so many times as large."""
+    own, key = case.package.joint_numerics, "package.joint_numerics"
+    return {
+        f"{key}.core": f"{_count(own.core, size)}",
+        f"{key}.rings": f"{_count(own.rings, size)}" if own.rings else "0",
+        f"{key}.layers": f"{max(2, _count(own.layers, size))}",
+    }
+
+
+def _count(own: int, size: float) -> int:
+    return max(1, floor(own / size + 0.5))
+
+
+def _length(value: float) -> str:
+    return from_si(value, "mm", digits=4)
+
+
+def _couplings(case: BoardDropCase) -> Iterator[Rung]:
+    """Two models, or one in explicit steps, on the mesh of the case; also against one model on that mesh."""
+    for name, settings in (_two_models(case) | _explicit(case)).items():
+        if settings != _fine(1):  # which is on the way of all meshes
+            yield Rung(name, "coupling", settings)
+        yield Rung(f"{name}: alone", "coupling, same mesh", settings, None, SAME_MESH)
+
+
+def _two_models(case: BoardDropCase) -> dict[str, Settings]:
+    """Extent of the fine region, schemes, one way; name -> settings."""
+    key, joints = "shock.coupling", len(pad_table(case.package, case.board, case.warpage))
+    every = TWO_SCALE | {f"{key}.fine_joints": "all"}
+    few = {f"{count} fine": _fine(count) for count in FINE if count < joints}
+    ways = few | {f"{name}, one way": settings | {f"{key}.direction": "one_way"} for name, settings in few.items()}
+    ways |= {"all fine": every, "all fine, held velocity": every | {f"{key}.scheme": "held_velocity"}}
+    if _is_linear(case) and not case.shock.numerics.mass_scaled:
+        ways["all fine, one level"] = every | {f"{key}.scheme": "local_steps", f"{key}.levels": "1"}
+    if case.shock.numerics.mass_scaled:
+        ways |= {f"{name}, true mass": settings | TRUE_MASS for name, settings in few.items()}
+    return ways
+
+
+def _explicit(case: BoardDropCase) -> dict[str, Settings]:
+    """One model in explicit steps, where the meshes were varied in implicit ones; name -> settings."""
+    if not _is_linear(case):
+        return {}
+    explicit, scaled = _one_model(case, "explicit"), case.shock.numerics.mass_scaled
+    if not scaled:
+        return {"explicit": explicit}
+    names = "[" + ", ".join(f'"{name}"' for name in scaled) + "]"
+    return {"explicit, true mass": explicit, "explicit": explicit | {"shock.numerics.mass_scaled": names}}

@@ -1,0 +1,165 @@
+"""Ladders of solder alone: particles and time steps, against exact shapes and periods."""
+
+from collections.abc import Mapping
+from functools import partial
+from math import ceil
+from pathlib import Path
+
+from workflow.case.kind import Case
+from workflow.case.units import from_si
+from workflow.convergence.errors import Quantity
+from workflow.convergence.series import Knob, Ladder, Rung
+from workflow.solder.case import DropCase, DropsCase, JointCase, OscillationCase
+from workflow.store.product import read_record
+
+SECOND = 2.0  # order in the spacing of a surface that minimises a discrete area
+PER_EDGE = (6, 7, 9, 11, 13, 15, 17, 21, 27, 41)
+OF_A_QUARTER = (9, 11, 15, 21, 27)
+FINENESS = (0.55, 0.7, 0.85, 1.0, 1.2, 1.45, 1.75, 2.1)  # of a spacing that the case gives
+PER_RADIUS = (2, 3, 4, 5, 6, 7)
+STEPS_PER_PERIOD = (16, 24, 36, 54, 81, 120)
+STEPS_TO_A_PARTICLE = 16  # of a period, that the spacing alone is seen to err
+LARGEST_COUNT, SMALLEST_COUNT = 50, 5
+TIME_STEPS = (20.0, 5.0)  # capillary limits
+WHERE = 11  # particles per edge of rungs that vary something else
+MOVING = {  # what Hu et al. print: so viscous that a drop with inertia comes to rest soon
+    "solder.effects.inertia": "on",
+    "solder.parameters": "paper",
+    "solder.process_time": "0.1 s",
+    "solder.numerics.max_steps": "20000",
+}
+GRIPC = MOVING | {
+    "solder.numerics.scheme": "gripc",
+    "solder.numerics.time_step_limit": "0.5",
+    "solder.process_time": "5 ms",
+}
+
+SHAPE = {"shape_error": "free surface, RMS distance over V^(1/3)", "max_width_error": "largest width"}
+ROUNDING = 1e-9
+
+
+def of_metrics(exact: str, errors: Mapping[str, str], stage: str, case: Case, run_folder: Path) -> dict[str, Quantity]:
+    """Read errors that a run has found itself; where it could not, the answer, to be compared with finer ones.
+
+    Args:
+        exact: what they are errors from.
+        errors: names of metrics -> anything; that of the answer has no ``_error``.
+        stage: whose record has them.
+        case: the case.
+        run_folder: of the run.
+    """
+    record = read_record(run_folder / stage)
+    metrics = {} if record is None else record["metrics"]
+    found = {}
+    for name in errors:
+        if name in metrics:
+            found[name] = Quantity(metrics[name]["value"], 0.0, 1.0, exact)
+        elif name.removesuffix("_error") in metrics:
+            found[name] = Quantity(metrics[name.removesuffix("_error")]["value"])
+    return found
+
+
+def drop_ladder(case: DropCase) -> Ladder:
+    """Particles along the edge of the cube that a drop starts as; half of them left out by symmetry; time steps."""
+    drop, errors = case.drop, {"shape_error": SHAPE["shape_error"], "height_error": "height", **SHAPE}
+    divisible = drop.symmetry == "none" and not drop.is_free
+    knobs = (_spacing_of_drop(case), _spacing_of_quarter(case)) if divisible else (_spacing_of_drop(case),)
+    base = _per_edge(case, WHERE)
+    steps = [
+        Rung(f"steps {limit:g} x", "time step", base | {"solder.numerics.time_step_limit": f"{limit:g}"})
+        for limit in TIME_STEPS
+        if limit != case.molten.numerics.time_step_limit
+    ]
+    coarse = _per_edge(case, PER_EDGE[1])
+    others = [Rung(f"inertia, {PER_EDGE[1]} per edge", "effects", coarse | MOVING)]
+    for basis in ("linear", "quadratic"):
+        others.append(Rung(f"gripc, {basis}", "scheme", coarse | GRIPC | {"solder.numerics.basis": basis}))
+    exact = "sphere" if drop.is_free else "Young-Laplace"
+    choices = (*steps, *(() if drop.is_free else others))
+    return Ladder("reflow", ("reflow",), errors, partial(of_metrics, exact, errors, "reflow"), knobs, choices)
+
+
+def _spacing_of_drop(case: DropCase) -> Knob:
+    """The spacing over the edge of the cube."""
+
+    def at(value: float) -> Rung:
+        count = _count(value, 1)
+        return Rung(f"{count} per edge", "particle spacing", _per_edge(case, count), 1.0 / (count - 1))
+
+    return Knob("particle spacing", tuple(1.0 / (count - 1) for count in PER_EDGE), at, SECOND)
+
+
+def _spacing_of_quarter(case: DropCase) -> Knob:
+    """The same of a quarter of the drop, in whose planes particles lie if there is an odd number along an edge."""
+
+    def at(value: float) -> Rung:
+        count = _count(value, 2)
+        settings = _per_edge(case, count) | {"drop.symmetry": "quarter"}
+        return Rung(f"{count} per edge, quarter", "particle spacing of a quarter", settings, 1.0 / (count - 1))
+
+    return Knob("particle spacing of a quarter", tuple(1.0 / (count - 1) for count in OF_A_QUARTER), at, SECOND)
+
+
+def _count(value: float, multiple: int) -> int:
+    """Particles along an edge for a spacing over the edge, or a smaller one; spacings in an edge are a multiple."""
+    spacings = multiple * ceil(1.0 / value / multiple - ROUNDING)
+    return 1 + min((LARGEST_COUNT - 1) // multiple * multiple, max(SMALLEST_COUNT - 1, spacings))
+
+
+def _per_edge(case: DropCase, count: int) -> dict[str, str]:
+    """Settings for so many particles along an edge, by the key that the case has."""
+    if case.drop.spacing is not None:
+        return {"drop.spacing": from_si(case.drop.edge / (count - 1), "mm")}
+    return {"drop.particles_per_edge": f"{count}"}
+
+
+def joint_ladder(case: JointCase) -> Ladder:
+    """Particle spacing of a joint, about the one that the case has."""
+    lifted = case.joint.package is not None and "lift" in case.joint.package.free
+    own = {"collapse_height_error": "standoff"} if lifted else {"axial_force_error": "axial force"}
+    errors = SHAPE | own
+    knob = _spacing("joint.spacing", case.joint.spacing)
+    return Ladder("reflow", ("reflow",), errors, partial(of_metrics, "Young-Laplace", errors, "reflow"), (knob,))
+
+
+def drops_ladder(case: DropsCase) -> Ladder:
+    """Particle spacing of two drops, about the one that the case has."""
+    errors = {"max_width_error": "largest width", "height_error": "height"}
+    exact = "sphere" if case.drops.is_free else "Young-Laplace"
+    knob = _spacing("drops.spacing", case.drops.spacing, FINENESS[1:])
+    return Ladder("reflow", ("reflow",), errors, partial(of_metrics, exact, errors, "reflow"), (knob,))
+
+
+def _spacing(key: str, own: float, fineness: tuple[float, ...] = FINENESS) -> Knob:
+    """A spacing that the case gives [m], and others about it; values are relative to it."""
+
+    def at(value: float) -> Rung:
+        text = from_si(value * own, "mm", digits=3)
+        return Rung(f"spacing {text}", "particle spacing", {key: text}, value)
+
+    return Knob("particle spacing", tuple(1.0 / one for one in fineness), at, SECOND)
+
+
+def oscillation_ladder(_case: OscillationCase) -> Ladder:
+    """Particles along the radius, with steps in proportion; and the time step by itself.
+
+    What is exact for small swings is not for larger ones, whose period is longer: errors fall to that difference only.
+    """
+    errors = {"period_error": "period", "decay_rate_error": "decay rate"}
+
+    def spacing(value: float) -> Rung:
+        count = min(20, max(2, ceil(1.0 / value - ROUNDING)))
+        steps = STEPS_TO_A_PARTICLE * count
+        settings = {"oscillation.particles_per_radius": f"{count}", "oscillation.steps_per_period": f"{steps}"}
+        return Rung(f"{count} per radius", "spacing and step", settings, 1.0 / count)
+
+    def step(value: float) -> Rung:
+        count = max(STEPS_PER_PERIOD[0], ceil(1.0 / value - ROUNDING))
+        settings = {"oscillation.particles_per_radius": "3", "oscillation.steps_per_period": f"{count}"}
+        return Rung(f"{count} steps a period", "time step", settings, 1.0 / count)
+
+    knobs = (
+        Knob("spacing and step", tuple(1.0 / count for count in PER_RADIUS), spacing),
+        Knob("time step", tuple(1.0 / count for count in STEPS_PER_PERIOD), step),
+    )
+    return Ladder("reflow", ("reflow",), errors, partial(of_metrics, "Reid, small swings", errors, "reflow"), knobs)

@@ -1,0 +1,59 @@
+"""The page of the registry, and that of a scene, in a terminal."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+from workflow.case.kind import Case
+from workflow.effects.costs import MEASURED, measured
+from workflow.effects.effect import Effect
+from workflow.effects.registry import registry
+from workflow.effects.table import CAPTION, HEAD, per_cent, rows
+from workflow.pipeline.stage_forecast import scene_effects
+from workflow.process.plan_table import new_table
+from workflow.process.terminal import styled
+
+FIELDS = (("adds", "adds"), ("number", "number"), ("influence", "influence"), ("switch", "key"), ("place", "object"))
+
+
+def show_registry(console: Console) -> None:
+    """Print every effect of the program."""
+    for stage in dict.fromkeys(effect.stage for effect in registry().values()):
+        table = new_table(f"\nEffects of the {stage}", "effect", "", "what")
+        for effect in registry().values():
+            if effect.stage == stage:
+                _add(table, effect)
+        console.print(table)
+    console.print(
+        styled("\n[dim]An effect that is off is absent: no memory, no work, no branch. `effects CASE` says what acts.")
+    )
+
+
+def _add(table: Table, effect: Effect) -> None:
+    lines = [(title, getattr(effect, name)) for name, title in FIELDS]
+    if effect.threshold is not None:
+        lines.insert(2, ("threshold", f"acts {effect.acts} {effect.threshold:g}"))
+    if effect.name in measured():
+        lines.append(("cost", f"adds {per_cent(measured()[effect.name] - 1.0)} of a step without it ({MEASURED.name})"))
+    lines.append(("source", effect.source))
+    for place, (title, text) in enumerate(lines):
+        name = effect.name.replace("_", " ") if place == 0 else ""
+        table.add_row(styled("[bold]{}[/]", name), styled("[dim]{}[/]", title), text)
+
+
+def effects_table(case: Case, effects: Mapping[str, Any], of_what: str) -> Table:
+    """Return the effects of a scene: on or off, expected influence, share of the cost, why."""
+    table = new_table(f"\nEffects of the {of_what}", *HEAD)
+    for name, acts, influence, cost, why in rows(case, effects):
+        table.add_row(name, styled("[green]on[/]" if acts else "[dim]off[/]"), influence, cost, why)
+    for column in table.columns[2:4]:
+        column.justify = "right"
+    table.caption, table.caption_justify = CAPTION, "left"
+    return table
+
+
+def show_effects(case: Case, console: Console) -> None:
+    """Print the effects of a case."""
+    console.print(effects_table(case, scene_effects(case), case.case.name))

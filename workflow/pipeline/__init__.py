@@ -1,0 +1,1 @@
+"""Running a case: reading it, its gate, its stages one by one, what a run folder holds."""

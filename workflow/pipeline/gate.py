@@ -1,0 +1,168 @@
+"""The gate: what is checked of a case before anything is computed, and asked before anything that takes long."""
+
+import resource
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+
+from workflow.case.kind import Case
+from workflow.case.plausible import FORCE, implausible, implausible_tables
+from workflow.case.problems import CaseError, Problem
+from workflow.case.toml_file import fault_of
+from workflow.process.plan_table import duration
+
+LONG = 3600.0  # seconds of a run before which its user is asked
+LARGEST_FILE = 100_000_000  # bytes of a file that a case names
+LARGEST_MEMORY = 1e15  # bytes; beyond it a case is for no machine
+CGROUPS = Path("/sys/fs/cgroup")
+UNITS = ((1e15, "PB"), (1e12, "TB"), (1e9, "GB"), (1e6, "MB"))
+
+
+@dataclass(frozen=True, slots=True)
+class Leave:
+    """What a user allows: a case that is larger than this machine, values that are not plausible."""
+
+    oversubscribe: bool = False
+    force: bool = False
+
+
+def problems_of(case: Case, leave: Leave) -> list[Problem]:
+    """Find why a case whose values are valid, each for itself, cannot be run; the cheapest checks first."""
+    with np.errstate(all="ignore"):
+        try:
+            return _values(case, leave) or case.problems() or list(too_large(case, leave))
+        except CaseError as error:
+            return error.problems
+        except (ArithmeticError, ValueError, MemoryError) as error:  # beyond what floats can tell
+            return [Problem("", f"has values with which nothing can be computed: {error or type(error).__name__}")]
+
+
+def _values(case: Case, leave: Leave) -> list[Problem]:
+    """Find ranks that there are not, values and tables that are not plausible, files that cannot be read."""
+    found = [] if leave.oversubscribe else list(too_many_ranks(case))
+    found += [] if leave.force else list(implausible(case))
+    found += unreadable_files(case)
+    return found if found or leave.force else list(implausible_tables(case))
+
+
+def unreadable_files(case: Case) -> Iterator[Problem]:
+    """Find files that a case names and that are not there, or none that can be read whole."""
+    for key, path in case.files.items():
+        fault = fault_of(path, LARGEST_FILE)
+        if fault:
+            yield Problem(key, fault, str(path))
+
+
+def too_many_ranks(case: Case) -> Iterator[Problem]:
+    """Find out whether a case asks for more MPI ranks than there are cores."""
+    from workflow.pipeline.reader import available_cores
+
+    cores = available_cores()
+    for key, ranks in case.ranks_by_key.items():
+        if ranks > cores:
+            message = f"asks for {ranks} MPI ranks, this machine offers {cores} cores"
+            yield Problem(key, message, ranks, f"<= {cores} in all, or more with --oversubscribe")
+
+
+def too_large(case: Case, leave: Leave | None = None) -> Iterator[Problem]:
+    """Find out whether a case needs more memory than this machine has, or, with leave, than any machine."""
+    needed, leave = needed_memory(case), leave or Leave()
+    if leave.force:
+        return
+    allowed = f"larger particles or elements, fewer MPI ranks, or {FORCE}"
+    if not needed <= LARGEST_MEMORY:
+        yield Problem("", f"needs about {bytes_text(needed)} of memory, no machine has as much", None, allowed)
+    elif not leave.oversubscribe and needed > machine_memory():
+        message = f"needs about {bytes_text(needed)} of memory, this machine has {bytes_text(machine_memory())}"
+        yield Problem("", message, None, allowed)
+
+
+def needed_memory(case: Case) -> float:
+    """Predict the memory [B] of the largest stage of a case on this machine."""
+    from workflow.cluster.resources import stage_resources
+    from workflow.pipeline.reader import available_cores
+
+    stages = stage_resources(case, cores=available_cores()).values()
+    return 1e6 * max((stage.mem_mb for stage in stages), default=0)
+
+
+def machine_memory() -> float:
+    """Return the memory [B] that a new process of this user may have: free, of its control group, of ulimit -v."""
+    limits = [*_free_memory(), *_group_memory()]
+    soft = resource.getrlimit(resource.RLIMIT_AS)[0]
+    if soft != resource.RLIM_INFINITY:
+        limits.append(float(soft))
+    return min(limits, default=float("inf"))
+
+
+def ask_if_long(name: str, seconds: float, yes: bool, console: Console) -> bool:
+    """Ask before a run that takes long.
+
+    Args:
+        name: of what is to be run.
+        seconds: its predicted wall time.
+        yes: whether the answer is known.
+        console: where to ask.
+
+    Returns:
+        Whether to run.
+
+    Raises:
+        CaseError: there is nobody to ask.
+    """
+    if yes or seconds <= LONG:
+        return True
+    told = f"{name} is predicted to take about {duration(seconds)}"
+    if not (console.is_terminal and sys.stdin is not None and sys.stdin.isatty()):
+        raise CaseError("run", [Problem("", f"{told}; start it with --yes")])
+    return console.input(f"{told}; run it? \\[y/N] ").strip().lower() in ("y", "yes")
+
+
+def bytes_text(number: float) -> str:
+    """Write a number of bytes with two digits."""
+    size, unit = next(((size, unit) for size, unit in UNITS if number >= size), UNITS[-1])
+    shown = number / size
+    return f"{shown:.2g} {unit}" if shown < 100.0 or shown >= 1e6 else f"{shown:.0f} {unit}"
+
+
+def _free_memory() -> Iterator[float]:
+    try:
+        lines = Path("/proc/meminfo").read_text().splitlines()
+    except OSError:
+        return
+    for line in lines:
+        if line.startswith("MemAvailable:"):
+            yield 1024.0 * float(line.split()[1])
+
+
+def _group_memory() -> Iterator[float]:
+    """Yield what the control groups of this process, and those around them, leave to it (versions 2 and 1)."""
+    try:
+        groups = [line.split(":", 2) for line in Path("/proc/self/cgroup").read_text().splitlines()]
+    except OSError:
+        return
+    for _, controllers, name in groups:
+        if controllers in ("", "memory"):
+            folder = CGROUPS / controllers
+            yield from _left(folder)
+            for part in Path(name.lstrip("/")).parts:
+                folder /= part
+                yield from _left(folder)
+
+
+def _left(folder: Path) -> Iterator[float]:
+    """Yield what a control group leaves; files that are only cached do not count."""
+    for limit, used, cached in (
+        ("memory.max", "memory.current", "inactive_file"),
+        ("memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file"),
+    ):
+        try:
+            most, taken = float((folder / limit).read_text()), float((folder / used).read_text())
+            stat = dict(line.split() for line in (folder / "memory.stat").read_text().splitlines())
+            yield max(0.0, most - taken + float(stat.get(cached, 0.0)))
+        except (OSError, ValueError):  # there is no such limit, or it is "max"
+            continue

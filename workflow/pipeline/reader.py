@@ -1,0 +1,149 @@
+"""Reading a case file: its kind, by the table that only this kind has, every value converted and checked."""
+
+import os
+import tomllib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from pydantic import ValidationError
+
+from fem.names import nearest
+from workflow.board_drop.case import BoardDropCase, PackageCase
+from workflow.case import fields
+from workflow.case.kind import FULL, Case
+from workflow.case.problems import CaseError, Origin, Problem
+from workflow.case.scales import choose, is_key, take_scales
+from workflow.case.toml_file import is_too_deep, parse_toml, read_text
+from workflow.case.toml_places import Places
+from workflow.case.validation import translate
+from workflow.pipeline import gate
+from workflow.pipeline.gate import Leave
+from workflow.solder.case import DropCase, DropsCase, JointCase, OscillationCase
+from workflow.structure.case import StructureCase
+
+SETTING = "--set"  # where a value is from that an option gives
+KINDS: dict[str, type[Case]] = {
+    model.kind: model for model in (BoardDropCase, DropCase, JointCase, DropsCase, OscillationCase, StructureCase)
+}
+
+
+def kind_of(table: Mapping) -> type[Case]:
+    """Return the model of a case file.
+
+    Raises:
+        CaseError: the file has the tables of no kind, or of several.
+    """
+    found = [kind for kind in KINDS if kind in table]
+    if found == [PackageCase.kind] and not any(nearest(name, ("shock",)) for name in table):
+        return PackageCase
+    if len(found) == 1:
+        return KINDS[found[0]]
+    choice = "exactly one of " + ", ".join(f"[{kind}]" for kind in KINDS)
+    if found:
+        message = "is of several kinds at once: it has " + " and ".join(f"[{kind}]" for kind in found)
+        raise CaseError("case", [Problem("", message, None, choice)])
+    if isinstance(table.get("study"), dict):
+        raise CaseError("case", [Problem("", "is a study, not a case; use: reflowshock study")])
+    hint = next((f"[{near}]" for name in table if (near := nearest(name, KINDS))), "")
+    raise CaseError("case", [Problem("", "does not say what kind of case it is", None, choice, hint)])
+
+
+def read_case(path: Path, overrides: Sequence[str] = (), oversubscribe: bool = False, force: bool = False) -> Case:
+    """Read and check a case file, and every file that it names: what it returns can be run.
+
+    Args:
+        path: TOML file.
+        overrides: "dotted.key=value" settings, applied over the file and its scale; values are TOML, quotes may be
+            left out.
+        oversubscribe: whether more MPI ranks than cores are welcome, and more memory than this machine has: the case
+            is for other machines, or not to be run.
+        force: whether values that are not plausible are welcome where they can be computed with.
+
+    Returns:
+        The case, every value checked.
+
+    Raises:
+        CaseError: with all problems found, each with its place: syntax, names, units, ranges, geometry that cannot be,
+            files that cannot be read, sizes that this machine cannot hold.
+    """
+    text = read_text(path)
+    table = parse_toml(str(path), text)
+    origins: dict[str, Origin] = {}
+    try:
+        return _checked_case(path, table, overrides, origins, Leave(oversubscribe, force))
+    except CaseError as error:
+        raise CaseError(str(path), error.problems, origins).located(Places(text)) from error
+
+
+def _checked_case(path: Path, table: dict, overrides: Sequence[str], origins: dict[str, Origin], leave: Leave) -> Case:
+    """Return the case of a table; its origins are noted; errors as ``read_case``, without their places."""
+    problems: list[Problem] = []
+    origins |= _override(table, overrides, problems)
+    try:
+        kind = kind_of(table)
+    except CaseError as error:
+        raise CaseError(str(path), error.problems + problems) from None
+    values = kind.located(fields.to_si_table(kind, kind.completed(table), "", problems), path.parent)
+    case = None
+    try:
+        case = kind.model_validate(values, strict=True)
+    except ValidationError as error:
+        problems += translate(kind, error, table, {problem.key for problem in problems})
+    if case is not None and not problems:
+        problems = gate.problems_of(case, leave)
+    if case is None or problems:
+        raise CaseError(str(path), problems)
+    return case
+
+
+def display_values(case: Case) -> dict[str, str]:
+    """Return every parameter that has a value as dotted key -> text in the user's unit."""
+    return {key: fields.display(value, field) for key, value, field in fields.leaves(case) if value is not None}
+
+
+def available_cores() -> int:
+    """Return the number of cores that this process may use."""
+    return len(os.sched_getaffinity(0))
+
+
+def _override(table: dict, overrides: Sequence[str], problems: list[Problem]) -> dict[str, Origin]:
+    """Write the values of the chosen scale, then overrides, into a table; return where each key was given."""
+    settings = [_setting(override, problems) for override in overrides]
+    scales, chosen = take_scales(table, problems), table.get("scale", FULL)
+    chosen = next((value for key, value in reversed(settings) if key == "scale"), chosen)
+    of_scale = choose(chosen, scales, problems)
+    wrong = {problem.key for problem in problems}
+    for key, value in [*of_scale.items(), *settings]:
+        if key not in wrong and not set_value(table, key.split("."), value):
+            problems.append(Problem(key, "is below a key that has a value, not a table", value))
+    of_file = {key: Origin(f"[scales.{chosen}]", f"scales.{chosen}.{key}") for key in of_scale}
+    return of_file | {key: Origin(SETTING) for key, _ in settings}
+
+
+def _setting(override: str, problems: list[Problem]) -> tuple[str, object]:
+    """Return key and value of an override; what is not one is its own key, and a problem."""
+    key, equals, text = override.partition("=")
+    key, value = key.strip(), override_value(text.strip())
+    if not equals or not is_key(key):
+        problems.append(Problem(key or override, "is not a setting", override, "--set dotted.key=value"))
+    elif is_too_deep(value):
+        problems.append(Problem(key, "has lists or tables nested too deeply", None, "a value, or a list of values"))
+    return key or override, value
+
+
+def override_value(text: str) -> object:
+    """Return the value that a setting's text stands for: TOML, quotes may be left out."""
+    try:
+        return tomllib.loads(f"value = {text}")["value"]
+    except (ValueError, RecursionError):
+        return text
+
+
+def set_value(table: dict, path: list[str], value: object) -> bool:
+    """Write a value at a path of names; False where the path leads through a value."""
+    for name in path[:-1]:
+        table = table.setdefault(name, {})
+        if not isinstance(table, dict):
+            return False
+    table[path[-1]] = value
+    return True

@@ -1,0 +1,111 @@
+"""JSON schema of the case file, in which a quantity is a string with its unit."""
+
+import re
+from collections.abc import Iterator
+from typing import Any
+
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+from pydantic_core import PydanticUndefined
+
+from workflow.board_drop.case import PackageCase
+from workflow.case.fields import allowed, display, holds_named_tables, models_of, unit_of
+from workflow.case.kind import Case
+from workflow.case.names import NAME
+from workflow.case.units import QUANTITY, dimension
+from workflow.pipeline.reader import KINDS
+
+SCALES = {
+    "description": "values, by dotted keys, that replace those of the file where its scale is chosen",
+    "type": "object",
+    "propertyNames": {"pattern": NAME},
+    "additionalProperties": {"type": "object"},
+}
+PATTERN = re.sub(r"\?P<\w+>", "", f"^{QUANTITY.pattern}$")
+
+
+def case_schema() -> dict:
+    """Return the JSON schema (draft 2020-12) of a case file: that of any kind."""
+    kinds: list[dict] = []
+    definitions: dict = {}
+    models: list[type[Case]] = [*KINDS.values(), PackageCase]
+    for kind in models:
+        schema = _with_own_names(_kind_schema(kind), kind.kind, definitions)
+        definitions |= schema.pop("$defs")
+        schema["properties"]["scales"] = SCALES
+        kinds.append(schema)
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "reflowshock case",
+        "anyOf": kinds,
+        "$defs": definitions,
+    }
+
+
+def _with_own_names(schema: dict, kind: str, taken: dict) -> dict:
+    """Put the kind before the names of its definitions, if another kind has one of them for something else."""
+    own = schema["$defs"]
+    if all(taken.get(name, definition) == definition for name, definition in own.items()):
+        return schema
+    renamed = _replaced(schema, {f"#/$defs/{name}": f"#/$defs/{kind}.{name}" for name in own})
+    return renamed | {"$defs": {f"{kind}.{name}": definition for name, definition in renamed["$defs"].items()}}
+
+
+def _replaced(node: Any, texts: dict[str, str]) -> Any:
+    """Replace texts wherever they stand as values."""
+    if isinstance(node, dict):
+        return {key: _replaced(value, texts) for key, value in node.items()}
+    if isinstance(node, list):
+        return [_replaced(value, texts) for value in node]
+    return texts.get(node, node) if isinstance(node, str) else node
+
+
+def _kind_schema(kind: type[Case]) -> dict:
+    schema = kind.model_json_schema()
+    for model in set(_reachable(kind)):
+        properties = schema if model is kind else schema["$defs"][model.__name__]
+        for name, field in model.model_fields.items():
+            unit = unit_of(field)
+            if unit is not None:
+                properties["properties"][name] = {
+                    **_quantities(properties["properties"][name]),
+                    "description": f"{dimension(unit)}, e.g. in {unit}; {allowed(field)}",
+                    "x-unit": unit,
+                    **_default(field),
+                }
+            if holds_named_tables(field):
+                properties["properties"][name]["propertyNames"] = {"pattern": NAME}
+    # Defaults of whole tables would be repeated in SI floats; each field has its own.
+    _drop_table_defaults(schema)
+    return schema
+
+
+def _quantities(numbers: dict) -> dict:
+    """Turn the schema of a number, or of a list of them, into that of strings with a unit."""
+    text = {"type": "string", "pattern": PATTERN}
+    if numbers.get("type") != "array":
+        return text
+    sizes = {name: numbers[name] for name in ("minItems", "maxItems") if name in numbers}
+    return {"type": "array", "items": text, **sizes}
+
+
+def _default(field: FieldInfo) -> dict:
+    return {} if field.default in (PydanticUndefined, None) else {"default": display(field.default, field)}
+
+
+def _reachable(model: type[BaseModel]) -> Iterator[type[BaseModel]]:
+    yield model
+    for field in model.model_fields.values():
+        for member in models_of(field):
+            yield from _reachable(member)
+
+
+def _drop_table_defaults(node: object) -> None:
+    if isinstance(node, dict):
+        if isinstance(node.get("default"), dict):
+            del node["default"]
+        for value in node.values():
+            _drop_table_defaults(value)
+    elif isinstance(node, list):
+        for value in node:
+            _drop_table_defaults(value)

@@ -1,0 +1,164 @@
+"""Running one stage: a fresh partial folder, a record of what was used and found, a rename when all is there."""
+
+import resource
+import time
+import traceback
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Generic, TypeVar
+
+from workflow.case.kind import Case
+from workflow.case.stage_table import Stage
+from workflow.process.last_word import in_words, is_interrupt
+from workflow.process.terminal import console, health_line
+from workflow.store.keys import compare, product_key, stage_inputs
+from workflow.store.product import discard, publish, read_record, seal
+from workflow.store.store import MESSAGE, TRACEBACK, reads
+
+AnyCase = TypeVar("AnyCase", bound=Case)
+
+
+@dataclass(frozen=True, slots=True)
+class Run(Generic[AnyCase]):
+    """What a stage works with.
+
+    Attributes:
+        folder: the run folder, with the products of earlier stages.
+        case: the resolved case.
+        cores: number of cores that a stage may use.
+        oversubscribe: whether MPI may have more ranks than cores.
+    """
+
+    folder: Path
+    case: AnyCase
+    cores: int
+    oversubscribe: bool = False
+
+    def checkpoints(self, stage: str) -> Path:
+        """Folder in which a stage keeps what it needs to continue after a kill; removed when it is complete."""
+        return self.folder / f".{stage}.checkpoints"
+
+
+@dataclass(frozen=True, slots=True)
+class Findings:
+    """What a stage found, in the form of ``summary.json``.
+
+    Attributes:
+        metrics: name -> {"value", "unit"}.
+        health: check -> {"value", "limit", "ok"}.
+        effects: effect -> {"on", "why"}.
+        continued: what continued from checkpoints, in words.
+    """
+
+    metrics: dict = field(default_factory=dict)
+    health: dict = field(default_factory=dict)
+    effects: dict = field(default_factory=dict)
+    continued: str = ""
+
+
+class StageError(RuntimeError):
+    """A stage cannot use what it was given, or has not made what it is to make."""
+
+
+StageFunction = Callable[[Run[Any], Path], Findings]
+
+
+def run_stage(name: str, function: StageFunction, run: Run, product: Path) -> dict:
+    """Run a stage; its product appears at once and complete, or not at all.
+
+    Args:
+        name: name of the stage.
+        function: writes products into the given folder and returns what it found.
+        run: what the stage works with.
+        product: the folder that its product becomes; one that is there is replaced.
+
+    Returns:
+        The record: seconds, core_seconds, metrics, health, effects, continued, key, inputs, reads, files.
+
+    Raises:
+        StageError: a file that the case names has changed since the command began, or a product was not written.
+    """
+    stage, partial = run.case.pipeline[name], run.folder / f".{name}.partial"
+    before = {"inputs": stage_inputs(run.case, stage), "reads": _reads(run, stage)}
+    key = product.name.rpartition("-")[2]
+    _check_key(run, stage, before["inputs"], key)
+    discard(partial)
+    partial.mkdir(parents=True)
+    start, used = time.perf_counter(), core_seconds()
+    findings = function(run, partial)
+    record = {
+        "seconds": round(time.perf_counter() - start, 3),
+        "core_seconds": round(core_seconds() - used, 3),
+        "metrics": findings.metrics,
+        "health": findings.health,
+        "effects": findings.effects,
+        "continued": findings.continued,
+        "key": key,
+    }
+    _check(run, stage, before, partial)
+    record = seal(partial, record | before)
+    publish(partial, product)
+    discard(run.checkpoints(name))
+    return record
+
+
+def _reads(run: Run, stage: Stage) -> dict[str, str | None]:
+    return reads({one.name: run.folder / one.name for one in run.case.pipeline.stages}, run.case, stage)
+
+
+def _check_key(run: Run, stage: Stage, inputs: dict, key: str) -> None:
+    """See to it that what a stage finds is what its product is named after, when the command began."""
+    follows = [(read_record(run.folder / name) or {}).get("key") for name in stage.follows]
+    if None not in follows and product_key(run.case, stage, inputs, follows) != key:
+        raise StageError("a file of the case, or the program, has changed since the command began; run it again")
+
+
+def _check(run: Run, stage: Stage, before: dict, partial: Path) -> None:
+    """See to it that what a stage has used is still so, and that it has written what it is to write."""
+    changed = compare(before["inputs"], stage_inputs(run.case, stage))
+    if changed:
+        names = ", ".join(change.key.removesuffix(".sha256") for change in changed)
+        raise StageError(f"{names}: the file has changed while the stage was at work; run it again")
+    if None in before["reads"].values() or before["reads"] != _reads(run, stage):
+        raise StageError("a product that it reads has changed, or is damaged; run it again")
+    missing = [name for name in stage.products if not (partial / name.removeprefix(f"{stage.name}/")).exists()]
+    if missing:
+        raise StageError(f"it has not written {', '.join(missing)}")
+
+
+def core_seconds() -> float:
+    """Processor time [s] of this process and of all that it started on this machine and that have ended.
+
+    Those are workers of a pool and, through the launcher that waits for them, MPI ranks; not ranks elsewhere.
+    """
+    used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    return sum(one.ru_utime + one.ru_stime for one in used)
+
+
+def execute(name: str, function: StageFunction, run: Run, product: Path) -> bool:
+    """Run a stage and tell the user how it ended, if it did well.
+
+    Returns:
+        Whether it completed. If not, ``.<stage>.partial`` of the run folder has the traceback and the message.
+    """
+    try:
+        record = run_stage(name, function, run, product)
+    except Exception as error:  # the boundary of a stage: whatever went wrong is told with the stage's name
+        if is_interrupt(error):
+            raise KeyboardInterrupt from error
+        _write_message(name, run.folder / f".{name}.partial", error)
+        return False
+    health_line(name, record["seconds"], record["health"], record["continued"])
+    return True
+
+
+def _write_message(name: str, folder: Path, error: Exception) -> None:
+    """Leave traceback and message for the command, which tells the user; say it at once where they cannot be."""
+    told = in_words(error, folder)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / TRACEBACK).write_text(traceback.format_exc(), encoding="utf-8")
+        (folder / MESSAGE).write_text(told, encoding="utf-8")
+    except OSError:
+        console.print(f"stage {name} failed: {told}", soft_wrap=True)

@@ -1,0 +1,73 @@
+"""What a run folder holds, stage by stage."""
+
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from workflow.case.units import from_si
+from workflow.process.terminal import styled
+from workflow.store.point import Point
+from workflow.store.state import Verdict, examine
+from workflow.store.store import Store
+
+SHOWN_UNITS = {"m": "mm", "m^3": "mm^3", "Pa": "MPa", "J": "mJ", "kg": "mg", "s": "ns"}
+FIGURES = {
+    "geometry": ("joint_count", "elements_board", "elements_board_patch", "elements"),
+    "reflow": (
+        "distinct_shapes", "load_steps", "coupling_residual_max", "standoff_min", "standoff_max",
+        "joint_width_min", "joint_width_max", "joint_width_error_max",
+        "height", "max_width", "waist", "contact_angle", "height_error", "max_width_error", "verdict",
+    ),
+    "surface": ("surface_volume_error_max",),
+    "solder_mesh": ("joint_volume_error_max", "joint_scaled_jacobian_min", "joint_critical_time_step"),
+    "shock": (
+        "critical_joint", "peak_von_mises", "shape_effect_on_peak_stress", "residual_stress_largest",
+        "peak_board_strain", "deflection_over_thickness", "step_ratio", "critical_joint_stress_error",
+        "die_displacement_error", "two_scale_dns_time_ratio", "first_frequency", "steps", "energy_balance_error",
+    ),
+    "comparison": (
+        "displacement_difference", "strain_difference", "wave_speed_error", "transmitted_velocity_error",
+        "reflected_velocity_error", "tip_deflection_error", "swing_frequency_error",
+    ),
+    "report": (),
+}  # fmt: skip
+
+
+def show_status(store: Store, point: Point, console: Console) -> None:
+    """Print for each stage whether its product is there and intact, the time it took and its main figures."""
+    table = Table(title=f"{point.case.case.name} in {store.folder}", title_justify="left", expand=True)
+    table.add_column("stage", no_wrap=True)
+    table.add_column("state", no_wrap=True)
+    table.add_column("time", justify="right", no_wrap=True)
+    table.add_column("figures", ratio=1)
+    for name, verdict in examine(store, point).items():
+        record = store.record(point, name) or {"metrics": {}, "health": {}}
+        seconds = f"{record['seconds']:.1f} s" if "seconds" in record else ""
+        figures = ", ".join(verdict.damaged) or _figures(name, record["metrics"])
+        table.add_row(name, _state(verdict, record["health"]), seconds, figures)
+    console.print(table)
+
+
+def metric_text(metric: dict) -> str:
+    """Write a metric in a unit that engineers read."""
+    value, unit = metric["value"], metric["unit"]
+    if isinstance(value, str | bool | int) or value is None:
+        return f"{value} {unit}".strip()
+    return from_si(value, SHOWN_UNITS[unit], 4) if unit in SHOWN_UNITS else f"{value:.4g} {unit}".strip()
+
+
+def _state(verdict: Verdict, health: dict) -> Text:
+    if verdict.missing:
+        return styled("[dim]missing[/]")
+    if verdict.damaged:
+        return styled("[bold red]damaged[/]")
+    if verdict.stale:
+        return styled("[yellow]stale[/]")
+    if not all(check["ok"] for check in health.values()):
+        return styled("[bold red]unhealthy[/]")
+    return styled("[green]done[/]")
+
+
+def _figures(stage: str, metrics: dict) -> str:
+    shown = [name for name in FIGURES[stage] if name in metrics]
+    return ", ".join(f"{name.replace('_', ' ')} {metric_text(metrics[name])}" for name in shown)

@@ -1,0 +1,136 @@
+"""Writing a case file: every parameter, its value, its default and its range."""
+
+import textwrap
+from pathlib import Path
+
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+from pydantic_core import PydanticUndefined
+
+from fem.names import nearest
+from workflow.case.fields import allowed, alternatives, display, holds_named_tables, literal_names, models_of, unit_of
+from workflow.case.kind import Case, Title
+from workflow.case.names import is_name, wrong_name
+from workflow.case.problems import CaseError, Problem, as_toml
+from workflow.case.scales import scales_text, take_scales
+from workflow.case.toml_file import read_toml
+from workflow.pipeline.reader import read_case
+
+CASES = Path(__file__).resolve().parents[2] / "cases"
+COMMENT_COLUMN = 44
+HEADER = """\
+# Case "{name}", from the template "{template}".
+# Every parameter is here. A quantity is a string with a unit, which may be any of its dimension ("0.48 mm", "480 um").
+# Tables named "numerics" say how something is computed, all others what. A line that only repeats the default can go.
+"""
+
+
+def templates() -> dict[str, Path]:
+    """Return the cases that a new one can start from: name -> case file."""
+    return {path.parent.name: path for path in sorted(CASES.glob("*/case.toml"))}
+
+
+def write_new_case(name: str, template: str, folder: Path = Path()) -> Path:
+    """Write ``<folder>/<name>.toml``, complete and commented.
+
+    Args:
+        name: name of the case.
+        template: name of the case whose values are taken.
+        folder: where to write.
+
+    Returns:
+        The path of the file.
+
+    Raises:
+        CaseError: the name is not valid, the template does not exist, or the file does.
+    """
+    known = templates()
+    if template not in known:
+        choice, hint = "one of " + ", ".join(known), nearest(template, known)
+        raise CaseError("new", [Problem("--template", "unknown template", template, choice, hint)])
+    if not is_name(name):
+        raise CaseError("new", [wrong_name("NAME", name)])
+    path = folder / f"{name}.toml"
+    if path.exists():
+        raise CaseError("new", [Problem("NAME", f"{path} exists already", name)])
+    case = read_case(known[template], [f"case.name='{name}'"], oversubscribe=True)
+    scales = scales_text(take_scales(read_toml(known[template]), []))
+    path.write_text("\n".join([case_text(case, template), *scales]), encoding="utf-8")
+    return path
+
+
+def case_text(case: Case, template: str) -> str:
+    """Write a case as TOML with comments."""
+    blocks = [HEADER.format(name=case.case.name, template=template)]
+    _add_table(blocks, "", case)
+    return "\n".join(blocks)
+
+
+def _add_table(blocks: list[str], key: str, parameters: BaseModel) -> None:
+    """Append a table's block, then those of the tables in it."""
+    lines, tables, absent = [], [], []
+    for name, field in type(parameters).model_fields.items():
+        value = getattr(parameters, name)
+        if isinstance(value, BaseModel):
+            tables.append((f"{key}.{name}".lstrip("."), value))
+        elif holds_named_tables(field) and not models_of(field):
+            lines.append(f"{name} = {{ {', '.join(f'{own} = {as_toml(item)}' for own, item in value.items())} }}")
+        elif holds_named_tables(field):
+            tables += [(f"{key}.{name}.{own_name}".lstrip("."), table) for own_name, table in value.items()]
+        elif value is None and models_of(field):
+            absent.append(_absent_table(f"{key}.{name}".lstrip("."), models_of(field)[0]))
+        else:
+            lines.append(_line(name, value, field))
+    header = [*_describe(type(parameters)), *([f"[{key}]"] if lines else [])] if key else []
+    if header or lines:
+        blocks.append("\n".join([*header, *lines, ""]))
+    blocks.extend(absent)
+    own = getattr(parameters, "kind", "")
+    for name, table in sorted(tables, key=lambda item: item[0] not in ("case", own)):
+        _add_table(blocks, name, table)
+
+
+def _absent_table(key: str, model: type[BaseModel]) -> str:
+    """Describe a table that is not given, commented out."""
+    lines, tables = [], []
+    for name, field in model.model_fields.items():
+        value = None if field.is_required() else field.get_default()
+        if isinstance(value, BaseModel):
+            tables.append(_absent_table(f"{key}.{name}", type(value)))
+        else:
+            lines.append(_line(name, value, field))
+    commented = [line if line.startswith("#") else f"# {line}" for line in (f"[{key}]", *lines)]
+    return "\n".join([*_describe(model, "Not given: "), *commented, "", *tables])
+
+
+def _line(name: str, value: object, field: FieldInfo) -> str:
+    if value is None:
+        return f"# {name} = ...".ljust(COMMENT_COLUMN) + f" # {'; '.join(filter(None, ('not given', allowed(field))))}"
+    text = _value(value, field)
+    is_fixed = len(literal_names(field)) == len(alternatives(field)) == 1
+    remarks = [] if is_fixed else [allowed(field)]
+    if field.default not in (PydanticUndefined, "", None):
+        remarks.append(f"default {_default(field)}")
+    comment = "; ".join(remark for remark in remarks if remark)
+    line = f"{name} = {text}"
+    return f"{line:<{COMMENT_COLUMN}} # {comment}" if comment else line
+
+
+def _value(value: object, field: FieldInfo) -> str:
+    """Write a value as TOML, a quantity with its unit."""
+    if isinstance(value, tuple):
+        return "[" + ", ".join(_value(item, field) for item in value) + "]"
+    return f'"{display(value, field)}"' if unit_of(field) else as_toml(value)
+
+
+def _default(field: FieldInfo) -> str:
+    is_switch = isinstance(field.default, bool)
+    return as_toml(field.default) if is_switch else display(field.default, field)
+
+
+def _describe(model: type[BaseModel], before: str = "") -> list[str]:
+    """Comment lines from a model's docstring, ReST marks taken out."""
+    if model is Title:
+        return []
+    text = before + " ".join((model.__doc__ or "").replace("``", "").split())
+    return textwrap.wrap(text, 118, initial_indent="# ", subsequent_indent="# ")

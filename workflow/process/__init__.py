@@ -1,0 +1,1 @@
+"""What surrounds a computation: terminal, launched programs, environment, last words."""

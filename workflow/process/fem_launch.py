@@ -1,0 +1,51 @@
+"""One run of the package fem: input file, MPI run, progress."""
+
+import json
+import logging
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+from workflow.pipeline.stage_runner import Run
+from workflow.process.launch import launch, mpi_command
+from workflow.process.progress import progress_bar
+from workflow.process.stopped_processes import PATIENCE
+
+AFTER_THE_RANKS = 10.0  # [s]
+
+logger = logging.getLogger(__name__)
+
+
+def run_fem(run: Run, folder: Path, request: dict, title: str) -> None:
+    """Run the package fem on the MPI ranks of the case, showing its progress.
+
+    Args:
+        run: case, cores.
+        folder: where its products go; made here.
+        request: what it reads as input, but for ``output``.
+        title: what the user sees.
+
+    Raises:
+        LaunchError: the run failed; the message has its last words.
+    """
+    folder.mkdir()
+    path = folder / "input.json"
+    path.write_text(json.dumps(request | {"output": str(folder.resolve())}, indent=1) + "\n", encoding="utf-8")
+    ranks = run.case.ranks
+    command = mpi_command(ranks, [sys.executable, "-m", "fem", str(path)], run.oversubscribe)
+    with progress_bar(f"{title} on {ranks} rank{'s' if ranks > 1 else ''}") as progress:
+        launch(command, lambda line: _pass_on(line, progress), folder / "log.txt", _patience(request))
+
+
+def _patience(request: dict) -> float:
+    """Return how long a rank may be stopped [s]: a little longer than ranks wait, which can tell more of it."""
+    model = request.get("shock") or request.get("dynamics") or {}
+    return float(model.get("numerics", {}).get("watchdog_seconds", PATIENCE)) + AFTER_THE_RANKS
+
+
+def _pass_on(line: str, progress: Callable[[float], None]) -> None:
+    """Show how far a run is, or what it warns of, if a line of its output says so."""
+    if line.startswith('{"progress"'):
+        progress(json.loads(line)["progress"])
+    if line.startswith('{"warning"'):
+        logger.warning(json.loads(line)["warning"])

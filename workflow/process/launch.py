@@ -1,0 +1,141 @@
+"""Launching MPI programs: command line, lines of output, and a clean end whatever happens."""
+
+import os
+import shlex
+import shutil
+import signal
+import subprocess
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from pathlib import Path
+
+from fem.parallel.own_job import own_environment
+from fem.parallel.status_board import ERROR
+from workflow.process.last_word import words_of
+from workflow.process.stopped_processes import PATIENCE, StoppedProcesses
+
+GRACE = 5.0  # seconds that a program has to end by itself after SIGTERM
+TRACEBACK = "Traceback (most recent call last):"
+TOLD = "error: "  # begins what a program says of an error that it knows
+LAST_LINES = 15
+LAUNCHER = "REFLOWSHOCK_MPI_LAUNCHER"  # variable: what starts MPI ranks, e.g. "srun --mpi=pmix" within a job of Slurm
+MPIRUN = "mpirun"
+QUIET = ("--mca", "orte_execute_quiet", "1")  # of Open MPI 4; 5 has no option --quiet, and lets this one pass
+
+# In front of a command: the system sends the signal when the process that starts it ends, however that happens.
+END_WITH_PARENT = ("setpriv", "--pdeathsig", "TERM")
+DIE_WITH_PARENT = ("setpriv", "--pdeathsig", "KILL")
+ENDINGS: dict[int, str] = {
+    signal.SIGKILL: "was killed, as the system does when memory is short",
+    signal.SIGXFSZ: "was ended, since a file exceeded the largest allowed size (ulimit -f)",
+    signal.SIGXCPU: "was ended, since it took all the processor time allowed (ulimit -t)",
+    signal.SIGSEGV: "crashed (segmentation fault)",
+    signal.SIGBUS: "crashed (bus error, as when no space is left for a file in memory)",
+}
+
+
+class LaunchError(RuntimeError):
+    """A launched program ended with an error; the message has its last words."""
+
+
+def mpi_command(ranks: int, program: Sequence[str], oversubscribe: bool) -> list[str]:
+    """Return the command that starts a program on a number of MPI ranks: by Open MPI, or by what ``LAUNCHER`` says.
+
+    Args:
+        ranks: number of MPI ranks.
+        program: program and arguments.
+        oversubscribe: whether there may be more ranks than cores.
+    """
+    launcher = shlex.split(os.environ.get(LAUNCHER, "")) or [MPIRUN]
+    if Path(launcher[0]).name != MPIRUN:
+        return [*launcher, "-n", str(ranks), *program]
+    command = [*launcher, *QUIET, "-n", str(ranks)]
+    if os.geteuid() == 0:
+        command.append("--allow-run-as-root")
+    if oversubscribe:
+        command.append("--oversubscribe")
+    return [*command, *program]
+
+
+def launch(command: Sequence[str], on_line: Callable[[str], None], log: Path, patience: float = PATIENCE) -> None:
+    """Run a program to its end, reading its standard output line by line.
+
+    Args:
+        command: program and arguments.
+        on_line: called with each line of standard output.
+        log: file that takes standard error; a program may say in ``ERROR`` beside it, too, why it ended.
+        patience: how long one of its processes may be stopped [s]; all are ended then.
+
+    Raises:
+        LaunchError: the program cannot be started, its exit code is not 0, or one of its processes was stopped.
+    """
+    program = command[0]
+    if shutil.which(program) is None:
+        raise LaunchError(f"{program} is not installed")
+    # What it writes is read here, not on a terminal: in UTF-8, whatever the terminal has.
+    environment = own_environment(os.environ) | {"OMP_NUM_THREADS": "1", "PYTHONIOENCODING": "utf-8:backslashreplace"}
+    with log.open("w", encoding="utf-8") as errors:
+        process = subprocess.Popen(
+            [*END_WITH_PARENT, *command],
+            stdout=subprocess.PIPE,
+            stderr=errors,
+            encoding="utf-8",
+            errors="replace",
+            env=environment,
+            start_new_session=True,
+        )
+        try:
+            with StoppedProcesses(process.pid, patience) as watch:
+                for line in process.stdout or ():
+                    on_line(line.rstrip("\n"))
+                code = process.wait()
+        except BaseException:
+            end_group(process)
+            raise
+    if code != 0:
+        lines = _read(log) + _read(log.with_name(ERROR))
+        words = "\n".join(lines[-LAST_LINES:]) or "it said nothing"
+        said, words = (without_traceback(text, log) for text in (told(lines), words))
+        if watch.told:
+            raise LaunchError(f"{watch.told}; {said}".removesuffix("; "))
+        raise LaunchError(said or f"{program} {ending(code)}: {words}")
+
+
+def _read(path: Path) -> list[str]:
+    return path.read_text(encoding="utf-8", errors="replace").strip().splitlines() if path.is_file() else []
+
+
+def told(lines: Sequence[str]) -> str:
+    """Return what a program says of an error that it knows, from the last line that begins so; nothing without one."""
+    begins = [k for k, line in enumerate(lines) if line.startswith(TOLD)]
+    return "\n".join(lines[begins[-1] :]).removeprefix(TOLD) if begins else ""
+
+
+def without_traceback(text: str, log: Path) -> str:
+    """Return what a program says without the way through its code, which stays in its log: where, and what it was."""
+    before, traceback, after = text.partition(TRACEBACK)
+    if not traceback:
+        return text
+    last = after.strip().splitlines()[-1]
+    what, semicolon, checkpoint = last.partition("; last checkpoint")
+    return f"{before.strip()} {words_of(what) or what}{semicolon}{checkpoint} (details: {log})".strip()
+
+
+def ending(code: int) -> str:
+    """Say how a program ended, from its exit code: below 0 or above 128 by a signal."""
+    number = -code if code < 0 else code - 128
+    if number in ENDINGS:
+        return ENDINGS[number]
+    return f"ended with exit code {code}"
+
+
+def end_group(process: subprocess.Popen) -> None:
+    """End a program that leads a process group, with all that it started; by force after ``GRACE`` seconds."""
+    with suppress(ProcessLookupError):
+        os.killpg(process.pid, signal.SIGTERM)
+    try:
+        process.wait(GRACE)
+    except subprocess.TimeoutExpired:
+        with suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
+        process.wait()

@@ -1,0 +1,120 @@
+r"""What the user sees: one console that takes no text for markup, errors, one health line a stage.
+
+A title, a folder or a message may hold anything: brackets are shown as they are, control characters as ``\x1b``.
+"""
+
+import os
+import re
+from collections.abc import Iterable
+from typing import Any
+
+from rich.console import Console, ConsoleOptions, RenderableType
+from rich.segment import Segment
+from rich.text import Span, Text
+
+from workflow.case.check_text import against_limit
+
+# All that a terminal obeys (but for line end and tab), that turns the direction of text, or that no encoding has.
+CONTROL = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
+PLACE = "{}"
+WIDTHS = {1: 100, 2: 200}  # of lines in a file or a pipe: what a report or a log can hold
+
+
+def visible(text: str) -> str:
+    r"""Return a text whose control characters are written out, as ``\x1b``."""
+    return CONTROL.sub(lambda found: found[0].encode("unicode_escape").decode(), text)
+
+
+def styled(template: str, *values: object) -> Text:
+    """Style the program's own words; each ``{}`` among them takes a value, which is no markup whatever it holds.
+
+    Args:
+        template: a constant with markup, as ``"[bold]{}[/] in {}"``.
+        values: in the order of their places.
+    """
+    words = Text.from_markup(template, emoji=False)
+    ends = [end for found in re.finditer(re.escape(PLACE), words.plain) for end in found.span()]
+    pieces = list(words.divide(ends))
+    for place, value in zip(range(1, len(pieces), 2), values, strict=True):
+        told = visible(str(value))
+        pieces[place] = Text(told, spans=[Span(0, len(told), span.style) for span in pieces[place].spans])
+    return Text("").join(pieces)
+
+
+class Terminal(Console):
+    """A console that shows text as it is: no markup, no emoji, no colours but those of ``styled``, nothing obeyed."""
+
+    def __init__(self, descriptor: int = 1, **options: Any) -> None:
+        """Take standard output (1) or standard error (2); into a file or a pipe go no control sequences."""
+        shown = _is_terminal(descriptor)
+        width = None if shown else WIDTHS[descriptor]
+        defaults = {"stderr": descriptor == 2, "width": width, "force_terminal": shown}
+        super().__init__(**defaults | options, markup=False, emoji=False, highlight=False)
+
+    def print(self, *objects: Any, soft_wrap: bool | None = None, **options: Any) -> None:
+        """Print as ``Console.print``; lines that a file has as they are (``soft_wrap``) end on a terminal at words."""
+        super().print(*objects, soft_wrap=soft_wrap and not self.is_terminal, **options)
+
+    def render_str(self, text: str, **options: Any) -> Text:
+        """Return a text, which is no markup, unless it is asked for, with its control characters visible."""
+        return super().render_str(visible(text), **options)
+
+    def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
+        """Yield the segments of anything; what it obeys are those of rich alone."""
+        for segment in super().render(renderable, options):
+            yield segment if segment.control else segment._replace(text=visible(segment.text))
+
+
+def _is_terminal(descriptor: int) -> bool:
+    try:
+        return os.isatty(descriptor)
+    except OSError:  # it is closed
+        return False
+
+
+console = Terminal()
+errors = Terminal(2)
+
+
+def print_error(text: str) -> None:
+    """Print an error, its first line emphasised."""
+    first, _, rest = text.partition("\n")
+    errors.print(styled("[bold red]error:[/] {}", first), soft_wrap=True)
+    if rest:
+        errors.print(rest, soft_wrap=True)
+
+
+def health_line(stage: str, seconds: float, health: dict, continued: str = "") -> None:
+    """Print how a stage ended: its time, the checks that did not hold, or else the one closest to its limit.
+
+    Args:
+        stage: its name.
+        seconds: its time.
+        health: check -> value, limit, ok.
+        continued: what continued from checkpoints, in words.
+    """
+    failed = [name for name, result in health.items() if not result["ok"]]
+    mark = styled("[bold red]FAILED[/]") if failed else styled("[green]ok[/]    ")
+    if failed:
+        text = ", ".join(_against_limit(name, health[name]) for name in failed)
+    elif health:
+        closest = max(health, key=lambda name: _closeness(health[name]))
+        checks = f"{len(health)} checks hold" if len(health) > 1 else "1 check holds"
+        text = f"{checks}; closest: {_against_limit(closest, health[closest])}"
+    else:
+        text = "done"
+    if continued:
+        text += f"; {continued} continued from checkpoints"
+    told = styled(" [bold]{}[/] {} s  {}", f"{stage:<11}", f"{seconds:6.1f}", text)
+    console.print(mark + told, soft_wrap=True)
+
+
+def _against_limit(name: str, result: dict) -> str:
+    value, limit = against_limit(name, result)
+    return f"{name.replace('_', ' ')} {value} (limit {limit})"
+
+
+def _closeness(result: dict) -> float:
+    """How near a value that holds is to its limit, which it may exceed or fall below: 1 is at the limit."""
+    smaller, larger = sorted((abs(result["value"]), abs(result["limit"])))
+    return smaller / larger if larger > 0.0 else 0.0

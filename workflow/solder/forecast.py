@@ -1,0 +1,112 @@
+"""Effects, size and cost of the reflow of solder alone, from the parameters of the scene."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from math import ceil
+from typing import Any
+
+from workflow.case.kind import Case
+from workflow.solder.case import DropCase, DropsCase, JointCase, OscillationCase, SceneCase
+
+SECONDS_TO_START = 2.0  # until a stage has loaded its libraries and kernels
+
+
+@dataclass(frozen=True, slots=True)
+class SceneForecast:
+    """What the reflow of one body will be like.
+
+    Attributes:
+        effects: effect -> {"on", "why"}.
+        particles: number of particles.
+        scheme: how steps are solved.
+        spacing: their distance at the start [m].
+        capillary_limit: largest stable time step of an explicit surface tension [s].
+        largest_step: largest time step that will be taken [s].
+        seconds: stage -> predicted wall time [s].
+    """
+
+    effects: Mapping[str, Any]
+    particles: int
+    scheme: str
+    spacing: float
+    capillary_limit: float
+    largest_step: float
+    seconds: dict[str, float]
+
+
+def forecast_scene(case: Case) -> SceneForecast:
+    """Predict effects, size, time step and cost of a scene of solder alone."""
+    return FORECASTS[case.kind](case)
+
+
+def _of_drop(case: DropCase) -> SceneForecast:
+    from particles.parameters.effects import decide_drop
+    from particles.parameters.estimate import drop_seconds
+
+    drop = case.drop
+    return _towards_rest(case, decide_drop(case.molten, drop.is_free), drop.particles, drop_seconds(drop.particles))
+
+
+def _of_joint(case: JointCase) -> SceneForecast:
+    from particles.parameters.effects import decide_effects
+    from particles.parameters.estimate import particle_count, reflow_seconds
+
+    geometry, solder = case.joint.geometry, case.molten
+    particles = particle_count(solder, geometry)
+    seconds = (1 + len(case.joint.places)) * reflow_seconds(solder, geometry)
+    return _towards_rest(case, decide_effects(geometry, solder), particles, seconds)
+
+
+def _of_drops(case: DropsCase) -> SceneForecast:
+    from particles.parameters.effects import decide_drop
+    from particles.parameters.estimate import drop_seconds
+
+    drops = case.drops
+    merged = (drops.volume,) if drops.merge else ()
+    flowing = merged if drops.is_free and drops.merge else (*drops.volumes, *merged)  # free ones touch at once
+    seconds = sum(drop_seconds(drops.per_edge(volume) ** 3) for volume in flowing)
+    return _towards_rest(case, decide_drop(case.molten, drops.is_free), drops.particles, seconds)
+
+
+def _towards_rest(case: SceneCase, effects: Mapping[str, Any], particles: int, seconds: float) -> SceneForecast:
+    from particles.parameters.estimate import inertial_seconds
+    from particles.steps.time_step import capillary_limit
+
+    solder = case.molten
+    numerics = solder.numerics
+    limit = capillary_limit(solder.density, numerics.spacing, solder.surface_tension)
+    largest = numerics.time_step_limit * limit
+    scheme: str = numerics.scheme
+    if scheme == "energy" and (effects["inertia"]["on"] or effects["viscosity"]["on"]):
+        steps = min(numerics.max_steps, ceil(solder.process_time / largest))
+        scheme, seconds = "inertia", inertial_seconds(particles, steps)
+    cost = {"reflow": SECONDS_TO_START + seconds}
+    return SceneForecast(effects, particles, scheme, numerics.spacing, limit, largest, cost)
+
+
+def _of_oscillation(case: OscillationCase) -> SceneForecast:
+    from particles.parameters.effects import decide_oscillation
+    from particles.parameters.estimate import inertial_seconds
+    from particles.parameters.scene_oscillation import rayleigh_period
+    from particles.steps.time_step import capillary_limit
+
+    scene, solder = case.oscillation, case.molten
+    spacing = solder.numerics.spacing
+    steps = ceil(scene.periods * scene.steps_per_period)
+    return SceneForecast(
+        effects=decide_oscillation(solder),
+        particles=scene.particles,
+        scheme="inertia",
+        spacing=spacing,
+        capillary_limit=capillary_limit(solder.density, spacing, solder.surface_tension),
+        largest_step=rayleigh_period(scene, solder) / scene.steps_per_period,
+        seconds={"reflow": SECONDS_TO_START + inertial_seconds(scene.particles, steps)},
+    )
+
+
+FORECASTS: dict[str, Callable[[Any], SceneForecast]] = {
+    DropCase.kind: _of_drop,
+    JointCase.kind: _of_joint,
+    DropsCase.kind: _of_drops,
+    OscillationCase.kind: _of_oscillation,
+}
