@@ -11,7 +11,7 @@ setup:  ## install what is missing: Debian packages, .venv
 	@.ci/setup
 
 demo: setup  ## run the default case from case file to report
-	$(PYTHON) -m workflow run $(CASE)
+	$(PYTHON) -m reflowshock run $(CASE)
 
 test: setup  ## run every check and test, on all cores
 	@.ci/setup-slurm
@@ -20,7 +20,7 @@ test: setup  ## run every check and test, on all cores
 test-long: setup  ## the expensive sweeps: 50 interrupts, damage, random hard cases on three new seeds
 	REFLOWSHOCK_LONG=1 $(PYTHON) -m pytest tests/faults --numprocesses=logical --maxprocesses=4
 	@for seed in $$($(PYTHON) -c 'import random; print(*random.sample(range(10**6), 3))'); do echo "seed $$seed"; \
-	    $(PYTHON) -m workflow stress-test --random 500 --seed $$seed --out runs/stress-test-$$seed || exit 1; done
+	    $(PYTHON) -m reflowshock stress-test --random 500 --seed $$seed --out runs/stress-test-$$seed || exit 1; done
 
 test-debian13:  ## run every test on Debian 13 too, in a chroot; compare results (root)
 	@.ci/debian13

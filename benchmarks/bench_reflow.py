@@ -11,12 +11,12 @@ from time import perf_counter
 
 import numpy as np
 
-from particles.core.geometry import JointGeometry
-from particles.core.neighbours import NeighbourList
-from particles.ispg.mls import SUPPORT, derivatives
-from particles.parameters.solder import Solder, SolderNumerics
-from particles.scenes.reflow import solve_joint
-from particles.steps.rest import NoRest
+from reflowshock.particles.core.geometry import JointGeometry
+from reflowshock.particles.core.neighbours import NeighbourList
+from reflowshock.particles.ispg.mls import SUPPORT, derivatives
+from reflowshock.particles.parameters.solder import Solder, SolderNumerics
+from reflowshock.particles.scenes.reflow import solve_joint
+from reflowshock.particles.steps.rest import NoRest
 
 RESULTS = Path(__file__).parent / "results" / "reflow.json"
 BALL, RADIUS, MM = 0.0724e-9, 0.24e-3, 1e-3

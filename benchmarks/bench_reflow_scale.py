@@ -14,10 +14,10 @@ from time import perf_counter
 
 import numpy as np
 
-from particles.core.cloud import box_cloud
-from particles.parameters.solder import Solder, SolderNumerics
-from particles.scenes.reflow import contact_line, start_flow
-from particles.steps.flow import LiquidFlow
+from reflowshock.particles.core.cloud import box_cloud
+from reflowshock.particles.parameters.solder import Solder, SolderNumerics
+from reflowshock.particles.scenes.reflow import contact_line, start_flow
+from reflowshock.particles.steps.flow import LiquidFlow
 
 RESULTS = Path(__file__).parent / "results" / "reflow_scale.json"
 EFFECTS = {"surface_tension": True, "wall_adhesion": True, "gravity": False, "inertia": False, "viscosity": False}

@@ -9,18 +9,18 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from benchmarks.support import turns
-from fem.forces.force import Kinematics, force_terms
-from fem.loads.damping import RayleighDamping
-from fem.loads.load import DOWN, BodyAcceleration, Load
-from fem.materials.library import FR4, SAC305
-from fem.materials.parameters import Material
-from fem.problem.pulse import STANDARD_GRAVITY, Constant, HalfSine
-from fem.trials.bodies import dns_body, motion_of
-from fem.trials.grids import grid, mesh_of, on
-from particles.core.cloud import box_cloud
-from particles.parameters.solder import Solder
-from particles.scenes.reflow import contact_line, start_flow
-from workflow.effects.costs import MEASURED
+from reflowshock.fem.forces.force import Kinematics, force_terms
+from reflowshock.fem.loads.damping import RayleighDamping
+from reflowshock.fem.loads.load import DOWN, BodyAcceleration, Load
+from reflowshock.fem.materials.library import FR4, SAC305
+from reflowshock.fem.materials.parameters import Material
+from reflowshock.fem.problem.pulse import STANDARD_GRAVITY, Constant, HalfSine
+from reflowshock.fem.trials.bodies import dns_body, motion_of
+from reflowshock.fem.trials.grids import grid, mesh_of, on
+from reflowshock.particles.core.cloud import box_cloud
+from reflowshock.particles.parameters.solder import Solder
+from reflowshock.particles.scenes.reflow import contact_line, start_flow
+from reflowshock.workflow.effects.costs import MEASURED
 
 CELLS, PER_EDGE, STRETCH = (40, 20, 4), 11, 2.0e-3
 PULSE = BodyAcceleration(DOWN, HalfSine(1.5e4, 5e-4))

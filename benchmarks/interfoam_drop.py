@@ -22,11 +22,11 @@ from time import process_time
 
 import numpy as np
 
-from particles.parameters.scenes import Drop
-from particles.parameters.solder import Solder, SolderEffects, SolderNumerics
-from particles.reference.young_laplace import Meridian, sessile_meridian
-from particles.scenes.drop_at_rest import flow_to_rest
-from particles.steps.time_step import capillary_limit
+from reflowshock.particles.parameters.scenes import Drop
+from reflowshock.particles.parameters.solder import Solder, SolderEffects, SolderNumerics
+from reflowshock.particles.reference.young_laplace import Meridian, sessile_meridian
+from reflowshock.particles.scenes.drop_at_rest import flow_to_rest
+from reflowshock.particles.steps.time_step import capillary_limit
 
 CASE, RESULTS = Path(__file__).parent / "interfoam", Path(__file__).parent / "results" / "interfoam_drop.json"
 VOLUME, ANGLE = 1e-9, 60.0

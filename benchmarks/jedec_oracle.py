@@ -24,22 +24,22 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 import numpy as np
 from mpi4py import MPI
 
-from fem.dynamics.implicit import ImplicitMotion
-from fem.estimates.factor_cost import box_factor
-from fem.estimates.solver_cost import forecast_solvers
-from fem.materials.library import FR4
-from fem.model.factorisation import Factorisation
-from fem.model.global_matrix import Equations
-from fem.output.compare_structures import solver_differences
-from fem.problem.inputs import INPUT, StructureInput
-from fem.problem.structure_pulses import pulse_durations, pulses_of
-from fem.run.structure_participants import make_participant
-from fem.run.structure_run import make_history
-from fem.setup.structure_model import build_structure
-from fem.trials.bodies import dns_body
-from fem.trials.grids import grid, mesh_of
-from meshing.board.box import write_box
-from meshing.board.box_plan import Box, BoxHoles, BoxLayer
+from reflowshock.fem.dynamics.implicit import ImplicitMotion
+from reflowshock.fem.estimates.factor_cost import box_factor
+from reflowshock.fem.estimates.solver_cost import forecast_solvers
+from reflowshock.fem.materials.library import FR4
+from reflowshock.fem.model.factorisation import Factorisation
+from reflowshock.fem.model.global_matrix import Equations
+from reflowshock.fem.output.compare_structures import solver_differences
+from reflowshock.fem.problem.inputs import INPUT, StructureInput
+from reflowshock.fem.problem.structure_pulses import pulse_durations, pulses_of
+from reflowshock.fem.run.structure_participants import make_participant
+from reflowshock.fem.run.structure_run import make_history
+from reflowshock.fem.setup.structure_model import build_structure
+from reflowshock.fem.trials.bodies import dns_body
+from reflowshock.fem.trials.grids import grid, mesh_of
+from reflowshock.meshing.board.box import write_box
+from reflowshock.meshing.board.box_plan import Box, BoxHoles, BoxLayer
 
 RESULTS = Path(__file__).parent / "results" / "jedec_oracle.json"
 LENGTH, WIDTH, THICKNESS, SPACING, HOLE = 132e-3, 77e-3, 1e-3, (105e-3, 71e-3), 3e-3

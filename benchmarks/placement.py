@@ -21,15 +21,15 @@ from mpi4py import MPI
 
 from benchmarks.support import turns
 from benchmarks.support.drop_scene import DropScene
-from fem.coupling.stopwatch import Stopwatch
-from fem.parallel.communicators import Communicators
-from fem.parallel.own_job import own_environment
-from fem.problem.inputs import RunInput
-from fem.problem.parameters import Ranks
-from fem.run.shock_run import make_crew, place
-from fem.run.time_loop import run_window
-from fem.setup.shock_models import build_models, divided_scene
-from workflow.process.launch import mpi_command
+from reflowshock.fem.coupling.stopwatch import Stopwatch
+from reflowshock.fem.parallel.communicators import Communicators
+from reflowshock.fem.parallel.own_job import own_environment
+from reflowshock.fem.problem.inputs import RunInput
+from reflowshock.fem.problem.parameters import Ranks
+from reflowshock.fem.run.shock_run import make_crew, place
+from reflowshock.fem.run.time_loop import run_window
+from reflowshock.fem.setup.shock_models import build_models, divided_scene
+from reflowshock.workflow.process.launch import mpi_command
 
 SCHEMES = ("held_velocity", "local_steps")
 WINDOWS, FASTEST = 300, 15

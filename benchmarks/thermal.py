@@ -24,23 +24,23 @@ import ufl
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from fem import dolfinx_api
-from fem.materials.elasticity import elasticity_matrix
-from fem.materials.library import FR4, SILICON
-from fem.materials.roles import Materials
-from fem.mesh.mesh import MeshData, append, without_unused_nodes
-from fem.model.factorisation import Factorisation
-from fem.problem.thermal import Thermal
-from fem.statics.pads import Pads
-from fem.statics.scene import thermal_tables
-from fem.statics.state import Assembly
-from fem.statics.structure import ThermalStructure
-from fem.statics.thermoelastic import Thermoelastic
-from fem.trials.grids import grid, mesh_of, on
-from meshing.board.assembly import write_assembly
-from meshing.board.heated_assembly import write_heated_assembly
-from meshing.board.pads import pad_table
-from workflow.pipeline.reader import read_case
+from reflowshock.fem import dolfinx_api
+from reflowshock.fem.materials.elasticity import elasticity_matrix
+from reflowshock.fem.materials.library import FR4, SILICON
+from reflowshock.fem.materials.roles import Materials
+from reflowshock.fem.mesh.mesh import MeshData, append, without_unused_nodes
+from reflowshock.fem.model.factorisation import Factorisation
+from reflowshock.fem.problem.thermal import Thermal
+from reflowshock.fem.statics.pads import Pads
+from reflowshock.fem.statics.scene import thermal_tables
+from reflowshock.fem.statics.state import Assembly
+from reflowshock.fem.statics.structure import ThermalStructure
+from reflowshock.fem.statics.thermoelastic import Thermoelastic
+from reflowshock.fem.trials.grids import grid, mesh_of, on
+from reflowshock.meshing.board.assembly import write_assembly
+from reflowshock.meshing.board.heated_assembly import write_heated_assembly
+from reflowshock.meshing.board.pads import pad_table
+from reflowshock.workflow.pipeline.reader import read_case
 
 RESULTS = Path(__file__).parent / "results" / "thermal.json"
 CASE = Path(__file__).parents[1] / "cases" / "bga_drop" / "case.toml"

@@ -25,7 +25,7 @@ import numpy as np
 from benchmarks.support import turns
 from benchmarks.support.drop_scene import DropScene
 from benchmarks.support.program_run import ProgramRun
-from fem.output.compare import compare_histories
+from reflowshock.fem.output.compare import compare_histories
 
 CRITICAL = ("A10", "A9", "B10")
 SETTINGS: dict[str, dict] = {

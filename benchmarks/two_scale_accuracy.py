@@ -21,7 +21,7 @@ from benchmarks.coupling import SMALL
 from benchmarks.support import turns
 from benchmarks.support.drop_scene import DropScene
 from benchmarks.support.program_run import ProgramRun
-from fem.output.compare import compare_histories
+from reflowshock.fem.output.compare import compare_histories
 
 SETTINGS: dict[str, dict] = {
     "held velocity, 2 layers": {"scheme": "held_velocity", "buffer_layers": 2},

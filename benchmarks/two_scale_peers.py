@@ -25,12 +25,12 @@ from benchmarks.peers import FOLDER, Peer, install
 from benchmarks.support import turns
 from benchmarks.support.conforming_package import MATERIALS, conforming_package
 from benchmarks.support.program_run import ProgramRun
-from fem.mesh.mesh import MeshData
-from fem.mesh.mesh_file import read_mesh
-from fem.mesh.supports import held_components
-from fem.mesh.watch_table import centre_nodes
-from fem.output.compare import relative_error
-from fem.problem.inputs import RunInput
+from reflowshock.fem.mesh.mesh import MeshData
+from reflowshock.fem.mesh.mesh_file import read_mesh
+from reflowshock.fem.mesh.supports import held_components
+from reflowshock.fem.mesh.watch_table import centre_nodes
+from reflowshock.fem.output.compare import relative_error
+from reflowshock.fem.problem.inputs import RunInput
 from tests.support.fem_models import write_msh
 
 PEAK, PULSE, DURATION, SAMPLES = 1.5e4, 1e-5, 2e-5, 200  # [m/s^2], [s]

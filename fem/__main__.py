@@ -14,7 +14,7 @@ if __name__ == "__main__":
     from mpi4py import MPI
 
     try:
-        from fem.run.program import main
+        from reflowshock.fem.run.program import main
 
         code = main(MPI.COMM_WORLD, sys.argv[1:])
     except BaseException as error:  # an interrupt, or a library that cannot be loaded: the other ranks would wait

@@ -11,7 +11,7 @@ import ufl
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from fem.cell_shape import shape_of
+from reflowshock.fem.cell_shape import shape_of
 
 OLD = tuple(int(part) for part in dolfinx.__version__.split(".")[:2]) < (0, 8)
 

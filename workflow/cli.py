@@ -8,15 +8,15 @@ from typing import Annotated
 
 import typer
 
-from workflow import __version__
-from workflow.cluster.executor import JOBS, ExecutorName, executor_for
-from workflow.pipeline.reader import available_cores, read_case
-from workflow.process.environment import prepare
-from workflow.process.last_word import answer, heed_signals, last_word, remember_run_folder
-from workflow.process.terminal import console, print_error
-from workflow.store.folders import check_folder, read_mark
-from workflow.store.point import Point
-from workflow.store.store import Store, read_case_of_run
+from reflowshock.workflow import __version__
+from reflowshock.workflow.cluster.executor import JOBS, ExecutorName, executor_for
+from reflowshock.workflow.pipeline.reader import available_cores, read_case
+from reflowshock.workflow.process.environment import prepare
+from reflowshock.workflow.process.last_word import answer, heed_signals, last_word, remember_run_folder
+from reflowshock.workflow.process.terminal import console, print_error
+from reflowshock.workflow.store.folders import check_folder, read_mark
+from reflowshock.workflow.store.point import Point
+from reflowshock.workflow.store.store import Store, read_case_of_run
 
 app = typer.Typer(
     name="reflowshock",
@@ -65,7 +65,7 @@ def new(
     template: Annotated[str, typer.Option(help="case to start from")] = "bga_drop",
 ) -> None:
     """Write a complete, commented case file."""
-    from workflow.pipeline.template import write_new_case
+    from reflowshock.workflow.pipeline.template import write_new_case
 
     path = write_new_case(name, template)
     console.print(f"wrote {path}; next: reflowshock plan {path}")
@@ -80,8 +80,8 @@ def plan(
     force: Force = False,
 ) -> None:
     """Show what a run would do and cost; runs nothing."""
-    from workflow.pipeline.run import WHAT
-    from workflow.plan import show_plan
+    from reflowshock.workflow.pipeline.run import WHAT
+    from reflowshock.workflow.plan import show_plan
 
     store, point = _load(case, settings, out, oversubscribe, force)
     check_folder(store.folder, WHAT, point.case.case.name, force)
@@ -102,10 +102,10 @@ def run(
     yes: Yes = False,
 ) -> None:
     """Run what is missing, stale or damaged."""
-    from workflow.pipeline.gate import ask_if_long
-    from workflow.pipeline.run import WHAT, run_case
-    from workflow.plan import predicted_seconds
-    from workflow.store.batch import machine_of
+    from reflowshock.workflow.pipeline.gate import ask_if_long
+    from reflowshock.workflow.pipeline.run import WHAT, run_case
+    from reflowshock.workflow.plan import predicted_seconds
+    from reflowshock.workflow.store.batch import machine_of
 
     store, point = _load(case, settings, out, oversubscribe or executor != ExecutorName.LOCAL, force)
     if until not in point.case.pipeline.names:
@@ -144,7 +144,7 @@ def accuracy(
     force: Force = False,
 ) -> None:
     """Measure what accuracy costs: a ladder of settings, their errors and times; recommend some and run them."""
-    from workflow.convergence.command import read_wish, show
+    from reflowshock.workflow.convergence.command import read_wish, show
 
     wish = replace(read_wish(case, settings or [], tolerance, budget), oversubscribe=oversubscribe, force=force)
     try:
@@ -158,7 +158,7 @@ def accuracy(
 @app.command()
 def status(case: CasePath, settings: Settings = None, out: Out = None) -> None:
     """Show what a run folder holds: stages done, stale, damaged or missing, their times and main figures."""
-    from workflow.pipeline.status import show_status
+    from reflowshock.workflow.pipeline.status import show_status
 
     show_status(*_load(case, settings, out, True, True), console)
 
@@ -166,9 +166,9 @@ def status(case: CasePath, settings: Settings = None, out: Out = None) -> None:
 @app.command()
 def report(case: CasePath, settings: Settings = None, out: Out = None) -> None:
     """Write the report again, from the products that are there and the values that they were made with."""
-    from workflow.pipeline.run import report_again
-    from workflow.report.page import write_report
-    from workflow.stages import report as stage_function
+    from reflowshock.workflow.pipeline.run import report_again
+    from reflowshock.workflow.report.page import write_report
+    from reflowshock.workflow.stages import report as stage_function
 
     store, point = _load(case, settings, out, True, True)
     if read_mark(store.folder) is None:
@@ -182,7 +182,7 @@ def report(case: CasePath, settings: Settings = None, out: Out = None) -> None:
 @app.command()
 def verify(case: CasePath, settings: Settings = None, out: Out = None) -> None:
     """Look at every file of a run folder: are all products there, and as they were written?"""
-    from workflow.pipeline.run import verify as verify_run
+    from reflowshock.workflow.pipeline.run import verify as verify_run
 
     raise typer.Exit(0 if verify_run(*_load(case, settings, out, True, True)) else 1)
 
@@ -198,7 +198,7 @@ def clean(
     force: Force = False,
 ) -> None:
     """Remove what the program has written into a case's run folder."""
-    from workflow.pipeline.run import clean as clean_run
+    from reflowshock.workflow.pipeline.run import clean as clean_run
 
     store, point = _load(case, settings, out, True, True)
     clean_run(store.folder, point.case.case.name, unused=unused, force=force)
@@ -220,8 +220,8 @@ def stress_test(
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="results")] = Path("runs/stress-test"),
 ) -> None:
     """Try the hard cases, and random ones: does each survive within its bounds?"""
-    from workflow.stress_test.command import RANDOM_COUNT, Request
-    from workflow.stress_test.command import stress_test as try_cases
+    from reflowshock.workflow.stress_test.command import RANDOM_COUNT, Request
+    from reflowshock.workflow.stress_test.command import stress_test as try_cases
 
     count = random if random is not None else 0 if cases else RANDOM_COUNT
     request = Request(cases or [], family or [], count, seed, cores or available_cores(), out)
@@ -239,7 +239,7 @@ def effects(
     settings: Settings = None,
 ) -> None:
     """Show the effects of the program, or those of a case: on or off and why, expected influence, share of the cost."""
-    from workflow.effects.page import show_effects, show_registry
+    from reflowshock.workflow.effects.page import show_effects, show_registry
 
     if case is None:
         show_registry(console)
@@ -262,9 +262,9 @@ def study(
     yes: Yes = False,
 ) -> None:
     """Run a case at many settings; only what is missing. Results as tables, plots and a page."""
-    from workflow.pipeline.gate import ask_if_long
-    from workflow.store.batch import machine_of
-    from workflow.study.command import predicted_study_seconds, read_points_of, run_study, show_outlook
+    from reflowshock.workflow.pipeline.gate import ask_if_long
+    from reflowshock.workflow.store.batch import machine_of
+    from reflowshock.workflow.study.command import predicted_study_seconds, read_points_of, run_study, show_outlook
 
     points = read_points_of(study, oversubscribe or executor != ExecutorName.LOCAL, force)
     store = Store(out or Path("runs") / points.study.about.name)
@@ -288,7 +288,7 @@ def study(
 @app.command()
 def schema() -> None:
     """Print the JSON schema of a case file."""
-    from workflow.pipeline.schema import case_schema
+    from reflowshock.workflow.pipeline.schema import case_schema
 
     print(json.dumps(case_schema(), indent=2))
 
@@ -302,8 +302,8 @@ def stage(
     mark: Annotated[Path | None, typer.Option(help="file that says to Snakemake that it is done")] = None,
 ) -> None:
     """Make one product, in the store that is the working directory; Snakemake calls this."""
-    from workflow.pipeline.stage_runner import Run, execute
-    from workflow.stages import STAGE_FUNCTIONS
+    from reflowshock.workflow.pipeline.stage_runner import Run, execute
+    from reflowshock.workflow.stages import STAGE_FUNCTIONS
 
     product, folder = Path("products", f"{name}-{key}"), Path("work", f"{name}-{key}")
     run = Run(folder, read_case_of_run(folder), cores, oversubscribe)

@@ -5,24 +5,24 @@ from collections.abc import Mapping
 from rich.console import Console
 from rich.table import Table
 
-from workflow.board_drop.case import BoardDropCase, PackageCase
-from workflow.board_drop.forecast import Forecast, forecast
-from workflow.board_drop.shock_forecast import ShockForecast
-from workflow.case.fields import display, leaves
-from workflow.case.kind import FULL, Case
-from workflow.effects.page import effects_table
-from workflow.pipeline.reader import available_cores
-from workflow.pipeline.stage_forecast import stage_seconds
-from workflow.process.plan_table import duration, new_table, short
-from workflow.process.terminal import styled
-from workflow.solder.forecast import SceneForecast, forecast_scene
-from workflow.store.keys import Change
-from workflow.store.point import Point
-from workflow.store.state import Verdict, examine, why_stale
-from workflow.store.store import Store
-from workflow.structure import plan as structure_plan
-from workflow.structure.case import StructureCase
-from workflow.structure.forecast import StructureForecast, forecast_structure
+from reflowshock.workflow.board_drop.case import BoardDropCase, PackageCase
+from reflowshock.workflow.board_drop.forecast import Forecast, forecast
+from reflowshock.workflow.board_drop.shock_forecast import ShockForecast
+from reflowshock.workflow.case.fields import display, leaves
+from reflowshock.workflow.case.kind import FULL, Case
+from reflowshock.workflow.effects.page import effects_table
+from reflowshock.workflow.pipeline.reader import available_cores
+from reflowshock.workflow.pipeline.stage_forecast import stage_seconds
+from reflowshock.workflow.process.plan_table import duration, new_table, short
+from reflowshock.workflow.process.terminal import styled
+from reflowshock.workflow.solder.forecast import SceneForecast, forecast_scene
+from reflowshock.workflow.store.keys import Change
+from reflowshock.workflow.store.point import Point
+from reflowshock.workflow.store.state import Verdict, examine, why_stale
+from reflowshock.workflow.store.store import Store
+from reflowshock.workflow.structure import plan as structure_plan
+from reflowshock.workflow.structure.case import StructureCase
+from reflowshock.workflow.structure.forecast import StructureForecast, forecast_structure
 
 LONGEST_LIST = 4
 REFLOW_SPEED = "Costs assume the reflow speed in particles/parameters/estimate.py, as benchmarks/ measured it."
@@ -115,7 +115,7 @@ def reason(verdict: Verdict, case: Case) -> str:
 
 def predicted_seconds(store: Store, point: Point, until: str) -> float:
     """Predict the wall time [s] of all that has to be made up to a stage, corrected by what accuracy measured here."""
-    from workflow.convergence.calibration import calibration_of
+    from reflowshock.workflow.convergence.calibration import calibration_of
 
     known, seconds = calibration_of(point.case), stage_seconds(point.case)
     verdicts = examine(store, point)
@@ -126,7 +126,7 @@ def predicted_seconds(store: Store, point: Point, until: str) -> float:
 
 def foreseen_costs(case: Case, seconds: Mapping[str, float]) -> dict[str, str]:
     """Write the predicted wall time of stages; corrected by what the command accuracy measured here."""
-    from workflow.convergence.calibration import calibration_of
+    from reflowshock.workflow.convergence.calibration import calibration_of
 
     known, texts = calibration_of(case), {}
     for stage, foreseen in seconds.items():

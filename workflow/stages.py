@@ -11,22 +11,22 @@ Packages are imported inside the functions, so that a stage loads only what it u
 from dataclasses import replace
 from pathlib import Path
 
-from workflow.board_drop import findings, identical_joints
-from workflow.board_drop.case import BoardDropCase, PackageCase
-from workflow.pipeline.stage_runner import Findings, Run, StageFunction
-from workflow.process.products import read_json, write_json
-from workflow.reflow.stage import reflow
-from workflow.solder.stages import REFLOW_SCENES
-from workflow.structure.case import StructureCase
-from workflow.structure.stages import STRUCTURE_STAGES
+from reflowshock.workflow.board_drop import findings, identical_joints
+from reflowshock.workflow.board_drop.case import BoardDropCase, PackageCase
+from reflowshock.workflow.pipeline.stage_runner import Findings, Run, StageFunction
+from reflowshock.workflow.process.products import read_json, write_json
+from reflowshock.workflow.reflow.stage import reflow
+from reflowshock.workflow.solder.stages import REFLOW_SCENES
+from reflowshock.workflow.structure.case import StructureCase
+from reflowshock.workflow.structure.stages import STRUCTURE_STAGES
 
 
 def geometry(run: Run[PackageCase], folder: Path) -> Findings:
     """Mesh board and package, both flat; tabulate the pads."""
-    from meshing.board.assembly import write_assembly
-    from meshing.board.pads import pad_table, write_pads
-    from meshing.board.parameters import Warpage
-    from meshing.core.preview import write_preview
+    from reflowshock.meshing.board.assembly import write_assembly
+    from reflowshock.meshing.board.pads import pad_table, write_pads
+    from reflowshock.meshing.board.parameters import Warpage
+    from reflowshock.meshing.core.preview import write_preview
 
     case = run.case
     pads = pad_table(case.package, case.board, Warpage())
@@ -38,7 +38,7 @@ def geometry(run: Run[PackageCase], folder: Path) -> Findings:
 
 def surface(run: Run[PackageCase], folder: Path) -> Findings:
     """Close the surface of each joint, or take the one that the user gives, and measure it."""
-    from workflow.board_drop.joint_surfaces import write_surfaces
+    from reflowshock.workflow.board_drop.joint_surfaces import write_surfaces
 
     surfaces = write_surfaces(run, folder)
     write_json(folder / "surfaces.json", surfaces)
@@ -47,8 +47,8 @@ def surface(run: Run[PackageCase], folder: Path) -> Findings:
 
 def solder_mesh(run: Run[PackageCase], folder: Path) -> Findings:
     """Put the package where the solder froze and mesh every joint in its place; once more if all were alike."""
-    from workflow.board_drop.fine_joints import coarse_joints_effect
-    from workflow.board_drop.joint_meshes import mesh_identical_joints, mesh_real_joints
+    from reflowshock.workflow.board_drop.fine_joints import coarse_joints_effect
+    from reflowshock.workflow.board_drop.joint_meshes import mesh_identical_joints, mesh_real_joints
 
     case, qualities = run.case, mesh_real_joints(run, folder)
     if not isinstance(case, BoardDropCase):
@@ -61,10 +61,10 @@ def solder_mesh(run: Run[PackageCase], folder: Path) -> Findings:
 
 def shock(run: Run[BoardDropCase], folder: Path) -> Findings:
     """Drop the board: each mode is one MPI run of the package fem; two modes are compared, and identical joints."""
-    from workflow.board_drop.reflow_pool import refuse_joints_without_mesh
-    from workflow.board_drop.shock_cooling import with_cooling
-    from workflow.board_drop.shock_effects import with_influence
-    from workflow.board_drop.shock_launch import find_fine_joints, read_results, run_mode
+    from reflowshock.workflow.board_drop.reflow_pool import refuse_joints_without_mesh
+    from reflowshock.workflow.board_drop.shock_cooling import with_cooling
+    from reflowshock.workflow.board_drop.shock_effects import with_influence
+    from reflowshock.workflow.board_drop.shock_launch import find_fine_joints, read_results, run_mode
 
     joints = read_json(run.folder / "reflow/joints.json")
     refuse_joints_without_mesh({name: joints[name] for name in joints if name not in run.case.package.surfaces})
@@ -83,7 +83,7 @@ def shock(run: Run[BoardDropCase], folder: Path) -> Findings:
 
 def report(run: Run, folder: Path) -> Findings:
     """Write report.html and summary.json from the products."""
-    from workflow.report.page import write_report
+    from reflowshock.workflow.report.page import write_report
 
     write_report(run.folder, run.case, folder)
     return Findings()

@@ -7,21 +7,21 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import brentq
 
-from fem.mesh.mesh_file import read_mesh
-from fem.problem.inputs import RunInput
-from fem.problem.parameters import Ranks
-from meshing.board.assembly import write_assembly
-from meshing.board.displaced_assembly import write_displaced_assembly
-from meshing.board.displacement import prescribed
-from meshing.board.package_side import PackageSide
-from meshing.board.pads import PadSite, pad_table
-from meshing.joint.joints_file import write_joints
-from meshing.joint.solder_mesh import JointMesh, mesh_coarse_joint, mesh_joint
-from meshing.surface.closed_surface import ClosedSurface
-from meshing.trials.surfaces import barrel
+from reflowshock.fem.mesh.mesh_file import read_mesh
+from reflowshock.fem.problem.inputs import RunInput
+from reflowshock.fem.problem.parameters import Ranks
+from reflowshock.meshing.board.assembly import write_assembly
+from reflowshock.meshing.board.displaced_assembly import write_displaced_assembly
+from reflowshock.meshing.board.displacement import prescribed
+from reflowshock.meshing.board.package_side import PackageSide
+from reflowshock.meshing.board.pads import PadSite, pad_table
+from reflowshock.meshing.joint.joints_file import write_joints
+from reflowshock.meshing.joint.solder_mesh import JointMesh, mesh_coarse_joint, mesh_joint
+from reflowshock.meshing.surface.closed_surface import ClosedSurface
+from reflowshock.meshing.trials.surfaces import barrel
+from reflowshock.workflow.board_drop.case import BoardDropCase
+from reflowshock.workflow.pipeline.reader import read_case
 from tests.support.fem_models import write_msh
-from workflow.board_drop.case import BoardDropCase
-from workflow.pipeline.reader import read_case
 
 CASE = Path(__file__).parents[2] / "cases" / "bga_drop" / "case.toml"
 HEIGHTS = np.linspace(0.0, 1.0, 25)  # of the sections between which a barrel is a cone

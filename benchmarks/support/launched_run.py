@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from fem.problem.inputs import RunInput
+from reflowshock.fem.problem.inputs import RunInput
 from tests.support.fem_program import run_program
 
 COMPARED = ("board_centre", "die_centre", "von_mises_board", "von_mises_package", "board_strain")

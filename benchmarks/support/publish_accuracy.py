@@ -11,8 +11,8 @@ import subprocess
 import sys
 from pathlib import Path
 
-from workflow.convergence.measured import FILE, read_accuracy
-from workflow.convergence.page import PICTURE, markdown
+from reflowshock.workflow.convergence.measured import FILE, read_accuracy
+from reflowshock.workflow.convergence.page import PICTURE, markdown
 
 ROOT = Path(__file__).resolve().parents[2]
 BEGIN, END = "<!-- accuracy: written by benchmarks/support/publish_accuracy.py -->", "<!-- accuracy: end -->"
@@ -36,7 +36,15 @@ def main() -> None:
     given = parser.parse_args()
     folder = Path("runs") / f"{given.case}-accuracy"
     if not given.stored:
-        command = [sys.executable, "-m", "workflow", "accuracy", f"cases/{given.case}/case.toml", "--out", str(folder)]
+        command = [
+            sys.executable,
+            "-m",
+            "reflowshock",
+            "accuracy",
+            f"cases/{given.case}/case.toml",
+            "--out",
+            str(folder),
+        ]
         subprocess.run([*command, *given.options], cwd=ROOT, check=True)
     publish(ROOT / folder, ROOT / "cases" / given.case)
 

@@ -5,14 +5,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fem.coupling.scheme import Scheme
-from fem.coupling.self_check import SelfCheck, self_check
-from fem.dynamics.participant import Participant
-from fem.estimates.estimate import WindowPlan
-from fem.loads.load import Load
-from fem.model.body import Body
-from fem.parallel.communicators import Communicators, Role
-from fem.parallel.exchange import CutChannels, MessageClock
+from reflowshock.fem.coupling.scheme import Scheme
+from reflowshock.fem.coupling.self_check import SelfCheck, self_check
+from reflowshock.fem.dynamics.participant import Participant
+from reflowshock.fem.estimates.estimate import WindowPlan
+from reflowshock.fem.loads.load import Load
+from reflowshock.fem.model.body import Body
+from reflowshock.fem.parallel.communicators import Communicators, Role
+from reflowshock.fem.parallel.exchange import CutChannels, MessageClock
 
 
 class Crew(NamedTuple):

@@ -22,16 +22,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.coupling.held_velocity import Answered, local_cut
-from fem.dynamics.central_difference import Motion
-from fem.dynamics.participant import Continued, uncut_motion
-from fem.estimates.estimate import WindowPlan
-from fem.kernels.coupling import link_velocities
-from fem.loads.load import Load
-from fem.model.body import Body
-from fem.parallel.communicators import Role
-from fem.parallel.exchange import CutChannels
-from fem.parallel.portable import Rows, State
+from reflowshock.fem.coupling.held_velocity import Answered, local_cut
+from reflowshock.fem.dynamics.central_difference import Motion
+from reflowshock.fem.dynamics.participant import Continued, uncut_motion
+from reflowshock.fem.estimates.estimate import WindowPlan
+from reflowshock.fem.kernels.coupling import link_velocities
+from reflowshock.fem.loads.load import Load
+from reflowshock.fem.model.body import Body
+from reflowshock.fem.parallel.communicators import Role
+from reflowshock.fem.parallel.exchange import CutChannels
+from reflowshock.fem.parallel.portable import Rows, State
 
 
 class GravouilCombescure:

@@ -12,15 +12,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.dynamics.central_difference import Motion
-from fem.dynamics.participant import Continued
-from fem.estimates.estimate import WindowPlan
-from fem.kernels.motion import add_impulse, add_rows
-from fem.loads.load import Load
-from fem.model.body import Body
-from fem.parallel.communicators import Role
-from fem.parallel.exchange import CutChannels
-from fem.parallel.portable import Rows, State
+from reflowshock.fem.dynamics.central_difference import Motion
+from reflowshock.fem.dynamics.participant import Continued
+from reflowshock.fem.estimates.estimate import WindowPlan
+from reflowshock.fem.kernels.motion import add_impulse, add_rows
+from reflowshock.fem.loads.load import Load
+from reflowshock.fem.model.body import Body
+from reflowshock.fem.parallel.communicators import Role
+from reflowshock.fem.parallel.exchange import CutChannels
+from reflowshock.fem.parallel.portable import Rows, State
 
 
 class HeldVelocity:

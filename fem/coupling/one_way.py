@@ -11,13 +11,13 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.coupling.held_velocity import Driven
-from fem.dynamics.participant import Alone, uncut_motion
-from fem.estimates.estimate import WindowPlan
-from fem.loads.load import Kept, Load
-from fem.model.body import Body
-from fem.parallel.communicators import Role
-from fem.parallel.exchange import CutChannels
+from reflowshock.fem.coupling.held_velocity import Driven
+from reflowshock.fem.dynamics.participant import Alone, uncut_motion
+from reflowshock.fem.estimates.estimate import WindowPlan
+from reflowshock.fem.loads.load import Kept, Load
+from reflowshock.fem.model.body import Body
+from reflowshock.fem.parallel.communicators import Role
+from reflowshock.fem.parallel.exchange import CutChannels
 
 
 class OneWay:

@@ -10,11 +10,21 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from fem.coupling.speeds import FAMILIES, Kind, StepCost, families, measured_costs, measured_latency, samples, speeds_of
-from fem.division.division import SchemeName
-from fem.division.tables import Tables
-from fem.division.whole import Treatment
-from fem.estimates.placement import (
+from reflowshock.data_file import write_at_once
+from reflowshock.fem.coupling.speeds import (
+    FAMILIES,
+    Kind,
+    StepCost,
+    families,
+    measured_costs,
+    measured_latency,
+    samples,
+    speeds_of,
+)
+from reflowshock.fem.division.division import SchemeName
+from reflowshock.fem.division.tables import Tables
+from reflowshock.fem.division.whole import Treatment
+from reflowshock.fem.estimates.placement import (
     Alternative,
     ModelCost,
     Placement,
@@ -24,17 +34,16 @@ from fem.estimates.placement import (
     model_seconds,
     shared,
 )
-from fem.materials.elasticity import materials_of_parts
-from fem.materials.parameters import Material
-from fem.materials.roles import Materials
-from fem.mesh.mesh import MeshData
-from fem.parallel.checkpoint_files import warn
-from fem.parallel.data_file import write_at_once
-from fem.parallel.partition import partition
-from fem.problem.parameters import Ranks
+from reflowshock.fem.materials.elasticity import materials_of_parts
+from reflowshock.fem.materials.parameters import Material
+from reflowshock.fem.materials.roles import Materials
+from reflowshock.fem.mesh.mesh import MeshData
+from reflowshock.fem.parallel.checkpoint_files import warn
+from reflowshock.fem.parallel.partition import partition
+from reflowshock.fem.problem.parameters import Ranks
 
 if TYPE_CHECKING:
-    from fem.setup.shock_models import Divided
+    from reflowshock.fem.setup.shock_models import Divided
 
 CALLS = 2.5e-5  # [s] of the interpreter in a step of a motion
 KEPT = "speeds.json"

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.errors import RecordingError
-from fem.parallel.exchange import CutChannels, MessageClock, Messages
+from reflowshock.fem.errors import RecordingError
+from reflowshock.fem.parallel.exchange import CutChannels, MessageClock, Messages
 
 CHANNELS, WAYS = ("velocities", "forces"), ("sent", "received")
 

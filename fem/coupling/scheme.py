@@ -3,17 +3,17 @@
 from dataclasses import replace
 from typing import Literal, Protocol
 
-from fem.coupling.gravouil_combescure import GravouilCombescure
-from fem.coupling.held_velocity import HeldVelocity
-from fem.coupling.impulse import Impulse
-from fem.coupling.one_way import OneWay
-from fem.division.division import SchemeName
-from fem.dynamics.participant import Participant
-from fem.estimates.estimate import WindowPlan
-from fem.loads.load import Load
-from fem.model.body import Body
-from fem.parallel.communicators import Role
-from fem.parallel.exchange import CutChannels
+from reflowshock.fem.coupling.gravouil_combescure import GravouilCombescure
+from reflowshock.fem.coupling.held_velocity import HeldVelocity
+from reflowshock.fem.coupling.impulse import Impulse
+from reflowshock.fem.coupling.one_way import OneWay
+from reflowshock.fem.division.division import SchemeName
+from reflowshock.fem.dynamics.participant import Participant
+from reflowshock.fem.estimates.estimate import WindowPlan
+from reflowshock.fem.loads.load import Load
+from reflowshock.fem.model.body import Body
+from reflowshock.fem.parallel.communicators import Role
+from reflowshock.fem.parallel.exchange import CutChannels
 
 Direction = Literal["two_way", "one_way"]
 

@@ -9,8 +9,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.estimates.estimate import WindowPlan
-from fem.parallel.exchange import CutChannels
+from reflowshock.fem.estimates.estimate import WindowPlan
+from reflowshock.fem.parallel.exchange import CutChannels
 
 # Velocity of the cut [m/s] from time [s] and points (nc, 3) [m]; force on it [N] from time, displacement and velocity.
 VelocityScript = Callable[[float, NDArray[np.float64]], NDArray[np.float64]]

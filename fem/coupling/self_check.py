@@ -8,11 +8,11 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from fem.errors import AgreedError
-from fem.estimates.placement import Role
-from fem.mesh.tie import EXACT, net_load
-from fem.model.body import MASS_TOLERANCE, Body
-from fem.parallel.exchange import CutChannels
+from reflowshock.fem.errors import AgreedError
+from reflowshock.fem.estimates.placement import Role
+from reflowshock.fem.mesh.tie import EXACT, net_load
+from reflowshock.fem.model.body import MASS_TOLERANCE, Body
+from reflowshock.fem.parallel.exchange import CutChannels
 
 RIGID = np.array([[0.0, -0.7, 0.4], [0.7, 0.0, -0.9], [-0.4, 0.9, 0.0]])
 LINEAR = np.array([[0.3, -1.0, 0.5], [1.0, 0.2, -0.7], [-0.4, 0.6, 1.0]])

@@ -13,12 +13,12 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from fem.elements.mesh_elements import elements_of
-from fem.forces.force import ForceTerm, Kinematics, force_terms
-from fem.forces.force_congruent import is_box
-from fem.kernels.motion import advance
-from fem.materials.parameters import Material
-from fem.mesh.mesh import MeshData, without_unused_nodes
+from reflowshock.fem.elements.mesh_elements import elements_of
+from reflowshock.fem.forces.force import ForceTerm, Kinematics, force_terms
+from reflowshock.fem.forces.force_congruent import is_box
+from reflowshock.fem.kernels.motion import advance
+from reflowshock.fem.materials.parameters import Material
+from reflowshock.fem.mesh.mesh import MeshData, without_unused_nodes
 
 FAMILIES = ("box", "assembled", "path")
 LARGE, SMALL = 8192, 128  # elements of a sample; the large one is no larger than a rank's share

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from fem.estimates.placement import Role
-from fem.parallel.exchange import MessageClock
+from reflowshock.fem.estimates.placement import Role
+from reflowshock.fem.parallel.exchange import MessageClock
 
 
 class Stopwatch:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.errors import LevelError
+from reflowshock.fem.errors import LevelError
 
 LARGEST_DAMPING, ROUNDING = 0.03, 1e-9
 FIRST, GROWTH = 0.15, 2.5  # nu of the outermost level; each inner one must stay below what the level around it bears

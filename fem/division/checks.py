@@ -5,15 +5,15 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.division.buffer import grown, touching
-from fem.division.chebyshev import LARGEST_DAMPING
-from fem.division.choose_levels import Pace, least_steps
-from fem.division.divide import cut_nodes, seeds_of
-from fem.division.division import BUFFERED, Division
-from fem.division.rules import Rules
-from fem.division.whole import Survey, Whole
-from fem.errors import CutError, PulseError
-from fem.estimates.estimate import damped_critical_step
+from reflowshock.fem.division.buffer import grown, touching
+from reflowshock.fem.division.chebyshev import LARGEST_DAMPING
+from reflowshock.fem.division.choose_levels import Pace, least_steps
+from reflowshock.fem.division.divide import cut_nodes, seeds_of
+from reflowshock.fem.division.division import BUFFERED, Division
+from reflowshock.fem.division.rules import Rules
+from reflowshock.fem.division.whole import Survey, Whole
+from reflowshock.fem.errors import CutError, PulseError
+from reflowshock.fem.estimates.estimate import damped_critical_step
 
 ROUNDING = 1e-9
 

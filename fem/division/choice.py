@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from fem.division.division import SchemeName
+from reflowshock.fem.division.division import SchemeName
 
 
 @dataclass(frozen=True, slots=True)

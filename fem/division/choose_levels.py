@@ -8,9 +8,9 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.division.chebyshev import Substeps
-from fem.errors import LevelError
-from fem.mesh.tie import Tie
+from reflowshock.fem.division.chebyshev import Substeps
+from reflowshock.fem.errors import LevelError
+from reflowshock.fem.mesh.tie import Tie
 
 SUBSTEP_COST = 500.0  # updates of boxes in the time of one substep without elements: kernel calls, messages
 LARGEST_RATIO = 64

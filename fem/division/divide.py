@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.division.buffer import grown, nodes_of, touching
-from fem.division.chebyshev import LARGEST_DAMPING
-from fem.division.choice import Choice, choose_scheme
-from fem.division.divide_levels import by_levels
-from fem.division.division import Division, SchemeName
-from fem.division.rules import Rules
-from fem.division.whole import Survey, Whole
-from fem.estimates.estimate import damped_critical_step
+from reflowshock.fem.division.buffer import grown, nodes_of, touching
+from reflowshock.fem.division.chebyshev import LARGEST_DAMPING
+from reflowshock.fem.division.choice import Choice, choose_scheme
+from reflowshock.fem.division.divide_levels import by_levels
+from reflowshock.fem.division.division import Division, SchemeName
+from reflowshock.fem.division.rules import Rules
+from reflowshock.fem.division.whole import Survey, Whole
+from reflowshock.fem.estimates.estimate import damped_critical_step
 
 
 def divide(whole: Whole, survey: Survey, rules: Rules) -> Division:

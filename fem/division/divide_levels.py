@@ -7,12 +7,17 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.division.choose_levels import SUBSTEP_COST, Pace, choose_levels
-from fem.division.division import Division
-from fem.division.rules import Rules
-from fem.division.whole import Survey, Whole
-from fem.errors import LevelError
-from fem.estimates.estimate import BOARD_ADVANTAGE, UPDATES_PER_SECOND, WINDOW_OVERHEAD, damped_critical_step
+from reflowshock.fem.division.choose_levels import SUBSTEP_COST, Pace, choose_levels
+from reflowshock.fem.division.division import Division
+from reflowshock.fem.division.rules import Rules
+from reflowshock.fem.division.whole import Survey, Whole
+from reflowshock.fem.errors import LevelError
+from reflowshock.fem.estimates.estimate import (
+    BOARD_ADVANTAGE,
+    UPDATES_PER_SECOND,
+    WINDOW_OVERHEAD,
+    damped_critical_step,
+)
 
 # Of the coarse cells, those that may need less than the window: none, a few at the walls of holes, the finer half.
 EXCEPTIONS = (0.0, 0.02, 0.5)

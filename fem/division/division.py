@@ -6,7 +6,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.estimates.estimate import WindowPlan
+from reflowshock.fem.estimates.estimate import WindowPlan
 
 SchemeName = Literal["held_velocity", "local_steps", "impulse", "gravouil_combescure"]
 BUFFERED: tuple[SchemeName, ...] = ("held_velocity", "impulse")  # schemes whose cut lies below layers of board

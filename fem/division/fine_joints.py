@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.errors import MeshError
-from fem.mesh.mesh import MeshData, append, select
-from fem.mesh.mesh_file import read_mesh, read_meshes
-from fem.mesh.watch_table import joint_names
-from fem.names import nearest
-from fem.problem.inputs import SceneInput
+from reflowshock.fem.errors import MeshError
+from reflowshock.fem.mesh.mesh import MeshData, append, select
+from reflowshock.fem.mesh.mesh_file import read_mesh, read_meshes
+from reflowshock.fem.mesh.watch_table import joint_names
+from reflowshock.fem.names import nearest
+from reflowshock.fem.problem.inputs import SceneInput
 
 COPY = "_coarse@"
 KEY = "shock.coupling.fine_joints"

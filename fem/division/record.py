@@ -4,8 +4,8 @@ from typing import Any
 
 import numpy as np
 
-from fem.division.division import Division
-from fem.division.whole import Survey
+from reflowshock.fem.division.division import Division
+from reflowshock.fem.division.whole import Survey
 
 
 def coupling_record(division: Division, survey: Survey, cut_nodes: int) -> dict[str, Any]:

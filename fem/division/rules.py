@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.estimates.estimate import WindowPlan, window_plan
-from fem.problem.parameters import Coupling
+from reflowshock.fem.estimates.estimate import WindowPlan, window_plan
+from reflowshock.fem.problem.parameters import Coupling
 
 
 @dataclass(frozen=True, slots=True)

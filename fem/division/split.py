@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.division.whole import Whole
-from fem.mesh.mesh import MeshData, selected_cells
-from fem.mesh.tie import Tie
+from reflowshock.fem.division.whole import Whole
+from reflowshock.fem.mesh.mesh import MeshData, selected_cells
+from reflowshock.fem.mesh.tie import Tie
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,15 +5,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.division.tables import Tables
-from fem.division.whole import Whole
-from fem.errors import LoadError, MeshError
-from fem.estimates.material_effects import plastic_laws
-from fem.mesh.facet_areas import OutwardFacets, facet_set, outward_areas, outward_facets
-from fem.mesh.mesh import MeshData
-from fem.mesh.tie import tie_joints
-from fem.output.watch_points import PointTable, point_table
-from fem.problem.structure import AXES, InputG, PrescribedMotion, Pressure, StructureScene
+from reflowshock.fem.division.tables import Tables
+from reflowshock.fem.division.whole import Whole
+from reflowshock.fem.errors import LoadError, MeshError
+from reflowshock.fem.estimates.material_effects import plastic_laws
+from reflowshock.fem.mesh.facet_areas import OutwardFacets, facet_set, outward_areas, outward_facets
+from reflowshock.fem.mesh.mesh import MeshData
+from reflowshock.fem.mesh.tie import tie_joints
+from reflowshock.fem.output.watch_points import PointTable, point_table
+from reflowshock.fem.problem.structure import AXES, InputG, PrescribedMotion, Pressure, StructureScene
 
 NODES = {"hexahedron": 8, "tetrahedron": 4, "tetrahedron_quadratic": 10}
 

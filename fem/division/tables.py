@@ -7,16 +7,16 @@ from typing import Any, Generic, Literal, Self, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.division.division import Division
-from fem.division.split import Part, cut_between, part_of
-from fem.division.whole import Whole
-from fem.estimates.placement import Role
-from fem.mesh.coupling_interface import find_cut
-from fem.mesh.interface_table import InterfaceTable, whole_interface
-from fem.mesh.mesh import MeshData, merge_nodes
-from fem.mesh.supports import HELD, held_components
-from fem.mesh.tie import Tie, tie_joints
-from fem.mesh.watch_table import WatchTable, whole_watch
+from reflowshock.fem.division.division import Division
+from reflowshock.fem.division.split import Part, cut_between, part_of
+from reflowshock.fem.division.whole import Whole
+from reflowshock.fem.estimates.placement import Role
+from reflowshock.fem.mesh.coupling_interface import find_cut
+from reflowshock.fem.mesh.interface_table import InterfaceTable, whole_interface
+from reflowshock.fem.mesh.mesh import MeshData, merge_nodes
+from reflowshock.fem.mesh.supports import HELD, held_components
+from reflowshock.fem.mesh.tie import Tie, tie_joints
+from reflowshock.fem.mesh.watch_table import WatchTable, whole_watch
 
 
 @dataclass(frozen=True, slots=True)

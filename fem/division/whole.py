@@ -6,19 +6,19 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.elements.element import critical_steps, element_geometry
-from fem.elements.hexahedron import HEXAHEDRON
-from fem.elements.mesh_elements import elements_of
-from fem.errors import StepError
-from fem.estimates.estimate import BOARD_ADVANTAGE, UPDATES_PER_SECOND
-from fem.estimates.solver_cost import NONLINEAR_RATE
-from fem.forces.force import Kinematics
-from fem.forces.force_congruent import is_box
-from fem.materials.elasticity import materials_of_parts
-from fem.materials.parameters import Material
-from fem.materials.roles import Materials
-from fem.mesh.mesh import MeshData
-from fem.mesh.tie import Tie
+from reflowshock.fem.elements.element import critical_steps, element_geometry
+from reflowshock.fem.elements.hexahedron import HEXAHEDRON
+from reflowshock.fem.elements.mesh_elements import elements_of
+from reflowshock.fem.errors import StepError
+from reflowshock.fem.estimates.estimate import BOARD_ADVANTAGE, UPDATES_PER_SECOND
+from reflowshock.fem.estimates.solver_cost import NONLINEAR_RATE
+from reflowshock.fem.forces.force import Kinematics
+from reflowshock.fem.forces.force_congruent import is_box
+from reflowshock.fem.materials.elasticity import materials_of_parts
+from reflowshock.fem.materials.parameters import Material
+from reflowshock.fem.materials.roles import Materials
+from reflowshock.fem.mesh.mesh import MeshData
+from reflowshock.fem.mesh.tie import Tie
 
 
 @dataclass(frozen=True, slots=True)

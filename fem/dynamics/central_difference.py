@@ -6,12 +6,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.forces.force_nonlinear import NonlinearElements
-from fem.kernels.motion import advance
-from fem.loads.load import FineSupports, Load, Loaded
-from fem.model.body import Body
-from fem.model.step_levels import levels_of
-from fem.parallel.portable import Rows, Same, Shares, State, Sum
+from reflowshock.fem.forces.force_nonlinear import NonlinearElements
+from reflowshock.fem.kernels.motion import advance
+from reflowshock.fem.loads.load import FineSupports, Load, Loaded
+from reflowshock.fem.model.body import Body
+from reflowshock.fem.model.step_levels import levels_of
+from reflowshock.fem.parallel.portable import Rows, Same, Shares, State, Sum
 
 
 class Motion(Loaded):

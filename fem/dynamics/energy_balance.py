@@ -5,9 +5,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.dynamics.participant import Participant
-from fem.errors import EnergyError
-from fem.mesh.tie import net_load
+from reflowshock.fem.dynamics.participant import Participant
+from reflowshock.fem.errors import EnergyError
+from reflowshock.fem.mesh.tie import net_load
 
 ENERGIES = ("kinetic", "internal", "plastic", "hourglass", "damping", "external", "interface")
 SUMS = len(ENERGIES) + 1 + 16

@@ -8,13 +8,13 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from fem.dynamics.energy_balance import Ledger, ledger_sums
-from fem.dynamics.participant import Participant
-from fem.dynamics.watch import Watch
-from fem.parallel.communicators import Role
-from fem.parallel.data_file import columns, fields_of, rows
-from fem.parallel.portable import Log, Same, State
-from fem.parallel.whereabouts import HERE
+from reflowshock.data_file import columns, fields_of, rows
+from reflowshock.fem.dynamics.energy_balance import Ledger, ledger_sums
+from reflowshock.fem.dynamics.participant import Participant
+from reflowshock.fem.dynamics.watch import Watch
+from reflowshock.fem.parallel.communicators import Role
+from reflowshock.fem.parallel.portable import Log, Same, State
+from reflowshock.fem.parallel.whereabouts import HERE
 
 SIDE: dict[Role, float] = {"macro": 1.0, "meso": -1.0, "dns": 0.0, "structure": 0.0}
 Signal = Callable[[float], float]

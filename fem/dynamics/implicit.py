@@ -17,16 +17,16 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from fem.dynamics.central_difference import Motion
-from fem.forces.force_assembled import AssembledElements
-from fem.forces.force_congruent import CongruentElements
-from fem.loads.damping import RayleighDamping
-from fem.loads.load import Load, Loaded
-from fem.model.body import Body
-from fem.model.factorisation import Factorisation
-from fem.model.global_matrix import Equations
-from fem.parallel.agreement import agreed
-from fem.parallel.portable import Rows, Same, Shares, State, Sum
+from reflowshock.fem.dynamics.central_difference import Motion
+from reflowshock.fem.forces.force_assembled import AssembledElements
+from reflowshock.fem.forces.force_congruent import CongruentElements
+from reflowshock.fem.loads.damping import RayleighDamping
+from reflowshock.fem.loads.load import Load, Loaded
+from reflowshock.fem.model.body import Body
+from reflowshock.fem.model.factorisation import Factorisation
+from reflowshock.fem.model.global_matrix import Equations
+from reflowshock.fem.parallel.agreement import agreed
+from reflowshock.fem.parallel.portable import Rows, Same, Shares, State, Sum
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,9 +6,9 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.forces.energy import Energy
-from fem.model.body import Body
-from fem.parallel.portable import State
+from reflowshock.fem.forces.energy import Energy
+from reflowshock.fem.model.body import Body
+from reflowshock.fem.parallel.portable import State
 
 
 class Moving(Protocol):

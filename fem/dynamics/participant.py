@@ -11,12 +11,12 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.dynamics.central_difference import Motion
-from fem.dynamics.moving import Moving
-from fem.estimates.estimate import WindowPlan
-from fem.loads.load import Load
-from fem.model.body import Body
-from fem.parallel.portable import State, Sum
+from reflowshock.fem.dynamics.central_difference import Motion
+from reflowshock.fem.dynamics.moving import Moving
+from reflowshock.fem.estimates.estimate import WindowPlan
+from reflowshock.fem.loads.load import Load
+from reflowshock.fem.model.body import Body
+from reflowshock.fem.parallel.portable import State, Sum
 
 
 class Participant(Protocol):

@@ -5,7 +5,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.dynamics.moving import Moving
+from reflowshock.fem.dynamics.moving import Moving
 
 
 class Watch(Protocol):

@@ -5,11 +5,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.elements.hexahedron import HEXAHEDRON
-from fem.elements.kind import ElementKind, Geometry
-from fem.elements.one_point import ONE_POINT
-from fem.elements.tetrahedron import TETRAHEDRON, TETRAHEDRON_QUADRATIC
-from fem.errors import MeshError
+from reflowshock.fem.elements.hexahedron import HEXAHEDRON
+from reflowshock.fem.elements.kind import ElementKind, Geometry
+from reflowshock.fem.elements.one_point import ONE_POINT
+from reflowshock.fem.elements.tetrahedron import TETRAHEDRON, TETRAHEDRON_QUADRATIC
+from reflowshock.fem.errors import MeshError
 
 CHUNK = 2048  # elements whose matrices are in memory at a time (hexahedra: 9 MiB)
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.elements.kind import Geometry
-from fem.kernels import hexahedron as kernels_hexahedron
+from reflowshock.fem.elements.kind import Geometry
+from reflowshock.fem.kernels import hexahedron as kernels_hexahedron
 
 
 @dataclass(frozen=True, slots=True)

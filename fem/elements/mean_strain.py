@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.elements.element import CHUNK, Elements, classes, element_geometry
-from fem.elements.stress import mean_strain
+from reflowshock.fem.elements.element import CHUNK, Elements, classes, element_geometry
+from reflowshock.fem.elements.stress import mean_strain
 
 
 @dataclass(frozen=True, slots=True)

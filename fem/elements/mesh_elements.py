@@ -5,10 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.elements.element import Elements, element_kind
-from fem.elements.hexahedron import HEXAHEDRON
-from fem.materials.elasticity import elasticity_matrix
-from fem.materials.parameters import Material
+from reflowshock.fem.elements.element import Elements, element_kind
+from reflowshock.fem.elements.hexahedron import HEXAHEDRON
+from reflowshock.fem.materials.elasticity import elasticity_matrix
+from reflowshock.fem.materials.parameters import Material
 
 
 def elements_of(

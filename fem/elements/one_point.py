@@ -12,10 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.elements.hexahedron import HEXAHEDRON
-from fem.elements.kind import Geometry
-from fem.elements.strain import strain_matrix
-from fem.kernels.hexahedron import SIDES
+from reflowshock.fem.elements.hexahedron import HEXAHEDRON
+from reflowshock.fem.elements.kind import Geometry
+from reflowshock.fem.elements.strain import strain_matrix
+from reflowshock.fem.kernels.hexahedron import SIDES
 
 HOURGLASS = np.column_stack([SIDES[:, 1] * SIDES[:, 2], SIDES[:, 2] * SIDES[:, 0], SIDES[:, 0] * SIDES[:, 1]])
 HOURGLASS = np.column_stack([HOURGLASS, SIDES.prod(axis=1)]) / np.sqrt(8.0)

@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from math import log
 from typing import Any
 
-from fem.materials.parameters import Isotropic, JohnsonCook, Material
-from fem.problem.parameters import Failure
+from reflowshock.fem.materials.parameters import Isotropic, JohnsonCook, Material
+from reflowshock.fem.problem.parameters import Failure
 
 RATE_OF_DROPS = 100.0  # [1/s] of solder: cases/bga_drop finds up to 50
 

@@ -6,8 +6,8 @@ from typing import Literal
 
 import numpy as np
 
-from fem.errors import RankError
-from fem.problem.parameters import Ranks
+from reflowshock.fem.errors import RankError
+from reflowshock.fem.problem.parameters import Ranks
 
 Role = Literal["macro", "meso", "dns", "structure"]
 

@@ -4,10 +4,10 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
-from fem.estimates.estimate import largest_implicit_step
-from fem.estimates.factor_cost import box_factor
-from fem.estimates.material_effects import plastic_laws
-from fem.problem.structure import Dynamics, StructureScene
+from reflowshock.fem.estimates.estimate import largest_implicit_step
+from reflowshock.fem.estimates.factor_cost import box_factor
+from reflowshock.fem.estimates.material_effects import plastic_laws
+from reflowshock.fem.problem.structure import Dynamics, StructureScene
 
 # Measured by benchmarks/jedec_oracle.py on one core of an AMD EPYC (AVX-512), Debian 12: element updates per second of
 # whole explicit steps, linear and with plasticity or finite rotations; MUMPS 5.5 on the BLAS that Debian installs (an

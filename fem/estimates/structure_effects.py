@@ -3,9 +3,9 @@
 from collections.abc import Iterator
 from typing import Any
 
-from fem.estimates.material_effects import material_effects
-from fem.materials.kinematics import finite_rotation
-from fem.problem.structure import StructureScene
+from reflowshock.fem.estimates.material_effects import material_effects
+from reflowshock.fem.materials.kinematics import finite_rotation
+from reflowshock.fem.problem.structure import StructureScene
 
 
 def effects(scene: StructureScene, added_mass: float, neglected_strain: float | None = None) -> dict[str, Any]:

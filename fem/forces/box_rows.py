@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.kernels.box_rows import LONGEST
+from reflowshock.fem.kernels.box_rows import LONGEST
 
 SAME_PLANE = 1e-9  # of the model's extent
 

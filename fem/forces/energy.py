@@ -6,7 +6,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.elements.mean_strain import MeanStrain
+from reflowshock.fem.elements.mean_strain import MeanStrain
 
 
 @dataclass(frozen=True, slots=True)

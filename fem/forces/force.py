@@ -6,14 +6,14 @@ from typing import Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.elements.element import Elements
-from fem.forces.energy import Energy
-from fem.forces.force_assembled import AssembledElements
-from fem.forces.force_congruent import CongruentElements, in_rows
-from fem.forces.force_nonlinear import NonlinearElements
-from fem.kernels.nonlinear import Path
-from fem.kernels.plasticity import FIRST_YIELD, plastic_constants
-from fem.materials.parameters import Material
+from reflowshock.fem.elements.element import Elements
+from reflowshock.fem.forces.energy import Energy
+from reflowshock.fem.forces.force_assembled import AssembledElements
+from reflowshock.fem.forces.force_congruent import CongruentElements, in_rows
+from reflowshock.fem.forces.force_nonlinear import NonlinearElements
+from reflowshock.fem.kernels.nonlinear import Path
+from reflowshock.fem.kernels.plasticity import FIRST_YIELD, plastic_constants
+from reflowshock.fem.materials.parameters import Material
 
 Kinematics = Literal["small", "finite"]
 

@@ -6,10 +6,10 @@ import numpy as np
 import scipy.sparse
 from numpy.typing import NDArray
 
-from fem.elements.element import CHUNK, Elements, element_stiffness
-from fem.elements.mean_strain import MeanStrain
-from fem.forces.energy import Energy, linear_energy
-from fem.kernels.force import add_block_force, assemble_upper_blocks
+from reflowshock.fem.elements.element import CHUNK, Elements, element_stiffness
+from reflowshock.fem.elements.mean_strain import MeanStrain
+from reflowshock.fem.forces.energy import Energy, linear_energy
+from reflowshock.fem.kernels.force import add_block_force, assemble_upper_blocks
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,11 +11,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.elements.element import Elements, classes, element_stiffness
-from fem.elements.mean_strain import MeanStrain
-from fem.forces.box_rows import BoxRows
-from fem.forces.energy import Energy, linear_energy
-from fem.kernels.box_rows import PAD, add_row_forces, read_lines, subtract_lines
+from reflowshock.fem.elements.element import Elements, classes, element_stiffness
+from reflowshock.fem.elements.mean_strain import MeanStrain
+from reflowshock.fem.forces.box_rows import BoxRows
+from reflowshock.fem.forces.energy import Energy, linear_energy
+from reflowshock.fem.kernels.box_rows import PAD, add_row_forces, read_lines, subtract_lines
 
 SIGNS = np.array([[(-1.0) ** bin(p & a).count("1") for a in range(8)] for p in range(8)])
 UPPER = np.triu_indices(3)

@@ -11,16 +11,16 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.elements.element import Elements
-from fem.elements.hexahedron import HEXAHEDRON
-from fem.errors import InvertedElementError
-from fem.forces.energy import Energy
-from fem.forces.nonlinear_blocks import Lanes, arrange, gradient_blocks, hexahedron_blocks
-from fem.kernels.lanes import LANES
-from fem.kernels.nonlinear import Path
-from fem.kernels.nonlinear_gradient import FINE, Blocks, add_gradient_force
-from fem.kernels.nonlinear_hexahedron import HexahedronBlocks, add_hexahedron_force
-from fem.parallel.portable import Rows
+from reflowshock.fem.elements.element import Elements
+from reflowshock.fem.elements.hexahedron import HEXAHEDRON
+from reflowshock.fem.errors import InvertedElementError
+from reflowshock.fem.forces.energy import Energy
+from reflowshock.fem.forces.nonlinear_blocks import Lanes, arrange, gradient_blocks, hexahedron_blocks
+from reflowshock.fem.kernels.lanes import LANES
+from reflowshock.fem.kernels.nonlinear import Path
+from reflowshock.fem.kernels.nonlinear_gradient import FINE, Blocks, add_gradient_force
+from reflowshock.fem.kernels.nonlinear_hexahedron import HexahedronBlocks, add_hexahedron_force
+from reflowshock.fem.parallel.portable import Rows
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,14 +5,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.elements.element import Elements, classes
-from fem.elements.one_point import hourglass_control
-from fem.elements.tetrahedron import QUADRATIC_SHARE, TETRAHEDRON, Tetrahedron, quadratic_derivatives
-from fem.kernels.hexahedron import CENTRE_DERIVATIVES, GAUSS, GAUSS_DERIVATIVES
-from fem.kernels.lanes import LANES
-from fem.kernels.nonlinear import STATE_SLOTS, STRETCH
-from fem.kernels.nonlinear_gradient import Blocks
-from fem.kernels.nonlinear_hexahedron import HexahedronBlocks
+from reflowshock.fem.elements.element import Elements, classes
+from reflowshock.fem.elements.one_point import hourglass_control
+from reflowshock.fem.elements.tetrahedron import QUADRATIC_SHARE, TETRAHEDRON, Tetrahedron, quadratic_derivatives
+from reflowshock.fem.kernels.hexahedron import CENTRE_DERIVATIVES, GAUSS, GAUSS_DERIVATIVES
+from reflowshock.fem.kernels.lanes import LANES
+from reflowshock.fem.kernels.nonlinear import STATE_SLOTS, STRETCH
+from reflowshock.fem.kernels.nonlinear_gradient import Blocks
+from reflowshock.fem.kernels.nonlinear_hexahedron import HexahedronBlocks
 
 # Degree 2 (Hammer, Marlowe & Stroud 1956): exact for the stiffness of straight-edged 10-node tetrahedra.
 FOUR_POINTS = np.full((4, 4), (5.0 - np.sqrt(5.0)) / 20.0) + np.eye(4) / np.sqrt(5.0)

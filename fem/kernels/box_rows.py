@@ -16,7 +16,7 @@ compiled function would be counted as references at each call.
 import numpy as np
 from numba import njit
 
-from fem.kernels.hexahedron import FINITE
+from reflowshock.fem.kernels.hexahedron import FINITE
 
 LONGEST = 128  # boxes of a row: what a row works with stays in the fastest cache
 LANES = 8  # of a vector; loops run over whole vectors, and past the end of a line

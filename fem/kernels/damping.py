@@ -3,8 +3,8 @@
 import numpy as np
 from numba import njit
 
-from fem.kernels.hexahedron import FINITE
-from fem.kernels.motion import STRIP
+from reflowshock.fem.kernels.hexahedron import FINITE
+from reflowshock.fem.kernels.motion import STRIP
 
 
 @njit(cache=True, error_model="numpy")

@@ -3,7 +3,7 @@
 import numpy as np
 from numba import njit
 
-from fem.kernels.hexahedron import FINITE
+from reflowshock.fem.kernels.hexahedron import FINITE
 
 
 @njit(cache=True, fastmath=FINITE)

@@ -15,9 +15,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from fem.kernels.hexahedron import add_product, condense, new_strain_bench, write_strains
-from fem.kernels.nonlinear_gradient import carried
-from fem.kernels.plasticity import FIRST_YIELD, plastic_increment, yield_stress
+from reflowshock.fem.kernels.hexahedron import add_product, condense, new_strain_bench, write_strains
+from reflowshock.fem.kernels.nonlinear_gradient import carried
+from reflowshock.fem.kernels.plasticity import FIRST_YIELD, plastic_increment, yield_stress
 
 NODAL, ALL = 24, 33  # components of a hexahedron at its nodes, and with its incompatible modes
 MODE_ITERATIONS = 60

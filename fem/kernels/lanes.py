@@ -8,7 +8,7 @@ scalars, row by row.
 
 from numba import njit
 
-from fem.kernels.hexahedron import FINITE
+from reflowshock.fem.kernels.hexahedron import FINITE
 
 LANES = 16
 LANE_OPTIONS = {"cache": True, "fastmath": FINITE, "error_model": "numpy"}

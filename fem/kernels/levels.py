@@ -5,7 +5,7 @@ A level has its state in ``(3, n, 3)``: displacement [m], force [N], weighted su
 
 from numba import njit
 
-from fem.kernels.force import add_block_force
+from reflowshock.fem.kernels.force import add_block_force
 
 
 @njit(cache=True)

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from fem.kernels.lanes import (
+from reflowshock.fem.kernels.lanes import (
     LANE_OPTIONS,
     LANES,
     cofactor,
@@ -29,7 +29,7 @@ from fem.kernels.lanes import (
     six,
     times,
 )
-from fem.kernels.plasticity import plastic_increment
+from reflowshock.fem.kernels.plasticity import plastic_increment
 
 DEFORMATION, ROTATION, INCREMENT, MISES, NOMINAL, WORK_SLOTS = (LANES * k for k in (0, 9, 18, 24, 25, 34))
 STRESS, STRETCH, PLASTIC, STATE_SLOTS = (LANES * k for k in (0, 6, 12, 13))

@@ -2,7 +2,7 @@
 
 from numba import njit
 
-from fem.kernels.lanes import (
+from reflowshock.fem.kernels.lanes import (
     LANE_OPTIONS,
     LANES,
     cofactor,
@@ -14,7 +14,7 @@ from fem.kernels.lanes import (
     six,
     times,
 )
-from fem.kernels.nonlinear import DEFORMATION, NOMINAL, ROTATION, STRESS, STRETCH
+from reflowshock.fem.kernels.nonlinear import DEFORMATION, NOMINAL, ROTATION, STRESS, STRETCH
 
 CUBE_ROOT_STEPS = 5  # from ratios between 1/3 and 3
 

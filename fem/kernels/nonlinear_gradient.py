@@ -17,7 +17,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from fem.kernels.lanes import (
+from reflowshock.fem.kernels.lanes import (
     LANE_OPTIONS,
     LANES,
     applied,
@@ -32,7 +32,7 @@ from fem.kernels.lanes import (
     turn,
     turn_back,
 )
-from fem.kernels.nonlinear import (
+from reflowshock.fem.kernels.nonlinear import (
     MISES,
     NOMINAL,
     PLASTIC,
@@ -48,7 +48,7 @@ from fem.kernels.nonlinear import (
     small_increment,
     stretch_increment,
 )
-from fem.kernels.plasticity import FIRST_YIELD, yield_stress
+from reflowshock.fem.kernels.plasticity import FIRST_YIELD, yield_stress
 
 HOURGLASS, RESISTANCE, TRIAL, GRADIENT_SLOTS = (WORK_SLOTS + LANES * k for k in (0, 12, 24, 25))
 BENDING_STRENGTH = np.sqrt(0.75)  # 3/2 of the yield stress at the faces of a section, as a root mean square

@@ -23,9 +23,19 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from fem.kernels.hexahedron import GAUSS
-from fem.kernels.lanes import LANE_OPTIONS, LANES, gather_lanes, nine, put_nine, put_six, scatter_lanes, turn, turn_back
-from fem.kernels.nonlinear import (
+from reflowshock.fem.kernels.hexahedron import GAUSS
+from reflowshock.fem.kernels.lanes import (
+    LANE_OPTIONS,
+    LANES,
+    gather_lanes,
+    nine,
+    put_nine,
+    put_six,
+    scatter_lanes,
+    turn,
+    turn_back,
+)
+from reflowshock.fem.kernels.nonlinear import (
     DEFORMATION,
     NOMINAL,
     ROTATION,
@@ -39,7 +49,7 @@ from fem.kernels.nonlinear import (
     stretch,
     stretch_increment,
 )
-from fem.kernels.nonlinear_dilatation import (
+from reflowshock.fem.kernels.nonlinear_dilatation import (
     change_dilatation_finite,
     change_dilatation_small,
     finish_nominal,
@@ -47,8 +57,8 @@ from fem.kernels.nonlinear_dilatation import (
     nominal_small,
     write_dilatation,
 )
-from fem.kernels.nonlinear_gradient import FINE
-from fem.kernels.nonlinear_modes import (
+from reflowshock.fem.kernels.nonlinear_gradient import FINE
+from reflowshock.fem.kernels.nonlinear_modes import (
     add_modes,
     add_remainder,
     add_residual,
@@ -57,7 +67,13 @@ from fem.kernels.nonlinear_modes import (
     write_inverse,
     write_operator,
 )
-from fem.kernels.nonlinear_parent import add_point_monomials, fit, gather_monomials, point_gradient, scatter_monomials
+from reflowshock.fem.kernels.nonlinear_parent import (
+    add_point_monomials,
+    fit,
+    gather_monomials,
+    point_gradient,
+    scatter_monomials,
+)
 
 
 class HexahedronBlocks(NamedTuple):

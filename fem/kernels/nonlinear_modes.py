@@ -3,7 +3,7 @@
 import numpy as np
 from numba import njit
 
-from fem.kernels.lanes import (
+from reflowshock.fem.kernels.lanes import (
     LANE_OPTIONS,
     LANES,
     applied,
@@ -20,7 +20,7 @@ from fem.kernels.lanes import (
     times,
     transposed,
 )
-from fem.kernels.nonlinear import DEFORMATION, NOMINAL
+from reflowshock.fem.kernels.nonlinear import DEFORMATION, NOMINAL
 
 PAIRS = ((0, 0, 0), (1, 1, 1), (2, 2, 2), (0, 1, 3), (1, 2, 4), (0, 2, 5))  # k, l, place in a symmetric matrix
 

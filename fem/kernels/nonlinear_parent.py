@@ -6,7 +6,7 @@ product of sides.
 
 from numba import njit
 
-from fem.kernels.lanes import LANE_OPTIONS, LANES, nine
+from reflowshock.fem.kernels.lanes import LANE_OPTIONS, LANES, nine
 
 
 @njit(**LANE_OPTIONS)

@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from fem.materials.parameters import Isotropic, Material
+from reflowshock.fem.materials.parameters import Isotropic, Material
 
 FIRST_YIELD = 1  # column of the yield stress at no plastic strain, infinite where a material never yields
 ITERATIONS = 100  # far more than any admissible constants need; typical are 2

@@ -6,15 +6,15 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.forces.energy import InternalForce
-from fem.forces.force import linear_terms
-from fem.kernels.damping import add_damping, power
-from fem.loads.load import Kept, Load
-from fem.loads.pretension import Pretension
-from fem.model.body import Body
+from reflowshock.fem.forces.energy import InternalForce
+from reflowshock.fem.forces.force import linear_terms
+from reflowshock.fem.kernels.damping import add_damping, power
+from reflowshock.fem.loads.load import Kept, Load
+from reflowshock.fem.loads.pretension import Pretension
+from reflowshock.fem.model.body import Body
 
 if TYPE_CHECKING:
-    from fem.dynamics.central_difference import Motion
+    from reflowshock.fem.dynamics.central_difference import Motion
 
 
 class RayleighDamping(Load):

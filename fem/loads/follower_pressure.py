@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.loads.load import Kept, Load
-from fem.mesh.facet import area_vectors
-from fem.mesh.facet_areas import OutwardFacets
-from fem.model.body import Body
-from fem.problem.pulse import Pulse
+from reflowshock.fem.loads.load import Kept, Load
+from reflowshock.fem.mesh.facet import area_vectors
+from reflowshock.fem.mesh.facet_areas import OutwardFacets
+from reflowshock.fem.model.body import Body
+from reflowshock.fem.problem.pulse import Pulse
 
 if TYPE_CHECKING:
-    from fem.dynamics.central_difference import Motion
+    from reflowshock.fem.dynamics.central_difference import Motion
 
 
 @dataclass

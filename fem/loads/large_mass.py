@@ -8,14 +8,14 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from fem.errors import LoadError
-from fem.loads.load import Kept, Load
-from fem.model.body import Body
-from fem.parallel.portable import Rows, State
-from fem.problem.pulse import Pulse
+from reflowshock.fem.errors import LoadError
+from reflowshock.fem.loads.load import Kept, Load
+from reflowshock.fem.model.body import Body
+from reflowshock.fem.parallel.portable import Rows, State
+from reflowshock.fem.problem.pulse import Pulse
 
 if TYPE_CHECKING:
-    from fem.dynamics.central_difference import Motion
+    from reflowshock.fem.dynamics.central_difference import Motion
 
 MASS_RATIO = 1e6  # large mass over the model's: the base deviates from its pulse by about one part in this
 

@@ -13,15 +13,15 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.errors import LoadError
-from fem.forces.energy import Energy
-from fem.model.body import Body
-from fem.model.step_levels import levels_of
-from fem.parallel.portable import Entry, Rows, Same, State, Sum
-from fem.problem.pulse import HalfSine, Pulse
+from reflowshock.fem.errors import LoadError
+from reflowshock.fem.forces.energy import Energy
+from reflowshock.fem.model.body import Body
+from reflowshock.fem.model.step_levels import levels_of
+from reflowshock.fem.parallel.portable import Entry, Rows, Same, State, Sum
+from reflowshock.fem.problem.pulse import HalfSine, Pulse
 
 if TYPE_CHECKING:
-    from fem.dynamics.central_difference import Motion
+    from reflowshock.fem.dynamics.central_difference import Motion
 
 # A package that is dropped looks towards the ground, so the table's upward acceleration points along -z and the board,
 # seen from the table, is pushed along +z; so does its weight.

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.forces.energy import Energy
+from reflowshock.fem.forces.energy import Energy
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,15 +5,15 @@ from collections.abc import Iterable
 import numpy as np
 from mpi4py import MPI
 
-from fem.division.tables import JointTables
-from fem.errors import LoadError
-from fem.loads.damping import RayleighDamping
-from fem.loads.large_mass import LargeMass
-from fem.loads.load import DOWN, BodyAcceleration, Load
-from fem.model.body import Body
-from fem.problem.parameters import Shock
-from fem.problem.pulse import STANDARD_GRAVITY, Constant
-from fem.problem.shock_pulse import shock_pulse
+from reflowshock.fem.division.tables import JointTables
+from reflowshock.fem.errors import LoadError
+from reflowshock.fem.loads.damping import RayleighDamping
+from reflowshock.fem.loads.large_mass import LargeMass
+from reflowshock.fem.loads.load import DOWN, BodyAcceleration, Load
+from reflowshock.fem.model.body import Body
+from reflowshock.fem.problem.parameters import Shock
+from reflowshock.fem.problem.pulse import STANDARD_GRAVITY, Constant
+from reflowshock.fem.problem.shock_pulse import shock_pulse
 
 
 def check_shaken(tables: Iterable[JointTables], shock: Shock) -> None:

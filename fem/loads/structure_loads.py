@@ -6,15 +6,15 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from fem.division.structure_tables import StructureTables, shaken_supports
-from fem.loads.damping import RayleighDamping
-from fem.loads.follower_pressure import FollowerPressure
-from fem.loads.large_mass import LargeMass
-from fem.loads.load import BodyAcceleration, Load, NodalForces, PrescribedMotion
-from fem.model.body import Body
-from fem.problem.parameters import Damping
-from fem.problem.pulse import Pulse
-from fem.problem.structure import AXES, Gravity, InputG, Pressure, StructureScene
+from reflowshock.fem.division.structure_tables import StructureTables, shaken_supports
+from reflowshock.fem.loads.damping import RayleighDamping
+from reflowshock.fem.loads.follower_pressure import FollowerPressure
+from reflowshock.fem.loads.large_mass import LargeMass
+from reflowshock.fem.loads.load import BodyAcceleration, Load, NodalForces, PrescribedMotion
+from reflowshock.fem.model.body import Body
+from reflowshock.fem.problem.parameters import Damping
+from reflowshock.fem.problem.pulse import Pulse
+from reflowshock.fem.problem.structure import AXES, Gravity, InputG, Pressure, StructureScene
 
 
 def structure_loads(

@@ -5,8 +5,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.materials.parameters import EngineeringConstants, Material
-from fem.materials.roles import Materials
+from reflowshock.fem.materials.parameters import EngineeringConstants, Material
+from reflowshock.fem.materials.roles import Materials
 
 
 def elasticity_matrix(material: Material) -> NDArray[np.float64]:

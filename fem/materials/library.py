@@ -4,7 +4,7 @@ Where sources differ, the comment says by how much: solder, moulding compound an
 each. "Not reread" marks published constants whose paper was not at hand for a second look: check before relying on it.
 """
 
-from fem.materials.parameters import Isotropic, JohnsonCook, Material, Orthotropic
+from reflowshock.fem.materials.parameters import Isotropic, JohnsonCook, Material, Orthotropic
 
 # H tables 3-5; the shear modulus G_xz and the density are from the same widely used FR4 data set, e.g.
 # Syed et al., ECTC 2005, and its successors; H leaves them out (PHYSICS 1).

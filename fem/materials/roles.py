@@ -7,9 +7,9 @@ from typing import Annotated, Any
 from pydantic import BaseModel, GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
-from fem.materials.library import COPPER, FR4, LIBRARY, SAC405, SILICON
-from fem.materials.parameters import Material
-from fem.problem.parameters import Parameters
+from reflowshock.fem.materials.library import COPPER, FR4, LIBRARY, SAC405, SILICON
+from reflowshock.fem.materials.parameters import Material
+from reflowshock.fem.problem.parameters import Parameters
 
 
 @dataclass(frozen=True, slots=True)

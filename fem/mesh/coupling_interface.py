@@ -4,8 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from fem.errors import CutError
-from fem.mesh.mesh import MeshData, boundary_facets
+from reflowshock.fem.errors import CutError
+from reflowshock.fem.mesh.mesh import MeshData, boundary_facets
 
 MATCH = 1e-6  # of the shortest edge of the cut
 MACRO, PATCH = "board", "board_patch"

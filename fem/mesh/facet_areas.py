@@ -7,9 +7,9 @@ from difflib import get_close_matches
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.errors import LoadError
-from fem.mesh.facet import area_vectors
-from fem.mesh.mesh import MeshData, cells_of_facets
+from reflowshock.fem.errors import LoadError
+from reflowshock.fem.mesh.facet import area_vectors
+from reflowshock.fem.mesh.mesh import MeshData, cells_of_facets
 
 
 def facet_set(mesh: MeshData, name: str) -> NDArray[np.int32]:

@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.mesh.mesh import MeshData, cells_of_facets
-from fem.mesh.watch_table import joint_names
+from reflowshock.fem.mesh.mesh import MeshData, cells_of_facets
+from reflowshock.fem.mesh.watch_table import joint_names
 
 SIDE = "pad_package@"
 

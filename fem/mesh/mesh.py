@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.cell_shape import CellShape, shape_of
-from fem.errors import MeshError
+from reflowshock.fem.cell_shape import CellShape, shape_of
+from reflowshock.fem.errors import MeshError
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,10 +7,10 @@ import meshio
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.cell_shape import SHAPES, CellShape
-from fem.errors import MeshError
-from fem.mesh.mesh import MeshData, append, without_unused_nodes
-from fem.mesh.mesh_quality import check_quality
+from reflowshock.fem.cell_shape import SHAPES, CellShape
+from reflowshock.fem.errors import MeshError
+from reflowshock.fem.mesh.mesh import MeshData, append, without_unused_nodes
+from reflowshock.fem.mesh.mesh_quality import check_quality
 
 
 def read_meshes(paths: Sequence[Path]) -> MeshData:

@@ -3,10 +3,10 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.cell_shape import HEXAHEDRON
-from fem.elements.tetrahedron import EDGES
-from fem.errors import MeshError
-from fem.mesh.mesh import MeshData
+from reflowshock.fem.cell_shape import HEXAHEDRON
+from reflowshock.fem.elements.tetrahedron import EDGES
+from reflowshock.fem.errors import MeshError
+from reflowshock.fem.mesh.mesh import MeshData
 
 # Three neighbours of each vertex, right-handed.
 OF_HEXAHEDRON = np.array(

@@ -8,7 +8,7 @@ layer of elements is all there is, no gradient across it can be known, and the v
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.mesh.mesh import MeshData
+from reflowshock.fem.mesh.mesh import MeshData
 
 NEARNESS = 2.0  # in the weight exp(-2 d^2) of an element, d its distance in sizes of the nearest ones
 SMALLEST = 1e-6  # of the largest singular value: below it a direction is not covered

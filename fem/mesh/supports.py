@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.mesh.mesh import MeshData
+from reflowshock.fem.mesh.mesh import MeshData
 
 # Facet set -> components held: bolted mounting holes; symmetry planes normal to x and y.
 HELD = {"mounting_holes": (0, 1, 2), "symmetry_x": (0,), "symmetry_y": (1,)}

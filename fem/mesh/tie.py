@@ -11,10 +11,10 @@ import scipy.sparse
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from fem.cell_shape import HEXAHEDRON
-from fem.errors import TieError
-from fem.kernels.motion import gather_from_slaves, spread_to_slaves
-from fem.mesh.mesh import MeshData
+from reflowshock.fem.cell_shape import HEXAHEDRON
+from reflowshock.fem.errors import TieError
+from reflowshock.fem.kernels.motion import gather_from_slaves, spread_to_slaves
+from reflowshock.fem.mesh.mesh import MeshData
 
 CORNERS = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 TOLERANCE = 0.02  # of the facet's size: distance of a slave from its facet

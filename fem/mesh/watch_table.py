@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.elements.element import element_geometry
-from fem.errors import MeshError
-from fem.mesh.mesh import MeshData, cells_of_facets
+from reflowshock.fem.elements.element import element_geometry
+from reflowshock.fem.errors import MeshError
+from reflowshock.fem.mesh.mesh import MeshData, cells_of_facets
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,20 +7,20 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from fem.division.tables import Tables
-from fem.elements.element import Elements, critical_steps, element_geometry, lumped_mass
-from fem.elements.hexahedron import HEXAHEDRON
-from fem.elements.kind import Geometry
-from fem.elements.mesh_elements import elements_of
-from fem.errors import MassError, RankError
-from fem.forces.force import ForceTerm, Kinematics, force_terms, linear_terms
-from fem.materials.elasticity import materials_of_parts
-from fem.materials.parameters import Material
-from fem.materials.roles import Materials
-from fem.mesh.tie import Tie
-from fem.model.step_levels import Levels, LocalSteps, check_elastic
-from fem.parallel.exchange import SharedNodes
-from fem.parallel.local_mesh import LocalMesh
+from reflowshock.fem.division.tables import Tables
+from reflowshock.fem.elements.element import Elements, critical_steps, element_geometry, lumped_mass
+from reflowshock.fem.elements.hexahedron import HEXAHEDRON
+from reflowshock.fem.elements.kind import Geometry
+from reflowshock.fem.elements.mesh_elements import elements_of
+from reflowshock.fem.errors import MassError, RankError
+from reflowshock.fem.forces.force import ForceTerm, Kinematics, force_terms, linear_terms
+from reflowshock.fem.materials.elasticity import materials_of_parts
+from reflowshock.fem.materials.parameters import Material
+from reflowshock.fem.materials.roles import Materials
+from reflowshock.fem.mesh.tie import Tie
+from reflowshock.fem.model.step_levels import Levels, LocalSteps, check_elastic
+from reflowshock.fem.parallel.exchange import SharedNodes
+from reflowshock.fem.parallel.local_mesh import LocalMesh
 
 MASS_TOLERANCE = 1e-10
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from petsc4py import PETSc
 
-from fem.errors import AgreedError
+from reflowshock.fem.errors import AgreedError
 
 PREFIX = "factor_"
 SETTINGS = {14: 50}  # ICNTL of MUMPS: working memory beyond its estimate [%], which ties and many ranks exceed

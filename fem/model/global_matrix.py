@@ -8,8 +8,8 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from fem.forces.force_assembled import AssembledElements
-from fem.model.body import Body
+from reflowshock.fem.forces.force_assembled import AssembledElements
+from reflowshock.fem.model.body import Body
 
 
 @dataclass(frozen=True, slots=True)

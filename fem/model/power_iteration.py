@@ -14,8 +14,8 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from fem.forces.energy import InternalForce
-from fem.model.body import Body
+from reflowshock.fem.forces.energy import InternalForce
+from reflowshock.fem.model.body import Body
 
 MISSED = 1e-12  # accepted probability that the estimate is too low
 MARGIN = 0.005  # wanted relative margin on the frequency squared

@@ -20,20 +20,20 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from fem.division.chebyshev import Substeps
-from fem.errors import LevelError
-from fem.forces.energy import Energy, InternalForce, linear_energy
-from fem.forces.force import ForceTerm, Kinematics, linear_terms
-from fem.forces.force_assembled import AssembledElements
-from fem.kernels.levels import begin_substeps, end_substeps, run_levels, take_substep
-from fem.materials.parameters import Material
-from fem.mesh.tie import Tie
-from fem.model.tied_elements import tied_terms
-from fem.parallel.exchange import SharedNodes
-from fem.parallel.local_mesh import positions
+from reflowshock.fem.division.chebyshev import Substeps
+from reflowshock.fem.errors import LevelError
+from reflowshock.fem.forces.energy import Energy, InternalForce, linear_energy
+from reflowshock.fem.forces.force import ForceTerm, Kinematics, linear_terms
+from reflowshock.fem.forces.force_assembled import AssembledElements
+from reflowshock.fem.kernels.levels import begin_substeps, end_substeps, run_levels, take_substep
+from reflowshock.fem.materials.parameters import Material
+from reflowshock.fem.mesh.tie import Tie
+from reflowshock.fem.model.tied_elements import tied_terms
+from reflowshock.fem.parallel.exchange import SharedNodes
+from reflowshock.fem.parallel.local_mesh import positions
 
 if TYPE_CHECKING:
-    from fem.model.body import Body
+    from reflowshock.fem.model.body import Body
 
 
 @dataclass(frozen=True, slots=True)

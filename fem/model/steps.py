@@ -8,16 +8,16 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from fem.division.checks import steps_of
-from fem.division.division import Division
-from fem.division.rules import Rules
-from fem.division.tables import Tables
-from fem.division.whole import Survey, Whole
-from fem.estimates.estimate import WindowPlan, damped_critical_step
-from fem.materials.roles import Materials
-from fem.model.body import Pieces, make_body
-from fem.model.power_iteration import highest_frequency
-from fem.parallel.communicators import Role
+from reflowshock.fem.division.checks import steps_of
+from reflowshock.fem.division.division import Division
+from reflowshock.fem.division.rules import Rules
+from reflowshock.fem.division.tables import Tables
+from reflowshock.fem.division.whole import Survey, Whole
+from reflowshock.fem.estimates.estimate import WindowPlan, damped_critical_step
+from reflowshock.fem.materials.roles import Materials
+from reflowshock.fem.model.body import Pieces, make_body
+from reflowshock.fem.model.power_iteration import highest_frequency
+from reflowshock.fem.parallel.communicators import Role
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,10 +3,10 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.elements.stress import element_stress, mean_strain, symmetric, voigt
-from fem.forces.force_nonlinear import NonlinearElements
-from fem.model.body import Body
-from fem.parallel.local_mesh import positions
+from reflowshock.fem.elements.stress import element_stress, mean_strain, symmetric, voigt
+from reflowshock.fem.forces.force_nonlinear import NonlinearElements
+from reflowshock.fem.model.body import Body
+from reflowshock.fem.parallel.local_mesh import positions
 
 
 class StressRecovery:

@@ -8,12 +8,12 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from fem.errors import StepError
-from fem.estimates.estimate import WindowPlan, damped_critical_step
-from fem.estimates.solver_cost import implicit_step
-from fem.model.body import Pieces
-from fem.model.steps import Steps, agreed_minimum, critical_by_role, mass_factor
-from fem.problem.structure import Dynamics
+from reflowshock.fem.errors import StepError
+from reflowshock.fem.estimates.estimate import WindowPlan, damped_critical_step
+from reflowshock.fem.estimates.solver_cost import implicit_step
+from reflowshock.fem.model.body import Pieces
+from reflowshock.fem.model.steps import Steps, agreed_minimum, critical_by_role, mass_factor
+from reflowshock.fem.problem.structure import Dynamics
 
 LONGEST_WINDOW = 250  # steps: after each window a run can be judged, stopped and continued
 STEP_LIMIT = 0.99  # of the critical step

@@ -4,11 +4,11 @@ import numpy as np
 import scipy.sparse
 from numpy.typing import NDArray
 
-from fem.elements.element import Elements
-from fem.forces.energy import InternalForce
-from fem.forces.force_assembled import AssembledElements
-from fem.forces.force_congruent import CongruentElements, in_rows
-from fem.mesh.tie import Tie
+from reflowshock.fem.elements.element import Elements
+from reflowshock.fem.forces.energy import InternalForce
+from reflowshock.fem.forces.force_assembled import AssembledElements
+from reflowshock.fem.forces.force_congruent import CongruentElements, in_rows
+from reflowshock.fem.mesh.tie import Tie
 
 
 def tied_terms(elements: Elements, tie: Tie) -> list[InternalForce]:

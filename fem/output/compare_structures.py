@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from fem.output.compare import relative_error
+from reflowshock.fem.output.compare import relative_error
 
 COMPARED = ("displacement", "strain")
 

@@ -9,11 +9,11 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from fem import dolfinx_api
-from fem.elements.stress import von_mises
-from fem.model.body import Body
-from fem.model.stress_recovery import StressRecovery
-from fem.parallel.portable import Rows, Same, State
+from reflowshock.fem import dolfinx_api
+from reflowshock.fem.elements.stress import von_mises
+from reflowshock.fem.model.body import Body
+from reflowshock.fem.model.stress_recovery import StressRecovery
+from reflowshock.fem.parallel.portable import Rows, Same, State
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,16 +8,16 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from fem.dynamics.participant import Participant
-from fem.elements.stress import von_mises
-from fem.estimates.estimate import WindowPlan
-from fem.mesh.interface_table import InterfaceTable
-from fem.model.body import Body
-from fem.model.stress_recovery import StressRecovery
-from fem.parallel.communicators import Role
-from fem.parallel.data_file import columns, rows
-from fem.parallel.portable import Log, State
-from fem.parallel.whereabouts import HERE
+from reflowshock.data_file import columns, rows
+from reflowshock.fem.dynamics.participant import Participant
+from reflowshock.fem.elements.stress import von_mises
+from reflowshock.fem.estimates.estimate import WindowPlan
+from reflowshock.fem.mesh.interface_table import InterfaceTable
+from reflowshock.fem.model.body import Body
+from reflowshock.fem.model.stress_recovery import StressRecovery
+from reflowshock.fem.parallel.communicators import Role
+from reflowshock.fem.parallel.portable import Log, State
+from reflowshock.fem.parallel.whereabouts import HERE
 
 
 def picture_windows(times: Iterable[float], plan: WindowPlan) -> frozenset[int]:

@@ -10,18 +10,18 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from fem.dynamics.history import History
-from fem.elements.hexahedron import HEXAHEDRON
-from fem.estimates.effects import ADDED_MASS_LIMIT
-from fem.estimates.material_effects import failure_effect, material_effects
-from fem.materials.kinematics import finite_rotation
-from fem.model.steps import Steps
-from fem.output.failure import Verdicts, failed_joints, failure_criteria, judge, worst
-from fem.output.watch_joints import FLOW_LAYERS, LAYERS
-from fem.parallel.communicators import Communicators, Role
-from fem.problem.inputs import RunInput
-from fem.problem.shock_pulse import shock_pulse
-from fem.setup.shock_models import Model
+from reflowshock.fem.dynamics.history import History
+from reflowshock.fem.elements.hexahedron import HEXAHEDRON
+from reflowshock.fem.estimates.effects import ADDED_MASS_LIMIT
+from reflowshock.fem.estimates.material_effects import failure_effect, material_effects
+from reflowshock.fem.materials.kinematics import finite_rotation
+from reflowshock.fem.model.steps import Steps
+from reflowshock.fem.output.failure import Verdicts, failed_joints, failure_criteria, judge, worst
+from reflowshock.fem.output.watch_joints import FLOW_LAYERS, LAYERS
+from reflowshock.fem.parallel.communicators import Communicators, Role
+from reflowshock.fem.problem.inputs import RunInput
+from reflowshock.fem.problem.shock_pulse import shock_pulse
+from reflowshock.fem.setup.shock_models import Model
 
 FORCE_RESIDUAL_LIMIT = 1e-10
 # Above it hourglass stiffness carries a part of the load, or incompatible modes are out of balance; 10 % is the usual

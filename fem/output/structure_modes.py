@@ -8,15 +8,15 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from fem.division.structure_tables import shaken_supports
-from fem.errors import AgreedError
-from fem.model.body import Body
-from fem.model.global_matrix import Equations
-from fem.output.fields import Fields
-from fem.problem.inputs import StructureInput
-from fem.problem.structure import AXES, PrescribedMotion
-from fem.setup.structure_model import StructureModel
-from fem.statics.modal import Modes, natural_modes
+from reflowshock.fem.division.structure_tables import shaken_supports
+from reflowshock.fem.errors import AgreedError
+from reflowshock.fem.model.body import Body
+from reflowshock.fem.model.global_matrix import Equations
+from reflowshock.fem.output.fields import Fields
+from reflowshock.fem.problem.inputs import StructureInput
+from reflowshock.fem.problem.structure import AXES, PrescribedMotion
+from reflowshock.fem.setup.structure_model import StructureModel
+from reflowshock.fem.statics.modal import Modes, natural_modes
 
 SHOWN = 0.05  # largest displacement of a shape in a field file, in lengths of the structure
 

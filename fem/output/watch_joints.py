@@ -3,12 +3,12 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.dynamics.moving import Moving
-from fem.elements.stress import principal_strain, von_mises
-from fem.mesh.watch_table import WatchTable
-from fem.model.body import Body
-from fem.model.stress_recovery import StressRecovery
-from fem.parallel.local_mesh import positions
+from reflowshock.fem.dynamics.moving import Moving
+from reflowshock.fem.elements.stress import principal_strain, von_mises
+from reflowshock.fem.mesh.watch_table import WatchTable
+from reflowshock.fem.model.body import Body
+from reflowshock.fem.model.stress_recovery import StressRecovery
+from reflowshock.fem.parallel.local_mesh import positions
 
 LAYERS = ("von_mises_board", "von_mises_package", "peel_board", "peel_package")
 FLOW_LAYERS = ("plastic_work_board", "plastic_work_package")

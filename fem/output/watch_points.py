@@ -6,12 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.dynamics.moving import Moving
-from fem.errors import MeshError
-from fem.mesh.mesh import MeshData
-from fem.mesh.recovery import fit, patch
-from fem.model.body import Body
-from fem.model.stress_recovery import StressRecovery
+from reflowshock.fem.dynamics.moving import Moving
+from reflowshock.fem.errors import MeshError
+from reflowshock.fem.mesh.mesh import MeshData
+from reflowshock.fem.mesh.recovery import fit, patch
+from reflowshock.fem.model.body import Body
+from reflowshock.fem.model.stress_recovery import StressRecovery
 
 ROUNDING = 1e-9  # of the mesh: closer than that is the same place
 Support = tuple[NDArray[np.integer], NDArray[np.bool_]]

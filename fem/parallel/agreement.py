@@ -5,7 +5,7 @@ from typing import TypeVar
 
 from mpi4py import MPI
 
-from fem.errors import AgreedError
+from reflowshock.fem.errors import AgreedError
 
 Result = TypeVar("Result")
 

@@ -17,9 +17,10 @@ from typing import Any
 
 from mpi4py import MPI
 
-from fem.errors import CheckpointError
-from fem.parallel import portable
-from fem.parallel.checkpoint_files import (
+from reflowshock.data_file import NotData, read_data
+from reflowshock.fem.errors import CheckpointError
+from reflowshock.fem.parallel import portable
+from reflowshock.fem.parallel.checkpoint_files import (
     FOLDER_NAME,
     KEPT,
     STATE,
@@ -31,9 +32,8 @@ from fem.parallel.checkpoint_files import (
     warn,
     write_state,
 )
-from fem.parallel.data_file import NotData, read_data
-from fem.parallel.portable import ENTRIES, State
-from fem.parallel.whereabouts import HERE
+from reflowshock.fem.parallel.portable import ENTRIES, State
+from reflowshock.fem.parallel.whereabouts import HERE
 
 LIBRARIES = ("numpy", "scipy", "numba")
 GENERATIONS = 2

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from fem.parallel.data_file import NotData, fields_of, read_header, write_data
+from reflowshock.data_file import NotData, fields_of, read_header, write_data
 
 STATE = "state-{rank:04d}-{generation}"
 KEPT = "{name}-{rank:04d}"

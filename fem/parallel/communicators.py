@@ -5,8 +5,8 @@ from typing import Self
 
 from mpi4py import MPI
 
-from fem.estimates.placement import Placement, Role
-from fem.parallel.whereabouts import HERE
+from reflowshock.fem.estimates.placement import Placement, Role
+from reflowshock.fem.parallel.whereabouts import HERE
 
 
 class Communicators:

@@ -8,8 +8,8 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from fem.kernels.motion import pack, sum_in_rank_order, unpack
-from fem.parallel.whereabouts import HERE
+from reflowshock.fem.kernels.motion import pack, sum_in_rank_order, unpack
+from reflowshock.fem.parallel.whereabouts import HERE
 
 SHARED_TAG, CHANNEL_TAG = 11, 12
 

@@ -7,8 +7,8 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from fem import dolfinx_api
-from fem.mesh.mesh import MeshData
+from reflowshock.fem import dolfinx_api
+from reflowshock.fem.mesh.mesh import MeshData
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.mesh.mesh import MeshData
+from reflowshock.fem.mesh.mesh import MeshData
 
 ANGLES = 12  # directions of a cut in the plane of the two largest extents
 TILT = 1e-3  # of a direction, so that cells at equal distance are taken row by row

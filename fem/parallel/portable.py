@@ -13,7 +13,7 @@ from typing import Any, ClassVar, Protocol, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.parallel.local_mesh import positions
+from reflowshock.fem.parallel.local_mesh import positions
 
 
 class Entry(Protocol):

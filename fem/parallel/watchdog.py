@@ -16,8 +16,8 @@ from pathlib import Path
 
 from mpi4py import MPI
 
-from fem.parallel.status_board import ERROR, Status, StatusBoard
-from fem.parallel.whereabouts import HERE
+from reflowshock.fem.parallel.status_board import ERROR, Status, StatusBoard
+from reflowshock.fem.parallel.whereabouts import HERE
 
 TICK = 1.0  # [s] between two looks, at most
 TICKS = 10  # looks in the time that a wait may last, at least

@@ -2,8 +2,8 @@
 
 from collections.abc import Iterator
 
-from fem.problem.problem import Problem, unknown_name
-from fem.problem.structure import InputG, LayerCoupling, StructureScene
+from reflowshock.fem.problem.problem import Problem, unknown_name
+from reflowshock.fem.problem.structure import InputG, LayerCoupling, StructureScene
 
 KEY = "dynamics.coupling"
 

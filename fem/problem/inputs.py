@@ -5,9 +5,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, TypeAdapter
 
-from fem.materials.roles import Materials
-from fem.problem.parameters import Parameters, Shock
-from fem.problem.structure import SolverName, StructureScene
+from reflowshock.fem.materials.roles import Materials
+from reflowshock.fem.problem.parameters import Parameters, Shock
+from reflowshock.fem.problem.structure import SolverName, StructureScene
 
 UNRELATED = {"checkpoint_seconds", "watchdog_seconds"}  # numerics that results do not depend on
 

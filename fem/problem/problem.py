@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
-from fem.names import nearest
+from reflowshock.fem.names import nearest
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import numpy as np
 
-from fem.estimates.effects import Effect, weight
-from fem.problem.parameters import Shock
-from fem.problem.pulse import STANDARD_GRAVITY, HalfSine, Pulse, Tabulated, service_condition
-from fem.problem.pulse_table import read_pulse
+from reflowshock.fem.estimates.effects import Effect, weight
+from reflowshock.fem.problem.parameters import Shock
+from reflowshock.fem.problem.pulse import STANDARD_GRAVITY, HalfSine, Pulse, Tabulated, service_condition
+from reflowshock.fem.problem.pulse_table import read_pulse
 
 
 @dataclass(frozen=True, slots=True)

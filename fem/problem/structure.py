@@ -10,9 +10,9 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from fem.materials.library import LIBRARY
-from fem.materials.parameters import Material
-from fem.problem.parameters import MOST_RANKS, Coupling, Damping, Parameters, ServiceCondition
+from reflowshock.fem.materials.library import LIBRARY
+from reflowshock.fem.materials.parameters import Material
+from reflowshock.fem.problem.parameters import MOST_RANKS, Coupling, Damping, Parameters, ServiceCondition
 
 AXES = "xyz"
 SMALLER = 0.5  # of the longest step of a layer: below it a layer is fine, unless the user names those that are

@@ -3,9 +3,9 @@
 import math
 from collections.abc import Iterable, Iterator
 
-from fem.problem.coupling_checks import coupling_problems
-from fem.problem.problem import Problem, unknown_name
-from fem.problem.structure import (
+from reflowshock.fem.problem.coupling_checks import coupling_problems
+from reflowshock.fem.problem.problem import Problem, unknown_name
+from reflowshock.fem.problem.structure import (
     AXES,
     Gravity,
     InputG,

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
-from fem.problem.pulse import Constant, HalfSine, Haversine, Pulse, Tabulated, service_condition
-from fem.problem.pulse_table import read_pulse
-from fem.problem.structure import InputG, StructureLoad
+from reflowshock.fem.problem.pulse import Constant, HalfSine, Haversine, Pulse, Tabulated, service_condition
+from reflowshock.fem.problem.pulse_table import read_pulse
+from reflowshock.fem.problem.structure import InputG, StructureLoad
 
 SHAPES: dict[str, type[HalfSine] | type[Haversine]] = {"half_sine": HalfSine, "haversine": Haversine}
 QUANTITY = {"input_g": "acceleration", "gravity": "acceleration", "pressure": "pressure", "motion": "velocity"}

@@ -8,8 +8,8 @@ from typing import Annotated, Literal
 from pydantic import Field, ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
 
-from fem.materials.parameters import Temperature
-from fem.problem.parameters import Parameters
+from reflowshock.fem.materials.parameters import Temperature
+from reflowshock.fem.problem.parameters import Parameters
 
 KELVIN = 273.15
 Switch = Literal["auto", "on", "off"]

@@ -2,9 +2,9 @@
 
 from collections.abc import Iterator, Mapping
 
-from fem.materials.parameters import Material
-from fem.problem.problem import Problem
-from fem.problem.thermal import Thermal
+from reflowshock.fem.materials.parameters import Material
+from reflowshock.fem.problem.problem import Problem
+from reflowshock.fem.problem.thermal import Thermal
 
 
 def problems(thermal: Thermal, materials: Mapping[str, Material], warpage: float) -> list[Problem]:

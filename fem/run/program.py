@@ -7,14 +7,14 @@ from pathlib import Path
 
 from mpi4py import MPI
 
-from fem.errors import AgreedError, EnergyError, InvertedElementError, RankError
-from fem.parallel.agreement import agreed
-from fem.parallel.watchdog import Watchdog
-from fem.problem.inputs import INPUT, CoolingInput, RunInput, StructureInput
-from fem.problem.structure_checks import check
-from fem.run.shock_run import run
-from fem.run.structure_run import run_structure
-from fem.statics.cooling import run_cooling
+from reflowshock.fem.errors import AgreedError, EnergyError, InvertedElementError, RankError
+from reflowshock.fem.parallel.agreement import agreed
+from reflowshock.fem.parallel.watchdog import Watchdog
+from reflowshock.fem.problem.inputs import INPUT, CoolingInput, RunInput, StructureInput
+from reflowshock.fem.problem.structure_checks import check
+from reflowshock.fem.run.shock_run import run
+from reflowshock.fem.run.structure_run import run_structure
+from reflowshock.fem.statics.cooling import run_cooling
 
 
 def main(world: MPI.Comm, arguments: list[str]) -> int:

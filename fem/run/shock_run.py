@@ -6,38 +6,38 @@ from dataclasses import replace
 import numpy as np
 from mpi4py import MPI
 
-from fem.coupling.crew import Crew, couple
-from fem.coupling.planner import Plan, loads_of, plan_ranks
-from fem.coupling.scheme import scheme_of
-from fem.coupling.self_check import recorded
-from fem.coupling.stopwatch import Stopwatch
-from fem.division.checks import check_pulses
-from fem.division.division import SchemeName
-from fem.division.whole import Treatment
-from fem.dynamics.energy_balance import Ledger
-from fem.dynamics.history import History
-from fem.dynamics.implicit import ImplicitMotion
-from fem.dynamics.participant import Alone, uncut_motion
-from fem.estimates.estimate import WindowPlan, implicit_plan, largest_implicit_step, shortened
-from fem.estimates.placement import check_size
-from fem.loads.shock_loads import shock_loads
-from fem.materials.elasticity import materials_of_parts
-from fem.model.steps import Steps
-from fem.output.fields import Fields, element_peaks
-from fem.output.interface import InterfaceStress, picture_windows
-from fem.output.result import Found, Timings, write_result
-from fem.output.watch_joints import JointWatch
-from fem.parallel.agreement import agreed
-from fem.parallel.checkpoint import Checkpoints
-from fem.parallel.checkpoint_files import digest_of_files
-from fem.parallel.communicators import Communicators, Role
-from fem.problem.inputs import RunInput
-from fem.problem.parameters import Shock
-from fem.problem.pulse import Pulse
-from fem.problem.shock_pulse import shock_pulse
-from fem.problem.structure_pulses import pulse_durations
-from fem.run.time_loop import Outputs, march
-from fem.setup.shock_models import Divided, Model, build_models, divided_scene
+from reflowshock.fem.coupling.crew import Crew, couple
+from reflowshock.fem.coupling.planner import Plan, loads_of, plan_ranks
+from reflowshock.fem.coupling.scheme import scheme_of
+from reflowshock.fem.coupling.self_check import recorded
+from reflowshock.fem.coupling.stopwatch import Stopwatch
+from reflowshock.fem.division.checks import check_pulses
+from reflowshock.fem.division.division import SchemeName
+from reflowshock.fem.division.whole import Treatment
+from reflowshock.fem.dynamics.energy_balance import Ledger
+from reflowshock.fem.dynamics.history import History
+from reflowshock.fem.dynamics.implicit import ImplicitMotion
+from reflowshock.fem.dynamics.participant import Alone, uncut_motion
+from reflowshock.fem.estimates.estimate import WindowPlan, implicit_plan, largest_implicit_step, shortened
+from reflowshock.fem.estimates.placement import check_size
+from reflowshock.fem.loads.shock_loads import shock_loads
+from reflowshock.fem.materials.elasticity import materials_of_parts
+from reflowshock.fem.model.steps import Steps
+from reflowshock.fem.output.fields import Fields, element_peaks
+from reflowshock.fem.output.interface import InterfaceStress, picture_windows
+from reflowshock.fem.output.result import Found, Timings, write_result
+from reflowshock.fem.output.watch_joints import JointWatch
+from reflowshock.fem.parallel.agreement import agreed
+from reflowshock.fem.parallel.checkpoint import Checkpoints
+from reflowshock.fem.parallel.checkpoint_files import digest_of_files
+from reflowshock.fem.parallel.communicators import Communicators, Role
+from reflowshock.fem.problem.inputs import RunInput
+from reflowshock.fem.problem.parameters import Shock
+from reflowshock.fem.problem.pulse import Pulse
+from reflowshock.fem.problem.shock_pulse import shock_pulse
+from reflowshock.fem.problem.structure_pulses import pulse_durations
+from reflowshock.fem.run.time_loop import Outputs, march
+from reflowshock.fem.setup.shock_models import Divided, Model, build_models, divided_scene
 
 SPEEDS = 201  # times at which the largest velocity of the table is looked for
 NON_TRIVIAL = 1e-4  # of the energy that the pulse gives a free body: from there on the balance is judged

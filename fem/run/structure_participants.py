@@ -5,19 +5,19 @@ from collections.abc import Mapping
 import numpy as np
 from mpi4py import MPI
 
-from fem.coupling.crew import Crew, couple
-from fem.coupling.scheme import scheme_of
-from fem.division.division import SchemeName
-from fem.dynamics.implicit import ImplicitMotion
-from fem.dynamics.moving import Moving
-from fem.dynamics.participant import Alone, uncut_motion
-from fem.errors import AgreedError
-from fem.loads.load import Load
-from fem.loads.structure_loads import damping_loads, structure_loads
-from fem.parallel.communicators import Communicators, Role
-from fem.problem.inputs import StructureInput
-from fem.problem.pulse import Pulse
-from fem.setup.structure_model import StructureModel
+from reflowshock.fem.coupling.crew import Crew, couple
+from reflowshock.fem.coupling.scheme import scheme_of
+from reflowshock.fem.division.division import SchemeName
+from reflowshock.fem.dynamics.implicit import ImplicitMotion
+from reflowshock.fem.dynamics.moving import Moving
+from reflowshock.fem.dynamics.participant import Alone, uncut_motion
+from reflowshock.fem.errors import AgreedError
+from reflowshock.fem.loads.load import Load
+from reflowshock.fem.loads.structure_loads import damping_loads, structure_loads
+from reflowshock.fem.parallel.communicators import Communicators, Role
+from reflowshock.fem.problem.inputs import StructureInput
+from reflowshock.fem.problem.pulse import Pulse
+from reflowshock.fem.setup.structure_model import StructureModel
 
 Pulses = Mapping[str, Pulse]
 

@@ -10,35 +10,35 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from fem.coupling.planner import Plan, loads_of, plan_ranks
-from fem.coupling.self_check import recorded
-from fem.coupling.stopwatch import Stopwatch
-from fem.division.whole import Treatment
-from fem.dynamics.energy_balance import Ledger
-from fem.dynamics.history import History
-from fem.dynamics.implicit import ImplicitMotion
-from fem.dynamics.participant import Participant
-from fem.estimates.material_effects import plastic_laws
-from fem.estimates.placement import shared
-from fem.output.fields import Fields, element_peaks
-from fem.output.result import Timings
-from fem.output.structure_modes import ModeTable, find_modes
-from fem.output.structure_result import Found, write_result
-from fem.output.watch_points import PointWatch
-from fem.parallel.agreement import agreed
-from fem.parallel.checkpoint import Checkpoints
-from fem.parallel.checkpoint_files import digest_of_files
-from fem.parallel.communicators import Communicators, Role
-from fem.parallel.exchange import MessageClock
-from fem.problem.inputs import StructureInput
-from fem.problem.parameters import Ranks
-from fem.problem.pulse import Pulse
-from fem.problem.structure import LayerCoupling
-from fem.problem.structure_pulses import pulse_durations, pulses_of
-from fem.run.structure_participants import couple_models, make_participant
-from fem.run.time_loop import Outputs, march
-from fem.setup.structure_divided import DividedStructure, divided_structure
-from fem.setup.structure_model import StructureModel, build_coupled, build_structure
+from reflowshock.fem.coupling.planner import Plan, loads_of, plan_ranks
+from reflowshock.fem.coupling.self_check import recorded
+from reflowshock.fem.coupling.stopwatch import Stopwatch
+from reflowshock.fem.division.whole import Treatment
+from reflowshock.fem.dynamics.energy_balance import Ledger
+from reflowshock.fem.dynamics.history import History
+from reflowshock.fem.dynamics.implicit import ImplicitMotion
+from reflowshock.fem.dynamics.participant import Participant
+from reflowshock.fem.estimates.material_effects import plastic_laws
+from reflowshock.fem.estimates.placement import shared
+from reflowshock.fem.output.fields import Fields, element_peaks
+from reflowshock.fem.output.result import Timings
+from reflowshock.fem.output.structure_modes import ModeTable, find_modes
+from reflowshock.fem.output.structure_result import Found, write_result
+from reflowshock.fem.output.watch_points import PointWatch
+from reflowshock.fem.parallel.agreement import agreed
+from reflowshock.fem.parallel.checkpoint import Checkpoints
+from reflowshock.fem.parallel.checkpoint_files import digest_of_files
+from reflowshock.fem.parallel.communicators import Communicators, Role
+from reflowshock.fem.parallel.exchange import MessageClock
+from reflowshock.fem.problem.inputs import StructureInput
+from reflowshock.fem.problem.parameters import Ranks
+from reflowshock.fem.problem.pulse import Pulse
+from reflowshock.fem.problem.structure import LayerCoupling
+from reflowshock.fem.problem.structure_pulses import pulse_durations, pulses_of
+from reflowshock.fem.run.structure_participants import couple_models, make_participant
+from reflowshock.fem.run.time_loop import Outputs, march
+from reflowshock.fem.setup.structure_divided import DividedStructure, divided_structure
+from reflowshock.fem.setup.structure_model import StructureModel, build_coupled, build_structure
 
 Models = Mapping[Role, StructureModel]
 

@@ -9,15 +9,15 @@ from typing import Any, Protocol
 import numpy as np
 from mpi4py import MPI
 
-from fem.coupling.stopwatch import Stopwatch
-from fem.dynamics.history import History
-from fem.dynamics.participant import Participant
-from fem.errors import InvertedElementError
-from fem.output.fields import Fields, FieldSample
-from fem.parallel.checkpoint import Checkpoints
-from fem.parallel.communicators import Role
-from fem.parallel.portable import State
-from fem.parallel.whereabouts import HERE
+from reflowshock.fem.coupling.stopwatch import Stopwatch
+from reflowshock.fem.dynamics.history import History
+from reflowshock.fem.dynamics.participant import Participant
+from reflowshock.fem.errors import InvertedElementError
+from reflowshock.fem.output.fields import Fields, FieldSample
+from reflowshock.fem.parallel.checkpoint import Checkpoints
+from reflowshock.fem.parallel.communicators import Role
+from reflowshock.fem.parallel.portable import State
+from reflowshock.fem.parallel.whereabouts import HERE
 
 PROGRESS_INTERVAL = 0.5  # [s] between two progress lines
 FLATTENED = "the step is that of the undeformed body: where elements are pressed flat, step_fraction must be smaller"

@@ -8,29 +8,29 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from fem import dolfinx_api
-from fem.division.checks import check_division
-from fem.division.divide import divide
-from fem.division.division import SchemeName
-from fem.division.fine_joints import copied_joints, read_scene
-from fem.division.record import coupling_record
-from fem.division.rules import Rules
-from fem.division.tables import JointTables, Tables, TablesT_co, joined, model_inputs
-from fem.division.whole import Treatment, survey
-from fem.forces.force import Kinematics
-from fem.loads.shock_loads import check_shaken
-from fem.materials.elasticity import role_of_part
-from fem.materials.parameters import Material
-from fem.materials.roles import Materials
-from fem.mesh.mesh import MeshData
-from fem.mesh.supports import HELD, SYMMETRY
-from fem.model.body import Body, Pieces, Response, make_body, make_pieces
-from fem.model.steps import Steps, agreed_minimum, assembled_step, steps_of_division, undivided
-from fem.parallel.agreement import agreed
-from fem.parallel.communicators import Communicators, Role
-from fem.parallel.local_mesh import distribute
-from fem.problem.inputs import RunInput
-from fem.statics.initial_state import Cooling, InitialState
+from reflowshock.fem import dolfinx_api
+from reflowshock.fem.division.checks import check_division
+from reflowshock.fem.division.divide import divide
+from reflowshock.fem.division.division import SchemeName
+from reflowshock.fem.division.fine_joints import copied_joints, read_scene
+from reflowshock.fem.division.record import coupling_record
+from reflowshock.fem.division.rules import Rules
+from reflowshock.fem.division.tables import JointTables, Tables, TablesT_co, joined, model_inputs
+from reflowshock.fem.division.whole import Treatment, survey
+from reflowshock.fem.forces.force import Kinematics
+from reflowshock.fem.loads.shock_loads import check_shaken
+from reflowshock.fem.materials.elasticity import role_of_part
+from reflowshock.fem.materials.parameters import Material
+from reflowshock.fem.materials.roles import Materials
+from reflowshock.fem.mesh.mesh import MeshData
+from reflowshock.fem.mesh.supports import HELD, SYMMETRY
+from reflowshock.fem.model.body import Body, Pieces, Response, make_body, make_pieces
+from reflowshock.fem.model.steps import Steps, agreed_minimum, assembled_step, steps_of_division, undivided
+from reflowshock.fem.parallel.agreement import agreed
+from reflowshock.fem.parallel.communicators import Communicators, Role
+from reflowshock.fem.parallel.local_mesh import distribute
+from reflowshock.fem.problem.inputs import RunInput
+from reflowshock.fem.statics.initial_state import Cooling, InitialState
 
 COARSE = "board"  # role of what velocities are held in
 

@@ -6,23 +6,23 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from fem.division.checks import check_division
-from fem.division.divide import divide
-from fem.division.division import Division
-from fem.division.record import coupling_record
-from fem.division.rules import Rules
-from fem.division.split import Part, cut_between, part_of
-from fem.division.structure_tables import StructureTables, structure_tables, tied
-from fem.division.tables import ModelInput
-from fem.division.whole import Survey, Treatment, Whole, survey
-from fem.errors import CutError, StepError
-from fem.estimates.placement import Role
-from fem.mesh.mesh_file import read_mesh
-from fem.model.steps import steps_of_division
-from fem.problem.inputs import StructureInput
-from fem.problem.structure import LayerCoupling, PrescribedMotion, fine_layers
-from fem.problem.structure_pulses import pulse_durations, pulses_of
-from fem.setup.shock_models import Divided, told_to_all
+from reflowshock.fem.division.checks import check_division
+from reflowshock.fem.division.divide import divide
+from reflowshock.fem.division.division import Division
+from reflowshock.fem.division.record import coupling_record
+from reflowshock.fem.division.rules import Rules
+from reflowshock.fem.division.split import Part, cut_between, part_of
+from reflowshock.fem.division.structure_tables import StructureTables, structure_tables, tied
+from reflowshock.fem.division.tables import ModelInput
+from reflowshock.fem.division.whole import Survey, Treatment, Whole, survey
+from reflowshock.fem.errors import CutError, StepError
+from reflowshock.fem.estimates.placement import Role
+from reflowshock.fem.mesh.mesh_file import read_mesh
+from reflowshock.fem.model.steps import steps_of_division
+from reflowshock.fem.problem.inputs import StructureInput
+from reflowshock.fem.problem.structure import LayerCoupling, PrescribedMotion, fine_layers
+from reflowshock.fem.problem.structure_pulses import pulse_durations, pulses_of
+from reflowshock.fem.setup.shock_models import Divided, told_to_all
 
 DividedStructure = Divided[StructureTables]
 

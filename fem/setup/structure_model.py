@@ -7,19 +7,19 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from fem.division.structure_tables import StructureTables, structure_tables, tied
-from fem.forces.force import Kinematics, linear_terms
-from fem.mesh.mesh import MeshData
-from fem.mesh.mesh_file import read_mesh
-from fem.model.body import Body, Pieces, Response, make_body, make_pieces
-from fem.model.power_iteration import highest_frequency
-from fem.model.steps import Steps
-from fem.model.structure_steps import check_step, explicit_steps, implicit_steps, with_critical
-from fem.parallel.agreement import agreed
-from fem.parallel.communicators import Communicators, Role
-from fem.parallel.local_mesh import distribute
-from fem.problem.inputs import StructureInput
-from fem.setup.shock_models import Divided, assembled, distributed
+from reflowshock.fem.division.structure_tables import StructureTables, structure_tables, tied
+from reflowshock.fem.forces.force import Kinematics, linear_terms
+from reflowshock.fem.mesh.mesh import MeshData
+from reflowshock.fem.mesh.mesh_file import read_mesh
+from reflowshock.fem.model.body import Body, Pieces, Response, make_body, make_pieces
+from reflowshock.fem.model.power_iteration import highest_frequency
+from reflowshock.fem.model.steps import Steps
+from reflowshock.fem.model.structure_steps import check_step, explicit_steps, implicit_steps, with_critical
+from reflowshock.fem.parallel.agreement import agreed
+from reflowshock.fem.parallel.communicators import Communicators, Role
+from reflowshock.fem.parallel.local_mesh import distribute
+from reflowshock.fem.problem.inputs import StructureInput
+from reflowshock.fem.setup.shock_models import Divided, assembled, distributed
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,22 +7,22 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from fem import dolfinx_api
-from fem.division.fine_joints import read_scene
-from fem.division.tables import JointTables, ModelInput, joined, model_inputs
-from fem.division.whole import Whole
-from fem.dynamics.participant import uncut_motion
-from fem.mesh.mesh import MeshData
-from fem.mesh.supports import SYMMETRY
-from fem.model.body import Body, Pieces, Response, make_body, make_pieces
-from fem.parallel.agreement import agreed
-from fem.parallel.local_mesh import distribute
-from fem.parallel.whereabouts import HERE
-from fem.problem.inputs import CoolingInput
-from fem.statics.cooling_report import Unbalanced, write_cooling
-from fem.statics.equilibrium import Equilibrium, Statics
-from fem.statics.initial_state import Cooling, begun
-from fem.statics.pins import pins
+from reflowshock.fem import dolfinx_api
+from reflowshock.fem.division.fine_joints import read_scene
+from reflowshock.fem.division.tables import JointTables, ModelInput, joined, model_inputs
+from reflowshock.fem.division.whole import Whole
+from reflowshock.fem.dynamics.participant import uncut_motion
+from reflowshock.fem.mesh.mesh import MeshData
+from reflowshock.fem.mesh.supports import SYMMETRY
+from reflowshock.fem.model.body import Body, Pieces, Response, make_body, make_pieces
+from reflowshock.fem.parallel.agreement import agreed
+from reflowshock.fem.parallel.local_mesh import distribute
+from reflowshock.fem.parallel.whereabouts import HERE
+from reflowshock.fem.problem.inputs import CoolingInput
+from reflowshock.fem.statics.cooling_report import Unbalanced, write_cooling
+from reflowshock.fem.statics.equilibrium import Equilibrium, Statics
+from reflowshock.fem.statics.initial_state import Cooling, begun
+from reflowshock.fem.statics.pins import pins
 
 
 def run_cooling(world: MPI.Comm, request: CoolingInput) -> None:

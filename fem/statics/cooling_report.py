@@ -9,19 +9,19 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from fem.cell_shape import TENSOR_ORDER
-from fem.division.tables import JointTables
-from fem.division.whole import Whole
-from fem.dynamics.participant import uncut_motion
-from fem.elements.stress import von_mises
-from fem.mesh.mesh import MeshData
-from fem.model.body import Body
-from fem.model.stress_recovery import StressRecovery
-from fem.output.result import checked, quantity
-from fem.output.watch_joints import LAYERS, JointWatch
-from fem.problem.inputs import CoolingInput
-from fem.statics.equilibrium import CONVERGED
-from fem.statics.initial_state import Cooling
+from reflowshock.fem.cell_shape import TENSOR_ORDER
+from reflowshock.fem.division.tables import JointTables
+from reflowshock.fem.division.whole import Whole
+from reflowshock.fem.dynamics.participant import uncut_motion
+from reflowshock.fem.elements.stress import von_mises
+from reflowshock.fem.mesh.mesh import MeshData
+from reflowshock.fem.model.body import Body
+from reflowshock.fem.model.stress_recovery import StressRecovery
+from reflowshock.fem.output.result import checked, quantity
+from reflowshock.fem.output.watch_joints import LAYERS, JointWatch
+from reflowshock.fem.problem.inputs import CoolingInput
+from reflowshock.fem.statics.equilibrium import CONVERGED
+from reflowshock.fem.statics.initial_state import Cooling
 
 UNBALANCED_LIMIT = 1e-8  # of the shock's own force terms, over the forces that hold expansion back
 STRESSES = LAYERS[:2]

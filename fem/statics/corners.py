@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.statics.thermoelastic import Thermoelastic
+from reflowshock.fem.statics.thermoelastic import Thermoelastic
 
 
 @dataclass(frozen=True, slots=True)

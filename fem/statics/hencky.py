@@ -6,15 +6,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.elements.element import CHUNK, Elements
-from fem.elements.one_point import hourglass_control, transformed
-from fem.elements.strain import strain_matrix
-from fem.errors import MeshError, ModesError
-from fem.forces.force_assembled import AssembledElements, upper_pattern
-from fem.kernels.force import assemble_upper_blocks
-from fem.kernels.hencky import Shape, State, hexahedra, hourglass_share, one_point
-from fem.kernels.plasticity import plastic_constants
-from fem.materials.parameters import Material
+from reflowshock.fem.elements.element import CHUNK, Elements
+from reflowshock.fem.elements.one_point import hourglass_control, transformed
+from reflowshock.fem.elements.strain import strain_matrix
+from reflowshock.fem.errors import MeshError, ModesError
+from reflowshock.fem.forces.force_assembled import AssembledElements, upper_pattern
+from reflowshock.fem.kernels.force import assemble_upper_blocks
+from reflowshock.fem.kernels.hencky import Shape, State, hexahedra, hourglass_share, one_point
+from reflowshock.fem.kernels.plasticity import plastic_constants
+from reflowshock.fem.materials.parameters import Material
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,18 +12,18 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.division.tables import ModelInput, TablesT_co
-from fem.division.whole import Whole
-from fem.elements.stress import element_stress
-from fem.errors import MeshError
-from fem.estimates.placement import Role
-from fem.forces.force import ForceTerm
-from fem.forces.force_nonlinear import NonlinearElements, by_lane
-from fem.loads.pretension import Pretension
-from fem.materials.parameters import Material
-from fem.model.body import Body
-from fem.statics.equilibrium import thermal_force
-from fem.statics.hencky import HenckyElements, free_expansion
+from reflowshock.fem.division.tables import ModelInput, TablesT_co
+from reflowshock.fem.division.whole import Whole
+from reflowshock.fem.elements.stress import element_stress
+from reflowshock.fem.errors import MeshError
+from reflowshock.fem.estimates.placement import Role
+from reflowshock.fem.forces.force import ForceTerm
+from reflowshock.fem.forces.force_nonlinear import NonlinearElements, by_lane
+from reflowshock.fem.loads.pretension import Pretension
+from reflowshock.fem.materials.parameters import Material
+from reflowshock.fem.model.body import Body
+from reflowshock.fem.statics.equilibrium import thermal_force
+from reflowshock.fem.statics.hencky import HenckyElements, free_expansion
 
 SAME = 1e-9  # of the size of a mesh: how far nodes of the file may be from its own
 

@@ -8,9 +8,9 @@ import scipy.sparse.linalg
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from fem.errors import AgreedError
-from fem.model.factorisation import make_direct
-from fem.model.global_matrix import Equations
+from reflowshock.fem.errors import AgreedError
+from reflowshock.fem.model.factorisation import make_direct
+from reflowshock.fem.model.global_matrix import Equations
 
 try:
     from slepc4py import SLEPc  # type: ignore[import-untyped]

@@ -13,9 +13,9 @@ import numpy as np
 import scipy.sparse
 from numpy.typing import NDArray
 
-from fem.errors import MeshError
-from fem.mesh.mesh import MeshData
-from fem.mesh.tie import bilinear, closest_facets
+from reflowshock.fem.errors import MeshError
+from reflowshock.fem.mesh.mesh import MeshData
+from reflowshock.fem.mesh.tie import bilinear, closest_facets
 
 SIDES = ("board_side", "package_side")
 RINGS, ANGLES = 4, 12  # quadrature points on a disc

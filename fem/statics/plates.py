@@ -5,13 +5,13 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.elements.element import element_geometry, lumped_mass
-from fem.elements.mesh_elements import elements_of
-from fem.materials.elasticity import materials_of_parts
-from fem.mesh.mesh_file import read_mesh
-from fem.statics.pads import pad_matrix
-from fem.statics.scene import connected, die_corners, thermal_tables
-from fem.statics.state import Assembly, RigidModes, State, check_loads
+from reflowshock.fem.elements.element import element_geometry, lumped_mass
+from reflowshock.fem.elements.mesh_elements import elements_of
+from reflowshock.fem.materials.elasticity import materials_of_parts
+from reflowshock.fem.mesh.mesh_file import read_mesh
+from reflowshock.fem.statics.pads import pad_matrix
+from reflowshock.fem.statics.scene import connected, die_corners, thermal_tables
+from reflowshock.fem.statics.state import Assembly, RigidModes, State, check_loads
 
 
 class RigidPlates:

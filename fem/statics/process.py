@@ -14,8 +14,8 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.parallel.own_job import end_with_parent, own_environment
-from fem.statics.state import Assembly, RigidModes, State
+from reflowshock.fem.parallel.own_job import end_with_parent, own_environment
+from reflowshock.fem.statics.state import Assembly, RigidModes, State
 
 GRACE = 5.0  # seconds that the process has to end when it is told to
 
@@ -106,7 +106,7 @@ def _serve(pipe: Connection, assembly: Assembly) -> None:
     os.environ.update(own)
     from mpi4py import MPI  # starts MPI, in an environment of its own
 
-    from fem.statics.structure import ThermalStructure
+    from reflowshock.fem.statics.structure import ThermalStructure
 
     with suppress(EOFError, BrokenPipeError):
         try:

@@ -6,15 +6,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.division.tables import Tables
-from fem.division.whole import Whole
-from fem.errors import MeshError
-from fem.materials.elasticity import role_of_part
-from fem.mesh.coupling_interface import find_cut
-from fem.mesh.mesh import MeshData, merge_nodes
-from fem.mesh.supports import SYMMETRY, held_components
-from fem.mesh.tie import Tie
-from fem.statics.rigid import RigidMotions
+from reflowshock.fem.division.tables import Tables
+from reflowshock.fem.division.whole import Whole
+from reflowshock.fem.errors import MeshError
+from reflowshock.fem.materials.elasticity import role_of_part
+from reflowshock.fem.mesh.coupling_interface import find_cut
+from reflowshock.fem.mesh.mesh import MeshData, merge_nodes
+from reflowshock.fem.mesh.supports import SYMMETRY, held_components
+from reflowshock.fem.mesh.tie import Tie
+from reflowshock.fem.statics.rigid import RigidMotions
 
 BOARD_PARTS = ("board", "board_patch", "copper_board")
 

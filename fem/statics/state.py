@@ -7,9 +7,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.materials.roles import Materials
-from fem.problem.thermal import Thermal
-from fem.statics.pads import Pads
+from reflowshock.fem.materials.roles import Materials
+from reflowshock.fem.problem.thermal import Thermal
+from reflowshock.fem.statics.pads import Pads
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,15 +16,15 @@ import scipy.sparse
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from fem.mesh.mesh import MeshData
-from fem.mesh.mesh_file import read_mesh
-from fem.model.factorisation import FactorCost
-from fem.parallel.agreement import agreed
-from fem.statics.corners import Corners
-from fem.statics.pads import pad_matrix
-from fem.statics.scene import ThermalTables, connected, die_corners, thermal_tables
-from fem.statics.state import Assembly, RigidModes, State, check_loads
-from fem.statics.thermoelastic import Thermoelastic
+from reflowshock.fem.mesh.mesh import MeshData
+from reflowshock.fem.mesh.mesh_file import read_mesh
+from reflowshock.fem.model.factorisation import FactorCost
+from reflowshock.fem.parallel.agreement import agreed
+from reflowshock.fem.statics.corners import Corners
+from reflowshock.fem.statics.pads import pad_matrix
+from reflowshock.fem.statics.scene import ThermalTables, connected, die_corners, thermal_tables
+from reflowshock.fem.statics.state import Assembly, RigidModes, State, check_loads
+from reflowshock.fem.statics.thermoelastic import Thermoelastic
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,16 +17,16 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from fem.elements.stress import symmetric
-from fem.materials.elasticity import materials_of_parts
-from fem.materials.roles import Materials
-from fem.mesh.mesh import MeshData
-from fem.model.body import Body, make_body, make_pieces
-from fem.model.factorisation import FactorCost, Factorisation
-from fem.model.global_matrix import Equations
-from fem.parallel.agreement import agreed
-from fem.parallel.local_mesh import distribute
-from fem.statics.scene import ThermalTables
+from reflowshock.fem.elements.stress import symmetric
+from reflowshock.fem.materials.elasticity import materials_of_parts
+from reflowshock.fem.materials.roles import Materials
+from reflowshock.fem.mesh.mesh import MeshData
+from reflowshock.fem.model.body import Body, make_body, make_pieces
+from reflowshock.fem.model.factorisation import FactorCost, Factorisation
+from reflowshock.fem.model.global_matrix import Equations
+from reflowshock.fem.parallel.agreement import agreed
+from reflowshock.fem.parallel.local_mesh import distribute
+from reflowshock.fem.statics.scene import ThermalTables
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,16 +5,16 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from scipy.integrate import trapezoid
 
-from fem.elements.element import critical_steps, element_geometry
-from fem.elements.kind import ElementKind
-from fem.materials.parameters import Isotropic, JohnsonCook, Material
-from fem.mesh.facet import area_vectors
-from fem.mesh.mesh import boundary_facets
-from fem.trials.bodies import force_of, nonlinear
-from fem.trials.boxes import KINDS, box, elements_of, mass_of, solve
-from fem.trials.distortion import laminate
-from fem.trials.grids import CYCLIC
-from fem.trials.parameters import Bending, Hinge
+from reflowshock.fem.elements.element import critical_steps, element_geometry
+from reflowshock.fem.elements.kind import ElementKind
+from reflowshock.fem.materials.parameters import Isotropic, JohnsonCook, Material
+from reflowshock.fem.mesh.facet import area_vectors
+from reflowshock.fem.mesh.mesh import boundary_facets
+from reflowshock.fem.trials.bodies import force_of, nonlinear
+from reflowshock.fem.trials.boxes import KINDS, box, elements_of, mass_of, solve
+from reflowshock.fem.trials.distortion import laminate
+from reflowshock.fem.trials.grids import CYCLIC
+from reflowshock.fem.trials.parameters import Bending, Hinge
 
 YOUNG = 1e9  # of beams [Pa]; nothing depends on it
 CURVATURE = 6.0  # of the hinge, over that at which the beam yields

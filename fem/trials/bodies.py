@@ -3,18 +3,18 @@
 import numpy as np
 from mpi4py import MPI
 
-from fem.division.tables import Tables, prepare
-from fem.dynamics.central_difference import Motion
-from fem.elements.element import Elements
-from fem.forces.force_nonlinear import NonlinearElements
-from fem.kernels.nonlinear import Path
-from fem.kernels.plasticity import plastic_constants
-from fem.materials.library import FR4
-from fem.materials.parameters import Material
-from fem.materials.roles import Materials
-from fem.mesh.mesh import MeshData
-from fem.model.body import Body, Pieces, Response, make_body, make_pieces
-from fem.parallel.local_mesh import distribute
+from reflowshock.fem.division.tables import Tables, prepare
+from reflowshock.fem.dynamics.central_difference import Motion
+from reflowshock.fem.elements.element import Elements
+from reflowshock.fem.forces.force_nonlinear import NonlinearElements
+from reflowshock.fem.kernels.nonlinear import Path
+from reflowshock.fem.kernels.plasticity import plastic_constants
+from reflowshock.fem.materials.library import FR4
+from reflowshock.fem.materials.parameters import Material
+from reflowshock.fem.materials.roles import Materials
+from reflowshock.fem.mesh.mesh import MeshData
+from reflowshock.fem.model.body import Body, Pieces, Response, make_body, make_pieces
+from reflowshock.fem.parallel.local_mesh import distribute
 
 
 def dns_pieces(mesh: MeshData, materials: Materials) -> tuple[Pieces, Tables]:

@@ -6,13 +6,13 @@ import numpy as np
 import scipy.sparse
 from scipy.sparse.linalg import eigsh, splu
 
-from fem.elements.box_step import diagonal_tetrahedra
-from fem.elements.element import Elements, element_geometry, element_kind, element_stiffness, lumped_mass
-from fem.elements.kind import ElementKind
-from fem.elements.tetrahedron import EDGES
-from fem.materials.elasticity import elasticity_matrix
-from fem.materials.parameters import Material
-from fem.trials.grids import Line, grid
+from reflowshock.fem.elements.box_step import diagonal_tetrahedra
+from reflowshock.fem.elements.element import Elements, element_geometry, element_kind, element_stiffness, lumped_mass
+from reflowshock.fem.elements.kind import ElementKind
+from reflowshock.fem.elements.tetrahedron import EDGES
+from reflowshock.fem.materials.elasticity import elasticity_matrix
+from reflowshock.fem.materials.parameters import Material
+from reflowshock.fem.trials.grids import Line, grid
 
 KINDS = {
     "incompatible_modes": element_kind(8),

@@ -7,26 +7,26 @@ from typing import NamedTuple, Protocol, cast
 import numpy as np
 from mpi4py import MPI
 
-from fem.coupling.gravouil_combescure import GravouilCombescure
-from fem.coupling.held_velocity import Answered
-from fem.coupling.impulse import Impulse
-from fem.coupling.scheme import Scheme
-from fem.division.division import Division
-from fem.division.tables import ModelInput, Tables, model_inputs
-from fem.dynamics.central_difference import Motion
-from fem.dynamics.energy_balance import ENERGIES, ledger_sums
-from fem.dynamics.participant import Participant
-from fem.estimates.estimate import WindowPlan
-from fem.loads.load import Load
-from fem.materials.roles import Materials
-from fem.mesh.mesh import MeshData
-from fem.mesh.tie import net_load
-from fem.model.body import Body, Pieces, Response, make_body, make_pieces
-from fem.parallel.communicators import Role
-from fem.parallel.exchange import CutChannels
-from fem.parallel.local_mesh import distribute
-from fem.problem.parameters import Coupling
-from fem.trials.divided import Divide, checked, surveyed
+from reflowshock.fem.coupling.gravouil_combescure import GravouilCombescure
+from reflowshock.fem.coupling.held_velocity import Answered
+from reflowshock.fem.coupling.impulse import Impulse
+from reflowshock.fem.coupling.scheme import Scheme
+from reflowshock.fem.division.division import Division
+from reflowshock.fem.division.tables import ModelInput, Tables, model_inputs
+from reflowshock.fem.dynamics.central_difference import Motion
+from reflowshock.fem.dynamics.energy_balance import ENERGIES, ledger_sums
+from reflowshock.fem.dynamics.participant import Participant
+from reflowshock.fem.estimates.estimate import WindowPlan
+from reflowshock.fem.loads.load import Load
+from reflowshock.fem.materials.roles import Materials
+from reflowshock.fem.mesh.mesh import MeshData
+from reflowshock.fem.mesh.tie import net_load
+from reflowshock.fem.model.body import Body, Pieces, Response, make_body, make_pieces
+from reflowshock.fem.parallel.communicators import Role
+from reflowshock.fem.parallel.exchange import CutChannels
+from reflowshock.fem.parallel.local_mesh import distribute
+from reflowshock.fem.problem.parameters import Coupling
+from reflowshock.fem.trials.divided import Divide, checked, surveyed
 
 MANY = 1e5  # elements that each of a mesh stands for where costs are weighed, so that levels are worth while
 

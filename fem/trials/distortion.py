@@ -3,12 +3,12 @@
 import numpy as np
 from scipy.optimize import brentq
 
-from fem.elements.element import Elements
-from fem.materials.parameters import Isotropic, Material, Orthotropic
-from fem.mesh.mesh_quality import scaled_jacobians
-from fem.trials.boxes import KINDS, box, elements_of
-from fem.trials.grids import Line, grid
-from fem.trials.parameters import Elastic
+from reflowshock.fem.elements.element import Elements
+from reflowshock.fem.materials.parameters import Isotropic, Material, Orthotropic
+from reflowshock.fem.mesh.mesh_quality import scaled_jacobians
+from reflowshock.fem.trials.boxes import KINDS, box, elements_of
+from reflowshock.fem.trials.grids import Line, grid
+from reflowshock.fem.trials.parameters import Elastic
 
 YOUNG, DENSITY = 10e9, 2000.0  # of bodies of trials [Pa], [kg/m^3]
 LARGEST = 1.0  # movement over the edge of a box: far more than any element bears

@@ -2,17 +2,17 @@
 
 from collections.abc import Callable
 
-from fem.division.checks import check_division
-from fem.division.divide import divide
-from fem.division.division import Division
-from fem.division.rules import Rules
-from fem.division.tables import joined
-from fem.division.whole import Survey, Treatment, Whole, survey
-from fem.materials.elasticity import role_of_part
-from fem.materials.parameters import Material
-from fem.materials.roles import Materials
-from fem.mesh.mesh import MeshData
-from fem.problem.parameters import Coupling
+from reflowshock.fem.division.checks import check_division
+from reflowshock.fem.division.divide import divide
+from reflowshock.fem.division.division import Division
+from reflowshock.fem.division.rules import Rules
+from reflowshock.fem.division.tables import joined
+from reflowshock.fem.division.whole import Survey, Treatment, Whole, survey
+from reflowshock.fem.materials.elasticity import role_of_part
+from reflowshock.fem.materials.parameters import Material
+from reflowshock.fem.materials.roles import Materials
+from reflowshock.fem.mesh.mesh import MeshData
+from reflowshock.fem.problem.parameters import Coupling
 
 Divide = Callable[[Whole, Survey, Rules], Division]
 DEFAULTS, HELD = Materials(), Coupling(scheme="held_velocity")

@@ -6,15 +6,15 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from fem.elements.element import Elements, element_geometry
-from fem.elements.stress import element_stress, symmetric
-from fem.forces.force import linear_terms
-from fem.forces.force_nonlinear import NonlinearElements
-from fem.mesh.mesh import boundary_facets
-from fem.trials.bodies import force_of, nonlinear
-from fem.trials.distortion import body_of, laminate
-from fem.trials.metals import LINEAR_HARDENING
-from fem.trials.parameters import Compression, Patch, Tension, Turns
+from reflowshock.fem.elements.element import Elements, element_geometry
+from reflowshock.fem.elements.stress import element_stress, symmetric
+from reflowshock.fem.forces.force import linear_terms
+from reflowshock.fem.forces.force_nonlinear import NonlinearElements
+from reflowshock.fem.mesh.mesh import boundary_facets
+from reflowshock.fem.trials.bodies import force_of, nonlinear
+from reflowshock.fem.trials.distortion import body_of, laminate
+from reflowshock.fem.trials.metals import LINEAR_HARDENING
+from reflowshock.fem.trials.parameters import Compression, Patch, Tension, Turns
 
 AXIS = np.array([0.48, -0.6, 0.64])
 LARGE = 0.3  # largest component of a displacement gradient of finite strain

@@ -3,24 +3,24 @@
 import numpy as np
 from mpi4py import MPI
 
-from fem.division.tables import Tables, prepare
-from fem.dynamics.central_difference import Motion
-from fem.dynamics.energy_balance import Ledger, ledger_sums
-from fem.dynamics.participant import Alone, uncut_motion
-from fem.estimates.estimate import WindowPlan, damped_critical_step
-from fem.loads.damping import RayleighDamping
-from fem.loads.load import Load
-from fem.materials.library import COPPER
-from fem.materials.roles import Materials
-from fem.mesh.mesh import MeshData
-from fem.mesh.tie import net_load
-from fem.model.body import Pieces, Response, make_body, make_pieces
-from fem.model.power_iteration import highest_frequency
-from fem.model.steps import mass_factor
-from fem.parallel.local_mesh import distribute
-from fem.trials.distortion import YOUNG, distorted, laminate
-from fem.trials.grids import mesh_of
-from fem.trials.parameters import Flight
+from reflowshock.fem.division.tables import Tables, prepare
+from reflowshock.fem.dynamics.central_difference import Motion
+from reflowshock.fem.dynamics.energy_balance import Ledger, ledger_sums
+from reflowshock.fem.dynamics.participant import Alone, uncut_motion
+from reflowshock.fem.estimates.estimate import WindowPlan, damped_critical_step
+from reflowshock.fem.loads.damping import RayleighDamping
+from reflowshock.fem.loads.load import Load
+from reflowshock.fem.materials.library import COPPER
+from reflowshock.fem.materials.roles import Materials
+from reflowshock.fem.mesh.mesh import MeshData
+from reflowshock.fem.mesh.tie import net_load
+from reflowshock.fem.model.body import Pieces, Response, make_body, make_pieces
+from reflowshock.fem.model.power_iteration import highest_frequency
+from reflowshock.fem.model.steps import mass_factor
+from reflowshock.fem.parallel.local_mesh import distribute
+from reflowshock.fem.trials.distortion import YOUNG, distorted, laminate
+from reflowshock.fem.trials.grids import mesh_of
+from reflowshock.fem.trials.parameters import Flight
 
 HEIGHT = 1e-3  # of a box [m]
 SPEED = np.array([1.0, -2.0, 3.0])  # of the body as a whole [m/s]

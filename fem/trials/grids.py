@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.mesh.mesh import MeshData, boundary_facets
+from reflowshock.fem.mesh.mesh import MeshData, boundary_facets
 
 CYCLIC = [0, 1, 3, 2]
 COPPER, GAP = 2e-5, 0.3e-3  # heights of a joint's pads and of its solder [m]

@@ -4,15 +4,15 @@ from collections.abc import Callable
 
 import numpy as np
 
-from fem.dynamics.central_difference import Motion
-from fem.forces.force import Kinematics
-from fem.materials.parameters import Material
-from fem.mesh.mesh import MeshData
-from fem.model.body import Body, Response
-from fem.trials.bodies import motion_of, nonlinear_body
-from fem.trials.grids import grid, mesh_of, on
-from fem.trials.metals import SOLDER
-from fem.trials.parameters import Impact
+from reflowshock.fem.dynamics.central_difference import Motion
+from reflowshock.fem.forces.force import Kinematics
+from reflowshock.fem.materials.parameters import Material
+from reflowshock.fem.mesh.mesh import MeshData
+from reflowshock.fem.model.body import Body, Response
+from reflowshock.fem.trials.bodies import motion_of, nonlinear_body
+from reflowshock.fem.trials.grids import grid, mesh_of, on
+from reflowshock.fem.trials.metals import SOLDER
+from reflowshock.fem.trials.parameters import Impact
 
 
 def impact(given: Impact) -> dict[str, float]:

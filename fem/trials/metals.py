@@ -1,6 +1,6 @@
 """Metals of trials."""
 
-from fem.materials.parameters import Isotropic, JohnsonCook
+from reflowshock.fem.materials.parameters import Isotropic, JohnsonCook
 
 SOLDER = Isotropic(
     density=7400.0,

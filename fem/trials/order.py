@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from fem.elements.element import element_geometry
-from fem.elements.stress import mean_strain
-from fem.materials.parameters import Isotropic
-from fem.mesh.mesh import boundary_facets
-from fem.trials.boxes import KINDS, box, elements_of, mass_of, solve
-from fem.trials.parameters import Order
+from reflowshock.fem.elements.element import element_geometry
+from reflowshock.fem.elements.stress import mean_strain
+from reflowshock.fem.materials.parameters import Isotropic
+from reflowshock.fem.mesh.mesh import boundary_facets
+from reflowshock.fem.trials.boxes import KINDS, box, elements_of, mass_of, solve
+from reflowshock.fem.trials.parameters import Order
 
 COUNTS = {4: (9, 13, 18), 8: (6, 9, 13), 10: (3, 5, 7)}  # of boxes each way, by the nodes of an element
 POISSON = 0.3

@@ -7,21 +7,21 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.coupling.held_velocity import Answered, HeldVelocity, Macro
-from fem.coupling.scheme import scheme_of
-from fem.dynamics.central_difference import Motion
-from fem.estimates.estimate import WindowPlan
-from fem.loads.load import Load
-from fem.materials.library import FR4
-from fem.materials.parameters import Isotropic, Orthotropic
-from fem.materials.roles import Materials
-from fem.mesh.mesh import MeshData, append
-from fem.model.body import Body
-from fem.parallel.exchange import CutChannels
-from fem.problem.parameters import Coupling
-from fem.trials.coupled import Coupled, Models, models_of
-from fem.trials.divided import surveyed
-from fem.trials.grids import grid, mesh_of, on
+from reflowshock.fem.coupling.held_velocity import Answered, HeldVelocity, Macro
+from reflowshock.fem.coupling.scheme import scheme_of
+from reflowshock.fem.dynamics.central_difference import Motion
+from reflowshock.fem.estimates.estimate import WindowPlan
+from reflowshock.fem.loads.load import Load
+from reflowshock.fem.materials.library import FR4
+from reflowshock.fem.materials.parameters import Isotropic, Orthotropic
+from reflowshock.fem.materials.roles import Materials
+from reflowshock.fem.mesh.mesh import MeshData, append
+from reflowshock.fem.model.body import Body
+from reflowshock.fem.parallel.exchange import CutChannels
+from reflowshock.fem.problem.parameters import Coupling
+from reflowshock.fem.trials.coupled import Coupled, Models, models_of
+from reflowshock.fem.trials.divided import surveyed
+from reflowshock.fem.trials.grids import grid, mesh_of, on
 
 SIZE, THICKNESS = 0.5e-3, 0.25e-3  # of a board element [m]
 FRACTION = 0.9  # of the critical step of elements, the program's default

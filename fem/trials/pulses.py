@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from fem.division.checks import check_pulses
-from fem.loads.load import BodyAcceleration
-from fem.mesh.mesh import MeshData
-from fem.problem.pulse import Constant, HalfSine, Haversine, Pulse, Tabulated
-from fem.trials.bodies import dns_body, motion_of
-from fem.trials.grids import grid, mesh_of
-from fem.trials.parameters import PulseTrial
+from reflowshock.fem.division.checks import check_pulses
+from reflowshock.fem.loads.load import BodyAcceleration
+from reflowshock.fem.mesh.mesh import MeshData
+from reflowshock.fem.problem.pulse import Constant, HalfSine, Haversine, Pulse, Tabulated
+from reflowshock.fem.trials.bodies import dns_body, motion_of
+from reflowshock.fem.trials.grids import grid, mesh_of
+from reflowshock.fem.trials.parameters import PulseTrial
 
 FRACTION = 0.9  # of the critical step, the program's default
 DIRECTION = np.array([0.6, 0.0, 0.8])

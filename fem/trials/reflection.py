@@ -2,17 +2,17 @@
 
 import numpy as np
 
-from fem.coupling.scheme import scheme_of
-from fem.materials.elasticity import elasticity_matrix
-from fem.materials.library import FR4
-from fem.materials.parameters import Isotropic
-from fem.materials.roles import Materials
-from fem.mesh.mesh import MeshData, append
-from fem.trials.coupled import Coupled, models_of
-from fem.trials.divided import surveyed
-from fem.trials.grids import grid, mesh_of, on
-from fem.trials.pairs import FRACTION, SCHEMES
-from fem.trials.parameters import Reflection
+from reflowshock.fem.coupling.scheme import scheme_of
+from reflowshock.fem.materials.elasticity import elasticity_matrix
+from reflowshock.fem.materials.library import FR4
+from reflowshock.fem.materials.parameters import Isotropic
+from reflowshock.fem.materials.roles import Materials
+from reflowshock.fem.mesh.mesh import MeshData, append
+from reflowshock.fem.trials.coupled import Coupled, models_of
+from reflowshock.fem.trials.divided import surveyed
+from reflowshock.fem.trials.grids import grid, mesh_of, on
+from reflowshock.fem.trials.pairs import FRACTION, SCHEMES
+from reflowshock.fem.trials.parameters import Reflection
 
 LENGTH = 0.25e-3  # of an element of the board along the bar [m]
 WIDTH = 0.5e-3  # of the bar [m]

@@ -3,16 +3,16 @@
 import numpy as np
 from mpi4py import MPI
 
-from fem.division.tables import prepare
-from fem.elements.stress import element_stress
-from fem.materials.roles import Materials
-from fem.mesh.mesh import MeshData, append
-from fem.model.body import Body, make_body, make_pieces
-from fem.parallel.local_mesh import distribute
-from fem.trials.boxes import stiffness_matrix
-from fem.trials.distortion import YOUNG, distorted, laminate
-from fem.trials.grids import mesh_of, on
-from fem.trials.parameters import Tied
+from reflowshock.fem.division.tables import prepare
+from reflowshock.fem.elements.stress import element_stress
+from reflowshock.fem.materials.roles import Materials
+from reflowshock.fem.mesh.mesh import MeshData, append
+from reflowshock.fem.model.body import Body, make_body, make_pieces
+from reflowshock.fem.parallel.local_mesh import distribute
+from reflowshock.fem.trials.boxes import stiffness_matrix
+from reflowshock.fem.trials.distortion import YOUNG, distorted, laminate
+from reflowshock.fem.trials.grids import mesh_of, on
+from reflowshock.fem.trials.parameters import Tied
 
 SIDE, HEIGHT, LAYERS = 3e-3, 2e-3, 3  # of a block [m], and its layers of elements
 PULL = 1e-3  # displacement of the upper face over the height of both blocks

@@ -5,16 +5,16 @@ from dataclasses import replace
 import numpy as np
 from mpi4py import MPI
 
-from fem.coupling.scheme import scheme_of
-from fem.coupling.self_check import self_check
-from fem.materials.library import FR4, SAC405
-from fem.materials.roles import Materials
-from fem.parallel.exchange import CutChannels
-from fem.parallel.portable import values
-from fem.problem.parameters import Coupling
-from fem.trials.coupled import Coupled, Models, models_of
-from fem.trials.pairs import FRACTION, SCHEMES, SIZE, Pair
-from fem.trials.parameters import PairRun, PairTransfer, PairTrial, Yielding
+from reflowshock.fem.coupling.scheme import scheme_of
+from reflowshock.fem.coupling.self_check import self_check
+from reflowshock.fem.materials.library import FR4, SAC405
+from reflowshock.fem.materials.roles import Materials
+from reflowshock.fem.parallel.exchange import CutChannels
+from reflowshock.fem.parallel.portable import values
+from reflowshock.fem.problem.parameters import Coupling
+from reflowshock.fem.trials.coupled import Coupled, Models, models_of
+from reflowshock.fem.trials.pairs import FRACTION, SCHEMES, SIZE, Pair
+from reflowshock.fem.trials.parameters import PairRun, PairTransfer, PairTrial, Yielding
 
 PUSH = np.array([0.3, 0.1, 1.0])  # [m/s]
 SAMPLES = 200  # of a run

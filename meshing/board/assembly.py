@@ -10,7 +10,7 @@ from pathlib import Path
 
 import gmsh
 
-from meshing.board.blocks import (
+from reflowshock.meshing.board.blocks import (
     MILLI,
     TOLERANCE,
     Block,
@@ -22,10 +22,10 @@ from meshing.board.blocks import (
     lies_within_hole,
     plan_surfaces,
 )
-from meshing.board.package_side import underside
-from meshing.board.parameters import Board, Package
-from meshing.board.plan import blocks_within, board_plan, footprint, hole_rings, package_plan, patch
-from meshing.core.gmsh_session import gmsh_model, name_groups, write_msh
+from reflowshock.meshing.board.package_side import underside
+from reflowshock.meshing.board.parameters import Board, Package
+from reflowshock.meshing.board.plan import blocks_within, board_plan, footprint, hole_rings, package_plan, patch
+from reflowshock.meshing.core.gmsh_session import gmsh_model, name_groups, write_msh
 
 
 def write_assembly(package: Package, board: Board, path: Path) -> dict[str, int]:

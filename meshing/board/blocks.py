@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import gmsh
 import numpy as np
 
-from meshing.board.plan import Interval, Plan
+from reflowshock.meshing.board.plan import Interval, Plan
 
 MILLI = 1.0e-3
 TOLERANCE = 1.0e-9  # m, far below any length of a package

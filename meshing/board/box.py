@@ -7,7 +7,7 @@ from pathlib import Path
 
 import gmsh
 
-from meshing.board.blocks import (
+from reflowshock.meshing.board.blocks import (
     MILLI,
     TOLERANCE,
     RoundHole,
@@ -18,8 +18,8 @@ from meshing.board.blocks import (
     lies_within_hole,
     plan_surfaces,
 )
-from meshing.board.box_plan import Box, box_plan
-from meshing.core.gmsh_session import gmsh_model, name_groups, write_msh
+from reflowshock.meshing.board.box_plan import Box, box_plan
+from reflowshock.meshing.core.gmsh_session import gmsh_model, name_groups, write_msh
 
 EVERYWHERE = 1.0e9  # mm
 SIDES = ("x_min", "x_max", "y_min", "y_max")

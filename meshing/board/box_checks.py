@@ -3,8 +3,8 @@
 import re
 from collections.abc import Iterator
 
-from meshing.board.box_plan import Box
-from meshing.board.checks import SMALLEST_INSET, Problem
+from reflowshock.meshing.board.box_plan import Box
+from reflowshock.meshing.board.checks import SMALLEST_INSET, Problem
 
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 FACETS = ("x_min", "x_max", "y_min", "y_max", "z_min", "z_max", "mounting_holes")

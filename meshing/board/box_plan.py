@@ -4,8 +4,8 @@ import math
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from meshing.board.estimate import PartEstimate
-from meshing.board.plan import Interval, Plan, uniform
+from reflowshock.meshing.board.estimate import PartEstimate
+from reflowshock.meshing.board.plan import Interval, Plan, uniform
 
 ElementKind = Literal["hexahedron", "tetrahedron", "tetrahedron_quadratic"]
 TETRAHEDRA = 6  # of which a box is made: two prisms of three

@@ -4,9 +4,9 @@ import difflib
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from meshing.board.pads import joint_name, lift, pad_table
-from meshing.board.parameters import Board, Package, Pad, Warpage
-from meshing.board.plan import hole_square, uniform
+from reflowshock.meshing.board.pads import joint_name, lift, pad_table
+from reflowshock.meshing.board.parameters import Board, Package, Pad, Warpage
+from reflowshock.meshing.board.plan import hole_square, uniform
 
 SMALLEST_INSET = 0.75  # of a hole's diameter: leaves a quarter of it as a wall between hole and edge
 

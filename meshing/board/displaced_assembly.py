@@ -5,10 +5,10 @@ from pathlib import Path
 import gmsh
 import numpy as np
 
-from meshing.board.blocks import check_elements
-from meshing.board.displacement import Displacement
-from meshing.board.package_side import PackageSide
-from meshing.core.gmsh_session import gmsh_model, write_msh
+from reflowshock.meshing.board.blocks import check_elements
+from reflowshock.meshing.board.displacement import Displacement
+from reflowshock.meshing.board.package_side import PackageSide
+from reflowshock.meshing.core.gmsh_session import gmsh_model, write_msh
 
 PACKAGE_PARTS = ("substrate", "die", "copper_package")
 

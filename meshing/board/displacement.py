@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import cKDTree
 
-from meshing.board.pads import lift
-from meshing.board.parameters import Package, Warpage
-from meshing.core.structured_face import MERGE, StructuredFace
+from reflowshock.meshing.board.pads import lift
+from reflowshock.meshing.board.parameters import Package, Warpage
+from reflowshock.meshing.core.structured_face import MERGE, StructuredFace
 
 Displacement = Callable[[np.ndarray], np.ndarray]  # reference places (n, 3) [m] -> displacements (n, 3) [m]
 

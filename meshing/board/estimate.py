@@ -3,9 +3,18 @@
 from collections.abc import Collection
 from dataclasses import dataclass
 
-from meshing.board.pads import has_rim, pad_table
-from meshing.board.parameters import Board, JointNumerics, Package, Warpage
-from meshing.board.plan import Interval, Plan, blocks_within, board_plan, footprint, hole_rings, package_plan, patch
+from reflowshock.meshing.board.pads import has_rim, pad_table
+from reflowshock.meshing.board.parameters import Board, JointNumerics, Package, Warpage
+from reflowshock.meshing.board.plan import (
+    Interval,
+    Plan,
+    blocks_within,
+    board_plan,
+    footprint,
+    hole_rings,
+    package_plan,
+    patch,
+)
 
 FLAT = Warpage()
 

@@ -7,8 +7,8 @@ everywhere, six layers) to a tenth of a nanometre, with a twentieth of the equat
 
 from pathlib import Path
 
-from meshing.board.assembly import write_assembly
-from meshing.board.parameters import Board, Package
+from reflowshock.meshing.board.assembly import write_assembly
+from reflowshock.meshing.board.parameters import Board, Package
 
 COARSE = 2.0  # thicknesses of the board
 

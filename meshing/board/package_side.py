@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from meshing.board.pads import lift
-from meshing.board.parameters import Board, Package, Warpage
-from meshing.board.plan import Interval, package_plan
-from meshing.core.structured_face import StructuredFace
+from reflowshock.meshing.board.pads import lift
+from reflowshock.meshing.board.parameters import Board, Package, Warpage
+from reflowshock.meshing.board.plan import Interval, package_plan
+from reflowshock.meshing.core.structured_face import StructuredFace
 
 STEPS = 30  # of the search for the point that was displaced to a place; each gains the digits of the strain
 EXACT = 1.0e-15  # m

@@ -9,7 +9,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from meshing.board.parameters import Board, Package, Warpage
+from reflowshock.meshing.board.parameters import Board, Package, Warpage
 
 # JEDEC JEP95 design guide 4.5: row letters skip those that look like digits or other letters.
 ROW_LETTERS = "ABCDEFGHJKLMNPRTUVWY"

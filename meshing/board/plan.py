@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from meshing.board.parameters import Board, BoardNumerics, Package
+from reflowshock.meshing.board.parameters import Board, BoardNumerics, Package
 
 MOST_LINES = 100_000
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import gmsh
 import numpy as np
 
-from meshing.core.gmsh_session import gmsh_model, name_groups, write_msh
-from meshing.core.split_tetrahedra import EDGES, SplitTetrahedra
+from reflowshock.meshing.core.gmsh_session import gmsh_model, name_groups, write_msh
+from reflowshock.meshing.core.split_tetrahedra import EDGES, SplitTetrahedra
 
 KIND, FACE = 11, 9  # Gmsh's ten-node tetrahedron and six-node triangle
 ORDER = np.array([0, 3, 1, 2, 5, 4])  # Gmsh's edges 01 12 20 03 23 13 among ours, 01 02 03 12 13 23

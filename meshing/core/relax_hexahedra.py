@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from meshing.core.hexahedra import CORNER_NEIGHBOURS
+from reflowshock.meshing.core.hexahedra import CORNER_NEIGHBOURS
 
 WANTED = 0.35  # scaled Jacobian up to which corners pull at their nodes
 WATCHED = 0.55  # corners up to this one take part in a round

@@ -6,16 +6,23 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
-from meshing.board.parameters import JointNumerics
-from meshing.joint.butterfly import circumradius
-from meshing.joint.free_form import free_form_solder
-from meshing.joint.joint_mesh import JointMesh, JointMeshError, check_errors
-from meshing.joint.levels import Placing
-from meshing.joint.shape_errors import shape_errors
-from meshing.joint.solder import Solder
-from meshing.joint.swept import swept_solder
-from meshing.joint.tetrahedra import fill_apart
-from meshing.surface.closed_surface import BOARD_PAD, PACKAGE_PAD, ClosedSurface, enclosed_volume, pad_planes, pieces_of
+from reflowshock.meshing.board.parameters import JointNumerics
+from reflowshock.meshing.joint.butterfly import circumradius
+from reflowshock.meshing.joint.free_form import free_form_solder
+from reflowshock.meshing.joint.joint_mesh import JointMesh, JointMeshError, check_errors
+from reflowshock.meshing.joint.levels import Placing
+from reflowshock.meshing.joint.shape_errors import shape_errors
+from reflowshock.meshing.joint.solder import Solder
+from reflowshock.meshing.joint.swept import swept_solder
+from reflowshock.meshing.joint.tetrahedra import fill_apart
+from reflowshock.meshing.surface.closed_surface import (
+    BOARD_PAD,
+    PACKAGE_PAD,
+    ClosedSurface,
+    enclosed_volume,
+    pad_planes,
+    pieces_of,
+)
 
 MOST_LAYERS = 64
 FREE_FORM_SIZES = (1.0, 0.75, 1.25)  # of two layers: split in two, an edge is as long as a layer is high

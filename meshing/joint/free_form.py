@@ -5,16 +5,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from meshing.core.hexahedra import quad_areas, volumes
-from meshing.core.nearest import nearest_on_line, nearest_on_triangles
-from meshing.core.outlines import outlines, pieces
-from meshing.core.quadratic_tetrahedra import curved_volume, quadratic_tetrahedra
-from meshing.core.relax_hexahedra import Freedom, relax_hexahedra
-from meshing.core.split_tetrahedra import split_tetrahedra
-from meshing.joint.levels import Placing, volume_keeping_scale
-from meshing.joint.solder import Side, Solder, WettedFace
-from meshing.joint.tetrahedra import Tetrahedra
-from meshing.surface.closed_surface import (
+from reflowshock.meshing.core.hexahedra import quad_areas, volumes
+from reflowshock.meshing.core.nearest import nearest_on_line, nearest_on_triangles
+from reflowshock.meshing.core.outlines import outlines, pieces
+from reflowshock.meshing.core.quadratic_tetrahedra import curved_volume, quadratic_tetrahedra
+from reflowshock.meshing.core.relax_hexahedra import Freedom, relax_hexahedra
+from reflowshock.meshing.core.split_tetrahedra import split_tetrahedra
+from reflowshock.meshing.joint.levels import Placing, volume_keeping_scale
+from reflowshock.meshing.joint.solder import Side, Solder, WettedFace
+from reflowshock.meshing.joint.tetrahedra import Tetrahedra
+from reflowshock.meshing.surface.closed_surface import (
     BOARD_PAD,
     FREE,
     PACKAGE_PAD,

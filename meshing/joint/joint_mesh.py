@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from meshing.board.pads import PadSite, has_rim
-from meshing.core.hexahedra import quad_areas, scaled_jacobian, shortest_lengths, volumes
-from meshing.core.quadratic_tetrahedra import QuadraticTetrahedra, tetrahedra_quality
-from meshing.joint.joint_place import JointPlace
-from meshing.joint.solder import Solder, WettedFace
+from reflowshock.meshing.board.pads import PadSite, has_rim
+from reflowshock.meshing.core.hexahedra import quad_areas, scaled_jacobian, shortest_lengths, volumes
+from reflowshock.meshing.core.quadratic_tetrahedra import QuadraticTetrahedra, tetrahedra_quality
+from reflowshock.meshing.joint.joint_place import JointPlace
+from reflowshock.meshing.joint.solder import Solder, WettedFace
 
 MINIMUM_SCALED_JACOBIAN = 0.2
 LARGEST_ERROR = 3.0e-3  # of volume, standoff and contact areas

@@ -5,9 +5,9 @@ from typing import Protocol
 
 import numpy as np
 
-from meshing.board.pad_planes import PadPlanes
-from meshing.board.pads import PadSite
-from meshing.surface.closed_surface import ClosedSurface, pad_planes
+from reflowshock.meshing.board.pad_planes import PadPlanes
+from reflowshock.meshing.board.pads import PadSite
+from reflowshock.meshing.surface.closed_surface import ClosedSurface, pad_planes
 
 
 class Underside(Protocol):

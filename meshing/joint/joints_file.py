@@ -5,8 +5,8 @@ from pathlib import Path
 import gmsh
 import numpy as np
 
-from meshing.core.gmsh_session import HEXAHEDRON, QUADRANGLE, gmsh_model, name_groups, write_msh
-from meshing.joint.solder_mesh import JointMesh
+from reflowshock.meshing.core.gmsh_session import HEXAHEDRON, QUADRANGLE, gmsh_model, name_groups, write_msh
+from reflowshock.meshing.joint.solder_mesh import JointMesh
 
 
 def write_joints(meshes: list[JointMesh], path: Path) -> dict[str, float]:

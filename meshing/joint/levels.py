@@ -5,10 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from meshing.core.hexahedra import volumes
-from meshing.core.section import cut_segments, radius_by_angle, section_area, section_centroid
-from meshing.joint.butterfly import Butterfly
-from meshing.surface.closed_surface import ClosedSurface, enclosed_volume, pad_planes
+from reflowshock.meshing.core.hexahedra import volumes
+from reflowshock.meshing.core.section import cut_segments, radius_by_angle, section_area, section_centroid
+from reflowshock.meshing.joint.butterfly import Butterfly
+from reflowshock.meshing.surface.closed_surface import ClosedSurface, enclosed_volume, pad_planes
 
 END = 1.0e-9  # of the height: how far inside the end sections are cut, where the plane still crosses the triangles
 LARGEST_CORRECTION = 0.1

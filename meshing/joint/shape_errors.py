@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from meshing.core.hexahedra import boundary_quads, quad_areas
-from meshing.core.nearest import nearest_on_triangles
-from meshing.joint.solder import Solder
-from meshing.surface.closed_surface import BOARD_PAD, PACKAGE_PAD, ClosedSurface, pad_area, pad_planes
+from reflowshock.meshing.core.hexahedra import boundary_quads, quad_areas
+from reflowshock.meshing.core.nearest import nearest_on_triangles
+from reflowshock.meshing.joint.solder import Solder
+from reflowshock.meshing.surface.closed_surface import BOARD_PAD, PACKAGE_PAD, ClosedSurface, pad_area, pad_planes
 
 
 def shape_errors(surface: ClosedSurface, solder: Solder) -> dict[str, float]:

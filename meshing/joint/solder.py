@@ -5,8 +5,8 @@ from typing import Literal
 
 import numpy as np
 
-from meshing.board.pad_planes import PadPlanes
-from meshing.core.quadratic_tetrahedra import QuadraticTetrahedra
+from reflowshock.meshing.board.pad_planes import PadPlanes
+from reflowshock.meshing.core.quadratic_tetrahedra import QuadraticTetrahedra
 
 Side = Literal["board", "package"]
 

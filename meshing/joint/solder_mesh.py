@@ -7,13 +7,13 @@ from functools import partial
 
 import numpy as np
 
-from meshing.board.pads import PadSite
-from meshing.board.parameters import Package
-from meshing.joint.attempts import attempts, first_good
-from meshing.joint.joint_mesh import JointMesh, JointMeshError, build_joint, joint_quality
-from meshing.joint.joint_place import JointPlace, Underside
-from meshing.joint.swept import swept_solder
-from meshing.surface.closed_surface import BOARD_PAD, PACKAGE_PAD, ClosedSurface
+from reflowshock.meshing.board.pads import PadSite
+from reflowshock.meshing.board.parameters import Package
+from reflowshock.meshing.joint.attempts import attempts, first_good
+from reflowshock.meshing.joint.joint_mesh import JointMesh, JointMeshError, build_joint, joint_quality
+from reflowshock.meshing.joint.joint_place import JointPlace, Underside
+from reflowshock.meshing.joint.swept import swept_solder
+from reflowshock.meshing.surface.closed_surface import BOARD_PAD, PACKAGE_PAD, ClosedSurface
 
 __all__ = [
     "JointMesh",

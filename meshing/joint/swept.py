@@ -1,10 +1,10 @@
 """Swept solder: butterfly sections of a body, stacked from the board's pad to the package's."""
 
-from meshing.board.parameters import JointNumerics
-from meshing.joint.butterfly import butterfly
-from meshing.joint.levels import Placing, layer_cells, solder_levels
-from meshing.joint.solder import Solder, WettedFace
-from meshing.surface.closed_surface import ClosedSurface, pad_planes
+from reflowshock.meshing.board.parameters import JointNumerics
+from reflowshock.meshing.joint.butterfly import butterfly
+from reflowshock.meshing.joint.levels import Placing, layer_cells, solder_levels
+from reflowshock.meshing.joint.solder import Solder, WettedFace
+from reflowshock.meshing.surface.closed_surface import ClosedSurface, pad_planes
 
 
 def swept_solder(surface: ClosedSurface, numerics: JointNumerics, place: Placing, overhang: float = 0.0) -> Solder:

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import gmsh
 import numpy as np
 
-from meshing.board.blocks import MILLI
-from meshing.core.gmsh_session import gmsh_model
-from meshing.surface.closed_surface import BOARD_PAD, FREE, PACKAGE_PAD, ClosedSurface, pad_planes
+from reflowshock.meshing.board.blocks import MILLI
+from reflowshock.meshing.core.gmsh_session import gmsh_model
+from reflowshock.meshing.surface.closed_surface import BOARD_PAD, FREE, PACKAGE_PAD, ClosedSurface, pad_planes
 
 TRIANGLE, TETRAHEDRON = 2, 4  # Gmsh's element types
 LONGEST = 300.0  # seconds

@@ -9,9 +9,9 @@ import meshio
 import numpy as np
 from numpy.polynomial import Legendre
 
-from meshing.board.pad_planes import PadPlanes
-from meshing.core.outlines import pieces
-from meshing.core.section import cut_segments, section_area
+from reflowshock.meshing.board.pad_planes import PadPlanes
+from reflowshock.meshing.core.outlines import pieces
+from reflowshock.meshing.core.section import cut_segments, section_area
 
 FREE, BOARD_PAD, PACKAGE_PAD = 0, 1, 2
 SMALLEST_TRIANGLE = 1.0e-8  # of the mean area

@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 
-from meshing.surface.closed_surface import ClosedSurface, close_surface
-from meshing.surface.truncated_sphere import TruncatedSphere
+from reflowshock.meshing.surface.closed_surface import ClosedSurface, close_surface
+from reflowshock.meshing.surface.truncated_sphere import TruncatedSphere
 
 AROUND, LEVELS = 96, 97  # vertices of a circle, circles
 

@@ -5,8 +5,8 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.spatial import cKDTree
 
-from meshing.core.outlines import pieces
-from meshing.surface.closed_surface import SurfaceError, edge_numbers, volume_of
+from reflowshock.meshing.core.outlines import pieces
+from reflowshock.meshing.surface.closed_surface import SurfaceError, edge_numbers, volume_of
 
 STEP = 1.5  # between two sizes of triangles
 SMALLEST = 1.0e-6  # of the largest radius: below it triangles are of one size

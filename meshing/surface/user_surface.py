@@ -10,10 +10,10 @@ from typing import Literal
 import meshio
 import numpy as np
 
-from meshing.board.pad_planes import PadPlanes
-from meshing.board.pads import PadSite
-from meshing.core.outlines import pieces
-from meshing.surface.closed_surface import (
+from reflowshock.meshing.board.pad_planes import PadPlanes
+from reflowshock.meshing.board.pads import PadSite
+from reflowshock.meshing.core.outlines import pieces
+from reflowshock.meshing.surface.closed_surface import (
     BOARD_PAD,
     FREE,
     PACKAGE_PAD,
@@ -23,7 +23,7 @@ from meshing.surface.closed_surface import (
     check_surface,
     volume_of,
 )
-from meshing.surface.surface_faults import check_triangulation
+from reflowshock.meshing.surface.surface_faults import check_triangulation
 
 Unit = Literal["um", "mm", "m"]
 UNITS: dict[Unit, float] = {"um": 1.0e-6, "mm": 1.0e-3, "m": 1.0}

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from meshing.trials.level_sets import sphere
-from meshing.trials.models import MM
+from reflowshock.meshing.trials.level_sets import sphere
+from reflowshock.meshing.trials.models import MM
 
 Triangulation = tuple[np.ndarray, np.ndarray]
 

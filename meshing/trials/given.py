@@ -6,15 +6,15 @@ from pathlib import Path
 import meshio
 import numpy as np
 
-from meshing.board.pads import PadSite, pad_table
-from meshing.board.parameters import Warpage
-from meshing.joint.solder_mesh import mesh_joint
-from meshing.surface.closed_surface import ClosedSurface
-from meshing.surface.user_surface import load_surface
-from meshing.trials.faults import FAULTS
-from meshing.trials.joints import Meshed
-from meshing.trials.models import MM, board, package, side_of
-from meshing.trials.surfaces import barrel
+from reflowshock.meshing.board.pads import PadSite, pad_table
+from reflowshock.meshing.board.parameters import Warpage
+from reflowshock.meshing.joint.solder_mesh import mesh_joint
+from reflowshock.meshing.surface.closed_surface import ClosedSurface
+from reflowshock.meshing.surface.user_surface import load_surface
+from reflowshock.meshing.trials.faults import FAULTS
+from reflowshock.meshing.trials.joints import Meshed
+from reflowshock.meshing.trials.models import MM, board, package, side_of
+from reflowshock.meshing.trials.surfaces import barrel
 
 NAME = "A4"
 

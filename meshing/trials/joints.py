@@ -5,16 +5,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from meshing.board.pad_planes import PadPlanes
-from meshing.board.pads import PadSite, lift, pad_table
-from meshing.board.parameters import JointNumerics, Warpage
-from meshing.core.hexahedra import scaled_jacobian, volumes
-from meshing.joint.joint_mesh import JointMesh, joint_quality
-from meshing.joint.joint_place import Underside as Placed
-from meshing.joint.solder_mesh import mesh_bridge, mesh_joint
-from meshing.surface.closed_surface import ClosedSurface, enclosed_volume, pad_planes
-from meshing.trials.models import MM, board, package, side_of
-from meshing.trials.surfaces import barrel
+from reflowshock.meshing.board.pad_planes import PadPlanes
+from reflowshock.meshing.board.pads import PadSite, lift, pad_table
+from reflowshock.meshing.board.parameters import JointNumerics, Warpage
+from reflowshock.meshing.core.hexahedra import scaled_jacobian, volumes
+from reflowshock.meshing.joint.joint_mesh import JointMesh, joint_quality
+from reflowshock.meshing.joint.joint_place import Underside as Placed
+from reflowshock.meshing.joint.solder_mesh import mesh_bridge, mesh_joint
+from reflowshock.meshing.surface.closed_surface import ClosedSurface, enclosed_volume, pad_planes
+from reflowshock.meshing.trials.models import MM, board, package, side_of
+from reflowshock.meshing.trials.surfaces import barrel
 
 PAIR = 1.0 * MM  # distance of two joints that are one body
 

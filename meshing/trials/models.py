@@ -1,7 +1,7 @@
 """A small package on a small board, to be varied."""
 
-from meshing.board.package_side import PackageSide
-from meshing.board.parameters import Board, Package, Warpage
+from reflowshock.meshing.board.package_side import PackageSide
+from reflowshock.meshing.board.parameters import Board, Package, Warpage
 
 MM = 1.0e-3
 PLATE = {"thickness": 0.02 * MM, "layout": "plate"}

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from meshing.board.pad_planes import PadPlanes
-from meshing.surface.closed_surface import ClosedSurface, close_surface
+from reflowshock.meshing.board.pad_planes import PadPlanes
+from reflowshock.meshing.surface.closed_surface import ClosedSurface, close_surface
 
 
 def revolve(profile: np.ndarray, gap: float, around: int = 48, offset: float = 0.0):

@@ -13,7 +13,7 @@ from pathlib import Path
 from time import monotonic
 from typing import Any
 
-from particles.core.data_file import NotData, read_data, read_header, write_data
+from reflowshock.data_file import NotData, read_data, read_header, write_data
 
 logger = logging.getLogger(__name__)
 

@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from particles.core.geometry import JointGeometry, joint_counts
-from particles.core.plate import Plate, joint_plates
-from particles.core.surface_measure import enclosed_volume
+from reflowshock.particles.core.geometry import JointGeometry, joint_counts
+from reflowshock.particles.core.plate import Plate, joint_plates
+from reflowshock.particles.core.surface_measure import enclosed_volume
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int32]

@@ -4,8 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
-from particles.core.cloud import Cloud
-from particles.core.surface_measure import enclosed_volume
+from reflowshock.particles.core.cloud import Cloud
+from reflowshock.particles.core.surface_measure import enclosed_volume
 
 Floats = NDArray[np.float64]
 

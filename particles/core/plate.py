@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from particles.core.geometry import JointGeometry
+from reflowshock.particles.core.geometry import JointGeometry
 
 Floats = NDArray[np.float64]
 

@@ -10,7 +10,7 @@ from numba import njit
 from numpy.typing import NDArray
 from scipy import sparse
 
-from particles.core.plate import Plate
+from reflowshock.particles.core.plate import Plate
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int32]

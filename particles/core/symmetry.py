@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from particles.core.cloud import Cloud
+from reflowshock.particles.core.cloud import Cloud
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from particles.core.body import Body
-from particles.core.tetrahedra import SMALLEST_VOLUME, cell_volumes, thick_cells, volume_gradients
-from particles.discretisation.discretisation import Discretisation
+from reflowshock.particles.core.body import Body
+from reflowshock.particles.core.tetrahedra import SMALLEST_VOLUME, cell_volumes, thick_cells, volume_gradients
+from reflowshock.particles.discretisation.discretisation import Discretisation
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int32]

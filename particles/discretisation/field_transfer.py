@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from particles.core.tetrahedra import cell_volumes, thick_cells, volume_gradients
+from reflowshock.particles.core.tetrahedra import cell_volumes, thick_cells, volume_gradients
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int32]

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy import sparse
 
-from particles.discretisation.incompressibility import (
+from reflowshock.particles.discretisation.incompressibility import (
     MAX_ITERATIONS,
     RELATIVE_TOLERANCE,
     RESIDUAL_LIMIT,

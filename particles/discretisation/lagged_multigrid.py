@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy import sparse
 
-from particles.discretisation.incompressibility import SolveFailed, petsc
+from reflowshock.particles.discretisation.incompressibility import SolveFailed, petsc
 
 Floats = NDArray[np.float64]
 

@@ -5,7 +5,13 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy import sparse
 
-from particles.discretisation.incompressibility import SaddlePoint, Solution, SolveFailed, check_residuals, petsc
+from reflowshock.particles.discretisation.incompressibility import (
+    SaddlePoint,
+    Solution,
+    SolveFailed,
+    check_residuals,
+    petsc,
+)
 
 Floats = NDArray[np.float64]
 

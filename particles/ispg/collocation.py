@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from particles.core.neighbours import NeighbourList
-from particles.core.plate import Plate
-from particles.ispg.ghosts import mirror
-from particles.ispg.mls import SUPPORT, derivatives, shape_functions
+from reflowshock.particles.core.neighbours import NeighbourList
+from reflowshock.particles.core.plate import Plate
+from reflowshock.particles.ispg.ghosts import mirror
+from reflowshock.particles.ispg.mls import SUPPORT, derivatives, shape_functions
 
 Floats = NDArray[np.float64]
 Matrix: TypeAlias = sparse.csr_matrix

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from particles.core.plate import Plate
+from reflowshock.particles.core.plate import Plate
 
 Floats = NDArray[np.float64]
 

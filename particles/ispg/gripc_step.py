@@ -16,19 +16,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from particles.core.body import Body
-from particles.core.data_file import fields_of
-from particles.core.neighbours import NeighbourList
-from particles.ispg.collocation import Operators, collocate
-from particles.ispg.mls import SUPPORT
-from particles.ispg.pressure_poisson import Correction, Poisson, correct_pressure
-from particles.ispg.surface_pressure import force_pressure, viscous_pressure
-from particles.ispg.velocity_prediction import predict_velocity
-from particles.ispg.velocity_smoothing import Velocities, smooth
-from particles.physics.mass import Mass
-from particles.physics.physics import Physics
-from particles.physics.viscosity import Viscosity
-from particles.steps.step_solver import Motion
+from reflowshock.data_file import fields_of
+from reflowshock.particles.core.body import Body
+from reflowshock.particles.core.neighbours import NeighbourList
+from reflowshock.particles.ispg.collocation import Operators, collocate
+from reflowshock.particles.ispg.mls import SUPPORT
+from reflowshock.particles.ispg.pressure_poisson import Correction, Poisson, correct_pressure
+from reflowshock.particles.ispg.surface_pressure import force_pressure, viscous_pressure
+from reflowshock.particles.ispg.velocity_prediction import predict_velocity
+from reflowshock.particles.ispg.velocity_smoothing import Velocities, smooth
+from reflowshock.particles.physics.mass import Mass
+from reflowshock.particles.physics.physics import Physics
+from reflowshock.particles.physics.viscosity import Viscosity
+from reflowshock.particles.steps.step_solver import Motion
 
 Floats = NDArray[np.float64]
 

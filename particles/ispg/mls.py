@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from particles.core.neighbours import NeighbourList
-from particles.ispg.mls_linear import linear_weights
-from particles.ispg.mls_quadratic import quadratic_weights
-from particles.ispg.mls_shape import shape_weights
+from reflowshock.particles.core.neighbours import NeighbourList
+from reflowshock.particles.ispg.mls_linear import linear_weights
+from reflowshock.particles.ispg.mls_quadratic import quadratic_weights
+from reflowshock.particles.ispg.mls_shape import shape_weights
 
 Floats = NDArray[np.float64]
 

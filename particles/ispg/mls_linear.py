@@ -6,7 +6,7 @@ The gradient converges; the Laplacian does not (its relative error stays at ever
 import numpy as np
 from numba import njit
 
-from particles.core.cholesky import factor_spd, substitute
+from reflowshock.particles.core.cholesky import factor_spd, substitute
 
 
 @njit(cache=True)

@@ -6,7 +6,7 @@ Generalised finite differences: the gradient is of order 2, the Laplacian of ord
 import numpy as np
 from numba import njit
 
-from particles.core.cholesky import factor_spd, substitute
+from reflowshock.particles.core.cholesky import factor_spd, substitute
 
 
 @njit(cache=True)

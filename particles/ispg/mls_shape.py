@@ -3,7 +3,7 @@
 import numpy as np
 from numba import njit
 
-from particles.core.cholesky import factor_spd, substitute
+from reflowshock.particles.core.cholesky import factor_spd, substitute
 
 
 @njit(cache=True)

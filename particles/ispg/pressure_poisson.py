@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from particles.discretisation.krylov import solve_gmres
-from particles.ispg.collocation import Operators
+from reflowshock.particles.discretisation.krylov import solve_gmres
+from reflowshock.particles.ispg.collocation import Operators
 
 Floats = NDArray[np.float64]
 

@@ -8,9 +8,9 @@ surface force makes p the pressure above the hydrostatic one.
 import numpy as np
 from numpy.typing import NDArray
 
-from particles.core.body import Body
-from particles.physics.physics import Physics
-from particles.surface.surface_quality import vertex_normals
+from reflowshock.particles.core.body import Body
+from reflowshock.particles.physics.physics import Physics
+from reflowshock.particles.surface.surface_quality import vertex_normals
 
 Floats = NDArray[np.float64]
 

@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from particles.discretisation.krylov import solve_gmres
-from particles.ispg.collocation import Operators
+from reflowshock.particles.discretisation.krylov import solve_gmres
+from reflowshock.particles.ispg.collocation import Operators
 
 Floats = NDArray[np.float64]
 

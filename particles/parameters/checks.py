@@ -4,10 +4,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from math import degrees, pi
 
-from particles.core.geometry import JointGeometry
-from particles.parameters.effects import Decision, acting_weight, decide_effects
-from particles.parameters.solder import Solder
-from particles.reference.young_laplace import NoMeridian, joint_meridian
+from reflowshock.particles.core.geometry import JointGeometry
+from reflowshock.particles.parameters.effects import Decision, acting_weight, decide_effects
+from reflowshock.particles.parameters.solder import Solder
+from reflowshock.particles.reference.young_laplace import NoMeridian, joint_meridian
 
 SPACINGS_IN_NECK = 2.0
 SPACINGS_IN_GAP = 3.0

@@ -2,7 +2,12 @@
 
 from typing import Any
 
-from particles.parameters.effects import LARGEST_BOND, NEGLIGIBLE_SHAPE_CHANGE, PROCESS_TIME_RATIO, SHAPE_CHANGE_BY_BOND
+from reflowshock.particles.parameters.effects import (
+    LARGEST_BOND,
+    NEGLIGIBLE_SHAPE_CHANGE,
+    PROCESS_TIME_RATIO,
+    SHAPE_CHANGE_BY_BOND,
+)
 
 ENTRIES: tuple[dict[str, Any], ...] = (
     {
@@ -11,7 +16,7 @@ ENTRIES: tuple[dict[str, Any], ...] = (
         "number": f"{SHAPE_CHANGE_BY_BOND:g} Bo, Bo = rho g L H / gamma",
         "threshold": NEGLIGIBLE_SHAPE_CHANGE,
         "influence": f"{SHAPE_CHANGE_BY_BOND:g} Bo of the shape, up to (large contact angles)",
-        "place": "particles.physics.force_gravity.Gravity",
+        "place": "reflowshock.particles.physics.force_gravity.Gravity",
         "switch": "solder.effects.gravity (of a scene: gravity) = auto, on, off",
         "source": "Bashforth & Adams 1883, heights of sessile drops",
     },
@@ -22,7 +27,7 @@ ENTRIES: tuple[dict[str, Any], ...] = (
         "threshold": PROCESS_TIME_RATIO,
         "acts": "below",
         "influence": "exp(-T / slowest time): what is left of the motion",
-        "place": "particles.physics.mass.Inertia",
+        "place": "reflowshock.particles.physics.mass.Inertia",
         "switch": "solder.effects.inertia = auto, on, off",
         "source": "Lamb 1932, art. 355, decay of mode 2",
     },
@@ -33,7 +38,7 @@ ENTRIES: tuple[dict[str, Any], ...] = (
         "threshold": PROCESS_TIME_RATIO,
         "acts": "below",
         "influence": "exp(-T / slowest time): at rest it does nothing",
-        "place": "particles.physics.viscosity.Viscosity",
+        "place": "reflowshock.particles.physics.viscosity.Viscosity",
         "switch": "solder.effects.viscosity = auto, on, off",
         "source": "Lamb 1932, art. 355",
     },
@@ -44,7 +49,7 @@ ENTRIES: tuple[dict[str, Any], ...] = (
         "threshold": LARGEST_BOND,
         "acts": "below",
         "influence": "1 / sqrt(1 + Bo) of the shape: the capillary length over the size",
-        "place": "particles.physics.force_surface_tension.SurfaceTension",
+        "place": "reflowshock.particles.physics.force_surface_tension.SurfaceTension",
         "switch": "solder.effects.surface_tension = auto, on, off",
         "source": "de Gennes, Brochard-Wyart & Quere 2004, 2.1",
     },
@@ -55,7 +60,7 @@ ENTRIES: tuple[dict[str, Any], ...] = (
         "threshold": LARGEST_BOND,
         "acts": "below",
         "influence": "1 / sqrt(1 + Bo) of the shape, unless theta = 90 deg",
-        "place": "particles.physics.force_wetting.Wetting",
+        "place": "reflowshock.particles.physics.force_wetting.Wetting",
         "switch": "solder.effects.wall_adhesion = auto, on, off",
         "source": "Young 1805; Brakke 1992",
     },

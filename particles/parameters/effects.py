@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 from math import exp, pi, sqrt
 from typing import NotRequired, TypedDict
 
-from particles.core.geometry import JointGeometry
-from particles.parameters.solder import Solder
+from reflowshock.particles.core.geometry import JointGeometry
+from reflowshock.particles.parameters.solder import Solder
 
 # Height of a drop changes by 0.08, 0.13, 0.19 Bo at contact angles of 60, 120, 148 deg (Bashforth-Adams table); what
 # changes less than 0.1 % of the shape is left out.

@@ -1,7 +1,7 @@
 """Particle count and cost of a reflow before it runs. Loads neither numba nor PETSc."""
 
-from particles.core.geometry import JointGeometry, joint_counts
-from particles.parameters.solder import Solder
+from reflowshock.particles.core.geometry import JointGeometry, joint_counts
+from reflowshock.particles.parameters.solder import Solder
 
 # Measured by benchmarks/bench_reflow_scale.py on one core of a 2-core x86-64 machine.
 SECONDS_PER_STEP = 0.02

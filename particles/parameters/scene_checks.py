@@ -4,16 +4,16 @@ from dataclasses import replace
 from math import asin, degrees, inf, pi, sin
 from typing import Protocol
 
-from particles.parameters import checks
-from particles.parameters.checks import Problem, mm, mm3
-from particles.parameters.effects import acting_weight, decide_drop, decide_effects
-from particles.parameters.estimate import particle_count
-from particles.parameters.scene_drops import Drops
-from particles.parameters.scene_oscillation import Oscillation
-from particles.parameters.scenes import Drop, Joint
-from particles.parameters.solder import Solder
-from particles.reference.rayleigh import lamb_decay_rate, rayleigh_frequency
-from particles.reference.young_laplace import NoMeridian, joint_meridian, sessile_meridian
+from reflowshock.particles.parameters import checks
+from reflowshock.particles.parameters.checks import Problem, mm, mm3
+from reflowshock.particles.parameters.effects import acting_weight, decide_drop, decide_effects
+from reflowshock.particles.parameters.estimate import particle_count
+from reflowshock.particles.parameters.scene_drops import Drops
+from reflowshock.particles.parameters.scene_oscillation import Oscillation
+from reflowshock.particles.parameters.scenes import Drop, Joint
+from reflowshock.particles.parameters.solder import Solder
+from reflowshock.particles.reference.rayleigh import lamb_decay_rate, rayleigh_frequency
+from reflowshock.particles.reference.young_laplace import NoMeridian, joint_meridian, sessile_meridian
 
 FEWEST_PER_EDGE = 5
 MOST_PARTICLES = 200_000

@@ -4,8 +4,8 @@ from typing import Annotated
 
 from pydantic import Field
 
-from particles.parameters.scenes import PI
-from particles.parameters.solder import Parameters
+from reflowshock.particles.parameters.scenes import PI
+from reflowshock.particles.parameters.solder import Parameters
 
 
 class Drops(Parameters):

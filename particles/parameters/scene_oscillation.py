@@ -5,9 +5,9 @@ from typing import Annotated
 
 from pydantic import Field
 
-from particles.parameters.scenes import Liquid
-from particles.parameters.solder import Parameters, Solder, SolderNumerics
-from particles.reference.rayleigh import rayleigh_frequency
+from reflowshock.particles.parameters.scenes import Liquid
+from reflowshock.particles.parameters.solder import Parameters, Solder, SolderNumerics
+from reflowshock.particles.reference.rayleigh import rayleigh_frequency
 
 
 class Oscillation(Parameters):

@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from particles.parameters.solder import Parameters
+from reflowshock.particles.parameters.solder import Parameters
 
 PI = 3.14159265
 Direction = Literal["lift", "shift", "turn"]

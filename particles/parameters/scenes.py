@@ -9,9 +9,9 @@ from typing import Annotated, Literal, Protocol
 
 from pydantic import Field
 
-from particles.core.geometry import JointGeometry
-from particles.parameters.scene_package import PI, FloatingPackage, PackagePath
-from particles.parameters.solder import (
+from reflowshock.particles.core.geometry import JointGeometry
+from reflowshock.particles.parameters.scene_package import PI, FloatingPackage, PackagePath
+from reflowshock.particles.parameters.solder import (
     FlowEffects,
     FlowNumerics,
     Parameters,

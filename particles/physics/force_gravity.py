@@ -6,8 +6,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from particles.core.body import Body
-from particles.core.surface_measure import area_vector, wall_corners
+from reflowshock.particles.core.body import Body
+from reflowshock.particles.core.surface_measure import area_vector, wall_corners
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int32]

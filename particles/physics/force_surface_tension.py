@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from particles.core.body import Body
-from particles.core.surface_measure import cotangent_laplacian, surface_area
-from particles.discretisation.discretisation import Discretisation
+from reflowshock.particles.core.body import Body
+from reflowshock.particles.core.surface_measure import cotangent_laplacian, surface_area
+from reflowshock.particles.discretisation.discretisation import Discretisation
 
 Floats = NDArray[np.float64]
 

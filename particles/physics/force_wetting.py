@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from particles.core.body import Body
-from particles.core.symmetry import fold
-from particles.physics.physics import Force
-from particles.surface.contact_line import ContactLine
+from reflowshock.particles.core.body import Body
+from reflowshock.particles.core.symmetry import fold
+from reflowshock.particles.physics.physics import Force
+from reflowshock.particles.surface.contact_line import ContactLine
 
 Floats = NDArray[np.float64]
 

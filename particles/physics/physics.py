@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from particles.core.body import Body
-from particles.core.plate import slide
-from particles.core.symmetry import fold
-from particles.discretisation.discretisation import Discretisation
-from particles.physics.plate_motion import PlateMotion
-from particles.surface.contact_line import ContactLine
+from reflowshock.particles.core.body import Body
+from reflowshock.particles.core.plate import slide
+from reflowshock.particles.core.symmetry import fold
+from reflowshock.particles.discretisation.discretisation import Discretisation
+from reflowshock.particles.physics.plate_motion import PlateMotion
+from reflowshock.particles.surface.contact_line import ContactLine
 
 Floats = NDArray[np.float64]
 

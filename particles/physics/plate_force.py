@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from particles.core.body import Body
-from particles.physics.physics import Force
+from reflowshock.particles.core.body import Body
+from reflowshock.particles.physics.physics import Force
 
 Floats = NDArray[np.float64]
 

@@ -6,7 +6,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from particles.core.plate import Plate
+from reflowshock.particles.core.plate import Plate
 
 Floats = NDArray[np.float64]
 

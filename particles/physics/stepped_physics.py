@@ -5,12 +5,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from particles.core.body import Body
-from particles.core.plate import Plate
-from particles.discretisation.discretisation import Discretisation
-from particles.physics.force_surface_tension import SurfaceTension
-from particles.physics.physics import Physics
-from particles.physics.plate_motion import PlateMotion
+from reflowshock.particles.core.body import Body
+from reflowshock.particles.core.plate import Plate
+from reflowshock.particles.discretisation.discretisation import Discretisation
+from reflowshock.particles.physics.force_surface_tension import SurfaceTension
+from reflowshock.particles.physics.physics import Physics
+from reflowshock.particles.physics.plate_motion import PlateMotion
 
 Floats = NDArray[np.float64]
 

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 from scipy import sparse
 
-from particles.core.body import Body
-from particles.discretisation.discretisation import Discretisation
+from reflowshock.particles.core.body import Body
+from reflowshock.particles.discretisation.discretisation import Discretisation
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from particles.core.body import Body
-from particles.discretisation.discretisation import Discretisation
+from reflowshock.particles.core.body import Body
+from reflowshock.particles.discretisation.discretisation import Discretisation
 
 Floats = NDArray[np.float64]
 

@@ -5,19 +5,19 @@ from dataclasses import replace
 
 import numpy as np
 
-from particles.core.body import Body
-from particles.core.cloud import Cloud
-from particles.core.geometry import JointGeometry
-from particles.core.plate import Pad, Plate
-from particles.parameters.effects import decide_effects, switched
-from particles.parameters.solder import Solder
-from particles.scenes.drops import run_drops
-from particles.scenes.metrics import bridge_metrics
-from particles.scenes.rebuild import rebuild
-from particles.scenes.reflow import collect_shape, pad_lines, start_flow, stop_rule
-from particles.steps.flow import LiquidFlow
-from particles.steps.rest import run_to_rest
-from particles.steps.shape import JointShape, Snapshot
+from reflowshock.particles.core.body import Body
+from reflowshock.particles.core.cloud import Cloud
+from reflowshock.particles.core.geometry import JointGeometry
+from reflowshock.particles.core.plate import Pad, Plate
+from reflowshock.particles.parameters.effects import decide_effects, switched
+from reflowshock.particles.parameters.solder import Solder
+from reflowshock.particles.scenes.drops import run_drops
+from reflowshock.particles.scenes.metrics import bridge_metrics
+from reflowshock.particles.scenes.rebuild import rebuild
+from reflowshock.particles.scenes.reflow import collect_shape, pad_lines, start_flow, stop_rule
+from reflowshock.particles.steps.flow import LiquidFlow
+from reflowshock.particles.steps.rest import run_to_rest
+from reflowshock.particles.steps.shape import JointShape, Snapshot
 
 SPACINGS_IN_GAP = 4
 

@@ -11,18 +11,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from particles.core.checkpoint import Checkpoint
-from particles.core.cloud import TooLittleSolder
-from particles.core.geometry import JointGeometry
-from particles.parameters.effects import decide_effects, switched
-from particles.parameters.solder import Solder
-from particles.physics.force_wetting import Wetting
-from particles.physics.plate_force import plate_wrench
-from particles.scenes.moving_joint import travel
-from particles.scenes.reflow import joint_flow, joint_shape, parted, solve_joint, start_joint, stop_rule
-from particles.steps.flow import LiquidFlow
-from particles.steps.rest import RECORDS, Run, StopRule, run_to_rest
-from particles.steps.shape import JointShape
+from reflowshock.particles.core.checkpoint import Checkpoint
+from reflowshock.particles.core.cloud import TooLittleSolder
+from reflowshock.particles.core.geometry import JointGeometry
+from reflowshock.particles.parameters.effects import decide_effects, switched
+from reflowshock.particles.parameters.solder import Solder
+from reflowshock.particles.physics.force_wetting import Wetting
+from reflowshock.particles.physics.plate_force import plate_wrench
+from reflowshock.particles.scenes.moving_joint import travel
+from reflowshock.particles.scenes.reflow import joint_flow, joint_shape, parted, solve_joint, start_joint, stop_rule
+from reflowshock.particles.steps.flow import LiquidFlow
+from reflowshock.particles.steps.rest import RECORDS, Run, StopRule, run_to_rest
+from reflowshock.particles.steps.shape import JointShape
 
 Floats = NDArray[np.float64]
 

@@ -5,20 +5,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from particles.core.checkpoint import Checkpoint
-from particles.core.cloud import Cloud, box_cloud, free_box_cloud
-from particles.core.symmetry import cut
-from particles.parameters.effects import Decision, acting_weight, decide_drop, switched
-from particles.parameters.scenes import Drop
-from particles.parameters.solder import Solder
-from particles.reference.young_laplace import Meridian, sessile_meridian, sphere_meridian
-from particles.scenes.metrics import Metrics, body_metrics, reference_drop, with_shape_error
-from particles.scenes.reflow import collect_shape, contact_line, start_flow, stop_rule
-from particles.steps.flow import LiquidFlow
-from particles.steps.rest import Run, run_to_rest
-from particles.steps.shape import JointShape
-from particles.surface.contact_line import ContactLine
-from particles.surface.contact_line_hysteresis import HystereticLine
+from reflowshock.particles.core.checkpoint import Checkpoint
+from reflowshock.particles.core.cloud import Cloud, box_cloud, free_box_cloud
+from reflowshock.particles.core.symmetry import cut
+from reflowshock.particles.parameters.effects import Decision, acting_weight, decide_drop, switched
+from reflowshock.particles.parameters.scenes import Drop
+from reflowshock.particles.parameters.solder import Solder
+from reflowshock.particles.reference.young_laplace import Meridian, sessile_meridian, sphere_meridian
+from reflowshock.particles.scenes.metrics import Metrics, body_metrics, reference_drop, with_shape_error
+from reflowshock.particles.scenes.reflow import collect_shape, contact_line, start_flow, stop_rule
+from reflowshock.particles.steps.flow import LiquidFlow
+from reflowshock.particles.steps.rest import Run, run_to_rest
+from reflowshock.particles.steps.shape import JointShape
+from reflowshock.particles.surface.contact_line import ContactLine
+from reflowshock.particles.surface.contact_line_hysteresis import HystereticLine
 
 ANGLE_OF_CUBE = 0.5 * np.pi
 

@@ -7,21 +7,21 @@ from math import inf
 
 import numpy as np
 
-from particles.core.checkpoint import Checkpoint
-from particles.core.cloud import Cloud, box_cloud
-from particles.core.cloud_sphere import sphere_cloud
-from particles.core.surface_measure import centre_of_volume
-from particles.parameters.effects import Decision, acting_weight, decide_drop, switched
-from particles.parameters.scene_drops import Drops
-from particles.parameters.solder import Solder
-from particles.reference.young_laplace import Meridian, sphere_meridian
-from particles.scenes.drops import Drop, run_drops
-from particles.scenes.metrics import Metrics, body_metrics, particle_pressure, reference_drop
-from particles.scenes.reflow import contact_line, start_flow, stop_rule
-from particles.steps.flow import LiquidFlow
-from particles.steps.rest import Run
-from particles.steps.shape import JointShape, Snapshot, numbered_on, together
-from particles.surface.profile import fit_profile
+from reflowshock.particles.core.checkpoint import Checkpoint
+from reflowshock.particles.core.cloud import Cloud, box_cloud
+from reflowshock.particles.core.cloud_sphere import sphere_cloud
+from reflowshock.particles.core.surface_measure import centre_of_volume
+from reflowshock.particles.parameters.effects import Decision, acting_weight, decide_drop, switched
+from reflowshock.particles.parameters.scene_drops import Drops
+from reflowshock.particles.parameters.solder import Solder
+from reflowshock.particles.reference.young_laplace import Meridian, sphere_meridian
+from reflowshock.particles.scenes.drops import Drop, run_drops
+from reflowshock.particles.scenes.metrics import Metrics, body_metrics, particle_pressure, reference_drop
+from reflowshock.particles.scenes.reflow import contact_line, start_flow, stop_rule
+from reflowshock.particles.steps.flow import LiquidFlow
+from reflowshock.particles.steps.rest import Run
+from reflowshock.particles.steps.shape import JointShape, Snapshot, numbered_on, together
+from reflowshock.particles.surface.profile import fit_profile
 
 WORST = ("_error", "_drift", "_scatter", "_at_rest")
 

@@ -6,13 +6,13 @@ from itertools import combinations
 from time import perf_counter
 from typing import Any
 
-from particles.core.body import Body
-from particles.core.checkpoint import Checkpoint
-from particles.core.data_file import columns, fields_of, rows
-from particles.scenes.rebuild import collapsing, overlap, rebuild, touch
-from particles.steps.flow import LiquidFlow, StepRecord
-from particles.steps.rest import CALM_STEPS, RECORDS, NoRest, StopRule, fraction_done, is_calm
-from particles.steps.shape import Snapshot
+from reflowshock.data_file import columns, fields_of, rows
+from reflowshock.particles.core.body import Body
+from reflowshock.particles.core.checkpoint import Checkpoint
+from reflowshock.particles.scenes.rebuild import collapsing, overlap, rebuild, touch
+from reflowshock.particles.steps.flow import LiquidFlow, StepRecord
+from reflowshock.particles.steps.rest import CALM_STEPS, RECORDS, NoRest, StopRule, fraction_done, is_calm
+from reflowshock.particles.steps.shape import Snapshot
 
 LARGEST_OVERLAP = 0.5  # spacings
 

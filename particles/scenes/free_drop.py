@@ -9,18 +9,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from particles.core.body import Body
-from particles.core.checkpoint import Checkpoint
-from particles.core.cloud_sphere import sphere_cloud
-from particles.core.data_file import fields_of
-from particles.parameters.solder import Solder
-from particles.reference.damped_oscillation import fit_oscillation
-from particles.reference.rayleigh import rayleigh_frequency, viscous_oscillation
-from particles.scenes.reflow import build_physics
-from particles.steps.flow import FLOW_RECORDS
-from particles.steps.inertial_flow import InertialFlow
-from particles.steps.shape import Snapshot
-from particles.surface.surface_quality import vertex_normals
+from reflowshock.data_file import fields_of
+from reflowshock.particles.core.body import Body
+from reflowshock.particles.core.checkpoint import Checkpoint
+from reflowshock.particles.core.cloud_sphere import sphere_cloud
+from reflowshock.particles.parameters.solder import Solder
+from reflowshock.particles.reference.damped_oscillation import fit_oscillation
+from reflowshock.particles.reference.rayleigh import rayleigh_frequency, viscous_oscillation
+from reflowshock.particles.scenes.reflow import build_physics
+from reflowshock.particles.steps.flow import FLOW_RECORDS
+from reflowshock.particles.steps.inertial_flow import InertialFlow
+from reflowshock.particles.steps.shape import Snapshot
+from reflowshock.particles.surface.surface_quality import vertex_normals
 
 Floats = NDArray[np.float64]
 

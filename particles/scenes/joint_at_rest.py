@@ -6,18 +6,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import brentq
 
-from particles.core.checkpoint import Checkpoint
-from particles.core.geometry import JointGeometry
-from particles.parameters.effects import Decision, acting_weight, decide_effects
-from particles.parameters.scene_package import FloatingPackage
-from particles.parameters.scenes import Joint
-from particles.parameters.solder import Solder
-from particles.physics.plate_motion import LIFT, SHIFT, TURN, Floating
-from particles.reference.young_laplace import Meridian
-from particles.scenes.metrics import Metrics, reference_meridian, with_shape_error
-from particles.scenes.moving_joint import follow_path, settle_joint
-from particles.scenes.reflow import solve_joint
-from particles.steps.shape import JointShape
+from reflowshock.particles.core.checkpoint import Checkpoint
+from reflowshock.particles.core.geometry import JointGeometry
+from reflowshock.particles.parameters.effects import Decision, acting_weight, decide_effects
+from reflowshock.particles.parameters.scene_package import FloatingPackage
+from reflowshock.particles.parameters.scenes import Joint
+from reflowshock.particles.parameters.solder import Solder
+from reflowshock.particles.physics.plate_motion import LIFT, SHIFT, TURN, Floating
+from reflowshock.particles.reference.young_laplace import Meridian
+from reflowshock.particles.scenes.metrics import Metrics, reference_meridian, with_shape_error
+from reflowshock.particles.scenes.moving_joint import follow_path, settle_joint
+from reflowshock.particles.scenes.reflow import solve_joint
+from reflowshock.particles.steps.shape import JointShape
 
 DIRECTIONS = {"lift": LIFT, "shift": SHIFT, "turn": TURN}
 BRACKET = 0.2  # around the collapse height that was found, in which the exact one is sought

@@ -6,10 +6,10 @@ from math import isfinite, pi
 import numpy as np
 from numpy.typing import NDArray
 
-from particles.core.geometry import JointGeometry
-from particles.parameters.effects import acting_weight, decide_effects
-from particles.parameters.solder import Solder
-from particles.scenes.metrics import reference_meridian
+from reflowshock.particles.core.geometry import JointGeometry
+from reflowshock.particles.parameters.effects import acting_weight, decide_effects
+from reflowshock.particles.parameters.solder import Solder
+from reflowshock.particles.scenes.metrics import reference_meridian
 
 STEP = 0.01  # of the gap
 

@@ -6,22 +6,22 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from particles.core.body import Body
-from particles.core.geometry import LARGEST_WIDTH_CHANGE, JointGeometry
-from particles.core.surface_measure import ring_area
-from particles.core.symmetry import whole_points
-from particles.parameters.solder import Solder
-from particles.physics.force_gravity import Gravity
-from particles.physics.force_wetting import Wetting
-from particles.physics.physics import Force
-from particles.physics.plate_force import plate_wrench
-from particles.reference.young_laplace import Meridian, NoMeridian, joint_meridian, pad_meridian
-from particles.steps.flow import LiquidFlow
-from particles.steps.rest import Run
-from particles.steps.shape import JointShape
-from particles.steps.time_step import capillary_limit
-from particles.surface.contact_line import ON_MASK, ON_PAD, ContactLine
-from particles.surface.shape_error import shape_error
+from reflowshock.particles.core.body import Body
+from reflowshock.particles.core.geometry import LARGEST_WIDTH_CHANGE, JointGeometry
+from reflowshock.particles.core.surface_measure import ring_area
+from reflowshock.particles.core.symmetry import whole_points
+from reflowshock.particles.parameters.solder import Solder
+from reflowshock.particles.physics.force_gravity import Gravity
+from reflowshock.particles.physics.force_wetting import Wetting
+from reflowshock.particles.physics.physics import Force
+from reflowshock.particles.physics.plate_force import plate_wrench
+from reflowshock.particles.reference.young_laplace import Meridian, NoMeridian, joint_meridian, pad_meridian
+from reflowshock.particles.steps.flow import LiquidFlow
+from reflowshock.particles.steps.rest import Run
+from reflowshock.particles.steps.shape import JointShape
+from reflowshock.particles.steps.time_step import capillary_limit
+from reflowshock.particles.surface.contact_line import ON_MASK, ON_PAD, ContactLine
+from reflowshock.particles.surface.shape_error import shape_error
 
 Floats = NDArray[np.float64]
 Metrics = dict[str, tuple[float, str]]

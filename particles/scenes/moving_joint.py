@@ -4,15 +4,15 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from math import degrees, hypot
 
-from particles.core.checkpoint import Checkpoint
-from particles.core.geometry import JointGeometry
-from particles.core.plate import joint_plates, placed_geometry
-from particles.parameters.solder import Solder
-from particles.physics.plate_motion import PlateMotion, Travel
-from particles.scenes.reflow import joint_shape, start_joint
-from particles.steps.flow import LiquidFlow
-from particles.steps.rest import run_to_rest
-from particles.steps.shape import JointShape
+from reflowshock.particles.core.checkpoint import Checkpoint
+from reflowshock.particles.core.geometry import JointGeometry
+from reflowshock.particles.core.plate import joint_plates, placed_geometry
+from reflowshock.particles.parameters.solder import Solder
+from reflowshock.particles.physics.plate_motion import PlateMotion, Travel
+from reflowshock.particles.scenes.reflow import joint_shape, start_joint
+from reflowshock.particles.steps.flow import LiquidFlow
+from reflowshock.particles.steps.rest import run_to_rest
+from reflowshock.particles.steps.shape import JointShape
 
 SPACINGS_IN_A_STEP = 0.2
 ALIGNED = 0.01  # of a radius, and rad

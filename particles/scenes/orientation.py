@@ -10,8 +10,8 @@ from math import atan2, hypot
 import numpy as np
 from numpy.typing import NDArray
 
-from particles.core.geometry import JointGeometry
-from particles.steps.shape import JointShape, Snapshot
+from reflowshock.particles.core.geometry import JointGeometry
+from reflowshock.particles.steps.shape import JointShape, Snapshot
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int32]

@@ -4,13 +4,13 @@ from collections.abc import Callable
 
 import numpy as np
 
-from particles.core.checkpoint import Checkpoint
-from particles.parameters.scene_oscillation import Oscillation, rayleigh_period
-from particles.parameters.solder import Solder
-from particles.scenes.free_drop import solve_free_drop
-from particles.scenes.metrics import Metrics
-from particles.steps.shape import JointShape
-from particles.steps.time_step import capillary_limit
+from reflowshock.particles.core.checkpoint import Checkpoint
+from reflowshock.particles.parameters.scene_oscillation import Oscillation, rayleigh_period
+from reflowshock.particles.parameters.solder import Solder
+from reflowshock.particles.scenes.free_drop import solve_free_drop
+from reflowshock.particles.scenes.metrics import Metrics
+from reflowshock.particles.steps.shape import JointShape
+from reflowshock.particles.steps.time_step import capillary_limit
 
 METRICS = (
     "period",

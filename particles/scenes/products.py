@@ -7,8 +7,8 @@ import h5py
 import meshio
 import numpy as np
 
-from particles.reference.young_laplace import Meridian
-from particles.steps.shape import JointShape, Snapshot
+from reflowshock.particles.reference.young_laplace import Meridian
+from reflowshock.particles.steps.shape import JointShape, Snapshot
 
 BODY = "body"
 REFERENCE = "reference"
@@ -61,7 +61,7 @@ def write_body(folder: Path, shape: JointShape, reference: Meridian | None) -> N
     if reference is not None:
         with h5py.File(folder / "shape.h5", "a") as file:
             file[REFERENCE] = np.stack((reference.r, reference.z))
-    write_particles(folder / "particles.vtu", shape)
+    write_particles(folder / "reflowshock.particles.vtu", shape)
 
 
 def read_body(folder: Path) -> tuple[JointShape, np.ndarray | None]:

@@ -7,11 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from particles.core.body import Body
-from particles.core.plate import Plate
-from particles.core.surface_measure import centre_of_volume
-from particles.surface.cloud_level_set import CannotRebuild, cloud_from_level_set
-from particles.surface.level_set import Grid, LevelSet, depths, signed_distance, smooth_union
+from reflowshock.particles.core.body import Body
+from reflowshock.particles.core.plate import Plate
+from reflowshock.particles.core.surface_measure import centre_of_volume
+from reflowshock.particles.surface.cloud_level_set import CannotRebuild, cloud_from_level_set
+from reflowshock.particles.surface.level_set import Grid, LevelSet, depths, signed_distance, smooth_union
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int32]

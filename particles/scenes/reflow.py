@@ -5,32 +5,32 @@ from dataclasses import replace
 
 import numpy as np
 
-from particles.core.body import Body
-from particles.core.checkpoint import Checkpoint
-from particles.core.cloud import Cloud, TooLittleSolder, box_cloud, joint_cloud
-from particles.core.geometry import JointGeometry
-from particles.core.plate import Pad
-from particles.core.symmetry import whole_line
-from particles.ispg.gripc_step import GripcStep
-from particles.parameters.effects import decide_effects, switched
-from particles.parameters.solder import Solder
-from particles.physics.force_gravity import Gravity
-from particles.physics.force_surface_tension import SurfaceTension
-from particles.physics.force_wetting import Wetting
-from particles.physics.mass import Inertia, Mass
-from particles.physics.physics import Event, Force, Hold, Momentum, Operator, Physics
-from particles.physics.viscosity import Viscosity
-from particles.physics.wall_friction import NavierSlip, NoSlip
-from particles.scenes.metrics import Metrics, joint_metrics, open_metrics, particle_pressure, verdict
-from particles.scenes.split import parted_shape, split_to_rest
-from particles.steps.flow import LiquidFlow
-from particles.steps.inertial_step import InertialStep
-from particles.steps.relaxation import Relaxation
-from particles.steps.rest import Run, StopRule, run_to_rest
-from particles.steps.shape import JointShape, Snapshot
-from particles.steps.step_solver import StepSolver
-from particles.steps.time_step import TimeStep, capillary_limit
-from particles.surface.contact_line import ContactLine
+from reflowshock.particles.core.body import Body
+from reflowshock.particles.core.checkpoint import Checkpoint
+from reflowshock.particles.core.cloud import Cloud, TooLittleSolder, box_cloud, joint_cloud
+from reflowshock.particles.core.geometry import JointGeometry
+from reflowshock.particles.core.plate import Pad
+from reflowshock.particles.core.symmetry import whole_line
+from reflowshock.particles.ispg.gripc_step import GripcStep
+from reflowshock.particles.parameters.effects import decide_effects, switched
+from reflowshock.particles.parameters.solder import Solder
+from reflowshock.particles.physics.force_gravity import Gravity
+from reflowshock.particles.physics.force_surface_tension import SurfaceTension
+from reflowshock.particles.physics.force_wetting import Wetting
+from reflowshock.particles.physics.mass import Inertia, Mass
+from reflowshock.particles.physics.physics import Event, Force, Hold, Momentum, Operator, Physics
+from reflowshock.particles.physics.viscosity import Viscosity
+from reflowshock.particles.physics.wall_friction import NavierSlip, NoSlip
+from reflowshock.particles.scenes.metrics import Metrics, joint_metrics, open_metrics, particle_pressure, verdict
+from reflowshock.particles.scenes.split import parted_shape, split_to_rest
+from reflowshock.particles.steps.flow import LiquidFlow
+from reflowshock.particles.steps.inertial_step import InertialStep
+from reflowshock.particles.steps.relaxation import Relaxation
+from reflowshock.particles.steps.rest import Run, StopRule, run_to_rest
+from reflowshock.particles.steps.shape import JointShape, Snapshot
+from reflowshock.particles.steps.step_solver import StepSolver
+from reflowshock.particles.steps.time_step import TimeStep, capillary_limit
+from reflowshock.particles.surface.contact_line import ContactLine
 
 __all__ = ["JointGeometry", "JointShape", "solve_joint"]
 

@@ -5,16 +5,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from particles.core.body import Body
-from particles.core.plate import Plate
-from particles.scenes.metrics import Metrics, particle_pressure
-from particles.scenes.rebuild import closed_surface
-from particles.steps.flow import LiquidFlow
-from particles.steps.rest import Run, StopRule, run_to_rest
-from particles.steps.shape import JointShape, numbered_on, together
-from particles.surface.cloud_level_set import cloud_from_level_set
-from particles.surface.level_set import Grid, LevelSet, signed_distance
-from particles.surface.profile import Profile, fit_profile
+from reflowshock.particles.core.body import Body
+from reflowshock.particles.core.plate import Plate
+from reflowshock.particles.scenes.metrics import Metrics, particle_pressure
+from reflowshock.particles.scenes.rebuild import closed_surface
+from reflowshock.particles.steps.flow import LiquidFlow
+from reflowshock.particles.steps.rest import Run, StopRule, run_to_rest
+from reflowshock.particles.steps.shape import JointShape, numbered_on, together
+from reflowshock.particles.surface.cloud_level_set import cloud_from_level_set
+from reflowshock.particles.surface.level_set import Grid, LevelSet, signed_distance
+from reflowshock.particles.surface.profile import Profile, fit_profile
 
 # A neck nearer to a plate than this leaves no drop there that particles could fill.
 FEWEST_SPACINGS = 2.0

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from particles.core.body import Body
-from particles.core.plate import slide
-from particles.core.symmetry import on_plane
-from particles.physics.plate_motion import PlateMotion
+from reflowshock.particles.core.body import Body
+from reflowshock.particles.core.plate import slide
+from reflowshock.particles.core.symmetry import on_plane
+from reflowshock.particles.physics.plate_motion import PlateMotion
 
 Floats = NDArray[np.float64]
 

@@ -12,12 +12,12 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from particles.core.body import Body
-from particles.core.symmetry import surface_planes
-from particles.physics.physics import Physics
-from particles.steps.step_solver import StepSolver
-from particles.surface.contact_line import ContactLine
-from particles.surface.surface_quality import flip_to_delaunay, smoothing_offsets
+from reflowshock.particles.core.body import Body
+from reflowshock.particles.core.symmetry import surface_planes
+from reflowshock.particles.physics.physics import Physics
+from reflowshock.particles.steps.step_solver import StepSolver
+from reflowshock.particles.surface.contact_line import ContactLine
+from reflowshock.particles.surface.surface_quality import flip_to_delaunay, smoothing_offsets
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int32]

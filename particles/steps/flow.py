@@ -12,15 +12,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from particles.core.body import Body
-from particles.core.cloud import Cloud
-from particles.core.neighbours import NeighbourList
-from particles.core.plate import Pad, Plate
-from particles.physics.physics import Physics
-from particles.steps.descent import Evening, Start, correct_volume, even_out, highest_energy
-from particles.steps.interior_shift import interior_shift
-from particles.steps.step_solver import Motion, PreparedStep, StepSolver
-from particles.steps.time_step import StepCollapsed, TimeStep
+from reflowshock.particles.core.body import Body
+from reflowshock.particles.core.cloud import Cloud
+from reflowshock.particles.core.neighbours import NeighbourList
+from reflowshock.particles.core.plate import Pad, Plate
+from reflowshock.particles.physics.physics import Physics
+from reflowshock.particles.steps.descent import Evening, Start, correct_volume, even_out, highest_energy
+from reflowshock.particles.steps.interior_shift import interior_shift
+from reflowshock.particles.steps.step_solver import Motion, PreparedStep, StepSolver
+from reflowshock.particles.steps.time_step import StepCollapsed, TimeStep
 
 Floats = NDArray[np.float64]
 

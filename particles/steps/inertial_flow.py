@@ -5,9 +5,9 @@ from typing import Any
 
 from scipy import sparse
 
-from particles.core.body import Body
-from particles.physics.physics import Physics
-from particles.steps.inertial_step import InertialStep
+from reflowshock.particles.core.body import Body
+from reflowshock.particles.physics.physics import Physics
+from reflowshock.particles.steps.inertial_step import InertialStep
 
 
 class InertialFlow:

@@ -13,20 +13,20 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from particles.core.body import Body
-from particles.core.data_file import fields_of
-from particles.core.neighbours import NeighbourList
-from particles.discretisation.backward_difference import BackwardDifference, Base
-from particles.discretisation.discretisation_tetrahedra import LinearTetrahedra, particle_mass
-from particles.discretisation.field_transfer import Transfer, interpolation
-from particles.discretisation.incompressibility import solve
-from particles.discretisation.inner_tetrahedra import fill
-from particles.physics.physics import Physics
-from particles.physics.stepped_physics import stepped
-from particles.physics.viscosity import Viscosity
-from particles.steps.step_equations import StepEquations
-from particles.steps.step_solver import Motion
-from particles.steps.time_step import LARGEST_DISPLACEMENT
+from reflowshock.data_file import fields_of
+from reflowshock.particles.core.body import Body
+from reflowshock.particles.core.neighbours import NeighbourList
+from reflowshock.particles.discretisation.backward_difference import BackwardDifference, Base
+from reflowshock.particles.discretisation.discretisation_tetrahedra import LinearTetrahedra, particle_mass
+from reflowshock.particles.discretisation.field_transfer import Transfer, interpolation
+from reflowshock.particles.discretisation.incompressibility import solve
+from reflowshock.particles.discretisation.inner_tetrahedra import fill
+from reflowshock.particles.physics.physics import Physics
+from reflowshock.particles.physics.stepped_physics import stepped
+from reflowshock.particles.physics.viscosity import Viscosity
+from reflowshock.particles.steps.step_equations import StepEquations
+from reflowshock.particles.steps.step_solver import Motion
+from reflowshock.particles.steps.time_step import LARGEST_DISPLACEMENT
 
 Floats = NDArray[np.float64]
 

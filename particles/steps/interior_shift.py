@@ -4,11 +4,11 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
-from particles.core.body import Body
-from particles.core.neighbours import NeighbourList
-from particles.core.plate import slide
-from particles.core.symmetry import fold, on_plane, unit
-from particles.surface.surface_quality import vertex_normals
+from reflowshock.particles.core.body import Body
+from reflowshock.particles.core.neighbours import NeighbourList
+from reflowshock.particles.core.plate import slide
+from reflowshock.particles.core.symmetry import fold, on_plane, unit
+from reflowshock.particles.surface.surface_quality import vertex_normals
 
 Floats = NDArray[np.float64]
 

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
-from particles.core.body import Body
-from particles.core.neighbours import NeighbourList
+from reflowshock.particles.core.body import Body
+from reflowshock.particles.core.neighbours import NeighbourList
 
 Floats = NDArray[np.float64]
 

@@ -17,18 +17,18 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from particles.core.body import Body
-from particles.core.neighbours import NeighbourList
-from particles.core.plate import slide
-from particles.core.surface_measure import centre_of_volume, ring_area, surface_flux
-from particles.core.symmetry import fold
-from particles.discretisation.discretisation import Discretisation
-from particles.discretisation.lagged_multigrid import LaggedMultigrid
-from particles.discretisation.volume_constraint import solve_volume
-from particles.physics.physics import Physics
-from particles.steps.potential_flow import PotentialFlow
-from particles.steps.step_equations import StepEquations
-from particles.steps.step_solver import Motion
+from reflowshock.particles.core.body import Body
+from reflowshock.particles.core.neighbours import NeighbourList
+from reflowshock.particles.core.plate import slide
+from reflowshock.particles.core.surface_measure import centre_of_volume, ring_area, surface_flux
+from reflowshock.particles.core.symmetry import fold
+from reflowshock.particles.discretisation.discretisation import Discretisation
+from reflowshock.particles.discretisation.lagged_multigrid import LaggedMultigrid
+from reflowshock.particles.discretisation.volume_constraint import solve_volume
+from reflowshock.particles.physics.physics import Physics
+from reflowshock.particles.steps.potential_flow import PotentialFlow
+from reflowshock.particles.steps.step_equations import StepEquations
+from reflowshock.particles.steps.step_solver import Motion
 
 Floats = NDArray[np.float64]
 

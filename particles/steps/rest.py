@@ -10,12 +10,12 @@ import numpy as np
 from numpy.polynomial import Legendre
 from numpy.typing import NDArray
 
-from particles.core.checkpoint import Checkpoint
-from particles.core.data_file import columns, fields_of, rows
-from particles.discretisation.incompressibility import SolveFailed
-from particles.steps.flow import FLOW_RECORDS, LiquidFlow, StepRecord
-from particles.steps.shape import Snapshot
-from particles.surface.profile import Profile, fit_profile
+from reflowshock.data_file import columns, fields_of, rows
+from reflowshock.particles.core.checkpoint import Checkpoint
+from reflowshock.particles.discretisation.incompressibility import SolveFailed
+from reflowshock.particles.steps.flow import FLOW_RECORDS, LiquidFlow, StepRecord
+from reflowshock.particles.steps.shape import Snapshot
+from reflowshock.particles.surface.profile import Profile, fit_profile
 
 CALM_STEPS = 3
 CALM_DISPLACEMENT = 1e-4

@@ -4,11 +4,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from particles.core.body import Body
-from particles.discretisation.discretisation import Discretisation
-from particles.discretisation.incompressibility import SaddlePoint
-from particles.physics.physics import Physics
-from particles.steps.admissible import Admissible
+from reflowshock.particles.core.body import Body
+from reflowshock.particles.discretisation.discretisation import Discretisation
+from reflowshock.particles.discretisation.incompressibility import SaddlePoint
+from reflowshock.particles.physics.physics import Physics
+from reflowshock.particles.steps.admissible import Admissible
 
 Floats = NDArray[np.float64]
 

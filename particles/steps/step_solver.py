@@ -7,9 +7,9 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from particles.core.body import Body
-from particles.core.neighbours import NeighbourList
-from particles.physics.physics import Physics
+from reflowshock.particles.core.body import Body
+from reflowshock.particles.core.neighbours import NeighbourList
+from reflowshock.particles.physics.physics import Physics
 
 Floats = NDArray[np.float64]
 

@@ -5,11 +5,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from particles.core.cloud import Cloud, equal_area_radius
-from particles.core.plate import Plate
-from particles.core.surface_measure import volume_and_gradient
-from particles.surface.level_set import LevelSet
-from particles.surface.surface_nets import extract_surface, relax
+from reflowshock.particles.core.cloud import Cloud, equal_area_radius
+from reflowshock.particles.core.plate import Plate
+from reflowshock.particles.core.surface_measure import volume_and_gradient
+from reflowshock.particles.surface.level_set import LevelSet
+from reflowshock.particles.surface.surface_nets import extract_surface, relax
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int32]

@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from particles.core.body import Body
-from particles.core.cloud import equal_area_radius
-from particles.core.plate import Pad
-from particles.core.symmetry import share, unit, whole_points
+from reflowshock.particles.core.body import Body
+from reflowshock.particles.core.cloud import equal_area_radius
+from reflowshock.particles.core.plate import Pad
+from reflowshock.particles.core.symmetry import share, unit, whole_points
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int32]

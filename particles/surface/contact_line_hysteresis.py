@@ -3,11 +3,11 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from particles.core.body import Body
-from particles.core.plate import Pad
-from particles.core.surface_measure import ring_area_gradient
-from particles.core.symmetry import share, whole_points
-from particles.surface.contact_line import ON_MASK, ON_PAD, PINNED, RELEASE_MARGIN, ContactLine
+from reflowshock.particles.core.body import Body
+from reflowshock.particles.core.plate import Pad
+from reflowshock.particles.core.surface_measure import ring_area_gradient
+from reflowshock.particles.core.symmetry import share, whole_points
+from reflowshock.particles.surface.contact_line import ON_MASK, ON_PAD, PINNED, RELEASE_MARGIN, ContactLine
 
 Floats = NDArray[np.float64]
 

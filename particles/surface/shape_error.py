@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from particles.reference.young_laplace import Meridian
+from reflowshock.particles.reference.young_laplace import Meridian
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int32]

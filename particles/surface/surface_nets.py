@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from particles.surface.level_set import LevelSet
-from particles.surface.surface_quality import flip_to_delaunay, smoothing_offsets
+from reflowshock.particles.surface.level_set import LevelSet
+from reflowshock.particles.surface.surface_quality import flip_to_delaunay, smoothing_offsets
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int32]

@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from particles.core.surface_measure import area_vector
+from reflowshock.particles.core.surface_measure import area_vector
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int32]

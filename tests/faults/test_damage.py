@@ -8,14 +8,14 @@ from pathlib import Path
 
 import pytest
 
+from reflowshock.workflow.pipeline.reader import read_case
+from reflowshock.workflow.store.batch import show_products
+from reflowshock.workflow.store.point import Point
+from reflowshock.workflow.store.state import examine
+from reflowshock.workflow.store.store import Store
 from tests.support.faults import SEED, answers, run_drop
 from tests.support.products import make
 from tests.support.workflow_command import SMALL_CASE
-from workflow.pipeline.reader import read_case
-from workflow.store.batch import show_products
-from workflow.store.point import Point
-from workflow.store.state import examine
-from workflow.store.store import Store
 
 
 def truncate(path: Path) -> None:

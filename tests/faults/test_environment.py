@@ -41,7 +41,7 @@ def place():
 
 def command(place: Path, *arguments: str, environment: dict | None = None, before: list[str] | None = None):
     own = {"PYTHONPATH": str(ROOT)} | (environment if environment is not None else dict(os.environ))
-    line = [*(before or []), sys.executable, "-m", "workflow", *arguments]
+    line = [*(before or []), sys.executable, "-m", "reflowshock", *arguments]
     return subprocess.run(line, cwd=place, env=own, capture_output=True, timeout=300, check=False)
 
 

@@ -7,9 +7,9 @@ import sys
 
 import pytest
 
+from reflowshock.workflow.store.engine import SNAKEFILE
 from tests.support.faults import DROP, SMALL_DROP, run_drop
 from tests.support.workflow_command import wait_until
-from workflow.store.engine import SNAKEFILE
 
 ODD = "Drop test #3: a\n\"b' {c} [/x] $(touch pwned) %d *é;\\ -e"
 
@@ -77,7 +77,7 @@ def test_names_do_not_lead_out_of_a_folder(tmp_path, name):
     text = f'[scales."{name}"]\n'.replace("\n", "\\n", name.count("\n"))
     case = tmp_path / "case.toml"
     case.write_text(DROP.read_text() + "\n" + text + '"drop.particles_per_edge" = 5\n')
-    line = [sys.executable, "-m", "workflow", "run", str(case), "--set", f"scale={name}", *SMALL_DROP]
+    line = [sys.executable, "-m", "reflowshock", "run", str(case), "--set", f"scale={name}", *SMALL_DROP]
     result = subprocess.run(line, capture_output=True, text=True, timeout=60, check=False, cwd=tmp_path)
     assert result.returncode == 2, result.stdout + result.stderr
     assert len(result.stderr) < 2000

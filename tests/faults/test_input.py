@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 from rich.console import Console
 
+from reflowshock.workflow.case.problems import CaseError
+from reflowshock.workflow.pipeline.reader import read_case
+from reflowshock.workflow.pipeline.template import templates
+from reflowshock.workflow.plan import show_plan
+from reflowshock.workflow.study.study_file import read_study
 from tests.support.workflow_command import SMALL_CASE
-from workflow.case.problems import CaseError
-from workflow.pipeline.reader import read_case
-from workflow.pipeline.template import templates
-from workflow.plan import show_plan
-from workflow.study.study_file import read_study
 
 SEED = 20261122
 MUTANTS = 240

@@ -8,18 +8,18 @@ SCRIPT = """
 import contextlib, json, sys
 import numpy as np
 from mpi4py import MPI
-from fem.model.body import Response, make_body, make_pieces
-from fem.parallel.communicators import Communicators
-from fem.coupling.crew import couple
-from fem.estimates.placement import shared
-from fem.coupling.scheme import scheme_of
-from fem.parallel.local_mesh import distribute
-from fem.materials.roles import Materials
-from fem.mesh.mesh import append
-from fem.problem.parameters import Coupling
-from fem.division.tables import model_inputs
+from reflowshock.fem.model.body import Response, make_body, make_pieces
+from reflowshock.fem.parallel.communicators import Communicators
+from reflowshock.fem.coupling.crew import couple
+from reflowshock.fem.estimates.placement import shared
+from reflowshock.fem.coupling.scheme import scheme_of
+from reflowshock.fem.parallel.local_mesh import distribute
+from reflowshock.fem.materials.roles import Materials
+from reflowshock.fem.mesh.mesh import append
+from reflowshock.fem.problem.parameters import Coupling
+from reflowshock.fem.division.tables import model_inputs
 from tests.stability.test_fem_division import board, joint
-from fem.trials.divided import checked, surveyed
+from reflowshock.fem.trials.divided import checked, surveyed
 
 world = MPI.COMM_WORLD
 

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fem.dynamics.central_difference import Motion
-from fem.loads.load import NodalForces, half_sine_drop
-from fem.materials.roles import Materials
-from fem.problem.pulse import HalfSine
+from reflowshock.fem.dynamics.central_difference import Motion
+from reflowshock.fem.loads.load import NodalForces, half_sine_drop
+from reflowshock.fem.materials.roles import Materials
+from reflowshock.fem.problem.pulse import HalfSine
 from tests.support.fem_levels import joint_on_board, levelled
 
 ROOT = Path(__file__).resolve().parents[2]

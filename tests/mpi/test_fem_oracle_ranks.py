@@ -8,15 +8,15 @@ SCRIPT = """
 import json, sys
 import numpy as np
 from mpi4py import MPI
-from fem.model.body import make_body, make_pieces
-from fem.model.global_matrix import Equations
-from fem.dynamics.implicit import ImplicitMotion
-from fem.loads.load import half_sine_drop
-from fem.parallel.local_mesh import distribute
-from fem.mesh.mesh import append
-from fem.statics.modal import natural_modes
-from fem.materials.roles import Materials
-from fem.division.tables import prepare
+from reflowshock.fem.model.body import make_body, make_pieces
+from reflowshock.fem.model.global_matrix import Equations
+from reflowshock.fem.dynamics.implicit import ImplicitMotion
+from reflowshock.fem.loads.load import half_sine_drop
+from reflowshock.fem.parallel.local_mesh import distribute
+from reflowshock.fem.mesh.mesh import append
+from reflowshock.fem.statics.modal import natural_modes
+from reflowshock.fem.materials.roles import Materials
+from reflowshock.fem.division.tables import prepare
 from tests.support.fem_models import small_assembly
 
 comm = MPI.COMM_WORLD

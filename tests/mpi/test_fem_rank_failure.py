@@ -10,19 +10,21 @@ from pathlib import Path
 
 import pytest
 
-from fem.parallel.own_job import own_environment
-from fem.parallel.status_board import ERROR
+from reflowshock.fem.parallel.own_job import own_environment
+from reflowshock.fem.parallel.status_board import ERROR
+from reflowshock.workflow.process.launch import mpi_command
 from tests.support.fem_models import write_small_assembly
 from tests.support.fem_program import run_python
-from workflow.process.launch import mpi_command
 
 # The program, but rank 1 does something in a window or in set-up; standard error is told of where it is.
 SCRIPT = """
 import os, signal, sys, time
 from pathlib import Path
 from mpi4py import MPI
-import fem.run.time_loop, fem.run.program, fem.run.shock_run
-from fem.errors import InvertedElementError
+from reflowshock.fem.run import time_loop
+from reflowshock.fem.run import program
+from reflowshock.fem.run import shock_run
+from reflowshock.fem.errors import InvertedElementError
 
 world, what, where = MPI.COMM_WORLD, sys.argv[2], sys.argv[3]
 count = iter(range(10**9))
@@ -45,10 +47,10 @@ def broken(real):
     return call
 
 if where == "set-up":
-    fem.run.shock_run.make_history = broken(fem.run.shock_run.make_history)
+    shock_run.make_history = broken(shock_run.make_history)
 else:
-    fem.run.time_loop.run_window = broken(fem.run.time_loop.run_window)
-sys.exit(fem.run.program.main(world, sys.argv[1:2]))
+    time_loop.run_window = broken(time_loop.run_window)
+sys.exit(program.main(world, sys.argv[1:2]))
 """
 
 
@@ -131,12 +133,12 @@ def test_a_rank_that_fails_while_it_loads_libraries_ends_all(tmp_path, raised, w
         "import os, sys\n"
         "class Broken:\n"
         "    def find_spec(self, name, *_):\n"
-        "        if name == 'fem.run.program' and os.environ.get('OMPI_COMM_WORLD_RANK') == '1':\n"
+        "        if name == 'reflowshock.fem.run.program' and os.environ.get('OMPI_COMM_WORLD_RANK') == '1':\n"
         f"            raise {raised}\n"
         "sys.meta_path.insert(0, Broken())\n"
     )
     environment = own_environment(os.environ) | {"PYTHONPATH": os.pathsep.join([str(tmp_path), os.getcwd()])}
-    line = mpi_command(2, [sys.executable, "-m", "fem", str(tmp_path / "absent.json")], True)
+    line = mpi_command(2, [sys.executable, "-m", "reflowshock.fem", str(tmp_path / "absent.json")], True)
     ended = subprocess.run(line, env=environment, capture_output=True, text=True, timeout=60, check=False)
     assert ended.returncode != 0
     assert loses_words() or words in ended.stderr

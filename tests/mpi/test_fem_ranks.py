@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fem.mesh.mesh import append
+from reflowshock.fem.mesh.mesh import append
 from tests.support.fem_models import board_mesh, package_mesh, small_assembly, write_msh, write_small_assembly
 from tests.support.fem_program import run_program
 
@@ -102,7 +102,7 @@ def test_ranks_that_carry_both_models_do_not_wait_for_large_messages(tmp_path):
     script.write_text(
         "import numpy as np\n"
         "from mpi4py import MPI\n"
-        "from fem.parallel.exchange import Channel\n"
+        "from reflowshock.fem.parallel.exchange import Channel\n"
         "world, count = MPI.COMM_WORLD, 50_000  # far more than Open MPI buffers\n"
         "here, nowhere = np.arange(count, dtype=np.int32), np.full(count, -1, np.int32)\n"
         "channel = Channel(world, *((here, nowhere) if world.rank == 0 else (nowhere, here)), receiver_waits=False)\n"
@@ -165,9 +165,9 @@ def test_crash_of_one_rank_ends_all(assembly, tmp_path):
     script.write_text(
         "import sys\n"
         "from mpi4py import MPI\n"
-        "import fem.coupling.held_velocity, fem.run.program as program\n"
+        "from reflowshock.fem.coupling import held_velocity; from reflowshock.fem.run import program\n"
         "def broken(self): raise ZeroDivisionError('broken rank')\n"
-        "fem.coupling.held_velocity.Meso.begin_window = broken\n"
+        "held_velocity.Meso.begin_window = broken\n"
         "sys.exit(program.main(MPI.COMM_WORLD, sys.argv[1:]))\n"
     )
     path = tmp_path / "input.json"

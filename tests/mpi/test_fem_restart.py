@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fem.parallel.checkpoint import Checkpoints
-from fem.parallel.portable import Same, State
+from reflowshock.fem.parallel.checkpoint import Checkpoints
+from reflowshock.fem.parallel.portable import Same, State
 from tests.support.fem_models import write_small_assembly
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -42,7 +42,7 @@ def start(directory: Path, mode: str, output: Path) -> subprocess.Popen:
     path.write_text(json.dumps(request | {"checkpoints": str(directory / f"{mode}.checkpoints")}))
     command = ["mpirun", "--allow-run-as-root", "--oversubscribe", "--mca", "mpi_yield_when_idle", "1", "-n", "2"]
     return subprocess.Popen(
-        [*command, sys.executable, "-m", "fem", str(path)],
+        [*command, sys.executable, "-m", "reflowshock.fem", str(path)],
         cwd=ROOT,
         env=os.environ | {"OMP_NUM_THREADS": "1"},
         stdout=subprocess.DEVNULL,

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from fem.mesh.mesh import append
+from reflowshock.fem.mesh.mesh import append
 from tests.support.fem_models import small_assembly, write_msh
 from tests.support.fem_program import run_python
 from tests.support.fem_structures import STEEL, write_structure
@@ -18,13 +18,13 @@ import json, shutil, sys
 from pathlib import Path
 import numpy as np
 from mpi4py import MPI
-import fem.run.time_loop
-from fem.problem.inputs import INPUT, RunInput
-from fem.run.shock_run import run
-from fem.run.structure_run import run_structure
+from reflowshock.fem.run import time_loop
+from reflowshock.fem.problem.inputs import INPUT, RunInput
+from reflowshock.fem.run.shock_run import run
+from reflowshock.fem.run.structure_run import run_structure
 
 ENERGIES = {"kinetic", "internal", "plastic", "hourglass", "damping", "external", "interface", "balance"}
-world, run_window = MPI.COMM_WORLD, fem.run.time_loop.run_window
+world, run_window = MPI.COMM_WORLD, time_loop.run_window
 
 class Killed(Exception):
     pass
@@ -38,7 +38,7 @@ def go(changes, name, checkpoints=None, windows=10**9):
         if next(left, None) is None:
             raise Killed
         run_window(*crew)
-    fem.run.time_loop.run_window = some_windows
+    time_loop.run_window = some_windows
     (folder / name).mkdir(exist_ok=True)
     request = json.loads((folder / "input.json").read_text()) | changes["input"]
     request = INPUT.validate_python(request | {"output": folder / name, "checkpoints": checkpoints})

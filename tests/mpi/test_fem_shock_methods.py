@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-import fem.run.shock_run
-from fem.problem.inputs import RunInput
+from reflowshock.fem.problem.inputs import RunInput
+from reflowshock.fem.run import shock_run
 from tests.support.fem_models import write_small_assembly
 from tests.support.fem_program import run_program
 
@@ -33,7 +33,7 @@ def run(directory: Path, mode: Literal["two_scale", "dns"], **changes) -> tuple[
     request = {"mode": mode, "meshes": meshes, "shock": SHOCK | changes, "output": str(output)}
     if mode == "dns":
         output.mkdir()
-        fem.run.shock_run.run(MPI.COMM_SELF, RunInput.model_validate(request))
+        shock_run.run(MPI.COMM_SELF, RunInput.model_validate(request))
     else:
         path = directory / "input.json"
         path.write_text(json.dumps(request))

@@ -8,9 +8,9 @@ from dataclasses import replace
 from pathlib import Path
 import numpy as np
 from mpi4py import MPI
-from fem.errors import AgreedError
-from fem.problem.thermal import Thermal
-from fem.statics.structure import ThermalStructure
+from reflowshock.fem.errors import AgreedError
+from reflowshock.fem.problem.thermal import Thermal
+from reflowshock.fem.statics.structure import ThermalStructure
 from tests.support.thermal_models import small_structure
 
 world, folder = MPI.COMM_WORLD, Path(sys.argv[1]) / str(MPI.COMM_WORLD.rank)

@@ -6,13 +6,13 @@ import numpy as np
 import psutil
 import pytest
 
-from particles.core.geometry import JointGeometry
-from particles.parameters.solder import Solder, SolderNumerics
+from reflowshock.particles.core.geometry import JointGeometry
+from reflowshock.particles.parameters.solder import Solder, SolderNumerics
+from reflowshock.workflow.board_drop.reflow_pool import Job
+from reflowshock.workflow.reflow.pool import ReflowError
+from reflowshock.workflow.reflow.processes import Processes
+from reflowshock.workflow.reflow.ranks import Ranks
 from tests.support import rank_work
-from workflow.board_drop.reflow_pool import Job
-from workflow.reflow.pool import ReflowError
-from workflow.reflow.processes import Processes
-from workflow.reflow.ranks import Ranks
 
 SOLDER = Solder(volume=7.2e-11, numerics=SolderNumerics(spacing=1.2e-4))
 PLACES = {
@@ -37,7 +37,9 @@ def test_what_fails_is_named_and_all_end(ranks):
     with pytest.raises(ReflowError, match=r"^joint A2: ValueError: no rest after 3 steps$"):
         ranks.run(rank_work.fail, {"A1": "sleeps", "A2": "fails"}, lambda _: None)
     assert time.monotonic() - begin < 60.0
-    assert not [one for one in psutil.Process().children(recursive=True) if "workflow.reflow" in one.cmdline()]
+    assert not [
+        one for one in psutil.Process().children(recursive=True) if "reflowshock.workflow.reflow" in one.cmdline()
+    ]
 
 
 def test_nothing_to_do_needs_no_rank(ranks):

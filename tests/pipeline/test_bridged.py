@@ -2,7 +2,7 @@
 
 import json
 
-from particles.scenes.products import read_shapes
+from reflowshock.particles.scenes.products import read_shapes
 from tests.support.workflow_command import reflowshock
 
 OVERFILLED = ("solder.volume=0.26 mm^3", "solder.numerics.spacing=0.1 mm")

@@ -2,10 +2,10 @@
 
 import shutil
 
+from reflowshock.workflow.report.page import write_report
+from reflowshock.workflow.store.store import read_case_of_run
 from tests.support.chain_products import add_chain
 from tests.support.workflow_command import reflowshock
-from workflow.report.page import write_report
-from workflow.store.store import read_case_of_run
 
 LATER = ("surface", "solder_mesh", "shock")
 

@@ -7,8 +7,8 @@ import meshio
 import numpy as np
 import pytest
 
-from meshing.board.pads import read_pads
-from particles.scenes.products import read_shapes
+from reflowshock.meshing.board.pads import read_pads
+from reflowshock.particles.scenes.products import read_shapes
 from tests.support.workflow_command import break_off, command_line, reflowshock
 
 HEATED = (

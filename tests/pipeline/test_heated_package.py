@@ -9,9 +9,9 @@ import meshio
 import numpy as np
 import pytest
 
-from meshing.board.displacement import read_computed
-from meshing.board.package_side import PackageSide
-from meshing.board.pads import read_pads
+from reflowshock.meshing.board.displacement import read_computed
+from reflowshock.meshing.board.package_side import PackageSide
+from reflowshock.meshing.board.pads import read_pads
 from tests.support.mesh_file import MeshFile
 
 CASE = Path(__file__).resolve().parents[2] / "cases/hu_bga_reflow/case.toml"
@@ -27,7 +27,7 @@ def heated_run(tmp_path_factory) -> Path:
     """Example 4.3 of Hu et al. with 4 joints and few particles, to its report."""
     folder = tmp_path_factory.mktemp("heated") / "run"
     settings = [word for setting in SHORT for word in ("--set", setting)]
-    line = [sys.executable, "-m", "workflow", "run", str(CASE), "--out", str(folder), *settings]
+    line = [sys.executable, "-m", "reflowshock", "run", str(CASE), "--out", str(folder), *settings]
     result = subprocess.run(line, capture_output=True, text=True, timeout=240, check=False)
     assert result.returncode == 0, result.stdout + result.stderr
     return folder

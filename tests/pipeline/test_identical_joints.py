@@ -8,10 +8,10 @@ import meshio
 import numpy as np
 import pytest
 
+from reflowshock.workflow.board_drop.identical_joints import identical_sphere
+from reflowshock.workflow.case.problems import CaseError
+from reflowshock.workflow.pipeline.reader import read_case
 from tests.support.workflow_command import SMALL_CASE, reflowshock
-from workflow.board_drop.identical_joints import identical_sphere
-from workflow.case.problems import CaseError
-from workflow.pipeline.reader import read_case
 
 SETTINGS = ("shock.identical_joints=true", "shock.coupling.fine_joints=['A4']", "shock.numerics.modes=['two_scale']")
 

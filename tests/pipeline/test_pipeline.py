@@ -12,9 +12,9 @@ import numpy as np
 import psutil
 import pytest
 
-from particles.scenes.products import read_shapes
+from reflowshock.particles.scenes.products import read_shapes
+from reflowshock.workflow.case.stage_table import BOARD_DROP
 from tests.support.workflow_command import SMALL_CASE, break_off, command_line, reflowshock, wait_until
-from workflow.case.stage_table import BOARD_DROP
 
 NAMES = BOARD_DROP.names
 SNAKEFILE = Path(__file__).resolve().parents[2] / "workflow" / "Snakefile"

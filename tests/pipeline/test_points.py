@@ -10,13 +10,13 @@ from pathlib import Path
 import psutil
 import pytest
 
+from reflowshock.workflow.pipeline.stage_runner import Run, run_stage
+from reflowshock.workflow.stages import STAGE_FUNCTIONS
+from reflowshock.workflow.store.batch import Machine, missing, run_points
+from reflowshock.workflow.store.folders import locked
+from reflowshock.workflow.store.store import Store
+from reflowshock.workflow.study.command import read_points_of, run_study
 from tests.support.workflow_command import wait_until
-from workflow.pipeline.stage_runner import Run, run_stage
-from workflow.stages import STAGE_FUNCTIONS
-from workflow.store.batch import Machine, missing, run_points
-from workflow.store.folders import locked
-from workflow.store.store import Store
-from workflow.study.command import read_points_of, run_study
 
 CASE = Path(__file__).resolve().parents[2] / "cases" / "sessile_drop" / "case.toml"
 STUDY = f"""
@@ -36,7 +36,7 @@ def test_a_study_is_computed_once_and_survives_a_kill(tmp_path):
     path.write_text(STUDY)
     study = read_points_of(path)
     good, bad = study.possible.values()
-    process = subprocess.Popen([sys.executable, "-m", "workflow", "study", str(path), "--out", str(store.folder)])
+    process = subprocess.Popen([sys.executable, "-m", "reflowshock", "study", str(path), "--out", str(store.folder)])
     reflow = store.product(good, "reflow") / "stage.json"
     wait_until(reflow.exists)
     children = psutil.Process(process.pid).children(recursive=True)

@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from reflowshock.workflow.board_drop.shock_cooling import begun
+from reflowshock.workflow.case.problems import CaseError
+from reflowshock.workflow.pipeline.reader import read_case
+from reflowshock.workflow.pipeline.stage_runner import Findings, Run
+from reflowshock.workflow.stages import shock
 from tests.support.workflow_command import SMALL_CASE
-from workflow.board_drop.shock_cooling import begun
-from workflow.case.problems import CaseError
-from workflow.pipeline.reader import read_case
-from workflow.pipeline.stage_runner import Findings, Run
-from workflow.stages import shock
 
 COOLED = ("thermal.effects.residual_stress=on", "thermal.effects.flexible=off", "materials.solder=SAC405")
 

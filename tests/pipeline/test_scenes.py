@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from particles.scenes.drop_at_rest import drop_to_rest
-from particles.scenes.products import read_body
-from particles.scenes.reflow import solve_joint
+from reflowshock.particles.scenes.drop_at_rest import drop_to_rest
+from reflowshock.particles.scenes.products import read_body
+from reflowshock.particles.scenes.reflow import solve_joint
+from reflowshock.workflow.pipeline.reader import read_case
+from reflowshock.workflow.solder.case import DropCase, JointCase
 from tests.support.workflow_command import break_off
-from workflow.pipeline.reader import read_case
-from workflow.solder.case import DropCase, JointCase
 
 CASES = Path(__file__).resolve().parents[2] / "cases"
 COARSE_DROP, COARSE_JOINT = "drop.particles_per_edge=7", "joint.spacing=0.06 mm"
@@ -28,7 +28,7 @@ CONTACT = {"contact_radius", "contact_angle"}
 
 
 def command(name: str, folder: Path, *settings: str) -> list[str]:
-    line = [sys.executable, "-m", "workflow", "run", str(CASES / name / "case.toml"), "--out", str(folder)]
+    line = [sys.executable, "-m", "reflowshock", "run", str(CASES / name / "case.toml"), "--out", str(folder)]
     return [*line, *(item for setting in settings for item in ("--set", setting))]
 
 

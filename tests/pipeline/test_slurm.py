@@ -10,9 +10,9 @@ from pathlib import Path
 import psutil
 import pytest
 
+from reflowshock.workflow.cluster.checks import PLUGIN
 from tests.support.one_node_slurm import NoSlurm, OneNode, one_node_slurm
 from tests.support.workflow_command import wait_until
-from workflow.cluster.checks import PLUGIN
 
 STRUCTURE = Path(__file__).parent / "structure.toml"
 DROP = Path(__file__).resolve().parents[2] / "cases/sessile_drop/case.toml"
@@ -37,7 +37,7 @@ def slurm(tmp_path_factory):
 def command(slurm: OneNode, case: Path, folder: Path, settings: tuple[str, ...], *more: str) -> list[str]:
     overrides = [item for setting in settings for item in ("--set", setting)]
     where = ["--executor", "slurm", "--profile", str(slurm.profile)]
-    return [sys.executable, "-m", "workflow", "run", str(case), "--out", str(folder), *overrides, *where, *more]
+    return [sys.executable, "-m", "reflowshock", "run", str(case), "--out", str(folder), *overrides, *where, *more]
 
 
 def run(slurm: OneNode, line: list[str]) -> subprocess.CompletedProcess:

@@ -23,7 +23,7 @@ ERRORS = {
 
 
 def command(what: str, name: str, folder: Path, *settings: str, until: str = "") -> subprocess.CompletedProcess:
-    line = [sys.executable, "-m", "workflow", what, str(CASES / name / "case.toml"), "--out", str(folder)]
+    line = [sys.executable, "-m", "reflowshock", what, str(CASES / name / "case.toml"), "--out", str(folder)]
     line += ["--until", until] if until else []
     line += [item for setting in settings for item in ("--set", setting)]
     return subprocess.run(line, capture_output=True, text=True, timeout=240, check=False)

@@ -4,19 +4,19 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fem.coupling.scheme import scheme_of
-from fem.coupling.self_check import self_check
-from fem.division.buffer import touching
-from fem.division.checks import check_division
-from fem.division.divide import cut_nodes, divide, held
-from fem.errors import CutError
-from fem.materials.roles import Materials
-from fem.mesh.mesh import MeshData, append
-from fem.parallel.exchange import CutChannels
-from fem.problem.parameters import Coupling
-from fem.trials.coupled import Coupled, models_of
-from fem.trials.divided import surveyed
-from fem.trials.layouts import board, copper_cut, corner, joint, overhang, two_regions
+from reflowshock.fem.coupling.scheme import scheme_of
+from reflowshock.fem.coupling.self_check import self_check
+from reflowshock.fem.division.buffer import touching
+from reflowshock.fem.division.checks import check_division
+from reflowshock.fem.division.divide import cut_nodes, divide, held
+from reflowshock.fem.errors import CutError
+from reflowshock.fem.materials.roles import Materials
+from reflowshock.fem.mesh.mesh import MeshData, append
+from reflowshock.fem.parallel.exchange import CutChannels
+from reflowshock.fem.problem.parameters import Coupling
+from reflowshock.fem.trials.coupled import Coupled, models_of
+from reflowshock.fem.trials.divided import surveyed
+from reflowshock.fem.trials.layouts import board, copper_cut, corner, joint, overhang, two_regions
 
 
 def radius(mesh: MeshData, scheme: str) -> float:

@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fem.division import chebyshev
-from fem.division.chebyshev import Substeps
-from fem.division.choose_levels import Pace, governing_steps, least_steps
-from fem.dynamics.central_difference import Motion
-from fem.loads.damping import RayleighDamping
-from fem.materials.library import SAC405
-from fem.materials.parameters import Isotropic
-from fem.materials.roles import Materials
-from fem.mesh.tie import Tie
-from fem.model.power_iteration import highest_frequency
+from reflowshock.fem.division import chebyshev
+from reflowshock.fem.division.chebyshev import Substeps
+from reflowshock.fem.division.choose_levels import Pace, governing_steps, least_steps
+from reflowshock.fem.dynamics.central_difference import Motion
+from reflowshock.fem.loads.damping import RayleighDamping
+from reflowshock.fem.materials.library import SAC405
+from reflowshock.fem.materials.parameters import Isotropic
+from reflowshock.fem.materials.roles import Materials
+from reflowshock.fem.mesh.tie import Tie
+from reflowshock.fem.model.power_iteration import highest_frequency
 from tests.support.fem_levels import joint_on_board, levelled
 
 ELEMENTS, SAMPLES = 12, 60

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from particles.core.cloud import box_cloud
-from particles.core.geometry import JointGeometry
-from particles.core.plate import slide
-from particles.parameters.solder import Solder, SolderEffects, SolderNumerics
-from particles.reference.young_laplace import sessile_meridian
-from particles.scenes.reflow import contact_line, solve_joint, start_flow, stop_rule
-from particles.steps.rest import run_to_rest
+from reflowshock.particles.core.cloud import box_cloud
+from reflowshock.particles.core.geometry import JointGeometry
+from reflowshock.particles.core.plate import slide
+from reflowshock.particles.parameters.solder import Solder, SolderEffects, SolderNumerics
+from reflowshock.particles.reference.young_laplace import sessile_meridian
+from reflowshock.particles.scenes.reflow import contact_line, solve_joint, start_flow, stop_rule
+from reflowshock.particles.steps.rest import run_to_rest
 from tests.support.drops import solve_drop
 
 GAMMA, DENSITY, VOLUME = 0.4985, 8930.0, 1e-9

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from particles.parameters.solder import Solder, SolderEffects, SolderNumerics
-from particles.scenes.metrics import drop_metrics
+from reflowshock.particles.parameters.solder import Solder, SolderEffects, SolderNumerics
+from reflowshock.particles.scenes.metrics import drop_metrics
 from tests.support.drops import solve_drop
 
 PAPER = {"surface_tension": 4.985, "viscosity": 0.227}

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from particles.core.geometry import JointGeometry
-from particles.parameters.solder import Solder, SolderNumerics
-from particles.reference.young_laplace import joint_meridian
-from particles.scenes.moving_joint import follow_path
-from particles.scenes.reflow import solve_joint
+from reflowshock.particles.core.geometry import JointGeometry
+from reflowshock.particles.parameters.solder import Solder, SolderNumerics
+from reflowshock.particles.reference.young_laplace import joint_meridian
+from reflowshock.particles.scenes.moving_joint import follow_path
+from reflowshock.particles.scenes.reflow import solve_joint
 
 BALL, RADIUS, GAMMA, WEIGHT = 0.0724e-9, 0.24e-3, 0.4985, 8930.0 * 9.81
 SOLDER = Solder(volume=BALL, numerics=SolderNumerics(spacing=7e-5, time_step_limit=100))

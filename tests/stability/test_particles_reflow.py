@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from particles.core.geometry import JointGeometry
-from particles.parameters.solder import Solder, SolderEffects, SolderNumerics
-from particles.scenes.metrics import reference_drop
-from particles.scenes.reflow import joint_shape, solve_joint, start_joint
-from particles.steps.rest import run_to_rest
+from reflowshock.particles.core.geometry import JointGeometry
+from reflowshock.particles.parameters.solder import Solder, SolderEffects, SolderNumerics
+from reflowshock.particles.scenes.metrics import reference_drop
+from reflowshock.particles.scenes.reflow import joint_shape, solve_joint, start_joint
+from reflowshock.particles.steps.rest import run_to_rest
 from tests.support.drops import solve_drop
 
 BALL, RADIUS = 0.0724e-9, 0.24e-3

@@ -4,14 +4,14 @@ from pathlib import Path
 
 import pytest
 
-from fem.coupling import held_velocity
-from fem.division import whole
-from fem.forces.force_assembled import AssembledElements
-from fem.forces.force_nonlinear import NonlinearElements
-from fem.trials import flight
-from workflow.pipeline.template import CASES
-from workflow.stress_test.hard_case import HardCase, read_hard_cases
-from workflow.stress_test.verdict import attempt
+from reflowshock.fem.coupling import held_velocity
+from reflowshock.fem.division import whole
+from reflowshock.fem.forces.force_assembled import AssembledElements
+from reflowshock.fem.forces.force_nonlinear import NonlinearElements
+from reflowshock.fem.trials import flight
+from reflowshock.workflow.pipeline.template import CASES
+from reflowshock.workflow.stress_test.hard_case import HardCase, read_hard_cases
+from reflowshock.workflow.stress_test.verdict import attempt
 
 ELSEWHERE = {  # asserted by tests of their own, which are slow
     "elements_order_hexahedra",

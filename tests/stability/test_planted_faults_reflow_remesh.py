@@ -4,15 +4,15 @@ from dataclasses import replace
 
 import pytest
 
-from meshing.joint import levels
-from meshing.joint.joint_place import JointPlace
-from meshing.surface import user_surface
-from particles.physics.force_gravity import Gravity
-from particles.physics.force_wetting import Wetting
-from particles.steps.inertial_flow import InertialFlow
-from workflow.stress_test.command import HARD
-from workflow.stress_test.hard_case import read_hard_cases
-from workflow.stress_test.verdict import attempt
+from reflowshock.meshing.joint import levels
+from reflowshock.meshing.joint.joint_place import JointPlace
+from reflowshock.meshing.surface import user_surface
+from reflowshock.particles.physics.force_gravity import Gravity
+from reflowshock.particles.physics.force_wetting import Wetting
+from reflowshock.particles.steps.inertial_flow import InertialFlow
+from reflowshock.workflow.stress_test.command import HARD
+from reflowshock.workflow.stress_test.hard_case import read_hard_cases
+from reflowshock.workflow.stress_test.verdict import attempt
 
 
 def flip(patch, owner, name):

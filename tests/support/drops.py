@@ -2,11 +2,11 @@
 
 from math import isfinite
 
-from particles.parameters.scenes import Drop
-from particles.parameters.solder import Solder
-from particles.scenes.drop_at_rest import flow_to_rest
-from particles.steps.flow import LiquidFlow
-from particles.steps.rest import Run
+from reflowshock.particles.parameters.scenes import Drop
+from reflowshock.particles.parameters.solder import Solder
+from reflowshock.particles.scenes.drop_at_rest import flow_to_rest
+from reflowshock.particles.steps.flow import LiquidFlow
+from reflowshock.particles.steps.rest import Run
 
 
 def solve_drop(solder: Solder, count: int, pad_radius: float = float("inf")) -> tuple[LiquidFlow, Run]:

@@ -10,21 +10,21 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from fem.dynamics.central_difference import Motion
-from fem.loads.load import DOWN, BodyAcceleration, Load
-from fem.loads.shock_loads import shock_loads
-from fem.materials.library import FR4
-from fem.materials.parameters import Material
-from fem.model.body import Body, Response
-from fem.problem.parameters import Shock
-from fem.problem.pulse import HalfSine
-from fem.trials.bodies import dns_body, motion_of, nonlinear_body
-from fem.trials.grids import grid, mesh_of, on
-from particles.core.cloud import box_cloud
-from particles.parameters.solder import Solder
-from particles.physics.physics import Physics
-from particles.scenes.reflow import contact_line, start_flow
-from particles.steps.flow import LiquidFlow
+from reflowshock.fem.dynamics.central_difference import Motion
+from reflowshock.fem.loads.load import DOWN, BodyAcceleration, Load
+from reflowshock.fem.loads.shock_loads import shock_loads
+from reflowshock.fem.materials.library import FR4
+from reflowshock.fem.materials.parameters import Material
+from reflowshock.fem.model.body import Body, Response
+from reflowshock.fem.problem.parameters import Shock
+from reflowshock.fem.problem.pulse import HalfSine
+from reflowshock.fem.trials.bodies import dns_body, motion_of, nonlinear_body
+from reflowshock.fem.trials.grids import grid, mesh_of, on
+from reflowshock.particles.core.cloud import box_cloud
+from reflowshock.particles.parameters.solder import Solder
+from reflowshock.particles.physics.physics import Physics
+from reflowshock.particles.scenes.reflow import contact_line, start_flow
+from reflowshock.particles.steps.flow import LiquidFlow
 
 __all__ = ["DOWN", "BodyAcceleration", "HalfSine", "motion_of"]
 G = 9.80665

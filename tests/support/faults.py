@@ -15,7 +15,7 @@ TIMES = ("seconds", "per_second", "memory", "wall", "setup", "time_ratio", "core
 
 def run_drop(folder: Path, command: str = "run", *options: str, **more: object) -> subprocess.CompletedProcess:
     """Run a command on a drop of 125 particles to its end."""
-    line = [sys.executable, "-m", "workflow", command, str(DROP), *SMALL_DROP, "--out", str(folder), *options]
+    line = [sys.executable, "-m", "reflowshock", command, str(DROP), *SMALL_DROP, "--out", str(folder), *options]
     return subprocess.run(line, capture_output=True, text=True, timeout=240, check=False, **more)
 
 

@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 from mpi4py import MPI
 
-from fem.materials.elasticity import elasticity_matrix
-from fem.materials.library import LIBRARY
-from fem.problem.inputs import INPUT, StructureInput
-from fem.run.structure_run import run_structure
-from meshing.board.box import write_box
-from meshing.board.box_plan import Box, BoxLayer
+from reflowshock.fem.materials.elasticity import elasticity_matrix
+from reflowshock.fem.materials.library import LIBRARY
+from reflowshock.fem.problem.inputs import INPUT, StructureInput
+from reflowshock.fem.run.structure_run import run_structure
+from reflowshock.meshing.board.box import write_box
+from reflowshock.meshing.board.box_plan import Box, BoxLayer
 
 HELD = {f"{axis}_{end}": {"on": f"{axis}_{end}", "hold": [axis]} for axis in "xy" for end in ("min", "max")}
 PEAK = 1e6  # [Pa]

@@ -1,9 +1,9 @@
 """Divisions of meshes for tests: by the parts of the mesh, or as a naive scheme would."""
 
-from fem.division.divide import held, two_steps
-from fem.division.division import Division
-from fem.division.rules import Rules
-from fem.division.whole import Survey, Whole
+from reflowshock.fem.division.divide import held, two_steps
+from reflowshock.fem.division.division import Division
+from reflowshock.fem.division.rules import Rules
+from reflowshock.fem.division.whole import Survey, Whole
 
 
 def by_patch(whole: Whole, found: Survey, rules: Rules) -> Division:

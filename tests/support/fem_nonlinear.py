@@ -3,12 +3,12 @@
 import numpy as np
 from scipy.linalg import polar
 
-from fem.elements.strain import strain_matrix
-from fem.elements.stress import symmetric, voigt
-from fem.kernels.hexahedron import GAUSS, shape_derivatives
-from fem.kernels.nonlinear import Path
-from fem.kernels.plasticity import plastic_constants, plastic_increment
-from fem.materials.parameters import Material
+from reflowshock.fem.elements.strain import strain_matrix
+from reflowshock.fem.elements.stress import symmetric, voigt
+from reflowshock.fem.kernels.hexahedron import GAUSS, shape_derivatives
+from reflowshock.fem.kernels.nonlinear import Path
+from reflowshock.fem.kernels.plasticity import plastic_constants, plastic_increment
+from reflowshock.fem.materials.parameters import Material
 
 SHEAR_TWICE = np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0])
 

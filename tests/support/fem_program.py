@@ -12,7 +12,7 @@ MPIRUN = ["mpirun", "--allow-run-as-root", "--oversubscribe", "--mca", "mpi_yiel
 
 def run_program(path: Path, ranks: int) -> subprocess.CompletedProcess:
     """Run ``python -m fem`` on an input file."""
-    return run_python(["-m", "fem", str(path)], ranks)
+    return run_python(["-m", "reflowshock.fem", str(path)], ranks)
 
 
 def run_script(text: str, directory: Path, ranks: int) -> dict:

@@ -6,17 +6,17 @@ from dataclasses import dataclass
 import numpy as np
 from mpi4py import MPI
 
-from fem.division.tables import joined, model_inputs
-from fem.materials.parameters import Material
-from fem.mesh.mesh import MeshData
-from fem.mesh.supports import SYMMETRY
-from fem.model.body import Body, Response, make_body, make_pieces
-from fem.model.stress_recovery import StressRecovery
-from fem.parallel.local_mesh import distribute
-from fem.statics.cooling import pinned
-from fem.statics.equilibrium import Equilibrium, Statics, thermal_force
-from fem.statics.initial_state import begun
-from fem.trials.grids import grid, mesh_of, on
+from reflowshock.fem.division.tables import joined, model_inputs
+from reflowshock.fem.materials.parameters import Material
+from reflowshock.fem.mesh.mesh import MeshData
+from reflowshock.fem.mesh.supports import SYMMETRY
+from reflowshock.fem.model.body import Body, Response, make_body, make_pieces
+from reflowshock.fem.model.stress_recovery import StressRecovery
+from reflowshock.fem.parallel.local_mesh import distribute
+from reflowshock.fem.statics.cooling import pinned
+from reflowshock.fem.statics.equilibrium import Equilibrium, Statics, thermal_force
+from reflowshock.fem.statics.initial_state import begun
+from reflowshock.fem.trials.grids import grid, mesh_of, on
 
 SMALL = Response()
 

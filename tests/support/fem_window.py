@@ -2,13 +2,13 @@
 
 from collections.abc import Sequence
 
-from fem.coupling.held_velocity import HeldVelocity
-from fem.division.divide import divide
-from fem.loads.load import Load
-from fem.materials.roles import Materials
-from fem.mesh.mesh import MeshData
-from fem.trials.coupled import Coupled, models_of
-from fem.trials.divided import HELD, Divide
+from reflowshock.fem.coupling.held_velocity import HeldVelocity
+from reflowshock.fem.division.divide import divide
+from reflowshock.fem.loads.load import Load
+from reflowshock.fem.materials.roles import Materials
+from reflowshock.fem.mesh.mesh import MeshData
+from reflowshock.fem.trials.coupled import Coupled, models_of
+from reflowshock.fem.trials.divided import HELD, Divide
 
 
 class Window(Coupled):

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from particles.core.data_file import FORMAT
+from reflowshock.data_file import FORMAT
 
 
 class Marking:

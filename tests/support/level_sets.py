@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from particles.surface.level_set import Grid, LevelSet
+from reflowshock.particles.surface.level_set import Grid, LevelSet
 
 
 def ball(grid, centre, radius, mirrored=False):

@@ -6,15 +6,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from meshing.board.pads import PadSite
-from meshing.joint.joint_mesh import JointMesh
-from meshing.joint.solder_mesh import JointMeshError, joint_quality
-from meshing.surface.closed_surface import ClosedSurface, close_surface, pad_planes
-from meshing.trials import level_sets, surfaces
-from meshing.trials.joints import measured, mesh_at, sites_of
-from meshing.trials.level_sets import bridged_pair, with_void
-from meshing.trials.models import MM
-from meshing.trials.surfaces import laid_between, revolve
+from reflowshock.meshing.board.pads import PadSite
+from reflowshock.meshing.joint.joint_mesh import JointMesh
+from reflowshock.meshing.joint.solder_mesh import JointMeshError, joint_quality
+from reflowshock.meshing.surface.closed_surface import ClosedSurface, close_surface, pad_planes
+from reflowshock.meshing.trials import level_sets, surfaces
+from reflowshock.meshing.trials.joints import measured, mesh_at, sites_of
+from reflowshock.meshing.trials.level_sets import bridged_pair, with_void
+from reflowshock.meshing.trials.models import MM
+from reflowshock.meshing.trials.surfaces import laid_between, revolve
 
 AROUND, LEVELS = 48, 25
 COUNTS = {

@@ -3,7 +3,7 @@
 import meshio
 import numpy as np
 
-from meshing.core.hexahedra import quad_areas, volumes
+from reflowshock.meshing.core.hexahedra import quad_areas, volumes
 
 
 class MeshFile:

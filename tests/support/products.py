@@ -4,10 +4,10 @@ import shutil
 from collections.abc import Iterable
 from pathlib import Path
 
-from workflow.pipeline.stage_runner import Findings, Run, run_stage
-from workflow.store.point import Point
-from workflow.store.product import seal
-from workflow.store.store import Store
+from reflowshock.workflow.pipeline.stage_runner import Findings, Run, run_stage
+from reflowshock.workflow.store.point import Point
+from reflowshock.workflow.store.product import seal
+from reflowshock.workflow.store.store import Store
 
 
 def make(

@@ -6,8 +6,8 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from workflow.board_drop import reflow_pool
-from workflow.board_drop.reflow_pool import Job, records
+from reflowshock.workflow.board_drop import reflow_pool
+from reflowshock.workflow.board_drop.reflow_pool import Job, records
 
 __all__ = ["records"]
 

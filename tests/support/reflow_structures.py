@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from workflow.reflow.array import JointArray
+from reflowshock.workflow.reflow.array import JointArray
 
 
 class HerePool:

@@ -16,7 +16,7 @@ SMALL_CASE = Path(__file__).resolve().parents[1] / "pipeline" / "small.toml"
 
 def command_line(command: str, folder: Path, *arguments: str, settings: tuple[str, ...] = ()) -> list[str]:
     overrides = [item for setting in settings for item in ("--set", setting)]
-    return [sys.executable, "-m", "workflow", command, str(SMALL_CASE), "--out", str(folder), *arguments, *overrides]
+    return [sys.executable, "-m", "reflowshock", command, str(SMALL_CASE), "--out", str(folder), *arguments, *overrides]
 
 
 def reflowshock(

@@ -64,7 +64,14 @@ def test_files_are_short(package):
 
 
 @pytest.mark.parametrize(
-    "module", ["workflow", "workflow.cli", "workflow.pipeline.reader", "workflow.stages", "workflow.plan"]
+    "module",
+    [
+        "reflowshock",
+        "reflowshock.workflow.cli",
+        "reflowshock.workflow.pipeline.reader",
+        "reflowshock.workflow.stages",
+        "reflowshock.workflow.plan",
+    ],
 )
 def test_import_is_light(module):
     run_tool("-c", f"import sys, {module}; loaded = {HEAVY} & set(sys.modules); assert not loaded, loaded")
@@ -74,8 +81,8 @@ def test_plans_are_light():
     """A report tells costs beside its pictures, and VTK draws no text in a process that has loaded DOLFINx."""
     lines = [
         "import sys; from pathlib import Path; from rich.console import Console",
-        "from workflow.pipeline.reader import read_case; from workflow.plan import show_plan",
-        "from workflow.store.point import Point; from workflow.store.store import Store",
+        "from reflowshock.workflow.pipeline.reader import read_case; from reflowshock.workflow.plan import show_plan",
+        "from reflowshock.workflow.store.point import Point; from reflowshock.workflow.store.store import Store",
         "for name in ('bga_drop', 'hu_bga_drop', 'two_scale_bar', 'sessile_drop', 'oscillating_drop'):",
         f"    case = read_case(Path('{ROOT}/cases') / name / 'case.toml', [], True)",
         "    show_plan(Store(Path('nowhere'), one_run=True), Point({}, case), Console(quiet=True))",

@@ -11,32 +11,32 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fem.coupling.one_way import OneWay
-from fem.coupling.scheme import scheme_of
-from fem.estimates.effects import NEGLIGIBLE_STIFFENING, NEGLIGIBLE_WEIGHT, called_for, damping, weight
-from fem.forces.force import force_terms
-from fem.forces.force_nonlinear import NonlinearElements
-from fem.kernels.plasticity import plastic_constants
-from fem.loads.pretension import Pretension
-from fem.materials.library import FR4, SAC305, SILICON
-from fem.mesh.supports import held_components
-from fem.model.steps import mass_factor
-from fem.output.failure import failure_criteria, judge
-from fem.problem.parameters import Damping, Failure, JointCoupling
-from fem.problem.thermal import Thermal
-from fem.statics.plates import RigidPlates
-from fem.statics.structure import ThermalStructure
-from fem.trials.grids import grid, mesh_of
-from particles.parameters.effects import NEGLIGIBLE_SHAPE_CHANGE, decide, decide_drop, drop_numbers
-from particles.parameters.solder import SolderEffects
+from reflowshock.fem.coupling.one_way import OneWay
+from reflowshock.fem.coupling.scheme import scheme_of
+from reflowshock.fem.estimates.effects import NEGLIGIBLE_STIFFENING, NEGLIGIBLE_WEIGHT, called_for, damping, weight
+from reflowshock.fem.forces.force import force_terms
+from reflowshock.fem.forces.force_nonlinear import NonlinearElements
+from reflowshock.fem.kernels.plasticity import plastic_constants
+from reflowshock.fem.loads.pretension import Pretension
+from reflowshock.fem.materials.library import FR4, SAC305, SILICON
+from reflowshock.fem.mesh.supports import held_components
+from reflowshock.fem.model.steps import mass_factor
+from reflowshock.fem.output.failure import failure_criteria, judge
+from reflowshock.fem.problem.parameters import Damping, Failure, JointCoupling
+from reflowshock.fem.problem.thermal import Thermal
+from reflowshock.fem.statics.plates import RigidPlates
+from reflowshock.fem.statics.structure import ThermalStructure
+from reflowshock.fem.trials.grids import grid, mesh_of
+from reflowshock.particles.parameters.effects import NEGLIGIBLE_SHAPE_CHANGE, decide, decide_drop, drop_numbers
+from reflowshock.particles.parameters.solder import SolderEffects
+from reflowshock.workflow.board_drop.fine_joints import needs_coarse_joints
+from reflowshock.workflow.effects.registry import registry
+from reflowshock.workflow.reflow.between import open_structure
+from reflowshock.workflow.reflow.load_steps import load_steps
 from tests.support import effect_switches as scene
 from tests.support.drops import solve_drop
 from tests.support.fem_residual import cooled, layered
 from tests.support.thermal_models import small_structure
-from workflow.board_drop.fine_joints import needs_coarse_joints
-from workflow.effects.registry import registry
-from workflow.reflow.between import open_structure
-from workflow.reflow.load_steps import load_steps
 
 ROOT = Path(__file__).parents[2]
 G, STEPS = scene.G, 40
@@ -174,7 +174,7 @@ def _(effect, folder):
     rigid = RigidPlates(assembly)
     called = scene.calls(lambda: rigid.solve(473.15, 0.0, np.zeros((4, 2, 6)), np.zeros(1)))
     assert not scene.enters(called, effect.place)
-    assert open_structure.__module__ == "workflow.reflow.between"
+    assert open_structure.__module__ == "reflowshock.workflow.reflow.between"
 
 
 @off("solder_force")
@@ -194,7 +194,7 @@ def _(_effect, _folder):
     body, step = scene.strip()
     assert not [term for term in body.terms if isinstance(term, Pretension)]
     called = steps_of(scene.motion_of(body, step))
-    assert not [key for key in called if key[0].startswith("fem.statics")]
+    assert not [key for key in called if key[0].startswith("reflowshock.fem.statics")]
 
 
 @on("residual_stress")

@@ -5,17 +5,17 @@ import pytest
 import scipy.sparse
 from scipy.sparse.linalg import eigsh
 
-from fem.elements.element import Elements, critical_steps, element_geometry
-from fem.elements.stress import element_stress, mean_strain
-from fem.forces.force import linear_terms
-from fem.materials.library import FR4, SAC405
-from fem.materials.parameters import Isotropic
-from fem.mesh.facet import area_vectors
-from fem.mesh.mesh import boundary_facets
-from fem.mesh.mesh_quality import scaled_jacobians
-from fem.trials.boxes import KINDS, box, elements_of, mass_of, solve, stiffness_matrix
-from fem.trials.grids import CYCLIC
-from fem.trials.order import orders_in_h
+from reflowshock.fem.elements.element import Elements, critical_steps, element_geometry
+from reflowshock.fem.elements.stress import element_stress, mean_strain
+from reflowshock.fem.forces.force import linear_terms
+from reflowshock.fem.materials.library import FR4, SAC405
+from reflowshock.fem.materials.parameters import Isotropic
+from reflowshock.fem.mesh.facet import area_vectors
+from reflowshock.fem.mesh.mesh import boundary_facets
+from reflowshock.fem.mesh.mesh_quality import scaled_jacobians
+from reflowshock.fem.trials.boxes import KINDS, box, elements_of, mass_of, solve, stiffness_matrix
+from reflowshock.fem.trials.grids import CYCLIC
+from reflowshock.fem.trials.order import orders_in_h
 
 RANDOM = np.random.default_rng(3)
 LINE = np.linspace(0, 1, 4)

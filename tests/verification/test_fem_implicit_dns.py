@@ -4,10 +4,10 @@ from pathlib import Path
 
 from mpi4py import MPI
 
-from fem.output.compare import compare_histories
-from fem.problem.inputs import RunInput
-from fem.problem.parameters import Shock
-from fem.run.shock_run import run
+from reflowshock.fem.output.compare import compare_histories
+from reflowshock.fem.problem.inputs import RunInput
+from reflowshock.fem.problem.parameters import Shock
+from reflowshock.fem.run.shock_run import run
 from tests.support.fem_models import write_small_assembly
 
 

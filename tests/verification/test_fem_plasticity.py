@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from fem.kernels.plasticity import plastic_constants, plastic_increment, yield_stress
-from fem.materials.library import FR4
-from fem.materials.parameters import Isotropic, JohnsonCook
+from reflowshock.fem.kernels.plasticity import plastic_constants, plastic_increment, yield_stress
+from reflowshock.fem.materials.library import FR4
+from reflowshock.fem.materials.parameters import Isotropic, JohnsonCook
 
 RANDOM = np.random.default_rng(11)
 

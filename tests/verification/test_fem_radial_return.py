@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from fem.kernels.plasticity import plastic_constants, plastic_increment
-from fem.materials.parameters import Isotropic, JohnsonCook
+from reflowshock.fem.kernels.plasticity import plastic_constants, plastic_increment
+from reflowshock.fem.materials.parameters import Isotropic, JohnsonCook
 
 ORDER = (0.93, 1.07)
 

@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from fem.elements.element import Elements, element_kind
-from fem.forces.force_nonlinear import NonlinearElements
-from fem.kernels.nonlinear import Path
-from fem.kernels.plasticity import plastic_constants
-from fem.materials.elasticity import elasticity_matrix
-from fem.materials.library import FR4
-from fem.materials.parameters import Isotropic, JohnsonCook
-from fem.statics.hencky import HenckyElements
+from reflowshock.fem.elements.element import Elements, element_kind
+from reflowshock.fem.forces.force_nonlinear import NonlinearElements
+from reflowshock.fem.kernels.nonlinear import Path
+from reflowshock.fem.kernels.plasticity import plastic_constants
+from reflowshock.fem.materials.elasticity import elasticity_matrix
+from reflowshock.fem.materials.library import FR4
+from reflowshock.fem.materials.parameters import Isotropic, JohnsonCook
+from reflowshock.fem.statics.hencky import HenckyElements
 from tests.support.fem_residual import cooled, layered
 
 CHANGE = -192.0

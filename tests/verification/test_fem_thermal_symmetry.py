@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fem.materials.roles import Materials
-from fem.problem.thermal import Thermal
-from fem.statics.pads import Pads
-from fem.statics.state import Assembly, State
-from fem.statics.structure import ThermalStructure
-from meshing.board.heated_assembly import write_heated_assembly
-from meshing.board.pads import pad_table
-from meshing.board.parameters import Warpage
-from meshing.trials.models import MM, PLATE, board, package
+from reflowshock.fem.materials.roles import Materials
+from reflowshock.fem.problem.thermal import Thermal
+from reflowshock.fem.statics.pads import Pads
+from reflowshock.fem.statics.state import Assembly, State
+from reflowshock.fem.statics.structure import ThermalStructure
+from reflowshock.meshing.board.heated_assembly import write_heated_assembly
+from reflowshock.meshing.board.pads import pad_table
+from reflowshock.meshing.board.parameters import Warpage
+from reflowshock.meshing.trials.models import MM, PLATE, board, package
 
 MOVED = Thermal(package="moved", corner_displacement=-5e-5)
 

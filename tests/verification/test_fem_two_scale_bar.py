@@ -5,12 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fem.materials.elasticity import elasticity_matrix
-from fem.materials.library import LIBRARY
-from fem.output.compare import relative_error
-from fem.problem.pulse import Haversine
+from reflowshock.fem.materials.elasticity import elasticity_matrix
+from reflowshock.fem.materials.library import LIBRARY
+from reflowshock.fem.output.compare import relative_error
+from reflowshock.fem.problem.pulse import Haversine
+from reflowshock.workflow.structure.exact_layers import Layers
 from tests.support.fem_bars import PEAK, bar_layers, run_bar, speed_of, write_bar
-from workflow.structure.exact_layers import Layers
 
 SCHEMES = ("held_velocity", "gravouil_combescure", "local_steps")
 SPEED = speed_of("FR4")

@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from particles.core.cloud import joint_cloud
-from particles.core.geometry import JointGeometry
-from particles.core.plate import Pad, Plate
-from particles.parameters.solder import Solder, SolderNumerics
-from particles.scenes.bridge import solve_bridge
-from particles.scenes.drops import run_drops
-from particles.scenes.reflow import pad_lines, solve_joint, start_flow, stop_rule
-from particles.surface.profile import fit_profile
+from reflowshock.particles.core.cloud import joint_cloud
+from reflowshock.particles.core.geometry import JointGeometry
+from reflowshock.particles.core.plate import Pad, Plate
+from reflowshock.particles.parameters.solder import Solder, SolderNumerics
+from reflowshock.particles.scenes.bridge import solve_bridge
+from reflowshock.particles.scenes.drops import run_drops
+from reflowshock.particles.scenes.reflow import pad_lines, solve_joint, start_flow, stop_rule
+from reflowshock.particles.surface.profile import fit_profile
 
 MM = 1e-3
 ON = {"surface_tension": True, "gravity": False, "wall_adhesion": True, "viscosity": False, "inertia": False}

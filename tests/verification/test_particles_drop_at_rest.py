@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from particles.parameters.scenes import Drop, Fluid
-from particles.scenes.drop_at_rest import drop_to_rest
+from reflowshock.particles.parameters.scenes import Drop, Fluid
+from reflowshock.particles.scenes.drop_at_rest import drop_to_rest
 
 EDGE = 75.4e-6
 WATER = Fluid(density=1000.0, surface_tension=0.072, viscosity=1e-3, numerics={"time_step_limit": 100.0})

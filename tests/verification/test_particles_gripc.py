@@ -6,20 +6,20 @@ It is there to be compared with: what it cannot do is asserted as well as what i
 import numpy as np
 import pytest
 
-from particles.core.cloud import box_cloud
-from particles.core.plate import Plate
-from particles.ispg.collocation import collocate
-from particles.ispg.gripc_step import GripcStep
-from particles.ispg.mls import DegenerateStencil
-from particles.ispg.pressure_poisson import Poisson
-from particles.ispg.surface_pressure import force_pressure
-from particles.ispg.velocity_prediction import predict_velocity
-from particles.parameters.effects import decide, drop_numbers, switched
-from particles.parameters.solder import Solder, SolderEffects, SolderNumerics
-from particles.reference.young_laplace import sessile_meridian
-from particles.scenes.reflow import build_physics, contact_line, start_flow
-from particles.steps.flow import LiquidFlow
-from particles.steps.time_step import StepCollapsed, TimeStep, capillary_limit
+from reflowshock.particles.core.cloud import box_cloud
+from reflowshock.particles.core.plate import Plate
+from reflowshock.particles.ispg.collocation import collocate
+from reflowshock.particles.ispg.gripc_step import GripcStep
+from reflowshock.particles.ispg.mls import DegenerateStencil
+from reflowshock.particles.ispg.pressure_poisson import Poisson
+from reflowshock.particles.ispg.surface_pressure import force_pressure
+from reflowshock.particles.ispg.velocity_prediction import predict_velocity
+from reflowshock.particles.parameters.effects import decide, drop_numbers, switched
+from reflowshock.particles.parameters.solder import Solder, SolderEffects, SolderNumerics
+from reflowshock.particles.reference.young_laplace import sessile_meridian
+from reflowshock.particles.scenes.reflow import build_physics, contact_line, start_flow
+from reflowshock.particles.steps.flow import LiquidFlow
+from reflowshock.particles.steps.time_step import StepCollapsed, TimeStep, capillary_limit
 from tests.support.drops import solve_drop
 
 COUNTS = (8, 12, 18)

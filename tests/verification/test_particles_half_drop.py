@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from particles.parameters.solder import Solder, SolderEffects, SolderNumerics
-from particles.reference.damped_oscillation import fit_oscillation
-from particles.reference.rayleigh import rayleigh_frequency, viscous_oscillation
-from particles.scenes.reflow import build_physics
-from particles.steps.flow import LiquidFlow
-from particles.steps.inertial_step import InertialStep
-from particles.steps.time_step import TimeStep
+from reflowshock.particles.parameters.solder import Solder, SolderEffects, SolderNumerics
+from reflowshock.particles.reference.damped_oscillation import fit_oscillation
+from reflowshock.particles.reference.rayleigh import rayleigh_frequency, viscous_oscillation
+from reflowshock.particles.scenes.reflow import build_physics
+from reflowshock.particles.steps.flow import LiquidFlow
+from reflowshock.particles.steps.inertial_step import InertialStep
+from reflowshock.particles.steps.time_step import TimeStep
 from tests.support.drops import solve_drop
 
 DENSITY, GAMMA, VOLUME, OHNESORGE = 8930.0, 0.4985, 1e-9, 0.02

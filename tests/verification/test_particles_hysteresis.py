@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from particles.core.cloud import box_cloud
-from particles.core.surface_measure import ring_area
-from particles.parameters.solder import Solder, SolderNumerics
-from particles.scenes.reflow import start_flow, stop_rule
-from particles.steps.rest import run_to_rest
-from particles.surface.contact_line_hysteresis import HystereticLine
+from reflowshock.particles.core.cloud import box_cloud
+from reflowshock.particles.core.surface_measure import ring_area
+from reflowshock.particles.parameters.solder import Solder, SolderNumerics
+from reflowshock.particles.scenes.reflow import start_flow, stop_rule
+from reflowshock.particles.steps.rest import run_to_rest
+from reflowshock.particles.surface.contact_line_hysteresis import HystereticLine
 from tests.support.level_sets import cap_radius
 
 RECEDING, ADVANCING = np.radians(60.0), np.radians(110.0)

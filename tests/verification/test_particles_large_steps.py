@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from meshing.surface.closed_surface import close_rings, measure
-from particles.core.checkpoint import Checkpoint
-from particles.core.geometry import JointGeometry
-from particles.parameters.solder import Solder, SolderNumerics
-from particles.scenes.carried_joint import carried_shape, carry_joint
-from workflow.board_drop.case import LARGE_STEPS
+from reflowshock.meshing.surface.closed_surface import close_rings, measure
+from reflowshock.particles.core.checkpoint import Checkpoint
+from reflowshock.particles.core.geometry import JointGeometry
+from reflowshock.particles.parameters.solder import Solder, SolderNumerics
+from reflowshock.particles.scenes.carried_joint import carried_shape, carry_joint
+from reflowshock.workflow.board_drop.case import LARGE_STEPS
 
 PAD = 0.24e-3
 PLACES = [

@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from particles.core.geometry import LARGEST_WIDTH_CHANGE, JointGeometry
-from particles.parameters.solder import Solder, SolderNumerics
-from particles.reference.young_laplace import joint_meridian
-from particles.scenes.metrics import width_change_bound
-from particles.scenes.reflow import solve_joint
+from reflowshock.particles.core.geometry import LARGEST_WIDTH_CHANGE, JointGeometry
+from reflowshock.particles.parameters.solder import Solder, SolderNumerics
+from reflowshock.particles.reference.young_laplace import joint_meridian
+from reflowshock.particles.scenes.metrics import width_change_bound
+from reflowshock.particles.scenes.reflow import solve_joint
 
 REFERENCE = json.loads((Path(__file__).parent / "references" / "surface_evolver.json").read_text())["leaning_joints"]
 MM, GAMMA = 1e-3, 0.4985

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from particles.core.neighbours import NeighbourList
-from particles.ispg.mls import SUPPORT, derivatives
+from reflowshock.particles.core.neighbours import NeighbourList
+from reflowshock.particles.ispg.mls import SUPPORT, derivatives
 
 COUNTS = (8, 12, 18)
 

@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from particles.core.geometry import JointGeometry
-from particles.parameters.solder import Solder, SolderEffects, SolderNumerics
-from particles.physics.force_wetting import Wetting
-from particles.physics.plate_force import plate_wrench
-from particles.physics.plate_motion import LIFT, SHIFT, Floating
-from particles.reference.young_laplace import joint_meridian
-from particles.scenes.moving_joint import settle_joint
-from particles.scenes.reflow import solve_joint, start_joint
-from particles.steps.rest import run_to_rest
+from reflowshock.particles.core.geometry import JointGeometry
+from reflowshock.particles.parameters.solder import Solder, SolderEffects, SolderNumerics
+from reflowshock.particles.physics.force_wetting import Wetting
+from reflowshock.particles.physics.plate_force import plate_wrench
+from reflowshock.particles.physics.plate_motion import LIFT, SHIFT, Floating
+from reflowshock.particles.reference.young_laplace import joint_meridian
+from reflowshock.particles.scenes.moving_joint import settle_joint
+from reflowshock.particles.scenes.reflow import solve_joint, start_joint
+from reflowshock.particles.steps.rest import run_to_rest
 
 RADIUS, GAMMA = 0.24e-3, 0.4985
 BALL, GAP = 0.0724e-9, 0.35e-3

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from particles.core.geometry import JointGeometry
-from particles.parameters.solder import Solder, SolderEffects, SolderNumerics
-from particles.reference.young_laplace import joint_meridian, sessile_meridian
-from particles.scenes.metrics import mean_angle, verdict
-from particles.scenes.reflow import solve_joint
-from particles.surface.profile import fit_profile
+from reflowshock.particles.core.geometry import JointGeometry
+from reflowshock.particles.parameters.solder import Solder, SolderEffects, SolderNumerics
+from reflowshock.particles.reference.young_laplace import joint_meridian, sessile_meridian
+from reflowshock.particles.scenes.metrics import mean_angle, verdict
+from reflowshock.particles.scenes.reflow import solve_joint
+from reflowshock.particles.surface.profile import fit_profile
 from tests.support.drops import solve_drop
 
 BALL, RADIUS, GAMMA = 0.0724e-9, 0.24e-3, 0.4985

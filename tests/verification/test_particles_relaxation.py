@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from particles.core.cloud import box_cloud
-from particles.parameters.solder import Solder, SolderEffects, SolderNumerics
-from particles.scenes.reflow import contact_line, start_flow
-from particles.steps.flow import LiquidFlow
+from reflowshock.particles.core.cloud import box_cloud
+from reflowshock.particles.parameters.solder import Solder, SolderEffects, SolderNumerics
+from reflowshock.particles.scenes.reflow import contact_line, start_flow
+from reflowshock.particles.steps.flow import LiquidFlow
 
 EFFECTS = {"surface_tension": True, "wall_adhesion": True, "gravity": False, "inertia": False, "viscosity": False}
 

@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from particles.parameters.scenes import Drop, Fluid, Joint
-from particles.scenes.drop_at_rest import drop_to_rest
-from particles.scenes.reflow import solve_joint
+from reflowshock.particles.parameters.scenes import Drop, Fluid, Joint
+from reflowshock.particles.scenes.drop_at_rest import drop_to_rest
+from reflowshock.particles.scenes.reflow import solve_joint
 
 REFERENCE = json.loads((Path(__file__).parent / "references" / "surface_evolver.json").read_text())
 MM, GAMMA = 1e-3, 0.4985

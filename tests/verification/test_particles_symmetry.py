@@ -5,8 +5,8 @@ from functools import cache
 import numpy as np
 import pytest
 
-from particles.parameters.scenes import Drop, Fluid
-from particles.scenes.drop_at_rest import drop_to_rest
+from reflowshock.particles.parameters.scenes import Drop, Fluid
+from reflowshock.particles.scenes.drop_at_rest import drop_to_rest
 
 SCENES = {
     "uniform wall": ({"volume": 1e-9, "contact_angle": np.radians(120.0), "particles_per_edge": 7}, "off"),

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from particles.reference.young_laplace import NoMeridian, joint_meridian, sessile_meridian
+from reflowshock.particles.reference.young_laplace import NoMeridian, joint_meridian, sessile_meridian
 
 GAMMA, RADIUS = 0.4985, 0.24e-3
 

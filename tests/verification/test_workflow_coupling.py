@@ -5,18 +5,18 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from fem.problem.thermal import KELVIN, Thermal
-from particles.core.geometry import JointGeometry
-from particles.parameters.solder import Solder, SolderNumerics
-from particles.reference.young_laplace import joint_meridian
-from particles.scenes.joint_stiffness import stiffness_estimate
+from reflowshock.fem.problem.thermal import KELVIN, Thermal
+from reflowshock.particles.core.geometry import JointGeometry
+from reflowshock.particles.parameters.solder import Solder, SolderNumerics
+from reflowshock.particles.reference.young_laplace import joint_meridian
+from reflowshock.particles.scenes.joint_stiffness import stiffness_estimate
+from reflowshock.workflow.case.problems import CaseError
+from reflowshock.workflow.pipeline.reader import read_case
+from reflowshock.workflow.reflow.coupling import Coupling, NotInBalance, placed
+from reflowshock.workflow.reflow.load_steps import LoadStep, load_steps
+from reflowshock.workflow.reflow.start import floating_height, scale_of, start
 from tests.support.reflow_structures import NAMES, Bow, joints_here, rigid_modes
 from tests.support.workflow_command import SMALL_CASE
-from workflow.case.problems import CaseError
-from workflow.pipeline.reader import read_case
-from workflow.reflow.coupling import Coupling, NotInBalance, placed
-from workflow.reflow.load_steps import LoadStep, load_steps
-from workflow.reflow.start import floating_height, scale_of, start
 
 RADIUS, GAMMA, BALL, GAP = 0.24e-3, 0.4985, 0.0724e-9, 0.33e-3
 SOLDER = Solder(volume=BALL, numerics=SolderNumerics(spacing=7e-5, time_step_limit=100), effects={"gravity": "off"})
@@ -128,7 +128,7 @@ def test_a_killed_run_continues_to_the_same_bits(tmp_path):
 
 
 def test_no_balance_names_load_step_and_residuals(tmp_path, monkeypatch):
-    monkeypatch.setattr("workflow.reflow.coupling.MOST_EXCHANGES", 1)
+    monkeypatch.setattr("reflowshock.workflow.reflow.coupling.MOST_EXCHANGES", 1)
     structure = Bow(SQUARE[:1], rigid_modes(SQUARE[:1], (), 0.0), compliance=5e-3)
     with pytest.raises(NotInBalance, match=r"load step 1 at 300\.0 K: after 1 exchanges forces still change by"):
         coupled(tmp_path, structure)

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from scipy.integrate import trapezoid
 
-from fem.materials.elasticity import elasticity_matrix
-from fem.materials.parameters import Isotropic
-from fem.problem.pulse import HalfSine, Haversine
-from workflow.structure import exact_bar, exact_cantilever, exact_layers
+from reflowshock.fem.materials.elasticity import elasticity_matrix
+from reflowshock.fem.materials.parameters import Isotropic
+from reflowshock.fem.problem.pulse import HalfSine, Haversine
+from reflowshock.workflow.structure import exact_bar, exact_cantilever, exact_layers
 
 BARS = exact_bar.Bars((0.1, 0.1), (70e9, 200e9), (2700.0, 8000.0), 8e-6)
 HEIGHTS = [0.03, 0.05, 0.15]

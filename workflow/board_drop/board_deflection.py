@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
-from fem.estimates.effects import STIFFENING_OF_BOARD, called_for, effect, stiffened
+from reflowshock.fem.estimates.effects import STIFFENING_OF_BOARD, called_for, effect, stiffened
 
 if TYPE_CHECKING:
-    from workflow.board_drop.case import BoardDropCase
+    from reflowshock.workflow.board_drop.case import BoardDropCase
 
 SHARE = 4.0 / math.pi  # of the base's acceleration in the first mode of a pinned beam, at its middle
 SAMPLES, SAMPLES_A_PERIOD = 1000, 100
@@ -30,7 +30,7 @@ def expected_deflection(case: "BoardDropCase") -> Deflection:
     The board is a beam between its holes that swings in its first mode, q'' + omega^2 q = 4/pi a(t): w = q sin(pi x/L).
     Width, package and later modes are left out.
     """
-    from fem.problem.shock_pulse import shock_pulse
+    from reflowshock.fem.problem.shock_pulse import shock_pulse
 
     board, (young_x, young_y, _) = case.board, case.materials.board.engineering_constants.young
     holes = board.holes
@@ -67,7 +67,7 @@ def decide_kinematics(case: "BoardDropCase") -> tuple[Literal["small", "finite"]
 
 def kinematics_effect(case: "BoardDropCase") -> dict:
     """Return whether rotations are finite, why, and what small ones would leave out, as an effect of a plan."""
-    from fem.materials.kinematics import finite_rotation
+    from reflowshock.fem.materials.kinematics import finite_rotation
 
     expected, kinematics = expected_deflection(case), case.shock.numerics.kinematics
     ratio = expected.largest / case.board.thickness
@@ -87,8 +87,8 @@ def weight_effect(case: "BoardDropCase") -> dict:
 
     It lasts, and a pulse does not: a board that is slow against the pulse feels it more than g over the peak says.
     """
-    from fem.problem.pulse import STANDARD_GRAVITY
-    from fem.problem.shock_pulse import shock_pulse
+    from reflowshock.fem.problem.pulse import STANDARD_GRAVITY
+    from reflowshock.fem.problem.shock_pulse import shock_pulse
 
     expected = expected_deflection(case)
     alone = first_mode_peak(expected.omega, lambda time: STANDARD_GRAVITY * time, case.shock.duration)

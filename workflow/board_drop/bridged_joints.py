@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from workflow.board_drop.case import PackageCase
+from reflowshock.workflow.board_drop.case import PackageCase
 
 if TYPE_CHECKING:
-    from meshing.board.package_side import PackageSide
-    from meshing.board.pads import PadSite
-    from meshing.joint.joint_mesh import JointMesh
-    from meshing.surface.closed_surface import ClosedSurface
+    from reflowshock.meshing.board.package_side import PackageSide
+    from reflowshock.meshing.board.pads import PadSite
+    from reflowshock.meshing.joint.joint_mesh import JointMesh
+    from reflowshock.meshing.surface.closed_surface import ClosedSurface
 
 logger = logging.getLogger(__name__)
 
@@ -45,7 +45,7 @@ def mesh_bridges(
         case: package, symmetry.
         side: the package's underside.
     """
-    from meshing.joint.solder_mesh import JointMeshError, mesh_bridge
+    from reflowshock.meshing.joint.solder_mesh import JointMeshError, mesh_bridge
 
     quarter = case.board.symmetry == "quarter"
     meshes = []

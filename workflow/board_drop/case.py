@@ -4,18 +4,18 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from fem.materials.roles import Materials
-from fem.problem.parameters import Shock
-from fem.problem.thermal import Thermal
-from meshing.board.parameters import Board, Package, Warpage
-from particles.parameters.solder import Reflow, Solder
-from workflow.board_drop import given_surfaces
-from workflow.case import fields
-from workflow.case.kind import Case, of_particles
-from workflow.case.problems import Problem
-from workflow.case.pulse_files import unreadable_pulses
-from workflow.case.stage_table import Pipeline, package_pipeline
-from workflow.case.toml_file import beside
+from reflowshock.fem.materials.roles import Materials
+from reflowshock.fem.problem.parameters import Shock
+from reflowshock.fem.problem.thermal import Thermal
+from reflowshock.meshing.board.parameters import Board, Package, Warpage
+from reflowshock.particles.parameters.solder import Reflow, Solder
+from reflowshock.workflow.board_drop import given_surfaces
+from reflowshock.workflow.case import fields
+from reflowshock.workflow.case.kind import Case, of_particles
+from reflowshock.workflow.case.problems import Problem
+from reflowshock.workflow.case.pulse_files import unreadable_pulses
+from reflowshock.workflow.case.stage_table import Pipeline, package_pipeline
+from reflowshock.workflow.case.toml_file import beside
 
 # Where solder overflows a sixth of the steps: tests/verification/test_particles_large_steps.py
 LARGE_STEPS = 100.0
@@ -68,12 +68,12 @@ class PackageCase(Case):
 
     def problems(self) -> list[Problem]:
         """Find parameters that make no possible package, joint or board together."""
-        from fem.problem import thermal_checks
-        from meshing.board import checks as meshing_checks
-        from meshing.board.pads import pad_table
-        from particles.parameters import checks as particles_checks
-        from workflow.board_drop.reflow_pool import joint_geometries
-        from workflow.reflow import forecast as reflow_forecast
+        from reflowshock.fem.problem import thermal_checks
+        from reflowshock.meshing.board import checks as meshing_checks
+        from reflowshock.meshing.board.pads import pad_table
+        from reflowshock.particles.parameters import checks as particles_checks
+        from reflowshock.workflow.board_drop.reflow_pool import joint_geometries
+        from reflowshock.workflow.reflow import forecast as reflow_forecast
 
         contradictions = meshing_checks.problems(self.package, self.board, self.warpage)
         if contradictions:
@@ -130,9 +130,9 @@ class BoardDropCase(PackageCase):
 
     def problems(self) -> list[Problem]:
         """Find parameters that make no possible package, joint, board or shock together."""
-        from fem.problem import shock_checks
-        from meshing.board import checks as meshing_checks
-        from workflow.board_drop import fine_joints, identical_joints, shock_cooling
+        from reflowshock.fem.problem import shock_checks
+        from reflowshock.meshing.board import checks as meshing_checks
+        from reflowshock.workflow.board_drop import fine_joints, identical_joints, shock_cooling
 
         found = super().problems()
         if meshing_checks.problems(self.package, self.board, self.warpage):
@@ -156,19 +156,19 @@ class BoardDropCase(PackageCase):
         """
         if self.shock.numerics.kinematics != "auto":
             return self
-        from workflow.board_drop.board_deflection import decide_kinematics
+        from reflowshock.workflow.board_drop.board_deflection import decide_kinematics
 
         numerics = self.shock.numerics.model_copy(update={"kinematics": decide_kinematics(self)[0]})
         return self.model_copy(update={"shock": self.shock.model_copy(update={"numerics": numerics})})
 
     def _decided_problems(self) -> list[Problem]:
         """Find what does not go with the kinematics that ``auto`` decides on."""
-        from fem.problem import shock_checks
+        from reflowshock.fem.problem import shock_checks
 
         return self.in_words(shock_checks.problems(self.decided.shock))
 
     def _impossible_steps(self) -> list[Problem]:
-        from workflow.board_drop.forecast import step_problems
+        from reflowshock.workflow.board_drop.forecast import step_problems
 
         return list(step_problems(self))
 

@@ -5,8 +5,8 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from particles.core.geometry import LARGEST_WIDTH_CHANGE
-from workflow.pipeline.stage_runner import Findings
+from reflowshock.particles.core.geometry import LARGEST_WIDTH_CHANGE
+from reflowshock.workflow.pipeline.stage_runner import Findings
 
 WIDTH_ERROR = 0.01  # of a joint's width, against the Young-Laplace shape of its volume, pads and gap
 VOLUME_DRIFT = 1.0e-3  # of a joint's volume during its reflow
@@ -250,7 +250,7 @@ def in_words_continued(results: Mapping[str, dict]) -> str:
 
 def _comparison(results: Mapping[str, dict], folder: Path) -> dict:
     """Compare both modes: errors of histories, and the ratio of the wall times of their windows."""
-    from fem.output.compare import compare_histories
+    from reflowshock.fem.output.compare import compare_histories
 
     files = [folder / mode / "history.npz" for mode in ("two_scale", "dns")]
     errors = compare_histories(files[0], files[1], fine_joints_of(results["two_scale"]))

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from fem.names import nearest
-from workflow.case.problems import Problem
+from reflowshock.fem.names import nearest
+from reflowshock.workflow.case.problems import Problem
 
 if TYPE_CHECKING:
-    from fem.problem.parameters import JointCoupling
-    from meshing.board.pads import PadSite
-    from workflow.board_drop.case import BoardDropCase
+    from reflowshock.fem.problem.parameters import JointCoupling
+    from reflowshock.meshing.board.pads import PadSite
+    from reflowshock.workflow.board_drop.case import BoardDropCase
 
 FINE, CRITICAL = "shock.coupling.fine_joints", "shock.coupling.critical_joints"
 
@@ -82,7 +82,7 @@ def read_fine_joints(folder: Path) -> FineJoints | None:
 
 def problems(case: "BoardDropCase") -> Iterator[Problem]:
     """Find joints that the model does not have, and more critical ones than there are."""
-    from meshing.board.pads import pad_table
+    from reflowshock.meshing.board.pads import pad_table
 
     coupling, sites = case.shock.coupling, pad_table(case.package, case.board, case.warpage)
     chosen = coupling.fine_joints
@@ -109,7 +109,7 @@ def _unknown(name: str, sites: "list[PadSite]", case: "BoardDropCase") -> Iterat
 
 def _image(name: str, sites: "list[PadSite]", case: "BoardDropCase") -> str:
     """Return the joint of a quarter model that is the mirror image of one outside it; empty where there is none."""
-    from meshing.board.pads import joint_name
+    from reflowshock.meshing.board.pads import joint_name
 
     package = case.package
     for site in sites if case.board.symmetry == "quarter" else ():

@@ -4,13 +4,13 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-from fem.materials.roles import Materials
-from fem.problem.thermal import Thermal
-from workflow.board_drop import shock_cooling
-from workflow.board_drop.case import BoardDropCase, PackageCase
-from workflow.board_drop.reflow_pool import distinct_joints, joint_geometries
-from workflow.board_drop.shock_effects import shock_effects
-from workflow.board_drop.shock_forecast import (
+from reflowshock.fem.materials.roles import Materials
+from reflowshock.fem.problem.thermal import Thermal
+from reflowshock.workflow.board_drop import shock_cooling
+from reflowshock.workflow.board_drop.case import BoardDropCase, PackageCase
+from reflowshock.workflow.board_drop.reflow_pool import distinct_joints, joint_geometries
+from reflowshock.workflow.board_drop.shock_effects import shock_effects
+from reflowshock.workflow.board_drop.shock_forecast import (
     PartForecast,
     ShockForecast,
     forecast_parts,
@@ -18,10 +18,10 @@ from workflow.board_drop.shock_forecast import (
     shorter_than_window,
     two_scale_parts,
 )
-from workflow.case.problems import Problem
-from workflow.case.step_limit import too_many_steps
-from workflow.pipeline.reader import available_cores
-from workflow.reflow.forecast import forecast_heated
+from reflowshock.workflow.case.problems import Problem
+from reflowshock.workflow.case.step_limit import too_many_steps
+from reflowshock.workflow.pipeline.reader import available_cores
+from reflowshock.workflow.reflow.forecast import forecast_heated
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,9 +51,9 @@ class Forecast:
 
 def forecast(case: PackageCase) -> Forecast:
     """Predict sizes, time steps and cost of a run."""
-    from meshing.board.pads import pad_table
-    from particles.parameters.effects import decide_effects
-    from particles.parameters.estimate import particle_count, reflow_seconds
+    from reflowshock.meshing.board.pads import pad_table
+    from reflowshock.particles.parameters.effects import decide_effects
+    from reflowshock.particles.parameters.estimate import particle_count, reflow_seconds
 
     geometries = joint_geometries(pad_table(case.package, case.board, case.warpage))
     given = () if case.thermal else case.package.surfaces
@@ -110,7 +110,7 @@ def step_problems(case: BoardDropCase) -> Iterator[Problem]:
     """Find more steps than any run takes, and what is over before two models meet again."""
     import numpy as np
 
-    from fem.estimates.estimate import damped_critical_step
+    from reflowshock.fem.estimates.estimate import damped_critical_step
 
     case = case.decided
 
@@ -126,7 +126,7 @@ def with_critical_step(quality: dict, materials: Materials) -> dict:
     """Add the critical time step [s] to the quality of a joint mesh, from the shortest length in each material."""
     import numpy as np
 
-    from fem.estimates.estimate import box_critical_step
+    from reflowshock.fem.estimates.estimate import box_critical_step
 
     steps = {
         role: box_critical_step(getattr(materials, role), np.full(3, length))

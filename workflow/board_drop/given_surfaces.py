@@ -5,13 +5,13 @@ from collections.abc import Container, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from fem.names import nearest
-from workflow.case.problems import Problem
-from workflow.case.toml_file import beside
+from reflowshock.fem.names import nearest
+from reflowshock.workflow.case.problems import Problem
+from reflowshock.workflow.case.toml_file import beside
 
 if TYPE_CHECKING:
-    from meshing.board.pads import PadSite
-    from meshing.board.parameters import Package
+    from reflowshock.meshing.board.pads import PadSite
+    from reflowshock.meshing.board.parameters import Package
 
 KEY = "package.surfaces"
 
@@ -39,8 +39,8 @@ def problems(package: "Package", pads: "Sequence[PadSite]", heated: bool) -> Ite
         pads: the pad table, as drawn.
         heated: whether pads move before the joints freeze: how high a joint is then, only the reflow finds.
     """
-    from meshing.surface.closed_surface import SurfaceError
-    from meshing.surface.user_surface import SUFFIXES, closed_triangles, load_surface
+    from reflowshock.meshing.surface.closed_surface import SurfaceError
+    from reflowshock.meshing.surface.user_surface import SUFFIXES, closed_triangles, load_surface
 
     sites = {pad.name: pad for pad in pads}
     for name, text in package.surfaces.items():
@@ -75,8 +75,8 @@ def given_records(package: "Package", pads: "Iterable[PadSite]", reflowed: Conta
     Raises:
         SurfaceError: a surface that does not fit.
     """
-    from meshing.surface.closed_surface import measure
-    from meshing.surface.user_surface import load_surface
+    from reflowshock.meshing.surface.closed_surface import measure
+    from reflowshock.meshing.surface.user_surface import load_surface
 
     records = {}
     for pad in (pad for pad in pads if pad.name in package.surfaces and pad.name not in reflowed):

@@ -5,14 +5,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from workflow.board_drop.findings import metric
-from workflow.case.problems import Problem
-from workflow.pipeline.stage_runner import Findings, Run
-from workflow.process.products import read_json
+from reflowshock.workflow.board_drop.findings import metric
+from reflowshock.workflow.case.problems import Problem
+from reflowshock.workflow.pipeline.stage_runner import Findings, Run
+from reflowshock.workflow.process.products import read_json
 
 if TYPE_CHECKING:
-    from meshing.surface.truncated_sphere import TruncatedSphere
-    from workflow.board_drop.case import BoardDropCase, PackageCase
+    from reflowshock.meshing.surface.truncated_sphere import TruncatedSphere
+    from reflowshock.workflow.board_drop.case import BoardDropCase, PackageCase
 
 KEY, FOLDER = "shock.identical_joints", "identical"
 PREFIX = "identical_"  # begins the names of meshes and metrics of identical joints
@@ -20,7 +20,7 @@ PREFIX = "identical_"  # begins the names of meshes and metrics of identical joi
 
 def identical_sphere(case: "PackageCase") -> "TruncatedSphere":
     """Return the truncated sphere of the solder's volume between the wetted discs of the pads."""
-    from meshing.surface.truncated_sphere import TruncatedSphere
+    from reflowshock.meshing.surface.truncated_sphere import TruncatedSphere
 
     board, package = case.package.board_pad, case.package.package_pad
     return TruncatedSphere.of_volume(case.solder.volume, board.wetted_radius, package.wetted_radius)
@@ -55,7 +55,7 @@ def compared(found: Findings, run: "Run[BoardDropCase]", folder: Path, mode: str
         folder: of the shock, with the run of a mode and that in ``identical``.
         mode: whose run has the real joints.
     """
-    from meshing.board.pads import read_pads
+    from reflowshock.meshing.board.pads import read_pads
 
     real, flat = (_peaks(folder / name / "history.npz") for name in (mode, FOLDER))
     critical = max(real, key=real.__getitem__)
@@ -75,7 +75,7 @@ def compared(found: Findings, run: "Run[BoardDropCase]", folder: Path, mode: str
 def _peaks(history: Path) -> dict[str, float]:
     import numpy as np
 
-    from workflow.report.histories import peaks
+    from reflowshock.workflow.report.histories import peaks
 
     with np.load(history) as arrays:
         return peaks(dict(arrays))

@@ -5,26 +5,26 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from workflow.board_drop.bridged_joints import mesh_bridges
-from workflow.board_drop.case import BoardDropCase, PackageCase
-from workflow.board_drop.fine_joints import needs_coarse_joints
-from workflow.board_drop.identical_joints import PREFIX, identical_sphere
-from workflow.pipeline.stage_runner import Run
-from workflow.process.products import write_json
+from reflowshock.workflow.board_drop.bridged_joints import mesh_bridges
+from reflowshock.workflow.board_drop.case import BoardDropCase, PackageCase
+from reflowshock.workflow.board_drop.fine_joints import needs_coarse_joints
+from reflowshock.workflow.board_drop.identical_joints import PREFIX, identical_sphere
+from reflowshock.workflow.pipeline.stage_runner import Run
+from reflowshock.workflow.process.products import write_json
 
 if TYPE_CHECKING:
-    from meshing.board.package_side import PackageSide
-    from meshing.board.pads import PadSite
-    from meshing.joint.joint_mesh import JointMesh
-    from meshing.surface.closed_surface import ClosedSurface
+    from reflowshock.meshing.board.package_side import PackageSide
+    from reflowshock.meshing.board.pads import PadSite
+    from reflowshock.meshing.joint.joint_mesh import JointMesh
+    from reflowshock.meshing.surface.closed_surface import ClosedSurface
 
 
 def mesh_real_joints(run: Run[PackageCase], folder: Path) -> dict[str, dict]:
     """Put the package where the solder froze and mesh the joints there; return what ``mesh_array`` does."""
-    from meshing.board.displaced_assembly import write_displaced_assembly
-    from meshing.board.displacement import prescribed, read_computed
-    from meshing.board.pads import read_pads
-    from meshing.surface.closed_surface import read_surface
+    from reflowshock.meshing.board.displaced_assembly import write_displaced_assembly
+    from reflowshock.meshing.board.displacement import prescribed, read_computed
+    from reflowshock.meshing.board.pads import read_pads
+    from reflowshock.meshing.surface.closed_surface import read_surface
 
     case, structure = run.case, run.folder / "reflow/structure.npz"
     displacement = read_computed(structure) if structure.exists() else prescribed(case.package, case.warpage)
@@ -40,10 +40,10 @@ def mesh_real_joints(run: Run[PackageCase], folder: Path) -> dict[str, dict]:
 
 def mesh_identical_joints(run: Run[PackageCase], folder: Path) -> dict[str, dict]:
     """Mesh truncated spheres of the solder's volume, on which nothing weighs, under a flat package at their height."""
-    from meshing.board.displaced_assembly import write_displaced_assembly
-    from meshing.board.displacement import raised
-    from meshing.board.pads import read_pads
-    from meshing.surface.sphere_surface import sphere_surface
+    from reflowshock.meshing.board.displaced_assembly import write_displaced_assembly
+    from reflowshock.meshing.board.displacement import raised
+    from reflowshock.meshing.board.pads import read_pads
+    from reflowshock.meshing.surface.sphere_surface import sphere_surface
 
     case = run.case
     sphere = identical_sphere(case)
@@ -75,7 +75,7 @@ def mesh_array(
     Returns:
         Kind of joint mesh, which begins the names of its metrics -> joint -> quality.
     """
-    from meshing.joint.solder_mesh import mesh_coarse_or_fine, mesh_joint
+    from reflowshock.meshing.joint.solder_mesh import mesh_coarse_or_fine, mesh_joint
 
     fine = [mesh_joint(surface, site, case.package, side) for surface, site in bodies]
     kinds = {prefix: fine}
@@ -89,10 +89,10 @@ def mesh_array(
 
 def _write(meshes: "Sequence[JointMesh]", kind: str, case: PackageCase, folder: Path) -> dict[str, dict]:
     """Write meshes, the tetrahedra of those that are free-form, and their quality; return this by joint."""
-    from meshing.core.quadratic_tetrahedra import write_tetrahedra
-    from meshing.joint.joints_file import write_joints
-    from meshing.joint.solder_mesh import joint_quality
-    from workflow.board_drop.forecast import with_critical_step
+    from reflowshock.meshing.core.quadratic_tetrahedra import write_tetrahedra
+    from reflowshock.meshing.joint.joints_file import write_joints
+    from reflowshock.meshing.joint.solder_mesh import joint_quality
+    from reflowshock.workflow.board_drop.forecast import with_critical_step
 
     write_joints(list(meshes), folder / f"{kind}joints.msh")
     for mesh in meshes:

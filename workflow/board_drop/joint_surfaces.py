@@ -3,14 +3,14 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from workflow.board_drop.bridged_joints import BETWEEN
-from workflow.board_drop.case import PackageCase
-from workflow.board_drop.reflow_pool import refuse_joints_without_mesh
-from workflow.pipeline.stage_runner import Run
-from workflow.process.products import read_json
+from reflowshock.workflow.board_drop.bridged_joints import BETWEEN
+from reflowshock.workflow.board_drop.case import PackageCase
+from reflowshock.workflow.board_drop.reflow_pool import refuse_joints_without_mesh
+from reflowshock.workflow.pipeline.stage_runner import Run
+from reflowshock.workflow.process.products import read_json
 
 if TYPE_CHECKING:
-    from particles.steps.shape import JointShape
+    from reflowshock.particles.steps.shape import JointShape
 
 
 def write_surfaces(run: Run[PackageCase], folder: Path) -> dict[str, dict]:
@@ -19,11 +19,11 @@ def write_surfaces(run: Run[PackageCase], folder: Path) -> dict[str, dict]:
     Raises:
         ReflowError: joints are open: they have no surface between their pads.
     """
-    from meshing.board.pads import read_pads
-    from meshing.surface.closed_surface import measure, write_surface
-    from meshing.surface.user_surface import file_volume, load_surface
-    from particles.scenes.orientation import Orientation, oriented
-    from particles.scenes.products import read_shapes
+    from reflowshock.meshing.board.pads import read_pads
+    from reflowshock.meshing.surface.closed_surface import measure, write_surface
+    from reflowshock.meshing.surface.user_surface import file_volume, load_surface
+    from reflowshock.particles.scenes.orientation import Orientation, oriented
+    from reflowshock.particles.scenes.products import read_shapes
 
     package, joints = run.case.package, read_json(run.folder / "reflow/joints.json")
     sites = {site.name: site for site in read_pads(run.folder / "reflow/pads.json")}
@@ -51,6 +51,6 @@ def write_surfaces(run: Run[PackageCase], folder: Path) -> dict[str, dict]:
 
 def _closed(shape: "JointShape"):
     """Close the free surface of a shape on all its pads."""
-    from meshing.surface.closed_surface import close_rings
+    from reflowshock.meshing.surface.closed_surface import close_rings
 
     return close_rings(shape.surface_points, shape.triangles, shape.rings)

@@ -6,15 +6,15 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from particles.parameters.solder import Solder
-from workflow.reflow.pool import JointPool, ReflowError
+from reflowshock.particles.parameters.solder import Solder
+from reflowshock.workflow.reflow.pool import JointPool, ReflowError
 
 if TYPE_CHECKING:
-    from meshing.board.pads import PadSite
-    from particles.core.geometry import JointGeometry
-    from particles.scenes.bridges import Contact
-    from particles.scenes.orientation import Orientation
-    from particles.steps.shape import JointShape
+    from reflowshock.meshing.board.pads import PadSite
+    from reflowshock.particles.core.geometry import JointGeometry
+    from reflowshock.particles.scenes.bridges import Contact
+    from reflowshock.particles.scenes.orientation import Orientation
+    from reflowshock.particles.steps.shape import JointShape
 
 logger = logging.getLogger(__name__)
 
@@ -32,15 +32,15 @@ class Job:
 
 def records() -> tuple[type, ...]:
     """Return what jobs and results consist of."""
-    from particles.core.geometry import JointGeometry
-    from particles.steps.shape import JointShape, Snapshot
+    from reflowshock.particles.core.geometry import JointGeometry
+    from reflowshock.particles.steps.shape import JointShape, Snapshot
 
     return Job, JointGeometry, Solder, JointShape, Snapshot
 
 
 def joint_geometries(pads: "Sequence[PadSite]") -> "dict[str, JointGeometry]":
     """Return the geometry of each joint of a pad table, by name."""
-    from particles.core.geometry import JointGeometry
+    from reflowshock.particles.core.geometry import JointGeometry
 
     return {
         pad.name: JointGeometry(pad.gap, pad.wetted_radius_board, pad.wetted_radius_package, pad.offset, pad.tilt)
@@ -72,7 +72,7 @@ def distinct_joints(geometries: "Mapping[str, JointGeometry]") -> list[Alike]:
     Args:
         geometries: joint name -> geometry.
     """
-    from particles.scenes.orientation import canonical, sizes
+    from reflowshock.particles.scenes.orientation import canonical, sizes
 
     found: list[Alike] = []
     for name, geometry in geometries.items():
@@ -100,7 +100,7 @@ def joint_records(
         Joint name -> ``shape``, ``turn`` [rad] and ``mirror`` (how it lies seen from that shape: mirrored first, y to
         -y, then turned about z), ``place`` of the package's pad over the board's, ``verdict``, ``metrics``.
     """
-    from particles.scenes.products import untimed
+    from reflowshock.particles.scenes.products import untimed
 
     records: dict[str, dict] = {}
     for group in groups:
@@ -130,7 +130,7 @@ def mark_bridges(records: dict[str, dict], pads: "Sequence[PadSite]", mirrored: 
     Returns:
         The pairs that touch, the largest overlap first.
     """
-    from particles.scenes.bridges import contacts, neighbours
+    from reflowshock.particles.scenes.bridges import contacts, neighbours
 
     places = {pad.name: (pad.x, pad.y) for pad in pads}
     widths = {name: records[name]["metrics"]["max_width"]["value"] for name in places}
@@ -152,10 +152,10 @@ def bridge_shapes(
         geometries: joint name -> geometry, of those that were reflowed.
         solder: of one joint.
     """
-    from particles.scenes.bridge import solve_bridge
-    from particles.scenes.reflow import solve_joint
-    from particles.steps.rest import NoRest
-    from particles.surface.cloud_level_set import CannotRebuild
+    from reflowshock.particles.scenes.bridge import solve_bridge
+    from reflowshock.particles.scenes.reflow import solve_joint
+    from reflowshock.particles.steps.rest import NoRest
+    from reflowshock.particles.surface.cloud_level_set import CannotRebuild
 
     bridges = {}
     reflowed = [pair for pair in found if pair.first in geometries and pair.second in geometries]
@@ -207,8 +207,8 @@ def solve_joints(
 
 def _solve(job: Job, progress: Callable[[float], None]) -> "tuple[JointShape, bool]":
     """Return the shape, and whether it continued from a checkpoint."""
-    from particles.core.checkpoint import Checkpoint
-    from particles.scenes.reflow import solve_joint
+    from reflowshock.particles.core.checkpoint import Checkpoint
+    from reflowshock.particles.scenes.reflow import solve_joint
 
     checkpoint = Checkpoint(job.checkpoint, (job.geometry, job.solder))
     shape = solve_joint(job.geometry, job.solder, progress=progress, checkpoint=checkpoint)

@@ -8,16 +8,16 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from workflow.board_drop.case import BoardDropCase
-from workflow.board_drop.shock_forecast import PartForecast, role_of
-from workflow.case.problems import Problem
-from workflow.pipeline.stage_runner import Findings, Run
-from workflow.process.fem_launch import run_fem
-from workflow.process.kernel_cache import digest
-from workflow.process.plan_table import duration
+from reflowshock.workflow.board_drop.case import BoardDropCase
+from reflowshock.workflow.board_drop.shock_forecast import PartForecast, role_of
+from reflowshock.workflow.case.problems import Problem
+from reflowshock.workflow.pipeline.stage_runner import Findings, Run
+from reflowshock.workflow.process.fem_launch import run_fem
+from reflowshock.workflow.process.kernel_cache import digest
+from reflowshock.workflow.process.plan_table import duration
 
 if TYPE_CHECKING:
-    from fem.estimates.solver_cost import SolverCost
+    from reflowshock.fem.estimates.solver_cost import SolverCost
 
 SCENE = ("meshes", "coarse_joints", "shock", "materials")  # of a request: what cooling depends on, too
 RESULT, IDENTITY = "result.json", "identity.txt"
@@ -65,7 +65,7 @@ def cooling_name(request: dict, prefix: str) -> str:
 
 def _cool(run: Run[BoardDropCase], folder: Path, request: dict) -> None:
     """Compute what cooling does, unless a stage that was killed has: a shock continues only from the same bits."""
-    from fem.parallel.checkpoint_files import digest_of_files
+    from reflowshock.fem.parallel.checkpoint_files import digest_of_files
 
     thermal = run.case.thermal
     assert thermal is not None
@@ -130,7 +130,7 @@ def forecast(case: BoardDropCase, parts: Mapping[str, PartForecast]) -> tuple[di
 
 def _cost(case: BoardDropCase, parts: Mapping[str, PartForecast]) -> "SolverCost":
     """Predict the cost of one cooling."""
-    from fem.estimates.solver_cost import cooling_cost
+    from reflowshock.fem.estimates.solver_cost import cooling_cost
 
     yielding = {role for role, material in case.materials.by_role.items() if material.plasticity is not None}
     path = sum(part.elements for name, part in parts.items() if role_of(name) in yielding)

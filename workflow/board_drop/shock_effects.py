@@ -3,14 +3,14 @@
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from fem.estimates.effects import damping, effect
-from fem.estimates.material_effects import failure_effect, material_effects
-from workflow.board_drop.board_deflection import expected_deflection, kinematics_effect, weight_effect
-from workflow.board_drop.fine_joints import coarse_joints_effect
-from workflow.board_drop.identical_joints import identical_joints_effect
+from reflowshock.fem.estimates.effects import damping, effect
+from reflowshock.fem.estimates.material_effects import failure_effect, material_effects
+from reflowshock.workflow.board_drop.board_deflection import expected_deflection, kinematics_effect, weight_effect
+from reflowshock.workflow.board_drop.fine_joints import coarse_joints_effect
+from reflowshock.workflow.board_drop.identical_joints import identical_joints_effect
 
 if TYPE_CHECKING:
-    from workflow.board_drop.case import BoardDropCase
+    from reflowshock.workflow.board_drop.case import BoardDropCase
 
 
 def shock_effects(case: "BoardDropCase") -> dict:

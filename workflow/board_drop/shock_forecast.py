@@ -4,13 +4,13 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from fem.materials.parameters import Material
-from workflow.case.problems import CaseError, Problem
-from workflow.process.plan_table import short
+from reflowshock.fem.materials.parameters import Material
+from reflowshock.workflow.case.problems import CaseError, Problem
+from reflowshock.workflow.process.plan_table import short
 
 if TYPE_CHECKING:
-    from meshing.board.estimate import PartEstimate
-    from workflow.board_drop.case import BoardDropCase
+    from reflowshock.meshing.board.estimate import PartEstimate
+    from reflowshock.workflow.board_drop.case import BoardDropCase
 
 MACRO = "board"  # role of the parts whose elements the window follows
 
@@ -84,14 +84,14 @@ Parts = Mapping[str, PartForecast]
 
 def forecast_parts(case: "BoardDropCase") -> dict[str, PartForecast]:
     """Predict size and critical time step of every part of the mesh with all joints fine."""
-    from meshing.board.estimate import count_elements
+    from reflowshock.meshing.board.estimate import count_elements
 
     return _forecasts(case, count_elements(case.package, case.board, case.warpage))
 
 
 def two_scale_parts(case: "BoardDropCase") -> dict[str, PartForecast]:
     """Predict the same of a two-scale run, in which joints may be coarse; of a one-way run those of both models."""
-    from meshing.board.estimate import count_elements
+    from reflowshock.meshing.board.estimate import count_elements
 
     if case.shock.coupling.direction == "one_way":
         return _driven_parts(case) | coarse_parts(case)
@@ -100,14 +100,14 @@ def two_scale_parts(case: "BoardDropCase") -> dict[str, PartForecast]:
 
 def coarse_parts(case: "BoardDropCase") -> dict[str, PartForecast]:
     """Predict the same of the run that finds the critical joints."""
-    from meshing.board.estimate import count_elements
+    from reflowshock.meshing.board.estimate import count_elements
 
     return _forecasts(case, count_elements(case.package, case.board, case.warpage, 0))
 
 
 def _driven_parts(case: "BoardDropCase") -> dict[str, PartForecast]:
     """Predict the same of the fine joints of a one-way run; the board around them is left out."""
-    from meshing.board.estimate import count_elements
+    from reflowshock.meshing.board.estimate import count_elements
 
     estimates = count_elements(case.package, case.board, case.warpage, fine_joint_count(case))
     return _forecasts(case, {name: part for name, part in estimates.items() if name in ("solder", "copper")})
@@ -124,7 +124,7 @@ def fine_joint_count(case: "BoardDropCase") -> int | None:
 def _forecasts(case: "BoardDropCase", estimates: "Mapping[str, PartEstimate]") -> dict[str, PartForecast]:
     import numpy as np
 
-    from fem.estimates.estimate import box_critical_step
+    from reflowshock.fem.estimates.estimate import box_critical_step
 
     scaled = case.shock.numerics.mass_scaled
     return {
@@ -145,8 +145,8 @@ def forecast_shock(case: "BoardDropCase", parts: Parts) -> ShockForecast:
         case: the case.
         parts: of the mesh with all joints fine.
     """
-    from fem.estimates.estimate import UPDATES_PER_SECOND, implicit_plan, largest_implicit_step, shortened
-    from fem.estimates.solver_cost import implicit_cost, plate_nodes
+    from reflowshock.fem.estimates.estimate import UPDATES_PER_SECOND, implicit_plan, largest_implicit_step, shortened
+    from reflowshock.fem.estimates.solver_cost import implicit_cost, plate_nodes
 
     shock = case.shock
     scheme, levels, seconds = _coupled(case, two_scale_parts(case))
@@ -194,7 +194,7 @@ def _slow(case: "BoardDropCase", parts: Parts) -> frozenset[str]:
 
 def _plan(case: "BoardDropCase", parts: Parts):
     """Return the windows of a mesh; scaled masses follow the smallest step of the others, so they do not limit it."""
-    from fem.estimates.estimate import damped_critical_step, window_plan
+    from reflowshock.fem.estimates.estimate import damped_critical_step, window_plan
 
     shock, numerics = case.shock, case.shock.numerics
     macro = min(parts[name].critical_step for name in _slow(case, parts) & parts.keys())
@@ -206,7 +206,7 @@ def _plan(case: "BoardDropCase", parts: Parts):
 
 def shorter_than_window(case: "BoardDropCase") -> Iterator[Problem]:
     """Find a pulse, or a whole shock, that ends within the first window of the two-scale run."""
-    from fem.estimates.estimate import damped_critical_step
+    from reflowshock.fem.estimates.estimate import damped_critical_step
 
     shock, parts = case.shock, two_scale_parts(case)
     slowest = min(parts[name].critical_step for name in _slow(case, parts) & parts.keys())
@@ -223,7 +223,7 @@ def shorter_than_window(case: "BoardDropCase") -> Iterator[Problem]:
 
 def _direct(case: "BoardDropCase", parts: Parts):
     """Return windows and seconds of a DNS."""
-    from fem.estimates.estimate import predict_seconds
+    from reflowshock.fem.estimates.estimate import predict_seconds
 
     plan, board = _plan(case, parts), parts[MACRO].elements
     work = sum(part.elements * part.cost for name, part in parts.items() if name != MACRO)
@@ -232,7 +232,7 @@ def _direct(case: "BoardDropCase", parts: Parts):
 
 def _coupled(case: "BoardDropCase", parts: Parts) -> tuple[tuple[str, str], tuple[LevelForecast, ...], float]:
     """Return scheme, levels and seconds of a two-scale run."""
-    from fem.estimates.estimate import BOARD_ADVANTAGE, predict_seconds
+    from reflowshock.fem.estimates.estimate import BOARD_ADVANTAGE, predict_seconds
 
     plan, scheme = _plan(case, parts), forecast_scheme(case, parts)
     if scheme[0] == "local_steps":
@@ -253,7 +253,7 @@ def _coupled(case: "BoardDropCase", parts: Parts) -> tuple[tuple[str, str], tupl
 
 def forecast_scheme(case: "BoardDropCase", parts: Parts) -> tuple[str, str]:
     """Return the scheme of the coupling, and why; layers of board around the joints are taken to be there."""
-    from fem.division.choice import choose_scheme
+    from reflowshock.fem.division.choice import choose_scheme
 
     wanted = case.shock.coupling.scheme
     if case.shock.coupling.direction == "one_way":
@@ -273,10 +273,10 @@ def _levels(case: "BoardDropCase", parts: Parts, window: float) -> tuple[tuple[i
     """Return the ratios of step levels and the level of each part, as if parts did not touch."""
     import numpy as np
 
-    from fem.division.choose_levels import Pace, choose_levels
-    from fem.errors import LevelError
-    from fem.estimates.estimate import BOARD_ADVANTAGE
-    from fem.mesh.tie import Tie
+    from reflowshock.fem.division.choose_levels import Pace, choose_levels
+    from reflowshock.fem.errors import LevelError
+    from reflowshock.fem.estimates.estimate import BOARD_ADVANTAGE
+    from reflowshock.fem.mesh.tie import Tie
 
     scaled_to = min(part.critical_step for part in parts.values() if not part.mass_scaled)
     steps = np.array([scaled_to if part.mass_scaled else part.critical_step for part in parts.values()])
@@ -297,8 +297,8 @@ def _levels(case: "BoardDropCase", parts: Parts, window: float) -> tuple[tuple[i
 
 def relative_cost(case: "BoardDropCase", part: str) -> float:
     """Return the cost of an element of a part over that of an elastic one: what yields or turns has a path."""
-    from fem.estimates.estimate import UPDATES_PER_SECOND
-    from fem.estimates.solver_cost import NONLINEAR_RATE
+    from reflowshock.fem.estimates.estimate import UPDATES_PER_SECOND
+    from reflowshock.fem.estimates.solver_cost import NONLINEAR_RATE
 
     numerics = case.shock.numerics
     has_path = material_of(case, part).plasticity is not None or numerics.kinematics == "finite"

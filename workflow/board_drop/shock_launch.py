@@ -3,18 +3,18 @@
 import json
 from pathlib import Path
 
-from fem.problem.parameters import JointCoupling
-from workflow.board_drop.case import BoardDropCase
-from workflow.board_drop.fine_joints import (
+from reflowshock.fem.problem.parameters import JointCoupling
+from reflowshock.workflow.board_drop.case import BoardDropCase
+from reflowshock.workflow.board_drop.fine_joints import (
     FineJoints,
     most_stressed,
     named_joints,
     needs_coarse_joints,
     write_fine_joints,
 )
-from workflow.board_drop.shock_cooling import begun
-from workflow.pipeline.stage_runner import Run
-from workflow.process.fem_launch import run_fem
+from reflowshock.workflow.board_drop.shock_cooling import begun
+from reflowshock.workflow.pipeline.stage_runner import Run
+from reflowshock.workflow.process.fem_launch import run_fem
 
 MODES = {"two_scale": "two-scale", "dns": "DNS"}
 IDENTICAL_TITLE = "identical joints"

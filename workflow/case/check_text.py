@@ -10,7 +10,7 @@ UNITS = {
 
 def against_limit(name: str, check: dict) -> tuple[str, str]:
     """Return value and limit of a check."""
-    from workflow.report.tables import quantity
+    from reflowshock.workflow.report.tables import quantity
 
     unit = next((unit for pattern, unit in UNITS.items() if re.fullmatch(pattern, name)), "")
     value, limit = (quantity({"value": check[key], "unit": unit}) for key in ("value", "limit"))

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, ClassVar
 
 from pydantic import BaseModel, ConfigDict
 
-from workflow.case.names import Name
-from workflow.case.problems import Problem
-from workflow.case.stage_table import Pipeline
+from reflowshock.workflow.case.names import Name
+from reflowshock.workflow.case.problems import Problem
+from reflowshock.workflow.case.stage_table import Pipeline
 
 if TYPE_CHECKING:
-    from particles.parameters.checks import Problem as ParticlesProblem
+    from reflowshock.particles.parameters.checks import Problem as ParticlesProblem
 
 FULL = "full"  # the scale of a case as its file says it
 

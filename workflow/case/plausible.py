@@ -7,11 +7,11 @@ from functools import cache
 
 from pydantic.fields import FieldInfo
 
-from workflow.case import fields
-from workflow.case.kind import Case
-from workflow.case.problems import Problem
-from workflow.case.pulse_files import largest_values
-from workflow.case.units import dimension, from_si, to_si
+from reflowshock.workflow.case import fields
+from reflowshock.workflow.case.kind import Case
+from reflowshock.workflow.case.problems import Problem
+from reflowshock.workflow.case.pulse_files import largest_values
+from reflowshock.workflow.case.units import dimension, from_si, to_si
 
 FORCE = "--force"
 

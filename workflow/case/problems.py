@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 
-from workflow.case.toml_places import Place
+from reflowshock.workflow.case.toml_places import Place
 
 LONGEST = 120  # characters of a value or key in a message
 Places = Callable[[str], Place | None]

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-from workflow.case.problems import Problem
+from reflowshock.workflow.case.problems import Problem
 
 UNITS = {"acceleration": "m/s^2", "pressure": "Pa", "velocity": "m/s"}
 Tables = Mapping[str, tuple[Path, str]]
@@ -15,8 +15,8 @@ def unreadable_pulses(tables: Tables) -> Iterator[Problem]:
     Args:
         tables: key -> file, and the quantity of its second column.
     """
-    from fem.errors import PulseError
-    from fem.problem.pulse_table import read_pulse
+    from reflowshock.fem.errors import PulseError
+    from reflowshock.fem.problem.pulse_table import read_pulse
 
     for key, (path, quantity) in tables.items():
         try:
@@ -28,8 +28,8 @@ def unreadable_pulses(tables: Tables) -> Iterator[Problem]:
 
 def largest_values(tables: Tables) -> Iterator[tuple[str, str, float]]:
     """Yield key, SI unit and magnitude of the last time and of the largest value of each table that can be read."""
-    from fem.errors import PulseError
-    from fem.problem.pulse_table import read_pulse
+    from reflowshock.fem.errors import PulseError
+    from reflowshock.fem.problem.pulse_table import read_pulse
 
     for key, (path, quantity) in tables.items():
         try:

@@ -7,11 +7,11 @@ scale = "full"                                   # or --set scale="quick"
 
 from collections.abc import Iterator
 
-from fem.names import nearest
-from workflow.case.kind import FULL
-from workflow.case.names import is_name, wrong_name
-from workflow.case.problems import Problem, as_toml
-from workflow.case.toml_file import DEEPEST
+from reflowshock.fem.names import nearest
+from reflowshock.workflow.case.kind import FULL
+from reflowshock.workflow.case.names import is_name, wrong_name
+from reflowshock.workflow.case.problems import Problem, as_toml
+from reflowshock.workflow.case.toml_file import DEEPEST
 
 KEYS = 'a table of dotted keys, e.g. "board.numerics.coarse_size" = "2 mm"'
 

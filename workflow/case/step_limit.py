@@ -2,8 +2,8 @@
 
 from collections.abc import Iterator
 
-from workflow.case.problems import Problem
-from workflow.process.plan_table import short
+from reflowshock.workflow.case.problems import Problem
+from reflowshock.workflow.process.plan_table import short
 
 STEPS_MOST = 1e10  # those of the smallest meshes take hours
 

@@ -5,8 +5,8 @@ import stat
 import tomllib
 from pathlib import Path
 
-from workflow.case.problems import CaseError, Problem
-from workflow.case.toml_places import Place, message_of, place_of_error
+from reflowshock.workflow.case.problems import CaseError, Problem
+from reflowshock.workflow.case.toml_places import Place, message_of, place_of_error
 
 MOST_BYTES = 4_000_000
 DEEPEST = 16  # tables in tables; no case has more than five

@@ -7,10 +7,10 @@ from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
-from fem.names import nearest
-from workflow.case import fields
-from workflow.case.names import wrong_name
-from workflow.case.problems import Problem
+from reflowshock.fem.names import nearest
+from reflowshock.workflow.case import fields
+from reflowshock.workflow.case.names import wrong_name
+from reflowshock.workflow.case.problems import Problem
 
 RANGES = ("greater_than", "greater_than_equal", "less_than", "less_than_equal", "finite_number")
 

@@ -4,11 +4,11 @@ import shutil
 from collections.abc import Iterator, Sequence
 from importlib.util import find_spec
 
-from fem.names import nearest
-from workflow.case.kind import Case
-from workflow.case.problems import CaseError, Problem
-from workflow.cluster.profile import FILE, Profile
-from workflow.cluster.queue import NoAnswer, Partition, partitions
+from reflowshock.fem.names import nearest
+from reflowshock.workflow.case.kind import Case
+from reflowshock.workflow.case.problems import CaseError, Problem
+from reflowshock.workflow.cluster.profile import FILE, Profile
+from reflowshock.workflow.cluster.queue import NoAnswer, Partition, partitions
 
 PLUGIN = "snakemake_executor_plugin_slurm"
 

@@ -10,14 +10,14 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Any, Protocol
 
-from workflow.case.kind import Case
-from workflow.case.problems import CaseError, Problem
-from workflow.cluster.checks import check_slurm
-from workflow.cluster.profile import Profile, read_profile
-from workflow.cluster.queue import NoAnswer, cancel, jobs_in
-from workflow.cluster.resources import MOST_CORES, stage_resources
-from workflow.pipeline.reader import available_cores
-from workflow.process.launch import DIE_WITH_PARENT, LAUNCHER, end_group
+from reflowshock.workflow.case.kind import Case
+from reflowshock.workflow.case.problems import CaseError, Problem
+from reflowshock.workflow.cluster.checks import check_slurm
+from reflowshock.workflow.cluster.profile import Profile, read_profile
+from reflowshock.workflow.cluster.queue import NoAnswer, cancel, jobs_in
+from reflowshock.workflow.cluster.resources import MOST_CORES, stage_resources
+from reflowshock.workflow.pipeline.reader import available_cores
+from reflowshock.workflow.process.launch import DIE_WITH_PARENT, LAUNCHER, end_group
 
 LONGEST_END = 70.0  # seconds that Snakemake has to cancel its jobs
 JOBS = 20  # that may be queued or at work at a time, unless the user says how many

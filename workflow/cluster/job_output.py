@@ -4,7 +4,7 @@ import re
 from collections.abc import Iterable
 from pathlib import Path
 
-from workflow.process.terminal import console
+from reflowshock.workflow.process.terminal import console
 
 # Options of env: Open MPI would take a stage that is a step of Slurm for one of the ranks that srun starts.
 OWN_STEP = "-u SLURM_STEPID -u SLURM_STEP_ID"

@@ -8,9 +8,9 @@ from typing import Any
 
 import yaml
 
-from fem.names import nearest
-from workflow.case.problems import CaseError, Problem
-from workflow.case.toml_file import MOST_BYTES, fault_of
+from reflowshock.fem.names import nearest
+from reflowshock.workflow.case.problems import CaseError, Problem
+from reflowshock.workflow.case.toml_file import MOST_BYTES, fault_of
 
 OWN = Path("profiles/slurm")  # of the user, below the working directory
 SHIPPED = Path(__file__).parents[1] / "profiles/slurm"

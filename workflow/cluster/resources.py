@@ -5,10 +5,10 @@ from dataclasses import dataclass
 from math import ceil
 from typing import Any
 
-from workflow.board_drop.case import PackageCase
-from workflow.case.kind import Case
-from workflow.pipeline.reader import available_cores
-from workflow.structure.case import StructureCase
+from reflowshock.workflow.board_drop.case import PackageCase
+from reflowshock.workflow.case.kind import Case
+from reflowshock.workflow.pipeline.reader import available_cores
+from reflowshock.workflow.structure.case import StructureCase
 
 # Short and serial: they run beside the command, not as jobs.
 WITH_COMMAND = ("comparison", "report")
@@ -96,8 +96,8 @@ def _size(case: Case) -> _Size:
 
 
 def _of_package(case: PackageCase) -> _Size:
-    from fem.estimates.solver_cost import cooling_cost
-    from workflow.board_drop.forecast import forecast
+    from reflowshock.fem.estimates.solver_cost import cooling_cost
+    from reflowshock.workflow.board_drop.forecast import forecast
 
     outlook = forecast(case)
     joints = max(1, outlook.distinct)
@@ -111,7 +111,7 @@ def _of_package(case: PackageCase) -> _Size:
 
 
 def _of_structure(case: StructureCase) -> _Size:
-    from workflow.structure.forecast import forecast_structure
+    from reflowshock.workflow.structure.forecast import forecast_structure
 
     outlook = forecast_structure(case)
     elements = sum(layer.elements for layer in outlook.layers.values())
@@ -120,7 +120,7 @@ def _of_structure(case: StructureCase) -> _Size:
 
 
 def _of_scene(case: Case) -> _Size:
-    from workflow.solder.forecast import forecast_scene
+    from reflowshock.workflow.solder.forecast import forecast_scene
 
     outlook: Any = forecast_scene(case)
     return _Size(outlook.seconds, 1, BYTES_OF_PARTICLE * outlook.particles)

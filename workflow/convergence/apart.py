@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from workflow.convergence.series import Knob, Rung
+from reflowshock.workflow.convergence.series import Knob, Rung
 
 
 def apart(knob: Knob, finest: float) -> tuple[Knob, Rung]:

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from math import log
 from pathlib import Path
 
-from workflow.case.kind import Case
-from workflow.convergence.machine import this_machine
-from workflow.convergence.measured import FILE, StageCost, read_accuracy
+from reflowshock.workflow.case.kind import Case
+from reflowshock.workflow.convergence.machine import this_machine
+from reflowshock.workflow.convergence.measured import FILE, StageCost, read_accuracy
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,29 +9,29 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from workflow.case.kind import Case
-from workflow.case.problems import CaseError, Problem
-from workflow.case.units import UnitError, to_si
-from workflow.convergence import tables
-from workflow.convergence.calibration import calibration, default_folder
-from workflow.convergence.kinds import ladder_of
-from workflow.convergence.machine import this_machine
-from workflow.convergence.measured import FILE, Accuracy, Recommended, fits_of, write_accuracy
-from workflow.convergence.page import PAGE, PICTURE, write_pages
-from workflow.convergence.recommend import Goal, recommend
-from workflow.convergence.runs import Climb, Compute
-from workflow.convergence.series import Ladder
-from workflow.pipeline.reader import available_cores, read_case
-from workflow.pipeline.stage_forecast import stage_seconds
-from workflow.process.plan_table import duration
-from workflow.process.progress import progress_bar
-from workflow.process.terminal import styled
-from workflow.report.tables import percent
-from workflow.store import batch
-from workflow.store.folders import check_folder, locked
-from workflow.store.point import Point
-from workflow.store.state import failed_checks
-from workflow.store.store import Store
+from reflowshock.workflow.case.kind import Case
+from reflowshock.workflow.case.problems import CaseError, Problem
+from reflowshock.workflow.case.units import UnitError, to_si
+from reflowshock.workflow.convergence import tables
+from reflowshock.workflow.convergence.calibration import calibration, default_folder
+from reflowshock.workflow.convergence.kinds import ladder_of
+from reflowshock.workflow.convergence.machine import this_machine
+from reflowshock.workflow.convergence.measured import FILE, Accuracy, Recommended, fits_of, write_accuracy
+from reflowshock.workflow.convergence.page import PAGE, PICTURE, write_pages
+from reflowshock.workflow.convergence.recommend import Goal, recommend
+from reflowshock.workflow.convergence.runs import Climb, Compute
+from reflowshock.workflow.convergence.series import Ladder
+from reflowshock.workflow.pipeline.reader import available_cores, read_case
+from reflowshock.workflow.pipeline.stage_forecast import stage_seconds
+from reflowshock.workflow.process.plan_table import duration
+from reflowshock.workflow.process.progress import progress_bar
+from reflowshock.workflow.process.terminal import styled
+from reflowshock.workflow.report.tables import percent
+from reflowshock.workflow.store import batch
+from reflowshock.workflow.store.folders import check_folder, locked
+from reflowshock.workflow.store.point import Point
+from reflowshock.workflow.store.state import failed_checks
+from reflowshock.workflow.store.store import Store
 
 WHAT = "accuracy"  # its folder holds
 TOLERANCE = 0.02  # where neither a tolerance nor a budget is given

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 if TYPE_CHECKING:
-    from workflow.convergence.series import Rung
+    from reflowshock.workflow.convergence.series import Rung
 
 Values = float | NDArray[np.float64]
 

@@ -3,15 +3,15 @@
 from collections.abc import Callable
 from typing import Any
 
-from workflow.board_drop.case import PackageCase
-from workflow.case.kind import Case
-from workflow.case.problems import CaseError, Problem
-from workflow.convergence.packages import package_ladder
-from workflow.convergence.series import Ladder
-from workflow.convergence.solder import drop_ladder, drops_ladder, joint_ladder, oscillation_ladder
-from workflow.convergence.structures import structure_ladder
-from workflow.solder.case import DropCase, DropsCase, JointCase, OscillationCase
-from workflow.structure.case import StructureCase
+from reflowshock.workflow.board_drop.case import PackageCase
+from reflowshock.workflow.case.kind import Case
+from reflowshock.workflow.case.problems import CaseError, Problem
+from reflowshock.workflow.convergence.packages import package_ladder
+from reflowshock.workflow.convergence.series import Ladder
+from reflowshock.workflow.convergence.solder import drop_ladder, drops_ladder, joint_ladder, oscillation_ladder
+from reflowshock.workflow.convergence.structures import structure_ladder
+from reflowshock.workflow.solder.case import DropCase, DropsCase, JointCase, OscillationCase
+from reflowshock.workflow.structure.case import StructureCase
 
 LADDERS: dict[str, Callable[[Any], Ladder]] = {
     DropCase.kind: drop_ladder,

@@ -5,10 +5,10 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from workflow.convergence.errors import Error
-from workflow.convergence.machine import Machine
-from workflow.convergence.orders import CostFit, ErrorFit, fit_cost, fit_error
-from workflow.convergence.series import Ladder, Rung
+from reflowshock.workflow.convergence.errors import Error
+from reflowshock.workflow.convergence.machine import Machine
+from reflowshock.workflow.convergence.orders import CostFit, ErrorFit, fit_cost, fit_error
+from reflowshock.workflow.convergence.series import Ladder, Rung
 
 FILE = "accuracy.json"
 

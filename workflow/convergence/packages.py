@@ -5,17 +5,17 @@ from math import floor
 from pathlib import Path
 from typing import Any
 
-from meshing.board.pads import pad_table
-from workflow.board_drop.case import BoardDropCase, PackageCase
-from workflow.board_drop.shock_forecast import implicit_seconds
-from workflow.board_drop.shock_launch import MODES
-from workflow.case.units import from_si
-from workflow.convergence.apart import apart
-from workflow.convergence.errors import Quantity
-from workflow.convergence.histories import at_same_times
-from workflow.convergence.series import Knob, Ladder, Rung
-from workflow.process.products import read_json
-from workflow.store.product import read_record
+from reflowshock.meshing.board.pads import pad_table
+from reflowshock.workflow.board_drop.case import BoardDropCase, PackageCase
+from reflowshock.workflow.board_drop.shock_forecast import implicit_seconds
+from reflowshock.workflow.board_drop.shock_launch import MODES
+from reflowshock.workflow.case.units import from_si
+from reflowshock.workflow.convergence.apart import apart
+from reflowshock.workflow.convergence.errors import Quantity
+from reflowshock.workflow.convergence.histories import at_same_times
+from reflowshock.workflow.convergence.series import Knob, Ladder, Rung
+from reflowshock.workflow.process.products import read_json
+from reflowshock.workflow.store.product import read_record
 
 REFINED = (2.0, 1.5, 1.0, 0.75, 0.5, 0.4, 0.25)  # sizes of elements over those of the case
 TWO_MODELS = (2.0, 1.5, 1.0, 0.75, 0.5)  # the same with two models

@@ -2,15 +2,15 @@
 
 from pathlib import Path
 
-from workflow import __version__
-from workflow.case.kind import Case
-from workflow.convergence import tables
-from workflow.convergence.calibration import folder_name
-from workflow.convergence.measured import FILE, Accuracy, read_accuracy
-from workflow.convergence.plot import figure, save_picture
-from workflow.pipeline.template import CASES
-from workflow.report.curves import svg
-from workflow.report.page import write_page
+from reflowshock.workflow import __version__
+from reflowshock.workflow.case.kind import Case
+from reflowshock.workflow.convergence import tables
+from reflowshock.workflow.convergence.calibration import folder_name
+from reflowshock.workflow.convergence.measured import FILE, Accuracy, read_accuracy
+from reflowshock.workflow.convergence.plot import figure, save_picture
+from reflowshock.workflow.pipeline.template import CASES
+from reflowshock.workflow.report.curves import svg
+from reflowshock.workflow.report.page import write_page
 
 PAGE, PICTURE, TEXT = "accuracy.html", "accuracy.png", "accuracy.md"
 

@@ -5,10 +5,10 @@ from textwrap import fill
 
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from workflow.convergence.measured import Accuracy, Measurement
-from workflow.convergence.pareto import front
-from workflow.convergence.tables import compared, every_run
-from workflow.report.curves import STYLE, pyplot
+from reflowshock.workflow.convergence.measured import Accuracy, Measurement
+from reflowshock.workflow.convergence.pareto import front
+from reflowshock.workflow.convergence.tables import compared, every_run
+from reflowshock.workflow.report.curves import STYLE, pyplot
 
 COLOURS = ("#0b5fa5", "#d1495b", "#2a7d4f", "#7a5ea8", "#e09f3e", "#5f6c7b", "#1b998b", "#8c564b")
 MARKERS = "osD^vP*X"

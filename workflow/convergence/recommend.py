@@ -3,8 +3,8 @@
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from workflow.convergence.measured import Fit, Measurement, Recommended
-from workflow.convergence.series import Ladder, Rung
+from reflowshock.workflow.convergence.measured import Fit, Measurement, Recommended
+from reflowshock.workflow.convergence.series import Ladder, Rung
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,13 +5,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from time import perf_counter
 
-from workflow.convergence.calibration import calibration
-from workflow.convergence.errors import Error, Quantity, errors_of
-from workflow.convergence.measured import Measurement, StageCost
-from workflow.convergence.series import Ladder, Rung
-from workflow.pipeline.stage_forecast import stage_seconds
-from workflow.store.point import Point, read_possible_points
-from workflow.store.store import Store
+from reflowshock.workflow.convergence.calibration import calibration
+from reflowshock.workflow.convergence.errors import Error, Quantity, errors_of
+from reflowshock.workflow.convergence.measured import Measurement, StageCost
+from reflowshock.workflow.convergence.series import Ladder, Rung
+from reflowshock.workflow.pipeline.stage_forecast import stage_seconds
+from reflowshock.workflow.store.point import Point, read_possible_points
+from reflowshock.workflow.store.store import Store
 
 AGAIN = 2  # times that a cheap point is run once more: load of the machine and first compilation are then not counted
 CHEAP = 8.0  # up to these core-seconds [s]

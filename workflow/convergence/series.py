@@ -4,8 +4,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from workflow.case.kind import Case
-from workflow.convergence.errors import Quantity
+from reflowshock.workflow.case.kind import Case
+from reflowshock.workflow.convergence.errors import Quantity
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,12 +5,12 @@ from functools import partial
 from math import ceil
 from pathlib import Path
 
-from workflow.case.kind import Case
-from workflow.case.units import from_si
-from workflow.convergence.errors import Quantity
-from workflow.convergence.series import Knob, Ladder, Rung
-from workflow.solder.case import DropCase, DropsCase, JointCase, OscillationCase
-from workflow.store.product import read_record
+from reflowshock.workflow.case.kind import Case
+from reflowshock.workflow.case.units import from_si
+from reflowshock.workflow.convergence.errors import Quantity
+from reflowshock.workflow.convergence.series import Knob, Ladder, Rung
+from reflowshock.workflow.solder.case import DropCase, DropsCase, JointCase, OscillationCase
+from reflowshock.workflow.store.product import read_record
 
 SECOND = 2.0  # order in the spacing of a surface that minimises a discrete area
 PER_EDGE = (6, 7, 9, 11, 13, 15, 17, 21, 27, 41)

@@ -6,18 +6,18 @@ from math import ceil
 from pathlib import Path
 from typing import Any
 
-from workflow.case.problems import CaseError, Problem
-from workflow.case.units import from_si
-from workflow.convergence.apart import apart
-from workflow.convergence.errors import Quantity
-from workflow.convergence.histories import at_same_times, common_times
-from workflow.convergence.series import Knob, Ladder, Rung
-from workflow.pipeline.reader import available_cores
-from workflow.store.product import read_record
-from workflow.structure.case import StructureCase
-from workflow.structure.findings import exact_velocities, read_history, read_places, wave_points
-from workflow.structure.launch import solver_folders
-from workflow.structure.references import BarWave, Cantilever, LayeredBar
+from reflowshock.workflow.case.problems import CaseError, Problem
+from reflowshock.workflow.case.units import from_si
+from reflowshock.workflow.convergence.apart import apart
+from reflowshock.workflow.convergence.errors import Quantity
+from reflowshock.workflow.convergence.histories import at_same_times, common_times
+from reflowshock.workflow.convergence.series import Knob, Ladder, Rung
+from reflowshock.workflow.pipeline.reader import available_cores
+from reflowshock.workflow.store.product import read_record
+from reflowshock.workflow.structure.case import StructureCase
+from reflowshock.workflow.structure.findings import exact_velocities, read_history, read_places, wave_points
+from reflowshock.workflow.structure.launch import solver_folders
+from reflowshock.workflow.structure.references import BarWave, Cantilever, LayeredBar
 
 SECOND = 2.0  # order of central differences and of trilinear elements (Hughes, The Finite Element Method, 9.2)
 REFINED = (0.3, 0.4, 0.5, 0.6, 0.8, 1.0, 1.2, 1.5, 2.0, 2.5, 4.0)  # times the numbers of elements of the case
@@ -170,7 +170,7 @@ def _step_fraction(value: float) -> tuple[str, Settings]:
 
 def _implicit_step(case: StructureCase) -> Callable[[float], tuple[str, Settings]]:
     """An implicit step, relative to that of the case."""
-    from workflow.structure.forecast import forecast_layers, forecast_steps
+    from reflowshock.workflow.structure.forecast import forecast_layers, forecast_steps
 
     length = forecast_steps(case, forecast_layers(case))["implicit"]
 

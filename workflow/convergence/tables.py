@@ -4,11 +4,11 @@ import shlex
 from collections import Counter
 from collections.abc import Mapping
 
-from workflow.case.problems import as_toml
-from workflow.convergence.measured import Accuracy, Fit, Measurement
-from workflow.convergence.pareto import front
-from workflow.pipeline.reader import override_value
-from workflow.report.tables import number, percent
+from reflowshock.workflow.case.problems import as_toml
+from reflowshock.workflow.convergence.measured import Accuracy, Fit, Measurement
+from reflowshock.workflow.convergence.pareto import front
+from reflowshock.workflow.pipeline.reader import override_value
+from reflowshock.workflow.report.tables import number, percent
 
 LONGEST_MESSAGE = 90
 ON_FRONT = "*"

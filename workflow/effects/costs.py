@@ -6,12 +6,12 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from fem.errors import PulseError
-from workflow.case.kind import Case
-from workflow.case.problems import CaseError
-from workflow.effects.registry import effect_of
-from workflow.effects.switches import switches
-from workflow.pipeline.stage_forecast import stage_seconds
+from reflowshock.fem.errors import PulseError
+from reflowshock.workflow.case.kind import Case
+from reflowshock.workflow.case.problems import CaseError
+from reflowshock.workflow.effects.registry import effect_of
+from reflowshock.workflow.effects.switches import switches
+from reflowshock.workflow.pipeline.stage_forecast import stage_seconds
 
 MEASURED = Path(__file__).with_name("costs.json")  # written by benchmarks/effects.py
 

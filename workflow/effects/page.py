@@ -6,14 +6,14 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from workflow.case.kind import Case
-from workflow.effects.costs import MEASURED, measured
-from workflow.effects.effect import Effect
-from workflow.effects.registry import registry
-from workflow.effects.table import CAPTION, HEAD, per_cent, rows
-from workflow.pipeline.stage_forecast import scene_effects
-from workflow.process.plan_table import new_table
-from workflow.process.terminal import styled
+from reflowshock.workflow.case.kind import Case
+from reflowshock.workflow.effects.costs import MEASURED, measured
+from reflowshock.workflow.effects.effect import Effect
+from reflowshock.workflow.effects.registry import registry
+from reflowshock.workflow.effects.table import CAPTION, HEAD, per_cent, rows
+from reflowshock.workflow.pipeline.stage_forecast import scene_effects
+from reflowshock.workflow.process.plan_table import new_table
+from reflowshock.workflow.process.terminal import styled
 
 FIELDS = (("adds", "adds"), ("number", "number"), ("influence", "influence"), ("switch", "key"), ("place", "object"))
 

@@ -2,7 +2,7 @@
 
 from functools import cache
 
-from workflow.effects.effect import Effect
+from reflowshock.workflow.effects.effect import Effect
 
 # Names that a stage gives to effects of which an earlier stage has one of the same name.
 APART = "_in_the_shock"
@@ -11,8 +11,8 @@ APART = "_in_the_shock"
 @cache
 def registry() -> dict[str, Effect]:
     """Return the effects by name."""
-    from fem.estimates.effect_entries import ENTRIES as OF_STAGES
-    from particles.parameters.effect_entries import ENTRIES as OF_LIQUID
+    from reflowshock.fem.estimates.effect_entries import ENTRIES as OF_STAGES
+    from reflowshock.particles.parameters.effect_entries import ENTRIES as OF_LIQUID
 
     entries = {"reflow": (*OF_LIQUID, *OF_STAGES["reflow"]), "shock": OF_STAGES["shock"]}
     found = [Effect(stage=stage, **entry) for stage, members in entries.items() for entry in members]

@@ -5,10 +5,10 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from fem.materials.library import SAC405
-from workflow.board_drop.case import BoardDropCase, PackageCase
-from workflow.case.kind import Case
-from workflow.structure.case import StructureCase
+from reflowshock.fem.materials.library import SAC405
+from reflowshock.workflow.board_drop.case import BoardDropCase, PackageCase
+from reflowshock.workflow.case.kind import Case
+from reflowshock.workflow.structure.case import StructureCase
 
 Toggle = Callable[
     [Any, bool], Any

@@ -3,8 +3,8 @@
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from workflow.case.kind import Case
-from workflow.effects.costs import cost_shares
+from reflowshock.workflow.case.kind import Case
+from reflowshock.workflow.effects.costs import cost_shares
 
 HEAD = ("effect", "", "influence", "cost", "why")
 CAPTION = (

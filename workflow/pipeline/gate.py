@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 from rich.console import Console
 
-from workflow.case.kind import Case
-from workflow.case.plausible import FORCE, implausible, implausible_tables
-from workflow.case.problems import CaseError, Problem
-from workflow.case.toml_file import fault_of
-from workflow.process.plan_table import duration
+from reflowshock.workflow.case.kind import Case
+from reflowshock.workflow.case.plausible import FORCE, implausible, implausible_tables
+from reflowshock.workflow.case.problems import CaseError, Problem
+from reflowshock.workflow.case.toml_file import fault_of
+from reflowshock.workflow.process.plan_table import duration
 
 LONG = 3600.0  # seconds of a run before which its user is asked
 LARGEST_FILE = 100_000_000  # bytes of a file that a case names
@@ -59,7 +59,7 @@ def unreadable_files(case: Case) -> Iterator[Problem]:
 
 def too_many_ranks(case: Case) -> Iterator[Problem]:
     """Find out whether a case asks for more MPI ranks than there are cores."""
-    from workflow.pipeline.reader import available_cores
+    from reflowshock.workflow.pipeline.reader import available_cores
 
     cores = available_cores()
     for key, ranks in case.ranks_by_key.items():
@@ -83,8 +83,8 @@ def too_large(case: Case, leave: Leave | None = None) -> Iterator[Problem]:
 
 def needed_memory(case: Case) -> float:
     """Predict the memory [B] of the largest stage of a case on this machine."""
-    from workflow.cluster.resources import stage_resources
-    from workflow.pipeline.reader import available_cores
+    from reflowshock.workflow.cluster.resources import stage_resources
+    from reflowshock.workflow.pipeline.reader import available_cores
 
     stages = stage_resources(case, cores=available_cores()).values()
     return 1e6 * max((stage.mem_mb for stage in stages), default=0)

@@ -7,19 +7,19 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
-from fem.names import nearest
-from workflow.board_drop.case import BoardDropCase, PackageCase
-from workflow.case import fields
-from workflow.case.kind import FULL, Case
-from workflow.case.problems import CaseError, Origin, Problem
-from workflow.case.scales import choose, is_key, take_scales
-from workflow.case.toml_file import is_too_deep, parse_toml, read_text
-from workflow.case.toml_places import Places
-from workflow.case.validation import translate
-from workflow.pipeline import gate
-from workflow.pipeline.gate import Leave
-from workflow.solder.case import DropCase, DropsCase, JointCase, OscillationCase
-from workflow.structure.case import StructureCase
+from reflowshock.fem.names import nearest
+from reflowshock.workflow.board_drop.case import BoardDropCase, PackageCase
+from reflowshock.workflow.case import fields
+from reflowshock.workflow.case.kind import FULL, Case
+from reflowshock.workflow.case.problems import CaseError, Origin, Problem
+from reflowshock.workflow.case.scales import choose, is_key, take_scales
+from reflowshock.workflow.case.toml_file import is_too_deep, parse_toml, read_text
+from reflowshock.workflow.case.toml_places import Places
+from reflowshock.workflow.case.validation import translate
+from reflowshock.workflow.pipeline import gate
+from reflowshock.workflow.pipeline.gate import Leave
+from reflowshock.workflow.solder.case import DropCase, DropsCase, JointCase, OscillationCase
+from reflowshock.workflow.structure.case import StructureCase
 
 SETTING = "--set"  # where a value is from that an option gives
 KINDS: dict[str, type[Case]] = {

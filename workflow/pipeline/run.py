@@ -4,16 +4,16 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-from workflow.case.kind import Case
-from workflow.pipeline.stage_runner import Run, execute
-from workflow.process.terminal import console, print_error
-from workflow.store.batch import Machine, failure_of, run_points, show_products
-from workflow.store.folders import locked, read_mark, remove_own
-from workflow.store.point import Point
-from workflow.store.product import discard
-from workflow.store.state import Verdict, examine, failed_checks, why_stale
-from workflow.store.store import TRACEBACK, Store, read_case_of_run
-from workflow.store.view import adopt, not_as_put, remove_unused, withdraw_all
+from reflowshock.workflow.case.kind import Case
+from reflowshock.workflow.pipeline.stage_runner import Run, execute
+from reflowshock.workflow.process.terminal import console, print_error
+from reflowshock.workflow.store.batch import Machine, failure_of, run_points, show_products
+from reflowshock.workflow.store.folders import locked, read_mark, remove_own
+from reflowshock.workflow.store.point import Point
+from reflowshock.workflow.store.product import discard
+from reflowshock.workflow.store.state import Verdict, examine, failed_checks, why_stale
+from reflowshock.workflow.store.store import TRACEBACK, Store, read_case_of_run
+from reflowshock.workflow.store.view import adopt, not_as_put, remove_unused, withdraw_all
 
 WHAT = "run"  # a run folder holds
 REPORT = "report"

@@ -8,12 +8,12 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
-from workflow.board_drop.case import PackageCase
-from workflow.case.fields import allowed, display, holds_named_tables, models_of, unit_of
-from workflow.case.kind import Case
-from workflow.case.names import NAME
-from workflow.case.units import QUANTITY, dimension
-from workflow.pipeline.reader import KINDS
+from reflowshock.workflow.board_drop.case import PackageCase
+from reflowshock.workflow.case.fields import allowed, display, holds_named_tables, models_of, unit_of
+from reflowshock.workflow.case.kind import Case
+from reflowshock.workflow.case.names import NAME
+from reflowshock.workflow.case.units import QUANTITY, dimension
+from reflowshock.workflow.pipeline.reader import KINDS
 
 SCALES = {
     "description": "values, by dotted keys, that replace those of the file where its scale is chosen",

@@ -1,11 +1,11 @@
 """The forecast of any case, from its parameters alone: wall time of its stages, its effects."""
 
-from workflow.board_drop.case import PackageCase
-from workflow.board_drop.forecast import Forecast, forecast
-from workflow.case.kind import Case
-from workflow.solder.forecast import SceneForecast, forecast_scene
-from workflow.structure.case import StructureCase
-from workflow.structure.forecast import StructureForecast, forecast_structure
+from reflowshock.workflow.board_drop.case import PackageCase
+from reflowshock.workflow.board_drop.forecast import Forecast, forecast
+from reflowshock.workflow.case.kind import Case
+from reflowshock.workflow.solder.forecast import SceneForecast, forecast_scene
+from reflowshock.workflow.structure.case import StructureCase
+from reflowshock.workflow.structure.forecast import StructureForecast, forecast_structure
 
 
 def stage_seconds(case: Case) -> dict[str, float]:

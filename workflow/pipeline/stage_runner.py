@@ -8,13 +8,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
-from workflow.case.kind import Case
-from workflow.case.stage_table import Stage
-from workflow.process.last_word import in_words, is_interrupt
-from workflow.process.terminal import console, health_line
-from workflow.store.keys import compare, product_key, stage_inputs
-from workflow.store.product import discard, publish, read_record, seal
-from workflow.store.store import MESSAGE, TRACEBACK, reads
+from reflowshock.workflow.case.kind import Case
+from reflowshock.workflow.case.stage_table import Stage
+from reflowshock.workflow.process.last_word import in_words, is_interrupt
+from reflowshock.workflow.process.terminal import console, health_line
+from reflowshock.workflow.store.keys import compare, product_key, stage_inputs
+from reflowshock.workflow.store.product import discard, publish, read_record, seal
+from reflowshock.workflow.store.store import MESSAGE, TRACEBACK, reads
 
 AnyCase = TypeVar("AnyCase", bound=Case)
 

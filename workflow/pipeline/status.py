@@ -4,11 +4,11 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from workflow.case.units import from_si
-from workflow.process.terminal import styled
-from workflow.store.point import Point
-from workflow.store.state import Verdict, examine
-from workflow.store.store import Store
+from reflowshock.workflow.case.units import from_si
+from reflowshock.workflow.process.terminal import styled
+from reflowshock.workflow.store.point import Point
+from reflowshock.workflow.store.state import Verdict, examine
+from reflowshock.workflow.store.store import Store
 
 SHOWN_UNITS = {"m": "mm", "m^3": "mm^3", "Pa": "MPa", "J": "mJ", "kg": "mg", "s": "ns"}
 FIGURES = {

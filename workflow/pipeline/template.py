@@ -7,14 +7,22 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
-from fem.names import nearest
-from workflow.case.fields import allowed, alternatives, display, holds_named_tables, literal_names, models_of, unit_of
-from workflow.case.kind import Case, Title
-from workflow.case.names import is_name, wrong_name
-from workflow.case.problems import CaseError, Problem, as_toml
-from workflow.case.scales import scales_text, take_scales
-from workflow.case.toml_file import read_toml
-from workflow.pipeline.reader import read_case
+from reflowshock.fem.names import nearest
+from reflowshock.workflow.case.fields import (
+    allowed,
+    alternatives,
+    display,
+    holds_named_tables,
+    literal_names,
+    models_of,
+    unit_of,
+)
+from reflowshock.workflow.case.kind import Case, Title
+from reflowshock.workflow.case.names import is_name, wrong_name
+from reflowshock.workflow.case.problems import CaseError, Problem, as_toml
+from reflowshock.workflow.case.scales import scales_text, take_scales
+from reflowshock.workflow.case.toml_file import read_toml
+from reflowshock.workflow.pipeline.reader import read_case
 
 CASES = Path(__file__).resolve().parents[2] / "cases"
 COMMENT_COLUMN = 44

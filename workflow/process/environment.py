@@ -14,8 +14,8 @@ from collections.abc import Mapping, MutableMapping
 from contextlib import suppress
 from pathlib import Path
 
-from fem.parallel.own_job import own_environment
-from workflow.process.kernel_cache import keep_kernels_by_source
+from reflowshock.fem.parallel.own_job import own_environment
+from reflowshock.workflow.process.kernel_cache import keep_kernels_by_source
 
 UTF8 = "PYTHONUTF8"
 OUTPUT_ENCODING = "PYTHONIOENCODING"

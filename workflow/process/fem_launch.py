@@ -6,10 +6,10 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from workflow.pipeline.stage_runner import Run
-from workflow.process.launch import launch, mpi_command
-from workflow.process.progress import progress_bar
-from workflow.process.stopped_processes import PATIENCE
+from reflowshock.workflow.pipeline.stage_runner import Run
+from reflowshock.workflow.process.launch import launch, mpi_command
+from reflowshock.workflow.process.progress import progress_bar
+from reflowshock.workflow.process.stopped_processes import PATIENCE
 
 AFTER_THE_RANKS = 10.0  # [s]
 
@@ -32,7 +32,7 @@ def run_fem(run: Run, folder: Path, request: dict, title: str) -> None:
     path = folder / "input.json"
     path.write_text(json.dumps(request | {"output": str(folder.resolve())}, indent=1) + "\n", encoding="utf-8")
     ranks = run.case.ranks
-    command = mpi_command(ranks, [sys.executable, "-m", "fem", str(path)], run.oversubscribe)
+    command = mpi_command(ranks, [sys.executable, "-m", "reflowshock.fem", str(path)], run.oversubscribe)
     with progress_bar(f"{title} on {ranks} rank{'s' if ranks > 1 else ''}") as progress:
         launch(command, lambda line: _pass_on(line, progress), folder / "log.txt", _patience(request))
 

@@ -12,7 +12,7 @@ from contextlib import suppress
 from importlib.util import find_spec
 from pathlib import Path
 
-PACKAGES = ("fem", "particles")  # those with kernels
+PACKAGES = ("reflowshock.fem", "reflowshock.particles")  # those with kernels
 VARIABLE = "NUMBA_CACHE_DIR"
 
 

@@ -23,7 +23,7 @@ LONGEST = 400  # characters of a message of unknown origin
 LAST_LINES = 5
 ENDING = ("SIGTERM", "SIGHUP")  # signals that end a command as Ctrl-C does
 
-OWN_PACKAGES = ("workflow", "meshing", "particles", "fem")  # the text of errors that they define is for the user
+OWN_PACKAGE = "reflowshock"  # the text of errors that it defines is for the user
 NO_MEMORY = "the memory is not sufficient (also limited by: ulimit -v)"
 SYSTEM = {
     errno.ENOSPC: "no space left on the device",
@@ -86,7 +86,7 @@ def in_words(error: BaseException, where: Path | None = None) -> str:
 
 
 def _is_own(error: BaseException) -> bool:
-    return type(error).__module__.partition(".")[0] in OWN_PACKAGES
+    return type(error).__module__.partition(".")[0] == OWN_PACKAGE
 
 
 def _known_words(error: BaseException, where: Path | None) -> str:
@@ -226,7 +226,7 @@ def _print_error(text: str) -> None:
     """Print an error; where even that fails, as without memory, by the plainest means."""
     with suppress(OSError):  # the terminal has gone
         try:
-            from workflow.process.terminal import print_error
+            from reflowshock.workflow.process.terminal import print_error
 
             print_error(text)
         except (ImportError, MemoryError, RuntimeError):

@@ -9,10 +9,10 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
 
-from fem.parallel.own_job import own_environment
-from fem.parallel.status_board import ERROR
-from workflow.process.last_word import words_of
-from workflow.process.stopped_processes import PATIENCE, StoppedProcesses
+from reflowshock.fem.parallel.own_job import own_environment
+from reflowshock.fem.parallel.status_board import ERROR
+from reflowshock.workflow.process.last_word import words_of
+from reflowshock.workflow.process.stopped_processes import PATIENCE, StoppedProcesses
 
 GRACE = 5.0  # seconds that a program has to end by itself after SIGTERM
 TRACEBACK = "Traceback (most recent call last):"

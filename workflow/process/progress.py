@@ -6,7 +6,7 @@ from typing import Protocol
 
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-from workflow.process.terminal import console, visible
+from reflowshock.workflow.process.terminal import console, visible
 
 
 class ProgressBar(Protocol):

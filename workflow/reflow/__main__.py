@@ -7,9 +7,9 @@ import os
 import sys
 from pathlib import Path
 
-from fem.parallel.own_job import own_environment
-from workflow.process.kernel_cache import keep_kernels_by_source
-from workflow.reflow.rank import find, main
+from reflowshock.fem.parallel.own_job import own_environment
+from reflowshock.workflow.process.kernel_cache import keep_kernels_by_source
+from reflowshock.workflow.reflow.rank import find, main
 
 if __name__ == "__main__":
     own = own_environment(os.environ)  # PETSc's MPI is to be each rank's own: else it would wait for those without work

@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from particles.parameters.solder import Solder
-from workflow.board_drop.reflow_pool import Alike, distinct_joints
-from workflow.reflow.pool import JointPool, Shares
+from reflowshock.particles.parameters.solder import Solder
+from reflowshock.workflow.board_drop.reflow_pool import Alike, distinct_joints
+from reflowshock.workflow.reflow.pool import JointPool, Shares
 
 if TYPE_CHECKING:
-    from particles.core.checkpoint import Checkpoint
-    from particles.core.geometry import JointGeometry
-    from particles.scenes.carried_joint import Carried
-    from particles.steps.shape import JointShape
+    from reflowshock.particles.core.checkpoint import Checkpoint
+    from reflowshock.particles.core.geometry import JointGeometry
+    from reflowshock.particles.scenes.carried_joint import Carried
+    from reflowshock.particles.steps.shape import JointShape
 
 Floats = NDArray[np.float64]
 
@@ -50,16 +50,16 @@ class Job:
 
     def checkpoint(self, source: Source) -> "Checkpoint":
         """Return the file of a joint."""
-        from particles.core.checkpoint import Checkpoint
+        from reflowshock.particles.core.checkpoint import Checkpoint
 
         return Checkpoint(self.files / f"{source.name}@{source.number}", (source, self.solder))
 
 
 def records() -> tuple[type, ...]:
     """Return what jobs and results consist of."""
-    from particles.core.geometry import JointGeometry
-    from particles.scenes.carried_joint import Carried
-    from particles.steps.shape import JointShape, Snapshot
+    from reflowshock.particles.core.geometry import JointGeometry
+    from reflowshock.particles.scenes.carried_joint import Carried
+    from reflowshock.particles.steps.shape import JointShape, Snapshot
 
     return Job, Source, JointGeometry, Solder, Carried, JointShape, Snapshot
 
@@ -121,7 +121,7 @@ class JointArray:
 
 def carry(job: Job, progress: Callable[[float], None]) -> "Carried":
     """Carry one joint on, in a process of the pool."""
-    from particles.scenes.carried_joint import carry_joint
+    from reflowshock.particles.scenes.carried_joint import carry_joint
 
     before = None if job.before is None else job.checkpoint(job.before)
     return carry_joint(job.now.place, job.solder, before, job.checkpoint(job.now), progress)
@@ -129,7 +129,7 @@ def carry(job: Job, progress: Callable[[float], None]) -> "Carried":
 
 def finish(job: Job, _progress: Callable[[float], None]) -> "JointShape":
     """Return the shape of one joint, in a process of the pool; what it begins from is its first reflow."""
-    from particles.scenes.carried_joint import carried_shape
+    from reflowshock.particles.scenes.carried_joint import carried_shape
 
     assert job.before is not None
     return carried_shape(job.now.place, job.solder, job.checkpoint(job.before), job.checkpoint(job.now))

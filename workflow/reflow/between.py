@@ -7,18 +7,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fem.problem.thermal import Thermal
+from reflowshock.fem.problem.thermal import Thermal
 
 if TYPE_CHECKING:
-    from fem.statics.state import Structure
-    from meshing.board.pads import PadSite
-    from workflow.board_drop.case import PackageCase
+    from reflowshock.fem.statics.state import Structure
+    from reflowshock.meshing.board.pads import PadSite
+    from reflowshock.workflow.board_drop.case import PackageCase
 
 
 def thermal_effects(case: "PackageCase", thermal: Thermal) -> dict:
     """Decide which effects act between solder and structure; see `fem.estimates.thermal_effects.decide`."""
-    from fem.estimates.thermal_effects import PackageSizes, decide
-    from meshing.board.pads import corner_axis
+    from reflowshock.fem.estimates.thermal_effects import PackageSizes, decide
+    from reflowshock.meshing.board.pads import corner_axis
 
     package, board = case.package, case.board
     sizes = PackageSizes(
@@ -47,10 +47,10 @@ def open_structure(
         pads: between them.
         flexible: whether they bend.
     """
-    from fem.statics.pads import Pads
-    from fem.statics.plates import RigidPlates
-    from fem.statics.process import StructureProcess
-    from fem.statics.state import Assembly
+    from reflowshock.fem.statics.pads import Pads
+    from reflowshock.fem.statics.plates import RigidPlates
+    from reflowshock.fem.statics.process import StructureProcess
+    from reflowshock.fem.statics.state import Assembly
 
     lower = np.array([(pad.x, pad.y, pad.z_board) for pad in pads])
     upper = lower + np.array([(*pad.offset, pad.gap) for pad in pads])
@@ -62,7 +62,7 @@ def open_structure(
 
 def frozen_displacement(case: "PackageCase", structure: "Structure", displacement: np.ndarray) -> np.ndarray:
     """Return the displacement `(n, 3)` with the lift of a prescribed warpage: rigid plates have it from the start."""
-    from meshing.board.pads import lift
+    from reflowshock.meshing.board.pads import lift
 
     raised = displacement.copy()
     x, y = structure.points[:, :2].T

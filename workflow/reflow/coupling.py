@@ -16,12 +16,12 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from workflow.reflow.load_steps import LoadStep
-from workflow.reflow.rigid_balance import RigidBalance
+from reflowshock.workflow.reflow.load_steps import LoadStep
+from reflowshock.workflow.reflow.rigid_balance import RigidBalance
 
 if TYPE_CHECKING:
-    from fem.statics.state import State, Structure
-    from particles.core.geometry import JointGeometry
+    from reflowshock.fem.statics.state import State, Structure
+    from reflowshock.particles.core.geometry import JointGeometry
 
 Floats = NDArray[np.float64]
 
@@ -199,7 +199,7 @@ def placed(drawn: "Mapping[str, JointGeometry]", pad_motion: Floats) -> "dict[st
         drawn: joint name -> geometry as drawn.
         pad_motion: `(joints, 2, 6)` [m, rad].
     """
-    from particles.core.plate import joint_plates, placed_geometry
+    from reflowshock.particles.core.plate import joint_plates, placed_geometry
 
     return {
         name: placed_geometry(

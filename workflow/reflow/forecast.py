@@ -4,15 +4,15 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from fem.problem.thermal import KELVIN, Thermal
-from particles.parameters.solder import Solder
-from workflow.case.problems import Problem
-from workflow.reflow.between import thermal_effects
-from workflow.reflow.load_steps import LoadStep, load_steps
+from reflowshock.fem.problem.thermal import KELVIN, Thermal
+from reflowshock.particles.parameters.solder import Solder
+from reflowshock.workflow.case.problems import Problem
+from reflowshock.workflow.reflow.between import thermal_effects
+from reflowshock.workflow.reflow.load_steps import LoadStep, load_steps
 
 if TYPE_CHECKING:
-    from particles.core.geometry import JointGeometry
-    from workflow.board_drop.case import PackageCase
+    from reflowshock.particles.core.geometry import JointGeometry
+    from reflowshock.workflow.board_drop.case import PackageCase
 
 # Measured with the structures of tests/verification/test_workflow_coupling.py: a package that floats is sought by
 # three or four exchanges a load step, forces that bend need two, and one way none beyond the first.
@@ -79,7 +79,7 @@ def _no_room(solder: Solder, gap: float, thermal: Thermal, pitch: float) -> Iter
 
 def _no_time(solder: Solder, geometries: "Mapping[str, JointGeometry]") -> Iterator[Problem]:
     """Find a motion that matters where load steps have no time."""
-    from particles.parameters.effects import decide_effects
+    from reflowshock.particles.parameters.effects import decide_effects
 
     for geometry in list(geometries.values())[:1]:
         for name in ("inertia", "viscosity"):

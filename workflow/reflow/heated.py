@@ -7,29 +7,29 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-import fem.statics as statics
-from fem.parallel.checkpoint_files import digest_of_files
-from fem.problem.thermal import KELVIN, Thermal
-from workflow.board_drop.case import PackageCase
-from workflow.board_drop.findings import at_most, metric
-from workflow.board_drop.reflow_pool import Alike, joint_geometries
-from workflow.pipeline.stage_runner import Run
-from workflow.process.progress import ProgressBar, progress_bar
-from workflow.reflow.array import JointArray, Left, Source
-from workflow.reflow.between import frozen_displacement, open_structure, thermal_effects
-from workflow.reflow.coupling import Coupled, Coupling, Exchange, placed
-from workflow.reflow.forecast import thermal_effect
-from workflow.reflow.load_steps import LoadStep, load_steps
-from workflow.reflow.open_pool import open_pool
-from workflow.reflow.pool import Shares
-from workflow.reflow.rigid_balance import RigidBalance
-from workflow.reflow.start import scale_of, start
+from reflowshock.fem import statics
+from reflowshock.fem.parallel.checkpoint_files import digest_of_files
+from reflowshock.fem.problem.thermal import KELVIN, Thermal
+from reflowshock.workflow.board_drop.case import PackageCase
+from reflowshock.workflow.board_drop.findings import at_most, metric
+from reflowshock.workflow.board_drop.reflow_pool import Alike, joint_geometries
+from reflowshock.workflow.pipeline.stage_runner import Run
+from reflowshock.workflow.process.progress import ProgressBar, progress_bar
+from reflowshock.workflow.reflow.array import JointArray, Left, Source
+from reflowshock.workflow.reflow.between import frozen_displacement, open_structure, thermal_effects
+from reflowshock.workflow.reflow.coupling import Coupled, Coupling, Exchange, placed
+from reflowshock.workflow.reflow.forecast import thermal_effect
+from reflowshock.workflow.reflow.load_steps import LoadStep, load_steps
+from reflowshock.workflow.reflow.open_pool import open_pool
+from reflowshock.workflow.reflow.pool import Shares
+from reflowshock.workflow.reflow.rigid_balance import RigidBalance
+from reflowshock.workflow.reflow.start import scale_of, start
 
 if TYPE_CHECKING:
-    from fem.statics.state import Structure
-    from meshing.board.pads import PadSite
-    from particles.core.geometry import JointGeometry
-    from particles.steps.shape import JointShape
+    from reflowshock.fem.statics.state import Structure
+    from reflowshock.meshing.board.pads import PadSite
+    from reflowshock.particles.core.geometry import JointGeometry
+    from reflowshock.particles.steps.shape import JointShape
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,9 +132,9 @@ def all_inputs(case: PackageCase, pads: "list[PadSite]") -> tuple:
 
 def _records() -> tuple[type, ...]:
     """What the file of a coupling consists of."""
-    from fem.statics.state import State
-    from particles.core.geometry import JointGeometry
-    from particles.scenes.orientation import Orientation
+    from reflowshock.fem.statics.state import State
+    from reflowshock.particles.core.geometry import JointGeometry
+    from reflowshock.particles.scenes.orientation import Orientation
 
     return Coupled, RigidBalance, State, Exchange, Left, Source, Alike, JointGeometry, Orientation
 
@@ -144,7 +144,7 @@ class Saved:
 
     def __init__(self, folder: Path, inputs: tuple) -> None:
         """Name the file and all that it depends on."""
-        from particles.core.checkpoint import Checkpoint
+        from reflowshock.particles.core.checkpoint import Checkpoint
 
         self._file = Checkpoint(folder / "coupling", inputs)
 

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from itertools import groupby
 
-from fem.problem.thermal import Thermal
+from reflowshock.fem.problem.thermal import Thermal
 
 
 @dataclass(frozen=True, slots=True)

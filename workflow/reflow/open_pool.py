@@ -1,10 +1,10 @@
 """Who brings the joints of a case to rest."""
 
-from workflow.board_drop.case import PackageCase
-from workflow.pipeline.stage_runner import Run
-from workflow.reflow.pool import JointPool
-from workflow.reflow.processes import Processes
-from workflow.reflow.ranks import Ranks
+from reflowshock.workflow.board_drop.case import PackageCase
+from reflowshock.workflow.pipeline.stage_runner import Run
+from reflowshock.workflow.reflow.pool import JointPool
+from reflowshock.workflow.reflow.processes import Processes
+from reflowshock.workflow.reflow.ranks import Ranks
 
 
 def open_pool(run: Run[PackageCase], joints: int) -> JointPool:

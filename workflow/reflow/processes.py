@@ -8,8 +8,8 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from typing import Any
 
-from fem.parallel.own_job import end_with_parent
-from workflow.reflow.pool import Job, ReflowError, Report, Result, Shares
+from reflowshock.fem.parallel.own_job import end_with_parent
+from reflowshock.workflow.reflow.pool import Job, ReflowError, Report, Result, Shares
 
 POLL = 0.2  # seconds between two looks at the progress
 

@@ -12,7 +12,7 @@ from pathlib import Path
 from time import monotonic
 from typing import Any
 
-from particles.core.data_file import read_data, write_data
+from reflowshock.data_file import read_data, write_data
 
 JOB, TAKEN, RESULT = ".job", ".taken", ".result"
 PAUSE = 0.2  # seconds between two words of the progress

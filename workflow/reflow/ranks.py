@@ -13,10 +13,10 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from particles.core.data_file import NotData, read_data, write_data
-from workflow.process.launch import DIE_WITH_PARENT, LaunchError, launch, mpi_command
-from workflow.reflow.pool import Job, ReflowError, Report, Result, Shares
-from workflow.reflow.rank import JOB, RESULT, TAKEN, Done, name_of, records_of
+from reflowshock.data_file import NotData, read_data, write_data
+from reflowshock.workflow.process.launch import DIE_WITH_PARENT, LaunchError, launch, mpi_command
+from reflowshock.workflow.reflow.pool import Job, ReflowError, Report, Result, Shares
+from reflowshock.workflow.reflow.rank import JOB, RESULT, TAKEN, Done, name_of, records_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +58,14 @@ class Ranks:
                 done.update({name: float(said[name]) for name in said if name in done})
                 progress(done)
 
-        program = [*DIE_WITH_PARENT, sys.executable, "-m", "workflow.reflow", str(self.folder.resolve()), name_of(work)]
+        program = [
+            *DIE_WITH_PARENT,
+            sys.executable,
+            "-m",
+            "reflowshock.workflow.reflow",
+            str(self.folder.resolve()),
+            name_of(work),
+        ]
         try:
             launch(mpi_command(min(self.count, len(jobs)), program, self.oversubscribe), take, self.folder / "log.txt")
         except LaunchError as error:

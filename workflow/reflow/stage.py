@@ -7,20 +7,20 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from workflow.board_drop import findings
-from workflow.board_drop import reflow_pool as pool
-from workflow.board_drop.case import PackageCase
-from workflow.board_drop.given_surfaces import given_records
-from workflow.pipeline.stage_runner import Findings, Run
-from workflow.process.products import write_json
-from workflow.process.progress import progress_bar
-from workflow.reflow.heated import reflow_heated
-from workflow.reflow.open_pool import open_pool
+from reflowshock.workflow.board_drop import findings
+from reflowshock.workflow.board_drop import reflow_pool as pool
+from reflowshock.workflow.board_drop.case import PackageCase
+from reflowshock.workflow.board_drop.given_surfaces import given_records
+from reflowshock.workflow.pipeline.stage_runner import Findings, Run
+from reflowshock.workflow.process.products import write_json
+from reflowshock.workflow.process.progress import progress_bar
+from reflowshock.workflow.reflow.heated import reflow_heated
+from reflowshock.workflow.reflow.open_pool import open_pool
 
 if TYPE_CHECKING:
-    from meshing.board.pads import PadSite
-    from particles.core.geometry import JointGeometry
-    from particles.steps.shape import JointShape
+    from reflowshock.meshing.board.pads import PadSite
+    from reflowshock.particles.core.geometry import JointGeometry
+    from reflowshock.particles.steps.shape import JointShape
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,9 +46,9 @@ class Reflowed:
 
 def reflow(run: Run[PackageCase], folder: Path) -> Findings:
     """Melt the solder of the array; write shapes, records of joints, pads as solidified."""
-    from meshing.board.pads import lifted, read_pads, write_pads
-    from particles.parameters.effects import decide_effects
-    from particles.scenes.products import write_shapes
+    from reflowshock.meshing.board.pads import lifted, read_pads, write_pads
+    from reflowshock.particles.parameters.effects import decide_effects
+    from reflowshock.particles.scenes.products import write_shapes
 
     case, solder = run.case, run.case.solder
     drawn = read_pads(run.folder / "geometry/pads.json")
@@ -90,7 +90,7 @@ def _between_plates(run: Run[PackageCase], pads: "list[PadSite]") -> Reflowed:
 
 def _heated(run: Run[PackageCase], pads: "list[PadSite]", mesh: Path) -> Reflowed:
     """All joints through the load steps of temperature, with board and package, which are meshed for it."""
-    from meshing.board.heated_assembly import write_heated_assembly
+    from reflowshock.meshing.board.heated_assembly import write_heated_assembly
 
     assert run.case.thermal is not None
     write_heated_assembly(run.case.package, run.case.board, mesh)

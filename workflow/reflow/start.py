@@ -5,13 +5,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from particles.parameters.solder import Solder
-from workflow.reflow.coupling import Coupled, Scale
-from workflow.reflow.rigid_balance import RigidBalance
+from reflowshock.particles.parameters.solder import Solder
+from reflowshock.workflow.reflow.coupling import Coupled, Scale
+from reflowshock.workflow.reflow.rigid_balance import RigidBalance
 
 if TYPE_CHECKING:
-    from fem.statics.state import RigidModes
-    from particles.core.geometry import JointGeometry
+    from reflowshock.fem.statics.state import RigidModes
+    from reflowshock.particles.core.geometry import JointGeometry
 
 LONGEST_MOTION = 0.1  # of the smallest gap, in one exchange
 SAMPLES = 41  # heights at which a package that floats is tried
@@ -35,7 +35,7 @@ def start(geometries: "Sequence[JointGeometry]", solder: Solder, modes: "RigidMo
         solder: of one joint.
         modes: free rigid motions of the package.
     """
-    from particles.scenes.joint_stiffness import stiffness_estimate
+    from reflowshock.particles.scenes.joint_stiffness import stiffness_estimate
 
     gaps = np.array([geometry.gap for geometry in geometries])
     middle = geometries[int(np.argsort(gaps)[len(gaps) // 2])]
@@ -56,7 +56,7 @@ def floating_height(geometry: "JointGeometry", solder: Solder, load: float) -> f
     """
     from scipy.optimize import brentq
 
-    from particles.scenes.joint_stiffness import axial_force
+    from reflowshock.particles.scenes.joint_stiffness import axial_force
 
     def excess(gap: float) -> float:
         return axial_force(geometry, solder, gap) - load

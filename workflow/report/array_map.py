@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib import colormaps, pyplot
 from matplotlib.axes import Axes
 
-from workflow.report.curves import MICRO, MILLI, STYLE, svg
+from reflowshock.workflow.report.curves import MICRO, MILLI, STYLE, svg
 
 MAPS = (
     ("standoff", "standoff [µm]", MICRO),

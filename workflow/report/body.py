@@ -8,12 +8,12 @@ import numpy as np
 import pyvista
 from matplotlib import pyplot
 
-from workflow.report.curves import MICRO, MILLI, STYLE, svg
-from workflow.report.pictures import new_plotter, save
-from workflow.report.tables import number, percent, quantity
+from reflowshock.workflow.report.curves import MICRO, MILLI, STYLE, svg
+from reflowshock.workflow.report.pictures import new_plotter, save
+from reflowshock.workflow.report.tables import number, percent, quantity
 
 if TYPE_CHECKING:
-    from particles.steps.shape import JointShape, Snapshot
+    from reflowshock.particles.steps.shape import JointShape, Snapshot
 
 SMALLEST_RANGE = 0.01
 DEGREE = np.pi / 180.0

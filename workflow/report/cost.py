@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from workflow.report.tables import mode_name, nano, number, quantity
+from reflowshock.workflow.report.tables import mode_name, nano, number, quantity
 
 Record = Mapping[str, Any]
 

@@ -8,8 +8,8 @@ import numpy as np
 matplotlib.use("Agg")
 from matplotlib import pyplot
 
-from workflow.process.terminal import visible
-from workflow.report.histories import joint_stress
+from reflowshock.workflow.process.terminal import visible
+from reflowshock.workflow.report.histories import joint_stress
 
 MODE_STYLE = {
     "two_scale": {"color": "#0b5fa5", "linestyle": "-", "linewidth": 1.6, "label": "two-scale"},

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import pyvista
 
-from meshing.surface.truncated_sphere import TruncatedSphere
-from workflow.report.joint_records import by_shape
-from workflow.report.pictures import MILLI, new_plotter, save
+from reflowshock.meshing.surface.truncated_sphere import TruncatedSphere
+from reflowshock.workflow.report.joint_records import by_shape
+from reflowshock.workflow.report.pictures import MILLI, new_plotter, save
 
 FREE, WIDTH = 0, 1800
 DEVIATION = "deviation [um]"
@@ -57,7 +57,7 @@ def joint_surface(run_folder: Path, joint: Mapping[str, Any]) -> pyvista.DataSet
         path = run_folder / f"surface/{name}.vtu"
         if path.exists():
             return pyvista.read(path)
-    from particles.scenes.products import read_shapes
+    from reflowshock.particles.scenes.products import read_shapes
 
     shape = read_shapes(run_folder / "reflow/shapes.h5")[joint["shape"]]
     surface = pyvista.PolyData.from_regular_faces(shape.surface_points, shape.triangles)

@@ -9,8 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from numpy.typing import NDArray
 
-from workflow.report.curves import MILLI, STYLE, svg
-from workflow.report.tables import mega, mode_name, percent
+from reflowshock.workflow.report.curves import MILLI, STYLE, svg
+from reflowshock.workflow.report.tables import mega, mode_name, percent
 
 Arrays = Mapping[str, NDArray]
 

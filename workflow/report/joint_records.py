@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from workflow.process.products import read_json
+from reflowshock.workflow.process.products import read_json
 
 Record = Mapping[str, Any]
 Column = tuple[str, str, Callable[[Any], str]]  # head, key of the record, text of its value

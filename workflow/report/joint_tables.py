@@ -5,10 +5,10 @@ from pathlib import Path
 
 import numpy as np
 
-from workflow.process.products import read_json
-from workflow.report.histories import at_pads
-from workflow.report.joint_records import Column, Record, by_shape, record_table
-from workflow.report.tables import mega, micro, number, percent
+from reflowshock.workflow.process.products import read_json
+from reflowshock.workflow.report.histories import at_pads
+from reflowshock.workflow.report.joint_records import Column, Record, by_shape, record_table
+from reflowshock.workflow.report.tables import mega, micro, number, percent
 
 SHAPE_COLUMNS: tuple[Column, ...] = (
     ("standoff [µm]", "standoff", micro),

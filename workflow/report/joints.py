@@ -4,9 +4,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from workflow.process.products import read_json
-from workflow.report import joint_tables, mesh_tables
-from workflow.report.joint_records import bridge_records, joint_records
+from reflowshock.workflow.process.products import read_json
+from reflowshock.workflow.report import joint_tables, mesh_tables
+from reflowshock.workflow.report.joint_records import bridge_records, joint_records
 
 BRIDGE_CAPTION = "as one body: particles and free surface, right by pressure above ambient."
 
@@ -15,9 +15,9 @@ def add_joints(run_folder: Path, context: dict) -> None:
     """Add shapes, maps, verdicts and meshes of the joints of an array, as far as the run has gone."""
     if not (run_folder / "reflow/joints.json").exists():
         return
-    from workflow.report.array_map import array_map
-    from workflow.report.gallery import render_gallery
-    from workflow.report.pictures import embedded
+    from reflowshock.workflow.report.array_map import array_map
+    from reflowshock.workflow.report.gallery import render_gallery
+    from reflowshock.workflow.report.pictures import embedded
 
     joints = joint_records(run_folder)
     meshed = joints + bridge_records(run_folder)
@@ -51,9 +51,9 @@ def _add_bridge(run_folder: Path, context: dict) -> None:
     """Add the picture of two joints that became one, the only shape under two names."""
     if not any(joint["verdict"] == "bridged" for joint in read_json(run_folder / "reflow/joints.json").values()):
         return
-    from particles.scenes.products import read_shapes
-    from workflow.report.body import render_stages
-    from workflow.report.pictures import embedded
+    from reflowshock.particles.scenes.products import read_shapes
+    from reflowshock.workflow.report.body import render_stages
+    from reflowshock.workflow.report.pictures import embedded
 
     for name, shape in read_shapes(run_folder / "reflow/shapes.h5").items():
         if "+" in name:
@@ -65,7 +65,7 @@ def _add_bridge(run_folder: Path, context: dict) -> None:
 
 def _add_warpage(run_folder: Path, joints: Sequence[Mapping[str, Any]], context: dict) -> None:
     """Add how package and board have warped, where they did."""
-    from workflow.report import warpage
+    from reflowshock.workflow.report import warpage
 
     structure = warpage.read_structure(run_folder)
     if structure is None:

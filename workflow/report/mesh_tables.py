@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from workflow.process.products import read_json
-from workflow.report.joint_records import Column, Record, by_shape, record_table
-from workflow.report.tables import micro, nano, number, percent
+from reflowshock.workflow.process.products import read_json
+from reflowshock.workflow.report.joint_records import Column, Record, by_shape, record_table
+from reflowshock.workflow.report.tables import micro, nano, number, percent
 
 MESH_COLUMNS: tuple[Column, ...] = (
     ("method", "method", str),

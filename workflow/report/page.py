@@ -3,12 +3,12 @@
 import base64
 from pathlib import Path
 
-from workflow.report import tables
-from workflow.report.joints import add_joints
-from workflow.report.scenes import add_scene
-from workflow.report.summary import collect_summary, write_summary
-from workflow.report.template import template_environment
-from workflow.structure.case import StructureCase
+from reflowshock.workflow.report import tables
+from reflowshock.workflow.report.joints import add_joints
+from reflowshock.workflow.report.scenes import add_scene
+from reflowshock.workflow.report.summary import collect_summary, write_summary
+from reflowshock.workflow.report.template import template_environment
+from reflowshock.workflow.structure.case import StructureCase
 
 TEMPLATES = Path(__file__).parent / "templates"
 
@@ -56,14 +56,14 @@ def _context(run_folder: Path, case, summary: dict) -> dict:
         "pictures": {},
     }
     if summary["timings"]:
-        from workflow.report.curves import timing_bars
+        from reflowshock.workflow.report.curves import timing_bars
 
         context["curves"]["timings"] = timing_bars(summary["timings"])
     preview = run_folder / "geometry/preview.png"
     if preview.exists():
         context["pictures"]["preview"] = base64.b64encode(preview.read_bytes()).decode()
     _add_sections(run_folder, case, context, summary)
-    from workflow.convergence.page import section_for
+    from reflowshock.workflow.convergence.page import section_for
 
     context["accuracy"] = section_for(run_folder, case)
     return context
@@ -72,12 +72,12 @@ def _context(run_folder: Path, case, summary: dict) -> dict:
 def _add_sections(run_folder: Path, case, context: dict, summary: dict) -> None:
     """Add the sections of a kind of case."""
     if isinstance(case, StructureCase):
-        from workflow.structure.report import add_structure
+        from reflowshock.workflow.structure.report import add_structure
 
         context["preview_caption"] = "Mesh, coloured by layer."
         add_structure(run_folder, case, context, summary["metrics"])
     elif case.kind == "package":
-        from workflow.report.shock import add_shock
+        from reflowshock.workflow.report.shock import add_shock
 
         add_joints(run_folder, context)
         add_shock(run_folder, case, context, summary)

@@ -5,8 +5,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from workflow.process.products import read_json
-from workflow.report.tables import mega, micro, number, quantity
+from reflowshock.workflow.process.products import read_json
+from reflowshock.workflow.report.tables import mega, micro, number, quantity
 
 FOLDERS = ("residual_two_scale", "residual_dns", "residual")  # of modes with fine joints of their own, or of all modes
 SIDES = ("von_mises_board", "von_mises_package")
@@ -20,7 +20,7 @@ def add_residual(shock: Path, parts: list[str], context: dict) -> None:
         parts: names of the parts of its mesh.
         context: of the page.
     """
-    from workflow.report.pictures import embedded
+    from reflowshock.workflow.report.pictures import embedded
 
     folder = next((shock / name for name in FOLDERS if (shock / name / "result.json").exists()), None)
     if folder is None:
@@ -63,7 +63,7 @@ def table(joints: Mapping[str, list]) -> dict:
 def _draw(folder: Path, joints: Mapping[str, list], parts: list[str], picture: Path) -> None:
     import pyvista
 
-    from workflow.report.pictures import draw_joints
+    from reflowshock.workflow.report.pictures import draw_joints
 
     stress = [max(joints[side][k] for side in SIDES) for k in range(len(joints["joints"]))]
     worst = stress.index(max(stress))

@@ -8,9 +8,9 @@ def add_scene(run_folder: Path, kind: str, context: dict, summary: dict) -> None
     """Add what is told of a scene of solder alone."""
     if not (run_folder / "reflow" / "shape.h5").exists():
         return
-    from particles.scenes.products import read_body
-    from workflow.report import body as report_body
-    from workflow.report.pictures import embedded
+    from reflowshock.particles.scenes.products import read_body
+    from reflowshock.workflow.report import body as report_body
+    from reflowshock.workflow.report.pictures import embedded
 
     shape, meridian = read_body(run_folder / "reflow")
     context["headline"] = report_body.headline(summary["metrics"])

@@ -6,9 +6,9 @@ import numpy as np
 from matplotlib import pyplot
 from numpy.typing import NDArray
 
-from workflow.report.curves import MILLI, STYLE, svg
-from workflow.report.histories import joint_stress, peaks
-from workflow.report.tables import mega, number, percent
+from reflowshock.workflow.report.curves import MILLI, STYLE, svg
+from reflowshock.workflow.report.histories import joint_stress, peaks
+from reflowshock.workflow.report.tables import mega, number, percent
 
 Arrays = Mapping[str, NDArray]
 

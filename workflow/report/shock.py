@@ -5,12 +5,12 @@ from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 
-from workflow.board_drop import findings
-from workflow.board_drop.case import BoardDropCase
-from workflow.report import joint_tables, tables
-from workflow.report.histories import MODES, late_peak, read_modes
-from workflow.report.joint_records import joint_records
-from workflow.report.residual import add_residual
+from reflowshock.workflow.board_drop import findings
+from reflowshock.workflow.board_drop.case import BoardDropCase
+from reflowshock.workflow.report import joint_tables, tables
+from reflowshock.workflow.report.histories import MODES, late_peak, read_modes
+from reflowshock.workflow.report.joint_records import joint_records
+from reflowshock.workflow.report.residual import add_residual
 
 
 def add_shock(run_folder: Path, case: BoardDropCase, context: dict, summary: dict) -> None:
@@ -19,8 +19,8 @@ def add_shock(run_folder: Path, case: BoardDropCase, context: dict, summary: dic
     histories, results = read_modes(shock)
     if not histories:
         return
-    from workflow.report import cost
-    from workflow.report.curves import difference_curves, energy_curves, history_curves
+    from reflowshock.workflow.report import cost
+    from reflowshock.workflow.report.curves import difference_curves, energy_curves, history_curves
 
     main = next(iter(histories))
     metrics = summary["metrics"]
@@ -68,7 +68,7 @@ def margins(result: Mapping) -> list[dict]:
 
 def kinematics_note(metrics: dict, kinematics: str) -> str:
     """Say what small kinematics leave out, where that matters; else nothing."""
-    from fem.materials.kinematics import NEGLIGIBLE_STRAIN
+    from reflowshock.fem.materials.kinematics import NEGLIGIBLE_STRAIN
 
     left_out = metrics.get("peak_neglected_strain", {}).get("value", 0.0)
     if kinematics == "finite" or left_out <= NEGLIGIBLE_STRAIN:
@@ -102,7 +102,7 @@ def _add_ranks(histories: dict, results: dict, joints: list[dict], context: dict
 
 def _add_shape_effect(shock: Path, history: dict, told: tuple[list[dict], dict], context: dict) -> None:
     """Add the shock of identical joints, where it was run; ``told`` of the real ones: records, and metrics of all."""
-    from workflow.report import shape_effect
+    from reflowshock.workflow.report import shape_effect
 
     histories, _ = read_modes(shock, ("identical",))
     if not histories:
@@ -117,7 +117,7 @@ def _add_shape_effect(shock: Path, history: dict, told: tuple[list[dict], dict],
 
 
 def _add_interface(shock: Path, context: dict) -> None:
-    from workflow.report import interface
+    from reflowshock.workflow.report import interface
 
     interfaces = interface.read_interfaces(shock, MODES)
     if interfaces:
@@ -127,9 +127,9 @@ def _add_interface(shock: Path, context: dict) -> None:
 
 def _add_two_scales(run_folder: Path, case: BoardDropCase, context: dict, results: dict[str, dict]) -> None:
     """Add how the models are coupled, where they are."""
-    from workflow.board_drop.fine_joints import read_fine_joints
-    from workflow.board_drop.shock_forecast import implicit_seconds
-    from workflow.report import two_scales as scales
+    from reflowshock.workflow.board_drop.fine_joints import read_fine_joints
+    from reflowshock.workflow.board_drop.shock_forecast import implicit_seconds
+    from reflowshock.workflow.report import two_scales as scales
 
     result = results.get("two_scale")
     if result is None:
@@ -147,7 +147,7 @@ def _add_two_scales(run_folder: Path, case: BoardDropCase, context: dict, result
 
 
 def _add_pictures(folder: Path, history: dict, result: dict, context: dict) -> None:
-    from workflow.report.pictures import embedded, render_board, render_joints
+    from reflowshock.workflow.report.pictures import embedded, render_board, render_joints
 
     whole = {name: path for name in ("dns", "macro", "meso") if (path := folder / f"{name}.pvd").exists()}
     is_one_way = result.get("coupling", {}).get("direction") == "one_way"

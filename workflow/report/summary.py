@@ -4,10 +4,10 @@ import json
 from pathlib import Path
 from typing import Any
 
-from workflow import __version__
-from workflow.case.kind import Case
-from workflow.store.keys import inputs_digest
-from workflow.store.product import read_record
+from reflowshock.workflow import __version__
+from reflowshock.workflow.case.kind import Case
+from reflowshock.workflow.store.keys import inputs_digest
+from reflowshock.workflow.store.product import read_record
 
 
 def collect_summary(run_folder: Path, case: Case) -> dict:

@@ -4,7 +4,7 @@ from importlib import metadata
 
 import numpy as np
 
-from workflow.case.check_text import against_limit
+from reflowshock.workflow.case.check_text import against_limit
 
 SHAPE_EFFECT = "shape_effect_on_peak_stress"
 HEADLINE = (
@@ -75,14 +75,14 @@ def health_rows(health: dict) -> list[dict]:
 
 def parameters(case) -> dict:
     """All resolved parameters of the case, as dotted keys with values in the user's units."""
-    from workflow.pipeline.reader import display_values
+    from reflowshock.workflow.pipeline.reader import display_values
 
     return {"head": ["key", "value"], "rows": [[key, value] for key, value in display_values(case).items()]}
 
 
 def effects(case, records: dict) -> dict:
     """Which effects were simulated, their expected influence and predicted cost, and why: in prose."""
-    from workflow.effects.table import CAPTION, rows
+    from reflowshock.workflow.effects.table import CAPTION, rows
 
     told = [
         [name, "on" if acts else "off", influence, cost, why]

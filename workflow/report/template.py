@@ -5,7 +5,7 @@ from pathlib import Path
 import jinja2
 from markupsafe import Markup
 
-from workflow.process.terminal import visible
+from reflowshock.workflow.process.terminal import visible
 
 
 def template_environment(folder: Path) -> jinja2.Environment:

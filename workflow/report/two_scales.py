@@ -3,8 +3,8 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from workflow.board_drop.fine_joints import FineJoints
-from workflow.report.tables import nano, number, quantity
+from reflowshock.workflow.board_drop.fine_joints import FineJoints
+from reflowshock.workflow.report.tables import nano, number, quantity
 
 Record = Mapping[str, Any]
 

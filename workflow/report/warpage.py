@@ -11,9 +11,9 @@ from matplotlib.axes import Axes
 from matplotlib.tri import LinearTriInterpolator, Triangulation
 from numpy.typing import NDArray
 
-from fem.problem.thermal import KELVIN
-from workflow.report.curves import MICRO, MILLI, STYLE, svg
-from workflow.report.tables import number
+from reflowshock.fem.problem.thermal import KELVIN
+from reflowshock.workflow.report.curves import MICRO, MILLI, STYLE, svg
+from reflowshock.workflow.report.tables import number
 
 Floats = NDArray[np.float64]
 

@@ -2,13 +2,13 @@
 
 from pydantic import Field
 
-from particles.parameters.scene_drops import Drops
-from particles.parameters.scene_oscillation import Oscillation
-from particles.parameters.scenes import Drop, Fluid, Joint, Liquid
-from particles.parameters.solder import Solder, Switch
-from workflow.case.kind import Case, of_particles
-from workflow.case.problems import Problem
-from workflow.case.stage_table import DROP, DROPS, JOINT, OSCILLATION
+from reflowshock.particles.parameters.scene_drops import Drops
+from reflowshock.particles.parameters.scene_oscillation import Oscillation
+from reflowshock.particles.parameters.scenes import Drop, Fluid, Joint, Liquid
+from reflowshock.particles.parameters.solder import Solder, Switch
+from reflowshock.workflow.case.kind import Case, of_particles
+from reflowshock.workflow.case.problems import Problem
+from reflowshock.workflow.case.stage_table import DROP, DROPS, JOINT, OSCILLATION
 
 
 class SceneCase(Case):
@@ -33,7 +33,7 @@ class DropCase(SceneCase):
 
     def problems(self) -> list[Problem]:
         """Find parameters that make no possible drop together."""
-        from particles.parameters.scene_checks import drop_problems
+        from reflowshock.particles.parameters.scene_checks import drop_problems
 
         return of_particles(drop_problems(self.drop, self.molten))
 
@@ -48,7 +48,7 @@ class JointCase(SceneCase):
 
     def problems(self) -> list[Problem]:
         """Find parameters that make no possible joint together."""
-        from particles.parameters.scene_checks import joint_problems
+        from reflowshock.particles.parameters.scene_checks import joint_problems
 
         return of_particles(joint_problems(self.joint, self.molten))
 
@@ -63,7 +63,7 @@ class DropsCase(SceneCase):
 
     def problems(self) -> list[Problem]:
         """Find parameters that make no possible pair together."""
-        from particles.parameters.scene_checks import pair_problems
+        from reflowshock.particles.parameters.scene_checks import pair_problems
 
         return of_particles(pair_problems(self.drops, self.molten))
 
@@ -84,6 +84,6 @@ class OscillationCase(Case):
 
     def problems(self) -> list[Problem]:
         """Find a drop that does not swing."""
-        from particles.parameters.scene_checks import oscillation_problems
+        from reflowshock.particles.parameters.scene_checks import oscillation_problems
 
         return of_particles(oscillation_problems(self.oscillation, self.molten))

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from math import ceil
 from typing import Any
 
-from workflow.case.kind import Case
-from workflow.solder.case import DropCase, DropsCase, JointCase, OscillationCase, SceneCase
+from reflowshock.workflow.case.kind import Case
+from reflowshock.workflow.solder.case import DropCase, DropsCase, JointCase, OscillationCase, SceneCase
 
 SECONDS_TO_START = 2.0  # until a stage has loaded its libraries and kernels
 
@@ -40,16 +40,16 @@ def forecast_scene(case: Case) -> SceneForecast:
 
 
 def _of_drop(case: DropCase) -> SceneForecast:
-    from particles.parameters.effects import decide_drop
-    from particles.parameters.estimate import drop_seconds
+    from reflowshock.particles.parameters.effects import decide_drop
+    from reflowshock.particles.parameters.estimate import drop_seconds
 
     drop = case.drop
     return _towards_rest(case, decide_drop(case.molten, drop.is_free), drop.particles, drop_seconds(drop.particles))
 
 
 def _of_joint(case: JointCase) -> SceneForecast:
-    from particles.parameters.effects import decide_effects
-    from particles.parameters.estimate import particle_count, reflow_seconds
+    from reflowshock.particles.parameters.effects import decide_effects
+    from reflowshock.particles.parameters.estimate import particle_count, reflow_seconds
 
     geometry, solder = case.joint.geometry, case.molten
     particles = particle_count(solder, geometry)
@@ -58,8 +58,8 @@ def _of_joint(case: JointCase) -> SceneForecast:
 
 
 def _of_drops(case: DropsCase) -> SceneForecast:
-    from particles.parameters.effects import decide_drop
-    from particles.parameters.estimate import drop_seconds
+    from reflowshock.particles.parameters.effects import decide_drop
+    from reflowshock.particles.parameters.estimate import drop_seconds
 
     drops = case.drops
     merged = (drops.volume,) if drops.merge else ()
@@ -69,8 +69,8 @@ def _of_drops(case: DropsCase) -> SceneForecast:
 
 
 def _towards_rest(case: SceneCase, effects: Mapping[str, Any], particles: int, seconds: float) -> SceneForecast:
-    from particles.parameters.estimate import inertial_seconds
-    from particles.steps.time_step import capillary_limit
+    from reflowshock.particles.parameters.estimate import inertial_seconds
+    from reflowshock.particles.steps.time_step import capillary_limit
 
     solder = case.molten
     numerics = solder.numerics
@@ -85,10 +85,10 @@ def _towards_rest(case: SceneCase, effects: Mapping[str, Any], particles: int, s
 
 
 def _of_oscillation(case: OscillationCase) -> SceneForecast:
-    from particles.parameters.effects import decide_oscillation
-    from particles.parameters.estimate import inertial_seconds
-    from particles.parameters.scene_oscillation import rayleigh_period
-    from particles.steps.time_step import capillary_limit
+    from reflowshock.particles.parameters.effects import decide_oscillation
+    from reflowshock.particles.parameters.estimate import inertial_seconds
+    from reflowshock.particles.parameters.scene_oscillation import rayleigh_period
+    from reflowshock.particles.steps.time_step import capillary_limit
 
     scene, solder = case.oscillation, case.molten
     spacing = solder.numerics.spacing

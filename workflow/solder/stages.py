@@ -3,18 +3,18 @@
 from dataclasses import replace
 from pathlib import Path
 
-from workflow.board_drop import findings
-from workflow.pipeline.stage_runner import Findings, Run, StageFunction
-from workflow.process.products import write_json
-from workflow.process.progress import progress_bar
-from workflow.solder.case import DropCase, DropsCase, JointCase, OscillationCase
+from reflowshock.workflow.board_drop import findings
+from reflowshock.workflow.pipeline.stage_runner import Findings, Run, StageFunction
+from reflowshock.workflow.process.products import write_json
+from reflowshock.workflow.process.progress import progress_bar
+from reflowshock.workflow.solder.case import DropCase, DropsCase, JointCase, OscillationCase
 
 
 def reflow_drop(run: Run[DropCase], folder: Path) -> Findings:
     """Melt a cube of solder on a wall or pad, or without a wall."""
-    from particles.core.checkpoint import Checkpoint
-    from particles.scenes.drop_at_rest import drop_to_rest
-    from particles.scenes.products import write_body
+    from reflowshock.particles.core.checkpoint import Checkpoint
+    from reflowshock.particles.scenes.drop_at_rest import drop_to_rest
+    from reflowshock.particles.scenes.products import write_body
 
     drop, solder = run.case.drop, run.case.molten
     checkpoint = Checkpoint(run.checkpoints("reflow") / "drop", (drop, solder))
@@ -27,9 +27,9 @@ def reflow_drop(run: Run[DropCase], folder: Path) -> Findings:
 
 def reflow_joint(run: Run[JointCase], folder: Path) -> Findings:
     """Melt the solder of one joint between its pads."""
-    from particles.core.checkpoint import Checkpoint
-    from particles.scenes.joint_at_rest import joint_to_rest
-    from particles.scenes.products import write_body
+    from reflowshock.particles.core.checkpoint import Checkpoint
+    from reflowshock.particles.scenes.joint_at_rest import joint_to_rest
+    from reflowshock.particles.scenes.products import write_body
 
     joint, solder = run.case.joint, run.case.molten
     used: list[Checkpoint] = []
@@ -49,9 +49,9 @@ def reflow_joint(run: Run[JointCase], folder: Path) -> Findings:
 
 def reflow_drops(run: Run[DropsCase], folder: Path) -> Findings:
     """Let two drops flow until they, or the one that they become, are at rest."""
-    from particles.core.checkpoint import Checkpoint
-    from particles.scenes.drop_pair import pair_to_rest
-    from particles.scenes.products import write_body
+    from reflowshock.particles.core.checkpoint import Checkpoint
+    from reflowshock.particles.scenes.drop_pair import pair_to_rest
+    from reflowshock.particles.scenes.products import write_body
 
     drops, solder = run.case.drops, run.case.molten
     checkpoint = Checkpoint(run.checkpoints("reflow") / "drops", (drops, solder))
@@ -64,10 +64,10 @@ def reflow_drops(run: Run[DropsCase], folder: Path) -> Findings:
 
 def reflow_oscillation(run: Run[OscillationCase], folder: Path) -> Findings:
     """Let a free drop swing."""
-    from particles.core.checkpoint import Checkpoint
-    from particles.parameters.effects import decide_oscillation
-    from particles.scenes.oscillation import solve_oscillation
-    from particles.scenes.products import write_body
+    from reflowshock.particles.core.checkpoint import Checkpoint
+    from reflowshock.particles.parameters.effects import decide_oscillation
+    from reflowshock.particles.scenes.oscillation import solve_oscillation
+    from reflowshock.particles.scenes.products import write_body
 
     scene, solder = run.case.oscillation, run.case.molten
     checkpoint = Checkpoint(run.checkpoints("reflow") / "drop", (scene, solder))

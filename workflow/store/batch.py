@@ -6,14 +6,14 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from workflow.cluster.executor import Executor, Jobs, Local, Slurm
-from workflow.cluster.job_output import JobOutput, failures_of
-from workflow.store.engine import SAID, last_words, snakemake
-from workflow.store.point import Point
-from workflow.store.product import discard
-from workflow.store.state import Verdict, examine, why_stale
-from workflow.store.store import Store
-from workflow.store.view import show
+from reflowshock.workflow.cluster.executor import Executor, Jobs, Local, Slurm
+from reflowshock.workflow.cluster.job_output import JobOutput, failures_of
+from reflowshock.workflow.store.engine import SAID, last_words, snakemake
+from reflowshock.workflow.store.point import Point
+from reflowshock.workflow.store.product import discard
+from reflowshock.workflow.store.state import Verdict, examine, why_stale
+from reflowshock.workflow.store.store import Store
+from reflowshock.workflow.store.view import show
 
 BATCH = "batch"  # below the store: jobs, logs and marks of the last call
 JOBS = f"{BATCH}/jobs.json"

@@ -5,12 +5,12 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
-from workflow.pipeline.reader import read_case
-from workflow.store.batch import BATCH, Machine, missing, write_jobs
-from workflow.store.folders import locked
-from workflow.store.point import Point
-from workflow.store.product import discard
-from workflow.store.store import Store
+from reflowshock.workflow.pipeline.reader import read_case
+from reflowshock.workflow.store.batch import BATCH, Machine, missing, write_jobs
+from reflowshock.workflow.store.folders import locked
+from reflowshock.workflow.store.point import Point
+from reflowshock.workflow.store.product import discard
+from reflowshock.workflow.store.store import Store
 
 _held = ExitStack()  # the lock of the run folder, until Snakemake ends: its jobs are at work in it
 

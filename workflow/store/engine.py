@@ -7,8 +7,8 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
 
-from workflow.cluster.executor import Executor
-from workflow.store.folders import RunFolderBusy
+from reflowshock.workflow.cluster.executor import Executor
+from reflowshock.workflow.store.folders import RunFolderBusy
 
 SNAKEFILE = Path(__file__).parents[1] / "Snakefile"
 SAID = "batch/snakemake.txt"  # what Snakemake says, below the store

@@ -7,10 +7,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from workflow import __version__
-from workflow.case.problems import CaseError, Problem
-from workflow.store.product import discard
-from workflow.store.store import HOME
+from reflowshock.workflow import __version__
+from reflowshock.workflow.case.problems import CaseError, Problem
+from reflowshock.workflow.store.product import discard
+from reflowshock.workflow.store.store import HOME
 
 MARK = ".reflowshock.json"
 LOCK = ".lock"

@@ -6,9 +6,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from workflow import __version__
-from workflow.case.kind import Case
-from workflow.case.stage_table import Stage
+from reflowshock.workflow import __version__
+from reflowshock.workflow.case.kind import Case
+from reflowshock.workflow.case.stage_table import Stage
 
 DIGITS = 12  # hexadecimal: two of a million products are alike with a probability of 0.2 %
 

@@ -4,10 +4,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from workflow.case.kind import Case
-from workflow.case.problems import CaseError
-from workflow.pipeline.reader import SETTING, read_case
-from workflow.store.keys import product_keys
+from reflowshock.workflow.case.kind import Case
+from reflowshock.workflow.case.problems import CaseError
+from reflowshock.workflow.pipeline.reader import SETTING, read_case
+from reflowshock.workflow.store.keys import product_keys
 
 
 @dataclass(frozen=True, slots=True)

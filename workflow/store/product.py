@@ -12,7 +12,7 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-from workflow.store.keys import digest_of
+from reflowshock.workflow.store.keys import digest_of
 
 RECORD = "stage.json"
 SEAL = "sha256"  # key of the record's own digest

@@ -3,12 +3,12 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from workflow.case.check_text import against_limit
-from workflow.store.keys import Change, compare, stage_inputs
-from workflow.store.point import Point
-from workflow.store.product import damage
-from workflow.store.store import Store, reads
-from workflow.store.view import shown_records
+from reflowshock.workflow.case.check_text import against_limit
+from reflowshock.workflow.store.keys import Change, compare, stage_inputs
+from reflowshock.workflow.store.point import Point
+from reflowshock.workflow.store.product import damage
+from reflowshock.workflow.store.store import Store, reads
+from reflowshock.workflow.store.view import shown_records
 
 
 @dataclass(frozen=True, slots=True)

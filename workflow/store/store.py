@@ -6,13 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from workflow.case.kind import Case
-from workflow.case.problems import CaseError, Problem
-from workflow.case.stage_table import Stage
-from workflow.pipeline.reader import kind_of
-from workflow.store.keys import digest_of
-from workflow.store.point import Point
-from workflow.store.product import RECORD, SEAL, content_digest, discard, read_record
+from reflowshock.workflow.case.kind import Case
+from reflowshock.workflow.case.problems import CaseError, Problem
+from reflowshock.workflow.case.stage_table import Stage
+from reflowshock.workflow.pipeline.reader import kind_of
+from reflowshock.workflow.store.keys import digest_of
+from reflowshock.workflow.store.point import Point
+from reflowshock.workflow.store.product import RECORD, SEAL, content_digest, discard, read_record
 
 HOME = ".store"  # in a run folder, or in the folder of a study
 CASE = "inputs/case.json"

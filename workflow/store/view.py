@@ -11,10 +11,10 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from workflow.case.stage_table import PAGE
-from workflow.store.point import Point
-from workflow.store.product import RECORD, discard, file_digest, read_record
-from workflow.store.store import CASE, Store, write_case
+from reflowshock.workflow.case.stage_table import PAGE
+from reflowshock.workflow.store.point import Point
+from reflowshock.workflow.store.product import RECORD, discard, file_digest, read_record
+from reflowshock.workflow.store.store import CASE, Store, write_case
 
 NO_PRODUCT = "views/none"  # in place of the product that a file is of
 

@@ -4,18 +4,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from fem.names import nearest
-from workflow.case.problems import CaseError, Problem
-from workflow.pipeline.template import CASES
-from workflow.process.terminal import console
-from workflow.store.folders import locked
-from workflow.stress_test.families import FAMILIES, random_trials
-from workflow.stress_test.hard_case import HardCase, read_hard_cases
-from workflow.stress_test.pool import Pool
-from workflow.stress_test.results import write_results
-from workflow.stress_test.sample import Sample, try_sample
-from workflow.stress_test.verdict import Verdict
-from workflow.stress_test.verdict_text import show_sample, show_table, show_verdict
+from reflowshock.fem.names import nearest
+from reflowshock.workflow.case.problems import CaseError, Problem
+from reflowshock.workflow.pipeline.template import CASES
+from reflowshock.workflow.process.terminal import console
+from reflowshock.workflow.store.folders import locked
+from reflowshock.workflow.stress_test.families import FAMILIES, random_trials
+from reflowshock.workflow.stress_test.hard_case import HardCase, read_hard_cases
+from reflowshock.workflow.stress_test.pool import Pool
+from reflowshock.workflow.stress_test.results import write_results
+from reflowshock.workflow.stress_test.sample import Sample, try_sample
+from reflowshock.workflow.stress_test.verdict import Verdict
+from reflowshock.workflow.stress_test.verdict_text import show_sample, show_table, show_verdict
 
 HARD = CASES / "hard"
 RANDOM_COUNT = 200

@@ -6,26 +6,26 @@ from functools import cache
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from workflow.stress_test.trial import Trial
+from reflowshock.workflow.stress_test.trial import Trial
 
 if TYPE_CHECKING:
-    from workflow.stress_test.random_trial import RandomTrial
+    from reflowshock.workflow.stress_test.random_trial import RandomTrial
 
 # Each module of trials has a table TRIALS: name -> Trial; names are unique among all families. Each module of random
 # cases has a list RANDOM of `RandomTrial`; it may load hypothesis.
 TRIALS_OF = {
-    "reflow": "workflow.stress_test.trials_reflow",
-    "elements": "workflow.stress_test.trials_elements",
-    "coupling": "workflow.stress_test.trials_coupling",
-    "remesh": "workflow.stress_test.trials_remesh",
+    "reflow": "reflowshock.workflow.stress_test.trials_reflow",
+    "elements": "reflowshock.workflow.stress_test.trials_elements",
+    "coupling": "reflowshock.workflow.stress_test.trials_coupling",
+    "remesh": "reflowshock.workflow.stress_test.trials_remesh",
 }
 RANDOM_OF: dict[str, str] = {
-    "reflow": "workflow.stress_test.random_reflow",
-    "elements": "workflow.stress_test.random_elements",
-    "coupling": "workflow.stress_test.random_coupling",
-    "remesh": "workflow.stress_test.random_remesh",
+    "reflow": "reflowshock.workflow.stress_test.random_reflow",
+    "elements": "reflowshock.workflow.stress_test.random_elements",
+    "coupling": "reflowshock.workflow.stress_test.random_coupling",
+    "remesh": "reflowshock.workflow.stress_test.random_remesh",
 }
-OF_ALL_FAMILIES = "workflow.stress_test.trials_run"
+OF_ALL_FAMILIES = "reflowshock.workflow.stress_test.trials_run"
 FAMILIES = ("reflow", "elements", "coupling", "remesh")
 
 

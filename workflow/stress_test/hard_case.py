@@ -9,17 +9,17 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from fem.names import nearest
-from workflow.case import fields
-from workflow.case.problems import CaseError, Problem
-from workflow.case.scales import dotted
-from workflow.case.toml_file import read_toml
-from workflow.case.units import UnitError
-from workflow.case.validation import translate
-from workflow.pipeline.reader import set_value
-from workflow.stress_test.bound import Bound, read_bound
-from workflow.stress_test.families import FAMILIES, trials
-from workflow.stress_test.trial import Trial
+from reflowshock.fem.names import nearest
+from reflowshock.workflow.case import fields
+from reflowshock.workflow.case.problems import CaseError, Problem
+from reflowshock.workflow.case.scales import dotted
+from reflowshock.workflow.case.toml_file import read_toml
+from reflowshock.workflow.case.units import UnitError
+from reflowshock.workflow.case.validation import translate
+from reflowshock.workflow.pipeline.reader import set_value
+from reflowshock.workflow.stress_test.bound import Bound, read_bound
+from reflowshock.workflow.stress_test.families import FAMILIES, trials
+from reflowshock.workflow.stress_test.trial import Trial
 
 DEADLINE = 300.0
 FREE_TABLES = ("parameters", "vary", "bounds")

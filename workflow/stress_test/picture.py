@@ -11,10 +11,10 @@ from matplotlib import pyplot
 from matplotlib.axes import Axes
 from matplotlib.ticker import LogFormatter
 
-from workflow.report.curves import STYLE
-from workflow.stress_test.families import FAMILIES
-from workflow.stress_test.sample import Sample
-from workflow.stress_test.verdict import Verdict
+from reflowshock.workflow.report.curves import STYLE
+from reflowshock.workflow.stress_test.families import FAMILIES
+from reflowshock.workflow.stress_test.sample import Sample
+from reflowshock.workflow.stress_test.verdict import Verdict
 
 LEAST, MOST = 0.05, 1000.0  # margins beyond are drawn at the edge
 SURVIVED, MISSED, REFUSED = "#0b5fa5", "#b3261e", "#2a7d4f"

@@ -14,9 +14,9 @@ from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
 from typing import Any
 
-from fem.parallel.own_job import end_with_parent
-from workflow.stress_test.hard_case import HardCase
-from workflow.stress_test.verdict import Verdict, attempt
+from reflowshock.fem.parallel.own_job import end_with_parent
+from reflowshock.workflow.stress_test.hard_case import HardCase
+from reflowshock.workflow.stress_test.verdict import Verdict, attempt
 
 
 @dataclass(slots=True)

@@ -11,10 +11,10 @@ from typing import Any
 import hypothesis
 from hypothesis import HealthCheck, Phase, Verbosity
 
-from workflow.stress_test.hard_case import HardCase, hard_cases
-from workflow.stress_test.pool import Pool
-from workflow.stress_test.random_trial import RandomTrial
-from workflow.stress_test.verdict import Verdict
+from reflowshock.workflow.stress_test.hard_case import HardCase, hard_cases
+from reflowshock.workflow.stress_test.pool import Pool
+from reflowshock.workflow.stress_test.random_trial import RandomTrial
+from reflowshock.workflow.stress_test.verdict import Verdict
 
 LONGEST_SEARCH = 120.0  # for a simpler case that misses, too [s]
 LONGEST_TRY = "120 s"

@@ -4,8 +4,8 @@ from typing import Any
 
 from hypothesis import strategies as st
 
-from workflow.stress_test.random_elements import powers
-from workflow.stress_test.random_trial import RandomTrial, numbers, quantities
+from reflowshock.workflow.stress_test.random_elements import powers
+from reflowshock.workflow.stress_test.random_trial import RandomTrial, numbers, quantities
 
 SCHEMES = ["held_velocity", "impulse", "gravouil_combescure", "local_steps", "local_steps, levels auto"]
 

@@ -4,7 +4,7 @@ from typing import Any
 
 from hypothesis import strategies as st
 
-from workflow.stress_test.random_trial import RandomTrial, numbers, quantities
+from reflowshock.workflow.stress_test.random_trial import RandomTrial, numbers, quantities
 
 KINDS = st.sampled_from(["incompatible_modes", "one_point", "tetrahedron", "tetrahedron_quadratic"])
 HEXAHEDRA = st.sampled_from(["incompatible_modes", "one_point"])

@@ -4,7 +4,7 @@ from typing import Any
 
 from hypothesis import strategies as st
 
-from workflow.stress_test.random_trial import RandomTrial, numbers, quantities
+from reflowshock.workflow.stress_test.random_trial import RandomTrial, numbers, quantities
 
 CONSERVED = {"volume_drift": "1e-6", "energy_rise": "1e-4"}
 

@@ -4,7 +4,7 @@ from typing import Any
 
 from hypothesis import strategies as st
 
-from workflow.stress_test.random_trial import RandomTrial, numbers, quantities
+from reflowshock.workflow.stress_test.random_trial import RandomTrial, numbers, quantities
 
 GOOD = {
     "volume_error": "0.3 %",

@@ -7,14 +7,14 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from workflow import __version__
-from workflow.report.template import template_environment
-from workflow.stress_test.case_file import hard_case_text
-from workflow.stress_test.families import FAMILIES
-from workflow.stress_test.picture import draw_margins
-from workflow.stress_test.sample import Sample
-from workflow.stress_test.verdict import Check, Verdict
-from workflow.stress_test.verdict_text import margin_text, said, sample_said
+from reflowshock.workflow import __version__
+from reflowshock.workflow.report.template import template_environment
+from reflowshock.workflow.stress_test.case_file import hard_case_text
+from reflowshock.workflow.stress_test.families import FAMILIES
+from reflowshock.workflow.stress_test.picture import draw_margins
+from reflowshock.workflow.stress_test.sample import Sample
+from reflowshock.workflow.stress_test.verdict import Check, Verdict
+from reflowshock.workflow.stress_test.verdict_text import margin_text, said, sample_said
 
 TEMPLATES = Path(__file__).parent / "templates"
 

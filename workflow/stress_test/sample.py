@@ -4,11 +4,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from workflow.stress_test.families import random_trials
-from workflow.stress_test.pool import Pool
-from workflow.stress_test.random_cases import Simplifier, drawn, file_table, random_case, shares
-from workflow.stress_test.random_trial import RandomTrial
-from workflow.stress_test.verdict import Check, Verdict
+from reflowshock.workflow.stress_test.families import random_trials
+from reflowshock.workflow.stress_test.pool import Pool
+from reflowshock.workflow.stress_test.random_cases import Simplifier, drawn, file_table, random_case, shares
+from reflowshock.workflow.stress_test.random_trial import RandomTrial
+from reflowshock.workflow.stress_test.verdict import Check, Verdict
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,7 +6,7 @@ from importlib import import_module
 
 from pydantic import BaseModel
 
-from workflow.stress_test.trial import Measured, Trial
+from reflowshock.workflow.stress_test.trial import Measured, Trial
 
 
 @dataclass(frozen=True, slots=True)

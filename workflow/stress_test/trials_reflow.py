@@ -5,15 +5,15 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from pydantic import Field
 
-from particles.parameters.scene_drops import Drops
-from particles.parameters.scene_oscillation import Oscillation
-from particles.parameters.scenes import Drop, Fluid, Joint, Liquid
-from particles.parameters.solder import Parameters, Solder, Switch
-from workflow.case.kind import of_particles
-from workflow.stress_test.trial import Measured, Refused, Trial
+from reflowshock.particles.parameters.scene_drops import Drops
+from reflowshock.particles.parameters.scene_oscillation import Oscillation
+from reflowshock.particles.parameters.scenes import Drop, Fluid, Joint, Liquid
+from reflowshock.particles.parameters.solder import Parameters, Solder, Switch
+from reflowshock.workflow.case.kind import of_particles
+from reflowshock.workflow.stress_test.trial import Measured, Refused, Trial
 
 if TYPE_CHECKING:
-    from particles.steps.shape import JointShape
+    from reflowshock.particles.steps.shape import JointShape
 
 SHAPE = {"volume_drift": "", "energy_rise": "", "energy_over_start": "", "capillary_number_at_rest": "", "steps": ""}
 ERRORS_OF_DROP = {
@@ -94,8 +94,8 @@ class SwingTrial(Parameters):
 
 def drop(parameters: DropTrial) -> dict[str, Measured]:
     """Bring a drop to rest."""
-    from particles.parameters.scene_checks import drop_problems
-    from particles.scenes.drop_at_rest import drop_to_rest
+    from reflowshock.particles.parameters.scene_checks import drop_problems
+    from reflowshock.particles.scenes.drop_at_rest import drop_to_rest
 
     solder = parameters.molten(parameters.drop)
     _refuse(drop_problems(parameters.drop, solder))
@@ -104,8 +104,8 @@ def drop(parameters: DropTrial) -> dict[str, Measured]:
 
 def joint(parameters: JointTrial) -> dict[str, Measured]:
     """Bring a joint to rest, along its path if it has one."""
-    from particles.parameters.scene_checks import joint_problems
-    from particles.scenes.joint_at_rest import joint_to_rest
+    from reflowshock.particles.parameters.scene_checks import joint_problems
+    from reflowshock.particles.scenes.joint_at_rest import joint_to_rest
 
     solder = parameters.molten(parameters.joint)
     _refuse(joint_problems(parameters.joint, solder))
@@ -117,9 +117,9 @@ def joint(parameters: JointTrial) -> dict[str, Measured]:
 
 def pair(parameters: PairTrial) -> dict[str, Measured]:
     """Let two drops flow until they, or the one that they became, are at rest; their place is over V^(1/3)."""
-    from particles.core.surface_measure import centre_of_volume
-    from particles.parameters.scene_checks import pair_problems
-    from particles.scenes.drop_pair import pair_to_rest
+    from reflowshock.particles.core.surface_measure import centre_of_volume
+    from reflowshock.particles.parameters.scene_checks import pair_problems
+    from reflowshock.particles.scenes.drop_pair import pair_to_rest
 
     solder = parameters.molten(parameters.drops)
     _refuse(pair_problems(parameters.drops, solder))
@@ -133,8 +133,8 @@ def pair(parameters: PairTrial) -> dict[str, Measured]:
 
 def swing(parameters: SwingTrial) -> dict[str, Measured]:
     """Let a free drop swing; its momentum is over that of its mass at the greatest speed of the swing."""
-    from particles.parameters.scene_checks import oscillation_problems
-    from particles.scenes.free_drop import solve_free_drop
+    from reflowshock.particles.parameters.scene_checks import oscillation_problems
+    from reflowshock.particles.scenes.free_drop import solve_free_drop
 
     scene = parameters.oscillation
     solder = scene.resolve(parameters.solder)

@@ -10,11 +10,11 @@ from pathlib import Path
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from fem.parallel.own_job import own_environment
-from workflow.case.problems import CaseError, as_toml
-from workflow.case.scales import dotted
-from workflow.pipeline.reader import read_case
-from workflow.stress_test.trial import Measured, Trial
+from reflowshock.fem.parallel.own_job import own_environment
+from reflowshock.workflow.case.problems import CaseError, as_toml
+from reflowshock.workflow.case.scales import dotted
+from reflowshock.workflow.pipeline.reader import read_case
+from reflowshock.workflow.stress_test.trial import Measured, Trial
 
 LAST_LINES = 3
 
@@ -49,7 +49,7 @@ def run_case(parameters: RunParameters) -> dict[str, Measured]:
     """
     settings = [part for override in parameters.overrides for part in ("--set", override)]
     with tempfile.TemporaryDirectory() as folder:
-        command = [sys.executable, "-m", "workflow", "run", parameters.case, "--out", folder, "-j", "1", *settings]
+        command = [sys.executable, "-m", "reflowshock", "run", parameters.case, "--out", folder, "-j", "1", *settings]
         environment = own_environment(os.environ)
         process = subprocess.run(
             command, capture_output=True, encoding="utf-8", errors="replace", check=False, env=environment

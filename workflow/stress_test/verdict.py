@@ -5,10 +5,10 @@ import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from workflow.case.units import UnitError
-from workflow.stress_test.bound import Bound
-from workflow.stress_test.hard_case import HardCase
-from workflow.stress_test.trial import Measured, Refused
+from reflowshock.workflow.case.units import UnitError
+from reflowshock.workflow.stress_test.bound import Bound
+from reflowshock.workflow.stress_test.hard_case import HardCase
+from reflowshock.workflow.stress_test.trial import Measured, Refused
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,10 +5,10 @@ from collections.abc import Sequence
 from rich.table import Table
 from rich.text import Text
 
-from workflow.process.terminal import console, styled
-from workflow.stress_test.families import FAMILIES
-from workflow.stress_test.sample import Sample
-from workflow.stress_test.verdict import Check, Verdict
+from reflowshock.workflow.process.terminal import console, styled
+from reflowshock.workflow.stress_test.families import FAMILIES
+from reflowshock.workflow.stress_test.sample import Sample
+from reflowshock.workflow.stress_test.verdict import Check, Verdict
 
 LARGEST_SHOWN = 1000.0
 

@@ -4,14 +4,14 @@ from pathlib import Path
 
 from pydantic import Field
 
-from fem.problem.structure import StructureScene
-from meshing.board.box_plan import Box, BoxHoles, BoxLayer
-from workflow.case.kind import Case
-from workflow.case.problems import Problem
-from workflow.case.pulse_files import unreadable_pulses
-from workflow.case.stage_table import STRUCTURE
-from workflow.case.toml_file import beside
-from workflow.structure.references import AnyReference, reference_problems
+from reflowshock.fem.problem.structure import StructureScene
+from reflowshock.meshing.board.box_plan import Box, BoxHoles, BoxLayer
+from reflowshock.workflow.case.kind import Case
+from reflowshock.workflow.case.problems import Problem
+from reflowshock.workflow.case.pulse_files import unreadable_pulses
+from reflowshock.workflow.case.stage_table import STRUCTURE
+from reflowshock.workflow.case.toml_file import beside
+from reflowshock.workflow.structure.references import AnyReference, reference_problems
 
 
 class StructureCase(StructureScene, Case):
@@ -35,7 +35,7 @@ class StructureCase(StructureScene, Case):
     @property
     def pulse_tables(self) -> dict[str, tuple[Path, str]]:
         """Tables of loads."""
-        from fem.problem.structure_pulses import QUANTITY
+        from reflowshock.fem.problem.structure_pulses import QUANTITY
 
         return {
             f"loads.{name}.table": (Path(load.table), QUANTITY[load.kind])
@@ -65,8 +65,8 @@ class StructureCase(StructureScene, Case):
 
     def problems(self) -> list[Problem]:
         """Find what does not fit together: materials, places, facet sets, loads, references."""
-        from fem.problem import structure_checks
-        from meshing.board.box_checks import box_problems
+        from reflowshock.fem.problem import structure_checks
+        from reflowshock.meshing.board.box_checks import box_problems
 
         boxes = [Problem(found.key, found.message, found.value, found.allowed) for found in box_problems(self.box)]
         scenes = [
@@ -78,8 +78,8 @@ class StructureCase(StructureScene, Case):
         return found or self._impossible_steps()
 
     def _impossible_steps(self) -> list[Problem]:
-        from workflow.structure.findings import waves_that_do_not_pass
-        from workflow.structure.forecast import step_problems
+        from reflowshock.workflow.structure.findings import waves_that_do_not_pass
+        from reflowshock.workflow.structure.forecast import step_problems
 
         return [*step_problems(self), *waves_that_do_not_pass(self)]
 

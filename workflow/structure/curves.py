@@ -8,7 +8,7 @@ from matplotlib import pyplot
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from workflow.report.curves import ENERGIES, MILLI, STYLE, svg
+from reflowshock.workflow.report.curves import ENERGIES, MILLI, STYLE, svg
 
 SOLVER_STYLE: dict[str, dict[str, Any]] = {
     "explicit": {"color": "#0b5fa5", "linestyle": "-", "linewidth": 1.6, "label": "explicit"},

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
-from workflow.structure.exact_bar import with_errors
+from reflowshock.workflow.structure.exact_bar import with_errors
 
 ROOTS = np.array([1.8751040687, 4.6940911330, 7.8547574382])  # of cos x cosh x = -1 (Blevins 1979, table 8-1)
 SEARCHED = 0.25  # of the exact frequency: how far from it that of the run is looked for

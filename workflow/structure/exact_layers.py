@@ -7,7 +7,7 @@ from heapq import heappop, heappush
 import numpy as np
 from numpy.typing import NDArray
 
-from workflow.structure.exact_bar import peak
+from reflowshock.workflow.structure.exact_bar import peak
 
 FAINTEST = 1e-9  # of the incident velocity: a weaker ray is not followed
 SAME = 1e-9  # of the duration: rays closer than that arrive together

@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from workflow.board_drop.findings import at_least, at_most, in_words_continued, metric
-from workflow.case.problems import Problem
-from workflow.pipeline.stage_runner import Findings
-from workflow.process.plan_table import short
-from workflow.structure import exact_bar, exact_cantilever, exact_layers
-from workflow.structure.case import StructureCase
-from workflow.structure.references import BarWave, Cantilever, FrequencyRange, LayeredBar
+from reflowshock.workflow.board_drop.findings import at_least, at_most, in_words_continued, metric
+from reflowshock.workflow.case.problems import Problem
+from reflowshock.workflow.pipeline.stage_runner import Findings
+from reflowshock.workflow.process.plan_table import short
+from reflowshock.workflow.structure import exact_bar, exact_cantilever, exact_layers
+from reflowshock.workflow.structure.case import StructureCase
+from reflowshock.workflow.structure.references import BarWave, Cantilever, FrequencyRange, LayeredBar
 
 SOLVER_DIFFERENCE = 0.01  # of the histories of watch points, explicit against implicit, relative L2
 JUDGED = ("displacement_difference", "strain_difference")
@@ -50,7 +50,7 @@ def of_comparison(case: StructureCase, folders: Mapping[str, Path]) -> Findings:
         case: the case.
         folders: folder of each solver's products, the one whose figures count first.
     """
-    from fem.output.compare_structures import solver_differences
+    from reflowshock.fem.output.compare_structures import solver_differences
 
     histories = {solver: read_history(folder) for solver, folder in folders.items()}
     metrics: dict = {}
@@ -145,7 +145,7 @@ def compared_with_references(case: StructureCase, motion: Motion) -> tuple[dict,
 
 def bars_of(case: StructureCase, reference: BarWave) -> exact_bar.Bars:
     """Return the two layers as bars."""
-    from fem.materials.elasticity import elasticity_matrix
+    from reflowshock.fem.materials.elasticity import elasticity_matrix
 
     layers, materials = case.structure.layers.values(), case.scene.layer_materials.values()
     lower, upper = (float(elasticity_matrix(material)[2, 2]) for material in materials)
@@ -156,7 +156,7 @@ def bars_of(case: StructureCase, reference: BarWave) -> exact_bar.Bars:
 
 def layers_of(case: StructureCase) -> exact_layers.Layers:
     """Return all layers as bars."""
-    from fem.materials.elasticity import elasticity_matrix
+    from reflowshock.fem.materials.elasticity import elasticity_matrix
 
     materials = case.scene.layer_materials.values()
     return exact_layers.Layers(
@@ -181,7 +181,7 @@ def waves_that_do_not_pass(case: StructureCase) -> Iterator[Problem]:
 
 def strip_of(case: StructureCase, reference: Cantilever) -> exact_cantilever.Strip:
     """Return the only layer as a strip."""
-    from fem.materials.elasticity import elasticity_matrix
+    from reflowshock.fem.materials.elasticity import elasticity_matrix
 
     (material,) = case.scene.layer_materials.values()
     pressure, body = case.loads[reference.load].peak or 0.0, case.structure
@@ -225,7 +225,7 @@ def _waves(case: StructureCase, reference: BarWave | LayeredBar, motion: Motion)
 
 
 def _pulse_of(case: StructureCase, name: str) -> exact_layers.Pulse:
-    from fem.problem.structure_pulses import pulse_durations, pulse_of
+    from reflowshock.fem.problem.structure_pulses import pulse_durations, pulse_of
 
     load = case.loads[name]
     pulse = pulse_of(load)

@@ -5,13 +5,13 @@ from dataclasses import dataclass
 from math import ceil
 from typing import TYPE_CHECKING, Any
 
-from workflow.case.problems import Problem
-from workflow.case.step_limit import too_many_steps
-from workflow.process.plan_table import short
-from workflow.structure.case import StructureCase
+from reflowshock.workflow.case.problems import Problem
+from reflowshock.workflow.case.step_limit import too_many_steps
+from reflowshock.workflow.process.plan_table import short
+from reflowshock.workflow.structure.case import StructureCase
 
 if TYPE_CHECKING:
-    from fem.estimates.solver_cost import SolverForecast
+    from reflowshock.fem.estimates.solver_cost import SolverForecast
 
 SECONDS_TO_START = 4.0  # until the ranks of a solver have loaded their libraries and kernels
 
@@ -59,8 +59,8 @@ class StructureForecast:
 
 def forecast_structure(case: StructureCase) -> StructureForecast:
     """Predict sizes, steps and cost."""
-    from fem.estimates.solver_cost import forecast_solvers
-    from fem.estimates.structure_effects import effects
+    from reflowshock.fem.estimates.solver_cost import forecast_solvers
+    from reflowshock.fem.estimates.structure_effects import effects
 
     layers, dynamics = forecast_layers(case), case.dynamics
     steps = forecast_steps(case, layers)
@@ -77,7 +77,7 @@ def forecast_structure(case: StructureCase) -> StructureForecast:
 
 def forecast_coupled(case: StructureCase, layers: Mapping[str, LayerForecast], update: float) -> CoupledForecast | None:
     """Predict window and cost of two models from the seconds of an element's update; buffers and levels left out."""
-    from fem.problem.structure import fine_layers
+    from reflowshock.fem.problem.structure import fine_layers
 
     coupling, dynamics = case.dynamics.coupling, case.dynamics
     if coupling is None:
@@ -94,7 +94,7 @@ def forecast_coupled(case: StructureCase, layers: Mapping[str, LayerForecast], u
 
 def critical_step(case: StructureCase, layers: Mapping[str, LayerForecast]) -> float:
     """Predict the critical step [s] of all elements, with damping."""
-    from fem.estimates.estimate import damped_critical_step
+    from reflowshock.fem.estimates.estimate import damped_critical_step
 
     undamped = min(layer.critical_step for layer in layers.values() if not layer.mass_scaled)
     return damped_critical_step(undamped, case.dynamics.damping.coefficients[1])
@@ -102,8 +102,8 @@ def critical_step(case: StructureCase, layers: Mapping[str, LayerForecast]) -> f
 
 def forecast_steps(case: StructureCase, layers: Mapping[str, LayerForecast]) -> dict[str, float]:
     """Predict the time step [s] of each solver."""
-    from fem.estimates.solver_cost import implicit_step
-    from fem.problem.structure_pulses import pulse_durations, pulses_of
+    from reflowshock.fem.estimates.solver_cost import implicit_step
+    from reflowshock.fem.problem.structure_pulses import pulse_durations, pulses_of
 
     numerics = case.dynamics.numerics
     explicit = numerics.explicit_step or numerics.step_fraction * critical_step(case, layers)
@@ -142,7 +142,7 @@ def step_problems(case: StructureCase) -> Iterator[Problem]:
 
 def shorter_than_window(case: StructureCase, window: float) -> Iterator[Problem]:
     """Find pulses that are over before two models meet again."""
-    from fem.problem.structure_pulses import pulse_durations, pulses_of
+    from reflowshock.fem.problem.structure_pulses import pulse_durations, pulses_of
 
     for name, pulse in pulses_of(case.loads).items():
         shortest = min(pulse_durations({name: pulse}), default=window)
@@ -156,8 +156,8 @@ def forecast_layers(case: StructureCase) -> dict[str, LayerForecast]:
     """Predict size and critical time step of every layer."""
     import numpy as np
 
-    from fem.elements.box_step import box_element_step
-    from meshing.board.box_plan import count_box
+    from reflowshock.fem.elements.box_step import box_element_step
+    from reflowshock.meshing.board.box_plan import count_box
 
     body, materials = case.structure, case.scene.layer_materials
     layers = {}

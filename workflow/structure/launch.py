@@ -3,9 +3,9 @@
 import json
 from pathlib import Path
 
-from workflow.pipeline.stage_runner import Run
-from workflow.process.fem_launch import run_fem
-from workflow.structure.case import StructureCase
+from reflowshock.workflow.pipeline.stage_runner import Run
+from reflowshock.workflow.process.fem_launch import run_fem
+from reflowshock.workflow.structure.case import StructureCase
 
 SOLVERS = ("explicit", "implicit", "dns")
 

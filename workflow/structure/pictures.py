@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pyvista
 
-from workflow.report.pictures import MILLI, SCALAR_BAR, new_plotter, round_down, save
+from reflowshock.workflow.report.pictures import MILLI, SCALAR_BAR, new_plotter, round_down, save
 
 CELL_TYPES = {
     8: pyvista.CellType.HEXAHEDRON,

@@ -4,12 +4,12 @@ from typing import TYPE_CHECKING
 
 from rich.table import Table
 
-from workflow.process.plan_table import duration, new_table, short
-from workflow.structure.case import StructureCase
-from workflow.structure.forecast import CoupledForecast, StructureForecast
+from reflowshock.workflow.process.plan_table import duration, new_table, short
+from reflowshock.workflow.structure.case import StructureCase
+from reflowshock.workflow.structure.forecast import CoupledForecast, StructureForecast
 
 if TYPE_CHECKING:
-    from fem.estimates.solver_cost import SolverCost
+    from reflowshock.fem.estimates.solver_cost import SolverCost
 
 MEGA = 1.0e6
 

@@ -5,9 +5,9 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from fem.names import nearest
-from fem.problem.structure import Pressure, StructureScene
-from workflow.case.problems import Problem
+from reflowshock.fem.names import nearest
+from reflowshock.fem.problem.structure import Pressure, StructureScene
+from reflowshock.workflow.case.problems import Problem
 
 
 class Reference(BaseModel):

@@ -5,14 +5,14 @@ from pathlib import Path
 
 import numpy as np
 
-from workflow.process.plan_table import short
-from workflow.report import two_scales
-from workflow.report.tables import costs, number, percent, quantity
-from workflow.structure import curves as structure_curves
-from workflow.structure.case import StructureCase
-from workflow.structure.findings import read_history, read_modes
-from workflow.structure.launch import read_results
-from workflow.structure.references import Published
+from reflowshock.workflow.process.plan_table import short
+from reflowshock.workflow.report import two_scales
+from reflowshock.workflow.report.tables import costs, number, percent, quantity
+from reflowshock.workflow.structure import curves as structure_curves
+from reflowshock.workflow.structure.case import StructureCase
+from reflowshock.workflow.structure.findings import read_history, read_modes
+from reflowshock.workflow.structure.launch import read_results
+from reflowshock.workflow.structure.references import Published
 
 HEADLINE = (
     "first_frequency", "peak_displacement", "displacement_range", "peak_strain", "displacement_difference",
@@ -158,8 +158,8 @@ def mode_table(modes: list[dict]) -> dict:
 
 
 def _add_pictures(folder: Path, case: StructureCase, history: Mapping[str, np.ndarray], context: dict) -> None:
-    from workflow.report.pictures import embedded
-    from workflow.structure.pictures import render_deformation, render_modes
+    from reflowshock.workflow.report.pictures import embedded
+    from reflowshock.workflow.structure.pictures import render_deformation, render_modes
 
     modes, series, time = read_modes(folder), model_series(folder), _peak_time(case, history)
     pictures = context["pictures"]

@@ -2,17 +2,17 @@
 
 from pathlib import Path
 
-from workflow.pipeline.stage_runner import Findings, Run, StageFunction
-from workflow.process.products import write_json
-from workflow.structure import findings as structure_findings
-from workflow.structure.case import StructureCase
-from workflow.structure.launch import read_results, run_solver, solver_folders
+from reflowshock.workflow.pipeline.stage_runner import Findings, Run, StageFunction
+from reflowshock.workflow.process.products import write_json
+from reflowshock.workflow.structure import findings as structure_findings
+from reflowshock.workflow.structure.case import StructureCase
+from reflowshock.workflow.structure.launch import read_results, run_solver, solver_folders
 
 
 def geometry(run: Run[StructureCase], folder: Path) -> Findings:
     """Mesh the layers."""
-    from meshing.board.box import write_box
-    from meshing.core.preview import write_layers_preview
+    from reflowshock.meshing.board.box import write_box
+    from reflowshock.meshing.core.preview import write_layers_preview
 
     counts = write_box(run.case.box, folder / "structure.msh")
     write_layers_preview(folder / "structure.msh", folder / "preview.png")

@@ -7,23 +7,23 @@ from pathlib import Path
 
 from rich.table import Table
 
-from fem.names import nearest
-from workflow.case.problems import CaseError
-from workflow.process.plan_table import duration, new_table
-from workflow.process.progress import progress_bar
-from workflow.process.terminal import console, print_error
-from workflow.store.batch import Machine, missing, run_points, show_products
-from workflow.store.folders import locked
-from workflow.store.point import Point, PointsError, read_possible_points
-from workflow.store.product import discard
-from workflow.store.store import Store
-from workflow.store.view import adopt
-from workflow.study import tables
-from workflow.study.main_effects import is_number
-from workflow.study.outlook import outlook
-from workflow.study.progress import teller
-from workflow.study.results import HEALTHY, IMPOSSIBLE, Row, row_of
-from workflow.study.study_file import Study, read_study
+from reflowshock.fem.names import nearest
+from reflowshock.workflow.case.problems import CaseError
+from reflowshock.workflow.process.plan_table import duration, new_table
+from reflowshock.workflow.process.progress import progress_bar
+from reflowshock.workflow.process.terminal import console, print_error
+from reflowshock.workflow.store.batch import Machine, missing, run_points, show_products
+from reflowshock.workflow.store.folders import locked
+from reflowshock.workflow.store.point import Point, PointsError, read_possible_points
+from reflowshock.workflow.store.product import discard
+from reflowshock.workflow.store.store import Store
+from reflowshock.workflow.store.view import adopt
+from reflowshock.workflow.study import tables
+from reflowshock.workflow.study.main_effects import is_number
+from reflowshock.workflow.study.outlook import outlook
+from reflowshock.workflow.study.progress import teller
+from reflowshock.workflow.study.results import HEALTHY, IMPOSSIBLE, Row, row_of
+from reflowshock.workflow.study.study_file import Study, read_study
 
 LAST = "report"
 WHAT = "study"  # its folder holds
@@ -140,7 +140,7 @@ def run_study(points: Points, store: Store, machine: Machine, *, force: bool = F
 
 def _write_results(store: Store, study: Study, rows: Sequence[Row]) -> None:
     """Write the results of a study beside its store; what a user has changed in earlier ones is set aside."""
-    from workflow.study.page import write_results
+    from reflowshock.workflow.study.page import write_results
 
     made = store.home / "work" / "results"
     discard(made)

@@ -5,9 +5,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 
-from workflow.case.problems import Problem
-from workflow.study.hypercube import Hypercube
-from workflow.study.setting_text import as_text, between
+from reflowshock.workflow.case.problems import Problem
+from reflowshock.workflow.study.hypercube import Hypercube
+from reflowshock.workflow.study.setting_text import as_text, between
 
 MOST_POINTS = 10_000  # each a run
 MOST_SAMPLED = 1_000_000  # values of a Latin hypercube

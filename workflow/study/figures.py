@@ -6,9 +6,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from workflow.report.curves import STYLE, pyplot
-from workflow.report.tables import SHOWN
-from workflow.study.main_effects import Effect
+from reflowshock.workflow.report.curves import STYLE, pyplot
+from reflowshock.workflow.report.tables import SHOWN
+from reflowshock.workflow.study.main_effects import Effect
 
 BLUE, RED, GREY = "#0b5fa5", "#d1495b", "#9aa5b1"
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from workflow.study.designs import Factor
-from workflow.study.results import Row, numbers
+from reflowshock.workflow.study.designs import Factor
+from reflowshock.workflow.study.results import Row, numbers
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,7 +104,7 @@ def effect_of(factor: Factor, rows: Sequence[Row], metric: str) -> Effect:
 
 def ranked(rows: Sequence[Row], metric: str, goal: str) -> list[Row]:
     """Return the healthy rows that have a metric, best first."""
-    from workflow.study.results import HEALTHY
+    from reflowshock.workflow.study.results import HEALTHY
 
     found = [row for row in measured(rows, metric) if row.verdict == HEALTHY]
     return sorted(found, key=lambda row: row.metrics[metric]["value"], reverse=goal == "maximise")

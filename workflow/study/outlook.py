@@ -3,9 +3,9 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from workflow.pipeline.stage_forecast import stage_seconds
-from workflow.store.batch import Job
-from workflow.store.point import Point
+from reflowshock.workflow.pipeline.stage_forecast import stage_seconds
+from reflowshock.workflow.store.batch import Job
+from reflowshock.workflow.store.point import Point
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,11 +3,11 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from workflow import __version__
-from workflow.report.page import write_page
-from workflow.study import tables
-from workflow.study.results import HEALTHY, Row, columns, write_csv, write_parquet
-from workflow.study.study_file import Study
+from reflowshock.workflow import __version__
+from reflowshock.workflow.report.page import write_page
+from reflowshock.workflow.study import tables
+from reflowshock.workflow.study.results import HEALTHY, Row, columns, write_csv, write_parquet
+from reflowshock.workflow.study.study_file import Study
 
 
 def write_results(folder: Path, study: Study, rows: Sequence[Row]) -> None:
@@ -46,8 +46,8 @@ def _picture(folder: Path, found: list) -> dict:
     """Draw main effects into a PNG; return them as SVG. Nothing where no point has a metric."""
     if not found:
         return {"picture": ""}
-    from workflow.report.curves import svg
-    from workflow.study.figures import main_effects
+    from reflowshock.workflow.report.curves import svg
+    from reflowshock.workflow.study.figures import main_effects
 
     figure = main_effects(found)
     figure.savefig(folder / "main_effects.png", dpi=150)

@@ -3,12 +3,12 @@
 import time
 from collections.abc import Callable, Sequence
 
-from workflow.process.plan_table import duration
-from workflow.process.progress import ProgressBar
-from workflow.process.terminal import console
-from workflow.store.batch import Job
-from workflow.store.point import Point
-from workflow.store.store import Store
+from reflowshock.workflow.process.plan_table import duration
+from reflowshock.workflow.process.progress import ProgressBar
+from reflowshock.workflow.process.terminal import console
+from reflowshock.workflow.store.batch import Job
+from reflowshock.workflow.store.point import Point
+from reflowshock.workflow.store.store import Store
 
 
 def teller(

@@ -6,12 +6,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from workflow.case.check_text import against_limit
-from workflow.case.units import QUANTITY
-from workflow.pipeline.reader import display_values
-from workflow.store.point import Point
-from workflow.store.store import Store
-from workflow.study.study_file import Study
+from reflowshock.workflow.case.check_text import against_limit
+from reflowshock.workflow.case.units import QUANTITY
+from reflowshock.workflow.pipeline.reader import display_values
+from reflowshock.workflow.store.point import Point
+from reflowshock.workflow.store.store import Store
+from reflowshock.workflow.study.study_file import Study
 
 HEALTHY, UNHEALTHY, FAILED, IMPOSSIBLE = "healthy", "unhealthy", "failed", "impossible"
 Value = str | float | int | bool | None

@@ -3,7 +3,7 @@
 import json
 import tomllib
 
-from workflow.case.units import QUANTITY
+from reflowshock.workflow.case.units import QUANTITY
 
 DIGITS = 6
 

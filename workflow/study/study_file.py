@@ -8,16 +8,16 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from workflow.case.names import Name
-from workflow.case.problems import CaseError, Problem
-from workflow.case.scales import dotted, is_key
-from workflow.case.toml_file import parse_toml, read_text
-from workflow.case.toml_places import Places
-from workflow.case.validation import translate
-from workflow.pipeline.reader import KINDS
-from workflow.study.designs import MOST_POINTS, Design, TooManyPoints, grid_axes, list_axis, sampled
-from workflow.study.hypercube import Hypercube
-from workflow.study.setting_text import as_text
+from reflowshock.workflow.case.names import Name
+from reflowshock.workflow.case.problems import CaseError, Problem
+from reflowshock.workflow.case.scales import dotted, is_key
+from reflowshock.workflow.case.toml_file import parse_toml, read_text
+from reflowshock.workflow.case.toml_places import Places
+from reflowshock.workflow.case.validation import translate
+from reflowshock.workflow.pipeline.reader import KINDS
+from reflowshock.workflow.study.designs import MOST_POINTS, Design, TooManyPoints, grid_axes, list_axis, sampled
+from reflowshock.workflow.study.hypercube import Hypercube
+from reflowshock.workflow.study.setting_text import as_text
 
 DESIGNS = "at least one of [grid], [[list]], [latin_hypercube]"
 

@@ -2,10 +2,10 @@
 
 from collections.abc import Iterable, Sequence
 
-from workflow.report.tables import quantity
-from workflow.study.main_effects import Effect, effect_of, measured, ranked
-from workflow.study.results import HEALTHY, UNHEALTHY, Row
-from workflow.study.study_file import Study
+from reflowshock.workflow.report.tables import quantity
+from reflowshock.workflow.study.main_effects import Effect, effect_of, measured, ranked
+from reflowshock.workflow.study.results import HEALTHY, UNHEALTHY, Row
+from reflowshock.workflow.study.study_file import Study
 
 MIXED = "{} of {} points have no result: means at the values of a factor then differ also by what other factors do."
 UNSOUND = "{} of {} points, which count in the means, broke a check."

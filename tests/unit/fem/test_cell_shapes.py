@@ -5,20 +5,20 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fem.cell_shape import HEXAHEDRON, TETRAHEDRON, TETRAHEDRON_QUADRATIC
-from fem.division.tables import prepare
-from fem.elements.tetrahedron import EDGES
-from fem.errors import MeshError
-from fem.kernels.hexahedron import SIDES
-from fem.materials.roles import Materials
-from fem.mesh.facet import area_vectors
-from fem.mesh.facet_areas import outward_areas
-from fem.mesh.mesh import append, boundary_facets, cells_of_facets
-from fem.mesh.mesh_file import read_mesh
-from fem.mesh.mesh_quality import scaled_jacobians
-from fem.model.body import make_body, make_pieces
-from fem.output.fields import Fields
-from fem.parallel.local_mesh import distribute
+from reflowshock.fem.cell_shape import HEXAHEDRON, TETRAHEDRON, TETRAHEDRON_QUADRATIC
+from reflowshock.fem.division.tables import prepare
+from reflowshock.fem.elements.tetrahedron import EDGES
+from reflowshock.fem.errors import MeshError
+from reflowshock.fem.kernels.hexahedron import SIDES
+from reflowshock.fem.materials.roles import Materials
+from reflowshock.fem.mesh.facet import area_vectors
+from reflowshock.fem.mesh.facet_areas import outward_areas
+from reflowshock.fem.mesh.mesh import append, boundary_facets, cells_of_facets
+from reflowshock.fem.mesh.mesh_file import read_mesh
+from reflowshock.fem.mesh.mesh_quality import scaled_jacobians
+from reflowshock.fem.model.body import make_body, make_pieces
+from reflowshock.fem.output.fields import Fields
+from reflowshock.fem.parallel.local_mesh import distribute
 
 SIZE = np.array([3.0, 2.0, 1.0])
 SHAPES = [HEXAHEDRON, TETRAHEDRON, TETRAHEDRON_QUADRATIC]

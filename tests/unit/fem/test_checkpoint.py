@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-import fem.run.time_loop
-from fem.coupling.planner import KEPT, kept
-from fem.parallel.checkpoint import Checkpoints
-from fem.parallel.portable import Log, Rows, Same, Shares, Sum
-from fem.run.structure_run import run_structure
+from reflowshock.fem.coupling.planner import KEPT, kept
+from reflowshock.fem.parallel.checkpoint import Checkpoints
+from reflowshock.fem.parallel.portable import Log, Rows, Same, Shares, Sum
+from reflowshock.fem.run import time_loop
+from reflowshock.fem.run.structure_run import run_structure
 from tests.support.fem_structures import structure_input
 from tests.support.forged_files import DAMAGES
 
@@ -92,7 +92,7 @@ def test_a_shock_beside_forged_checkpoints_starts_anew(tmp_path, capsys, monkeyp
     marker = tmp_path / "marker"
     request = structure_input(tmp_path, dynamics={"duration": 2e-5, "numerics": NUMERICS})
     request = request.model_copy(update={"checkpoints": tmp_path / "checkpoints"})
-    windows, real = iter(range(11)), fem.run.time_loop.run_window
+    windows, real = iter(range(11)), time_loop.run_window
 
     def run_window(crew, stopwatch) -> None:
         if next(windows, None) is None:
@@ -100,7 +100,7 @@ def test_a_shock_beside_forged_checkpoints_starts_anew(tmp_path, capsys, monkeyp
         real(crew, stopwatch)
 
     with monkeypatch.context() as patch:
-        patch.setattr(fem.run.time_loop, "run_window", run_window)
+        patch.setattr(time_loop, "run_window", run_window)
         with pytest.raises(Killed):
             run_structure(MPI.COMM_SELF, request)
     files = [path for path in request.checkpoints.glob("*/*") if path.is_file()]

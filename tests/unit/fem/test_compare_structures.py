@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fem.output.compare_structures import solver_differences
+from reflowshock.fem.output.compare_structures import solver_differences
 
 
 def history(samples: int, scale: float = 1.0, names: tuple[str, ...] = ("tip",), end: float = 1.0) -> dict:

@@ -5,18 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fem.division.buffer import grown
-from fem.division.checks import check_division
-from fem.division.divide import divide, scheme_for
-from fem.division.split import cut_between, part_of
-from fem.division.tables import model_inputs
-from fem.errors import CutError
-from fem.materials.library import SAC305
-from fem.materials.roles import Materials
-from fem.mesh.mesh import append
-from fem.model.steps import steps_of_division
-from fem.problem.parameters import Coupling
-from fem.trials.divided import surveyed
+from reflowshock.fem.division.buffer import grown
+from reflowshock.fem.division.checks import check_division
+from reflowshock.fem.division.divide import divide, scheme_for
+from reflowshock.fem.division.split import cut_between, part_of
+from reflowshock.fem.division.tables import model_inputs
+from reflowshock.fem.errors import CutError
+from reflowshock.fem.materials.library import SAC305
+from reflowshock.fem.materials.roles import Materials
+from reflowshock.fem.mesh.mesh import append
+from reflowshock.fem.model.steps import steps_of_division
+from reflowshock.fem.problem.parameters import Coupling
+from reflowshock.fem.trials.divided import surveyed
 from tests.support.fem_models import small_assembly
 
 ELASTIC, YIELDING = Materials(), Materials(solder=SAC305)

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from fem.elements.element import Elements, critical_steps, element_geometry, element_kind, element_stiffness
-from fem.elements.hexahedron import HEXAHEDRON
-from fem.elements.one_point import ONE_POINT, OnePoint, hourglass_control
-from fem.elements.tetrahedron import EDGES, TETRAHEDRON, TETRAHEDRON_QUADRATIC
-from fem.errors import MeshError
-from fem.kernels.hexahedron import SIDES
-from fem.materials.elasticity import elasticity_matrix
-from fem.materials.library import FR4, SAC405
+from reflowshock.fem.elements.element import Elements, critical_steps, element_geometry, element_kind, element_stiffness
+from reflowshock.fem.elements.hexahedron import HEXAHEDRON
+from reflowshock.fem.elements.one_point import ONE_POINT, OnePoint, hourglass_control
+from reflowshock.fem.elements.tetrahedron import EDGES, TETRAHEDRON, TETRAHEDRON_QUADRATIC
+from reflowshock.fem.errors import MeshError
+from reflowshock.fem.kernels.hexahedron import SIDES
+from reflowshock.fem.materials.elasticity import elasticity_matrix
+from reflowshock.fem.materials.library import FR4, SAC405
 
 RANDOM = np.random.default_rng(11)
 KINDS = [HEXAHEDRON, ONE_POINT, TETRAHEDRON, TETRAHEDRON_QUADRATIC]

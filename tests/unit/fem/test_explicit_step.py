@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fem.dynamics.energy_balance import Ledger
-from fem.errors import StepError
-from fem.run.structure_run import run_structure
-from fem.run.time_loop import GUARD
-from fem.setup.structure_model import build_structure
+from reflowshock.fem.dynamics.energy_balance import Ledger
+from reflowshock.fem.errors import StepError
+from reflowshock.fem.run.structure_run import run_structure
+from reflowshock.fem.run.time_loop import GUARD
+from reflowshock.fem.setup.structure_model import build_structure
 from tests.support.fem_structures import structure_input
 
 

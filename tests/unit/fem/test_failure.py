@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from fem.estimates.material_effects import failure_effect, material_effects
-from fem.materials.library import SAC305, SILICON, SNPB
-from fem.materials.roles import Materials
-from fem.output.failure import failed_joints, failure_criteria, judge, worst
-from fem.problem.parameters import Failure
+from reflowshock.fem.estimates.material_effects import failure_effect, material_effects
+from reflowshock.fem.materials.library import SAC305, SILICON, SNPB
+from reflowshock.fem.materials.roles import Materials
+from reflowshock.fem.output.failure import failed_joints, failure_criteria, judge, worst
+from reflowshock.fem.problem.parameters import Failure
 
 HISTORY = {
     "joints": np.array(["A1", "A2"]),

@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 
-from fem.elements.element import Elements, critical_steps, element_geometry, element_stiffness, lumped_mass
-from fem.errors import MeshError
-from fem.estimates.estimate import box_critical_step
-from fem.forces.force_assembled import AssembledElements
-from fem.forces.force_congruent import CongruentElements, is_box, parity_blocks
-from fem.kernels.hexahedron import GAUSS, SIDES, shape_derivatives
-from fem.materials.elasticity import elasticity_matrix
-from fem.materials.library import COPPER, FR4, SAC405, SILICON
-from fem.trials.grids import grid
+from reflowshock.fem.elements.element import Elements, critical_steps, element_geometry, element_stiffness, lumped_mass
+from reflowshock.fem.errors import MeshError
+from reflowshock.fem.estimates.estimate import box_critical_step
+from reflowshock.fem.forces.force_assembled import AssembledElements
+from reflowshock.fem.forces.force_congruent import CongruentElements, is_box, parity_blocks
+from reflowshock.fem.kernels.hexahedron import GAUSS, SIDES, shape_derivatives
+from reflowshock.fem.materials.elasticity import elasticity_matrix
+from reflowshock.fem.materials.library import COPPER, FR4, SAC405, SILICON
+from reflowshock.fem.trials.grids import grid
 
 RANDOM = np.random.default_rng(7)
 

@@ -5,16 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fem.dynamics.central_difference import Motion
-from fem.dynamics.energy_balance import Ledger
-from fem.loads.damping import RayleighDamping
-from fem.loads.pretension import Pretension
-from fem.materials.library import FR4, SAC405, SILICON
-from fem.model.body import Body, Response
-from fem.model.stress_recovery import StressRecovery
-from fem.parallel import portable
-from fem.statics.pins import pins, rigid_motions
-from fem.trials.bodies import motion_of
+from reflowshock.fem.dynamics.central_difference import Motion
+from reflowshock.fem.dynamics.energy_balance import Ledger
+from reflowshock.fem.loads.damping import RayleighDamping
+from reflowshock.fem.loads.pretension import Pretension
+from reflowshock.fem.materials.library import FR4, SAC405, SILICON
+from reflowshock.fem.model.body import Body, Response
+from reflowshock.fem.model.stress_recovery import StressRecovery
+from reflowshock.fem.parallel import portable
+from reflowshock.fem.statics.pins import pins, rigid_motions
+from reflowshock.fem.trials.bodies import motion_of
 from tests.support.fem_residual import Cooled, cooled, layered
 
 CHANGE = -192.0

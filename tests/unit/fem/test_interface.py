@@ -7,18 +7,18 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-import fem.run.time_loop
-from fem.division.tables import joined
-from fem.estimates.estimate import WindowPlan, shortened
-from fem.mesh.mesh import append
-from fem.mesh.watch_table import whole_watch
-from fem.output.compare import compare_histories
-from fem.output.interface import picture_windows
-from fem.problem.inputs import RunInput
-from fem.problem.parameters import Shock
-from fem.problem.shock_checks import problems
-from fem.run.shock_run import run
-from fem.trials.grids import COPPER, GAP
+from reflowshock.fem.division.tables import joined
+from reflowshock.fem.estimates.estimate import WindowPlan, shortened
+from reflowshock.fem.mesh.mesh import append
+from reflowshock.fem.mesh.watch_table import whole_watch
+from reflowshock.fem.output.compare import compare_histories
+from reflowshock.fem.output.interface import picture_windows
+from reflowshock.fem.problem.inputs import RunInput
+from reflowshock.fem.problem.parameters import Shock
+from reflowshock.fem.problem.shock_checks import problems
+from reflowshock.fem.run import time_loop
+from reflowshock.fem.run.shock_run import run
+from reflowshock.fem.trials.grids import COPPER, GAP
 from tests.support.fem_models import SITES, small_assembly, write_small_assembly
 
 TIMES = 4e-6, 1e-5
@@ -110,7 +110,7 @@ class Killed(Exception):
 
 
 def test_broken_run_has_the_same_pictures(files, two_scale, monkeypatch):
-    real, left = fem.run.time_loop.run_window, iter(range(80))
+    real, left = time_loop.run_window, iter(range(80))
 
     def run_window(crew, stopwatch) -> None:
         if next(left, None) is None:
@@ -119,7 +119,7 @@ def test_broken_run_has_the_same_pictures(files, two_scale, monkeypatch):
 
     kept = {"checkpoints": files / "checkpoints", "numerics": {"checkpoint_seconds": 1e-9}}
     with monkeypatch.context() as patch:
-        patch.setattr(fem.run.time_loop, "run_window", run_window)
+        patch.setattr(time_loop, "run_window", run_window)
         with pytest.raises(Killed):
             results(files, "broken", "two_scale", **kept)
     broken = arrays(results(files, "broken", "two_scale", **kept) / "interface.npz")

@@ -8,19 +8,19 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fem.division.chebyshev import Substeps
-from fem.division.choose_levels import Pace, choose_levels, governing_steps
-from fem.dynamics.central_difference import Motion
-from fem.elements.one_point import ONE_POINT
-from fem.errors import LevelError
-from fem.forces.energy import Energy
-from fem.forces.force import linear_terms
-from fem.loads.load import PrescribedMotion
-from fem.materials.library import FR4, SAC405
-from fem.materials.roles import Materials
-from fem.mesh.tie import Tie, net_load
-from fem.model.step_levels import Levels, LocalSteps, check_elastic, levels_of
-from fem.problem.pulse import HalfSine
+from reflowshock.fem.division.chebyshev import Substeps
+from reflowshock.fem.division.choose_levels import Pace, choose_levels, governing_steps
+from reflowshock.fem.dynamics.central_difference import Motion
+from reflowshock.fem.elements.one_point import ONE_POINT
+from reflowshock.fem.errors import LevelError
+from reflowshock.fem.forces.energy import Energy
+from reflowshock.fem.forces.force import linear_terms
+from reflowshock.fem.loads.load import PrescribedMotion
+from reflowshock.fem.materials.library import FR4, SAC405
+from reflowshock.fem.materials.roles import Materials
+from reflowshock.fem.mesh.tie import Tie, net_load
+from reflowshock.fem.model.step_levels import Levels, LocalSteps, check_elastic, levels_of
+from reflowshock.fem.problem.pulse import HalfSine
 from tests.support.fem_bodies import dense_stiffness
 from tests.support.fem_levels import Levelled, dense_effective_stiffness, joint_on_board, levelled
 

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fem.materials.roles import Materials
-from fem.mesh.mesh import MeshData
-from fem.model.step_levels import LocalSteps, levels_of
+from reflowshock.fem.materials.roles import Materials
+from reflowshock.fem.mesh.mesh import MeshData
+from reflowshock.fem.model.step_levels import LocalSteps, levels_of
 from tests.support.fem_levels import joint_on_board, levelled
 
 

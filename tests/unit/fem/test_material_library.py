@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from fem.kernels.plasticity import plastic_constants, yield_stress
-from fem.materials.elasticity import elasticity_matrix
-from fem.materials.library import LIBRARY, SAC305, SNPB
-from fem.materials.parameters import Isotropic
+from reflowshock.fem.kernels.plasticity import plastic_constants, yield_stress
+from reflowshock.fem.materials.elasticity import elasticity_matrix
+from reflowshock.fem.materials.library import LIBRARY, SAC305, SNPB
+from reflowshock.fem.materials.parameters import Isotropic
 
 RATES = (1e-3, 1e-1, 10.0, 100.0)
 

@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 
-from fem.division.checks import check_division
-from fem.division.divide import divide
-from fem.division.tables import prepare
-from fem.errors import CutError, MeshError
-from fem.mesh.coupling_interface import find_cut
-from fem.mesh.mesh import MeshData, append, boundary_facets, cells_of_facets, merge_nodes, select
-from fem.mesh.mesh_file import read_mesh
-from fem.trials.divided import surveyed
-from fem.trials.grids import grid, mesh_of
+from reflowshock.fem.division.checks import check_division
+from reflowshock.fem.division.divide import divide
+from reflowshock.fem.division.tables import prepare
+from reflowshock.fem.errors import CutError, MeshError
+from reflowshock.fem.mesh.coupling_interface import find_cut
+from reflowshock.fem.mesh.mesh import MeshData, append, boundary_facets, cells_of_facets, merge_nodes, select
+from reflowshock.fem.mesh.mesh_file import read_mesh
+from reflowshock.fem.trials.divided import surveyed
+from reflowshock.fem.trials.grids import grid, mesh_of
 from tests.support.fem_models import board_mesh, small_assembly, write_msh
 
 

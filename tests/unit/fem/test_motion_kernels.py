@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from fem.kernels.motion import STRIP, add_rows, advance, sum_in_rank_order
-from fem.parallel.exchange import rank_order
+from reflowshock.fem.kernels.motion import STRIP, add_rows, advance, sum_in_rank_order
+from reflowshock.fem.parallel.exchange import rank_order
 
 
 @pytest.mark.parametrize("count", [1, 2, STRIP // 3, STRIP // 3 + 1, STRIP + 5])

@@ -6,18 +6,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fem.elements.one_point import hourglass_control
-from fem.elements.stress import von_mises
-from fem.errors import InvertedElementError
-from fem.forces.force import force_terms, linear_terms
-from fem.forces.force_nonlinear import NonlinearElements
-from fem.forces.nonlinear_blocks import TEN_NODES, elastic_constants
-from fem.kernels.nonlinear import Path
-from fem.kernels.plasticity import yield_stress
-from fem.materials.library import FR4
-from fem.trials.bodies import force_of, nonlinear
-from fem.trials.boxes import KINDS, box, elements_of
-from fem.trials.metals import SOLDER
+from reflowshock.fem.elements.one_point import hourglass_control
+from reflowshock.fem.elements.stress import von_mises
+from reflowshock.fem.errors import InvertedElementError
+from reflowshock.fem.forces.force import force_terms, linear_terms
+from reflowshock.fem.forces.force_nonlinear import NonlinearElements
+from reflowshock.fem.forces.nonlinear_blocks import TEN_NODES, elastic_constants
+from reflowshock.fem.kernels.nonlinear import Path
+from reflowshock.fem.kernels.plasticity import yield_stress
+from reflowshock.fem.materials.library import FR4
+from reflowshock.fem.trials.bodies import force_of, nonlinear
+from reflowshock.fem.trials.boxes import KINDS, box, elements_of
+from reflowshock.fem.trials.metals import SOLDER
 from tests.support.fem_nonlinear import HexahedronTwin, PointTwin
 
 LINE = np.linspace(0.0, 1.0, 4)

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.integrate import trapezoid
 
-from fem.dynamics.energy_balance import SUMS, Ledger
-from fem.elements.stress import principal_strain, von_mises
-from fem.errors import EnergyError
-from fem.estimates.estimate import (
+from reflowshock.fem.dynamics.energy_balance import SUMS, Ledger
+from reflowshock.fem.elements.stress import principal_strain, von_mises
+from reflowshock.fem.errors import EnergyError
+from reflowshock.fem.estimates.estimate import (
     BOARD_ADVANTAGE,
     UPDATES_PER_SECOND,
     implicit_plan,
@@ -17,15 +17,15 @@ from fem.estimates.estimate import (
     predict_seconds,
     window_plan,
 )
-from fem.loads.load import half_sine_drop
-from fem.materials.elasticity import elasticity_matrix, material_of_part, role_of_part
-from fem.materials.library import COPPER, FR4, SILICON
-from fem.materials.parameters import Isotropic, Orthotropic
-from fem.materials.roles import Materials
-from fem.mesh.mesh import append
-from fem.mesh.watch_table import centre_nodes, whole_watch
-from fem.output.compare import compare_histories
-from fem.problem.parameters import Ranks
+from reflowshock.fem.loads.load import half_sine_drop
+from reflowshock.fem.materials.elasticity import elasticity_matrix, material_of_part, role_of_part
+from reflowshock.fem.materials.library import COPPER, FR4, SILICON
+from reflowshock.fem.materials.parameters import Isotropic, Orthotropic
+from reflowshock.fem.materials.roles import Materials
+from reflowshock.fem.mesh.mesh import append
+from reflowshock.fem.mesh.watch_table import centre_nodes, whole_watch
+from reflowshock.fem.output.compare import compare_histories
+from reflowshock.fem.problem.parameters import Ranks
 from tests.support.fem_models import BOARD_Z, small_assembly
 
 

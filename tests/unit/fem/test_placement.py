@@ -8,14 +8,30 @@ import pytest
 from mpi4py import MPI
 from pydantic import ValidationError
 
-from fem.coupling.planner import Load, Measured, keep, kept, plan_from, plan_ranks, words
-from fem.coupling.speeds import Kind, StepCost, families, line_through, sample_terms, seconds_of_step, speeds_of
-from fem.estimates.estimate import WindowPlan, predict_seconds
-from fem.estimates.placement import ModelCost, WindowCost, alternatives, disjoint, least_seconds, shared, window_seconds
-from fem.materials.library import LIBRARY
-from fem.parallel.communicators import Communicators
-from fem.problem.parameters import Ranks
-from fem.trials.grids import grid, joint_mesh, mesh_of
+from reflowshock.fem.coupling.planner import Load, Measured, keep, kept, plan_from, plan_ranks, words
+from reflowshock.fem.coupling.speeds import (
+    Kind,
+    StepCost,
+    families,
+    line_through,
+    sample_terms,
+    seconds_of_step,
+    speeds_of,
+)
+from reflowshock.fem.estimates.estimate import WindowPlan, predict_seconds
+from reflowshock.fem.estimates.placement import (
+    ModelCost,
+    WindowCost,
+    alternatives,
+    disjoint,
+    least_seconds,
+    shared,
+    window_seconds,
+)
+from reflowshock.fem.materials.library import LIBRARY
+from reflowshock.fem.parallel.communicators import Communicators
+from reflowshock.fem.problem.parameters import Ranks
+from reflowshock.fem.trials.grids import grid, joint_mesh, mesh_of
 
 EVEN = WindowCost(ModelCost(1e-3, 0.0, 1), ModelCost(1e-3, 0.0, 8), 1e-5)
 KIND = Kind([LIBRARY["FR4"], LIBRARY["copper"]], "incompatible_modes", "small", 1e-8)

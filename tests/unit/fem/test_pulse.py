@@ -3,11 +3,18 @@
 import numpy as np
 import pytest
 
-from fem.errors import LoadError, PulseError
-from fem.mesh.facet import area_vectors
-from fem.mesh.facet_areas import outward_areas
-from fem.problem.pulse import SERVICE_CONDITIONS, Constant, HalfSine, Haversine, Tabulated, service_condition
-from fem.problem.pulse_table import read_pulse
+from reflowshock.fem.errors import LoadError, PulseError
+from reflowshock.fem.mesh.facet import area_vectors
+from reflowshock.fem.mesh.facet_areas import outward_areas
+from reflowshock.fem.problem.pulse import (
+    SERVICE_CONDITIONS,
+    Constant,
+    HalfSine,
+    Haversine,
+    Tabulated,
+    service_condition,
+)
+from reflowshock.fem.problem.pulse_table import read_pulse
 from tests.support.fem_models import bar
 
 PULSES = {

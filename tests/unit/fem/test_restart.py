@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-import fem.run.time_loop
-from fem.run.structure_run import run_structure
+from reflowshock.fem.run import time_loop
+from reflowshock.fem.run.structure_run import run_structure
 from tests.support.fem_structures import STEEL, structure_input
 
 NUMERICS = {"history_samples": 20, "field_samples": 3, "checkpoint_seconds": 1e-9}
@@ -40,7 +40,7 @@ def test_broken_run_continues_to_the_same_bits(tmp_path, monkeypatch, name):
         if folder == "broken":
             request = request.model_copy(update={"checkpoints": tmp_path / "checkpoints"})
             with monkeypatch.context() as patch:
-                patch.setattr(fem.run.time_loop, "run_window", run_some_windows(11))
+                patch.setattr(time_loop, "run_window", run_some_windows(11))
                 with pytest.raises(Killed):
                     run_structure(MPI.COMM_SELF, request)
         run_structure(MPI.COMM_SELF, request)
@@ -60,7 +60,7 @@ def test_broken_run_continues_to_the_same_bits(tmp_path, monkeypatch, name):
 
 def run_some_windows(count: int):
     left = iter(range(count))
-    real = fem.run.time_loop.run_window
+    real = time_loop.run_window
 
     def run_window(crew, stopwatch) -> None:
         if next(left, None) is None:

@@ -2,9 +2,9 @@
 
 import pytest
 
-from fem.coupling.one_way import OneWay
-from fem.coupling.scheme import scheme_of
-from fem.division.choice import choose_scheme
+from reflowshock.fem.coupling.one_way import OneWay
+from reflowshock.fem.coupling.scheme import scheme_of
+from reflowshock.fem.division.choice import choose_scheme
 
 
 @pytest.mark.parametrize(

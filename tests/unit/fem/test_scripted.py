@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fem.coupling.gravouil_combescure import GravouilCombescure
-from fem.coupling.held_velocity import HeldVelocity, local_cut
-from fem.coupling.one_way import OneWay
-from fem.coupling.recording import record, replay, save_recording
-from fem.coupling.scripted import ScriptedDriver, ScriptedMacro, ScriptedMeso, scripted_cut
-from fem.dynamics.participant import uncut_motion
-from fem.errors import RecordingError
-from fem.loads.load import half_sine_drop
-from fem.parallel.exchange import CutChannels
-from fem.trials.pairs import SCHEMES, Pair
+from reflowshock.fem.coupling.gravouil_combescure import GravouilCombescure
+from reflowshock.fem.coupling.held_velocity import HeldVelocity, local_cut
+from reflowshock.fem.coupling.one_way import OneWay
+from reflowshock.fem.coupling.recording import record, replay, save_recording
+from reflowshock.fem.coupling.scripted import ScriptedDriver, ScriptedMacro, ScriptedMeso, scripted_cut
+from reflowshock.fem.dynamics.participant import uncut_motion
+from reflowshock.fem.errors import RecordingError
+from reflowshock.fem.loads.load import half_sine_drop
+from reflowshock.fem.parallel.exchange import CutChannels
+from reflowshock.fem.trials.pairs import SCHEMES, Pair
 
 WINDOWS = 20
 

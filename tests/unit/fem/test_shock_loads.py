@@ -5,18 +5,18 @@ import pytest
 from mpi4py import MPI
 from pydantic import ValidationError
 
-from fem.dynamics.energy_balance import SUMS, Ledger
-from fem.errors import EnergyError, LoadError
-from fem.loads.large_mass import LargeMass
-from fem.loads.load import BodyAcceleration, PrescribedMotion
-from fem.mesh.mesh import MeshData
-from fem.model.body import Body
-from fem.problem import shock_checks
-from fem.problem.parameters import Damping, Shock
-from fem.problem.pulse import Constant
-from fem.problem.shock_pulse import shock_pulse
-from fem.trials.bodies import dns_body, motion_of
-from fem.trials.grids import grid, mesh_of, on
+from reflowshock.fem.dynamics.energy_balance import SUMS, Ledger
+from reflowshock.fem.errors import EnergyError, LoadError
+from reflowshock.fem.loads.large_mass import LargeMass
+from reflowshock.fem.loads.load import BodyAcceleration, PrescribedMotion
+from reflowshock.fem.mesh.mesh import MeshData
+from reflowshock.fem.model.body import Body
+from reflowshock.fem.problem import shock_checks
+from reflowshock.fem.problem.parameters import Damping, Shock
+from reflowshock.fem.problem.pulse import Constant
+from reflowshock.fem.problem.shock_pulse import shock_pulse
+from reflowshock.fem.trials.bodies import dns_body, motion_of
+from reflowshock.fem.trials.grids import grid, mesh_of, on
 from tests.support.fem_bodies import STEEL
 
 G = 9.80665

@@ -2,9 +2,9 @@ import math
 
 import pytest
 
-from fem.estimates.factor_cost import box_factor
-from fem.estimates.solver_cost import forecast_solvers, plate_nodes
-from fem.problem.structure import StructureScene
+from reflowshock.fem.estimates.factor_cost import box_factor
+from reflowshock.fem.estimates.solver_cost import forecast_solvers, plate_nodes
+from reflowshock.fem.problem.structure import StructureScene
 from tests.support.fem_structures import structure_tables_of
 
 # Unknowns of three MUMPS factorisations by benchmarks/jedec_oracle.py: operations, entries.

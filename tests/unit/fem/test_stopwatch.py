@@ -4,8 +4,8 @@ import time
 
 import pytest
 
-from fem.coupling.stopwatch import Stopwatch
-from fem.parallel.exchange import MessageClock
+from reflowshock.fem.coupling.stopwatch import Stopwatch
+from reflowshock.fem.parallel.exchange import MessageClock
 
 
 class TwoRanks:

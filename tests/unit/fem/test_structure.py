@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fem.errors import AgreedError, EnergyError
-from fem.loads.follower_pressure import FollowerPressure
-from fem.loads.load import NodalForces
-from fem.loads.structure_loads import structure_loads
-from fem.output.compare_structures import solver_differences
-from fem.problem.structure_pulses import pulses_of
-from fem.run.program import main
-from fem.run.structure_run import run_structure
-from fem.setup.structure_model import build_structure
+from reflowshock.fem.errors import AgreedError, EnergyError
+from reflowshock.fem.loads.follower_pressure import FollowerPressure
+from reflowshock.fem.loads.load import NodalForces
+from reflowshock.fem.loads.structure_loads import structure_loads
+from reflowshock.fem.output.compare_structures import solver_differences
+from reflowshock.fem.problem.structure_pulses import pulses_of
+from reflowshock.fem.run.program import main
+from reflowshock.fem.run.structure_run import run_structure
+from reflowshock.fem.setup.structure_model import build_structure
 from tests.support.fem_structures import (
     LENGTH,
     STEEL,

@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 
-from fem.division.division import Division
-from fem.division.structure_tables import structure_tables, tied
-from fem.errors import CutError, StepError
-from fem.estimates.estimate import WindowPlan
-from fem.mesh.mesh_file import read_mesh
-from fem.output.compare import relative_error
-from fem.output.compare_structures import solver_differences
-from fem.problem.structure_checks import problems
-from fem.setup.structure_divided import divided_on_one_rank, structure_inputs
+from reflowshock.fem.division.division import Division
+from reflowshock.fem.division.structure_tables import structure_tables, tied
+from reflowshock.fem.errors import CutError, StepError
+from reflowshock.fem.estimates.estimate import WindowPlan
+from reflowshock.fem.mesh.mesh_file import read_mesh
+from reflowshock.fem.output.compare import relative_error
+from reflowshock.fem.output.compare_structures import solver_differences
+from reflowshock.fem.problem.structure_checks import problems
+from reflowshock.fem.setup.structure_divided import divided_on_one_rank, structure_inputs
 from tests.support.fem_bars import bar_layers, run_bar, write_bar
 
 WIDTH = 2e-3

@@ -2,8 +2,8 @@
 
 import pytest
 
-from fem.problem.structure import StructureScene
-from fem.problem.structure_checks import check, problems
+from reflowshock.fem.problem.structure import StructureScene
+from reflowshock.fem.problem.structure_checks import check, problems
 
 TIN = {"kind": "isotropic", "density": 7400.0, "young_modulus": 50e9, "poisson_ratio": 0.36}
 HELD = {"on": "mounting_holes", "hold": ["x", "y", "z"]}

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fem.dynamics.history import History
-from fem.run.structure_run import run_structure
+from reflowshock.fem.dynamics.history import History
+from reflowshock.fem.run.structure_run import run_structure
 from tests.support.fem_structures import LENGTH, STEEL, THICKNESS, WIDTH, structure_input
 
 YIELD, SLOPE = 2e8, 2e9
@@ -83,7 +83,7 @@ def test_interrupted_run_continues_to_the_same_bits(whole, tmp_path, monkeypatch
 
 
 def test_implicit_solver_refuses_what_yields(tmp_path):
-    from fem.problem.structure_checks import check
+    from reflowshock.fem.problem.structure_checks import check
 
     with pytest.raises(ValueError, match="yields, the solver implicit is linear"):
         check(structure_input(tmp_path, **(PULLED | {"dynamics": {"duration": 1e-4, "solver": "implicit"}})))

@@ -7,19 +7,25 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fem.estimates.thermal_effects import NEGLIGIBLE, PackageSizes, decide, solder_force_number, warpage_number
-from fem.materials.library import FR4, SILICON
-from fem.materials.roles import Materials
-from fem.problem.thermal import Thermal
-from fem.statics.pads import Pads
-from fem.statics.plates import RigidPlates
-from fem.statics.state import Assembly
-from fem.statics.structure import ThermalStructure
-from fem.trials.grids import GAP
-from meshing.board.heated_assembly import write_heated_assembly
-from meshing.board.pads import pad_table
-from meshing.board.parameters import Warpage
-from meshing.trials.models import MM, board, package
+from reflowshock.fem.estimates.thermal_effects import (
+    NEGLIGIBLE,
+    PackageSizes,
+    decide,
+    solder_force_number,
+    warpage_number,
+)
+from reflowshock.fem.materials.library import FR4, SILICON
+from reflowshock.fem.materials.roles import Materials
+from reflowshock.fem.problem.thermal import Thermal
+from reflowshock.fem.statics.pads import Pads
+from reflowshock.fem.statics.plates import RigidPlates
+from reflowshock.fem.statics.state import Assembly
+from reflowshock.fem.statics.structure import ThermalStructure
+from reflowshock.fem.trials.grids import GAP
+from reflowshock.meshing.board.heated_assembly import write_heated_assembly
+from reflowshock.meshing.board.pads import pad_table
+from reflowshock.meshing.board.parameters import Warpage
+from reflowshock.meshing.trials.models import MM, board, package
 from tests.support.thermal_models import REFERENCE, Layers, pads_at, small_structure, structure_of
 
 SIZES = PackageSizes(

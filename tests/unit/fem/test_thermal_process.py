@@ -13,15 +13,15 @@ import psutil
 import pytest
 from mpi4py import MPI
 
-from fem.statics.process import StructureError, StructureProcess
-from fem.statics.structure import ThermalStructure
+from reflowshock.fem.statics.process import StructureError, StructureProcess
+from reflowshock.fem.statics.structure import ThermalStructure
 from tests.support.thermal_models import REFERENCE, small_structure
 
 ROOT = Path(__file__).resolve().parents[3]
 ORPHAN = """
 import sys, time
 from pathlib import Path
-from fem.statics.process import StructureProcess
+from reflowshock.fem.statics.process import StructureProcess
 from tests.support.thermal_models import small_structure
 if __name__ == "__main__":
     process = StructureProcess(small_structure(Path(sys.argv[1])))

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fem.errors import AgreedError, MeshError
-from fem.materials.roles import Materials
-from fem.mesh.mesh import append
-from fem.statics.pads import disc_rule, pad_matrix
-from fem.statics.structure import ThermalStructure
+from reflowshock.fem.errors import AgreedError, MeshError
+from reflowshock.fem.materials.roles import Materials
+from reflowshock.fem.mesh.mesh import append
+from reflowshock.fem.statics.pads import disc_rule, pad_matrix
+from reflowshock.fem.statics.structure import ThermalStructure
 from tests.support.fem_models import board_mesh, package_mesh
 from tests.support.thermal_models import REFERENCE, Layers, pads_at, small_pads, small_structure, structure_of
 

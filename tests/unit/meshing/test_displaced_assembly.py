@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from meshing.board.assembly import write_assembly
-from meshing.board.displaced_assembly import ContactError, write_displaced_assembly
-from meshing.board.displacement import DisplacementError, computed, prescribed
-from meshing.board.package_side import PackageSide, underside
-from meshing.board.pads import lift
-from meshing.board.parameters import Warpage
-from meshing.core.structured_face import NotStructuredError, StructuredFace
-from meshing.trials.models import MM, PLATE, board, package
+from reflowshock.meshing.board.assembly import write_assembly
+from reflowshock.meshing.board.displaced_assembly import ContactError, write_displaced_assembly
+from reflowshock.meshing.board.displacement import DisplacementError, computed, prescribed
+from reflowshock.meshing.board.package_side import PackageSide, underside
+from reflowshock.meshing.board.pads import lift
+from reflowshock.meshing.board.parameters import Warpage
+from reflowshock.meshing.core.structured_face import NotStructuredError, StructuredFace
+from reflowshock.meshing.trials.models import MM, PLATE, board, package
 from tests.support.mesh_file import MeshFile
 
 PACKAGE = ("substrate", "die")

@@ -4,17 +4,17 @@ import gmsh
 import numpy as np
 import pytest
 
-from meshing.board.pads import pad_table
-from meshing.board.parameters import Warpage
-from meshing.core.gmsh_session import gmsh_model
-from meshing.core.hexahedra import boundary_quads, quad_areas, scaled_jacobian, volumes
-from meshing.core.quadratic_tetrahedra import write_tetrahedra
-from meshing.joint.joints_file import write_joints
-from meshing.joint.solder_mesh import joint_quality, mesh_bridge, mesh_joint
-from meshing.surface.closed_surface import enclosed_volume
-from meshing.trials.level_sets import bridged_pair, with_void
-from meshing.trials.models import MM, board, package, side_of
-from meshing.trials.surfaces import barrel
+from reflowshock.meshing.board.pads import pad_table
+from reflowshock.meshing.board.parameters import Warpage
+from reflowshock.meshing.core.gmsh_session import gmsh_model
+from reflowshock.meshing.core.hexahedra import boundary_quads, quad_areas, scaled_jacobian, volumes
+from reflowshock.meshing.core.quadratic_tetrahedra import write_tetrahedra
+from reflowshock.meshing.joint.joints_file import write_joints
+from reflowshock.meshing.joint.solder_mesh import joint_quality, mesh_bridge, mesh_joint
+from reflowshock.meshing.surface.closed_surface import enclosed_volume
+from reflowshock.meshing.trials.level_sets import bridged_pair, with_void
+from reflowshock.meshing.trials.models import MM, board, package, side_of
+from reflowshock.meshing.trials.surfaces import barrel
 
 FLAT = Warpage()
 

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from meshing.board.pads import PadSite
-from meshing.joint.joint_mesh import JointMeshError
-from meshing.joint.solder_mesh import mesh_joint
-from meshing.surface.closed_surface import ClosedSurface, pad_planes
-from meshing.trials.joints import Underside
-from meshing.trials.models import MM, package
-from meshing.trials.surfaces import barrel, laid_between
+from reflowshock.meshing.board.pads import PadSite
+from reflowshock.meshing.joint.joint_mesh import JointMeshError
+from reflowshock.meshing.joint.solder_mesh import mesh_joint
+from reflowshock.meshing.surface.closed_surface import ClosedSurface, pad_planes
+from reflowshock.meshing.trials.joints import Underside
+from reflowshock.meshing.trials.models import MM, package
+from reflowshock.meshing.trials.surfaces import barrel, laid_between
 from tests.support.many_joints import hooked
 
 SLOPE, ASIDE, PAD = 0.02, 0.05 * MM, 0.24 * MM

@@ -3,8 +3,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from meshing.board.plan import Interval, board_plan, footprint, package_plan, patch
-from meshing.trials.models import MM, board, package
+from reflowshock.meshing.board.plan import Interval, board_plan, footprint, package_plan, patch
+from reflowshock.meshing.trials.models import MM, board, package
 
 
 def test_graded_lines_keep_their_ratio():
@@ -19,7 +19,7 @@ def test_graded_lines_keep_their_ratio():
 def test_the_shortest_of_very_many_cells_is_known_without_their_lines(monkeypatch, ratio):
     interval = Interval(1.0, 8.0, 3000, ratio)
     laid_out = interval.smallest()
-    monkeypatch.setattr("meshing.board.plan.MOST_LINES", 10)
+    monkeypatch.setattr("reflowshock.meshing.board.plan.MOST_LINES", 10)
     assert interval.smallest() == pytest.approx(laid_out, rel=1e-9)
     assert Interval(0.0, 1.0, 10**12).smallest() == 1e-12
 

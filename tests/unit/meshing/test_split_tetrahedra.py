@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 from scipy.spatial import Delaunay
 
-from meshing.core.hexahedra import boundary_quads, quad_areas, scaled_jacobian, volumes
-from meshing.core.quadratic_tetrahedra import curved_volume, least_jacobian, quadratic_tetrahedra
-from meshing.core.split_tetrahedra import split_tetrahedra
+from reflowshock.meshing.core.hexahedra import boundary_quads, quad_areas, scaled_jacobian, volumes
+from reflowshock.meshing.core.quadratic_tetrahedra import curved_volume, least_jacobian, quadratic_tetrahedra
+from reflowshock.meshing.core.split_tetrahedra import split_tetrahedra
 
 REGULAR = np.array([[1.0, 1.0, 1.0], [-1.0, 1.0, -1.0], [1.0, -1.0, -1.0], [-1.0, -1.0, 1.0]])
 

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from meshing.surface.closed_surface import (
+from reflowshock.meshing.surface.closed_surface import (
     BOARD_PAD,
     FREE,
     PACKAGE_PAD,
@@ -12,8 +12,8 @@ from meshing.surface.closed_surface import (
     read_surface,
     write_surface,
 )
-from meshing.trials.models import MM
-from meshing.trials.surfaces import barrel, truncated_sphere
+from reflowshock.meshing.trials.models import MM
+from reflowshock.meshing.trials.surfaces import barrel, truncated_sphere
 
 
 @pytest.fixture

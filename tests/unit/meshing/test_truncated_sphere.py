@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from meshing.surface.truncated_sphere import TruncatedSphere
+from reflowshock.meshing.surface.truncated_sphere import TruncatedSphere
 
 DISCS = ((2.4e-4, 2.4e-4), (2.4e-4, 2.0e-4), (1.0e-4, 2.9e-4))
 

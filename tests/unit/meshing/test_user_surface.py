@@ -4,15 +4,15 @@ import meshio
 import numpy as np
 import pytest
 
-from meshing.board.pads import pad_table
-from meshing.board.parameters import Warpage
-from meshing.joint.solder_mesh import joint_quality, mesh_joint
-from meshing.surface.closed_surface import SurfaceError, enclosed_volume, measure
-from meshing.surface.user_surface import file_volume, load_surface
-from meshing.trials import faults
-from meshing.trials.level_sets import of_level_set, with_void
-from meshing.trials.models import MM, board, package, side_of
-from meshing.trials.surfaces import barrel
+from reflowshock.meshing.board.pads import pad_table
+from reflowshock.meshing.board.parameters import Warpage
+from reflowshock.meshing.joint.solder_mesh import joint_quality, mesh_joint
+from reflowshock.meshing.surface.closed_surface import SurfaceError, enclosed_volume, measure
+from reflowshock.meshing.surface.user_surface import file_volume, load_surface
+from reflowshock.meshing.trials import faults
+from reflowshock.meshing.trials.level_sets import of_level_set, with_void
+from reflowshock.meshing.trials.models import MM, board, package, side_of
+from reflowshock.meshing.trials.surfaces import barrel
 
 SITE = {site.name: site for site in pad_table(package(), board(), Warpage())}["A4"]
 SHAPE = barrel(SITE.gap, 0.04 * MM)

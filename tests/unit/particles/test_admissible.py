@@ -1,12 +1,12 @@
 import numpy as np
 import pytest
 
-from particles.core.body import Body
-from particles.core.cloud import joint_cloud
-from particles.core.geometry import JointGeometry
-from particles.core.plate import Plate
-from particles.physics.plate_motion import LIFT, SHIFT, TURN, Floating, Travel
-from particles.steps.admissible import Admissible
+from reflowshock.particles.core.body import Body
+from reflowshock.particles.core.cloud import joint_cloud
+from reflowshock.particles.core.geometry import JointGeometry
+from reflowshock.particles.core.plate import Plate
+from reflowshock.particles.physics.plate_motion import LIFT, SHIFT, TURN, Floating, Travel
+from reflowshock.particles.steps.admissible import Admissible
 
 SPEED = 0.5
 

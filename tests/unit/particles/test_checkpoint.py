@@ -8,10 +8,10 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
-from particles.core.checkpoint import Checkpoint
-from particles.core.geometry import JointGeometry
-from particles.parameters.solder import Solder, SolderEffects, SolderNumerics
-from particles.scenes.reflow import solve_joint
+from reflowshock.particles.core.checkpoint import Checkpoint
+from reflowshock.particles.core.geometry import JointGeometry
+from reflowshock.particles.parameters.solder import Solder, SolderEffects, SolderNumerics
+from reflowshock.particles.scenes.reflow import solve_joint
 from tests.support.forged_files import DAMAGES
 
 JOINT = JointGeometry(0.31e-3, 0.24e-3, 0.24e-3)
@@ -24,9 +24,9 @@ BREAK = 5
 PROGRAM = """
 import os, sys
 from pathlib import Path
-from particles.core.checkpoint import Checkpoint
-from particles.parameters.solder import Solder
-from particles.scenes.reflow import JointGeometry, solve_joint
+from reflowshock.particles.core.checkpoint import Checkpoint
+from reflowshock.particles.parameters.solder import Solder
+from reflowshock.particles.scenes.reflow import JointGeometry, solve_joint
 
 joint, solder, steps = JointGeometry(*map(float, sys.argv[2:5])), Solder.model_validate_json(sys.argv[5]), []
 
@@ -150,7 +150,7 @@ def test_a_file_of_other_inputs_is_ignored_with_a_message(tmp_path, caplog):
 def test_a_file_of_other_code_is_ignored(tmp_path, monkeypatch):
     path = tmp_path / "joint"
     Checkpoint(path, ()).write("state")
-    monkeypatch.setattr("particles.core.checkpoint._code", lambda: b"another version")
+    monkeypatch.setattr("reflowshock.particles.core.checkpoint._code", lambda: b"another version")
     assert Checkpoint(path, ()).read() is None
 
 
@@ -161,7 +161,7 @@ def test_a_write_that_fails_leaves_the_old_file(tmp_path, monkeypatch):
     def fail(_):
         raise OSError("no space")
 
-    monkeypatch.setattr("particles.core.data_file.os.fsync", fail)
+    monkeypatch.setattr("reflowshock.data_file.os.fsync", fail)
     with pytest.raises(OSError, match="no space"):
         checkpoint.write("new")
     assert checkpoint.read() == "old"

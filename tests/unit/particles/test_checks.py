@@ -1,8 +1,8 @@
 import pytest
 
-from particles.core.geometry import JointGeometry
-from particles.parameters.checks import problems
-from particles.parameters.solder import Solder, SolderNumerics
+from reflowshock.particles.core.geometry import JointGeometry
+from reflowshock.particles.parameters.checks import problems
+from reflowshock.particles.parameters.solder import Solder, SolderNumerics
 
 GEOMETRIES = {f"A{k}": JointGeometry(gap * 1e-3, 0.24e-3, 0.24e-3) for k, gap in enumerate((0.31, 0.325, 0.34), 1)}
 PITCH = 1e-3

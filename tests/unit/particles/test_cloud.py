@@ -1,12 +1,12 @@
 import numpy as np
 import pytest
 
-from particles.core.body import Body
-from particles.core.cloud import box_cloud, equal_area_radius, joint_cloud
-from particles.core.geometry import JointGeometry
-from particles.core.surface_measure import enclosed_volume, ring_area
-from particles.parameters.estimate import particle_count, reflow_seconds
-from particles.parameters.solder import Solder
+from reflowshock.particles.core.body import Body
+from reflowshock.particles.core.cloud import box_cloud, equal_area_radius, joint_cloud
+from reflowshock.particles.core.geometry import JointGeometry
+from reflowshock.particles.core.surface_measure import enclosed_volume, ring_area
+from reflowshock.particles.parameters.estimate import particle_count, reflow_seconds
+from reflowshock.particles.parameters.solder import Solder
 
 BALL = 0.0724e-9
 GEOMETRY = JointGeometry(0.31e-3, 0.24e-3, 0.20e-3)

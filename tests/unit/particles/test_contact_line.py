@@ -3,15 +3,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from particles.core.body import Body
-from particles.core.cloud import box_cloud, equal_area_radius, joint_cloud
-from particles.core.geometry import JointGeometry
-from particles.core.plate import Pad, Plate
-from particles.core.surface_measure import ring_area
-from particles.physics.force_wetting import Wetting
-from particles.scenes.metrics import verdict
-from particles.steps.descent import Start
-from particles.surface.contact_line import ON_MASK, ON_PAD, PINNED, ContactLine
+from reflowshock.particles.core.body import Body
+from reflowshock.particles.core.cloud import box_cloud, equal_area_radius, joint_cloud
+from reflowshock.particles.core.geometry import JointGeometry
+from reflowshock.particles.core.plate import Pad, Plate
+from reflowshock.particles.core.surface_measure import ring_area
+from reflowshock.particles.physics.force_wetting import Wetting
+from reflowshock.particles.scenes.metrics import verdict
+from reflowshock.particles.steps.descent import Start
+from reflowshock.particles.surface.contact_line import ON_MASK, ON_PAD, PINNED, ContactLine
 
 PAD, MASK = np.radians(5.0), np.radians(148.0)
 

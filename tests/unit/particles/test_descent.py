@@ -6,20 +6,20 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from particles.core.body import Body
-from particles.core.cloud import free_box_cloud, joint_cloud
-from particles.core.geometry import JointGeometry
-from particles.core.plate import Pad, Plate
-from particles.physics.force_surface_tension import SurfaceTension
-from particles.physics.mass import Inertia, Mass
-from particles.physics.physics import Physics
-from particles.physics.plate_motion import Travel
-from particles.steps.descent import Evening, Start, correct_volume, even_out, highest_energy
-from particles.steps.flow import LiquidFlow
-from particles.steps.relaxation import Relaxation
-from particles.steps.time_step import TimeStep
-from particles.surface.contact_line import ON_PAD, PINNED, ContactLine
-from particles.surface.contact_line_hysteresis import HystereticLine
+from reflowshock.particles.core.body import Body
+from reflowshock.particles.core.cloud import free_box_cloud, joint_cloud
+from reflowshock.particles.core.geometry import JointGeometry
+from reflowshock.particles.core.plate import Pad, Plate
+from reflowshock.particles.physics.force_surface_tension import SurfaceTension
+from reflowshock.particles.physics.mass import Inertia, Mass
+from reflowshock.particles.physics.physics import Physics
+from reflowshock.particles.physics.plate_motion import Travel
+from reflowshock.particles.steps.descent import Evening, Start, correct_volume, even_out, highest_energy
+from reflowshock.particles.steps.flow import LiquidFlow
+from reflowshock.particles.steps.relaxation import Relaxation
+from reflowshock.particles.steps.time_step import TimeStep
+from reflowshock.particles.surface.contact_line import ON_PAD, PINNED, ContactLine
+from reflowshock.particles.surface.contact_line_hysteresis import HystereticLine
 
 RADII, GAP = (0.75, 1.46), 1.0
 TENSION = (SurfaceTension(2.0),)

@@ -3,9 +3,9 @@ import sys
 
 import pytest
 
-from particles.core.geometry import JointGeometry
-from particles.parameters.effects import decide_drop, decide_effects, dimensionless_numbers
-from particles.parameters.solder import Solder, SolderEffects
+from reflowshock.particles.core.geometry import JointGeometry
+from reflowshock.particles.parameters.effects import decide_drop, decide_effects, dimensionless_numbers
+from reflowshock.particles.parameters.solder import Solder, SolderEffects
 
 JOINT = JointGeometry(0.31e-3, 0.24e-3, 0.24e-3)
 BALL = Solder(volume=0.0724e-9)

@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 
-from particles.core.neighbours import NeighbourList
-from particles.core.plate import Plate
-from particles.ispg.ghosts import mirror
-from particles.ispg.mls import derivatives
+from reflowshock.particles.core.neighbours import NeighbourList
+from reflowshock.particles.core.plate import Plate
+from reflowshock.particles.ispg.ghosts import mirror
+from reflowshock.particles.ispg.mls import derivatives
 
 REACH = 0.3
 

@@ -4,22 +4,22 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from particles.core.body import Body
-from particles.core.cloud import box_cloud
-from particles.core.neighbours import NeighbourList
-from particles.core.plate import Plate
-from particles.discretisation.incompressibility import SolveFailed
-from particles.discretisation.krylov import solve_gmres
-from particles.ispg.collocation import collocate
-from particles.ispg.gripc_step import GripcStep
-from particles.ispg.pressure_poisson import Poisson, correct_pressure
-from particles.ispg.surface_pressure import force_pressure, viscous_pressure
-from particles.ispg.velocity_smoothing import Velocities, smooth
-from particles.physics.force_surface_tension import SurfaceTension
-from particles.physics.mass import Mass
-from particles.physics.physics import Physics
-from particles.physics.plate_motion import PlateMotion
-from particles.surface.contact_line import ContactLine
+from reflowshock.particles.core.body import Body
+from reflowshock.particles.core.cloud import box_cloud
+from reflowshock.particles.core.neighbours import NeighbourList
+from reflowshock.particles.core.plate import Plate
+from reflowshock.particles.discretisation.incompressibility import SolveFailed
+from reflowshock.particles.discretisation.krylov import solve_gmres
+from reflowshock.particles.ispg.collocation import collocate
+from reflowshock.particles.ispg.gripc_step import GripcStep
+from reflowshock.particles.ispg.pressure_poisson import Poisson, correct_pressure
+from reflowshock.particles.ispg.surface_pressure import force_pressure, viscous_pressure
+from reflowshock.particles.ispg.velocity_smoothing import Velocities, smooth
+from reflowshock.particles.physics.force_surface_tension import SurfaceTension
+from reflowshock.particles.physics.mass import Mass
+from reflowshock.particles.physics.physics import Physics
+from reflowshock.particles.physics.plate_motion import PlateMotion
+from reflowshock.particles.surface.contact_line import ContactLine
 
 
 @pytest.fixture(scope="module")

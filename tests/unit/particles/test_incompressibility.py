@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from particles.discretisation.incompressibility import SaddlePoint, SolveFailed, solve
+from reflowshock.particles.discretisation.incompressibility import SaddlePoint, SolveFailed, solve
 
 
 def problem(size=60, rows=20, seed=11):

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from particles.core.body import Body
-from particles.core.cloud import joint_cloud
-from particles.core.geometry import JointGeometry
-from particles.core.plate import Plate
-from particles.physics.mass import Inertia, Mass
-from particles.physics.physics import Physics
-from particles.physics.plate_motion import Travel
-from particles.steps.inertial_flow import InertialFlow
+from reflowshock.particles.core.body import Body
+from reflowshock.particles.core.cloud import joint_cloud
+from reflowshock.particles.core.geometry import JointGeometry
+from reflowshock.particles.core.plate import Plate
+from reflowshock.particles.physics.mass import Inertia, Mass
+from reflowshock.particles.physics.physics import Physics
+from reflowshock.particles.physics.plate_motion import Travel
+from reflowshock.particles.steps.inertial_flow import InertialFlow
 
 
 def test_a_plate_arrives_exactly_and_rests():

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from particles.core.neighbours import NeighbourList
-from particles.ispg.mls import SUPPORT, DegenerateStencil, derivatives, shape_functions
+from reflowshock.particles.core.neighbours import NeighbourList
+from reflowshock.particles.ispg.mls import SUPPORT, DegenerateStencil, derivatives, shape_functions
 
 
 @pytest.fixture

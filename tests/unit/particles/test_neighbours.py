@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from particles.core.neighbours import NeighbourList, find_neighbours
+from reflowshock.particles.core.neighbours import NeighbourList, find_neighbours
 
 
 def brute_force(points, radius):

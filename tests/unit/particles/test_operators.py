@@ -3,16 +3,16 @@
 import numpy as np
 import pytest
 
-from particles.core.body import Body
-from particles.core.cloud import box_cloud
-from particles.core.neighbours import NeighbourList
-from particles.discretisation.discretisation_tetrahedra import LinearTetrahedra
-from particles.discretisation.inner_tetrahedra import fill
-from particles.physics.force_surface_tension import SurfaceTension
-from particles.physics.mass import Inertia, Mass
-from particles.physics.viscosity import Viscosity
-from particles.steps.interior_shift import SMALLEST_DEPTH, interior_shift
-from particles.steps.time_step import TimeStep, capillary_limit
+from reflowshock.particles.core.body import Body
+from reflowshock.particles.core.cloud import box_cloud
+from reflowshock.particles.core.neighbours import NeighbourList
+from reflowshock.particles.discretisation.discretisation_tetrahedra import LinearTetrahedra
+from reflowshock.particles.discretisation.inner_tetrahedra import fill
+from reflowshock.particles.physics.force_surface_tension import SurfaceTension
+from reflowshock.particles.physics.mass import Inertia, Mass
+from reflowshock.particles.physics.viscosity import Viscosity
+from reflowshock.particles.steps.interior_shift import SMALLEST_DEPTH, interior_shift
+from reflowshock.particles.steps.time_step import TimeStep, capillary_limit
 
 
 @pytest.fixture

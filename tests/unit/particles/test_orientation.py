@@ -5,11 +5,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from particles.core.geometry import JointGeometry
-from particles.core.plate import joint_plates
-from particles.parameters.solder import Solder, SolderNumerics
-from particles.scenes.orientation import Orientation, canonical, oriented, sizes
-from particles.scenes.reflow import solve_joint
+from reflowshock.particles.core.geometry import JointGeometry
+from reflowshock.particles.core.plate import joint_plates
+from reflowshock.particles.parameters.solder import Solder, SolderNumerics
+from reflowshock.particles.scenes.orientation import Orientation, canonical, oriented, sizes
+from reflowshock.particles.scenes.reflow import solve_joint
 
 RADIUS = 0.24e-3
 SOLDER = Solder(volume=0.0724e-9, numerics=SolderNumerics(spacing=8e-5, time_step_limit=100))

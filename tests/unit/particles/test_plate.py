@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from particles.core.cloud import joint_cloud
-from particles.core.geometry import JointGeometry
-from particles.core.plate import Plate, joint_plates, placed_geometry, slide
+from reflowshock.particles.core.cloud import joint_cloud
+from reflowshock.particles.core.geometry import JointGeometry
+from reflowshock.particles.core.plate import Plate, joint_plates, placed_geometry, slide
 
 SEED = 11
 

@@ -1,12 +1,12 @@
 import numpy as np
 import pytest
 
-from particles.core.body import Body
-from particles.core.cloud import box_cloud
-from particles.core.neighbours import NeighbourList
-from particles.discretisation.lagged_multigrid import LaggedMultigrid
-from particles.steps.potential_flow import LEAK, PotentialFlow
-from particles.steps.relaxation import SUPPORT
+from reflowshock.particles.core.body import Body
+from reflowshock.particles.core.cloud import box_cloud
+from reflowshock.particles.core.neighbours import NeighbourList
+from reflowshock.particles.discretisation.lagged_multigrid import LaggedMultigrid
+from reflowshock.particles.steps.potential_flow import LEAK, PotentialFlow
+from reflowshock.particles.steps.relaxation import SUPPORT
 
 
 def shaken_flow(count, seed=17):

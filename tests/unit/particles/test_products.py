@@ -2,10 +2,10 @@ import meshio
 import numpy as np
 import pytest
 
-from particles.core.geometry import JointGeometry
-from particles.parameters.solder import Solder, SolderNumerics
-from particles.scenes.products import TIMES, read_shapes, untimed, write_particles, write_shapes
-from particles.scenes.reflow import solve_joint
+from reflowshock.particles.core.geometry import JointGeometry
+from reflowshock.particles.parameters.solder import Solder, SolderNumerics
+from reflowshock.particles.scenes.products import TIMES, read_shapes, untimed, write_particles, write_shapes
+from reflowshock.particles.scenes.reflow import solve_joint
 
 
 @pytest.fixture(scope="module")

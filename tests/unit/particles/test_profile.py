@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from particles.core.cloud import box_cloud, joint_cloud
-from particles.core.geometry import JointGeometry
-from particles.surface.profile import fit_profile, section_areas
+from reflowshock.particles.core.cloud import box_cloud, joint_cloud
+from reflowshock.particles.core.geometry import JointGeometry
+from reflowshock.particles.surface.profile import fit_profile, section_areas
 
 
 def test_sections_of_a_cube():

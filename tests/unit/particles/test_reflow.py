@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 
-from particles.core.geometry import JointGeometry
-from particles.parameters.solder import Solder, SolderEffects, SolderNumerics
-from particles.scenes.reflow import build_physics, solve_joint
-from particles.steps.rest import NoRest
+from reflowshock.particles.core.geometry import JointGeometry
+from reflowshock.particles.parameters.solder import Solder, SolderEffects, SolderNumerics
+from reflowshock.particles.scenes.reflow import build_physics, solve_joint
+from reflowshock.particles.steps.rest import NoRest
 
 JOINT = JointGeometry(0.31e-3, 0.24e-3, 0.24e-3)
 COARSE = SolderNumerics(spacing=1e-4)

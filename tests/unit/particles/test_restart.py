@@ -8,20 +8,20 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from particles.core.checkpoint import Checkpoint
-from particles.core.cloud import box_cloud
-from particles.core.cloud_sphere import sphere_cloud
-from particles.core.geometry import JointGeometry
-from particles.parameters.scenes import Drop
-from particles.parameters.solder import Solder, SolderEffects, SolderNumerics
-from particles.physics.plate_motion import LIFT, Floating
-from particles.scenes.carried_joint import carried_shape, carry_joint
-from particles.scenes.drop_at_rest import flow_to_rest
-from particles.scenes.drops import run_drops
-from particles.scenes.free_drop import solve_free_drop
-from particles.scenes.moving_joint import follow_path, settle_joint
-from particles.scenes.reflow import contact_line, start_flow, start_joint, stop_rule
-from particles.steps.rest import RECORDS
+from reflowshock.particles.core.checkpoint import Checkpoint
+from reflowshock.particles.core.cloud import box_cloud
+from reflowshock.particles.core.cloud_sphere import sphere_cloud
+from reflowshock.particles.core.geometry import JointGeometry
+from reflowshock.particles.parameters.scenes import Drop
+from reflowshock.particles.parameters.solder import Solder, SolderEffects, SolderNumerics
+from reflowshock.particles.physics.plate_motion import LIFT, Floating
+from reflowshock.particles.scenes.carried_joint import carried_shape, carry_joint
+from reflowshock.particles.scenes.drop_at_rest import flow_to_rest
+from reflowshock.particles.scenes.drops import run_drops
+from reflowshock.particles.scenes.free_drop import solve_free_drop
+from reflowshock.particles.scenes.moving_joint import follow_path, settle_joint
+from reflowshock.particles.scenes.reflow import contact_line, start_flow, start_joint, stop_rule
+from reflowshock.particles.steps.rest import RECORDS
 
 RADIUS = 0.24e-3
 JOINT = JointGeometry(0.31e-3, RADIUS, RADIUS)

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from particles.reference.young_laplace import sphere_meridian
-from particles.surface.shape_error import distance, shape_error
+from reflowshock.particles.reference.young_laplace import sphere_meridian
+from reflowshock.particles.surface.shape_error import distance, shape_error
 
 VOLUME = 4.0 / 3.0 * np.pi * 1e-9  # of a sphere of 1 mm
 OCTAHEDRON = np.vstack((np.eye(3), -np.eye(3)))

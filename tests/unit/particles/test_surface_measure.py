@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 
-from particles.core.body import Body
-from particles.core.cloud import box_cloud, joint_cloud
-from particles.core.geometry import JointGeometry
-from particles.core.surface_measure import (
+from reflowshock.particles.core.body import Body
+from reflowshock.particles.core.cloud import box_cloud, joint_cloud
+from reflowshock.particles.core.geometry import JointGeometry
+from reflowshock.particles.core.surface_measure import (
     cotangent_laplacian,
     enclosed_volume,
     ring_area,
@@ -12,7 +12,7 @@ from particles.core.surface_measure import (
     surface_area,
     volume_and_gradient,
 )
-from particles.physics.force_gravity import Gravity
+from reflowshock.particles.physics.force_gravity import Gravity
 
 CLOUDS = [box_cloud(1.0, 5), joint_cloud(JointGeometry(1.0, 0.8, 0.6), 1.9, 0.25)]
 

@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 
-from particles.core.cloud import box_cloud, joint_cloud
-from particles.core.geometry import JointGeometry
-from particles.core.surface_measure import enclosed_volume, surface_area
-from particles.surface.surface_quality import flip_to_delaunay, smoothing_offsets, vertex_normals
+from reflowshock.particles.core.cloud import box_cloud, joint_cloud
+from reflowshock.particles.core.geometry import JointGeometry
+from reflowshock.particles.core.surface_measure import enclosed_volume, surface_area
+from reflowshock.particles.surface.surface_quality import flip_to_delaunay, smoothing_offsets, vertex_normals
 
 
 def opposite_angle_sums(points, triangles):

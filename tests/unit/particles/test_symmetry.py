@@ -5,12 +5,12 @@ from math import inf
 import numpy as np
 import pytest
 
-from particles.core.body import Body
-from particles.core.cloud import box_cloud
-from particles.core.symmetry import cut, on_plane, share, whole_points
-from particles.parameters.solder import Solder, SolderNumerics
-from particles.physics.physics import Physics
-from particles.scenes.reflow import build_physics, contact_line, start_flow
+from reflowshock.particles.core.body import Body
+from reflowshock.particles.core.cloud import box_cloud
+from reflowshock.particles.core.symmetry import cut, on_plane, share, whole_points
+from reflowshock.particles.parameters.solder import Solder, SolderNumerics
+from reflowshock.particles.physics.physics import Physics
+from reflowshock.particles.scenes.reflow import build_physics, contact_line, start_flow
 
 SOLDER = Solder(volume=1e-9, pad_contact_angle=np.radians(60.0), numerics=SolderNumerics(spacing=1e-4))
 ON = {"surface_tension": True, "gravity": True, "wall_adhesion": True, "viscosity": False, "inertia": False}

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from particles.core.body import Body
-from particles.core.cloud_sphere import geodesic_sphere, sphere_cloud
-from particles.core.surface_measure import enclosed_volume
-from particles.core.tetrahedra import boundary_triangles, cell_volumes, tetrahedralise, volume_gradients
-from particles.discretisation.backward_difference import BackwardDifference
-from particles.discretisation.discretisation_tetrahedra import LinearTetrahedra
-from particles.physics.viscosity import Viscosity
+from reflowshock.particles.core.body import Body
+from reflowshock.particles.core.cloud_sphere import geodesic_sphere, sphere_cloud
+from reflowshock.particles.core.surface_measure import enclosed_volume
+from reflowshock.particles.core.tetrahedra import boundary_triangles, cell_volumes, tetrahedralise, volume_gradients
+from reflowshock.particles.discretisation.backward_difference import BackwardDifference
+from reflowshock.particles.discretisation.discretisation_tetrahedra import LinearTetrahedra
+from reflowshock.particles.physics.viscosity import Viscosity
 
 
 @pytest.fixture

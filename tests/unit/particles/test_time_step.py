@@ -1,6 +1,6 @@
 import pytest
 
-from particles.steps.time_step import StepCollapsed, TimeStep
+from reflowshock.particles.steps.time_step import StepCollapsed, TimeStep
 
 
 def test_a_flow_that_no_step_can_follow_is_an_error():

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from particles.discretisation.incompressibility import SaddlePoint
-from particles.discretisation.volume_constraint import solve_volume
+from reflowshock.particles.discretisation.incompressibility import SaddlePoint
+from reflowshock.particles.discretisation.volume_constraint import solve_volume
 
 
 def test_what_nothing_moves_stays_where_it_is():

@@ -5,21 +5,21 @@ from pathlib import Path
 
 import pytest
 
+from reflowshock.workflow.case.problems import CaseError
+from reflowshock.workflow.cli import main
+from reflowshock.workflow.convergence import command
+from reflowshock.workflow.convergence.calibration import calibration, calibration_of, default_folder
+from reflowshock.workflow.convergence.command import Wish, keeps_promise, measure, read_wish, unproved
+from reflowshock.workflow.convergence.kinds import ladder_of
+from reflowshock.workflow.convergence.measured import StageCost, read_accuracy
+from reflowshock.workflow.convergence.page import section, section_for, write_pages
+from reflowshock.workflow.convergence.runs import AGAIN
+from reflowshock.workflow.convergence.tables import as_lines, as_options, legend, on_front, runs
+from reflowshock.workflow.pipeline.reader import read_case
+from reflowshock.workflow.plan import foreseen_costs
+from reflowshock.workflow.store.store import MESSAGE
+from reflowshock.workflow.store.view import show
 from tests.support.products import record_of
-from workflow.case.problems import CaseError
-from workflow.cli import main
-from workflow.convergence import command
-from workflow.convergence.calibration import calibration, calibration_of, default_folder
-from workflow.convergence.command import Wish, keeps_promise, measure, read_wish, unproved
-from workflow.convergence.kinds import ladder_of
-from workflow.convergence.measured import StageCost, read_accuracy
-from workflow.convergence.page import section, section_for, write_pages
-from workflow.convergence.runs import AGAIN
-from workflow.convergence.tables import as_lines, as_options, legend, on_front, runs
-from workflow.pipeline.reader import read_case
-from workflow.plan import foreseen_costs
-from workflow.store.store import MESSAGE
-from workflow.store.view import show
 
 CASE = Path(__file__).resolve().parents[3] / "cases/sessile_drop/case.toml"
 BROKEN = "the flow is unstable"

@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from workflow.convergence.errors import Error, Quantity, errors_of, richardson
-from workflow.convergence.machine import this_machine
-from workflow.convergence.measured import (
+from reflowshock.workflow.convergence.errors import Error, Quantity, errors_of, richardson
+from reflowshock.workflow.convergence.machine import this_machine
+from reflowshock.workflow.convergence.measured import (
     Accuracy,
     Measurement,
     Recommended,
@@ -16,11 +16,11 @@ from workflow.convergence.measured import (
     read_accuracy,
     write_accuracy,
 )
-from workflow.convergence.orders import fit_cost, fit_error
-from workflow.convergence.pareto import front
-from workflow.convergence.recommend import Goal, recommend
-from workflow.convergence.series import Knob, Ladder, Rung
-from workflow.pipeline.template import CASES
+from reflowshock.workflow.convergence.orders import fit_cost, fit_error
+from reflowshock.workflow.convergence.pareto import front
+from reflowshock.workflow.convergence.recommend import Goal, recommend
+from reflowshock.workflow.convergence.series import Knob, Ladder, Rung
+from reflowshock.workflow.pipeline.template import CASES
 
 SIZES = (0.4, 0.2, 0.1, 0.05)
 

@@ -5,18 +5,18 @@ import json
 import numpy as np
 import pytest
 
+from reflowshock.workflow.case.problems import CaseError
+from reflowshock.workflow.convergence.errors import Error, errors_of
+from reflowshock.workflow.convergence.histories import at_same_times
+from reflowshock.workflow.convergence.measured import Measurement, StageCost, fits_of
+from reflowshock.workflow.convergence.packages import SAME_MESH, package_ladder
+from reflowshock.workflow.convergence.recommend import Goal, recommend
+from reflowshock.workflow.convergence.series import Knob, Ladder, Rung
+from reflowshock.workflow.convergence.structures import structure_ladder
+from reflowshock.workflow.pipeline.reader import read_case
+from reflowshock.workflow.pipeline.template import CASES
+from reflowshock.workflow.structure.findings import exact_velocities, wave_points
 from tests.support.workflow_command import SMALL_CASE
-from workflow.case.problems import CaseError
-from workflow.convergence.errors import Error, errors_of
-from workflow.convergence.histories import at_same_times
-from workflow.convergence.measured import Measurement, StageCost, fits_of
-from workflow.convergence.packages import SAME_MESH, package_ladder
-from workflow.convergence.recommend import Goal, recommend
-from workflow.convergence.series import Knob, Ladder, Rung
-from workflow.convergence.structures import structure_ladder
-from workflow.pipeline.reader import read_case
-from workflow.pipeline.template import CASES
-from workflow.structure.findings import exact_velocities, wave_points
 
 
 def case_of(name, *settings):

@@ -5,9 +5,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from workflow.board_drop.board_deflection import SHARE, expected_deflection, first_mode_peak, kinematics_effect
-from workflow.board_drop.shock_effects import shock_effects
-from workflow.pipeline.reader import read_case
+from reflowshock.workflow.board_drop.board_deflection import (
+    SHARE,
+    expected_deflection,
+    first_mode_peak,
+    kinematics_effect,
+)
+from reflowshock.workflow.board_drop.shock_effects import shock_effects
+from reflowshock.workflow.pipeline.reader import read_case
 
 CASE = Path(__file__).parents[3] / "cases/bga_drop/case.toml"
 

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from fem.materials.library import SAC305
+from reflowshock.fem.materials.library import SAC305
+from reflowshock.workflow.case.problems import CaseError
+from reflowshock.workflow.pipeline.reader import available_cores, display_values, read_case
 from tests.support.workflow_command import SMALL_CASE
-from workflow.case.problems import CaseError
-from workflow.pipeline.reader import available_cores, display_values, read_case
 
 BAD_VALUES = {
     "unknown key": (

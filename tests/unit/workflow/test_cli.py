@@ -8,11 +8,11 @@ from pathlib import Path
 import jsonschema
 import pytest
 
+from reflowshock.workflow import cli
+from reflowshock.workflow.pipeline.reader import display_values, read_case
+from reflowshock.workflow.pipeline.schema import case_schema
+from reflowshock.workflow.store.folders import locked
 from tests.support.workflow_command import command_line
-from workflow import cli
-from workflow.pipeline.reader import display_values, read_case
-from workflow.pipeline.schema import case_schema
-from workflow.store.folders import locked
 
 CASE = Path(__file__).resolve().parents[3] / "cases" / "bga_drop" / "case.toml"
 

@@ -7,16 +7,22 @@ import pytest
 from rich.console import Console
 from typer.testing import CliRunner
 
-from fem.estimates.effects import NEGLIGIBLE_STIFFENING, STIFFENING_BOUND, STIFFENING_OF_BOARD, called_for, stiffened
+from reflowshock.fem.estimates.effects import (
+    NEGLIGIBLE_STIFFENING,
+    STIFFENING_BOUND,
+    STIFFENING_OF_BOARD,
+    called_for,
+    stiffened,
+)
+from reflowshock.workflow.case.problems import CaseError
+from reflowshock.workflow.cli import app
+from reflowshock.workflow.effects.costs import cost_shares, measured
+from reflowshock.workflow.effects.page import effects_table
+from reflowshock.workflow.effects.registry import effect_of, registry
+from reflowshock.workflow.effects.table import per_cent
+from reflowshock.workflow.pipeline.reader import read_case
+from reflowshock.workflow.pipeline.stage_forecast import scene_effects
 from tests.support.workflow_command import SMALL_CASE
-from workflow.case.problems import CaseError
-from workflow.cli import app
-from workflow.effects.costs import cost_shares, measured
-from workflow.effects.page import effects_table
-from workflow.effects.registry import effect_of, registry
-from workflow.effects.table import per_cent
-from workflow.pipeline.reader import read_case
-from workflow.pipeline.stage_forecast import scene_effects
 
 CASES = Path(__file__).parents[3] / "cases"
 FILES = [*sorted(CASES.glob("*/case.toml")), SMALL_CASE]
@@ -131,7 +137,7 @@ def test_what_is_linear_does_not_go_with_auto_where_the_board_bends_far(setting)
 
 
 def _ratio(case) -> float:
-    from workflow.board_drop.board_deflection import expected_deflection
+    from reflowshock.workflow.board_drop.board_deflection import expected_deflection
 
     return expected_deflection(case).largest / case.board.thickness
 

@@ -7,8 +7,14 @@ import threading
 
 import pytest
 
-from workflow.process import environment
-from workflow.process.environment import EnvironmentProblem, check_limits, check_ranks, complete, private_folder
+from reflowshock.workflow.process import environment
+from reflowshock.workflow.process.environment import (
+    EnvironmentProblem,
+    check_limits,
+    check_ranks,
+    complete,
+    private_folder,
+)
 
 
 @pytest.fixture

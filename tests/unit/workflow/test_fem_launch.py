@@ -2,7 +2,7 @@
 
 import json
 
-from workflow.process.fem_launch import _pass_on
+from reflowshock.workflow.process.fem_launch import _pass_on
 
 
 def test_progress_and_warnings_are_passed_on_and_other_words_are_not(caplog):

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.support.workflow_command import SMALL_CASE
-from workflow.board_drop.fine_joints import (
+from reflowshock.workflow.board_drop.fine_joints import (
     FineJoints,
     coarse_joints_effect,
     most_stressed,
@@ -12,9 +11,10 @@ from workflow.board_drop.fine_joints import (
     read_fine_joints,
     write_fine_joints,
 )
-from workflow.case.problems import CaseError
-from workflow.pipeline.reader import read_case
-from workflow.pipeline.template import case_text
+from reflowshock.workflow.case.problems import CaseError
+from reflowshock.workflow.pipeline.reader import read_case
+from reflowshock.workflow.pipeline.template import case_text
+from tests.support.workflow_command import SMALL_CASE
 
 FAULTS = {
     "shock.coupling.fine_joints=['A9']": ("no such joint", "A3 to B4", "did you mean A4?"),

@@ -7,18 +7,18 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
+from reflowshock.workflow.board_drop.case import PackageCase
+from reflowshock.workflow.case.fields import display, leaves, unit_of
+from reflowshock.workflow.case.names import is_name
+from reflowshock.workflow.case.problems import CaseError
+from reflowshock.workflow.case.toml_places import Place, Places
+from reflowshock.workflow.case.units import to_si
+from reflowshock.workflow.pipeline import gate
+from reflowshock.workflow.pipeline.gate import Leave, ask_if_long, bytes_text, machine_memory, needed_memory, too_large
+from reflowshock.workflow.pipeline.reader import KINDS, read_case
+from reflowshock.workflow.pipeline.schema import _reachable
+from reflowshock.workflow.pipeline.template import templates
 from tests.support.workflow_command import SMALL_CASE
-from workflow.board_drop.case import PackageCase
-from workflow.case.fields import display, leaves, unit_of
-from workflow.case.names import is_name
-from workflow.case.problems import CaseError
-from workflow.case.toml_places import Place, Places
-from workflow.case.units import to_si
-from workflow.pipeline import gate
-from workflow.pipeline.gate import Leave, ask_if_long, bytes_text, machine_memory, needed_memory, too_large
-from workflow.pipeline.reader import KINDS, read_case
-from workflow.pipeline.schema import _reachable
-from workflow.pipeline.template import templates
 
 STRUCTURE = SMALL_CASE.parent / "structure.toml"
 GOOD_NAMES = ("a", "bga_drop", "1", "A-1.b_2", "x" * 64)

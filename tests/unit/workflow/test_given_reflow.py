@@ -6,19 +6,19 @@ import meshio
 import numpy as np
 import pytest
 
-from meshing.board.pads import pad_table, write_pads
-from meshing.board.parameters import Warpage
-from meshing.trials.models import MM
-from meshing.trials.surfaces import barrel
+from reflowshock.meshing.board.pads import pad_table, write_pads
+from reflowshock.meshing.board.parameters import Warpage
+from reflowshock.meshing.trials.models import MM
+from reflowshock.meshing.trials.surfaces import barrel
+from reflowshock.workflow.board_drop import findings
+from reflowshock.workflow.board_drop.forecast import forecast
+from reflowshock.workflow.pipeline.reader import read_case
+from reflowshock.workflow.pipeline.stage_runner import Run
+from reflowshock.workflow.reflow.stage import reflow
+from reflowshock.workflow.report import joint_tables
+from reflowshock.workflow.report.joint_records import joint_records
+from reflowshock.workflow.store.keys import stage_inputs
 from tests.support.workflow_command import SMALL_CASE
-from workflow.board_drop import findings
-from workflow.board_drop.forecast import forecast
-from workflow.pipeline.reader import read_case
-from workflow.pipeline.stage_runner import Run
-from workflow.reflow.stage import reflow
-from workflow.report import joint_tables
-from workflow.report.joint_records import joint_records
-from workflow.store.keys import stage_inputs
 
 NAMES = ("A3", "A4", "B3", "B4")
 

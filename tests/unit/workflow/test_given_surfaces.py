@@ -10,26 +10,26 @@ import meshio
 import numpy as np
 import pytest
 
-from meshing.board.assembly import write_assembly
-from meshing.board.pads import pad_table, write_pads
-from meshing.board.parameters import Warpage
-from meshing.core.outlines import outlines
-from meshing.surface.closed_surface import enclosed_volume, read_surface
-from meshing.trials.level_sets import bridged_pair
-from meshing.trials.models import MM
-from meshing.trials.surfaces import barrel, revolve
-from particles.scenes.products import write_shapes
-from particles.steps.shape import JointShape, Snapshot
+from reflowshock.meshing.board.assembly import write_assembly
+from reflowshock.meshing.board.pads import pad_table, write_pads
+from reflowshock.meshing.board.parameters import Warpage
+from reflowshock.meshing.core.outlines import outlines
+from reflowshock.meshing.surface.closed_surface import enclosed_volume, read_surface
+from reflowshock.meshing.trials.level_sets import bridged_pair
+from reflowshock.meshing.trials.models import MM
+from reflowshock.meshing.trials.surfaces import barrel, revolve
+from reflowshock.particles.scenes.products import write_shapes
+from reflowshock.particles.steps.shape import JointShape, Snapshot
+from reflowshock.workflow.board_drop import findings
+from reflowshock.workflow.board_drop.joint_meshes import mesh_real_joints
+from reflowshock.workflow.board_drop.joint_surfaces import write_surfaces
+from reflowshock.workflow.case.problems import CaseError
+from reflowshock.workflow.pipeline.reader import display_values, read_case
+from reflowshock.workflow.pipeline.stage_runner import Run
+from reflowshock.workflow.pipeline.template import case_text
+from reflowshock.workflow.process.products import write_json
+from reflowshock.workflow.store.keys import stage_inputs
 from tests.support.workflow_command import SMALL_CASE
-from workflow.board_drop import findings
-from workflow.board_drop.joint_meshes import mesh_real_joints
-from workflow.board_drop.joint_surfaces import write_surfaces
-from workflow.case.problems import CaseError
-from workflow.pipeline.reader import display_values, read_case
-from workflow.pipeline.stage_runner import Run
-from workflow.pipeline.template import case_text
-from workflow.process.products import write_json
-from workflow.store.keys import stage_inputs
 
 
 @pytest.fixture

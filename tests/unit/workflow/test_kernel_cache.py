@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from workflow.process import kernel_cache
+from reflowshock.workflow.process import kernel_cache
 
 
 def test_folder_changes_with_a_kernel(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,10 +2,10 @@
 
 import pytest
 
-from particles.parameters.solder import SolderNumerics
+from reflowshock.particles.parameters.solder import SolderNumerics
+from reflowshock.workflow.board_drop.case import LARGE_STEPS
+from reflowshock.workflow.pipeline.reader import read_case
 from tests.support.workflow_command import SMALL_CASE
-from workflow.board_drop.case import LARGE_STEPS
-from workflow.pipeline.reader import read_case
 
 HEATED = ('warpage.corner="0 mm"', 'thermal.peak="245 degC"')
 

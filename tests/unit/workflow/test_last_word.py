@@ -9,11 +9,11 @@ from pathlib import Path
 
 import pytest
 
-from workflow.case.problems import CaseError, Problem
-from workflow.process import last_word
-from workflow.process.last_word import in_words, say
-from workflow.process.launch import LaunchError
-from workflow.store.folders import RunFolderBusy
+from reflowshock.workflow.case.problems import CaseError, Problem
+from reflowshock.workflow.process import last_word
+from reflowshock.workflow.process.last_word import in_words, say
+from reflowshock.workflow.process.launch import LaunchError
+from reflowshock.workflow.store.folders import RunFolderBusy
 
 
 @pytest.fixture(autouse=True)
@@ -22,7 +22,7 @@ def no_run_before(monkeypatch):
     monkeypatch.setattr(last_word, "_known", {})
 
 
-COMMAND = "from workflow.__main__ import main; main()"
+COMMAND = "from reflowshock.workflow.__main__ import main; main()"
 
 
 def raised(error: BaseException, cause: BaseException | None = None) -> BaseException:
@@ -121,8 +121,8 @@ def test_an_interrupt_while_the_program_loads_is_one_line(tmp_path):
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_signals_in_any_command_are_one_line(tmp_path, number):
     (tmp_path / "sitecustomize.py").write_text(
-        "import os, workflow.pipeline.schema\n"
-        f"workflow.pipeline.schema.case_schema = lambda: os.kill(os.getpid(), {int(number)})\n", encoding="utf-8"
+        "import os; from reflowshock.workflow.pipeline import schema\n"
+        f"schema.case_schema = lambda: os.kill(os.getpid(), {int(number)})\n", encoding="utf-8"
     )  # fmt: skip
     paths = os.pathsep.join([str(tmp_path), *sys.path])
     done = command("schema", env=os.environ | {"PYTHONPATH": paths})

@@ -9,7 +9,7 @@ import time
 import psutil
 import pytest
 
-from workflow.process.launch import QUIET, LaunchError, launch, mpi_command
+from reflowshock.workflow.process.launch import QUIET, LaunchError, launch, mpi_command
 
 
 def test_mpi_command(monkeypatch):
@@ -133,7 +133,8 @@ def test_an_interruption_ends_the_program_and_its_children(tmp_path):
 
 def test_mpirun_starts_from_a_process_that_initialised_mpi(tmp_path):
     launching = (
-        "from mpi4py import MPI; from workflow.process.launch import launch, mpi_command; from pathlib import Path; "
+        "from mpi4py import MPI; from pathlib import Path; "
+        "from reflowshock.workflow.process.launch import launch, mpi_command; "
         + (f"launch(mpi_command(2, ['true'], True), print, Path({str(tmp_path / 'log.txt')!r}))")
     )
     nested = (

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from workflow.case.problems import CaseError
-from workflow.pipeline.reader import display_values, read_case
+from reflowshock.workflow.case.problems import CaseError
+from reflowshock.workflow.pipeline.reader import display_values, read_case
 
 STRUCTURE = Path(__file__).resolve().parents[2] / "pipeline" / "structure.toml"
 LAMINATE = (

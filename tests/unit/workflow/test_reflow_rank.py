@@ -5,18 +5,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from particles.core.data_file import read_data, write_data
-from particles.core.geometry import JointGeometry
-from particles.parameters.solder import Solder
-from particles.scenes.carried_joint import Carried
-from particles.steps.shape import JointShape, Snapshot
+from reflowshock.data_file import read_data, write_data
+from reflowshock.particles.core.geometry import JointGeometry
+from reflowshock.particles.parameters.solder import Solder
+from reflowshock.particles.scenes.carried_joint import Carried
+from reflowshock.particles.steps.shape import JointShape, Snapshot
+from reflowshock.workflow.board_drop import reflow_pool
+from reflowshock.workflow.reflow import array, rank
+from reflowshock.workflow.reflow.pool import ReflowError
+from reflowshock.workflow.reflow.rank import JOB, RESULT, Done, find, name_of, records_of
+from reflowshock.workflow.reflow.ranks import Ranks
 from tests.support import rank_work
 from tests.support.forged_files import DAMAGES
-from workflow.board_drop import reflow_pool
-from workflow.reflow import array, rank
-from workflow.reflow.pool import ReflowError
-from workflow.reflow.rank import JOB, RESULT, Done, find, name_of, records_of
-from workflow.reflow.ranks import Ranks
 
 SOLDER = Solder(volume=7.2e-11)
 PLACE = JointGeometry(3.0e-4, 2.4e-4, 2.4e-4, (1e-5, 0.0), (0.0, -0.01))
@@ -88,7 +88,7 @@ def test_a_broken_or_forged_result_names_its_joint(tmp_path, monkeypatch, damage
         write_data(path, {}, Done((None, True)))
         path.write_bytes(damage(path.read_bytes(), marker))
 
-    monkeypatch.setattr("workflow.reflow.ranks.launch", launch)
+    monkeypatch.setattr("reflowshock.workflow.reflow.ranks.launch", launch)
     with pytest.raises(ReflowError, match=r"^joint A1: .*A1\.result is "):
         Ranks(1, True, tmp_path / "jobs").run(rank_work.solve, {"A1": JOBS[reflow_pool._solve]}, lambda _: None)
     assert not marker.exists()

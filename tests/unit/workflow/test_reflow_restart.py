@@ -2,10 +2,10 @@
 
 from types import SimpleNamespace
 
-from meshing.board.pads import pad_table
+from reflowshock.meshing.board.pads import pad_table
+from reflowshock.workflow.pipeline.reader import read_case
+from reflowshock.workflow.reflow.heated import Saved, all_inputs
 from tests.support.workflow_command import SMALL_CASE
-from workflow.pipeline.reader import read_case
-from workflow.reflow.heated import Saved, all_inputs
 
 HEATED = ["warpage.corner=0 mm", "thermal.peak=245 degC"]
 

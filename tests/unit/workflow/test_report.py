@@ -5,20 +5,20 @@ import json
 import numpy as np
 import pytest
 
-from fem.output.failure import failure_criteria, judge
-from fem.problem.parameters import Failure
+from reflowshock.fem.output.failure import failure_criteria, judge
+from reflowshock.fem.problem.parameters import Failure
+from reflowshock.workflow.pipeline.reader import read_case
+from reflowshock.workflow.report import body as report_body
+from reflowshock.workflow.report import joint_tables, tables
+from reflowshock.workflow.report.array_map import array_map
+from reflowshock.workflow.report.curves import energy_curves, history_curves
+from reflowshock.workflow.report.histories import late_peak
+from reflowshock.workflow.report.pictures import exaggeration
+from reflowshock.workflow.report.shock import ranking_mode
+from reflowshock.workflow.report.summary import collect_summary, write_summary
+from reflowshock.workflow.store.keys import inputs_digest
 from tests.support.products import record_of
 from tests.support.workflow_command import SMALL_CASE
-from workflow.pipeline.reader import read_case
-from workflow.report import body as report_body
-from workflow.report import joint_tables, tables
-from workflow.report.array_map import array_map
-from workflow.report.curves import energy_curves, history_curves
-from workflow.report.histories import late_peak
-from workflow.report.pictures import exaggeration
-from workflow.report.shock import ranking_mode
-from workflow.report.summary import collect_summary, write_summary
-from workflow.store.keys import inputs_digest
 
 JOINT = {"standoff": 3.2e-4, "max_width": 5.5e-4}
 
@@ -131,7 +131,7 @@ def test_a_board_at_rest_is_drawn_as_it_is():
 
 
 def test_dollars_and_backslashes_are_no_formulas():
-    from workflow.report.curves import STYLE, pyplot, svg
+    from reflowshock.workflow.report.curves import STYLE, pyplot, svg
 
     with pyplot.rc_context(STYLE):
         figure, axis = pyplot.subplots()
@@ -142,7 +142,7 @@ def test_dollars_and_backslashes_are_no_formulas():
 
 
 def test_pages_take_no_text_for_code(tmp_path):
-    from workflow.report.template import template_environment
+    from reflowshock.workflow.report.template import template_environment
 
     (tmp_path / "page.html.j2").write_text("<p>{{ text }}</p>{{ own | safe }}", encoding="utf-8")
     text = "<script>[/x] {{ 1 }} \x1b[31m\udce4"

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 import pyvista
 
+from reflowshock.workflow.report import cost, gallery, mesh_tables, residual, shape_effect, shock, warpage
+from reflowshock.workflow.report import interface as section
+from reflowshock.workflow.report.array_map import array_map
+from reflowshock.workflow.report.joint_records import joint_records
+from reflowshock.workflow.report.joints import headline
 from tests.support.chain_products import BOW, MICRO, MILLI, bowed_structure, interface
-from workflow.report import cost, gallery, mesh_tables, residual, shape_effect, shock, warpage
-from workflow.report import interface as section
-from workflow.report.array_map import array_map
-from workflow.report.joint_records import joint_records
-from workflow.report.joints import headline
 
 NAMES = ["A3", "A4", "B3", "B4"]
 X, Y = np.array([0.5, 1.5, 0.5, 1.5]) * MILLI, np.array([1.5, 1.5, 0.5, 0.5]) * MILLI

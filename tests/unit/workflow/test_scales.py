@@ -2,11 +2,11 @@
 
 import pytest
 
+from reflowshock.workflow.case.problems import CaseError
+from reflowshock.workflow.pipeline.reader import read_case
+from reflowshock.workflow.pipeline.template import templates, write_new_case
+from reflowshock.workflow.store.keys import stage_inputs
 from tests.support.workflow_command import SMALL_CASE
-from workflow.case.problems import CaseError
-from workflow.pipeline.reader import read_case
-from workflow.pipeline.template import templates, write_new_case
-from workflow.store.keys import stage_inputs
 
 SCALES = """
 [scales.quick]
@@ -83,7 +83,7 @@ def test_wrong_scales_are_named(case_file, text, setting, words):
 
 
 def test_scales_of_a_template_come_along(case_file, tmp_path, monkeypatch):
-    monkeypatch.setattr("workflow.pipeline.template.templates", lambda: {"small": case_file()})
+    monkeypatch.setattr("reflowshock.workflow.pipeline.template.templates", lambda: {"small": case_file()})
     path = write_new_case("mine", "small", tmp_path)
     assert read_case(path).scale == "full"
     assert read_case(path, ["scale=quick"]).shock.duration == pytest.approx(2e-5)

@@ -6,15 +6,15 @@ from pathlib import Path
 import jsonschema
 import pytest
 
+from reflowshock.workflow.board_drop.case import BoardDropCase
+from reflowshock.workflow.case.problems import CaseError
+from reflowshock.workflow.pipeline.reader import display_values, read_case
+from reflowshock.workflow.pipeline.schema import case_schema
+from reflowshock.workflow.pipeline.template import templates, write_new_case
+from reflowshock.workflow.solder.case import DropCase, JointCase
+from reflowshock.workflow.solder.forecast import forecast_scene
+from reflowshock.workflow.store.keys import stage_inputs
 from tests.support.workflow_command import WHO_COMPUTES
-from workflow.board_drop.case import BoardDropCase
-from workflow.case.problems import CaseError
-from workflow.pipeline.reader import display_values, read_case
-from workflow.pipeline.schema import case_schema
-from workflow.pipeline.template import templates, write_new_case
-from workflow.solder.case import DropCase, JointCase
-from workflow.solder.forecast import forecast_scene
-from workflow.store.keys import stage_inputs
 
 CASES = Path(__file__).resolve().parents[3] / "cases"
 DROP, BALL, JOINT, FREE = (

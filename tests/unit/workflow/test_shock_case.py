@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
+from reflowshock.workflow.case.problems import CaseError
+from reflowshock.workflow.pipeline.reader import read_case
 from tests.support.workflow_command import SMALL_CASE
-from workflow.case.problems import CaseError
-from workflow.pipeline.reader import read_case
 
 PULSE = 'peak_acceleration = "1500 G"\npulse_duration = "0.02 ms"\n'
 

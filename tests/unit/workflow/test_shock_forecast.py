@@ -4,10 +4,15 @@ from itertools import pairwise
 
 import pytest
 
-from meshing.board.estimate import count_elements
+from reflowshock.meshing.board.estimate import count_elements
+from reflowshock.workflow.board_drop.shock_forecast import (
+    forecast_parts,
+    forecast_shock,
+    implicit_seconds,
+    two_scale_parts,
+)
+from reflowshock.workflow.pipeline.reader import read_case
 from tests.support.workflow_command import SMALL_CASE
-from workflow.board_drop.shock_forecast import forecast_parts, forecast_shock, implicit_seconds, two_scale_parts
-from workflow.pipeline.reader import read_case
 
 
 def foreseen(*settings: str):

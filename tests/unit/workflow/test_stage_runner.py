@@ -8,13 +8,13 @@ from pathlib import Path
 
 import pytest
 
+from reflowshock.workflow.case.check_text import against_limit
+from reflowshock.workflow.pipeline.reader import read_case
+from reflowshock.workflow.pipeline.stage_runner import Findings, Run, StageError, execute, run_stage
+from reflowshock.workflow.store.point import Point
+from reflowshock.workflow.store.store import MESSAGE, TRACEBACK, Store
 from tests.support.products import make, record_of
 from tests.support.workflow_command import SMALL_CASE
-from workflow.case.check_text import against_limit
-from workflow.pipeline.reader import read_case
-from workflow.pipeline.stage_runner import Findings, Run, StageError, execute, run_stage
-from workflow.store.point import Point
-from workflow.store.store import MESSAGE, TRACEBACK, Store
 
 
 @pytest.fixture

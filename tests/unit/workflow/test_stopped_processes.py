@@ -6,7 +6,7 @@ import time
 
 import pytest
 
-from workflow.process.launch import LaunchError, launch, mpi_command
+from reflowshock.workflow.process.launch import LaunchError, launch, mpi_command
 
 # Rank 1 stops itself; rank 0 waits for it in MPI, as in set-up, a solve or a window of one model.
 RANKS = """

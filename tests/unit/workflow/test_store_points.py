@@ -2,12 +2,12 @@
 
 import pytest
 
+from reflowshock.workflow.store.batch import log_of, missing, show_products, why
+from reflowshock.workflow.store.point import PointsError, read_possible_points
+from reflowshock.workflow.store.state import examine
+from reflowshock.workflow.store.store import MESSAGE, Store
 from tests.support.products import make
 from tests.support.workflow_command import SMALL_CASE
-from workflow.store.batch import log_of, missing, show_products, why
-from workflow.store.point import PointsError, read_possible_points
-from workflow.store.state import examine
-from workflow.store.store import MESSAGE, Store
 
 HEATED = {"warpage.corner": "0 mm", "thermal.steps": "2"}
 
@@ -42,7 +42,7 @@ def test_where_the_solder_freezes_changes_the_reflow_and_what_cools_from_there_o
 
 def test_another_version_makes_other_products(monkeypatch):
     before = digests({})
-    monkeypatch.setattr("workflow.store.keys.__version__", "0")
+    monkeypatch.setattr("reflowshock.workflow.store.keys.__version__", "0")
     assert not set(before.values()) & set(digests({}).values())
 
 

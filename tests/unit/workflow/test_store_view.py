@@ -6,18 +6,18 @@ import shutil
 
 import pytest
 
+from reflowshock.workflow.case.problems import CaseError
+from reflowshock.workflow.pipeline.reader import read_case
+from reflowshock.workflow.store import view
+from reflowshock.workflow.store.batch import show_products
+from reflowshock.workflow.store.folders import RunFolderBusy, locked, remove_own
+from reflowshock.workflow.store.point import Point
+from reflowshock.workflow.store.product import discard
+from reflowshock.workflow.store.state import examine
+from reflowshock.workflow.store.store import Store
+from reflowshock.workflow.store.view import not_as_put, remove_unused, withdraw_all
 from tests.support.products import make
 from tests.support.workflow_command import SMALL_CASE
-from workflow.case.problems import CaseError
-from workflow.pipeline.reader import read_case
-from workflow.store import view
-from workflow.store.batch import show_products
-from workflow.store.folders import RunFolderBusy, locked, remove_own
-from workflow.store.point import Point
-from workflow.store.product import discard
-from workflow.store.state import examine
-from workflow.store.store import Store
-from workflow.store.view import not_as_put, remove_unused, withdraw_all
 
 POINT = Point({}, read_case(SMALL_CASE))
 OTHER = Point({}, read_case(SMALL_CASE, ["shock.peak_acceleration=1000 G"]))

@@ -18,23 +18,23 @@ import pytest
 from hypothesis import strategies as st
 from pydantic import Field
 
-from fem.trials.parameters import Impact, PairRun, Turns
-from particles.parameters.solder import Parameters
+from reflowshock.fem.trials.parameters import Impact, PairRun, Turns
+from reflowshock.particles.parameters.solder import Parameters
+from reflowshock.workflow.case.problems import CaseError
+from reflowshock.workflow.case.units import UnitError
+from reflowshock.workflow.stress_test import families, hard_case, sample
+from reflowshock.workflow.stress_test.bound import read_bound
+from reflowshock.workflow.stress_test.case_file import hard_case_text
+from reflowshock.workflow.stress_test.command import HARD, Request, stress_test
+from reflowshock.workflow.stress_test.hard_case import hard_cases, read_hard_cases
+from reflowshock.workflow.stress_test.pool import Pool
+from reflowshock.workflow.stress_test.random_cases import drawn
+from reflowshock.workflow.stress_test.random_trial import RandomTrial, quantities
+from reflowshock.workflow.stress_test.results import write_results
+from reflowshock.workflow.stress_test.sample import try_sample
+from reflowshock.workflow.stress_test.trial import Measured, Refused, Trial
+from reflowshock.workflow.stress_test.verdict import attempt
 from tests.support.workflow_command import wait_until
-from workflow.case.problems import CaseError
-from workflow.case.units import UnitError
-from workflow.stress_test import families, hard_case, sample
-from workflow.stress_test.bound import read_bound
-from workflow.stress_test.case_file import hard_case_text
-from workflow.stress_test.command import HARD, Request, stress_test
-from workflow.stress_test.hard_case import hard_cases, read_hard_cases
-from workflow.stress_test.pool import Pool
-from workflow.stress_test.random_cases import drawn
-from workflow.stress_test.random_trial import RandomTrial, quantities
-from workflow.stress_test.results import write_results
-from workflow.stress_test.sample import try_sample
-from workflow.stress_test.trial import Measured, Refused, Trial
-from workflow.stress_test.verdict import attempt
 
 
 class Rod(Parameters):
@@ -112,8 +112,8 @@ def test_errors_and_nan_are_misses(fate):
 
 def test_no_measure_hides_nan(monkeypatch):
     """The largest of zero and nan is zero to Python: a trial that compares so would survive without a number."""
-    from fem.trials import fields, impact
-    from workflow.stress_test import trials_reflow
+    from reflowshock.fem.trials import fields, impact
+    from reflowshock.workflow.stress_test import trials_reflow
 
     energies = np.array([1.0, math.nan, 0.5])
     told = {name: found.value for name, found in trials_reflow._energy(energies).items()}
@@ -125,7 +125,7 @@ def test_no_measure_hides_nan(monkeypatch):
 
 
 def test_a_push_in_the_middle_of_a_run_counts(monkeypatch):
-    from fem.trials import windows
+    from reflowshock.fem.trials import windows
 
     pushes = iter([0.0] * 100 + [0.5] + [0.0] * 100)
     monkeypatch.setattr(windows, "momentum_change", lambda *_: next(pushes))
@@ -185,7 +185,18 @@ def test_hangs_and_deaths_are_misses_and_the_rest_goes_on():
 
 
 def test_ctrl_c_ends_a_stress_test_with_a_word(tmp_path):
-    line = [sys.executable, "-m", "workflow", "stress-test", "--family", "coupling", "--out", str(tmp_path), "-j", "2"]
+    line = [
+        sys.executable,
+        "-m",
+        "reflowshock",
+        "stress-test",
+        "--family",
+        "coupling",
+        "--out",
+        str(tmp_path),
+        "-j",
+        "2",
+    ]
     heed = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)  # a shell lets background jobs ignore it
     process = subprocess.Popen(line, stderr=subprocess.PIPE, text=True, start_new_session=True, preexec_fn=heed)
     wait_until(lambda: len(psutil.Process(process.pid).children()) > 1)

@@ -6,13 +6,13 @@ from pathlib import Path
 import jsonschema
 import pytest
 
-from workflow.case.problems import CaseError
-from workflow.pipeline.reader import display_values, read_case
-from workflow.pipeline.schema import case_schema
-from workflow.pipeline.template import case_text, templates
-from workflow.store.keys import compare, stage_inputs
-from workflow.structure.forecast import forecast_structure
-from workflow.structure.report import meshed_part
+from reflowshock.workflow.case.problems import CaseError
+from reflowshock.workflow.pipeline.reader import display_values, read_case
+from reflowshock.workflow.pipeline.schema import case_schema
+from reflowshock.workflow.pipeline.template import case_text, templates
+from reflowshock.workflow.store.keys import compare, stage_inputs
+from reflowshock.workflow.structure.forecast import forecast_structure
+from reflowshock.workflow.structure.report import meshed_part
 
 BOARD = Path(__file__).resolve().parents[2] / "pipeline" / "structure.toml"
 FINITE = ["dynamics.solver=explicit", "dynamics.kinematics=finite"]

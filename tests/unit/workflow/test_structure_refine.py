@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from workflow.case.problems import CaseError
-from workflow.pipeline.reader import read_case
-from workflow.pipeline.template import CASES
-from workflow.structure.findings import Motion, compared_with_references, layers_of
-from workflow.structure.forecast import forecast_structure
+from reflowshock.workflow.case.problems import CaseError
+from reflowshock.workflow.pipeline.reader import read_case
+from reflowshock.workflow.pipeline.template import CASES
+from reflowshock.workflow.structure.findings import Motion, compared_with_references, layers_of
+from reflowshock.workflow.structure.forecast import forecast_structure
 
 TWO_SCALES, ONE_SCALE = CASES / "two_scale_bar/case.toml", CASES / "cantilever/case.toml"
 

@@ -6,22 +6,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from reflowshock.workflow.case.problems import CaseError
+from reflowshock.workflow.pipeline.stage_forecast import stage_seconds
+from reflowshock.workflow.store.batch import Machine, missing
+from reflowshock.workflow.store.point import PointsError
+from reflowshock.workflow.store.store import Store
+from reflowshock.workflow.study import tables
+from reflowshock.workflow.study.command import read_points_of, results, run_study
+from reflowshock.workflow.study.designs import Factor
+from reflowshock.workflow.study.hypercube import Hypercube
+from reflowshock.workflow.study.main_effects import effect_of, ranked
+from reflowshock.workflow.study.outlook import outlook
+from reflowshock.workflow.study.progress import seconds_left
+from reflowshock.workflow.study.results import HEALTHY, IMPOSSIBLE, UNHEALTHY, Row, columns, write_csv, write_parquet
+from reflowshock.workflow.study.setting_text import as_text, between
+from reflowshock.workflow.study.study_file import read_study
 from tests.support.workflow_command import SMALL_CASE
-from workflow.case.problems import CaseError
-from workflow.pipeline.stage_forecast import stage_seconds
-from workflow.store.batch import Machine, missing
-from workflow.store.point import PointsError
-from workflow.store.store import Store
-from workflow.study import tables
-from workflow.study.command import read_points_of, results, run_study
-from workflow.study.designs import Factor
-from workflow.study.hypercube import Hypercube
-from workflow.study.main_effects import effect_of, ranked
-from workflow.study.outlook import outlook
-from workflow.study.progress import seconds_left
-from workflow.study.results import HEALTHY, IMPOSSIBLE, UNHEALTHY, Row, columns, write_csv, write_parquet
-from workflow.study.setting_text import as_text, between
-from workflow.study.study_file import read_study
 
 HEAD = f'[study]\nname = "mine"\ncase = "{SMALL_CASE}"\nrank_by = "stress"\n'
 GRID = '[grid]\n"package.pitch" = ["0.9 mm", "1 mm"]\n"solder.volume" = ["0.07 mm^3", "0.0724 mm^3"]\n'
@@ -195,7 +195,7 @@ def test_csv_and_parquet_have_the_same_columns_with_units(write, tmp_path):
 
 
 def test_the_page_tells_ranks_effects_and_troubles(write, tmp_path):
-    from workflow.study.page import write_results
+    from reflowshock.workflow.study.page import write_results
 
     rows = [*ROWS, row(5, 1.0, 0.08, None, "failed")]
     study = read_study(write(GRID))
@@ -211,15 +211,15 @@ def test_the_page_tells_ranks_effects_and_troubles(write, tmp_path):
 
 def test_a_metric_that_there_is_not_is_told(write, tmp_path, monkeypatch, capsys):
     points = read_points_of(write('[grid]\n"package.pitch" = ["1 mm"]\n', HEAD.replace("stress", "stres")))
-    monkeypatch.setattr("workflow.study.command.missing", lambda *_: [])
-    monkeypatch.setattr("workflow.study.command.row_of", lambda *_: ROWS[0])
-    monkeypatch.setattr("workflow.study.page.write_results", lambda *_: None)
+    monkeypatch.setattr("reflowshock.workflow.study.command.missing", lambda *_: [])
+    monkeypatch.setattr("reflowshock.workflow.study.command.row_of", lambda *_: ROWS[0])
+    monkeypatch.setattr("reflowshock.workflow.study.page.write_results", lambda *_: None)
     assert not run_study(points, Store(tmp_path / "store"), Machine(1))
     assert "did you mean stress?" in capsys.readouterr().err
 
 
 def test_no_text_of_a_csv_file_is_a_formula(tmp_path):
-    from workflow.study.results import write_csv
+    from reflowshock.workflow.study.results import write_csv
 
     path = tmp_path / "results.csv"
     write_csv(path, {"a": ["=1+1", "+x", "-40 degC", "@x", "\tx", "x"], "b": [-1.0, 2, None, True, "1", "ä"]})

@@ -4,11 +4,11 @@ import tomllib
 
 import pytest
 
-from fem.materials.library import FR4, LIBRARY
+from reflowshock.fem.materials.library import FR4, LIBRARY
+from reflowshock.workflow.case.problems import CaseError
+from reflowshock.workflow.pipeline.reader import display_values, read_case
+from reflowshock.workflow.pipeline.template import case_text
 from tests.support.workflow_command import SMALL_CASE
-from workflow.case.problems import CaseError
-from workflow.pipeline.reader import display_values, read_case
-from workflow.pipeline.template import case_text
 
 PAPER = ['thermal.peak="200 degC"', 'thermal.melting="25 degC"', 'thermal.solidification="200 degC"']
 MOVED = ['thermal.package="moved"', 'thermal.corner_displacement="-0.1 mm"']

@@ -5,9 +5,9 @@ import json
 import numpy as np
 import pytest
 
-from workflow.board_drop.findings import fine_joints_of, ideal_ratio, of_shock
-from workflow.board_drop.fine_joints import FineJoints
-from workflow.report import two_scales as section
+from reflowshock.workflow.board_drop.findings import fine_joints_of, ideal_ratio, of_shock
+from reflowshock.workflow.board_drop.fine_joints import FineJoints
+from reflowshock.workflow.report import two_scales as section
 
 MODEL = {"window": 80e-9, "step": 10e-9, "substeps": 8, "ranks": 2, "elements": {"dns": 1000}}
 COUPLING = {

@@ -5,9 +5,9 @@ from types import SimpleNamespace
 
 import pytest
 
-from workflow.board_drop import findings
-from workflow.board_drop.reflow_pool import ReflowError, mark_bridges, refuse_joints_without_mesh
-from workflow.report import joint_tables
+from reflowshock.workflow.board_drop import findings
+from reflowshock.workflow.board_drop.reflow_pool import ReflowError, mark_bridges, refuse_joints_without_mesh
+from reflowshock.workflow.report import joint_tables
 
 PADS = [SimpleNamespace(name=f"A{k}", x=k * 1e-3, y=2.5e-3) for k in (1, 2, 3, 4)]
 

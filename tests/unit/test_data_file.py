@@ -1,15 +1,12 @@
 """Files of data come back as they were written; any other file is refused, and nothing in it is executed."""
 
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-import fem.parallel.data_file
-from particles.core import data_file
-from particles.core.data_file import NotData, columns, read_data, read_header, rows, write_data
-from particles.parameters.solder import Solder, SolderNumerics
+from reflowshock.data_file import NotData, columns, read_data, read_header, rows, write_data
+from reflowshock.particles.parameters.solder import Solder, SolderNumerics
 from tests.support.forged_files import DAMAGES, forged_array, with_digest
 
 
@@ -23,10 +20,6 @@ class Wheel:
 class Cart:
     wheels: tuple[Wheel, ...]
     name: str | None = None
-
-
-def test_both_packages_have_the_same_file():
-    assert Path(data_file.__file__).read_bytes() == Path(fem.parallel.data_file.__file__).read_bytes()
 
 
 def test_a_value_comes_back_as_it_was(tmp_path):

@@ -3,8 +3,6 @@
 The first line has the format and the SHA-256 digest of all that follows, the second a header in JSON. The rest is an
 npz: arrays, and in JSON (`TREE`) how a value is put together of them. Records, dataclasses and pydantic models, stand
 there as their name and fields; a reader lists those that it takes, and makes no others.
-
-`particles` and `fem`, which do not import each other, each have this file, the same to the letter.
 """
 
 import hashlib

@@ -1,0 +1,20 @@
+"""``python -m reflowshock`` is the command; what happens while the program loads is told, too."""
+
+from reflowshock.workflow.process.last_word import heed_signals, last_word
+
+
+def main() -> None:
+    """Prepare the process, then load and run the command line."""
+    with last_word():
+        heed_signals()
+        from reflowshock.workflow.process.environment import begin_again_in_utf8, prepare
+
+        begin_again_in_utf8()
+        prepare()  # before any library is loaded
+        from reflowshock.workflow.cli import main as run_command_line
+
+        run_command_line()
+
+
+if __name__ == "__main__":
+    main()
