@@ -7,12 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from reflowshock.arrays import Floats, Indices
 from reflowshock.particles.core.geometry import JointGeometry, joint_counts
 from reflowshock.particles.core.plate import Plate, joint_plates
 from reflowshock.particles.core.surface_measure import enclosed_volume
 
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int32]
 Lengths = TypeVar("Lengths", float, Floats)
 
 LARGEST_BULGE = 0.5 * np.sqrt(3.0)  # of a double cone beyond its discs, over the gap

@@ -4,10 +4,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
+from reflowshock.arrays import Floats
 from reflowshock.particles.core.cloud import Cloud
 from reflowshock.particles.core.surface_measure import enclosed_volume
-
-Floats = NDArray[np.float64]
 
 
 def sphere_cloud(volume: float, shells: int) -> Cloud:

@@ -2,9 +2,6 @@
 
 import numpy as np
 from numba import njit, prange
-from numpy.typing import NDArray
-
-Floats = NDArray[np.float64]
 
 
 @njit(cache=True, parallel=True)

@@ -8,9 +8,8 @@ Euler. A mode of frequency omega is damped at a rate of omega^4 dt^3 / 4 and slo
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from reflowshock.arrays import Floats
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,11 +2,9 @@
 
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
-Floats = NDArray[np.float64]
+from reflowshock.arrays import Floats
 
 
 @dataclass(frozen=True, slots=True)

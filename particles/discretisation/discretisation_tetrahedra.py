@@ -11,15 +11,12 @@ pressures and hardly damps.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
+from reflowshock.arrays import Floats, Indices
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.tetrahedra import SMALLEST_VOLUME, cell_volumes, thick_cells, volume_gradients
 from reflowshock.particles.discretisation.discretisation import Discretisation
-
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int32]
 
 STABILISATION = 0.05
 DIFFUSION = 4.0

@@ -11,11 +11,10 @@ discrete energy stationary.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy import sparse
 
-Floats = NDArray[np.float64]
+from reflowshock.arrays import Floats
 
 RELATIVE_TOLERANCE = 1e-9
 RESIDUAL_LIMIT = 1e-6

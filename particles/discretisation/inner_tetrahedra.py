@@ -11,13 +11,12 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
+from reflowshock.arrays import Indices
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.surface_measure import wall_corners
 from reflowshock.particles.core.tetrahedra import boundary_triangles, cell_volumes, tetrahedralise, thick_cells
 from reflowshock.particles.core.winding_number import winding_numbers
 
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int32]
 Mask = NDArray[np.bool_]
 
 

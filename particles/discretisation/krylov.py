@@ -1,10 +1,10 @@
 """Nonsymmetric sparse systems: PETSc's GMRES, its preconditioner chosen by the basis, and the true residual checked."""
 
 import numpy as np
-from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy import sparse
 
+from reflowshock.arrays import Floats
 from reflowshock.particles.discretisation.incompressibility import (
     MAX_ITERATIONS,
     RELATIVE_TOLERANCE,
@@ -12,8 +12,6 @@ from reflowshock.particles.discretisation.incompressibility import (
     SolveFailed,
     to_petsc,
 )
-
-Floats = NDArray[np.float64]
 
 # Shape functions of the linear basis average: fast oscillating coefficients hardly show in values or derivatives, so
 # that multigrid and incomplete factors stall (200 iterations leave a residual above 1e-3 at 1728 particles).

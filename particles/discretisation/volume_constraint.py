@@ -1,10 +1,10 @@
 """A symmetric positive definite system bordered by one constraint: the surface of a body that keeps its volume."""
 
 import numpy as np
-from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy import sparse
 
+from reflowshock.arrays import Floats
 from reflowshock.particles.discretisation.incompressibility import (
     SaddlePoint,
     Solution,
@@ -12,8 +12,6 @@ from reflowshock.particles.discretisation.incompressibility import (
     check_residuals,
     petsc,
 )
-
-Floats = NDArray[np.float64]
 
 RELATIVE_TOLERANCE = 1e-10
 MAX_ITERATIONS = 2000

@@ -9,15 +9,14 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
+from reflowshock.arrays import Floats
 from reflowshock.particles.core.neighbours import NeighbourList
 from reflowshock.particles.core.plate import Plate
 from reflowshock.particles.ispg.ghosts import mirror
 from reflowshock.particles.ispg.mls import SUPPORT, derivatives, shape_functions
 
-Floats = NDArray[np.float64]
 Matrix: TypeAlias = sparse.csr_matrix
 
 

@@ -11,9 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from reflowshock.arrays import Floats
 from reflowshock.particles.core.plate import Plate
-
-Floats = NDArray[np.float64]
 
 # Particles nearer to a plate than this share of the reach lie on it: they are their own image.
 ON_PLATE = 1e-6

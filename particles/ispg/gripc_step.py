@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from reflowshock.arrays import Floats
 from reflowshock.data_file import fields_of
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.neighbours import NeighbourList
@@ -29,8 +29,6 @@ from reflowshock.particles.physics.mass import Mass
 from reflowshock.particles.physics.physics import Physics
 from reflowshock.particles.physics.viscosity import Viscosity
 from reflowshock.particles.steps.step_solver import Motion
-
-Floats = NDArray[np.float64]
 
 
 class GripcStep:

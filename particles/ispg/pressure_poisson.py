@@ -6,10 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from reflowshock.arrays import Floats
 from reflowshock.particles.discretisation.krylov import solve_gmres
 from reflowshock.particles.ispg.collocation import Operators
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

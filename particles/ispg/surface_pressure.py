@@ -6,13 +6,11 @@ surface force makes p the pressure above the hydrostatic one.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from reflowshock.arrays import Floats
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.physics.physics import Physics
 from reflowshock.particles.surface.surface_quality import vertex_normals
-
-Floats = NDArray[np.float64]
 
 
 def force_pressure(body: Body, physics: Physics) -> Floats:

@@ -1,12 +1,8 @@
 """Velocity under viscosity and the last pressure, implicit in the viscosity (Hu et al., eqs 3 and 12-17)."""
 
-import numpy as np
-from numpy.typing import NDArray
-
+from reflowshock.arrays import Floats
 from reflowshock.particles.discretisation.krylov import solve_gmres
 from reflowshock.particles.ispg.collocation import Operators
-
-Floats = NDArray[np.float64]
 
 
 def predict_velocity(

@@ -4,13 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from reflowshock.arrays import Floats
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.surface_measure import area_vector, wall_corners
-
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int32]
 
 
 @njit(cache=True)

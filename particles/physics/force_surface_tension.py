@@ -2,15 +2,12 @@
 
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
+from reflowshock.arrays import Floats
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.surface_measure import cotangent_laplacian, surface_area
 from reflowshock.particles.discretisation.discretisation import Discretisation
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,14 +4,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from reflowshock.arrays import Floats
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.symmetry import fold
 from reflowshock.particles.physics.physics import Force
 from reflowshock.particles.surface.contact_line import ContactLine
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,14 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from reflowshock.arrays import Floats
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.plate import slide
 from reflowshock.particles.core.symmetry import fold
 from reflowshock.particles.discretisation.discretisation import Discretisation
 from reflowshock.particles.physics.plate_motion import PlateMotion
 from reflowshock.particles.surface.contact_line import ContactLine
-
-Floats = NDArray[np.float64]
 
 
 class Force(Protocol):

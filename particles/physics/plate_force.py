@@ -3,12 +3,10 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from reflowshock.arrays import Floats
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.physics.physics import Force
-
-Floats = NDArray[np.float64]
 
 
 def plate_wrench(body: Body, others: Sequence[Force], wall: int) -> Floats:

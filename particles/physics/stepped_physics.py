@@ -3,16 +3,14 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from reflowshock.arrays import Floats
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.plate import Plate
 from reflowshock.particles.discretisation.discretisation import Discretisation
 from reflowshock.particles.physics.force_surface_tension import SurfaceTension
 from reflowshock.particles.physics.physics import Physics
 from reflowshock.particles.physics.plate_motion import PlateMotion
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,10 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from reflowshock.arrays import Floats
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.discretisation.discretisation import Discretisation
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

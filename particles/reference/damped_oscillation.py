@@ -1,10 +1,9 @@
 """Frequency and decay rate of a weakly nonlinear damped oscillation, from samples."""
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-Floats = NDArray[np.float64]
+from reflowshock.arrays import Floats
 
 
 def fit_oscillation(time: Floats, values: Floats, frequency: float) -> tuple[float, float]:

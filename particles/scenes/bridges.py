@@ -4,10 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from reflowshock.arrays import Floats
 from reflowshock.particles.core.checkpoint import Checkpoint
 from reflowshock.particles.core.cloud import TooLittleSolder
 from reflowshock.particles.core.geometry import JointGeometry
@@ -23,8 +23,6 @@ from reflowshock.particles.scenes.reflow import joint_flow, joint_shape, parted,
 from reflowshock.particles.steps.flow import LiquidFlow
 from reflowshock.particles.steps.rest import RECORDS, Run, StopRule, run_to_rest
 from reflowshock.particles.steps.shape import JointShape
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

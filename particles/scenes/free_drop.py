@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from reflowshock.arrays import Floats
 from reflowshock.data_file import fields_of
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.checkpoint import Checkpoint
@@ -21,8 +22,6 @@ from reflowshock.particles.steps.flow import FLOW_RECORDS
 from reflowshock.particles.steps.inertial_flow import InertialFlow
 from reflowshock.particles.steps.shape import Snapshot
 from reflowshock.particles.surface.surface_quality import vertex_normals
-
-Floats = NDArray[np.float64]
 
 EFFECTS = {"surface_tension": True, "gravity": False, "wall_adhesion": False, "inertia": True}
 COLUMNS = ("time", "amplitude", "energy", "kinetic_energy", "volume", "momentum")

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from reflowshock.arrays import Floats
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.geometry import LARGEST_WIDTH_CHANGE, JointGeometry
 from reflowshock.particles.core.surface_measure import ring_area
@@ -23,7 +23,6 @@ from reflowshock.particles.steps.time_step import capillary_limit
 from reflowshock.particles.surface.contact_line import ON_MASK, ON_PAD, ContactLine
 from reflowshock.particles.surface.shape_error import shape_error
 
-Floats = NDArray[np.float64]
 Metrics = dict[str, tuple[float, str]]
 WIDTH_CHANGE, TILT_LEVER = 0.1, 2.0
 JOINT_NAMES = {

@@ -4,17 +4,14 @@ from collections.abc import Sequence
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from reflowshock.arrays import Floats, Indices
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.plate import Plate
 from reflowshock.particles.core.surface_measure import centre_of_volume
 from reflowshock.particles.surface.cloud_level_set import CannotRebuild, cloud_from_level_set
 from reflowshock.particles.surface.level_set import Grid, LevelSet, depths, signed_distance, smooth_union
-
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int32]
 
 CONTACT_SPACINGS = 1.0
 NECK_SPACINGS = 2.5  # a gap narrower than half of this closes: wider than the contact distance, so a neck always forms

@@ -10,12 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from reflowshock.arrays import Floats
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.plate import slide
 from reflowshock.particles.core.symmetry import on_plane
 from reflowshock.particles.physics.plate_motion import PlateMotion
-
-Floats = NDArray[np.float64]
 
 
 class Admissible:

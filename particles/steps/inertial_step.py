@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from reflowshock.arrays import Floats
 from reflowshock.data_file import fields_of
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.neighbours import NeighbourList
@@ -27,8 +28,6 @@ from reflowshock.particles.physics.viscosity import Viscosity
 from reflowshock.particles.steps.step_equations import StepEquations
 from reflowshock.particles.steps.step_solver import Motion
 from reflowshock.particles.steps.time_step import LARGEST_DISPLACEMENT
-
-Floats = NDArray[np.float64]
 
 SUPPORT = 1.5
 # Shift of a particle that calls for new tetrahedra, in spacings.

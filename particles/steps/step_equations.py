@@ -1,16 +1,14 @@
 """The linear equations of one step: forces, implicit operators, constraints, in the velocities that walls admit."""
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
+from reflowshock.arrays import Floats
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.discretisation.discretisation import Discretisation
 from reflowshock.particles.discretisation.incompressibility import SaddlePoint
 from reflowshock.particles.physics.physics import Physics
 from reflowshock.particles.steps.admissible import Admissible
-
-Floats = NDArray[np.float64]
 
 
 class StepEquations:

@@ -6,13 +6,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from reflowshock.arrays import Floats, Indices
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.cloud import equal_area_radius
 from reflowshock.particles.core.plate import Pad
 from reflowshock.particles.core.symmetry import share, unit, whole_points
-
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int32]
 
 PINNED, ON_PAD, ON_MASK = 0, 1, 2
 RELEASE_MARGIN = 0.02

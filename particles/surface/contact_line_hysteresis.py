@@ -1,15 +1,13 @@
 """A contact line with hysteresis: it advances at one contact angle, recedes at a smaller one, and else stands."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from reflowshock.arrays import Floats
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.plate import Pad
 from reflowshock.particles.core.surface_measure import ring_area_gradient
 from reflowshock.particles.core.symmetry import share, whole_points
 from reflowshock.particles.surface.contact_line import ON_MASK, ON_PAD, PINNED, RELEASE_MARGIN, ContactLine
-
-Floats = NDArray[np.float64]
 
 RECEDING, ADVANCING = ON_PAD, ON_MASK
 

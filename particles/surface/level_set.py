@@ -5,11 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import pyvista
-from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int32]
+from reflowshock.arrays import Floats, Indices
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,13 +1,10 @@
 """How far a free surface lies from an exact surface of revolution: the error of a whole shape in one number."""
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from reflowshock.arrays import Floats, Indices
 from reflowshock.particles.reference.young_laplace import Meridian
-
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int32]
 
 # Barycentric points and weights of a rule that is exact for cubic polynomials on a triangle: corners, middles of
 # edges, centroid (Zienkiewicz, The Finite Element Method, table of triangles).

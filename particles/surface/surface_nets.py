@@ -5,11 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from reflowshock.arrays import Floats, Indices
 from reflowshock.particles.surface.level_set import LevelSet
 from reflowshock.particles.surface.surface_quality import flip_to_delaunay, smoothing_offsets
-
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int32]
 
 RELAXATIONS = 30
 CORNERS = np.stack(np.meshgrid([0, 1], [0, 1], [0, 1], indexing="ij"), axis=-1).reshape(-1, 3)
