@@ -8,8 +8,8 @@ from reflowshock.particles.parameters import checks
 from reflowshock.particles.parameters.checks import Problem, mm, mm3
 from reflowshock.particles.parameters.effects import acting_weight, decide_drop, decide_effects
 from reflowshock.particles.parameters.estimate import particle_count
-from reflowshock.particles.parameters.scene_drops import Drops
-from reflowshock.particles.parameters.scene_oscillation import Oscillation
+from reflowshock.particles.parameters.scenes import Drops
+from reflowshock.particles.parameters.scenes import Oscillation
 from reflowshock.particles.parameters.scenes import Drop, Joint
 from reflowshock.particles.parameters.solder import Solder
 from reflowshock.particles.reference.rayleigh import lamb_decay_rate, rayleigh_frequency

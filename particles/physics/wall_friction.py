@@ -13,7 +13,77 @@ from scipy import sparse
 
 from reflowshock.arrays import Floats
 from reflowshock.particles.core.body import Body
-from reflowshock.particles.discretisation.discretisation import Discretisation
+from reflowshock.particles.discretisation.discretisation_tetrahedra import Discretisation
+
+from dataclasses import dataclass
+
+from scipy import sparse
+
+from reflowshock.arrays import Floats
+from reflowshock.particles.core.body import Body
+from reflowshock.particles.discretisation.discretisation_tetrahedra import Discretisation
+
+from dataclasses import dataclass
+
+from scipy import sparse
+
+from reflowshock.particles.core.body import Body
+from reflowshock.particles.discretisation.discretisation_tetrahedra import Discretisation
+
+
+@dataclass(frozen=True, slots=True)
+class Viscosity:
+    """Newtonian viscosity.
+
+    Attributes:
+        coefficient: dynamic viscosity mu [Pa s].
+    """
+
+    coefficient: float
+
+    def matrix(self, _body: Body, space: Discretisation, _time_step: float) -> sparse.csr_matrix:
+        """Matrix of the virtual power, `(3 n, 3 n)` [kg/s], components one after the other.
+
+        With D = (grad v + grad v^T) / 2:
+        2 mu D : D = mu (grad v : grad v + grad v : grad v^T). Symmetric, positive semidefinite, zero for rigid motion.
+        """
+        gradient = space.gradient
+        weight = sparse.diags(self.coefficient * space.weights)
+        full = sum(component.T @ weight @ component for component in gradient)
+        blocks = [[gradient[j].T @ weight @ gradient[i] for j in range(3)] for i in range(3)]
+        for i in range(3):
+            blocks[i][i] = blocks[i][i] + full
+        return sparse.bmat(blocks, format="csr")
+
+
+@dataclass(frozen=True, slots=True)
+class Mass:
+    """Mass. Without `Inertia` beside it, it only damps: velocity is force times dt over mass.
+
+    Attributes:
+        density: [kg/m^3].
+    """
+
+    density: float
+
+    def matrix(self, _body: Body, space: Discretisation, time_step: float) -> sparse.csr_matrix:
+        """M / dt, `(3 n, 3 n)` [kg/s]."""
+        return sparse.kron(sparse.identity(3), self.density / time_step * space.mass, format="csr")
+
+
+@dataclass(frozen=True, slots=True)
+class Inertia:
+    """Momentum of the last step.
+
+    Attributes:
+        density: [kg/m^3].
+    """
+
+    density: float
+
+    def load(self, body: Body, space: Discretisation, time_step: float) -> Floats:
+        """M v_n / dt, `(n, 3)` [N]."""
+        return self.density / time_step * (space.mass @ body.velocity)
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,10 +9,10 @@ import numpy as np
 
 from reflowshock.particles.core.checkpoint import Checkpoint
 from reflowshock.particles.core.cloud import Cloud, box_cloud
-from reflowshock.particles.core.cloud_sphere import sphere_cloud
+from reflowshock.particles.core.cloud import sphere_cloud
 from reflowshock.particles.core.surface_measure import centre_of_volume
 from reflowshock.particles.parameters.effects import Decision, acting_weight, decide_drop, switched
-from reflowshock.particles.parameters.scene_drops import Drops
+from reflowshock.particles.parameters.scenes import Drops
 from reflowshock.particles.parameters.solder import Solder
 from reflowshock.particles.reference.young_laplace import Meridian, sphere_meridian
 from reflowshock.particles.scenes.drops import Drop, run_drops

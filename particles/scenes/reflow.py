@@ -15,11 +15,11 @@ from reflowshock.particles.ispg.gripc_step import GripcStep
 from reflowshock.particles.parameters.effects import decide_effects, switched
 from reflowshock.particles.parameters.solder import Solder
 from reflowshock.particles.physics.force_gravity import Gravity
-from reflowshock.particles.physics.force_surface_tension import SurfaceTension
-from reflowshock.particles.physics.force_wetting import Wetting
-from reflowshock.particles.physics.mass import Inertia, Mass
+from reflowshock.particles.physics.force_gravity import SurfaceTension
+from reflowshock.particles.physics.force_gravity import Wetting
+from reflowshock.particles.physics.wall_friction import Inertia, Mass
 from reflowshock.particles.physics.physics import Event, Force, Hold, Momentum, Operator, Physics
-from reflowshock.particles.physics.viscosity import Viscosity
+from reflowshock.particles.physics.wall_friction import Viscosity
 from reflowshock.particles.physics.wall_friction import NavierSlip, NoSlip
 from reflowshock.particles.scenes.metrics import Metrics, joint_metrics, open_metrics, particle_pressure, verdict
 from reflowshock.particles.scenes.split import parted_shape, split_to_rest

@@ -12,8 +12,8 @@ from reflowshock.particles.ispg.collocation import collocate
 from reflowshock.particles.ispg.gripc_step import GripcStep
 from reflowshock.particles.ispg.mls import DegenerateStencil
 from reflowshock.particles.ispg.pressure_poisson import Poisson
-from reflowshock.particles.ispg.surface_pressure import force_pressure
-from reflowshock.particles.ispg.velocity_prediction import predict_velocity
+from reflowshock.particles.ispg.gripc_step import force_pressure
+from reflowshock.particles.ispg.pressure_poisson import predict_velocity
 from reflowshock.particles.parameters.effects import decide, drop_numbers, switched
 from reflowshock.particles.parameters.solder import Solder, SolderEffects, SolderNumerics
 from reflowshock.particles.reference.young_laplace import sessile_meridian

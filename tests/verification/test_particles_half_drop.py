@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from reflowshock.particles.parameters.solder import Solder, SolderEffects, SolderNumerics
-from reflowshock.particles.reference.damped_oscillation import fit_oscillation
+from reflowshock.particles.reference.rayleigh import fit_oscillation
 from reflowshock.particles.reference.rayleigh import rayleigh_frequency, viscous_oscillation
 from reflowshock.particles.scenes.reflow import build_physics
 from reflowshock.particles.steps.flow import LiquidFlow

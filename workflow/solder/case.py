@@ -2,8 +2,8 @@
 
 from pydantic import Field
 
-from reflowshock.particles.parameters.scene_drops import Drops
-from reflowshock.particles.parameters.scene_oscillation import Oscillation
+from reflowshock.particles.parameters.scenes import Drops
+from reflowshock.particles.parameters.scenes import Oscillation
 from reflowshock.particles.parameters.scenes import Drop, Fluid, Joint, Liquid
 from reflowshock.particles.parameters.solder import Solder, Switch
 from reflowshock.workflow.case.kind import Case, of_particles
