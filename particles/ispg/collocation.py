@@ -1,7 +1,9 @@
 """Strong-form operators at all particles by moving least squares, walls mirrored: what Hu et al. build eqs 12-28 from.
 
 With the linear basis values are those of the MLS shape functions, derivatives theirs (as printed); with the quadratic
-basis particles carry their own values, and derivatives are those of a fitted Taylor expansion.
+basis particles carry their own values, and derivatives are those of a fitted Taylor expansion. A stencil next to a wall
+sees images of the particles behind it: a scalar is even there and has no slope along the normal; of a velocity the
+component along the wall is even, the other one odd (free slip).
 """
 
 from collections.abc import Sequence
@@ -9,27 +11,17 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import sparse
 
 from reflowshock.arrays import Floats
 from reflowshock.particles.core.neighbours import NeighbourList
 from reflowshock.particles.core.plate import Plate
-
 from reflowshock.particles.ispg.mls import SUPPORT, derivatives, shape_functions
-
-from collections.abc import Sequence
-from dataclasses import dataclass
-
-import numpy as np
-from numpy.typing import NDArray
-from scipy import sparse
-
-from reflowshock.arrays import Floats
-from reflowshock.particles.core.plate import Plate
-
 
 # Particles nearer to a plate than this share of the reach lie on it: they are their own image.
 ON_PLATE = 1e-6
+Matrix: TypeAlias = sparse.csr_matrix
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,9 +77,6 @@ def mirror(points: Floats, plates: Sequence[Plate], reach: float) -> Ghosts:
         reflection = np.concatenate((reflection, flip @ reflection[near]))
     count = len(points)
     return Ghosts(all_points[count:], source[count:], reflection[count:])
-
-
-Matrix: TypeAlias = sparse.csr_matrix
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,9 +8,7 @@ from scipy import sparse
 
 from reflowshock.arrays import Floats
 from reflowshock.particles.core.neighbours import NeighbourList
-from reflowshock.particles.ispg.mls_quadratic import linear_weights
-from reflowshock.particles.ispg.mls_quadratic import quadratic_weights
-from reflowshock.particles.ispg.mls_quadratic import shape_weights
+from reflowshock.particles.ispg.mls_weights import linear_weights, quadratic_weights, shape_weights
 
 # Support radius in spacings: the quadratic fit needs at least 9 well placed neighbours at a wall, too.
 SUPPORT = {"linear": 2.0, "quadratic": 2.4}

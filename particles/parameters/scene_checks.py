@@ -8,11 +8,9 @@ from reflowshock.particles.parameters import checks
 from reflowshock.particles.parameters.checks import Problem, mm, mm3
 from reflowshock.particles.parameters.effects import acting_weight, decide_drop, decide_effects
 from reflowshock.particles.parameters.estimate import particle_count
-from reflowshock.particles.parameters.scenes import Drops
-from reflowshock.particles.parameters.scenes import Oscillation
-from reflowshock.particles.parameters.scenes import Drop, Joint
+from reflowshock.particles.parameters.scenes import Drop, Drops, Joint, Oscillation
 from reflowshock.particles.parameters.solder import Solder
-from reflowshock.particles.reference.rayleigh import lamb_decay_rate, rayleigh_frequency
+from reflowshock.particles.reference.drop_oscillation import lamb_decay_rate, rayleigh_frequency
 from reflowshock.particles.reference.young_laplace import NoMeridian, joint_meridian, sessile_meridian
 
 FEWEST_PER_EDGE = 5

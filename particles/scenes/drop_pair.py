@@ -8,8 +8,7 @@ from math import inf
 import numpy as np
 
 from reflowshock.particles.core.checkpoint import Checkpoint
-from reflowshock.particles.core.cloud import Cloud, box_cloud
-from reflowshock.particles.core.cloud import sphere_cloud
+from reflowshock.particles.core.cloud import Cloud, box_cloud, sphere_cloud
 from reflowshock.particles.core.surface_measure import centre_of_volume
 from reflowshock.particles.parameters.effects import Decision, acting_weight, decide_drop, switched
 from reflowshock.particles.parameters.scenes import Drops

@@ -9,7 +9,7 @@ from typing import Any
 from reflowshock.data_file import columns, fields_of, rows
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.checkpoint import Checkpoint
-from reflowshock.particles.scenes.split import collapsing, overlap, rebuild, touch
+from reflowshock.particles.scenes.rebuild import collapsing, overlap, rebuild, touch
 from reflowshock.particles.steps.flow import LiquidFlow, StepRecord
 from reflowshock.particles.steps.rest import CALM_STEPS, RECORDS, NoRest, StopRule, fraction_done, is_calm
 from reflowshock.particles.steps.shape import Snapshot

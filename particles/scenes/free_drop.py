@@ -1,4 +1,4 @@
-"""A free drop with inertia: at rest (Laplace pressure) or swinging in its second mode (Rayleigh)."""
+"""A free drop with inertia: at rest (Laplace pressure) or oscillating in its second mode (Rayleigh)."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -14,27 +14,16 @@ from reflowshock.data_file import fields_of
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.checkpoint import Checkpoint
 from reflowshock.particles.core.cloud import sphere_cloud
+from reflowshock.particles.parameters.scenes import Oscillation, rayleigh_period
 from reflowshock.particles.parameters.solder import Solder
-from reflowshock.particles.reference.rayleigh import fit_oscillation
-from reflowshock.particles.reference.rayleigh import rayleigh_frequency, viscous_oscillation
+from reflowshock.particles.reference.drop_oscillation import fit_oscillation, rayleigh_frequency, viscous_oscillation
+from reflowshock.particles.scenes.metrics import Metrics
 from reflowshock.particles.scenes.reflow import build_physics
 from reflowshock.particles.steps.flow import FLOW_RECORDS
 from reflowshock.particles.steps.inertial_step import InertialFlow
-from reflowshock.particles.steps.shape import Snapshot
-from reflowshock.particles.surface.surface_quality import vertex_normals
-
-from collections.abc import Callable
-
-import numpy as np
-
-from reflowshock.particles.core.checkpoint import Checkpoint
-from reflowshock.particles.parameters.scenes import Oscillation, rayleigh_period
-from reflowshock.particles.parameters.solder import Solder
-from reflowshock.particles.scenes.free_drop import solve_free_drop
-from reflowshock.particles.scenes.metrics import Metrics
-from reflowshock.particles.steps.shape import JointShape
+from reflowshock.particles.steps.shape import JointShape, Snapshot
 from reflowshock.particles.steps.time_step import capillary_limit
-
+from reflowshock.particles.surface.surface_quality import vertex_normals
 
 METRICS = (
     "period",
@@ -45,50 +34,6 @@ METRICS = (
     "particles",
     "particle_steps_per_second",
 )
-
-
-def solve_oscillation(
-    scene: Oscillation,
-    solder: Solder,
-    progress: Callable[[float], None] | None = None,
-    checkpoint: Checkpoint | None = None,
-) -> JointShape:
-    """Let a drop swing: its shape at the end, history and snapshots in time.
-
-    Args:
-        scene: volume, amplitude, duration and resolution.
-        solder: the same volume, and fluid.
-        progress: called with the fraction done.
-        checkpoint: where the run continues from, to the last bit, and leaves its state.
-
-    Raises:
-        SolveFailed: a linear solve failed.
-    """
-    drop = solve_free_drop(solder, scene.amplitude, scene.periods, scene.steps_per_period, progress, checkpoint)
-    steps = len(drop.history["time"]) - 1
-    limit = capillary_limit(solder.density, solder.numerics.spacing, solder.surface_tension)
-    largest = rayleigh_period(scene, solder) / scene.steps_per_period
-    metrics: Metrics = {name: drop.metrics[name] for name in METRICS}
-    metrics |= {
-        "amplitude": (float(np.abs(drop.history["amplitude"]).max()), ""),
-        "time_step_over_capillary_limit": (largest / limit, ""),
-        "steps": (float(steps), ""),
-        "seconds": (steps * len(drop.points) / drop.metrics["particle_steps_per_second"][0], "s"),
-    }
-    return JointShape(
-        points=drop.points,
-        velocity=drop.velocity,
-        pressure=drop.pressure,
-        surface_points=drop.surface_points,
-        triangles=drop.triangles,
-        rings=(),
-        history=drop.history,
-        snapshots=drop.snapshots,
-        metrics=metrics,
-        verdict="ok",
-    )
-
-
 EFFECTS = {"surface_tension": True, "gravity": False, "wall_adhesion": False, "inertia": True}
 COLUMNS = ("time", "amplitude", "energy", "kinetic_energy", "volume", "momentum")
 # Ways to the rest of the polyhedron, whose vertices are not quite on a sphere; the step in radians of the second mode.
@@ -284,3 +229,45 @@ def _swing_metrics(solder: Solder, history: dict[str, Floats]) -> dict[str, tupl
         "period_error": (exact_frequency / frequency - 1.0, ""),
         "decay_rate_error": (decay / exact_decay - 1.0, ""),
     }
+
+
+def solve_oscillation(
+    scene: Oscillation,
+    solder: Solder,
+    progress: Callable[[float], None] | None = None,
+    checkpoint: Checkpoint | None = None,
+) -> JointShape:
+    """Let a drop swing: its shape at the end, history and snapshots in time.
+
+    Args:
+        scene: volume, amplitude, duration and resolution.
+        solder: the same volume, and fluid.
+        progress: called with the fraction done.
+        checkpoint: where the run continues from, to the last bit, and leaves its state.
+
+    Raises:
+        SolveFailed: a linear solve failed.
+    """
+    drop = solve_free_drop(solder, scene.amplitude, scene.periods, scene.steps_per_period, progress, checkpoint)
+    steps = len(drop.history["time"]) - 1
+    limit = capillary_limit(solder.density, solder.numerics.spacing, solder.surface_tension)
+    largest = rayleigh_period(scene, solder) / scene.steps_per_period
+    metrics: Metrics = {name: drop.metrics[name] for name in METRICS}
+    metrics |= {
+        "amplitude": (float(np.abs(drop.history["amplitude"]).max()), ""),
+        "time_step_over_capillary_limit": (largest / limit, ""),
+        "steps": (float(steps), ""),
+        "seconds": (steps * len(drop.points) / drop.metrics["particle_steps_per_second"][0], "s"),
+    }
+    return JointShape(
+        points=drop.points,
+        velocity=drop.velocity,
+        pressure=drop.pressure,
+        surface_points=drop.surface_points,
+        triangles=drop.triangles,
+        rings=(),
+        history=drop.history,
+        snapshots=drop.snapshots,
+        metrics=metrics,
+        verdict="ok",
+    )

@@ -22,7 +22,7 @@ from reflowshock.particles.core.neighbours import NeighbourList
 from reflowshock.particles.core.plate import slide
 from reflowshock.particles.core.surface_measure import centre_of_volume, ring_area, surface_flux
 from reflowshock.particles.core.symmetry import fold
-from reflowshock.particles.discretisation.discretisation_tetrahedra import Discretisation
+from reflowshock.particles.discretisation.discretisation import Discretisation
 from reflowshock.particles.discretisation.lagged_multigrid import LaggedMultigrid
 from reflowshock.particles.discretisation.volume_constraint import solve_volume
 from reflowshock.particles.physics.physics import Physics

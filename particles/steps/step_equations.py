@@ -1,14 +1,9 @@
-"""The linear equations of one step: forces, implicit operators, constraints, in the velocities that walls admit."""
+"""The linear equations of one step: forces, implicit operators, constraints, in the velocities that walls admit.
 
-import numpy as np
-from scipy import sparse
-
-from reflowshock.arrays import Floats
-from reflowshock.particles.core.body import Body
-from reflowshock.particles.discretisation.discretisation_tetrahedra import Discretisation
-from reflowshock.particles.discretisation.incompressibility import SaddlePoint
-from reflowshock.particles.physics.physics import Physics
-
+Admissible velocities are v = B q + v0, q the degrees of freedom. A particle off the walls has three, one on a wall two
+along its plate (free slip), one that an edge holds none; a floating plate has its own and takes along what it carries.
+v0 is the part that prescribed motion gives.
+"""
 
 from collections.abc import Callable, Sequence
 
@@ -20,6 +15,9 @@ from reflowshock.arrays import Floats
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.plate import slide
 from reflowshock.particles.core.symmetry import on_plane
+from reflowshock.particles.discretisation.discretisation import Discretisation
+from reflowshock.particles.discretisation.incompressibility import SaddlePoint
+from reflowshock.particles.physics.physics import Physics
 from reflowshock.particles.physics.plate_motion import PlateMotion
 
 

@@ -8,8 +8,7 @@ from reflowshock.arrays import Floats, Indices
 from reflowshock.particles.core.cloud import Cloud, equal_area_radius
 from reflowshock.particles.core.plate import Plate
 from reflowshock.particles.core.surface_measure import volume_and_gradient
-from reflowshock.particles.surface.level_set import LevelSet
-from reflowshock.particles.surface.level_set import extract_surface, relax
+from reflowshock.particles.surface.level_set import LevelSet, extract_surface, relax
 
 DEPTH = 0.75
 SNAP_SPACINGS = 0.5  # the net rounds the edge between a surface and its mirror image by less

@@ -7,8 +7,7 @@ import pytest
 from reflowshock.meshing.joint import levels
 from reflowshock.meshing.joint.joint_place import JointPlace
 from reflowshock.meshing.surface import user_surface
-from reflowshock.particles.physics.force_gravity import Gravity
-from reflowshock.particles.physics.force_gravity import Wetting
+from reflowshock.particles.physics.forces import Gravity, Wetting
 from reflowshock.particles.steps.inertial_step import InertialFlow
 from reflowshock.workflow.stress_test.command import HARD
 from reflowshock.workflow.stress_test.hard_case import read_hard_cases

@@ -9,11 +9,9 @@ import pytest
 from reflowshock.particles.core.cloud import box_cloud
 from reflowshock.particles.core.plate import Plate
 from reflowshock.particles.ispg.collocation import collocate
-from reflowshock.particles.ispg.gripc_step import GripcStep
+from reflowshock.particles.ispg.gripc_step import GripcStep, force_pressure
 from reflowshock.particles.ispg.mls import DegenerateStencil
-from reflowshock.particles.ispg.pressure_poisson import Poisson
-from reflowshock.particles.ispg.gripc_step import force_pressure
-from reflowshock.particles.ispg.pressure_poisson import predict_velocity
+from reflowshock.particles.ispg.projection import Poisson, predict_velocity
 from reflowshock.particles.parameters.effects import decide, drop_numbers, switched
 from reflowshock.particles.parameters.solder import Solder, SolderEffects, SolderNumerics
 from reflowshock.particles.reference.young_laplace import sessile_meridian

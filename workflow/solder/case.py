@@ -2,9 +2,7 @@
 
 from pydantic import Field
 
-from reflowshock.particles.parameters.scenes import Drops
-from reflowshock.particles.parameters.scenes import Oscillation
-from reflowshock.particles.parameters.scenes import Drop, Fluid, Joint, Liquid
+from reflowshock.particles.parameters.scenes import Drop, Drops, Fluid, Joint, Liquid, Oscillation
 from reflowshock.particles.parameters.solder import Solder, Switch
 from reflowshock.workflow.case.kind import Case, of_particles
 from reflowshock.workflow.case.problems import Problem

@@ -1,22 +1,9 @@
-"""A joint whose neck has collapsed becomes two drops, one on each pad."""
+"""Bodies made anew: two that touch become one, one whose triangles have collapsed gets even ones, and a joint whose neck
+has collapsed becomes two drops, one on each pad.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-
-import numpy as np
-
-from reflowshock.particles.core.body import Body
-from reflowshock.particles.core.plate import Plate
-from reflowshock.particles.scenes.metrics import Metrics, particle_pressure
-
-from reflowshock.particles.steps.flow import LiquidFlow
-from reflowshock.particles.steps.rest import Run, StopRule, run_to_rest
-from reflowshock.particles.steps.shape import JointShape, numbered_on, together
-from reflowshock.particles.surface.cloud_level_set import cloud_from_level_set
-from reflowshock.particles.surface.level_set import Grid, LevelSet, signed_distance
-from reflowshock.particles.surface.profile import Profile, fit_profile
-
-from collections.abc import Sequence
 from itertools import combinations
 
 import numpy as np
@@ -26,9 +13,13 @@ from reflowshock.arrays import Floats, Indices
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.plate import Plate
 from reflowshock.particles.core.surface_measure import centre_of_volume
+from reflowshock.particles.scenes.metrics import Metrics, particle_pressure
+from reflowshock.particles.steps.flow import LiquidFlow
+from reflowshock.particles.steps.rest import Run, StopRule, run_to_rest
+from reflowshock.particles.steps.shape import JointShape, numbered_on, together
 from reflowshock.particles.surface.cloud_level_set import CannotRebuild, cloud_from_level_set
 from reflowshock.particles.surface.level_set import Grid, LevelSet, depths, signed_distance, smooth_union
-
+from reflowshock.particles.surface.profile import Profile, fit_profile
 
 CONTACT_SPACINGS = 1.0
 NECK_SPACINGS = 2.5  # a gap narrower than half of this closes: wider than the contact distance, so a neck always forms
@@ -36,6 +27,10 @@ CLOSING_SPACINGS = 0.5
 VELOCITY_NEIGHBOURS = 4
 SHORTEST_EDGE = 0.25
 LOWEST_QUALITY = 0.25
+# A neck nearer to a plate than this leaves no drop there that particles could fill.
+FEWEST_SPACINGS = 2.0
+KEPT_METRICS = ("volume", "volume_drift", "standoff", "steps", "seconds", "time_step_over_capillary_limit")
+Flowed = tuple[LiquidFlow, Run]
 
 
 def touch(first: Body, second: Body) -> bool:
@@ -142,13 +137,6 @@ def _common_velocity(body: Body, parts: Sequence[Body]) -> Floats:
     new += (momentum - (body.volumes[:, None] * new).sum(axis=0)) / body.volumes.sum()
     new[body.cloud.wall >= 0, 2] = 0.0
     return new
-
-
-# A neck nearer to a plate than this leaves no drop there that particles could fill.
-FEWEST_SPACINGS = 2.0
-KEPT_METRICS = ("volume", "volume_drift", "standoff", "steps", "seconds", "time_step_over_capillary_limit")
-
-Flowed = tuple[LiquidFlow, Run]
 
 
 def split_to_rest(flow: LiquidFlow, rule: StopRule, start: Callable[[Body], LiquidFlow]) -> list[Flowed]:

@@ -1,8 +1,9 @@
-"""What a wall does to the liquid that slides on it: nothing (free slip), a friction (Navier slip), or it holds it.
+"""Implicit operators of a step: mass and inertia, viscosity, and what a wall does to the liquid that slides on it.
 
-Navier's condition: the shear stress on the wall is mu / b times the velocity relative to the plate, b the slip length,
-the depth below the wall at which the flow, continued linearly, would rest. Contact lines stay mobile without slip, too:
-there the stress of a line that moves would be infinite (Huh & Scriven 1971).
+A wall does nothing (free slip), exerts a friction (Navier slip), or holds the liquid. Navier's condition: the shear
+stress on the wall is mu / b times the velocity relative to the plate, b the slip length, the depth below the wall at
+which the flow, continued linearly, would rest. Contact lines stay mobile without slip, too: there the stress of a line
+that moves would be infinite (Huh & Scriven 1971).
 """
 
 from dataclasses import dataclass
@@ -13,47 +14,7 @@ from scipy import sparse
 
 from reflowshock.arrays import Floats
 from reflowshock.particles.core.body import Body
-from reflowshock.particles.discretisation.discretisation_tetrahedra import Discretisation
-
-from dataclasses import dataclass
-
-from scipy import sparse
-
-from reflowshock.arrays import Floats
-from reflowshock.particles.core.body import Body
-from reflowshock.particles.discretisation.discretisation_tetrahedra import Discretisation
-
-from dataclasses import dataclass
-
-from scipy import sparse
-
-from reflowshock.particles.core.body import Body
-from reflowshock.particles.discretisation.discretisation_tetrahedra import Discretisation
-
-
-@dataclass(frozen=True, slots=True)
-class Viscosity:
-    """Newtonian viscosity.
-
-    Attributes:
-        coefficient: dynamic viscosity mu [Pa s].
-    """
-
-    coefficient: float
-
-    def matrix(self, _body: Body, space: Discretisation, _time_step: float) -> sparse.csr_matrix:
-        """Matrix of the virtual power, `(3 n, 3 n)` [kg/s], components one after the other.
-
-        With D = (grad v + grad v^T) / 2:
-        2 mu D : D = mu (grad v : grad v + grad v : grad v^T). Symmetric, positive semidefinite, zero for rigid motion.
-        """
-        gradient = space.gradient
-        weight = sparse.diags(self.coefficient * space.weights)
-        full = sum(component.T @ weight @ component for component in gradient)
-        blocks = [[gradient[j].T @ weight @ gradient[i] for j in range(3)] for i in range(3)]
-        for i in range(3):
-            blocks[i][i] = blocks[i][i] + full
-        return sparse.bmat(blocks, format="csr")
+from reflowshock.particles.discretisation.discretisation import Discretisation
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,6 +45,31 @@ class Inertia:
     def load(self, body: Body, space: Discretisation, time_step: float) -> Floats:
         """M v_n / dt, `(n, 3)` [N]."""
         return self.density / time_step * (space.mass @ body.velocity)
+
+
+@dataclass(frozen=True, slots=True)
+class Viscosity:
+    """Newtonian viscosity.
+
+    Attributes:
+        coefficient: dynamic viscosity mu [Pa s].
+    """
+
+    coefficient: float
+
+    def matrix(self, _body: Body, space: Discretisation, _time_step: float) -> sparse.csr_matrix:
+        """Matrix of the virtual power, `(3 n, 3 n)` [kg/s], components one after the other.
+
+        With D = (grad v + grad v^T) / 2:
+        2 mu D : D = mu (grad v : grad v + grad v : grad v^T). Symmetric, positive semidefinite, zero for rigid motion.
+        """
+        gradient = space.gradient
+        weight = sparse.diags(self.coefficient * space.weights)
+        full = sum(component.T @ weight @ component for component in gradient)
+        blocks = [[gradient[j].T @ weight @ gradient[i] for j in range(3)] for i in range(3)]
+        for i in range(3):
+            blocks[i][i] = blocks[i][i] + full
+        return sparse.bmat(blocks, format="csr")
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,26 +1,12 @@
-"""The equations of the pressure in the seed's scheme (Hu et al., eqs 5-7 and 20-24), in strong form."""
+"""The projection of the paper's scheme, in strong form: velocity prediction (Hu et al., eqs 3 and 12-17), rotational
+pressure correction (eqs 5-7 and 20-24), and the momentum-consistent smoothing of velocities (eqs 27-29), which
+dissipates what the approximation cannot show.
+"""
 
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
-
-from reflowshock.arrays import Floats
-
-from reflowshock.particles.ispg.collocation import Operators
-
-from reflowshock.arrays import Floats
-
-from reflowshock.particles.ispg.collocation import Operators
-
-from dataclasses import dataclass
-
-from scipy import sparse
-
-from reflowshock.arrays import Floats
-
-import numpy as np
 from petsc4py import PETSc
 from scipy import sparse
 
@@ -32,78 +18,12 @@ from reflowshock.particles.discretisation.incompressibility import (
     SolveFailed,
     to_petsc,
 )
-
+from reflowshock.particles.ispg.collocation import Operators
 
 # Shape functions of the linear basis average: fast oscillating coefficients hardly show in values or derivatives, so
 # that multigrid and incomplete factors stall (200 iterations leave a residual above 1e-3 at 1728 particles).
 PRECONDITIONER = {"quadratic": (PETSc.PC.Type.HYPRE, None), "linear": (PETSc.PC.Type.LU, "mumps")}
-
-
-def solve_gmres(matrix: sparse.csr_matrix, right: Floats, basis: str) -> tuple[Floats, int]:
-    """Solve A x = b, each row scaled by its largest entry: algebraic multigrid, with the linear basis exact factors.
-
-    Args:
-        matrix: `(d, d)`.
-        right: `(d,)`.
-        basis: that the matrix is made with.
-
-    Returns:
-        x `(d,)` and the number of iterations.
-
-    Raises:
-        SolveFailed: the true residual of the scaled system stays above the limit.
-    """
-    scale = 1.0 / abs(matrix).max(axis=1).toarray().ravel()
-    scaled, load = (sparse.diags(scale) @ matrix).tocsr(), scale * right
-    solver = PETSc.KSP().create(PETSc.COMM_SELF)
-    solver.setOperators(to_petsc(scaled))
-    solver.setType(PETSc.KSP.Type.GMRES)
-    solver.setGMRESRestart(MAX_ITERATIONS)
-    solver.setPCSide(PETSc.PC.Side.RIGHT)
-    solver.setTolerances(rtol=RELATIVE_TOLERANCE, max_it=MAX_ITERATIONS)
-    kind, package = PRECONDITIONER[basis]
-    solver.getPC().setType(kind)
-    if package is not None:
-        solver.getPC().setFactorSolverType(package)
-    solution, known = solver.getOperators()[0].createVecs()
-    known.setArray(load)
-    solver.solve(known, solution)
-    found, iterations = solution.getArray().copy(), solver.getIterationNumber()
-    residual = float(np.linalg.norm(scaled @ found - load)) / (float(np.linalg.norm(load)) or 1.0)
-    if not residual < RESIDUAL_LIMIT:
-        raise SolveFailed(
-            f"GMRES: relative residual {residual:.2e} above {RESIDUAL_LIMIT:g} after {iterations} iterations "
-            f"(PETSc reason {solver.getConvergedReason()})"
-        )
-    return found, iterations
-
-
 RELAXATION = 0.5
-
-
-@dataclass(frozen=True, slots=True)
-class Velocities:
-    """What the smoothing keeps from step to step, `(3 n,)` each, by component [m/s].
-
-    Attributes:
-        coefficients: V of the approximation.
-        unsmoothed: u of the particles, which carry the momentum.
-    """
-
-    coefficients: Floats
-    unsmoothed: Floats
-
-
-def smooth(last: Velocities, coefficients: Floats, smoothing: sparse.csr_matrix) -> Velocities:
-    """Velocities after a step, eq 28: u_new = (1 - a) (u + S (V_new - V)) + a S V_new, a = 0.5.
-
-    Args:
-        last: velocities before the step.
-        coefficients: V_new `(3 n,)` [m/s].
-        smoothing: S, `(3 n, 3 n)`.
-    """
-    kept = last.unsmoothed + smoothing @ (coefficients - last.coefficients)
-    return Velocities(coefficients, (1.0 - RELAXATION) * kept + RELAXATION * (smoothing @ coefficients))
 
 
 def predict_velocity(
@@ -196,3 +116,67 @@ def correct_pressure(
     last = poisson.operators.values @ pressure - viscosity * divergence
     potential, iterations = poisson.solve(inertia * divergence, given - last)
     return Correction(potential, poisson.operators.values @ potential + last, iterations)
+
+
+@dataclass(frozen=True, slots=True)
+class Velocities:
+    """What the smoothing keeps from step to step, `(3 n,)` each, by component [m/s].
+
+    Attributes:
+        coefficients: V of the approximation.
+        unsmoothed: u of the particles, which carry the momentum.
+    """
+
+    coefficients: Floats
+    unsmoothed: Floats
+
+
+def smooth(last: Velocities, coefficients: Floats, smoothing: sparse.csr_matrix) -> Velocities:
+    """Velocities after a step, eq 28: u_new = (1 - a) (u + S (V_new - V)) + a S V_new, a = 0.5.
+
+    Args:
+        last: velocities before the step.
+        coefficients: V_new `(3 n,)` [m/s].
+        smoothing: S, `(3 n, 3 n)`.
+    """
+    kept = last.unsmoothed + smoothing @ (coefficients - last.coefficients)
+    return Velocities(coefficients, (1.0 - RELAXATION) * kept + RELAXATION * (smoothing @ coefficients))
+
+
+def solve_gmres(matrix: sparse.csr_matrix, right: Floats, basis: str) -> tuple[Floats, int]:
+    """Solve A x = b, each row scaled by its largest entry: algebraic multigrid, with the linear basis exact factors.
+
+    Args:
+        matrix: `(d, d)`.
+        right: `(d,)`.
+        basis: that the matrix is made with.
+
+    Returns:
+        x `(d,)` and the number of iterations.
+
+    Raises:
+        SolveFailed: the true residual of the scaled system stays above the limit.
+    """
+    scale = 1.0 / abs(matrix).max(axis=1).toarray().ravel()
+    scaled, load = (sparse.diags(scale) @ matrix).tocsr(), scale * right
+    solver = PETSc.KSP().create(PETSc.COMM_SELF)
+    solver.setOperators(to_petsc(scaled))
+    solver.setType(PETSc.KSP.Type.GMRES)
+    solver.setGMRESRestart(MAX_ITERATIONS)
+    solver.setPCSide(PETSc.PC.Side.RIGHT)
+    solver.setTolerances(rtol=RELATIVE_TOLERANCE, max_it=MAX_ITERATIONS)
+    kind, package = PRECONDITIONER[basis]
+    solver.getPC().setType(kind)
+    if package is not None:
+        solver.getPC().setFactorSolverType(package)
+    solution, known = solver.getOperators()[0].createVecs()
+    known.setArray(load)
+    solver.solve(known, solution)
+    found, iterations = solution.getArray().copy(), solver.getIterationNumber()
+    residual = float(np.linalg.norm(scaled @ found - load)) / (float(np.linalg.norm(load)) or 1.0)
+    if not residual < RESIDUAL_LIMIT:
+        raise SolveFailed(
+            f"GMRES: relative residual {residual:.2e} above {RESIDUAL_LIMIT:g} after {iterations} iterations "
+            f"(PETSc reason {solver.getConvergedReason()})"
+        )
+    return found, iterations

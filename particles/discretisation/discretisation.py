@@ -1,4 +1,4 @@
-"""Linear velocity and linear pressure on tetrahedra of the particles, for motion with inertia.
+"""What a step needs of space, and how tetrahedra of the particles give it: linear velocity and linear pressure.
 
 The rows of the constraint are the gradients of the dual volumes, a quarter of the tetrahedra around a particle. They
 add up to the gradient of the enclosed volume, so a uniform pressure balances the surface exactly as in the statics, and
@@ -17,12 +17,10 @@ from reflowshock.arrays import Floats, Indices
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.tetrahedra import SMALLEST_VOLUME, cell_volumes, thick_cells, volume_gradients
 
-
-from dataclasses import dataclass
-
-from scipy import sparse
-
-from reflowshock.arrays import Floats
+STABILISATION = 0.05
+DIFFUSION = 4.0
+# Share of its first volume below which a tetrahedron is worn out.
+WORN = 0.2
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,12 +44,6 @@ class Discretisation:
     volume_share: Floats
     stabilisation: sparse.csr_matrix | None = None
     diffusion_rate: float = 0.0
-
-
-STABILISATION = 0.05
-DIFFUSION = 4.0
-# Share of its first volume below which a tetrahedron is worn out.
-WORN = 0.2
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,26 +1,13 @@
-"""Weights of the quadratic basis: Taylor expansion to second order about the particle, fitted to differences.
+"""Weights of moving least squares: values and derivatives of the linear basis, derivatives of the quadratic one.
 
-Generalised finite differences: the gradient is of order 2, the Laplacian of order 1 (2 on symmetric stencils).
+Linear (Hu et al., eqs 11, 21-23): the shape functions average, they do not interpolate; the gradient converges, the
+Laplacian does not (its relative error stays at every spacing). Quadratic: a Taylor expansion to second order about the
+particle, fitted to differences (generalised finite differences); the gradient is of order 2, the Laplacian of order 1
+(2 on symmetric stencils). The small dense systems of a stencil are solved by Cholesky factors.
 """
 
 import numpy as np
 from numba import njit
-
-
-
-import numpy as np
-from numba import njit
-
-
-
-import numpy as np
-from numba import njit
-
-
-
-import numpy as np
-from numba import njit
-
 
 PIVOT_FLOOR = 1e-9
 
