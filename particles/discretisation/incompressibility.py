@@ -88,7 +88,7 @@ def _cholesky(matrix: sparse.csr_matrix) -> PETSc.KSP:
     return solver
 
 
-class _Inverse:
+class _FactoredInverse:
     """x -> A^-1 x on NumPy vectors; only the rows that A couples are factored."""
 
     def __init__(self, matrix: sparse.csr_matrix) -> None:
@@ -113,7 +113,7 @@ class _Inverse:
 class _Schur:
     """PETSc shell of C A^-1 C^T + S."""
 
-    def __init__(self, problem: SaddlePoint, inverse: _Inverse) -> None:
+    def __init__(self, problem: SaddlePoint, inverse: _FactoredInverse) -> None:
         self._problem, self._transposed, self._inverse = problem, problem.constraint.T.tocsr(), inverse
 
     def mult(self, _matrix: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
@@ -134,7 +134,7 @@ def solve(problem: SaddlePoint) -> Solution:
         SolveFailed: the true residual of either equation stays above the limit.
     """
     operator, constraint = problem.operator, problem.constraint
-    inverse = _Inverse(operator)
+    inverse = _FactoredInverse(operator)
     lumped = constraint @ sparse.diags(1.0 / operator.diagonal()) @ constraint.T
     if problem.stabilisation is not None:
         lumped = lumped + problem.stabilisation

@@ -17,7 +17,7 @@ RELATIVE_TOLERANCE = 1e-10
 MAX_ITERATIONS = 2000
 
 
-class _Inverse:
+class _IterativeInverse:
     """x -> A^-1 x by conjugate gradients and an incomplete factorisation."""
 
     def __init__(self, matrix: sparse.csr_matrix) -> None:
@@ -60,7 +60,7 @@ def solve_volume(problem: SaddlePoint) -> Solution:
     Raises:
         SolveFailed: the true residual of either equation stays above the limit.
     """
-    inverse, slope = _Inverse(problem.operator), problem.constraint.toarray().ravel()
+    inverse, slope = _IterativeInverse(problem.operator), problem.constraint.toarray().ravel()
     loaded = inverse(problem.load)
     reason = inverse.reason
     pressed = inverse(slope)

@@ -90,7 +90,7 @@ def shape_weights(rows, points, offsets, indices, support):
 
 @njit(cache=True)
 def linear_weights(rows, points, offsets, indices, support):
-    """First and second derivatives of the linear MLS shape functions at the particle, columns as above.
+    """First and second derivatives of the linear MLS shape functions at the particle; columns as below.
 
     psi_J = b . p_J w_J with M b = p; derivatives of b from M b,i = p,i - M,i b and
     M b,ii = -2 M,i b,i - M,ii b (Belytschko et al. 1996). Offsets are in units of the support radius.

@@ -1,6 +1,7 @@
-"""The projection of the paper's scheme, in strong form: velocity prediction (Hu et al., eqs 3 and 12-17), rotational
-pressure correction (eqs 5-7 and 20-24), and the momentum-consistent smoothing of velocities (eqs 27-29), which
-dissipates what the approximation cannot show.
+"""The projection of the paper's ISPG scheme, in strong form.
+
+Velocity prediction (Hu et al., eqs 3 and 12-17), rotational pressure correction (eqs 5-7 and 20-24), and the
+momentum-consistent smoothing of velocities (eqs 27-29), which dissipates what the approximation cannot show.
 """
 
 from dataclasses import dataclass

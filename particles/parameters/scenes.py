@@ -1,5 +1,4 @@
-"""Scenes of solder alone, their parameters in SI floats: a drop on a wall or pad, a joint between two pads, two drops
-side by side, a free drop that oscillates.
+"""Scenes of solder alone, their parameters in SI floats: a drop, a joint, two drops, a free drop that oscillates.
 
 A scene is resolved into the `Solder` and the geometry that the solvers take.
 """

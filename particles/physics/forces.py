@@ -1,4 +1,4 @@
-"""Conservative forces on the free surface, each the gradient of its own energy: surface tension, gravity, wall adhesion.
+"""Conservative forces on the free surface, gradients of their energies: surface tension, gravity, wall adhesion.
 
 The weight of an incompressible body is a hydrostatic load on its boundary; wetting a wall gains gamma cos(theta) a unit
 area.

@@ -1,6 +1,4 @@
-"""Small oscillations of a free drop: Rayleigh's frequency, Lamb's damping, both exactly for any viscosity, and a fit to
-samples.
-"""
+"""Small oscillations of a free drop: Rayleigh's frequency, Lamb's damping, both at any viscosity, a fit."""
 
 from cmath import sqrt as complex_sqrt
 from math import sqrt

@@ -1,5 +1,6 @@
-"""Bodies made anew: two that touch become one, one whose triangles have collapsed gets even ones, and a joint whose neck
-has collapsed becomes two drops, one on each pad.
+"""Bodies made anew: two that touch become one, one whose triangles have collapsed gets even ones, a joint is split.
+
+A joint whose neck has collapsed becomes two drops, one on each pad.
 """
 
 from collections.abc import Callable, Sequence

@@ -1,4 +1,4 @@
-"""Signed distance to closed triangle surfaces on a grid, the smooth union of two liquids, and the triangles of its surface."""
+"""Signed distance to closed triangle surfaces on a grid, the smooth union of two liquids, its surface."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
