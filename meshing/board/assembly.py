@@ -27,6 +27,21 @@ from reflowshock.meshing.board.parameters import Board, Package
 from reflowshock.meshing.board.plan import blocks_within, board_plan, footprint, hole_rings, package_plan, patch
 from reflowshock.meshing.core.gmsh_session import gmsh_model, name_groups, write_msh
 
+from pathlib import Path
+
+from reflowshock.meshing.board.assembly import write_assembly
+from reflowshock.meshing.board.parameters import Board, Package
+
+
+COARSE = 2.0  # thicknesses of the board
+
+
+def write_heated_assembly(package: Package, board: Board, path: Path) -> dict[str, int]:
+    """Mesh board and package for a reflow; package, and grid of the board below it, are those of ``write_assembly``."""
+    coarse = max(board.numerics.coarse_size, COARSE * board.thickness)
+    numerics = board.numerics.model_copy(update={"layers": 2, "patch_layers": 1, "coarse_size": coarse})
+    return write_assembly(package, board.model_copy(update={"numerics": numerics}), path)
+
 
 def write_assembly(package: Package, board: Board, path: Path) -> dict[str, int]:
     """Mesh board and package, both flat, and write them as Gmsh 4.1 in metres.

@@ -6,9 +6,90 @@ from dataclasses import dataclass
 import numpy as np
 
 from reflowshock.meshing.core.hexahedra import volumes
-from reflowshock.meshing.core.section import cut_segments, radius_by_angle, section_area, section_centroid
-from reflowshock.meshing.joint.butterfly import Butterfly
+from reflowshock.meshing.core.outlines import cut_segments, radius_by_angle, section_area, section_centroid
+
 from reflowshock.meshing.surface.closed_surface import ClosedSurface, enclosed_volume, pad_planes
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from reflowshock.meshing.board.parameters import JointNumerics
+from reflowshock.meshing.joint.levels import butterfly
+from reflowshock.meshing.joint.levels import Placing, layer_cells, solder_levels
+from reflowshock.meshing.joint.solder import Solder, WettedFace
+from reflowshock.meshing.surface.closed_surface import ClosedSurface, pad_planes
+
+
+def swept_solder(surface: ClosedSurface, numerics: JointNumerics, place: Placing, overhang: float = 0.0) -> Solder:
+    """Sweep hexahedra through a body; arguments and errors as ``solder_levels``."""
+    section = butterfly(numerics.core, numerics.rings)
+    levels = solder_levels(surface, section, numerics.layers, place, overhang)
+    count = len(section.points)
+    top = numerics.layers * count
+    faces = (
+        WettedFace("board", section.quads, section.rim),
+        WettedFace("package", section.quads + top, section.rim + top),
+    )
+    cells = layer_cells(section.quads, count, numerics.layers)
+    return Solder(levels.points.reshape(-1, 3), cells, faces, levels.volume, levels.scale, pad_planes(surface))
+
+
+# Half-diagonal and half-side of the core on the unit disc: between a circle (equal) and a square (ratio sqrt 2).
+CORE_DIAGONAL, CORE_SIDE = 0.60, 0.50
+
+
+@dataclass(frozen=True, slots=True)
+class Butterfly:
+    """A section of the unit disc: points (n, 2), quads (q, 4) counter-clockwise, rim (4 core,) nodes of the outline."""
+
+    points: np.ndarray
+    quads: np.ndarray
+    rim: np.ndarray
+
+
+def butterfly(core: int, rings: int) -> Butterfly:
+    """Build the section with core x core quads inside ``rings`` rings of 4 core quads each; without, it fills all."""
+    outline = _core_outline(core)
+    inner = _core_points(core, CORE_DIAGONAL, CORE_SIDE) if rings else _core_points(core, 1.0, 1.0)
+    if not rings:
+        inner[outline] /= np.linalg.norm(inner[outline], axis=1, keepdims=True)
+    angles = -0.75 * np.pi + 0.5 * np.pi * np.arange(4 * core) / core
+    circle = np.column_stack([np.cos(angles), np.sin(angles)])
+    layers = [inner[outline] + share * (circle - inner[outline]) for share in np.arange(1, rings + 1) / rings]
+    ids = [outline] + [len(inner) + ring * len(outline) + np.arange(len(outline)) for ring in range(rings)]
+    quads = [_core_quads(core)] + [
+        np.column_stack([low, high, np.roll(high, -1), np.roll(low, -1)]) for low, high in pairwise(ids)
+    ]
+    return Butterfly(np.vstack([inner, *layers]), np.vstack(quads), ids[-1])
+
+
+def circumradius(sides: int) -> float:
+    """Return the distance of the corners from the centre of a regular polygon that has the unit disc's area."""
+    angle = 2.0 * np.pi / sides
+    return float(np.sqrt(angle / np.sin(angle)))
+
+
+def _core_points(core: int, diagonal: float, side: float) -> np.ndarray:
+    """Square grid of given half-diagonal and half-side: its sides are bent outwards towards the circle."""
+    steps = np.linspace(-1.0, 1.0, core + 1)
+    x, y = np.meshgrid(steps, steps)
+    corner = diagonal / np.sqrt(2.0)
+    bend = side - corner
+    return np.column_stack([(x * (corner + bend * (1.0 - y**2))).ravel(), (y * (corner + bend * (1.0 - x**2))).ravel()])
+
+
+def _core_outline(core: int) -> np.ndarray:
+    """Outline nodes of the core, counter-clockwise from the corner at (-1, -1)."""
+    grid = np.arange((core + 1) ** 2).reshape(core + 1, core + 1)
+    return np.concatenate([grid[0, :-1], grid[:-1, -1], grid[-1, :0:-1], grid[:0:-1, 0]])
+
+
+def _core_quads(core: int) -> np.ndarray:
+    grid = np.arange((core + 1) ** 2).reshape(core + 1, core + 1)
+    return np.column_stack([grid[:-1, :-1].ravel(), grid[:-1, 1:].ravel(), grid[1:, 1:].ravel(), grid[1:, :-1].ravel()])
+
 
 END = 1.0e-9  # of the height: how far inside the end sections are cut, where the plane still crosses the triangles
 LARGEST_CORRECTION = 0.1

@@ -66,7 +66,7 @@ class StructureCase(StructureScene, Case):
     def problems(self) -> list[Problem]:
         """Find what does not fit together: materials, places, facet sets, loads, references."""
         from reflowshock.fem.problem import structure_checks
-        from reflowshock.meshing.board.box_checks import box_problems
+        from reflowshock.meshing.board.box_plan import box_problems
 
         boxes = [Problem(found.key, found.message, found.value, found.allowed) for found in box_problems(self.box)]
         scenes = [

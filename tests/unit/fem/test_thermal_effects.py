@@ -22,7 +22,7 @@ from reflowshock.fem.statics.plates import RigidPlates
 from reflowshock.fem.statics.state import Assembly
 from reflowshock.fem.statics.structure import ThermalStructure
 from reflowshock.fem.trials.grids import GAP
-from reflowshock.meshing.board.heated_assembly import write_heated_assembly
+from reflowshock.meshing.board.assembly import write_heated_assembly
 from reflowshock.meshing.board.pads import pad_table
 from reflowshock.meshing.board.parameters import Warpage
 from reflowshock.meshing.trials.models import MM, board, package

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from reflowshock.meshing.board.box import write_box
-from reflowshock.meshing.board.box_checks import box_problems
+from reflowshock.meshing.board.box_plan import box_problems
 from reflowshock.meshing.board.box_plan import Box, BoxHoles, BoxLayer, box_plan, count_box
 
 SIZE, THICKNESS = (40e-3, 20e-3), (1e-3, 0.5e-3)

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from reflowshock.meshing.board.assembly import write_assembly
-from reflowshock.meshing.board.heated_assembly import write_heated_assembly
+from reflowshock.meshing.board.assembly import write_heated_assembly
 from reflowshock.meshing.trials.models import MM, PLATE, board, package
 
 

@@ -7,7 +7,7 @@ import pytest
 from reflowshock.meshing.board.pads import lift, pad_table
 from reflowshock.meshing.board.parameters import Warpage
 from reflowshock.meshing.core.hexahedra import quad_areas, volumes
-from reflowshock.meshing.joint.joint_place import JointPlace
+from reflowshock.meshing.joint.joint_mesh import JointPlace
 from reflowshock.meshing.joint.solder_mesh import JointMeshError, joint_quality, mesh_joint
 from reflowshock.meshing.surface.closed_surface import close_surface
 from reflowshock.meshing.trials.models import MM, PLATE, board, package, side_of
