@@ -8,13 +8,9 @@ from reflowshock.meshing.board.pads import lift
 from reflowshock.meshing.board.parameters import Board, Package, Warpage
 from reflowshock.meshing.board.plan import Interval, package_plan
 
-
-from dataclasses import dataclass
-
-import numpy as np
-
-
 MERGE = 1.0e-9  # m: grid lines nearer than this are one
+STEPS = 30  # of the search for the point that was displaced to a place; each gains the digits of the strain
+EXACT = 1.0e-15  # m
 
 
 class NotStructuredError(ValueError):
@@ -76,10 +72,6 @@ def _cell(lines: np.ndarray, places: np.ndarray, axis: str) -> tuple[np.ndarray,
         raise NotStructuredError(f"{axis} = {worst:.6g} m, allowed {lines[0]:.6g} to {lines[-1]:.6g} m")
     cell = np.clip(np.searchsorted(lines, places, side="right") - 1, 0, len(lines) - 2)
     return cell, np.clip((places - lines[cell]) / np.diff(lines)[cell], 0.0, 1.0)
-
-
-STEPS = 30  # of the search for the point that was displaced to a place; each gains the digits of the strain
-EXACT = 1.0e-15  # m
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from skimage.measure import marching_cubes
 
-from reflowshock.meshing.core.outlines import outlines
+from reflowshock.meshing.core.facets import outlines
 from reflowshock.meshing.surface.closed_surface import FREE, ClosedSurface, close_rings
 
 Field = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from reflowshock.meshing.joint import levels
+from reflowshock.meshing.joint import swept as levels
 from reflowshock.meshing.joint.joint_mesh import JointPlace
 from reflowshock.meshing.surface import user_surface
 from reflowshock.particles.physics.forces import Gravity, Wetting

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from reflowshock.meshing.core.hexahedra import volumes
-from reflowshock.meshing.joint.levels import butterfly
-from reflowshock.meshing.joint.levels import layer_cells, solder_levels
+from reflowshock.meshing.joint.swept import butterfly, layer_cells, solder_levels
 from reflowshock.meshing.surface.closed_surface import close_surface, enclosed_volume, measure
 from reflowshock.meshing.trials.surfaces import truncated_sphere
 

@@ -14,7 +14,7 @@ from reflowshock.meshing.board.parameters import JointNumerics
 from reflowshock.meshing.core.hexahedra import quad_areas, shortest_lengths
 from reflowshock.meshing.joint.free_form import free_form_solder
 from reflowshock.meshing.joint.solder import Solder
-from reflowshock.meshing.joint.levels import swept_solder
+from reflowshock.meshing.joint.swept import swept_solder
 from reflowshock.meshing.joint.tetrahedra import fill_apart
 from reflowshock.meshing.trials.models import MM
 from reflowshock.meshing.trials.surfaces import barrel

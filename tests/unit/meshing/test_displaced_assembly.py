@@ -4,12 +4,16 @@ import numpy as np
 import pytest
 
 from reflowshock.meshing.board.assembly import write_assembly
-from reflowshock.meshing.board.displaced_assembly import ContactError, write_displaced_assembly
-from reflowshock.meshing.board.displaced_assembly import DisplacementError, computed, prescribed
-from reflowshock.meshing.board.package_side import PackageSide, underside
+from reflowshock.meshing.board.displaced_assembly import (
+    ContactError,
+    DisplacementError,
+    computed,
+    prescribed,
+    write_displaced_assembly,
+)
+from reflowshock.meshing.board.package_side import NotStructuredError, PackageSide, StructuredFace, underside
 from reflowshock.meshing.board.pads import lift
 from reflowshock.meshing.board.parameters import Warpage
-from reflowshock.meshing.board.package_side import NotStructuredError, StructuredFace
 from reflowshock.meshing.trials.models import MM, PLATE, board, package
 from tests.support.mesh_file import MeshFile
 

@@ -4,8 +4,7 @@ import meshio
 import numpy as np
 import pytest
 
-from reflowshock.meshing.board.assembly import write_assembly
-from reflowshock.meshing.board.assembly import write_heated_assembly
+from reflowshock.meshing.board.assembly import write_assembly, write_heated_assembly
 from reflowshock.meshing.trials.models import MM, PLATE, board, package
 
 

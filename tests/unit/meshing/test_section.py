@@ -3,8 +3,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from reflowshock.meshing.core.outlines import cut_segments, radius_by_angle, section_area, section_centroid
-from reflowshock.meshing.joint.levels import butterfly
+from reflowshock.meshing.core.facets import cut_segments, radius_by_angle, section_area, section_centroid
+from reflowshock.meshing.joint.swept import butterfly
 from reflowshock.meshing.trials.surfaces import revolve
 
 

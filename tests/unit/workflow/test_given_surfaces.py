@@ -13,7 +13,7 @@ import pytest
 from reflowshock.meshing.board.assembly import write_assembly
 from reflowshock.meshing.board.pads import pad_table, write_pads
 from reflowshock.meshing.board.parameters import Warpage
-from reflowshock.meshing.core.outlines import outlines
+from reflowshock.meshing.core.facets import outlines
 from reflowshock.meshing.surface.closed_surface import enclosed_volume, read_surface
 from reflowshock.meshing.trials.level_sets import bridged_pair
 from reflowshock.meshing.trials.models import MM

@@ -1,43 +1,24 @@
-"""From a closed surface to the nodes of a swept butterfly: one section a level, areas and volume kept."""
+"""Swept solder: butterfly (O-grid) sections of a body, stacked from the board's pad to the package's."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
-
-import numpy as np
-
-from reflowshock.meshing.core.hexahedra import volumes
-from reflowshock.meshing.core.outlines import cut_segments, radius_by_angle, section_area, section_centroid
-
-from reflowshock.meshing.surface.closed_surface import ClosedSurface, enclosed_volume, pad_planes
-
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
 from reflowshock.meshing.board.parameters import JointNumerics
-from reflowshock.meshing.joint.levels import butterfly
-from reflowshock.meshing.joint.levels import Placing, layer_cells, solder_levels
+from reflowshock.meshing.core.facets import cut_segments, radius_by_angle, section_area, section_centroid
+from reflowshock.meshing.core.hexahedra import volumes
 from reflowshock.meshing.joint.solder import Solder, WettedFace
-from reflowshock.meshing.surface.closed_surface import ClosedSurface, pad_planes
-
-
-def swept_solder(surface: ClosedSurface, numerics: JointNumerics, place: Placing, overhang: float = 0.0) -> Solder:
-    """Sweep hexahedra through a body; arguments and errors as ``solder_levels``."""
-    section = butterfly(numerics.core, numerics.rings)
-    levels = solder_levels(surface, section, numerics.layers, place, overhang)
-    count = len(section.points)
-    top = numerics.layers * count
-    faces = (
-        WettedFace("board", section.quads, section.rim),
-        WettedFace("package", section.quads + top, section.rim + top),
-    )
-    cells = layer_cells(section.quads, count, numerics.layers)
-    return Solder(levels.points.reshape(-1, 3), cells, faces, levels.volume, levels.scale, pad_planes(surface))
-
+from reflowshock.meshing.surface.closed_surface import ClosedSurface, enclosed_volume, pad_planes
 
 # Half-diagonal and half-side of the core on the unit disc: between a circle (equal) and a square (ratio sqrt 2).
 CORE_DIAGONAL, CORE_SIDE = 0.60, 0.50
+END = 1.0e-9  # of the height: how far inside the end sections are cut, where the plane still crosses the triangles
+LARGEST_CORRECTION = 0.1
+VOLUME_TOLERANCE = 1.0e-12
+SECANT_STEPS = 20
+Placing = Callable[[np.ndarray], np.ndarray]
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,14 +72,6 @@ def _core_quads(core: int) -> np.ndarray:
     return np.column_stack([grid[:-1, :-1].ravel(), grid[:-1, 1:].ravel(), grid[1:, 1:].ravel(), grid[1:, :-1].ravel()])
 
 
-END = 1.0e-9  # of the height: how far inside the end sections are cut, where the plane still crosses the triangles
-LARGEST_CORRECTION = 0.1
-VOLUME_TOLERANCE = 1.0e-12
-SECANT_STEPS = 20
-
-Placing = Callable[[np.ndarray], np.ndarray]
-
-
 @dataclass(frozen=True, slots=True)
 class Levels:
     """Nodes of the solder, level by level.
@@ -112,6 +85,20 @@ class Levels:
     points: np.ndarray
     scale: float
     volume: float
+
+
+def swept_solder(surface: ClosedSurface, numerics: JointNumerics, place: Placing, overhang: float = 0.0) -> Solder:
+    """Sweep hexahedra through a body; arguments and errors as ``solder_levels``."""
+    section = butterfly(numerics.core, numerics.rings)
+    levels = solder_levels(surface, section, numerics.layers, place, overhang)
+    count = len(section.points)
+    top = numerics.layers * count
+    faces = (
+        WettedFace("board", section.quads, section.rim),
+        WettedFace("package", section.quads + top, section.rim + top),
+    )
+    cells = layer_cells(section.quads, count, numerics.layers)
+    return Solder(levels.points.reshape(-1, 3), cells, faces, levels.volume, levels.scale, pad_planes(surface))
 
 
 def solder_levels(
