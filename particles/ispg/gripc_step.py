@@ -1,4 +1,4 @@
-"""The seed's own scheme (Hu et al., 2.2-2.6): prediction, rotational pressure correction, velocity smoothing.
+"""The paper's ISPG scheme (Hu et al., 2.2-2.6): prediction, rotational pressure correction, velocity smoothing.
 
 As printed: strong form at the particles, moving least squares, explicit pressure of the surface tension on the free
 surface, so that the time step is bound by the capillary limit. Different: walls are mirrored (their Neumann rows make

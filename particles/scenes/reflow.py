@@ -140,7 +140,7 @@ def start_flow(cloud: Cloud, solder: Solder, effects: dict[str, bool], lines: tu
 
 
 def step_solver(solder: Solder, effects: dict[str, bool]) -> StepSolver:
-    """How steps are solved: by the seed's scheme, on tetrahedra where momentum is carried or shared, else to rest."""
+    """How steps are solved: as the paper does, on tetrahedra where momentum is carried or shared, else towards rest."""
     if solder.numerics.scheme == "gripc":
         return GripcStep(solder.numerics.basis)
     if effects["inertia"] or effects["viscosity"]:

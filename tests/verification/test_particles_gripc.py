@@ -1,4 +1,4 @@
-"""The seed's scheme (Hu et al., 2.2-2.6) against exact fields, and what it makes of a drop.
+"""The paper's ISPG scheme (Hu et al., 2.2-2.6) against exact fields, and what it makes of a drop.
 
 It is there to be compared with: what it cannot do is asserted as well as what it can.
 """
@@ -97,7 +97,7 @@ def rest():
 
 
 def continued(rest, basis):
-    """The drop at rest, continued with the seed's scheme, inertia and viscosity."""
+    """The drop at rest, continued with the paper's scheme, inertia and viscosity."""
     solder, flow = rest
     on = {"gravity": False, "inertia": True, "viscosity": True, "surface_tension": True, "wall_adhesion": True}
     physics = build_physics(solder, on, flow.physics.lines)

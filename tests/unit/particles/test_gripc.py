@@ -1,4 +1,4 @@
-"""Parts of the seed's scheme against exact fields and printed sums."""
+"""Parts of the paper's scheme against exact fields and printed sums."""
 
 import numpy as np
 import pytest
