@@ -12,7 +12,7 @@ from reflowshock.fem.materials.elasticity import role_of_part
 from reflowshock.fem.materials.parameters import Material
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.mesh import MeshData
-from reflowshock.fem.problem.parameters import Coupling
+from reflowshock.fem.problem.shock import Coupling
 
 Divide = Callable[[Whole, Survey, Rules], Division]
 DEFAULTS, HELD = Materials(), Coupling(scheme="held_velocity")

@@ -14,7 +14,7 @@ from reflowshock.fem.materials.library import COPPER
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.mesh.tie import net_load
-from reflowshock.fem.model.body import Pieces, Response, make_body, make_pieces
+from reflowshock.fem.model.assembly import Pieces, Response, make_body, make_pieces
 from reflowshock.fem.model.power_iteration import highest_frequency
 from reflowshock.fem.model.steps import mass_factor
 from reflowshock.fem.parallel.local_mesh import distribute

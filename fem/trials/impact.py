@@ -8,7 +8,8 @@ from reflowshock.fem.dynamics.central_difference import Motion
 from reflowshock.fem.forces.force import Kinematics
 from reflowshock.fem.materials.parameters import Material
 from reflowshock.fem.mesh.mesh import MeshData
-from reflowshock.fem.model.body import Body, Response
+from reflowshock.fem.model.assembly import Response
+from reflowshock.fem.model.body import Body
 from reflowshock.fem.trials.bodies import motion_of, nonlinear_body
 from reflowshock.fem.trials.grids import grid, mesh_of, on
 from reflowshock.fem.trials.metals import SOLDER

@@ -5,7 +5,7 @@ import numpy as np
 from reflowshock.fem.coupling.scheme import scheme_of
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.mesh import MeshData, append
-from reflowshock.fem.problem.parameters import Coupling
+from reflowshock.fem.problem.shock import Coupling
 from reflowshock.fem.trials.coupled import Coupled, models_of
 from reflowshock.fem.trials.grids import grid, joint_mesh, mesh_of, on
 from reflowshock.fem.trials.pairs import FRACTION

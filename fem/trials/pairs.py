@@ -18,7 +18,7 @@ from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.mesh import MeshData, append
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.parallel.exchange import CutChannels
-from reflowshock.fem.problem.parameters import Coupling
+from reflowshock.fem.problem.shock import Coupling
 from reflowshock.fem.trials.coupled import Coupled, Models, models_of
 from reflowshock.fem.trials.divided import surveyed
 from reflowshock.fem.trials.grids import grid, mesh_of, on

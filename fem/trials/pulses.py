@@ -4,8 +4,8 @@ import numpy as np
 
 from reflowshock.fem.division.checks import check_pulses
 from reflowshock.fem.loads.load import BodyAcceleration
+from reflowshock.fem.loads.pulse import Constant, HalfSine, Haversine, Pulse, Tabulated
 from reflowshock.fem.mesh.mesh import MeshData
-from reflowshock.fem.problem.pulse import Constant, HalfSine, Haversine, Pulse, Tabulated
 from reflowshock.fem.trials.bodies import dns_body, motion_of
 from reflowshock.fem.trials.grids import grid, mesh_of
 from reflowshock.fem.trials.parameters import PulseTrial

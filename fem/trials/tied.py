@@ -7,7 +7,8 @@ from reflowshock.fem.division.tables import prepare
 from reflowshock.fem.elements.stress import element_stress
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.mesh import MeshData, append
-from reflowshock.fem.model.body import Body, make_body, make_pieces
+from reflowshock.fem.model.assembly import make_body, make_pieces
+from reflowshock.fem.model.body import Body
 from reflowshock.fem.parallel.local_mesh import distribute
 from reflowshock.fem.trials.boxes import stiffness_matrix
 from reflowshock.fem.trials.distortion import YOUNG, distorted, laminate

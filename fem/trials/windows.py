@@ -11,7 +11,7 @@ from reflowshock.fem.materials.library import FR4, SAC405
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.parallel.exchange import CutChannels
 from reflowshock.fem.parallel.portable import values
-from reflowshock.fem.problem.parameters import Coupling
+from reflowshock.fem.problem.shock import Coupling
 from reflowshock.fem.trials.coupled import Coupled, Models, models_of
 from reflowshock.fem.trials.pairs import FRACTION, SCHEMES, SIZE, Pair
 from reflowshock.fem.trials.parameters import PairRun, PairTransfer, PairTrial, Yielding

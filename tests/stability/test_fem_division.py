@@ -13,7 +13,7 @@ from reflowshock.fem.errors import CutError
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.mesh import MeshData, append
 from reflowshock.fem.parallel.exchange import CutChannels
-from reflowshock.fem.problem.parameters import Coupling
+from reflowshock.fem.problem.shock import Coupling
 from reflowshock.fem.trials.coupled import Coupled, models_of
 from reflowshock.fem.trials.divided import surveyed
 from reflowshock.fem.trials.layouts import board, copper_cut, corner, joint, overhang, two_regions

@@ -7,7 +7,7 @@ from reflowshock.fem.coupling.scheme import scheme_of
 from reflowshock.fem.materials.library import SAC405
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.tie import net_load
-from reflowshock.fem.problem.parameters import Coupling
+from reflowshock.fem.problem.shock import Coupling
 from reflowshock.fem.trials.coupled import Coupled, models_of
 from reflowshock.fem.trials.pairs import FRACTION, SIZE, Pair
 

@@ -11,12 +11,12 @@ from reflowshock.fem.errors import EnergyError
 from reflowshock.fem.estimates.estimate import WindowPlan, damped_critical_step
 from reflowshock.fem.loads.damping import RayleighDamping
 from reflowshock.fem.loads.load import BodyAcceleration, Load
+from reflowshock.fem.loads.pulse import HalfSine
 from reflowshock.fem.materials.parameters import Isotropic
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.power_iteration import highest_frequency
-from reflowshock.fem.problem.pulse import HalfSine
 from reflowshock.fem.trials.bodies import dns_body
 from reflowshock.fem.trials.grids import grid, mesh_of, on
 

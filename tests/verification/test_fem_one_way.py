@@ -11,8 +11,8 @@ from reflowshock.fem.dynamics.energy_balance import Ledger, ledger_sums
 from reflowshock.fem.loads.load import half_sine_drop
 from reflowshock.fem.materials.library import SAC405
 from reflowshock.fem.materials.roles import Materials
-from reflowshock.fem.model.body import Pieces
-from reflowshock.fem.problem.parameters import Coupling
+from reflowshock.fem.model.assembly import Pieces
+from reflowshock.fem.problem.shock import Coupling
 from reflowshock.fem.trials.bodies import motion_of
 from reflowshock.fem.trials.coupled import Coupled, Models, models_of, pieces_of
 from reflowshock.fem.trials.divided import surveyed

@@ -8,7 +8,7 @@ from reflowshock.fem.elements.stress import symmetric
 from reflowshock.fem.materials.elasticity import elasticity_matrix
 from reflowshock.fem.materials.library import FR4
 from reflowshock.fem.materials.parameters import Isotropic
-from reflowshock.fem.model.body import Response
+from reflowshock.fem.model.assembly import Response
 from reflowshock.fem.model.stress_recovery import StressRecovery
 from reflowshock.fem.trials.bodies import motion_of, nonlinear_body
 from reflowshock.fem.trials.grids import grid, mesh_of

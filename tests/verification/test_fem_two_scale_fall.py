@@ -9,7 +9,7 @@ from reflowshock.fem.coupling.scheme import scheme_of
 from reflowshock.fem.loads.load import half_sine_drop
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.mesh import append
-from reflowshock.fem.problem.parameters import Coupling
+from reflowshock.fem.problem.shock import Coupling
 from reflowshock.fem.trials.coupled import Coupled, models_of
 from tests.support.fem_models import small_assembly
 

@@ -10,7 +10,7 @@ from reflowshock.fem.kernels.damping import add_damping, power
 from reflowshock.fem.kernels.motion import STRIP
 from reflowshock.fem.loads.damping import RayleighDamping
 from reflowshock.fem.loads.load import BodyAcceleration
-from reflowshock.fem.problem.pulse import Constant
+from reflowshock.fem.loads.pulse import Constant
 from reflowshock.fem.trials.bodies import dns_body, motion_of
 from reflowshock.fem.trials.grids import grid, mesh_of, on
 from tests.support.fem_bodies import STEEL, dense_stiffness

@@ -30,7 +30,7 @@ from reflowshock.fem.estimates.placement import (
 )
 from reflowshock.fem.materials.library import LIBRARY
 from reflowshock.fem.parallel.communicators import Communicators
-from reflowshock.fem.problem.parameters import Ranks
+from reflowshock.fem.problem.shock import Ranks
 from reflowshock.fem.trials.grids import grid, joint_mesh, mesh_of
 
 EVEN = WindowCost(ModelCost(1e-3, 0.0, 1), ModelCost(1e-3, 0.0, 8), 1e-5)
