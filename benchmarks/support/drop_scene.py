@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 from reflowshock.cases.hard.trials.surfaces import barrel
 from reflowshock.fem.mesh.mesh_file import read_mesh
 from reflowshock.fem.problem.inputs import RunInput
-from reflowshock.fem.problem.parameters import Ranks
+from reflowshock.fem.problem.shock import Ranks
 from reflowshock.meshing.board.assembly import write_assembly
 from reflowshock.meshing.board.displaced_assembly import write_displaced_assembly
 from reflowshock.meshing.board.displacement import prescribed

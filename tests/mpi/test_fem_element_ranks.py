@@ -11,7 +11,7 @@ import json, sys
 from pathlib import Path
 import numpy as np
 from mpi4py import MPI
-from reflowshock.fem.model.body import make_body, make_pieces
+from reflowshock.fem.model.assembly import make_body, make_pieces
 from reflowshock.fem.forces.energy import Energy
 from reflowshock.fem.output.fields import Fields
 from reflowshock.fem.loads.load import half_sine_drop

@@ -15,7 +15,7 @@ from reflowshock.fem.errors import CutError
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.mesh import MeshData, append
 from reflowshock.fem.parallel.exchange import CutChannels
-from reflowshock.fem.problem.parameters import Coupling
+from reflowshock.fem.problem.shock import Coupling
 
 
 def radius(mesh: MeshData, scheme: str) -> float:

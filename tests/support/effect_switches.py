@@ -14,12 +14,13 @@ from reflowshock.cases.hard.trials.bodies import dns_body, motion_of, nonlinear_
 from reflowshock.cases.hard.trials.grids import grid, mesh_of, on
 from reflowshock.fem.dynamics.central_difference import Motion
 from reflowshock.fem.loads.load import DOWN, BodyAcceleration, Load
+from reflowshock.fem.loads.pulse import HalfSine
 from reflowshock.fem.loads.shock_loads import shock_loads
 from reflowshock.fem.materials.library import FR4
 from reflowshock.fem.materials.parameters import Material
-from reflowshock.fem.model.body import Body, Response
-from reflowshock.fem.problem.parameters import Shock
-from reflowshock.fem.problem.pulse import HalfSine
+from reflowshock.fem.model.assembly import Response
+from reflowshock.fem.model.body import Body
+from reflowshock.fem.problem.shock import Shock
 from reflowshock.particles.core.cloud import box_cloud
 from reflowshock.particles.parameters.solder import Solder
 from reflowshock.particles.physics.physics import Physics

@@ -12,7 +12,8 @@ from reflowshock.fem.division.tables import prepare
 from reflowshock.fem.elements.element import element_stiffness
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.mesh import MeshData, append
-from reflowshock.fem.model.body import Body, Response, make_body, make_pieces
+from reflowshock.fem.model.assembly import Response, make_body, make_pieces
+from reflowshock.fem.model.body import Body
 from reflowshock.fem.parallel.local_mesh import distribute
 
 EDGE = 1.5e-3

@@ -23,7 +23,7 @@ from reflowshock.fem.materials.library import FR4, SAC305, SILICON
 from reflowshock.fem.mesh.supports import held_components
 from reflowshock.fem.model.steps import mass_factor
 from reflowshock.fem.output.failure import failure_criteria, judge
-from reflowshock.fem.problem.parameters import Damping, Failure, JointCoupling
+from reflowshock.fem.problem.shock import Damping, Failure, JointCoupling
 from reflowshock.fem.problem.thermal import Thermal
 from reflowshock.fem.statics.plates import RigidPlates
 from reflowshock.fem.statics.structure import ThermalStructure

@@ -14,8 +14,8 @@ from reflowshock.fem.dynamics.energy_balance import Ledger, ledger_sums
 from reflowshock.fem.loads.load import half_sine_drop
 from reflowshock.fem.materials.library import SAC405
 from reflowshock.fem.materials.roles import Materials
-from reflowshock.fem.model.body import Pieces
-from reflowshock.fem.problem.parameters import Coupling
+from reflowshock.fem.model.assembly import Pieces
+from reflowshock.fem.problem.shock import Coupling
 
 LOADS = [half_sine_drop(peak=1.5e4, duration=1e-5)]
 WINDOWS = 200

@@ -10,7 +10,7 @@ from reflowshock.fem.elements.stress import symmetric
 from reflowshock.fem.materials.elasticity import elasticity_matrix
 from reflowshock.fem.materials.library import FR4
 from reflowshock.fem.materials.parameters import Isotropic
-from reflowshock.fem.model.body import Response
+from reflowshock.fem.model.assembly import Response
 from reflowshock.fem.model.stress_recovery import StressRecovery
 
 ELASTIC = Isotropic(density=1.0, young_modulus=1e9, poisson_ratio=0.3)

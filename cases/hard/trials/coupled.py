@@ -27,11 +27,12 @@ from reflowshock.fem.materials.parameters import Material
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.mesh.tie import net_load
-from reflowshock.fem.model.body import Body, Pieces, Response, make_body, make_pieces
+from reflowshock.fem.model.assembly import Pieces, Response, make_body, make_pieces
+from reflowshock.fem.model.body import Body
 from reflowshock.fem.parallel.communicators import Role
 from reflowshock.fem.parallel.exchange import CutChannels
 from reflowshock.fem.parallel.local_mesh import distribute
-from reflowshock.fem.problem.parameters import Coupling
+from reflowshock.fem.problem.shock import Coupling
 
 Divide = Callable[[Whole, Survey, Rules], Division]
 DEFAULTS, HELD = Materials(), Coupling(scheme="held_velocity")

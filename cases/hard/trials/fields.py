@@ -18,7 +18,8 @@ from reflowshock.fem.forces.force import linear_terms
 from reflowshock.fem.forces.force_nonlinear import NonlinearElements
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.mesh import MeshData, append, boundary_facets
-from reflowshock.fem.model.body import Body, make_body, make_pieces
+from reflowshock.fem.model.assembly import make_body, make_pieces
+from reflowshock.fem.model.body import Body
 from reflowshock.fem.parallel.local_mesh import distribute
 
 AXIS = np.array([0.48, -0.6, 0.64])

@@ -10,7 +10,7 @@ from reflowshock.cases.hard.trials.windows import through
 from reflowshock.fem.coupling.scheme import scheme_of
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.mesh import MeshData, append
-from reflowshock.fem.problem.parameters import Coupling
+from reflowshock.fem.problem.shock import Coupling
 
 SIZE, LAYER = 0.5e-3, 0.25e-3  # of an element of board [m]
 

@@ -18,7 +18,7 @@ from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.mesh import MeshData, append
 from reflowshock.fem.parallel.exchange import CutChannels
 from reflowshock.fem.parallel.portable import values
-from reflowshock.fem.problem.parameters import Coupling
+from reflowshock.fem.problem.shock import Coupling
 
 PUSH = np.array([0.3, 0.1, 1.0])  # [m/s]
 SAMPLES = 200  # of a run

@@ -12,7 +12,7 @@ from reflowshock.fem.kernels.damping import add_damping, power
 from reflowshock.fem.kernels.motion import STRIP
 from reflowshock.fem.loads.damping import RayleighDamping
 from reflowshock.fem.loads.load import BodyAcceleration
-from reflowshock.fem.problem.pulse import Constant
+from reflowshock.fem.loads.pulse import Constant
 from tests.support.fem_bodies import STEEL, dense_stiffness
 
 GRAVITY = np.array([0.3, -2.0, 9.81])

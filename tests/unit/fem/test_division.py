@@ -16,7 +16,7 @@ from reflowshock.fem.materials.library import SAC305
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.mesh import append
 from reflowshock.fem.model.steps import steps_of_division
-from reflowshock.fem.problem.parameters import Coupling
+from reflowshock.fem.problem.shock import Coupling
 from tests.support.fem_models import small_assembly
 
 ELASTIC, YIELDING = Materials(), Materials(solder=SAC305)

@@ -15,7 +15,7 @@ from reflowshock.fem.mesh.watch_table import whole_watch
 from reflowshock.fem.output.compare import compare_histories
 from reflowshock.fem.output.interface import picture_windows
 from reflowshock.fem.problem.inputs import RunInput
-from reflowshock.fem.problem.parameters import Shock
+from reflowshock.fem.problem.shock import Shock
 from reflowshock.fem.problem.shock_checks import problems
 from reflowshock.fem.run import time_loop
 from reflowshock.fem.run.shock_run import run

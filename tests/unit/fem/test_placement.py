@@ -31,7 +31,7 @@ from reflowshock.fem.estimates.placement import (
 )
 from reflowshock.fem.materials.library import LIBRARY
 from reflowshock.fem.parallel.communicators import Communicators
-from reflowshock.fem.problem.parameters import Ranks
+from reflowshock.fem.problem.shock import Ranks
 
 EVEN = WindowCost(ModelCost(1e-3, 0.0, 1), ModelCost(1e-3, 0.0, 8), 1e-5)
 KIND = Kind([LIBRARY["FR4"], LIBRARY["copper"]], "incompatible_modes", "small", 1e-8)
