@@ -147,5 +147,5 @@ def test_a_run_that_is_broken_off_continues_to_the_same_bits(tmp_path, name, set
 def test_a_drop_that_finds_no_rest_says_so(tmp_path):
     result = run("sessile_drop", tmp_path, COARSE_DROP, "solder.numerics.max_steps=2")
     assert result.returncode == 1
-    assert "stage reflow failed: NoRest" in result.stderr
+    assert "stage reflow failed: no rest after 2 steps (solder.numerics.max_steps)" in result.stderr
     assert not (tmp_path / "reflow").exists()

@@ -54,11 +54,19 @@ def at_work(folder: Path) -> bool:
     return any(process.info["cwd"] == str(folder / ".store") for process in psutil.process_iter(["cwd"]))
 
 
+def stage_of(comment: str) -> str:
+    """Return the stage of a job; Snakemake's executor puts rule and product in the job's comment."""
+    return comment.removeprefix("rule_").partition("_wildcards_")[0].removesuffix("_on_ranks")
+
+
 def test_stages_are_jobs_with_ranks_and_products_those_of_a_local_run(slurm, tmp_path):
     line = command(slurm, STRUCTURE, tmp_path / "jobs", SHORT)
     first = run(slurm, line)
     assert first.returncode == 0, first.stdout + first.stderr
-    jobs = {comment.removeprefix("rule_"): (state, tasks) for _, state, tasks, comment, _ in slurm.queue()}
+    jobs = {
+        comment.removeprefix("rule_").partition("_wildcards_")[0].partition("_on_ranks")[0]: (state, tasks)
+        for _, state, tasks, comment, _ in slurm.queue()
+    }
     assert jobs == {"geometry": ("COMPLETED", "1"), "shock": ("COMPLETED", "2")}
     said = first.stdout
     assert "shock, explicit solver on 2 ranks" in said
@@ -104,7 +112,7 @@ def test_what_is_impossible_is_said_before_anything_is_submitted(slurm, tmp_path
     wrong = run(slurm, other)
     assert wrong.returncode == 2
     assert (
-        'default-resources.slurm_partition = "onne": is no partition here; allowed: one; did you mean one?'
+        'default-resources.slurm_partition = "onne": is not a partition here; allowed: one; did you mean one?'
         in wrong.stderr
     )
     assert not (tmp_path / "run").exists()

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from reflowshock.fem.output.failure import failure_criteria, judge
-from reflowshock.fem.problem.parameters import Failure
+from reflowshock.fem.problem.shock import Failure
 from reflowshock.workflow.pipeline.reader import read_case
 from reflowshock.workflow.report import body as report_body
 from reflowshock.workflow.report import joint_tables, tables
