@@ -34,7 +34,7 @@ from reflowshock.fem.forces.force import Kinematics
 from reflowshock.fem.materials.parameters import Isotropic
 from reflowshock.fem.mesh.facet import area_vectors
 from reflowshock.fem.mesh.mesh import MeshData, boundary_facets
-from reflowshock.fem.model.assembly import Response, make_body, make_pieces
+from reflowshock.fem.model.assembly import ForceOptions, make_body, make_pieces
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.factorisation import Factorisation
 from reflowshock.fem.model.global_matrix import Equations
@@ -108,7 +108,7 @@ class Problem:
         item = prepare(mesh, "dns")["dns"]
         formulation = self.kind if KINDS[self.kind].nodes == 8 else "incompatible_modes"
         pieces = make_pieces(distribute(MPI.COMM_SELF, mesh), item.tables, {"board": material}, formulation)
-        body = make_body(MPI.COMM_SELF, pieces, item.tables, np.ones(len(pieces.steps)), Response(kinematics))
+        body = make_body(MPI.COMM_SELF, pieces, item.tables, np.ones(len(pieces.steps)), ForceOptions(kinematics))
         body.free[self.held(body.local.points)] = False
         return body
 

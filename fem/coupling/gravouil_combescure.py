@@ -39,16 +39,16 @@ class GravouilCombescure:
 
     order: tuple[Role, Role] = ("macro", "meso")
 
-    def macro(self, body: Body, loads: list[Load], plan: WindowPlan, channels: CutChannels) -> "Macro":
+    def macro(self, body: Body, loads: list[Load], plan: WindowPlan, channels: CutChannels) -> "LinkedMacro":
         """Return the macro model's participant."""
-        return Macro(uncut_motion(body, loads, plan.window), plan, channels)
+        return LinkedMacro(uncut_motion(body, loads, plan.window), plan, channels)
 
-    def meso(self, body: Body, loads: list[Load], plan: WindowPlan, channels: CutChannels) -> "Meso":
+    def meso(self, body: Body, loads: list[Load], plan: WindowPlan, channels: CutChannels) -> "LinkedMeso":
         """Return the meso model's participant."""
-        return Meso(uncut_motion(body, loads, plan.step), plan, channels)
+        return LinkedMeso(uncut_motion(body, loads, plan.step), plan, channels)
 
 
-class Macro(Answered):
+class LinkedMacro(Answered):
     """The board: one step a window, then as long as the meso model takes."""
 
     def __init__(self, motion: Motion, plan: WindowPlan, channels: CutChannels) -> None:
@@ -71,13 +71,13 @@ class Macro(Answered):
         self.take_force()
 
 
-class Meso(Continued):
+class LinkedMeso(Continued):
     """Joints and package on copies of the macro nodes: m substeps a window, each with its link."""
 
     motion: Motion
 
     def __init__(self, motion: Motion, plan: WindowPlan, channels: CutChannels) -> None:
-        """Receive the mobility of the cut; a ``Macro`` must have sent it."""
+        """Receive the mobility of the cut; a ``LinkedMacro`` must have sent it."""
         self.motion, self.plan, self._channels = motion, plan, channels
         self.interface_work = 0.0
         self._link = np.zeros_like(motion.force)

@@ -28,13 +28,13 @@ class HeldVelocity:
 
     order: tuple[Role, Role] = ("meso", "macro")
 
-    def macro(self, body: Body, loads: list[Load], plan: WindowPlan, channels: CutChannels) -> "Macro":
+    def macro(self, body: Body, loads: list[Load], plan: WindowPlan, channels: CutChannels) -> "HeldVelocityMacro":
         """Return the macro model's participant."""
-        return Macro(body, loads, plan, channels)
+        return HeldVelocityMacro(body, loads, plan, channels)
 
-    def meso(self, body: Body, loads: list[Load], plan: WindowPlan, channels: CutChannels) -> "Meso":
+    def meso(self, body: Body, loads: list[Load], plan: WindowPlan, channels: CutChannels) -> "HeldVelocityMeso":
         """Return the meso model's participant."""
-        return Meso(body, loads, plan, channels)
+        return HeldVelocityMeso(body, loads, plan, channels)
 
 
 class Answered(Continued):
@@ -77,11 +77,11 @@ class Answered(Continued):
         self._received[:] = state["received"]
 
 
-class Macro(Answered):
+class HeldVelocityMacro(Answered):
     """The board: one step a window."""
 
     def __init__(self, body: Body, loads: list[Load], plan: WindowPlan, channels: CutChannels) -> None:
-        """Receive the interface mass and start at rest; a ``Meso`` must have sent it."""
+        """Receive the interface mass and start at rest; a ``HeldVelocityMeso`` must have sent it."""
         mass = np.zeros((len(body.mass), 3))
         channels.forces.receive(mass)
         super().__init__(Motion(body, loads, plan.window, np.empty(0, np.int32), mass[:, 0].copy()), plan, channels)
@@ -174,7 +174,7 @@ class Driven(Continued):
         return self._zero
 
 
-class Meso(Driven):
+class HeldVelocityMeso(Driven):
     """Joints, package and the uppermost board layers: m substeps a window."""
 
     def __init__(self, body: Body, loads: list[Load], plan: WindowPlan, channels: CutChannels) -> None:

@@ -29,16 +29,16 @@ class Impulse:
 
     order: tuple[Role, Role] = ("macro", "meso")
 
-    def macro(self, body: Body, loads: list[Load], plan: WindowPlan, channels: CutChannels) -> "Macro":
+    def macro(self, body: Body, loads: list[Load], plan: WindowPlan, channels: CutChannels) -> "ImpulseMacro":
         """Return the macro model's participant."""
-        return Macro(body, loads, plan, channels)
+        return ImpulseMacro(body, loads, plan, channels)
 
-    def meso(self, body: Body, loads: list[Load], plan: WindowPlan, channels: CutChannels) -> "Meso":
+    def meso(self, body: Body, loads: list[Load], plan: WindowPlan, channels: CutChannels) -> "ImpulseMeso":
         """Return the meso model's participant."""
-        return Meso(body, loads, plan, channels)
+        return ImpulseMeso(body, loads, plan, channels)
 
 
-class Macro(Continued):
+class ImpulseMacro(Continued):
     """The board: one step a window, its cut where the meso model has taken it."""
 
     def __init__(self, body: Body, loads: list[Load], plan: WindowPlan, channels: CutChannels) -> None:
@@ -74,11 +74,11 @@ class Macro(Continued):
         return self._zero
 
 
-class Meso(Continued):
+class ImpulseMeso(Continued):
     """Joints, package, buffer and the cut itself: m substeps a window."""
 
     def __init__(self, body: Body, loads: list[Load], plan: WindowPlan, channels: CutChannels) -> None:
-        """Receive the macro model's mass at the cut and start at rest; a ``Macro`` must have sent it."""
+        """Receive the macro model's mass at the cut and start at rest; a ``ImpulseMacro`` must have sent it."""
         mass = np.zeros((len(body.mass), 3))
         channels.velocities.receive(mass)
         self.motion = WindowMotion(body, loads, plan, np.empty(0, np.int32), mass[:, 0].copy())

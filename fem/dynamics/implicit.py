@@ -29,7 +29,7 @@ from reflowshock.fem.parallel.portable import Rows, Same, Shares, State, Sum
 
 
 @dataclass(frozen=True, slots=True)
-class Scheme:
+class HHTScheme:
     """Coefficients of one step: h [s], alpha."""
 
     step: float
@@ -83,7 +83,7 @@ class ImplicitMotion(Loaded):
             ValueError: Step or alpha out of range.
             AgreedError: A material or kinematics is not linear, or memory ran out; on every rank.
         """
-        self._scheme = Scheme(step, alpha)
+        self._scheme = HHTScheme(step, alpha)
         agreed(comm, lambda: check_linear(body))
         self.body, self.step, self.time = body, step, 0.0
         self._loads = [load for load in loads if not isinstance(load, RayleighDamping)]

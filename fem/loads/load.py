@@ -275,7 +275,7 @@ class FineSupports(Load):
 
 
 @dataclass
-class PrescribedMotion(Load):
+class PrescribedVelocity(Load):
     """One velocity component of some nodes follows a pulse; its work is that of the reaction.
 
     Attributes:

@@ -10,7 +10,7 @@ from reflowshock.fem.division.structure_tables import StructureTables, shaken_su
 from reflowshock.fem.loads.damping import RayleighDamping
 from reflowshock.fem.loads.follower_pressure import FollowerPressure
 from reflowshock.fem.loads.large_mass import LargeMass
-from reflowshock.fem.loads.load import BodyAcceleration, Load, NodalForces, PrescribedMotion
+from reflowshock.fem.loads.load import BodyAcceleration, Load, NodalForces, PrescribedVelocity
 from reflowshock.fem.loads.pulse import Pulse
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.problem.shock import Damping
@@ -38,7 +38,7 @@ def structure_loads(
             made.append(BodyAcceleration(push * unit(load.direction), pulse))
         else:
             local = body.local.locate(tables.nodes_of[load.on])
-            made.append(PrescribedMotion(local[local >= 0], AXES.index(load.component), pulse))
+            made.append(PrescribedVelocity(local[local >= 0], AXES.index(load.component), pulse))
     return made
 
 

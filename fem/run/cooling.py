@@ -14,7 +14,7 @@ from reflowshock.fem.division.whole import Whole
 from reflowshock.fem.dynamics.participant import uncut_motion
 from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.mesh.supports import SYMMETRY
-from reflowshock.fem.model.assembly import Pieces, Response, make_body, make_pieces
+from reflowshock.fem.model.assembly import Pieces, ForceOptions, make_body, make_pieces
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.output.cooling_report import Unbalanced, write_cooling
 from reflowshock.fem.parallel.agreement import agreed
@@ -41,7 +41,7 @@ def run_cooling(world: MPI.Comm, request: CoolingInput) -> None:
     HERE.slow = "cools the model"
     pieces = distributed(world, scene[1].mesh if scene else None, tables, request)
     ones = np.ones(len(pieces.steps))
-    body = make_body(world, pieces, tables, ones, Response())
+    body = make_body(world, pieces, tables, ones, ForceOptions())
     statics = Statics(world, body, pieces.materials, request.change)
     found, memory = statics.solve(), statics.memory
     statics.free()

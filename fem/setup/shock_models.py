@@ -24,7 +24,7 @@ from reflowshock.fem.materials.parameters import Material
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.mesh.supports import HELD, SYMMETRY
-from reflowshock.fem.model.assembly import Pieces, Response, make_body, make_pieces
+from reflowshock.fem.model.assembly import Pieces, ForceOptions, make_body, make_pieces
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.steps import Steps, agreed_minimum, assembled_step, steps_of_division, undivided
 from reflowshock.fem.parallel.agreement import agreed
@@ -179,7 +179,7 @@ def assembled(
     bodies = {}
     for role, own in pieces.items():
         factor = divided.mass_factors[role][own.local.cell_numbers]
-        response = Response(kinematics, divided.steps.step_of(role), divided.rules.stiffness)
+        response = ForceOptions(kinematics, divided.steps.step_of(role), divided.rules.stiffness)
         body = make_body(comms.models[role], own, divided.tables[role], factor, response)
         bodies[role] = divided.initial.begin(role, body, own.materials) if divided.initial else body
     return bodies

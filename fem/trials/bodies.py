@@ -13,7 +13,7 @@ from reflowshock.fem.materials.library import FR4
 from reflowshock.fem.materials.parameters import Material
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.mesh import MeshData
-from reflowshock.fem.model.assembly import Pieces, Response, make_body, make_pieces
+from reflowshock.fem.model.assembly import Pieces, ForceOptions, make_body, make_pieces
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.parallel.local_mesh import distribute
 
@@ -49,7 +49,7 @@ def force_of(term: NonlinearElements, displacement: np.ndarray) -> np.ndarray:
 
 
 def nonlinear_body(
-    mesh: MeshData, material: Material, response: Response, formulation: str = "one_point"
+    mesh: MeshData, material: Material, response: ForceOptions, formulation: str = "one_point"
 ) -> tuple[Body, float]:
     """Return a body of one material, and its smallest element critical step [s]."""
     item = prepare(mesh, "dns")["dns"]

@@ -21,7 +21,7 @@ from reflowshock.fem.loads.load import Load
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.mesh.tie import net_load
-from reflowshock.fem.model.assembly import Pieces, Response, make_body, make_pieces
+from reflowshock.fem.model.assembly import Pieces, ForceOptions, make_body, make_pieces
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.parallel.communicators import Role
 from reflowshock.fem.parallel.exchange import CutChannels
@@ -42,7 +42,7 @@ class Models(NamedTuple):
         """Return both models on this rank, new each time: terms may have a path."""
         step = self.division.meso_step
         return {
-            role: make_body(MPI.COMM_SELF, *part, np.ones(len(part[0].steps)), Response(step=step))
+            role: make_body(MPI.COMM_SELF, *part, np.ones(len(part[0].steps)), ForceOptions(step=step))
             for role, part in self.parts.items()
         }
 

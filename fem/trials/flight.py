@@ -14,7 +14,7 @@ from reflowshock.fem.materials.library import COPPER
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.mesh.tie import net_load
-from reflowshock.fem.model.assembly import Pieces, Response, make_body, make_pieces
+from reflowshock.fem.model.assembly import Pieces, ForceOptions, make_body, make_pieces
 from reflowshock.fem.model.power_iteration import highest_frequency
 from reflowshock.fem.model.steps import mass_factor
 from reflowshock.fem.parallel.local_mesh import distribute
@@ -46,7 +46,7 @@ def flight(given: Flight) -> dict[str, float]:
     stiffness = given.stiffness_damping * plain
     critical = float(damped_critical_step(plain, stiffness))
     step = given.step_fraction * critical
-    body = make_body(MPI.COMM_SELF, pieces, tables, factor, Response(given.kinematics, step))
+    body = make_body(MPI.COMM_SELF, pieces, tables, factor, ForceOptions(given.kinematics, step))
     loads: list[Load] = []
     if given.mass_damping or stiffness:
         loads.append(RayleighDamping.build(body, (given.mass_damping / step, stiffness)))

@@ -8,7 +8,7 @@ from reflowshock.fem.dynamics.central_difference import Motion
 from reflowshock.fem.forces.force import Kinematics
 from reflowshock.fem.materials.parameters import Material
 from reflowshock.fem.mesh.mesh import MeshData
-from reflowshock.fem.model.assembly import Response
+from reflowshock.fem.model.assembly import ForceOptions
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.trials.bodies import motion_of, nonlinear_body
 from reflowshock.fem.trials.grids import grid, mesh_of, on
@@ -51,8 +51,8 @@ def explicit(
     mesh: MeshData, material: Material, kinematics: Kinematics, formulation: str, fraction: float
 ) -> tuple[Body, Motion]:
     """Return a body of one material and its motion at a fraction of the critical step of its elements."""
-    _, critical = nonlinear_body(mesh, material, Response(kinematics, np.inf), formulation)
-    body, _ = nonlinear_body(mesh, material, Response(kinematics, fraction * critical), formulation)
+    _, critical = nonlinear_body(mesh, material, ForceOptions(kinematics, np.inf), formulation)
+    body, _ = nonlinear_body(mesh, material, ForceOptions(kinematics, fraction * critical), formulation)
     return body, motion_of(body, fraction * critical)
 
 

@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from reflowshock.fem.coupling.held_velocity import Answered, HeldVelocity, Macro
+from reflowshock.fem.coupling.held_velocity import Answered, HeldVelocity, HeldVelocityMacro
 from reflowshock.fem.coupling.scheme import scheme_of
 from reflowshock.fem.dynamics.central_difference import Motion
 from reflowshock.fem.estimates.estimate import WindowPlan
@@ -131,12 +131,12 @@ def shaped(mesh: MeshData, shape: str) -> MeshData:
 class Printed(HeldVelocity):
     """The paper's scheme as printed: the block alone is meso, only its internal force goes to the board, no mass."""
 
-    def macro(self, body: Body, loads: list[Load], plan: WindowPlan, channels: CutChannels) -> Macro:
+    def macro(self, body: Body, loads: list[Load], plan: WindowPlan, channels: CutChannels) -> HeldVelocityMacro:
         """Return the macro model's participant, which is told the interface mass and leaves it out."""
         return PrintedMacro(body, loads, plan, channels)
 
 
-class PrintedMacro(Macro):
+class PrintedMacro(HeldVelocityMacro):
     """A board that answers for no mass of the block at its interface."""
 
     def __init__(self, body: Body, loads: list[Load], plan: WindowPlan, channels: CutChannels) -> None:

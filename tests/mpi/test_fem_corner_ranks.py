@@ -8,7 +8,7 @@ SCRIPT = """
 import contextlib, json, sys
 import numpy as np
 from mpi4py import MPI
-from reflowshock.fem.model.assembly import Response, make_body, make_pieces
+from reflowshock.fem.model.assembly import ForceOptions, make_body, make_pieces
 from reflowshock.fem.parallel.communicators import Communicators
 from reflowshock.fem.coupling.crew import couple
 from reflowshock.fem.estimates.placement import shared
@@ -42,7 +42,7 @@ def moved(scheme):
         pieces = make_pieces(distribute(comms.models[role], *mesh), item.tables, Materials())
         step = division.plan.window if role == "macro" else division.meso_step
         factor = np.ones(len(pieces.steps))
-        bodies[role] = make_body(comms.models[role], pieces, item.tables, factor, Response(step=step))
+        bodies[role] = make_body(comms.models[role], pieces, item.tables, factor, ForceOptions(step=step))
     at_corner = [(np.abs(body.local.points[:, :2] - corner).max(axis=1) < 1e-9).any() for body in bodies.values()]
     crew, _, found = couple(comms, bodies, dict.fromkeys(bodies, []), division.plan, scheme_of(scheme))
     for part in crew.values():

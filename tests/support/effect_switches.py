@@ -16,7 +16,7 @@ from reflowshock.fem.loads.pulse import HalfSine
 from reflowshock.fem.loads.shock_loads import shock_loads
 from reflowshock.fem.materials.library import FR4
 from reflowshock.fem.materials.parameters import Material
-from reflowshock.fem.model.assembly import Response
+from reflowshock.fem.model.assembly import ForceOptions
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.problem.shock import Shock
 from reflowshock.fem.trials.bodies import dns_body, motion_of, nonlinear_body
@@ -82,7 +82,7 @@ def strip(kinematics: str = "small", material: Material = FR4) -> tuple[Body, fl
     if kinematics == "small" and material is FR4:
         body, critical = dns_body(mesh)
     else:
-        body, critical = nonlinear_body(mesh, material, Response(kinematics))
+        body, critical = nonlinear_body(mesh, material, ForceOptions(kinematics))
     return body, 0.5 * critical
 
 

@@ -14,7 +14,7 @@ from reflowshock.fem.dynamics.central_difference import Motion
 from reflowshock.fem.estimates.estimate import WindowPlan
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.tie import net_load
-from reflowshock.fem.model.step_levels import Levels, LocalSteps
+from reflowshock.fem.model.step_levels import Levels, SubsteppedElements
 from reflowshock.fem.trials.bodies import motion_of
 from reflowshock.fem.trials.coupled import Coupled, Models, pieces_of
 from tests.support.fem_bodies import dense_stiffness
@@ -34,7 +34,7 @@ def released(model: Levelled, displacement: np.ndarray, step: float) -> Motion:
 
 def at_step(model: Levelled, step: float) -> Levelled:
     """Return a model with the same levels at another window."""
-    levels = LocalSteps.build(MPI.COMM_SELF, model.body, Levels(model.level, model.ratios, step))
+    levels = SubsteppedElements.build(MPI.COMM_SELF, model.body, Levels(model.level, model.ratios, step))
     return replace(model, body=replace(model.body, terms=[*model.body.terms[:-1], levels]), window=step)
 
 

@@ -8,7 +8,7 @@ from reflowshock.fem.dynamics.central_difference import Motion
 from reflowshock.fem.estimates.estimate import damped_critical_step
 from reflowshock.fem.loads.damping import RayleighDamping
 from reflowshock.fem.loads.large_mass import LargeMass
-from reflowshock.fem.loads.load import BodyAcceleration, Load, NodalForces, PrescribedMotion
+from reflowshock.fem.loads.load import BodyAcceleration, Load, NodalForces, PrescribedVelocity
 from reflowshock.fem.loads.pulse import Constant, HalfSine
 from reflowshock.fem.materials.parameters import Isotropic
 from reflowshock.fem.mesh.facet_areas import outward_areas
@@ -62,7 +62,7 @@ def loads_of(kind: str, body: Body, mesh: MeshData, stiffness: float) -> list[Lo
     if kind == "pressure":
         return [pressure(body, mesh, Constant(1e6)), BodyAcceleration(ALONG, Constant(9.81))]
     if kind == "motion":
-        return [PrescribedMotion(low_nodes(body, mesh), 0, Constant(1.0)), BodyAcceleration(ALONG, pulse)]
+        return [PrescribedVelocity(low_nodes(body, mesh), 0, Constant(1.0)), BodyAcceleration(ALONG, pulse)]
     if kind == "large_mass":
         low = mesh.facet_nodes("low")
         return [LargeMass.build(MPI.COMM_SELF, body, low, (ALONG, pulse)), BodyAcceleration(ALONG, Constant(9.81))]
@@ -118,7 +118,7 @@ def test_prescribed_motion_sends_the_exact_wave():
     mesh, speed = bar(held=False, elements=60), 1.0
     body, critical = dns_body(mesh, STEEL)
     driven = low_nodes(body, mesh)
-    motion = motion_of(body, 0.9 * critical, [PrescribedMotion(driven, 0, Constant(speed))])
+    motion = motion_of(body, 0.9 * critical, [PrescribedVelocity(driven, 0, Constant(speed))])
     while motion.time < LENGTH / SPEED:
         motion.advance()
         motion.update_force()

@@ -10,7 +10,7 @@ from reflowshock.fem.dynamics.energy_balance import Ledger
 from reflowshock.fem.loads.damping import RayleighDamping
 from reflowshock.fem.loads.pretension import Pretension
 from reflowshock.fem.materials.library import FR4, SAC405, SILICON
-from reflowshock.fem.model.assembly import Response
+from reflowshock.fem.model.assembly import ForceOptions
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.stress_recovery import StressRecovery
 from reflowshock.fem.parallel import portable
@@ -25,7 +25,7 @@ LAYERS = {"board": [1.5e-4, 1.5e-4], "solder": [1e-4, 1e-4], "die": [2e-4]}
 
 def package(formulation: str = "one_point", kinematics: str = "small", materials: dict | None = None) -> Cooled:
     mesh = layered(np.linspace(0, 1e-3, 4), np.linspace(0, 7e-4, 3), LAYERS, distorted=0.15)
-    return cooled(mesh, materials or MATERIALS, CHANGE, formulation, Response(kinematics, 1e-9))
+    return cooled(mesh, materials or MATERIALS, CHANGE, formulation, ForceOptions(kinematics, 1e-9))
 
 
 def force_at_rest(body: Body) -> np.ndarray:

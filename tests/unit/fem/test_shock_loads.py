@@ -8,7 +8,7 @@ from pydantic import ValidationError
 from reflowshock.fem.dynamics.energy_balance import SUMS, Ledger
 from reflowshock.fem.errors import EnergyError, LoadError
 from reflowshock.fem.loads.large_mass import LargeMass
-from reflowshock.fem.loads.load import BodyAcceleration, PrescribedMotion
+from reflowshock.fem.loads.load import BodyAcceleration, PrescribedVelocity
 from reflowshock.fem.loads.pulse import Constant
 from reflowshock.fem.loads.shock_pulse import shock_pulse
 from reflowshock.fem.mesh.mesh import MeshData
@@ -96,7 +96,7 @@ def test_large_mass_needs_nodes_that_are_free():
 def test_motion_of_a_held_component_is_refused():
     mesh, body = box(held=True)
     with pytest.raises(LoadError, match="prescribed motion along x acts on nodes that are held"):
-        motion_of(body, 1e-8, [PrescribedMotion(body.local.locate(mesh.facet_nodes("low")), 0, Constant(1.0))])
+        motion_of(body, 1e-8, [PrescribedVelocity(body.local.locate(mesh.facet_nodes("low")), 0, Constant(1.0))])
 
 
 def test_weight_of_the_large_mass_does_not_move_the_base():
