@@ -26,7 +26,7 @@ import numpy as np
 from mpi4py import MPI
 
 from reflowshock.fem.division.tables import prepare
-from reflowshock.fem.dynamics.central_difference import Motion
+from reflowshock.fem.dynamics.central_difference import ExplicitMotion
 from reflowshock.fem.dynamics.implicit import ImplicitMotion
 from reflowshock.fem.dynamics.modal import natural_modes
 from reflowshock.fem.elements.element import critical_steps
@@ -146,7 +146,7 @@ def answers(body: Body) -> dict:
     return {"deflection": deflection(body, equations), "frequency": frequency}
 
 
-def seconds_a_step(motion: Motion | ImplicitMotion) -> float:
+def seconds_a_step(motion: ExplicitMotion | ImplicitMotion) -> float:
     """Processor seconds of a whole step, force included; best of three batches."""
 
     def batch(steps: int) -> float:
@@ -160,9 +160,9 @@ def seconds_a_step(motion: Motion | ImplicitMotion) -> float:
     return min(batch(steps) for _ in range(3))
 
 
-def explicit_motion(body: Body, step: float) -> Motion:
+def explicit_motion(body: Body, step: float) -> ExplicitMotion:
     """The motion of a body by explicit steps [s]."""
-    return Motion(body, [], step, np.empty(0, np.int32), np.zeros(len(body.mass)))
+    return ExplicitMotion(body, [], step, np.empty(0, np.int32), np.zeros(len(body.mass)))
 
 
 def speeds(cells: tuple[int, int]) -> dict:

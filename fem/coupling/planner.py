@@ -112,7 +112,11 @@ def loads_of(
 
 
 def plan_ranks(
-    world: MPI.Comm, loads: Mapping[Role, ModelWork], ranks: Ranks, folder: Path | None, scheme: SchemeName = "held_velocity"
+    world: MPI.Comm,
+    loads: Mapping[Role, ModelWork],
+    ranks: Ranks,
+    folder: Path | None,
+    scheme: SchemeName = "held_velocity",
 ) -> Plan:
     """Measure, predict, choose, and say so; collective.
 

@@ -134,8 +134,8 @@ def make_body(
     held = local.locate(tables.held_nodes)
     free[held[held >= 0]] = ~tables.held[held >= 0]
     free[tie.slave] = False
-    cut = local.locate(tables.cut).astype(np.int32)
-    body = Body(local, elements, pieces.geometry, [], tie, shared, cut, mass, free)
+    interface = local.locate(tables.interface).astype(np.int32)
+    body = Body(local, elements, pieces.geometry, [], tie, shared, interface, mass, free)
     terms = response_terms(comm, body, pieces.materials, tables, response) if response else linear_terms(elements)
     warm_up(terms, len(mass))
     return replace(body, terms=terms)

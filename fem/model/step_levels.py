@@ -92,7 +92,7 @@ class SubsteppedElements:
 
         Args:
             comm: Communicator of the model.
-            body: The model, whatever its terms. The nodes of its cut are held.
+            body: The model, whatever its terms. The nodes of its interface are held.
             levels: Levels of its elements, which must be linear elastic.
         """
         term = build_level(comm, body, levels, 1, np.arange(len(body.mass), dtype=np.int32))
@@ -179,7 +179,9 @@ def check_elastic(materials: Sequence[Material], kinematics: Kinematics, ratios:
         )
 
 
-def build_level(comm: MPI.Comm, body: Body, levels: Levels, number: int, around: NDArray[np.int32]) -> SubsteppedElements:
+def build_level(
+    comm: MPI.Comm, body: Body, levels: Levels, number: int, around: NDArray[np.int32]
+) -> SubsteppedElements:
     """Build a level and those inside it; collective.
 
     Args:
@@ -212,7 +214,7 @@ def build_level(comm: MPI.Comm, body: Body, levels: Levels, number: int, around:
 
 
 def arrays_at_once(level: SubsteppedElements) -> tuple[tuple[NDArray, ...], ...]:
-    """Return what ``SubsteppedElements.at_once`` is for a level: Python between substeps costs as much as small levels do."""
+    """Return ``SubsteppedElements.at_once`` of a level: Python between substeps costs as much as small levels do."""
     inner = levels_of(level.terms)
     own = [term for term in level.terms if term not in inner]
     matrix = own[0] if len(own) == 1 else None
@@ -235,7 +237,7 @@ def level_nodes(body: Body, level: NDArray[np.int32], number: int) -> tuple[NDAr
     used[body.tie.master[used[body.tie.slave]]] = True
     outer = np.zeros((len(body.mass), 3))
     outer[body.elements.cells[level < number]] = 1.0
-    outer[body.cut[body.cut >= 0]] = 1.0
+    outer[body.interface[body.interface >= 0]] = 1.0
     body.tie.gather(outer)
     body.shared.add(outer)
     moves = outer[:, 0] == 0.0

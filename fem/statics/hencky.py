@@ -12,7 +12,7 @@ from reflowshock.fem.elements.strain import strain_matrix
 from reflowshock.fem.errors import MeshError, ModesError
 from reflowshock.fem.forces.force_assembled import AssembledElements, upper_pattern
 from reflowshock.fem.kernels.force import assemble_upper_blocks
-from reflowshock.fem.kernels.hencky import Shape, ElementState, hexahedra, hourglass_share, one_point
+from reflowshock.fem.kernels.hencky import ElementState, Shape, hexahedra, hourglass_share, one_point
 from reflowshock.fem.kernels.plasticity import plastic_constants
 from reflowshock.fem.materials.parameters import Material
 

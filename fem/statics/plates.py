@@ -10,8 +10,8 @@ from reflowshock.fem.elements.mesh_elements import elements_of
 from reflowshock.fem.materials.elasticity import materials_of_parts
 from reflowshock.fem.mesh.mesh_file import read_mesh
 from reflowshock.fem.statics.pads import pad_matrix
-from reflowshock.fem.statics.scene import connected, die_corners, thermal_tables
-from reflowshock.fem.statics.state import Assembly, RigidModes, HeatedState, check_loads
+from reflowshock.fem.statics.state import Assembly, HeatedState, RigidModes, check_loads
+from reflowshock.fem.statics.thermal_tables import connected, die_corners, thermal_tables
 
 
 class RigidPlates:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reflowshock.fem.parallel.own_job import end_with_parent, own_environment
-from reflowshock.fem.statics.state import Assembly, RigidModes, HeatedState
+from reflowshock.fem.statics.state import Assembly, HeatedState, RigidModes
 
 GRACE = 5.0  # seconds that the process has to end when it is told to
 

@@ -22,8 +22,8 @@ from reflowshock.fem.model.factorisation import FactorCost
 from reflowshock.fem.parallel.agreement import agreed
 from reflowshock.fem.statics.corners import Corners
 from reflowshock.fem.statics.pads import pad_matrix
-from reflowshock.fem.statics.scene import ThermalTables, connected, die_corners, thermal_tables
-from reflowshock.fem.statics.state import Assembly, RigidModes, HeatedState, check_loads
+from reflowshock.fem.statics.state import Assembly, HeatedState, RigidModes, check_loads
+from reflowshock.fem.statics.thermal_tables import ThermalTables, connected, die_corners, thermal_tables
 from reflowshock.fem.statics.thermoelastic import Thermoelastic
 
 

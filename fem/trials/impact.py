@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from reflowshock.fem.dynamics.central_difference import Motion
+from reflowshock.fem.dynamics.central_difference import ExplicitMotion
 from reflowshock.fem.forces.force import Kinematics
 from reflowshock.fem.materials.parameters import Material
 from reflowshock.fem.mesh.mesh import MeshData
@@ -49,14 +49,14 @@ def rod(
 
 def explicit(
     mesh: MeshData, material: Material, kinematics: Kinematics, formulation: str, fraction: float
-) -> tuple[Body, Motion]:
+) -> tuple[Body, ExplicitMotion]:
     """Return a body of one material and its motion at a fraction of the critical step of its elements."""
     _, critical = nonlinear_body(mesh, material, ForceOptions(kinematics, np.inf), formulation)
     body, _ = nonlinear_body(mesh, material, ForceOptions(kinematics, fraction * critical), formulation)
     return body, motion_of(body, fraction * critical)
 
 
-def march(motion: Motion, steps: int) -> np.ndarray:
+def march(motion: ExplicitMotion, steps: int) -> np.ndarray:
     """Take steps; return kinetic, strain, plastic and hourglass energy at each: (steps + 1, 4)."""
     energies = []
     for _ in range(steps + 1):

@@ -9,7 +9,7 @@ from reflowshock.fem.coupling.scheme import scheme_of
 from reflowshock.fem.coupling.self_check import self_check
 from reflowshock.fem.materials.library import FR4, SAC405
 from reflowshock.fem.materials.roles import Materials
-from reflowshock.fem.parallel.exchange import CutChannels
+from reflowshock.fem.parallel.exchange import InterfaceChannels
 from reflowshock.fem.parallel.portable import values
 from reflowshock.fem.problem.shock import Coupling
 from reflowshock.fem.trials.coupled import Coupled, Models, models_of
@@ -55,7 +55,7 @@ def all_energy(coupled: Coupled) -> float:
 
 def momentum_change(coupled: Coupled, start: np.ndarray) -> float:
     """Return the largest change of linear and angular momentum over that of all nodes at the speed of the push."""
-    mass = sum(part.motion.ledger_mass.sum() for part in coupled.parts)
+    mass = sum(part.motion.counted_mass.sum() for part in coupled.parts)
     scale = mass * np.linalg.norm(PUSH) * np.array([1.0] * 3 + [3 * SIZE] * 3)
     return float(np.abs((coupled.momentum() - start) / scale).max())
 
@@ -83,7 +83,9 @@ def transfer(given: PairTransfer) -> dict[str, float]:
 def through(models: Models) -> dict[str, float]:
     """Try fields, forces and masses through tie and cut of two models."""
     bodies = models.bodies()
-    channels = CutChannels.open(MPI.COMM_SELF, bodies["macro"].cut, bodies["meso"].cut, receiver_waits=False)
+    channels = InterfaceChannels.open(
+        MPI.COMM_SELF, bodies["macro"].interface, bodies["meso"].interface, receiver_waits=False
+    )
     found = self_check(MPI.COMM_SELF, bodies, channels)
     masses = found.macro_mass + found.interface_mass + found.meso_mass
     return {

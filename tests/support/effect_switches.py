@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from reflowshock.fem.dynamics.central_difference import Motion
+from reflowshock.fem.dynamics.central_difference import ExplicitMotion
 from reflowshock.fem.loads.load import DOWN, BodyAcceleration, Load
 from reflowshock.fem.loads.pulse import HalfSine
 from reflowshock.fem.loads.shock_loads import shock_loads
@@ -92,7 +92,7 @@ def loads_of(body: Body, wanted: Shock) -> list[Load]:
     return shock_loads(MPI.COMM_SELF, float(body.mass.sum()), body, tables, wanted)
 
 
-def moved(body: Body, step: float, loads: list[Load], duration: float) -> tuple[Motion, float]:
+def moved(body: Body, step: float, loads: list[Load], duration: float) -> tuple[ExplicitMotion, float]:
     """Return the motion after a duration [s], and the largest deflection of its middle [m] until then."""
     motion, largest = motion_of(body, step, loads), 0.0
     middle = np.argmin(np.abs(body.local.points[:, 0] - 0.5 * LENGTH))
@@ -102,7 +102,7 @@ def moved(body: Body, step: float, loads: list[Load], duration: float) -> tuple[
     return motion, largest
 
 
-def step_of(motion: Motion) -> None:
+def step_of(motion: ExplicitMotion) -> None:
     """Take a step of a motion."""
     motion.advance()
     motion.update_force()

@@ -1,9 +1,9 @@
-"""A pressure that follows its surface: normal to it, in balance on a closed one, its work exact in the ledger."""
+"""A pressure that follows its surface: normal to it, in balance on a closed one, its work exact."""
 
 import numpy as np
 import pytest
 
-from reflowshock.fem.dynamics.central_difference import Motion
+from reflowshock.fem.dynamics.central_difference import ExplicitMotion
 from reflowshock.fem.loads.follower_pressure import FollowerPressure
 from reflowshock.fem.loads.load import NodalForces
 from reflowshock.fem.loads.pulse import Constant
@@ -23,14 +23,14 @@ def cube() -> MeshData:
     return mesh_of(points, cells, "board", SIDES)
 
 
-def pressed(names) -> tuple[MeshData, Motion, list[FollowerPressure]]:
+def pressed(names) -> tuple[MeshData, ExplicitMotion, list[FollowerPressure]]:
     mesh = cube()
     body, critical = dns_body(mesh, STEEL)
     loads = [FollowerPressure.build(body, outward_facets(mesh, name), Constant(PRESSURE)) for name in names]
     return mesh, motion_of(body, 0.5 * critical, loads), loads
 
 
-def force_of(load, motion: Motion) -> np.ndarray:
+def force_of(load, motion: ExplicitMotion) -> np.ndarray:
     before = motion.force.copy()
     load.add(motion)
     return motion.force - before

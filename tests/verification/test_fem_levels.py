@@ -10,7 +10,7 @@ from mpi4py import MPI
 from reflowshock.fem.coupling.scheme import scheme_of
 from reflowshock.fem.division.division import Division
 from reflowshock.fem.division.tables import joined, model_inputs
-from reflowshock.fem.dynamics.central_difference import Motion
+from reflowshock.fem.dynamics.central_difference import ExplicitMotion
 from reflowshock.fem.estimates.estimate import WindowPlan
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.tie import net_load
@@ -23,7 +23,7 @@ from tests.support.fem_levels import Levelled, joint_on_board, levelled
 MESH = joint_on_board(solder=4)
 
 
-def released(model: Levelled, displacement: np.ndarray, step: float) -> Motion:
+def released(model: Levelled, displacement: np.ndarray, step: float) -> ExplicitMotion:
     """Return the motion of a body of a model, let go at rest at a displacement (n, 3)."""
     motion = motion_of(model.body, step)
     motion.displacement[:] = displacement

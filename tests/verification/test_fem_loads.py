@@ -1,10 +1,10 @@
-"""Loads and damping against exact solutions; their work in the ledger is exact to round-off."""
+"""Loads and damping against exact solutions; their work in the energy balance is exact to round-off."""
 
 import numpy as np
 import pytest
 from mpi4py import MPI
 
-from reflowshock.fem.dynamics.central_difference import Motion
+from reflowshock.fem.dynamics.central_difference import ExplicitMotion
 from reflowshock.fem.estimates.estimate import damped_critical_step
 from reflowshock.fem.loads.damping import RayleighDamping
 from reflowshock.fem.loads.large_mass import LargeMass
@@ -31,13 +31,13 @@ def bar(held: bool, elements: int = 10) -> MeshData:
     return mesh_of(points, cells, "board", facets | {"low": on(0, 0.0), "high": on(0, LENGTH)})
 
 
-def total_energy(motion: Motion) -> float:
+def total_energy(motion: ExplicitMotion) -> float:
     """Return all energy that is there or was taken, minus the external work."""
     held = motion.internal_energy()
     return motion.kinetic_energy() + held.total + motion.damping_energy - motion.external_work
 
 
-def largest_imbalance(motion: Motion, steps: int) -> tuple[float, float]:
+def largest_imbalance(motion: ExplicitMotion, steps: int) -> tuple[float, float]:
     """Return the largest change of the total energy and the largest external work."""
     start, error, work = total_energy(motion), 0.0, 0.0
     for _ in range(steps):

@@ -110,7 +110,9 @@ def reflow_heated(run: Run[PackageCase], thermal: Thermal, pads: "list[PadSite]"
         )
 
 
-def _start(structure: "HeatedStructure", drawn: "dict[str, JointGeometry]", case: PackageCase, first: LoadStep) -> Coupled:
+def _start(
+    structure: "HeatedStructure", drawn: "dict[str, JointGeometry]", case: PackageCase, first: LoadStep
+) -> Coupled:
     """Begin with pads where the structure has them without solder."""
     modes = structure.rigid_modes
     alone = structure.solve(first.temperature, first.corner, *_nothing(structure))

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from reflowshock.fem.dynamics.central_difference import Motion
-from reflowshock.fem.dynamics.energy_balance import Ledger
+from reflowshock.fem.dynamics.central_difference import ExplicitMotion
+from reflowshock.fem.dynamics.energy_balance import EnergyBalance
 from reflowshock.fem.loads.damping import RayleighDamping
 from reflowshock.fem.loads.pretension import Pretension
 from reflowshock.fem.materials.library import FR4, SAC405, SILICON
@@ -50,7 +50,7 @@ def test_nothing_moves_without_a_shock(formulation, kinematics):
     assert StressRecovery(body, np.arange(len(body.elements.cells))).plastic_strain().max() > 1e-3
 
 
-def launched(body: Body, step: float) -> Motion:
+def launched(body: Body, step: float) -> ExplicitMotion:
     motion = motion_of(body, step, [RayleighDamping.build(body, (0.0, 0.01 * step))])
     motion.launch(np.array([0.0, 0.1, 1.0]))
     return motion
@@ -82,14 +82,14 @@ def test_stresses_add_where_all_is_linear():
 
 
 def test_energy_at_the_beginning_is_a_reference():
-    ledger = Ledger(limit=0.1, trivial=0.0)
+    balance = EnergyBalance(limit=0.1, trivial=0.0)
     sums = np.zeros(24)
     sums[1] = 5.0
-    assert ledger.judge(sums, 0.0)["balance"] == 0.0
-    assert ledger.largest == 0.0
+    assert balance.judge(sums, 0.0)["balance"] == 0.0
+    assert balance.largest == 0.0
     sums[1], sums[0] = 4.0, 1.0
-    assert ledger.judge(sums, 1.0)["balance"] == 0.0
-    assert ledger.largest == 1.0
+    assert balance.judge(sums, 1.0)["balance"] == 0.0
+    assert balance.largest == 1.0
 
 
 def test_state_continues_from_a_checkpoint():

@@ -10,7 +10,7 @@ from mpi4py import MPI
 
 from reflowshock.fem.division.chebyshev import Substeps
 from reflowshock.fem.division.choose_levels import Pace, choose_levels, governing_steps
-from reflowshock.fem.dynamics.central_difference import Motion
+from reflowshock.fem.dynamics.central_difference import ExplicitMotion
 from reflowshock.fem.elements.one_point import ONE_POINT
 from reflowshock.fem.errors import LevelError
 from reflowshock.fem.forces.energy import Energy
@@ -104,7 +104,7 @@ def test_what_a_motion_prescribes_does_not_move_in_substeps():
     top = np.flatnonzero(body.local.points[:, 2] == body.local.points[:, 2].max())
     held.body.free[top, 0] = False
     levels = SubsteppedElements.build(MPI.COMM_SELF, held.body, Levels(held.level, ratios, held.window))
-    motion = Motion(
+    motion = ExplicitMotion(
         body, [PrescribedVelocity(top, 0, HalfSine(1.0, 1e-6))], model.window, np.empty(0, int), 0.0 * body.mass
     )
     motion.displacement[:] = 1e-6 * np.sin(np.arange(motion.displacement.size)).reshape(-1, 3)

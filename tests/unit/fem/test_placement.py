@@ -8,7 +8,7 @@ import pytest
 from mpi4py import MPI
 from pydantic import ValidationError
 
-from reflowshock.fem.coupling.planner import ModelWork, Measured, keep, kept, plan_from, plan_ranks, words
+from reflowshock.fem.coupling.planner import Measured, ModelWork, keep, kept, plan_from, plan_ranks, words
 from reflowshock.fem.coupling.speeds import (
     Kind,
     StepCost,

@@ -5,7 +5,7 @@ import pytest
 from mpi4py import MPI
 from pydantic import ValidationError
 
-from reflowshock.fem.dynamics.energy_balance import SUMS, Ledger
+from reflowshock.fem.dynamics.energy_balance import SUMS, EnergyBalance
 from reflowshock.fem.errors import EnergyError, LoadError
 from reflowshock.fem.loads.large_mass import LargeMass
 from reflowshock.fem.loads.load import BodyAcceleration, PrescribedVelocity
@@ -116,14 +116,14 @@ def test_weight_of_the_large_mass_does_not_move_the_base():
     assert motion.base_displacement()[0] == pytest.approx(-0.5 * 1e3 * motion.time**2, rel=1e-10)
 
 
-def test_ledger_says_what_grew_and_which_step_it_was():
-    ledger = Ledger(limit=0.02, trivial=0.0, step=1e-9, critical=9e-10)
+def test_energy_balance_says_what_grew_and_which_step_it_was():
+    balance = EnergyBalance(limit=0.02, trivial=0.0, step=1e-9, critical=9e-10)
     sums = np.zeros(SUMS)
-    ledger.judge(sums, 0.0)
+    balance.judge(sums, 0.0)
     sums[1] = np.inf
     expected = (
         r"energies are not numbers at time 1\.0+e-06 s \(step 1000\): the internal energy went from 0\.000e\+00 J to"
         r" inf J since the sample before; step 1\.000e-09 s, estimated critical step 9\.000e-10 s; most likely the time"
     )
     with pytest.raises(EnergyError, match=expected):
-        ledger.judge(sums, 1e-6)
+        balance.judge(sums, 1e-6)
