@@ -19,7 +19,7 @@ from reflowshock.fem.mesh.mesh import append
 from reflowshock.fem.problem.shock import Coupling
 from reflowshock.fem.division.tables import model_inputs
 from tests.stability.test_fem_division import board, joint
-from reflowshock.fem.trials.divided import checked, surveyed
+from reflowshock.cases.hard.trials.coupled import checked, surveyed
 
 world = MPI.COMM_WORLD
 
@@ -33,7 +33,7 @@ def moved(scheme):
     whole, found, rules = surveyed(append([board(4), joint(0.25e-3, 0.25e-3)]), coupling=Coupling(scheme=scheme))
     division = checked(whole, found, rules)
     inputs, bodies = model_inputs(whole, division), {}
-    corner = inputs["macro"].mesh.points[inputs["macro"].tables.cut].max(axis=0)[:2]
+    corner = inputs["macro"].mesh.points[inputs["macro"].tables.interface].max(axis=0)[:2]
     comms = Communicators(world, shared(("macro", "meso"), world.size))
     for role, item in inputs.items():
         centre = item.mesh.points[item.mesh.cells].mean(axis=1)

@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from reflowshock.cases.hard.trials.bodies import dns_body
+from reflowshock.cases.hard.trials.grids import grid, mesh_of, on
 from reflowshock.fem.dynamics.central_difference import ExplicitMotion
 from reflowshock.fem.dynamics.energy_balance import EnergyBalance, energy_sums
 from reflowshock.fem.dynamics.participant import Alone, explicit_motion
@@ -17,8 +19,6 @@ from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.power_iteration import highest_frequency
-from reflowshock.fem.trials.bodies import dns_body
-from reflowshock.fem.trials.grids import grid, mesh_of, on
 
 SOFT = Isotropic(density=1200.0, young_modulus=1e9, poisson_ratio=0.45)
 PUSH = np.array([0.6, 0.0, 0.8])
@@ -75,7 +75,7 @@ def test_energy_stays_for_1e5_steps_at_99_percent(name, estimate):
 
 
 def steps_until_stopped(body: Body, step: float, loads: list[Load], critical: float) -> tuple[int, str]:
-    """March as a run does, with a look at the energy balance now and then; return when it was stopped, and why."""
+    """March as a run does, with a look at the ledger now and then; return when it was stopped, and why."""
     participant = Alone(explicit_motion(body, loads, step), WindowPlan(50 * step, 50, 20, 1))
     balance = EnergyBalance(limit=0.02, trivial=0.0, step=step, critical=critical)
     balance.judge(energy_sums(participant, 0.0), 0.0)

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
+from reflowshock.cases.hard.trials.bodies import dns_body, motion_of
 from reflowshock.fem.dynamics.energy_balance import EnergyBalance, energy_sums
 from reflowshock.fem.loads.load import half_sine_drop
 from reflowshock.fem.materials.library import SAC405
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.mesh import MeshData, append
-from reflowshock.fem.trials.bodies import dns_body, motion_of
 from tests.support.fem_division import by_patch
 from tests.support.fem_models import board_mesh, small_assembly
 from tests.support.fem_window import Window
@@ -75,7 +75,7 @@ def test_two_scale_follows_the_dns_and_improves_with_the_window():
     assert np.log2(coarse / fine) == pytest.approx(2.0, abs=0.5)
 
 
-def test_energy_balance_of_a_two_scale_run_balances():
+def test_ledger_of_a_two_scale_run_balances():
     window, _ = die_history(0.9, 4e-5)
     sums = energy_sums(window.macro, 1.0) + energy_sums(window.meso, -1.0)
     balance = EnergyBalance(limit=0.02, trivial=0.0)

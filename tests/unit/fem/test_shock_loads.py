@@ -5,6 +5,8 @@ import pytest
 from mpi4py import MPI
 from pydantic import ValidationError
 
+from reflowshock.cases.hard.trials.bodies import dns_body, motion_of
+from reflowshock.cases.hard.trials.grids import grid, mesh_of, on
 from reflowshock.fem.dynamics.energy_balance import SUMS, EnergyBalance
 from reflowshock.fem.errors import EnergyError, LoadError
 from reflowshock.fem.loads.large_mass import LargeMass
@@ -15,8 +17,6 @@ from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.problem import shock_checks
 from reflowshock.fem.problem.shock import Damping, Shock
-from reflowshock.fem.trials.bodies import dns_body, motion_of
-from reflowshock.fem.trials.grids import grid, mesh_of, on
 from tests.support.fem_bodies import STEEL
 
 G = 9.80665
@@ -116,7 +116,7 @@ def test_weight_of_the_large_mass_does_not_move_the_base():
     assert motion.base_displacement()[0] == pytest.approx(-0.5 * 1e3 * motion.time**2, rel=1e-10)
 
 
-def test_energy_balance_says_what_grew_and_which_step_it_was():
+def test_ledger_says_what_grew_and_which_step_it_was():
     balance = EnergyBalance(limit=0.02, trivial=0.0, step=1e-9, critical=9e-10)
     sums = np.zeros(SUMS)
     balance.judge(sums, 0.0)
