@@ -16,7 +16,6 @@ from tests.support.mesh_file import MeshFile
 
 CASE = Path(__file__).resolve().parents[2] / "cases/hu_bga_reflow/case.toml"
 SHORT = (
-    "shock.ranks.total=1",
     'scale="quick"', "thermal.steps=1", "solder.numerics.spacing=0.12 mm", "package.rows=4", "package.columns=4",
     "package.substrate.length=5 mm", "package.substrate.width=5 mm", "package.die.length=3 mm",
     "package.die.width=3 mm",
