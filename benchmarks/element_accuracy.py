@@ -25,6 +25,8 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 import numpy as np
 from mpi4py import MPI
 
+from reflowshock.cases.hard.trials.boxes import KINDS, box
+from reflowshock.cases.hard.trials.grids import CYCLIC
 from reflowshock.fem.division.tables import prepare
 from reflowshock.fem.dynamics.central_difference import Motion
 from reflowshock.fem.dynamics.implicit import ImplicitMotion
@@ -39,8 +41,6 @@ from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.factorisation import Factorisation
 from reflowshock.fem.model.global_matrix import Equations
 from reflowshock.fem.parallel.local_mesh import distribute
-from reflowshock.fem.trials.boxes import KINDS, box
-from reflowshock.fem.trials.grids import CYCLIC
 
 RESULTS = Path(__file__).parent / "results" / "element_accuracy.json"
 README = Path(__file__).parents[1] / "cases" / "cantilever" / "README.md"

@@ -19,7 +19,7 @@ from reflowshock.fem.mesh.mesh import append
 from reflowshock.fem.problem.shock import Coupling
 from reflowshock.fem.division.tables import model_inputs
 from tests.stability.test_fem_division import board, joint
-from reflowshock.fem.trials.divided import checked, surveyed
+from reflowshock.cases.hard.trials.coupled import checked, surveyed
 
 world = MPI.COMM_WORLD
 

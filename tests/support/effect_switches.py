@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
+from reflowshock.cases.hard.trials.bodies import dns_body, motion_of, nonlinear_body
+from reflowshock.cases.hard.trials.grids import grid, mesh_of, on
 from reflowshock.fem.dynamics.central_difference import Motion
 from reflowshock.fem.loads.load import DOWN, BodyAcceleration, Load
 from reflowshock.fem.loads.pulse import HalfSine
@@ -19,8 +21,6 @@ from reflowshock.fem.materials.parameters import Material
 from reflowshock.fem.model.assembly import Response
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.problem.shock import Shock
-from reflowshock.fem.trials.bodies import dns_body, motion_of, nonlinear_body
-from reflowshock.fem.trials.grids import grid, mesh_of, on
 from reflowshock.particles.core.cloud import box_cloud
 from reflowshock.particles.parameters.solder import Solder
 from reflowshock.particles.physics.physics import Physics

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from mpi4py import MPI
 
+from reflowshock.cases.hard.trials.grids import grid, mesh_of, on
 from reflowshock.fem.division.tables import joined, model_inputs
 from reflowshock.fem.materials.parameters import Material
 from reflowshock.fem.mesh.mesh import MeshData
@@ -17,7 +18,6 @@ from reflowshock.fem.parallel.local_mesh import distribute
 from reflowshock.fem.run.cooling import pinned
 from reflowshock.fem.statics.equilibrium import Equilibrium, Statics, thermal_force
 from reflowshock.fem.statics.initial_state import begun
-from reflowshock.fem.trials.grids import grid, mesh_of, on
 
 SMALL = Response()
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from reflowshock.cases.hard.trials.bodies import dns_body, motion_of
 from reflowshock.fem.dynamics.implicit import ImplicitMotion
 from reflowshock.fem.dynamics.modal import natural_modes
 from reflowshock.fem.dynamics.moving import Moving
@@ -14,7 +15,6 @@ from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.global_matrix import Equations
 from reflowshock.fem.parallel import portable
 from reflowshock.fem.problem.shock import Damping
-from reflowshock.fem.trials.bodies import dns_body, motion_of
 from tests.support.fem_bodies import STEEL
 from tests.verification.test_fem_loads import bar, largest_imbalance, loads_of
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from reflowshock.cases.hard.trials.bodies import motion_of
 from reflowshock.fem.dynamics.central_difference import Motion
 from reflowshock.fem.dynamics.energy_balance import Ledger
 from reflowshock.fem.loads.damping import RayleighDamping
@@ -15,7 +16,6 @@ from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.stress_recovery import StressRecovery
 from reflowshock.fem.parallel import portable
 from reflowshock.fem.statics.pins import pins, rigid_motions
-from reflowshock.fem.trials.bodies import motion_of
 from tests.support.fem_residual import Cooled, cooled, layered
 
 CHANGE = -192.0
