@@ -14,7 +14,12 @@ from reflowshock.workflow.pipeline.stage_runner import Findings, Run
 from reflowshock.workflow.stages import shock
 from tests.support.workflow_command import SMALL_CASE
 
-COOLED = ("thermal.effects.residual_stress=on", "thermal.effects.flexible=off", "materials.solder=SAC405")
+COOLED = (
+    "shock.ranks.total=1",
+    "thermal.effects.residual_stress=on",
+    "thermal.effects.flexible=off",
+    "materials.solder=SAC405",
+)
 
 
 def shock_of(run_folder: Path, *settings: str) -> tuple[Path, Findings]:
