@@ -40,7 +40,7 @@ BAD_VALUES = {
     "gravity on free drops": (PAIR, "gravity=on", ['gravity = "on"', "no wall"]),
     "amplitude too large": (SWING, "oscillation.amplitude=0.5", ["oscillation.amplitude = 0.5", "<= 0.3"]),
     "fewer than two shells": (SWING, "oscillation.particles_per_radius=1", ["particles_per_radius = 1", ">= 2"]),
-    "too viscous to swing": (SWING, "solder.viscosity=2 Pa*s", ["solder.viscosity", "< 0.9401 Pa*s", "not swing"]),
+    "too viscous to swing": (SWING, "solder.viscosity=2 Pa*s", ["solder.viscosity", "< 0.9401 Pa*s", "not oscillate"]),
     "gravity of a swing": (SWING, "solder.gravity=1 m/s^2", ["solder.gravity", "unknown key"]),
     "angle of a full turn": (DROP, "drop.contact_angle=190 deg", ['"190 deg"', "out of range", "< 180 deg"]),
     "angle of zero": (DROP, "drop.contact_angle=0 deg", ["drop.contact_angle", "> 0 deg"]),
@@ -61,7 +61,7 @@ BAD_VALUES = {
     "even count cut in half": (
         DROP,
         "drop={volume='1 mm^3',contact_angle='60 deg',particles_per_edge=10,symmetry='half'}",
-        ['drop.symmetry = "half"', "10 along an edge", "an odd number"],
+        ['drop.symmetry = "half"', "10 particles along an edge", "an odd number"],
     ),
     "volume without end": (JOINT, "joint.volume=1000 mm^3", ["joint.spacing", "does not fit", ">= "]),
     "gravity without a wall": (FREE, "gravity=on", ['gravity = "on"', "auto, off", "no wall"]),
