@@ -1,13 +1,7 @@
-"""Small oscillations of a free drop: Rayleigh's frequency, Lamb's damping, both at any viscosity, a fit."""
+"""Small oscillations of a free drop: Rayleigh's frequency, Lamb's damping, and both exactly for any viscosity."""
 
 from cmath import sqrt as complex_sqrt
 from math import sqrt
-
-import numpy as np
-from scipy.optimize import least_squares, newton
-from scipy.special import jve
-
-from reflowshock.arrays import Floats
 
 
 def rayleigh_frequency(mode: int, radius: float, density: float, surface_tension: float) -> float:
@@ -31,6 +25,9 @@ def viscous_oscillation(mode: int, frequency: float, diffusion_rate: float) -> t
         frequency: Rayleigh's omega [rad/s].
         diffusion_rate: nu* = mu / (rho R^2) [1/s].
     """
+    from scipy.optimize import newton  # plans and stages that need no root start without them
+    from scipy.special import jve
+
     ratio = (frequency / diffusion_rate) ** 2
 
     def residual(s: complex) -> complex:
@@ -42,35 +39,3 @@ def viscous_oscillation(mode: int, frequency: float, diffusion_rate: float) -> t
     first = (mode - 1) * (2 * mode + 1) + 1j * sqrt(ratio)
     root = newton(residual, first, x1=first * (0.99 + 0.01j)) * diffusion_rate
     return root.real, root.imag
-
-
-def fit_oscillation(time: Floats, values: Floats, frequency: float) -> tuple[float, float]:
-    """Fit decay rate [1/s] and angular frequency [rad/s] of the fundamental.
-
-    Model: exp(-b t) cos(w t + ..), and of second order its harmonic exp(-2 b t) cos(2 w t + ..), its mean exp(-2 b t)
-    and a constant. The factors of these are linear and eliminated (variable projection).
-
-    Args:
-        time: `(k,)` [s], more than a period.
-        values: `(k,)`.
-        frequency: a guess within some 20 % [rad/s]; an octave too low is noticed: the harmonic is then the larger one.
-    """
-
-    def columns(unknowns: Floats) -> Floats:
-        decay, angle = np.exp(-unknowns[0] * scaled), unknowns[1] * scaled
-        first, second = decay * np.exp(1j * angle), decay**2 * np.exp(2j * angle)
-        return np.column_stack((first.real, first.imag, second.real, second.imag, decay**2, np.ones_like(decay)))
-
-    def factors(basis: Floats) -> Floats:
-        return np.linalg.lstsq(basis, values, rcond=None)[0]
-
-    def misfit(unknowns: Floats) -> Floats:
-        basis = columns(unknowns)
-        return basis @ factors(basis) - values
-
-    scaled = time * frequency
-    found = least_squares(misfit, (0.01, 1.0), x_scale=(0.01, 0.01), xtol=1e-12, ftol=1e-12).x
-    first, second = np.hypot(*factors(columns(found))[:4].reshape(2, 2).T)
-    if second > first:
-        return fit_oscillation(time, values, 2.0 * frequency)
-    return found[0] * frequency, found[1] * frequency
