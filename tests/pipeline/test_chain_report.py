@@ -2,8 +2,8 @@
 
 import shutil
 
-from reflowshock.workflow.report.page import write_report
-from reflowshock.workflow.store.store import read_case_of_run
+from reflowshock.workflow.pipeline.points import read_case_of_run
+from reflowshock.workflow.pipeline.report import write_report
 from tests.support.chain_products import add_chain
 from tests.support.workflow_command import reflowshock
 

@@ -9,7 +9,7 @@ from reflowshock.particles.parameters.scene_drops import Drops
 from reflowshock.particles.parameters.scene_oscillation import Oscillation
 from reflowshock.particles.parameters.scenes import Drop, Fluid, Joint, Liquid
 from reflowshock.particles.parameters.solder import Parameters, Solder, Switch
-from reflowshock.workflow.case.kind import of_particles
+from reflowshock.workflow.case.problems import of_particles
 from reflowshock.workflow.stress_test.trial import Measured, Refused, Trial
 
 if TYPE_CHECKING:

@@ -54,7 +54,9 @@ def test_the_user_decides_if_he_wants_to(switch):
     assert "by the user" in decided["gravity"]["why"]
 
 
-@pytest.mark.parametrize("module", ["parameters.effects", "parameters.checks", "parameters.estimate", "core.geometry", "parameters.solder"])
+@pytest.mark.parametrize(
+    "module", ["parameters.effects", "parameters.checks", "parameters.estimate", "core.geometry", "parameters.solder"]
+)
 def test_planning_loads_neither_numba_nor_petsc(module):
     code = f"import sys, reflowshock.particles.{module}; assert not {{'numba', 'petsc4py'}} & set(sys.modules)"
     subprocess.run([sys.executable, "-c", code], check=True, timeout=60)
