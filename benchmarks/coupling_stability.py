@@ -18,8 +18,8 @@ from itertools import product
 os.environ["OMP_NUM_THREADS"] = os.environ["NUMBA_NUM_THREADS"] = "1"
 
 from benchmarks.support import turns
-from reflowshock.fem.trials.pairs import SCHEMES, Pair
-from reflowshock.fem.trials.windows import PUSH, momentum_error
+from reflowshock.cases.hard.trials.pairs import SCHEMES, Pair
+from reflowshock.cases.hard.trials.windows import PUSH, momentum_error
 from tests.stability.test_fem_window_grid import GROWTH
 
 PRINTED = "as printed"

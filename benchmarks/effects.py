@@ -9,14 +9,14 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from benchmarks.support import turns
+from reflowshock.cases.hard.trials.bodies import dns_body, motion_of
+from reflowshock.cases.hard.trials.grids import grid, mesh_of, on
 from reflowshock.fem.forces.force import Kinematics, force_terms
 from reflowshock.fem.loads.damping import RayleighDamping
 from reflowshock.fem.loads.load import DOWN, BodyAcceleration, Load
+from reflowshock.fem.loads.pulse import STANDARD_GRAVITY, Constant, HalfSine
 from reflowshock.fem.materials.library import FR4, SAC305
 from reflowshock.fem.materials.parameters import Material
-from reflowshock.fem.problem.pulse import STANDARD_GRAVITY, Constant, HalfSine
-from reflowshock.fem.trials.bodies import dns_body, motion_of
-from reflowshock.fem.trials.grids import grid, mesh_of, on
 from reflowshock.particles.core.cloud import box_cloud
 from reflowshock.particles.parameters.solder import Solder
 from reflowshock.particles.scenes.reflow import contact_line, start_flow

@@ -25,21 +25,22 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 import numpy as np
 from mpi4py import MPI
 
+from reflowshock.cases.hard.trials.boxes import KINDS, box
+from reflowshock.cases.hard.trials.grids import CYCLIC
 from reflowshock.fem.division.tables import prepare
 from reflowshock.fem.dynamics.central_difference import Motion
 from reflowshock.fem.dynamics.implicit import ImplicitMotion
+from reflowshock.fem.dynamics.modal import natural_modes
 from reflowshock.fem.elements.element import critical_steps
 from reflowshock.fem.forces.force import Kinematics
 from reflowshock.fem.materials.parameters import Isotropic
 from reflowshock.fem.mesh.facet import area_vectors
 from reflowshock.fem.mesh.mesh import MeshData, boundary_facets
-from reflowshock.fem.model.body import Body, Response, make_body, make_pieces
+from reflowshock.fem.model.assembly import Response, make_body, make_pieces
+from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.factorisation import Factorisation
 from reflowshock.fem.model.global_matrix import Equations
 from reflowshock.fem.parallel.local_mesh import distribute
-from reflowshock.fem.statics.modal import natural_modes
-from reflowshock.fem.trials.boxes import KINDS, box
-from reflowshock.fem.trials.grids import CYCLIC
 
 RESULTS = Path(__file__).parent / "results" / "element_accuracy.json"
 README = Path(__file__).parents[1] / "cases" / "cantilever" / "README.md"

@@ -31,11 +31,11 @@ from petsc4py import PETSc
 
 from benchmarks.support import turns
 from benchmarks.support.cube import SOLDER, STEEL, cube, elements_of, random_displacement
+from reflowshock.cases.hard.trials.bodies import dns_body, motion_of
 from reflowshock.fem import dolfinx_api
 from reflowshock.fem.elements.element import CHUNK, Elements, element_stiffness
 from reflowshock.fem.forces.force import ForceTerm, Kinematics, force_terms
 from reflowshock.fem.mesh.mesh import MeshData
-from reflowshock.fem.trials.bodies import dns_body, motion_of
 
 KINDS = ("incompatible_modes", "one_point")
 PLASTIC = [f"{name}_{kind}_small" for name in ("below_yield", "yielding") for kind in KINDS]

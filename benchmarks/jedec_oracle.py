@@ -24,20 +24,20 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 import numpy as np
 from mpi4py import MPI
 
+from reflowshock.cases.hard.trials.bodies import dns_body
+from reflowshock.cases.hard.trials.grids import grid, mesh_of
 from reflowshock.fem.dynamics.implicit import ImplicitMotion
 from reflowshock.fem.estimates.factor_cost import box_factor
 from reflowshock.fem.estimates.solver_cost import forecast_solvers
+from reflowshock.fem.loads.structure_pulses import pulse_durations, pulses_of
 from reflowshock.fem.materials.library import FR4
 from reflowshock.fem.model.factorisation import Factorisation
 from reflowshock.fem.model.global_matrix import Equations
 from reflowshock.fem.output.compare_structures import solver_differences
 from reflowshock.fem.problem.inputs import INPUT, StructureInput
-from reflowshock.fem.problem.structure_pulses import pulse_durations, pulses_of
 from reflowshock.fem.run.structure_participants import make_participant
 from reflowshock.fem.run.structure_run import make_history
 from reflowshock.fem.setup.structure_model import build_structure
-from reflowshock.fem.trials.bodies import dns_body
-from reflowshock.fem.trials.grids import grid, mesh_of
 from reflowshock.meshing.board.box import write_box
 from reflowshock.meshing.board.box_plan import Box, BoxHoles, BoxLayer
 

@@ -21,10 +21,10 @@ import numpy as np
 
 from benchmarks.support import turns
 from benchmarks.support.cube import STEEL, cube, elements_of
+from reflowshock.cases.hard.trials.bodies import dns_body, motion_of
 from reflowshock.fem.forces.force_assembled import AssembledElements
 from reflowshock.fem.forces.force_congruent import CongruentElements
 from reflowshock.fem.mesh.mesh import MeshData
-from reflowshock.fem.trials.bodies import dns_body, motion_of
 
 FOLDER = Path(__file__).parents[1] / "build" / "peers"
 PYTHON = FOLDER / "venv" / "bin" / "python"

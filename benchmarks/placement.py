@@ -25,7 +25,7 @@ from reflowshock.fem.coupling.stopwatch import Stopwatch
 from reflowshock.fem.parallel.communicators import Communicators
 from reflowshock.fem.parallel.own_job import own_environment
 from reflowshock.fem.problem.inputs import RunInput
-from reflowshock.fem.problem.parameters import Ranks
+from reflowshock.fem.problem.shock import Ranks
 from reflowshock.fem.run.shock_run import make_crew, place
 from reflowshock.fem.run.time_loop import run_window
 from reflowshock.fem.setup.shock_models import build_models, divided_scene

@@ -24,6 +24,7 @@ import ufl
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from reflowshock.cases.hard.trials.grids import grid, mesh_of, on
 from reflowshock.fem import dolfinx_api
 from reflowshock.fem.materials.elasticity import elasticity_matrix
 from reflowshock.fem.materials.library import FR4, SILICON
@@ -36,7 +37,6 @@ from reflowshock.fem.statics.scene import thermal_tables
 from reflowshock.fem.statics.state import Assembly
 from reflowshock.fem.statics.structure import ThermalStructure
 from reflowshock.fem.statics.thermoelastic import Thermoelastic
-from reflowshock.fem.trials.grids import grid, mesh_of, on
 from reflowshock.meshing.board.assembly import write_assembly
 from reflowshock.meshing.board.heated_assembly import write_heated_assembly
 from reflowshock.meshing.board.pads import pad_table

@@ -2,13 +2,13 @@
 
 import numpy as np
 
+from reflowshock.cases.hard.trials.boxes import KINDS, with_middles
+from reflowshock.cases.hard.trials.boxes import elements_of as material_elements
+from reflowshock.cases.hard.trials.grids import grid, mesh_of
 from reflowshock.fem.elements.box_step import diagonal_tetrahedra
 from reflowshock.fem.elements.element import Elements
 from reflowshock.fem.materials.parameters import Isotropic, JohnsonCook, Material
 from reflowshock.fem.mesh.mesh import MeshData
-from reflowshock.fem.trials.boxes import KINDS, with_middles
-from reflowshock.fem.trials.boxes import elements_of as material_elements
-from reflowshock.fem.trials.grids import grid, mesh_of
 
 EDGE = 40
 LENGTH = 0.04  # [m]

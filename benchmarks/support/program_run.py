@@ -6,9 +6,9 @@ import numpy as np
 from mpi4py import MPI
 
 from reflowshock.fem.estimates.placement import shared
+from reflowshock.fem.loads.shock_pulse import shock_pulse
 from reflowshock.fem.parallel.communicators import Communicators
 from reflowshock.fem.problem.inputs import RunInput
-from reflowshock.fem.problem.shock_pulse import shock_pulse
 from reflowshock.fem.run.shock_run import make_crew, make_history, planned
 from reflowshock.fem.setup.shock_models import build_models, divided_scene
 

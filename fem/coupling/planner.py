@@ -40,7 +40,7 @@ from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.parallel.checkpoint_files import warn
 from reflowshock.fem.parallel.partition import partition
-from reflowshock.fem.problem.parameters import Ranks
+from reflowshock.fem.problem.shock import Ranks
 
 if TYPE_CHECKING:
     from reflowshock.fem.setup.shock_models import Divided

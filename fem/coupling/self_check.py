@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from reflowshock.fem.errors import AgreedError
 from reflowshock.fem.estimates.placement import Role
 from reflowshock.fem.mesh.tie import EXACT, net_load
-from reflowshock.fem.model.body import MASS_TOLERANCE, Body
+from reflowshock.fem.model.assembly import MASS_TOLERANCE
+from reflowshock.fem.model.body import Body
 from reflowshock.fem.parallel.exchange import CutChannels
 
 RIGID = np.array([[0.0, -0.7, 0.4], [0.7, 0.0, -0.9], [-0.4, 0.9, 0.0]])

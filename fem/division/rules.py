@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reflowshock.fem.estimates.estimate import WindowPlan, window_plan
-from reflowshock.fem.problem.parameters import Coupling
+from reflowshock.fem.problem.shock import Coupling
 
 
 @dataclass(frozen=True, slots=True)

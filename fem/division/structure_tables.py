@@ -11,8 +11,8 @@ from reflowshock.fem.errors import LoadError, MeshError
 from reflowshock.fem.estimates.material_effects import plastic_laws
 from reflowshock.fem.mesh.facet_areas import OutwardFacets, facet_set, outward_areas, outward_facets
 from reflowshock.fem.mesh.mesh import MeshData
+from reflowshock.fem.mesh.point_table import PointTable, point_table
 from reflowshock.fem.mesh.tie import tie_joints
-from reflowshock.fem.output.watch_points import PointTable, point_table
 from reflowshock.fem.problem.structure import AXES, InputG, PrescribedMotion, Pressure, StructureScene
 
 NODES = {"hexahedron": 8, "tetrahedron": 4, "tetrahedron_quadratic": 10}

@@ -11,13 +11,12 @@ Negative alpha damps what the step does not resolve, for loads that start with a
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from reflowshock.fem.dynamics.central_difference import Motion
 from reflowshock.fem.forces.force_assembled import AssembledElements
 from reflowshock.fem.forces.force_congruent import CongruentElements
 from reflowshock.fem.loads.damping import RayleighDamping
@@ -99,7 +98,7 @@ class ImplicitMotion(Loaded):
         self._extra, self._free = np.zeros(count), body.free.copy()
         self.gravity = self.body_acceleration(0.0)
         for load in self._loads:
-            load.begin(cast(Motion, self))
+            load.begin(self)
         self._prescribed = body.free & ~self._free
         self._equations = Equations.of(comm, replace(body, free=self._free))
         self.factor = self._factorise()
@@ -127,6 +126,10 @@ class ImplicitMotion(Loaded):
         """Add masses ``(k,)`` [kg] that the ledger does not count to local nodes."""
         self._extra[nodes] += mass
 
+    def acceleration(self, nodes: NDArray[np.integer] | slice = slice(None)) -> NDArray[np.float64]:
+        """Return the acceleration ``(k, 3)`` [m/s^2] of some local nodes at ``time``."""
+        return self._acceleration[nodes]
+
     def launch(self, velocity: NDArray[np.float64]) -> None:
         """Give all free components an initial velocity ``(3,)`` [m/s]; before the first step."""
         self.velocity += np.where(self._free, velocity, 0.0)
@@ -135,7 +138,7 @@ class ImplicitMotion(Loaded):
     def _begin(self) -> None:
         """Take the loads and prescribed velocities of time zero."""
         for load in self._loads:
-            load.add(cast(Motion, self))
+            load.add(self)
         self._nodal[:] = self.force
         mean, following = self._driven(-self.step), self._driven(0.0)
         self.velocity += 0.5 * (mean + following)
@@ -163,7 +166,7 @@ class ImplicitMotion(Loaded):
         self.gravity = self.body_acceleration(self.time)
         self.force.fill(0.0)
         for load in self._loads:
-            load.add(cast(Motion, self))
+            load.add(self)
         self._nodal[:] = self.force
         self._update_force()  # of the predicted motion
         right = (1.0 + scheme.alpha) * self._total_force() - scheme.alpha * before

@@ -5,7 +5,7 @@ from math import log
 from typing import Any
 
 from reflowshock.fem.materials.parameters import Isotropic, JohnsonCook, Material
-from reflowshock.fem.problem.parameters import Failure
+from reflowshock.fem.problem.shock import Failure
 
 RATE_OF_DROPS = 100.0  # [1/s] of solder: cases/bga_drop finds up to 50
 

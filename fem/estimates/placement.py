@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 
 from reflowshock.fem.errors import RankError
-from reflowshock.fem.problem.parameters import Ranks
+from reflowshock.fem.problem.shock import Ranks
 
 Role = Literal["macro", "meso", "dns", "structure"]
 

@@ -1,7 +1,7 @@
 """Rayleigh damping C = alpha M + beta K: a force at the nodes, and the energy that it takes."""
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,12 +9,9 @@ from numpy.typing import NDArray
 from reflowshock.fem.forces.energy import InternalForce
 from reflowshock.fem.forces.force import linear_terms
 from reflowshock.fem.kernels.damping import add_damping, power
-from reflowshock.fem.loads.load import Kept, Load
+from reflowshock.fem.loads.load import Kept, Load, Loaded
 from reflowshock.fem.loads.pretension import Pretension
 from reflowshock.fem.model.body import Body
-
-if TYPE_CHECKING:
-    from reflowshock.fem.dynamics.central_difference import Motion
 
 
 class RayleighDamping(Load):
@@ -55,7 +52,7 @@ class RayleighDamping(Load):
         linear = [term for term in body.terms if not isinstance(term, Pretension)]
         return cls(*coefficients, linear_terms(body.elements) if paths and coefficients[1] else linear)
 
-    def begin(self, motion: "Motion") -> None:
+    def begin(self, motion: Loaded) -> None:
         """Make room."""
         self.force = np.zeros_like(motion.force)
         if self._terms:
@@ -63,7 +60,7 @@ class RayleighDamping(Load):
         edges = np.diff(motion.body.shared.owned, prepend=False, append=False)
         self._runs = np.flatnonzero(edges).reshape(-1, 2)
 
-    def add(self, motion: "Motion") -> None:
+    def add(self, motion: Loaded) -> None:
         """Add both forces; those of the loads are there, those of elements too."""
         self.force.fill(0.0)
         if self._terms:
@@ -81,6 +78,6 @@ class RayleighDamping(Load):
         """Subtract both from a copy."""
         force -= self.force
 
-    def collect(self, motion: "Motion") -> None:
+    def collect(self, motion: Loaded) -> None:
         """Add half a step's work."""
         self.work += 0.5 * motion.step * power(self._runs, self.force, motion.velocity)

@@ -2,19 +2,16 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from reflowshock.fem.loads.load import Kept, Load
+from reflowshock.fem.loads.load import Kept, Load, Loaded
+from reflowshock.fem.loads.pulse import Pulse
 from reflowshock.fem.mesh.facet import area_vectors
 from reflowshock.fem.mesh.facet_areas import OutwardFacets
 from reflowshock.fem.model.body import Body
-from reflowshock.fem.problem.pulse import Pulse
-
-if TYPE_CHECKING:
-    from reflowshock.fem.dynamics.central_difference import Motion
 
 
 @dataclass
@@ -41,7 +38,7 @@ class FollowerPressure(Load):
         facets = found.facets[here]
         return cls(body.local.locate(facets.ravel()).reshape(facets.shape), found.sign[here], pulse)
 
-    def add(self, motion: "Motion") -> None:
+    def add(self, motion: Loaded) -> None:
         """Add the force of the motion's time and place; collective."""
         body = motion.body
         areas = area_vectors(body.local.points[self.facets] + motion.displacement[self.facets])
@@ -55,7 +52,7 @@ class FollowerPressure(Load):
         """Subtract it from a copy."""
         force -= self._force
 
-    def collect(self, motion: "Motion") -> None:
+    def collect(self, motion: Loaded) -> None:
         """Add half a step's work."""
         owned = motion.body.shared.owned
         self.work += 0.5 * motion.step * float(np.sum((self._force * motion.velocity)[owned]))

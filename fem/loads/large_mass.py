@@ -2,20 +2,17 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
 from reflowshock.fem.errors import LoadError
-from reflowshock.fem.loads.load import Kept, Load
+from reflowshock.fem.loads.load import Kept, Load, Loaded
+from reflowshock.fem.loads.pulse import Pulse
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.parallel.portable import Rows, State
-from reflowshock.fem.problem.pulse import Pulse
-
-if TYPE_CHECKING:
-    from reflowshock.fem.dynamics.central_difference import Motion
 
 MASS_RATIO = 1e6  # large mass over the model's: the base deviates from its pulse by about one part in this
 
@@ -93,13 +90,13 @@ class LargeMass(Load):
         """Return the velocity ``(3,)`` [m/s] of the base, integrated in the motion's own steps."""
         return -self.direction * self._base[1]
 
-    def begin(self, motion: "Motion") -> None:
+    def begin(self, motion: Loaded) -> None:
         """Add the masses."""
         motion.add_mass(self.nodes, self.mass)
         kick = 0.5 * motion.step * self.pulse.value(0.0)
         self._base = np.array([motion.step * kick, -2.0 * kick, kick])
 
-    def add(self, motion: "Motion") -> None:
+    def add(self, motion: Loaded) -> None:
         """Add the force that gives the masses the base's acceleration against all body forces."""
         value = self.pulse.value(motion.time)
         kick = 0.5 * motion.step * value
@@ -116,7 +113,7 @@ class LargeMass(Load):
         """Subtract all of it: the mass stands for a support."""
         self.remove(force)
 
-    def collect(self, motion: "Motion") -> None:
+    def collect(self, motion: Loaded) -> None:
         """Add half a step's work of what is left of the force after moving the mass itself."""
         owned = motion.body.shared.owned[self.nodes]
         passed = self._force - self.mass[:, None] * (motion.acceleration(self.nodes) - motion.gravity)

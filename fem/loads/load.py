@@ -5,28 +5,81 @@ step's work. The work of a force over a step is the mean of its values at both e
 them, so that with ``Motion.kinetic_energy`` the ledger of a linear model is exact at any step.
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from reflowshock.fem.errors import LoadError
 from reflowshock.fem.forces.energy import Energy
+from reflowshock.fem.loads.pulse import HalfSine, Pulse
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.step_levels import levels_of
 from reflowshock.fem.parallel.portable import Entry, Rows, Same, State, Sum
-from reflowshock.fem.problem.pulse import HalfSine, Pulse
-
-if TYPE_CHECKING:
-    from reflowshock.fem.dynamics.central_difference import Motion
 
 # A package that is dropped looks towards the ground, so the table's upward acceleration points along -z and the board,
 # seen from the table, is pushed along +z; so does its weight.
 DOWN = np.array([0.0, 0.0, 1.0])
 Kept = Literal["sum", "same", "nodes"]
+
+
+class Loaded(ABC):
+    """A motion under loads, explicit or implicit: what loads ask of it, and what follows from their list.
+
+    Attributes:
+        body: The model.
+        step: Time step [s].
+        time: [s].
+        displacement: ``(n, 3)`` [m] at ``time``.
+        velocity: ``(n, 3)`` [m/s], of explicit steps at ``time - step / 2``.
+        force: ``(n, 3)`` [N] at ``time``, summed over ranks, slaves' moved to their masters; without body force.
+        gravity: ``(3,)`` [m/s^2], sum of the loads' accelerations at ``time``.
+        mobility: ``(n, 3)`` [1/kg] inverse masses, zero where the velocity is prescribed; of explicit steps.
+        ledger_mass: ``(n,)`` [kg] that counts in the energy balance of this rank.
+    """
+
+    body: Body
+    step: float
+    time: float
+    displacement: NDArray[np.float64]
+    velocity: NDArray[np.float64]
+    force: NDArray[np.float64]
+    gravity: NDArray[np.float64]
+    mobility: NDArray[np.float64]
+    ledger_mass: NDArray[np.float64]
+    _loads: Sequence["Load"]
+
+    @abstractmethod
+    def hold(self, nodes: NDArray[np.integer], component: int) -> None:
+        """Let a velocity component of local nodes no longer follow from forces."""
+
+    @abstractmethod
+    def add_mass(self, nodes: NDArray[np.integer], mass: NDArray[np.float64]) -> None:
+        """Add masses ``(k,)`` [kg] that the energy balance does not count to local nodes, all of them free."""
+
+    @abstractmethod
+    def acceleration(self, nodes: NDArray[np.integer] | slice = slice(None)) -> NDArray[np.float64]:
+        """Return the acceleration ``(k, 3)`` [m/s^2] of some local nodes, zero where it does not follow from forces."""
+
+    def body_acceleration(self, time: float) -> NDArray[np.float64]:
+        """Return the sum of all loads' accelerations ``(3,)`` [m/s^2] at a time [s]."""
+        return sum((load.acceleration(time) for load in self._loads), np.zeros(3))
+
+    def base_displacement(self) -> NDArray[np.float64]:
+        """Return the displacement ``(3,)`` [m] of the frame in which results are told; zero but with a large mass."""
+        return sum((load.base_displacement() for load in self._loads), np.zeros(3))
+
+    def base_velocity(self) -> NDArray[np.float64]:
+        """Return the velocity ``(3,)`` [m/s] of that frame."""
+        return sum((load.base_velocity() for load in self._loads), np.zeros(3))
+
+    def internal_energy(self) -> Energy:
+        """Return the energies [J] of this rank's elements."""
+        return sum((term.energy(self.displacement) for term in self.body.terms), Energy())
 
 
 class Load:
@@ -54,7 +107,7 @@ class Load:
         """Return the velocity ``(3,)`` [m/s] of the frame in which results are told."""
         return np.zeros(3)
 
-    def begin(self, motion: "Motion") -> None:
+    def begin(self, motion: Loaded) -> None:
         """Take part in the masses and free components of a motion at rest."""
 
     def carry(self, body: Body) -> None:
@@ -63,7 +116,7 @@ class Load:
     def drive(self, velocity: NDArray[np.float64], time: float) -> None:
         """Prescribe rows of the mean velocity ``(n, 3)`` [m/s] of the step that begins at a time [s]."""
 
-    def add(self, motion: "Motion") -> None:
+    def add(self, motion: Loaded) -> None:
         """Add the force at the motion's time to ``motion.force``, which is already summed over ranks."""
 
     def remove(self, force: NDArray[np.float64]) -> None:
@@ -72,7 +125,7 @@ class Load:
     def release(self, force: NDArray[np.float64]) -> None:
         """Subtract from a copy of ``motion.force`` what a support puts into it."""
 
-    def collect(self, motion: "Motion") -> None:
+    def collect(self, motion: Loaded) -> None:
         """Add half a step's work of the force at the motion's time at its velocity; all forces are complete."""
 
     def state(self, body: Body) -> State:
@@ -84,35 +137,6 @@ class Load:
         """Continue from the values of what ``state`` returned."""
         for name, value in state.items():
             setattr(self, name, value)
-
-
-class Loaded:
-    """A motion under loads: what follows from their list and from the force terms, explicit or implicit.
-
-    Attributes:
-        body: The model.
-        displacement: ``(n, 3)`` [m].
-    """
-
-    body: Body
-    displacement: NDArray[np.float64]
-    _loads: Sequence[Load]
-
-    def body_acceleration(self, time: float) -> NDArray[np.float64]:
-        """Return the sum of all loads' accelerations ``(3,)`` [m/s^2] at a time [s]."""
-        return sum((load.acceleration(time) for load in self._loads), np.zeros(3))
-
-    def base_displacement(self) -> NDArray[np.float64]:
-        """Return the displacement ``(3,)`` [m] of the frame in which results are told; zero but with a large mass."""
-        return sum((load.base_displacement() for load in self._loads), np.zeros(3))
-
-    def base_velocity(self) -> NDArray[np.float64]:
-        """Return the velocity ``(3,)`` [m/s] of that frame."""
-        return sum((load.base_velocity() for load in self._loads), np.zeros(3))
-
-    def internal_energy(self) -> Energy:
-        """Return the energies [J] of this rank's elements."""
-        return sum((term.energy(self.displacement) for term in self.body.terms), Energy())
 
 
 @dataclass(frozen=True)
@@ -175,7 +199,7 @@ class NodalForces(Load):
         pattern[self.nodes] = self.pattern
         self.nodes, self.pattern, self.owned = nodal(body, pattern + carried(body, pattern, np.zeros(3)))
 
-    def add(self, motion: "Motion") -> None:
+    def add(self, motion: Loaded) -> None:
         """Add the force of the motion's time."""
         self._factor = self.pulse.value(motion.time)
         motion.force[self.nodes] += self._factor * self.pattern
@@ -184,7 +208,7 @@ class NodalForces(Load):
         """Subtract it from a copy."""
         force[self.nodes] -= self._factor * self.pattern
 
-    def collect(self, motion: "Motion") -> None:
+    def collect(self, motion: Loaded) -> None:
         """Add half a step's work."""
         power = np.sum(self.pattern[self.owned] * motion.velocity[self.nodes[self.owned]])
         self.work += 0.5 * motion.step * self._factor * float(power)
@@ -226,7 +250,7 @@ class FineSupports(Load):
         nothing = np.zeros((len(body.mass), 3))
         self.patterns = [nodal(body, carried(body, nothing, fall)) for fall in np.eye(3)]
 
-    def add(self, motion: "Motion") -> None:
+    def add(self, motion: Loaded) -> None:
         """Add the force for the motion's body acceleration."""
         self._factor = motion.gravity
         for factor, (nodes, force, _) in self._acting():
@@ -237,7 +261,7 @@ class FineSupports(Load):
         for factor, (nodes, own, _) in self._acting():
             force[nodes] -= factor * own
 
-    def collect(self, motion: "Motion") -> None:
+    def collect(self, motion: Loaded) -> None:
         """Add half a step's work."""
         for factor, (nodes, force, owned) in self._acting():
             power = np.sum(force[owned] * motion.velocity[nodes[owned]])
@@ -267,7 +291,7 @@ class PrescribedMotion(Load):
     step: float = field(default=0.0, init=False)
     work: float = field(default=0.0, init=False)
 
-    def begin(self, motion: "Motion") -> None:
+    def begin(self, motion: Loaded) -> None:
         """Take the component out of the free ones.
 
         Raises:
@@ -290,7 +314,7 @@ class PrescribedMotion(Load):
             return 2.0 * self.pulse.value(0.0) - self.mean(0.0)
         return (self.pulse.integral(time + self.step) - self.pulse.integral(time)) / self.step
 
-    def collect(self, motion: "Motion") -> None:
+    def collect(self, motion: Loaded) -> None:
         """Add half a step's work of the reaction m a - f - m g."""
         before, after = self.mean(motion.time - self.step), self.mean(motion.time)
         acceleration = (after - before) / self.step - motion.gravity[self.component]

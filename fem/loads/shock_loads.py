@@ -10,10 +10,10 @@ from reflowshock.fem.errors import LoadError
 from reflowshock.fem.loads.damping import RayleighDamping
 from reflowshock.fem.loads.large_mass import LargeMass
 from reflowshock.fem.loads.load import DOWN, BodyAcceleration, Load
+from reflowshock.fem.loads.pulse import STANDARD_GRAVITY, Constant
+from reflowshock.fem.loads.shock_pulse import shock_pulse
 from reflowshock.fem.model.body import Body
-from reflowshock.fem.problem.parameters import Shock
-from reflowshock.fem.problem.pulse import STANDARD_GRAVITY, Constant
-from reflowshock.fem.problem.shock_pulse import shock_pulse
+from reflowshock.fem.problem.shock import Shock
 
 
 def check_shaken(tables: Iterable[JointTables], shock: Shock) -> None:

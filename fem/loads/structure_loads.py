@@ -11,9 +11,9 @@ from reflowshock.fem.loads.damping import RayleighDamping
 from reflowshock.fem.loads.follower_pressure import FollowerPressure
 from reflowshock.fem.loads.large_mass import LargeMass
 from reflowshock.fem.loads.load import BodyAcceleration, Load, NodalForces, PrescribedMotion
+from reflowshock.fem.loads.pulse import Pulse
 from reflowshock.fem.model.body import Body
-from reflowshock.fem.problem.parameters import Damping
-from reflowshock.fem.problem.pulse import Pulse
+from reflowshock.fem.problem.shock import Damping
 from reflowshock.fem.problem.structure import AXES, Gravity, InputG, Pressure, StructureScene
 
 

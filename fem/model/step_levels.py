@@ -14,7 +14,6 @@ act once a step. The elements of the next level are a term inside f with the sub
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from mpi4py import MPI
@@ -28,12 +27,10 @@ from reflowshock.fem.forces.force_assembled import AssembledElements
 from reflowshock.fem.kernels.levels import begin_substeps, end_substeps, run_levels, take_substep
 from reflowshock.fem.materials.parameters import Material
 from reflowshock.fem.mesh.tie import Tie
+from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.tied_elements import tied_terms
 from reflowshock.fem.parallel.exchange import SharedNodes
 from reflowshock.fem.parallel.local_mesh import positions
-
-if TYPE_CHECKING:
-    from reflowshock.fem.model.body import Body
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,7 +87,7 @@ class LocalSteps:
     history: dict[str, NDArray] = field(default_factory=dict)
 
     @classmethod
-    def build(cls, comm: MPI.Comm, body: "Body", levels: Levels) -> "LocalSteps":
+    def build(cls, comm: MPI.Comm, body: Body, levels: Levels) -> "LocalSteps":
         """Build the levels below the step of a model, whose elements of level 0 are not in them; collective.
 
         Args:
@@ -182,7 +179,7 @@ def check_elastic(materials: Sequence[Material], kinematics: Kinematics, ratios:
         )
 
 
-def build_level(comm: MPI.Comm, body: "Body", levels: Levels, number: int, around: NDArray[np.int32]) -> LocalSteps:
+def build_level(comm: MPI.Comm, body: Body, levels: Levels, number: int, around: NDArray[np.int32]) -> LocalSteps:
     """Build a level and those inside it; collective.
 
     Args:
@@ -227,7 +224,7 @@ def arrays_at_once(level: LocalSteps) -> tuple[tuple[NDArray, ...], ...]:
     return ((*arrays, matrix.pointer, matrix.columns, matrix.blocks), *(inner[0].at_once if inner else ()))
 
 
-def level_nodes(body: "Body", level: NDArray[np.int32], number: int) -> tuple[NDArray[np.int32], int]:
+def level_nodes(body: Body, level: NDArray[np.int32], number: int) -> tuple[NDArray[np.int32], int]:
     """Return the local nodes but slaves of a level and those inside it, and how many of them move; collective.
 
     Those that move come first: no element of an outer level has them, on any rank, not even by a slave.
@@ -247,7 +244,7 @@ def level_nodes(body: "Body", level: NDArray[np.int32], number: int) -> tuple[ND
     return nodes.astype(np.int32), int(np.sum(used & moves))
 
 
-def own_terms(body: "Body", chosen: NDArray[np.bool_], nodes: NDArray[np.int32]) -> list[InternalForce]:
+def own_terms(body: Body, chosen: NDArray[np.bool_], nodes: NDArray[np.int32]) -> list[InternalForce]:
     """Return the forces of some elements of a body at some of its nodes, none of them a slave."""
     here = np.isin(body.tie.slave, body.elements.cells[chosen])
     tie = Tie(body.tie.slave[here], body.tie.master[here], body.tie.weight[here])

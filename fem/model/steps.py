@@ -15,7 +15,7 @@ from reflowshock.fem.division.tables import Tables
 from reflowshock.fem.division.whole import Survey, Whole
 from reflowshock.fem.estimates.estimate import WindowPlan, damped_critical_step
 from reflowshock.fem.materials.roles import Materials
-from reflowshock.fem.model.body import Pieces, make_body
+from reflowshock.fem.model.assembly import Pieces, make_body
 from reflowshock.fem.model.power_iteration import highest_frequency
 from reflowshock.fem.parallel.communicators import Role
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from reflowshock.fem.errors import StepError
 from reflowshock.fem.estimates.estimate import WindowPlan, damped_critical_step
 from reflowshock.fem.estimates.solver_cost import implicit_step
-from reflowshock.fem.model.body import Pieces
+from reflowshock.fem.model.assembly import Pieces
 from reflowshock.fem.model.steps import Steps, agreed_minimum, critical_by_role, mass_factor
 from reflowshock.fem.problem.structure import Dynamics
 

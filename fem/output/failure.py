@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from reflowshock.fem.problem.parameters import Failure
+from reflowshock.fem.problem.shock import Failure
 
 Verdicts = Mapping[str, Mapping[str, dict[str, Any]]]  # criterion -> joint -> value, limit, ok
 

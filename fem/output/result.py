@@ -14,13 +14,13 @@ from reflowshock.fem.dynamics.history import History
 from reflowshock.fem.elements.hexahedron import HEXAHEDRON
 from reflowshock.fem.estimates.effects import ADDED_MASS_LIMIT
 from reflowshock.fem.estimates.material_effects import failure_effect, material_effects
+from reflowshock.fem.loads.shock_pulse import shock_pulse
 from reflowshock.fem.materials.kinematics import finite_rotation
 from reflowshock.fem.model.steps import Steps
 from reflowshock.fem.output.failure import Verdicts, failed_joints, failure_criteria, judge, worst
 from reflowshock.fem.output.watch_joints import FLOW_LAYERS, LAYERS
 from reflowshock.fem.parallel.communicators import Communicators, Role
 from reflowshock.fem.problem.inputs import RunInput
-from reflowshock.fem.problem.shock_pulse import shock_pulse
 from reflowshock.fem.setup.shock_models import Model
 
 FORCE_RESIDUAL_LIMIT = 1e-10

@@ -9,6 +9,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from reflowshock.fem.division.structure_tables import shaken_supports
+from reflowshock.fem.dynamics.modal import Modes, natural_modes
 from reflowshock.fem.errors import AgreedError
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.global_matrix import Equations
@@ -16,7 +17,6 @@ from reflowshock.fem.output.fields import Fields
 from reflowshock.fem.problem.inputs import StructureInput
 from reflowshock.fem.problem.structure import AXES, PrescribedMotion
 from reflowshock.fem.setup.structure_model import StructureModel
-from reflowshock.fem.statics.modal import Modes, natural_modes
 
 SHOWN = 0.05  # largest displacement of a shape in a field file, in lengths of the structure
 

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from reflowshock.fem.dynamics.history import History
 from reflowshock.fem.elements.stress import principal_strains, von_mises
 from reflowshock.fem.estimates.structure_effects import effects
+from reflowshock.fem.mesh.point_table import PointTable
 from reflowshock.fem.model.factorisation import FactorCost
 from reflowshock.fem.output.result import ADDED_MASS_LIMIT, Timings, checked, hourglass_check, quantity
 from reflowshock.fem.output.structure_modes import ModeTable
-from reflowshock.fem.output.watch_points import PointTable
 from reflowshock.fem.parallel.communicators import Communicators, Role
 from reflowshock.fem.problem.inputs import StructureInput
 from reflowshock.fem.setup.structure_model import StructureModel

@@ -6,7 +6,8 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, TypeAdapter
 
 from reflowshock.fem.materials.roles import Materials
-from reflowshock.fem.problem.parameters import Parameters, Shock
+from reflowshock.fem.parameters import Parameters
+from reflowshock.fem.problem.shock import Shock
 from reflowshock.fem.problem.structure import SolverName, StructureScene
 
 UNRELATED = {"checkpoint_seconds", "watchdog_seconds"}  # numerics that results do not depend on

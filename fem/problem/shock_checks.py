@@ -2,8 +2,8 @@
 
 from collections.abc import Iterator
 
-from reflowshock.fem.problem.parameters import Damping, JointCoupling, Shock
 from reflowshock.fem.problem.problem import Problem
+from reflowshock.fem.problem.shock import Damping, JointCoupling, Shock
 
 
 def problems(shock: Shock) -> list[Problem]:

@@ -12,9 +12,9 @@ from reflowshock.fem.parallel.agreement import agreed
 from reflowshock.fem.parallel.watchdog import Watchdog
 from reflowshock.fem.problem.inputs import INPUT, CoolingInput, RunInput, StructureInput
 from reflowshock.fem.problem.structure_checks import check
+from reflowshock.fem.run.cooling import run_cooling
 from reflowshock.fem.run.shock_run import run
 from reflowshock.fem.run.structure_run import run_structure
-from reflowshock.fem.statics.cooling import run_cooling
 
 
 def main(world: MPI.Comm, arguments: list[str]) -> int:

@@ -20,7 +20,10 @@ from reflowshock.fem.dynamics.implicit import ImplicitMotion
 from reflowshock.fem.dynamics.participant import Alone, uncut_motion
 from reflowshock.fem.estimates.estimate import WindowPlan, implicit_plan, largest_implicit_step, shortened
 from reflowshock.fem.estimates.placement import check_size
+from reflowshock.fem.loads.pulse import Pulse
 from reflowshock.fem.loads.shock_loads import shock_loads
+from reflowshock.fem.loads.shock_pulse import shock_pulse
+from reflowshock.fem.loads.structure_pulses import pulse_durations
 from reflowshock.fem.materials.elasticity import materials_of_parts
 from reflowshock.fem.model.steps import Steps
 from reflowshock.fem.output.fields import Fields, element_peaks
@@ -32,10 +35,7 @@ from reflowshock.fem.parallel.checkpoint import Checkpoints
 from reflowshock.fem.parallel.checkpoint_files import digest_of_files
 from reflowshock.fem.parallel.communicators import Communicators, Role
 from reflowshock.fem.problem.inputs import RunInput
-from reflowshock.fem.problem.parameters import Shock
-from reflowshock.fem.problem.pulse import Pulse
-from reflowshock.fem.problem.shock_pulse import shock_pulse
-from reflowshock.fem.problem.structure_pulses import pulse_durations
+from reflowshock.fem.problem.shock import Shock
 from reflowshock.fem.run.time_loop import Outputs, march
 from reflowshock.fem.setup.shock_models import Divided, Model, build_models, divided_scene
 

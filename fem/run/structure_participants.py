@@ -13,10 +13,10 @@ from reflowshock.fem.dynamics.moving import Moving
 from reflowshock.fem.dynamics.participant import Alone, uncut_motion
 from reflowshock.fem.errors import AgreedError
 from reflowshock.fem.loads.load import Load
+from reflowshock.fem.loads.pulse import Pulse
 from reflowshock.fem.loads.structure_loads import damping_loads, structure_loads
 from reflowshock.fem.parallel.communicators import Communicators, Role
 from reflowshock.fem.problem.inputs import StructureInput
-from reflowshock.fem.problem.pulse import Pulse
 from reflowshock.fem.setup.structure_model import StructureModel
 
 Pulses = Mapping[str, Pulse]

@@ -20,6 +20,8 @@ from reflowshock.fem.dynamics.implicit import ImplicitMotion
 from reflowshock.fem.dynamics.participant import Participant
 from reflowshock.fem.estimates.material_effects import plastic_laws
 from reflowshock.fem.estimates.placement import shared
+from reflowshock.fem.loads.pulse import Pulse
+from reflowshock.fem.loads.structure_pulses import pulse_durations, pulses_of
 from reflowshock.fem.output.fields import Fields, element_peaks
 from reflowshock.fem.output.result import Timings
 from reflowshock.fem.output.structure_modes import ModeTable, find_modes
@@ -31,10 +33,8 @@ from reflowshock.fem.parallel.checkpoint_files import digest_of_files
 from reflowshock.fem.parallel.communicators import Communicators, Role
 from reflowshock.fem.parallel.exchange import MessageClock
 from reflowshock.fem.problem.inputs import StructureInput
-from reflowshock.fem.problem.parameters import Ranks
-from reflowshock.fem.problem.pulse import Pulse
+from reflowshock.fem.problem.shock import Ranks
 from reflowshock.fem.problem.structure import LayerCoupling
-from reflowshock.fem.problem.structure_pulses import pulse_durations, pulses_of
 from reflowshock.fem.run.structure_participants import couple_models, make_participant
 from reflowshock.fem.run.time_loop import Outputs, march
 from reflowshock.fem.setup.structure_divided import DividedStructure, divided_structure

@@ -24,7 +24,8 @@ from reflowshock.fem.materials.parameters import Material
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.mesh.supports import HELD, SYMMETRY
-from reflowshock.fem.model.body import Body, Pieces, Response, make_body, make_pieces
+from reflowshock.fem.model.assembly import Pieces, Response, make_body, make_pieces
+from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.steps import Steps, agreed_minimum, assembled_step, steps_of_division, undivided
 from reflowshock.fem.parallel.agreement import agreed
 from reflowshock.fem.parallel.communicators import Communicators, Role

@@ -17,11 +17,11 @@ from reflowshock.fem.division.tables import ModelInput
 from reflowshock.fem.division.whole import Survey, Treatment, Whole, survey
 from reflowshock.fem.errors import CutError, StepError
 from reflowshock.fem.estimates.placement import Role
+from reflowshock.fem.loads.structure_pulses import pulse_durations, pulses_of
 from reflowshock.fem.mesh.mesh_file import read_mesh
 from reflowshock.fem.model.steps import steps_of_division
 from reflowshock.fem.problem.inputs import StructureInput
 from reflowshock.fem.problem.structure import LayerCoupling, PrescribedMotion, fine_layers
-from reflowshock.fem.problem.structure_pulses import pulse_durations, pulses_of
 from reflowshock.fem.setup.shock_models import Divided, told_to_all
 
 DividedStructure = Divided[StructureTables]

@@ -11,7 +11,8 @@ from reflowshock.fem.division.structure_tables import StructureTables, structure
 from reflowshock.fem.forces.force import Kinematics, linear_terms
 from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.mesh.mesh_file import read_mesh
-from reflowshock.fem.model.body import Body, Pieces, Response, make_body, make_pieces
+from reflowshock.fem.model.assembly import Pieces, Response, make_body, make_pieces
+from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.power_iteration import highest_frequency
 from reflowshock.fem.model.steps import Steps
 from reflowshock.fem.model.structure_steps import check_step, explicit_steps, implicit_steps, with_critical

@@ -21,7 +21,8 @@ from reflowshock.fem.elements.stress import symmetric
 from reflowshock.fem.materials.elasticity import materials_of_parts
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.mesh import MeshData
-from reflowshock.fem.model.body import Body, make_body, make_pieces
+from reflowshock.fem.model.assembly import make_body, make_pieces
+from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.factorisation import FactorCost, Factorisation
 from reflowshock.fem.model.global_matrix import Equations
 from reflowshock.fem.parallel.agreement import agreed

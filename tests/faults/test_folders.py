@@ -84,6 +84,7 @@ def test_names_do_not_lead_out_of_a_folder(tmp_path, name):
     assert [path.name for path in tmp_path.iterdir()] == ["case.toml"]
 
 
+@pytest.mark.long
 def test_plain_snakemake_holds_the_folder_and_shows_no_old_report(tmp_path):
     folder = tmp_path / "run"
     assert run_drop(folder).returncode == 0

@@ -15,6 +15,8 @@ from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.pipeline.reader import read_case
 from reflowshock.workflow.pipeline.template import templates
 from reflowshock.workflow.plan import show_plan
+from reflowshock.workflow.store.point import Point
+from reflowshock.workflow.store.store import Store
 from reflowshock.workflow.study.study_file import read_study
 from tests.support.workflow_command import SMALL_CASE
 
@@ -52,7 +54,7 @@ BAD_TABLES = {
 
 def planned(path: Path, *settings: str, force: bool = False) -> None:
     case = read_case(path, settings, oversubscribe=True, force=force)
-    show_plan(case, path.parent / "none", Console(file=io.StringIO(), width=120))
+    show_plan(Store(path.parent / "none", one_run=True), Point({}, case), Console(file=io.StringIO(), width=120))
 
 
 def mutant(text: str, draw: random.Random) -> bytes:

@@ -8,7 +8,7 @@ SCRIPT = """
 import contextlib, json, sys
 import numpy as np
 from mpi4py import MPI
-from reflowshock.fem.model.body import Response, make_body, make_pieces
+from reflowshock.fem.model.assembly import Response, make_body, make_pieces
 from reflowshock.fem.parallel.communicators import Communicators
 from reflowshock.fem.coupling.crew import couple
 from reflowshock.fem.estimates.placement import shared
@@ -16,10 +16,10 @@ from reflowshock.fem.coupling.scheme import scheme_of
 from reflowshock.fem.parallel.local_mesh import distribute
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.mesh import append
-from reflowshock.fem.problem.parameters import Coupling
+from reflowshock.fem.problem.shock import Coupling
 from reflowshock.fem.division.tables import model_inputs
 from tests.stability.test_fem_division import board, joint
-from reflowshock.fem.trials.divided import checked, surveyed
+from reflowshock.cases.hard.trials.coupled import checked, surveyed
 
 world = MPI.COMM_WORLD
 

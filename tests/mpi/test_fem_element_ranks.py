@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from reflowshock.fem.trials.boxes import KINDS
+from reflowshock.cases.hard.trials.boxes import KINDS
 from tests.support.fem_program import run_script
 
 SCRIPT = """
@@ -11,7 +11,7 @@ import json, sys
 from pathlib import Path
 import numpy as np
 from mpi4py import MPI
-from reflowshock.fem.model.body import make_body, make_pieces
+from reflowshock.fem.model.assembly import make_body, make_pieces
 from reflowshock.fem.forces.energy import Energy
 from reflowshock.fem.output.fields import Fields
 from reflowshock.fem.loads.load import half_sine_drop
@@ -20,7 +20,7 @@ from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.dynamics.central_difference import Motion
 from reflowshock.fem.division.tables import prepare
-from reflowshock.fem.trials.boxes import KINDS, box
+from reflowshock.cases.hard.trials.boxes import KINDS, box
 
 comm, result = MPI.COMM_WORLD, {}
 for name, kind in KINDS.items():

@@ -11,8 +11,8 @@ from mpi4py import MPI
 
 from reflowshock.fem.dynamics.central_difference import Motion
 from reflowshock.fem.loads.load import NodalForces, half_sine_drop
+from reflowshock.fem.loads.pulse import HalfSine
 from reflowshock.fem.materials.roles import Materials
-from reflowshock.fem.problem.pulse import HalfSine
 from tests.support.fem_levels import joint_on_board, levelled
 
 ROOT = Path(__file__).resolve().parents[2]

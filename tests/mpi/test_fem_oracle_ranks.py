@@ -8,13 +8,13 @@ SCRIPT = """
 import json, sys
 import numpy as np
 from mpi4py import MPI
-from reflowshock.fem.model.body import make_body, make_pieces
+from reflowshock.fem.model.assembly import make_body, make_pieces
 from reflowshock.fem.model.global_matrix import Equations
 from reflowshock.fem.dynamics.implicit import ImplicitMotion
 from reflowshock.fem.loads.load import half_sine_drop
 from reflowshock.fem.parallel.local_mesh import distribute
 from reflowshock.fem.mesh.mesh import append
-from reflowshock.fem.statics.modal import natural_modes
+from reflowshock.fem.dynamics.modal import natural_modes
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.division.tables import prepare
 from tests.support.fem_models import small_assembly

@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from reflowshock.cases.hard.trials.coupled import Coupled, models_of, surveyed
+from reflowshock.cases.hard.trials.layouts import board, copper_cut, corner, joint, overhang, two_regions
 from reflowshock.fem.coupling.scheme import scheme_of
 from reflowshock.fem.coupling.self_check import self_check
 from reflowshock.fem.division.buffer import touching
@@ -13,10 +15,7 @@ from reflowshock.fem.errors import CutError
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.mesh import MeshData, append
 from reflowshock.fem.parallel.exchange import CutChannels
-from reflowshock.fem.problem.parameters import Coupling
-from reflowshock.fem.trials.coupled import Coupled, models_of
-from reflowshock.fem.trials.divided import surveyed
-from reflowshock.fem.trials.layouts import board, copper_cut, corner, joint, overhang, two_regions
+from reflowshock.fem.problem.shock import Coupling
 
 
 def radius(mesh: MeshData, scheme: str) -> float:

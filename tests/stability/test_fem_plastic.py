@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
+from reflowshock.cases.hard.trials.bodies import SOLDER
+from reflowshock.cases.hard.trials.grids import grid, mesh_of, on
+from reflowshock.cases.hard.trials.motion import explicit, imbalance, march, rod
 from reflowshock.fem.errors import InvertedElementError
 from reflowshock.fem.materials.library import FR4
 from reflowshock.fem.materials.parameters import Isotropic, JohnsonCook
 from reflowshock.fem.mesh.mesh import MeshData
-from reflowshock.fem.trials.grids import grid, mesh_of, on
-from reflowshock.fem.trials.impact import explicit, imbalance, march, rod
-from reflowshock.fem.trials.metals import SOLDER
 
 both_formulations = pytest.mark.parametrize("formulation", ["one_point", "incompatible_modes"])
 

@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from reflowshock.cases.hard.trials.bodies import dns_body
+from reflowshock.cases.hard.trials.grids import grid, mesh_of, on
 from reflowshock.fem.dynamics.central_difference import Motion
 from reflowshock.fem.dynamics.energy_balance import Ledger, ledger_sums
 from reflowshock.fem.dynamics.participant import Alone, uncut_motion
@@ -11,14 +13,12 @@ from reflowshock.fem.errors import EnergyError
 from reflowshock.fem.estimates.estimate import WindowPlan, damped_critical_step
 from reflowshock.fem.loads.damping import RayleighDamping
 from reflowshock.fem.loads.load import BodyAcceleration, Load
+from reflowshock.fem.loads.pulse import HalfSine
 from reflowshock.fem.materials.parameters import Isotropic
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.power_iteration import highest_frequency
-from reflowshock.fem.problem.pulse import HalfSine
-from reflowshock.fem.trials.bodies import dns_body
-from reflowshock.fem.trials.grids import grid, mesh_of, on
 
 SOFT = Isotropic(density=1200.0, young_modulus=1e9, poisson_ratio=0.45)
 PUSH = np.array([0.6, 0.0, 0.8])

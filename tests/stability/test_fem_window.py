@@ -7,14 +7,14 @@ scheme, fine elements at the cut, must be seen to fail by the same measure.
 import numpy as np
 import pytest
 
+from reflowshock.cases.hard.trials.coupled import surveyed
+from reflowshock.cases.hard.trials.grids import grid, joint_mesh, mesh_of, on
 from reflowshock.fem.division.checks import check_division
 from reflowshock.fem.errors import CutError
 from reflowshock.fem.materials.library import SAC405, SILICON
 from reflowshock.fem.materials.parameters import Isotropic
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.mesh import MeshData, append, merge_nodes
-from reflowshock.fem.trials.divided import surveyed
-from reflowshock.fem.trials.grids import grid, joint_mesh, mesh_of, on
 from tests.support.fem_division import by_patch, naive
 from tests.support.fem_window import Window
 

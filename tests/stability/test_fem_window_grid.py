@@ -7,8 +7,8 @@ measured beside them, and is seen to fail.
 
 import pytest
 
-from reflowshock.fem.trials.pairs import SCHEMES, Pair
-from reflowshock.fem.trials.windows import PUSH, momentum_error
+from reflowshock.cases.hard.trials.pairs import SCHEMES, Pair
+from reflowshock.cases.hard.trials.windows import PUSH, momentum_error
 
 GROWTH = 1e-8
 SAMPLES = {

@@ -4,6 +4,9 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from reflowshock.cases.hard.trials.joints import mesh_warped
+from reflowshock.cases.hard.trials.packages import MM, board, package, side_of
+from reflowshock.cases.hard.trials.surfaces import barrel
 from reflowshock.meshing.board.assembly import write_assembly
 from reflowshock.meshing.board.checks import problems
 from reflowshock.meshing.board.estimate import count_elements
@@ -11,9 +14,6 @@ from reflowshock.meshing.board.pads import pad_table
 from reflowshock.meshing.board.parameters import Warpage
 from reflowshock.meshing.joint.joints_file import write_joints
 from reflowshock.meshing.joint.solder_mesh import joint_quality, mesh_joint
-from reflowshock.meshing.trials.joints import mesh_warped
-from reflowshock.meshing.trials.models import MM, board, package, side_of
-from reflowshock.meshing.trials.surfaces import barrel
 
 HARD = {
     "strongly bulged": {"bulge": 0.20 * MM},

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from reflowshock.cases.hard.trials.joints import Underside, sites_of
+from reflowshock.cases.hard.trials.packages import package
 from reflowshock.meshing.board.pad_planes import PadPlanes
 from reflowshock.meshing.joint.solder_mesh import JointMeshError, mesh_joint
-from reflowshock.meshing.trials.joints import Underside, sites_of
-from reflowshock.meshing.trials.models import package
 from tests.support.many_joints import COUNTS, barrel, mesh, outcome, samples
 
 LARGEST_ERROR, SMALLEST_JACOBIAN = 3.0e-3, 0.2

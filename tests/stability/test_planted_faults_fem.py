@@ -4,11 +4,11 @@ from pathlib import Path
 
 import pytest
 
+from reflowshock.cases.hard.trials import motion
 from reflowshock.fem.coupling import held_velocity
 from reflowshock.fem.division import whole
 from reflowshock.fem.forces.force_assembled import AssembledElements
 from reflowshock.fem.forces.force_nonlinear import NonlinearElements
-from reflowshock.fem.trials import flight
 from reflowshock.workflow.case.case import CASES
 from reflowshock.workflow.stress_test.hard_case import HardCase, read_hard_cases
 from reflowshock.workflow.stress_test.verdict import attempt
@@ -68,8 +68,8 @@ def test_flipped_force_of_elements_that_yield_is_caught(monkeypatch):
 
 def test_doubled_step_is_caught(monkeypatch):
     case = hard_case("elements_free_flight", "element incompatible_modes, critical step element")
-    right = flight.damped_critical_step
-    monkeypatch.setattr(flight, "damped_critical_step", lambda *values: 2.0 * right(*values))
+    right = motion.damped_critical_step
+    monkeypatch.setattr(motion, "damped_critical_step", lambda *values: 2.0 * right(*values))
     assert caught(case)
 
 

@@ -10,16 +10,17 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
+from reflowshock.cases.hard.trials.bodies import dns_body, motion_of, nonlinear_body
+from reflowshock.cases.hard.trials.grids import grid, mesh_of, on
 from reflowshock.fem.dynamics.central_difference import Motion
 from reflowshock.fem.loads.load import DOWN, BodyAcceleration, Load
+from reflowshock.fem.loads.pulse import HalfSine
 from reflowshock.fem.loads.shock_loads import shock_loads
 from reflowshock.fem.materials.library import FR4
 from reflowshock.fem.materials.parameters import Material
-from reflowshock.fem.model.body import Body, Response
-from reflowshock.fem.problem.parameters import Shock
-from reflowshock.fem.problem.pulse import HalfSine
-from reflowshock.fem.trials.bodies import dns_body, motion_of, nonlinear_body
-from reflowshock.fem.trials.grids import grid, mesh_of, on
+from reflowshock.fem.model.assembly import Response
+from reflowshock.fem.model.body import Body
+from reflowshock.fem.problem.shock import Shock
 from reflowshock.particles.core.cloud import box_cloud
 from reflowshock.particles.parameters.solder import Solder
 from reflowshock.particles.physics.physics import Physics

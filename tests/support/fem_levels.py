@@ -5,15 +5,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from mpi4py import MPI
 
+from reflowshock.cases.hard.trials.grids import grid, joint_mesh, mesh_of, on
 from reflowshock.fem.division.chebyshev import stabilisation
 from reflowshock.fem.division.choose_levels import Pace, governing_steps, least_steps
 from reflowshock.fem.division.tables import prepare
 from reflowshock.fem.elements.element import element_stiffness
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.mesh import MeshData, append
-from reflowshock.fem.model.body import Body, Response, make_body, make_pieces
+from reflowshock.fem.model.assembly import Response, make_body, make_pieces
+from reflowshock.fem.model.body import Body
 from reflowshock.fem.parallel.local_mesh import distribute
-from reflowshock.fem.trials.grids import grid, joint_mesh, mesh_of, on
 
 EDGE = 1.5e-3
 FRACTION = 0.9

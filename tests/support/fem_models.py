@@ -5,9 +5,9 @@ from pathlib import Path
 import gmsh
 import numpy as np
 
+from reflowshock.cases.hard.trials.grids import COPPER, GAP, grid, joint_mesh, mesh_of, on
 from reflowshock.fem.cell_shape import TENSOR_ORDER
 from reflowshock.fem.mesh.mesh import MeshData, append, without_unused_nodes
-from reflowshock.fem.trials.grids import COPPER, GAP, grid, joint_mesh, mesh_of, on
 
 # Of cells and facets with so many nodes: Gmsh's type, and its order of our nodes.
 GMSH_TYPES = {8: 5, 4: 4, 10: 11}, {4: 3, 3: 2, 6: 9}

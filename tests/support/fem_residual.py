@@ -6,17 +6,18 @@ from dataclasses import dataclass
 import numpy as np
 from mpi4py import MPI
 
+from reflowshock.cases.hard.trials.grids import grid, mesh_of, on
 from reflowshock.fem.division.tables import joined, model_inputs
 from reflowshock.fem.materials.parameters import Material
 from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.mesh.supports import SYMMETRY
-from reflowshock.fem.model.body import Body, Response, make_body, make_pieces
+from reflowshock.fem.model.assembly import Response, make_body, make_pieces
+from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.stress_recovery import StressRecovery
 from reflowshock.fem.parallel.local_mesh import distribute
-from reflowshock.fem.statics.cooling import pinned
+from reflowshock.fem.run.cooling import pinned
 from reflowshock.fem.statics.equilibrium import Equilibrium, Statics, thermal_force
 from reflowshock.fem.statics.initial_state import begun
-from reflowshock.fem.trials.grids import grid, mesh_of, on
 
 SMALL = Response()
 

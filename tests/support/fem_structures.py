@@ -5,9 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
+from reflowshock.cases.hard.trials.grids import grid, mesh_of, on
 from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.problem.inputs import INPUT, StructureInput
-from reflowshock.fem.trials.grids import grid, mesh_of, on
 from tests.support.fem_models import write_msh
 
 LENGTH, WIDTH, THICKNESS = 20e-3, 8e-3, 1e-3

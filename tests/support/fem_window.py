@@ -2,13 +2,12 @@
 
 from collections.abc import Sequence
 
+from reflowshock.cases.hard.trials.coupled import HELD, Coupled, Divide, models_of
 from reflowshock.fem.coupling.held_velocity import HeldVelocity
 from reflowshock.fem.division.divide import divide
 from reflowshock.fem.loads.load import Load
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.mesh import MeshData
-from reflowshock.fem.trials.coupled import Coupled, models_of
-from reflowshock.fem.trials.divided import HELD, Divide
 
 
 class Window(Coupled):

@@ -6,15 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from reflowshock.cases.hard.trials import surfaces
+from reflowshock.cases.hard.trials.joints import measured, mesh_at, sites_of
+from reflowshock.cases.hard.trials.packages import MM
+from reflowshock.cases.hard.trials.surfaces import bridged_pair, laid_between, revolve, with_void
 from reflowshock.meshing.board.pads import PadSite
 from reflowshock.meshing.joint.joint_mesh import JointMesh
 from reflowshock.meshing.joint.solder_mesh import JointMeshError, joint_quality
 from reflowshock.meshing.surface.closed_surface import ClosedSurface, close_surface, pad_planes
-from reflowshock.meshing.trials import level_sets, surfaces
-from reflowshock.meshing.trials.joints import measured, mesh_at, sites_of
-from reflowshock.meshing.trials.level_sets import bridged_pair, with_void
-from reflowshock.meshing.trials.models import MM
-from reflowshock.meshing.trials.surfaces import laid_between, revolve
 
 AROUND, LEVELS = 48, 25
 COUNTS = {
@@ -122,7 +121,7 @@ def lobed(generator: np.random.Generator, number: int) -> ClosedSurface:
 
 def hooked(generator: np.random.Generator, number: int) -> ClosedSurface:
     """A joint with an arm that bends round a bay: not star-shaped."""
-    return level_sets.hooked(0.3 * MM, generator.uniform(0.35, 0.5) * MM)
+    return surfaces.hooked(0.3 * MM, generator.uniform(0.35, 0.5) * MM)
 
 
 def bridged(generator: np.random.Generator, number: int) -> ClosedSurface:

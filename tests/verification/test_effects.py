@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from reflowshock.cases.hard.trials.grids import grid, mesh_of
 from reflowshock.fem.coupling.one_way import OneWay
 from reflowshock.fem.coupling.scheme import scheme_of
 from reflowshock.fem.estimates.effects import NEGLIGIBLE_STIFFENING, NEGLIGIBLE_WEIGHT, called_for, damping, weight
@@ -22,11 +23,10 @@ from reflowshock.fem.materials.library import FR4, SAC305, SILICON
 from reflowshock.fem.mesh.supports import held_components
 from reflowshock.fem.model.steps import mass_factor
 from reflowshock.fem.output.failure import failure_criteria, judge
-from reflowshock.fem.problem.parameters import Damping, Failure, JointCoupling
+from reflowshock.fem.problem.shock import Damping, Failure, JointCoupling
 from reflowshock.fem.problem.thermal import Thermal
 from reflowshock.fem.statics.plates import RigidPlates
 from reflowshock.fem.statics.structure import ThermalStructure
-from reflowshock.fem.trials.grids import grid, mesh_of
 from reflowshock.particles.parameters.effects import NEGLIGIBLE_SHAPE_CHANGE, decide, decide_drop, drop_numbers
 from reflowshock.particles.parameters.solder import SolderEffects
 from reflowshock.workflow.board_drop.fine_joints import needs_coarse_joints

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from reflowshock.cases.hard.trials.beams import beam, tip
+from reflowshock.cases.hard.trials.boxes import KINDS, box, elements_of, frequencies
 from reflowshock.fem.materials.library import FR4
 from reflowshock.fem.materials.parameters import Isotropic, Material
 from reflowshock.fem.mesh.mesh_quality import scaled_jacobians
-from reflowshock.fem.trials.bending import beam, tip
-from reflowshock.fem.trials.boxes import KINDS, box, elements_of, frequencies
 
 HEXAHEDRA = ["incompatible_modes", "one_point"]
 NOT_LOCKING = pytest.mark.parametrize("name", [*HEXAHEDRA, "tetrahedron_quadratic"])

@@ -7,10 +7,10 @@ import pytest
 import ufl
 from mpi4py import MPI
 
+from reflowshock.cases.hard.trials.boxes import KINDS, box, elements_of, stiffness_matrix
 from reflowshock.fem import dolfinx_api
 from reflowshock.fem.materials.elasticity import elasticity_matrix
 from reflowshock.fem.materials.library import FR4
-from reflowshock.fem.trials.boxes import KINDS, box, elements_of, stiffness_matrix
 
 RANDOM = np.random.default_rng(0)
 

@@ -5,6 +5,9 @@ import pytest
 import scipy.sparse
 from scipy.sparse.linalg import eigsh
 
+from reflowshock.cases.hard.trials.beams import orders_in_h
+from reflowshock.cases.hard.trials.boxes import KINDS, box, elements_of, mass_of, solve, stiffness_matrix
+from reflowshock.cases.hard.trials.grids import CYCLIC
 from reflowshock.fem.elements.element import Elements, critical_steps, element_geometry
 from reflowshock.fem.elements.stress import element_stress, mean_strain
 from reflowshock.fem.forces.force import linear_terms
@@ -13,9 +16,6 @@ from reflowshock.fem.materials.parameters import Isotropic
 from reflowshock.fem.mesh.facet import area_vectors
 from reflowshock.fem.mesh.mesh import boundary_facets
 from reflowshock.fem.mesh.mesh_quality import scaled_jacobians
-from reflowshock.fem.trials.boxes import KINDS, box, elements_of, mass_of, solve, stiffness_matrix
-from reflowshock.fem.trials.grids import CYCLIC
-from reflowshock.fem.trials.order import orders_in_h
 
 RANDOM = np.random.default_rng(3)
 LINE = np.linspace(0, 1, 4)

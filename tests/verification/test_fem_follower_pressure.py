@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
+from reflowshock.cases.hard.trials.bodies import dns_body, motion_of
+from reflowshock.cases.hard.trials.grids import grid, mesh_of, on
 from reflowshock.fem.dynamics.central_difference import Motion
 from reflowshock.fem.loads.follower_pressure import FollowerPressure
 from reflowshock.fem.loads.load import NodalForces
+from reflowshock.fem.loads.pulse import Constant
 from reflowshock.fem.mesh.facet_areas import outward_areas, outward_facets
 from reflowshock.fem.mesh.mesh import MeshData
-from reflowshock.fem.problem.pulse import Constant
-from reflowshock.fem.trials.bodies import dns_body, motion_of
-from reflowshock.fem.trials.grids import grid, mesh_of, on
 from tests.support.fem_bodies import STEEL
 
 PRESSURE = 1e6

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from reflowshock.cases.hard.trials.bodies import dns_body, motion_of
+from reflowshock.cases.hard.trials.grids import grid, mesh_of
 from reflowshock.fem.dynamics.implicit import ImplicitMotion
 from reflowshock.fem.errors import AgreedError
 from reflowshock.fem.loads.load import half_sine_drop
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.mesh import append
 from reflowshock.fem.model.body import Body
-from reflowshock.fem.trials.bodies import dns_body, motion_of
-from reflowshock.fem.trials.grids import grid, mesh_of
 from tests.support.fem_bodies import STEEL
 from tests.support.fem_models import board_mesh, small_assembly
 

@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from reflowshock.cases.hard.trials.bodies import dns_body, motion_of
 from reflowshock.fem.dynamics.implicit import ImplicitMotion
+from reflowshock.fem.dynamics.modal import natural_modes
 from reflowshock.fem.dynamics.moving import Moving
 from reflowshock.fem.loads.damping import RayleighDamping
 from reflowshock.fem.loads.load import Load
@@ -12,9 +14,7 @@ from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.global_matrix import Equations
 from reflowshock.fem.parallel import portable
-from reflowshock.fem.problem.parameters import Damping
-from reflowshock.fem.statics.modal import natural_modes
-from reflowshock.fem.trials.bodies import dns_body, motion_of
+from reflowshock.fem.problem.shock import Damping
 from tests.support.fem_bodies import STEEL
 from tests.verification.test_fem_loads import bar, largest_imbalance, loads_of
 

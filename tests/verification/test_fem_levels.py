@@ -7,6 +7,8 @@ import pytest
 import scipy.linalg
 from mpi4py import MPI
 
+from reflowshock.cases.hard.trials.bodies import motion_of
+from reflowshock.cases.hard.trials.coupled import Coupled, Models, pieces_of
 from reflowshock.fem.coupling.scheme import scheme_of
 from reflowshock.fem.division.division import Division
 from reflowshock.fem.division.tables import joined, model_inputs
@@ -15,8 +17,6 @@ from reflowshock.fem.estimates.estimate import WindowPlan
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.tie import net_load
 from reflowshock.fem.model.step_levels import Levels, LocalSteps
-from reflowshock.fem.trials.bodies import motion_of
-from reflowshock.fem.trials.coupled import Coupled, Models, pieces_of
 from tests.support.fem_bodies import dense_stiffness
 from tests.support.fem_levels import Levelled, joint_on_board, levelled
 

@@ -4,19 +4,19 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from reflowshock.cases.hard.trials.bodies import dns_body, motion_of
+from reflowshock.cases.hard.trials.grids import grid, mesh_of, on
 from reflowshock.fem.dynamics.central_difference import Motion
 from reflowshock.fem.estimates.estimate import damped_critical_step
 from reflowshock.fem.loads.damping import RayleighDamping
 from reflowshock.fem.loads.large_mass import LargeMass
 from reflowshock.fem.loads.load import BodyAcceleration, Load, NodalForces, PrescribedMotion
+from reflowshock.fem.loads.pulse import Constant, HalfSine
 from reflowshock.fem.materials.parameters import Isotropic
 from reflowshock.fem.mesh.facet_areas import outward_areas
 from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.model.body import Body
-from reflowshock.fem.problem.parameters import Damping
-from reflowshock.fem.problem.pulse import Constant, HalfSine
-from reflowshock.fem.trials.bodies import dns_body, motion_of
-from reflowshock.fem.trials.grids import grid, mesh_of, on
+from reflowshock.fem.problem.shock import Damping
 from tests.support.fem_bodies import STEEL
 
 LENGTH, WIDTH = 0.02, 2e-3

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from reflowshock.cases.hard.trials.bodies import dns_body, motion_of
+from reflowshock.cases.hard.trials.grids import grid, mesh_of, on
 from reflowshock.fem.loads.load import half_sine_drop
 from reflowshock.fem.mesh.mesh import MeshData
-from reflowshock.fem.trials.bodies import dns_body, motion_of
-from reflowshock.fem.trials.grids import grid, mesh_of, on
 from tests.support.fem_bodies import STEEL
 from tests.support.fem_models import bar
 

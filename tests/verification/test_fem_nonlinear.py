@@ -6,14 +6,13 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from reflowshock.cases.hard.trials.beams import bent_moment
+from reflowshock.cases.hard.trials.bodies import LINEAR_HARDENING, SOLDER, force_of, nonlinear
+from reflowshock.cases.hard.trials.boxes import KINDS, box, elements_of
 from reflowshock.fem.elements.stress import symmetric
 from reflowshock.fem.forces.force_nonlinear import NonlinearElements
 from reflowshock.fem.materials.library import FR4
 from reflowshock.fem.materials.parameters import Isotropic, Material
-from reflowshock.fem.trials.bending import bent_moment
-from reflowshock.fem.trials.bodies import force_of, nonlinear
-from reflowshock.fem.trials.boxes import KINDS, box, elements_of
-from reflowshock.fem.trials.metals import LINEAR_HARDENING, SOLDER
 
 LINE = np.linspace(0.0, 1.0, 4)
 ELASTIC = Isotropic(density=1.0, young_modulus=1.0, poisson_ratio=0.3)

@@ -4,6 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from reflowshock.cases.hard.trials.bodies import motion_of
+from reflowshock.cases.hard.trials.coupled import Coupled, Models, models_of, pieces_of, surveyed
+from reflowshock.cases.hard.trials.pairs import FRACTION, Pair
 from reflowshock.fem.coupling.held_velocity import HeldVelocity
 from reflowshock.fem.coupling.one_way import OneWay
 from reflowshock.fem.division.tables import Tables, model_inputs
@@ -11,12 +14,8 @@ from reflowshock.fem.dynamics.energy_balance import Ledger, ledger_sums
 from reflowshock.fem.loads.load import half_sine_drop
 from reflowshock.fem.materials.library import SAC405
 from reflowshock.fem.materials.roles import Materials
-from reflowshock.fem.model.body import Pieces
-from reflowshock.fem.problem.parameters import Coupling
-from reflowshock.fem.trials.bodies import motion_of
-from reflowshock.fem.trials.coupled import Coupled, Models, models_of, pieces_of
-from reflowshock.fem.trials.divided import surveyed
-from reflowshock.fem.trials.pairs import FRACTION, Pair
+from reflowshock.fem.model.assembly import Pieces
+from reflowshock.fem.problem.shock import Coupling
 
 LOADS = [half_sine_drop(peak=1.5e4, duration=1e-5)]
 WINDOWS = 200

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
+from reflowshock.cases.hard.trials.bodies import dns_body, motion_of
+from reflowshock.cases.hard.trials.coupled import Coupled
+from reflowshock.cases.hard.trials.pairs import SCHEMES, Pair
 from reflowshock.fem.dynamics.energy_balance import Ledger
 from reflowshock.fem.errors import EnergyError
 from reflowshock.fem.parallel.portable import values
-from reflowshock.fem.trials.bodies import dns_body, motion_of
-from reflowshock.fem.trials.coupled import Coupled
-from reflowshock.fem.trials.pairs import SCHEMES, Pair
 
 PUSH = np.array([0.3, 0.1, 1.0])  # [m/s]
 OF_TWO_STEPS = [name for name, coupling in SCHEMES.items() if coupling.scheme != "local_steps"]

@@ -4,15 +4,14 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from reflowshock.cases.hard.trials.bodies import LINEAR_HARDENING, motion_of, nonlinear_body
+from reflowshock.cases.hard.trials.grids import grid, mesh_of
 from reflowshock.fem.elements.stress import symmetric
 from reflowshock.fem.materials.elasticity import elasticity_matrix
 from reflowshock.fem.materials.library import FR4
 from reflowshock.fem.materials.parameters import Isotropic
-from reflowshock.fem.model.body import Response
+from reflowshock.fem.model.assembly import Response
 from reflowshock.fem.model.stress_recovery import StressRecovery
-from reflowshock.fem.trials.bodies import motion_of, nonlinear_body
-from reflowshock.fem.trials.grids import grid, mesh_of
-from reflowshock.fem.trials.metals import LINEAR_HARDENING
 
 ELASTIC = Isotropic(density=1.0, young_modulus=1e9, poisson_ratio=0.3)
 both_formulations = pytest.mark.parametrize("formulation", ["one_point", "incompatible_modes"])

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from reflowshock.cases.hard.trials.grids import grid, mesh_of, on
 from reflowshock.fem.materials.library import FR4
 from reflowshock.fem.materials.parameters import Isotropic
 from reflowshock.fem.materials.roles import Materials
@@ -14,7 +15,6 @@ from reflowshock.fem.problem.thermal import Thermal
 from reflowshock.fem.statics.rigid import RigidMotions
 from reflowshock.fem.statics.state import Assembly
 from reflowshock.fem.statics.structure import ThermalStructure
-from reflowshock.fem.trials.grids import grid, mesh_of, on
 from tests.support.fem_models import write_msh
 from tests.support.thermal_models import (
     LIFT,

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from reflowshock.cases.hard.trials.packages import MM, PLATE, board, package
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.problem.thermal import Thermal
 from reflowshock.fem.statics.pads import Pads
@@ -14,7 +15,6 @@ from reflowshock.fem.statics.structure import ThermalStructure
 from reflowshock.meshing.board.heated_assembly import write_heated_assembly
 from reflowshock.meshing.board.pads import pad_table
 from reflowshock.meshing.board.parameters import Warpage
-from reflowshock.meshing.trials.models import MM, PLATE, board, package
 
 MOVED = Thermal(package="moved", corner_displacement=-5e-5)
 

@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from reflowshock.cases.hard.trials.bodies import dns_body, motion_of
+from reflowshock.cases.hard.trials.grids import grid, mesh_of, on
 from reflowshock.fem.loads.damping import RayleighDamping
 from reflowshock.fem.loads.large_mass import LargeMass
 from reflowshock.fem.loads.load import BodyAcceleration, Load, NodalForces, PrescribedMotion
+from reflowshock.fem.loads.pulse import HalfSine, Tabulated
 from reflowshock.fem.materials.parameters import Isotropic
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.facet_areas import outward_areas
 from reflowshock.fem.mesh.mesh import MeshData
-from reflowshock.fem.problem.pulse import HalfSine, Tabulated
-from reflowshock.fem.trials.bodies import dns_body, motion_of
-from reflowshock.fem.trials.grids import grid, mesh_of, on
 from tests.support.fem_bodies import STEEL
 
 SPEED = np.sqrt(STEEL.young_modulus / STEEL.density)

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from reflowshock.cases.hard.trials.coupled import Coupled, models_of
 from reflowshock.fem.coupling.scheme import scheme_of
 from reflowshock.fem.loads.load import half_sine_drop
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.mesh import append
-from reflowshock.fem.problem.parameters import Coupling
-from reflowshock.fem.trials.coupled import Coupled, models_of
+from reflowshock.fem.problem.shock import Coupling
 from tests.support.fem_models import small_assembly
 
 PULSE = half_sine_drop(peak=1.5e4, duration=2e-5)

@@ -5,19 +5,19 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
+from reflowshock.cases.hard.trials.boxes import KINDS, elements_of, frequencies, solve
+from reflowshock.cases.hard.trials.packages import MM
+from reflowshock.cases.hard.trials.surfaces import barrel
 from reflowshock.fem.cell_shape import TENSOR_ORDER
 from reflowshock.fem.elements.element import critical_steps, element_geometry
 from reflowshock.fem.estimates.estimate import box_critical_step
 from reflowshock.fem.materials.library import LIBRARY
-from reflowshock.fem.trials.boxes import KINDS, elements_of, frequencies, solve
 from reflowshock.meshing.board.parameters import JointNumerics
 from reflowshock.meshing.core.hexahedra import quad_areas, shortest_lengths
 from reflowshock.meshing.joint.free_form import free_form_solder
 from reflowshock.meshing.joint.solder import Solder
 from reflowshock.meshing.joint.swept import swept_solder
 from reflowshock.meshing.joint.tetrahedra import fill_apart
-from reflowshock.meshing.trials.models import MM
-from reflowshock.meshing.trials.surfaces import barrel
 
 SOLDER = LIBRARY["SAC405"]
 COLUMN = barrel(0.45 * MM, 0.03 * MM)

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.integrate import trapezoid
 
+from reflowshock.fem.loads.pulse import HalfSine, Haversine
 from reflowshock.fem.materials.elasticity import elasticity_matrix
 from reflowshock.fem.materials.parameters import Isotropic
-from reflowshock.fem.problem.pulse import HalfSine, Haversine
 from reflowshock.workflow.structure import exact_bar, exact_cantilever, exact_layers
 
 BARS = exact_bar.Bars((0.1, 0.1), (70e9, 200e9), (2700.0, 8000.0), 8e-6)

@@ -30,7 +30,7 @@ def expected_deflection(case: "BoardDropCase") -> Deflection:
     The board is a beam between its holes that swings in its first mode, q'' + omega^2 q = 4/pi a(t): w = q sin(pi x/L).
     Width, package and later modes are left out.
     """
-    from reflowshock.fem.problem.shock_pulse import shock_pulse
+    from reflowshock.fem.loads.shock_pulse import shock_pulse
 
     board, (young_x, young_y, _) = case.board, case.materials.board.engineering_constants.young
     holes = board.holes
@@ -99,8 +99,8 @@ def weight_effect(case: "BoardDropCase") -> dict:
 
     It lasts, and a pulse does not: a board that is slow against the pulse feels it more than g over the peak says.
     """
-    from reflowshock.fem.problem.pulse import STANDARD_GRAVITY
-    from reflowshock.fem.problem.shock_pulse import shock_pulse
+    from reflowshock.fem.loads.pulse import STANDARD_GRAVITY
+    from reflowshock.fem.loads.shock_pulse import shock_pulse
 
     expected = expected_deflection(case)
     alone = first_mode_peak(expected.omega, lambda time: STANDARD_GRAVITY * time, case.shock.duration)

@@ -10,7 +10,7 @@ from reflowshock.fem.names import nearest
 from reflowshock.workflow.case.problems import Problem
 
 if TYPE_CHECKING:
-    from reflowshock.fem.problem.parameters import JointCoupling
+    from reflowshock.fem.problem.shock import JointCoupling
     from reflowshock.meshing.board.pads import PadSite
     from reflowshock.workflow.package.case import BoardDropCase
 

@@ -3,7 +3,7 @@
 import json
 from pathlib import Path
 
-from reflowshock.fem.problem.parameters import JointCoupling
+from reflowshock.fem.problem.shock import JointCoupling
 from reflowshock.workflow.board_drop.board_deflection import decided
 from reflowshock.workflow.board_drop.fine_joints import (
     FineJoints,

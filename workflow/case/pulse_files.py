@@ -16,7 +16,7 @@ def unreadable_pulses(tables: Tables) -> Iterator[Problem]:
         tables: key -> file, and the quantity of its second column.
     """
     from reflowshock.fem.errors import PulseError
-    from reflowshock.fem.problem.pulse_table import read_pulse
+    from reflowshock.fem.loads.pulse_table import read_pulse
 
     for key, (path, quantity) in tables.items():
         try:
@@ -29,7 +29,7 @@ def unreadable_pulses(tables: Tables) -> Iterator[Problem]:
 def largest_values(tables: Tables) -> Iterator[tuple[str, str, float]]:
     """Yield key, SI unit and magnitude of the last time and of the largest value of each table that can be read."""
     from reflowshock.fem.errors import PulseError
-    from reflowshock.fem.problem.pulse_table import read_pulse
+    from reflowshock.fem.loads.pulse_table import read_pulse
 
     for key, (path, quantity) in tables.items():
         try:

@@ -1,6 +1,7 @@
 """Making products: one Snakemake job for each that is missing; those that fail leave the others finished."""
 
 import json
+import shutil
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -18,6 +19,7 @@ from reflowshock.workflow.store.view import show
 BATCH = "batch"  # below the store: jobs, logs and marks of the last call
 JOBS = f"{BATCH}/jobs.json"
 UNTRIED = "was not reached"
+LEAST_FREE = 2**20  # bytes of a device on which a stage could still have said why it ended
 
 
 @dataclass(frozen=True, slots=True)
@@ -187,6 +189,8 @@ def _untold(store: Store, point: Point, stage: str, verdict: Verdict) -> str:
         return f"{told}; see {said}\n{last_words(store.home)}" if said.is_file() else told
     words = log.read_text(encoding="utf-8", errors="replace").strip().splitlines()
     last = f'; its last words: "{words[-1].strip()}"' if words else ""
+    if shutil.disk_usage(store.home).free < LEAST_FREE:
+        return f"no space left on the device of {store.home}"
     return f"ended without an error of its own, as when it is killed{last}; see {log}"
 
 

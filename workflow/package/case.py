@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from reflowshock.fem.materials.roles import Materials
-from reflowshock.fem.problem.parameters import Shock
+from reflowshock.fem.problem.shock import Shock
 from reflowshock.fem.problem.thermal import Thermal
 from reflowshock.meshing.board.parameters import Board, Package, Warpage
 from reflowshock.particles.parameters.solder import Reflow, Solder

@@ -14,10 +14,10 @@ if TYPE_CHECKING:
 # Each module of trials has a table TRIALS: name -> Trial; names are unique among all families. Each module of random
 # cases has a list RANDOM of `RandomTrial`; it may load hypothesis.
 TRIALS_OF = {
-    "reflow": "reflowshock.workflow.stress_test.trials_reflow",
+    "reflow": "reflowshock.cases.hard.trials.reflow",
     "elements": "reflowshock.workflow.stress_test.trials_elements",
     "coupling": "reflowshock.workflow.stress_test.trials_coupling",
-    "remesh": "reflowshock.workflow.stress_test.trials_remesh",
+    "remesh": "reflowshock.cases.hard.trials.remesh",
 }
 RANDOM_OF: dict[str, str] = {
     "reflow": "reflowshock.workflow.stress_test.random_reflow",

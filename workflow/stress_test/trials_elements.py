@@ -1,33 +1,35 @@
 """Trials of elements and of one model that moves; what they measure is described in fem/trials."""
 
-from reflowshock.fem.trials import parameters as of
+from reflowshock.cases.hard.trials import elements as of
 from reflowshock.workflow.stress_test.solver_trial import solver_trial
 
 MEASURES_OF_FLIGHT = "energy_error momentum_error angular_momentum_error energy_left step_gain"
 TRIALS = {
     "patch": solver_trial(
-        of.Patch, "reflowshock.fem.trials.fields:patch", "force_error stress_error softest_mode rigid_mode"
+        of.Patch, "reflowshock.cases.hard.trials.fields:patch", "force_error stress_error softest_mode rigid_mode"
     ),
-    "turns": solver_trial(of.Turns, "reflowshock.fem.trials.fields:turns", "force_error stress_error"),
+    "turns": solver_trial(of.Turns, "reflowshock.cases.hard.trials.fields:turns", "force_error stress_error"),
     "tension": solver_trial(
-        of.Tension, "reflowshock.fem.trials.fields:tension", "stress_error stress_scatter force_error"
+        of.Tension, "reflowshock.cases.hard.trials.fields:tension", "stress_error stress_scatter force_error"
     ),
     "compression": solver_trial(
-        of.Compression, "reflowshock.fem.trials.fields:compression", "stress_error stress_scatter force_error"
+        of.Compression, "reflowshock.cases.hard.trials.fields:compression", "stress_error stress_scatter force_error"
     ),
-    "bending": solver_trial(of.Bending, "reflowshock.fem.trials.bending:bending", "deflection_error"),
-    "order": solver_trial(of.Order, "reflowshock.fem.trials.order:order", "displacement_order strain_order"),
-    "hinge": solver_trial(of.Hinge, "reflowshock.fem.trials.bending:hinge", "moment_error"),
-    "flight": solver_trial(of.Flight, "reflowshock.fem.trials.flight:flight", MEASURES_OF_FLIGHT),
+    "bending": solver_trial(of.Bending, "reflowshock.cases.hard.trials.beams:bending", "deflection_error"),
+    "order": solver_trial(of.Order, "reflowshock.cases.hard.trials.beams:order", "displacement_order strain_order"),
+    "hinge": solver_trial(of.Hinge, "reflowshock.cases.hard.trials.beams:hinge", "moment_error"),
+    "flight": solver_trial(of.Flight, "reflowshock.cases.hard.trials.motion:flight", MEASURES_OF_FLIGHT),
     "impact": solver_trial(
-        of.Impact, "reflowshock.fem.trials.impact:impact", "energy_error plastic_share plastic_return hourglass_share"
+        of.Impact,
+        "reflowshock.cases.hard.trials.motion:impact",
+        "energy_error plastic_share plastic_return hourglass_share",
     ),
     "tied_blocks": solver_trial(
-        of.Tied, "reflowshock.fem.trials.tied:tied", "stress_error mean_stress_error pull_error"
+        of.Tied, "reflowshock.cases.hard.trials.fields:tied", "stress_error mean_stress_error pull_error"
     ),
     "pulse": solver_trial(
         of.PulseTrial,
-        "reflowshock.fem.trials.pulses:pulse",
+        "reflowshock.cases.hard.trials.motion:pulse",
         "velocity_error displacement_error strain_energy energy_error",
     ),
 }

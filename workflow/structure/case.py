@@ -48,7 +48,7 @@ class StructureCase(StructureScene, Case):
     @property
     def pulse_tables(self) -> dict[str, tuple[Path, str]]:
         """Tables of loads."""
-        from reflowshock.fem.problem.structure_pulses import QUANTITY
+        from reflowshock.fem.loads.structure_pulses import QUANTITY
 
         return {
             f"loads.{name}.table": (Path(load.table), QUANTITY[load.kind])

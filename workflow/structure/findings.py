@@ -224,7 +224,7 @@ def _waves(case: StructureCase, reference: BarWave | LayeredBar, motion: Motion)
 
 
 def _pulse_of(case: StructureCase, name: str) -> exact_layers.Pulse:
-    from reflowshock.fem.problem.structure_pulses import pulse_durations, pulse_of
+    from reflowshock.fem.loads.structure_pulses import pulse_durations, pulse_of
 
     load = case.loads[name]
     pulse = pulse_of(load)

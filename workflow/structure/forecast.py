@@ -103,7 +103,7 @@ def critical_step(case: StructureCase, layers: Mapping[str, LayerForecast]) -> f
 def forecast_steps(case: StructureCase, layers: Mapping[str, LayerForecast]) -> dict[str, float]:
     """Predict the time step [s] of each solver."""
     from reflowshock.fem.estimates.solver_cost import implicit_step
-    from reflowshock.fem.problem.structure_pulses import pulse_durations, pulses_of
+    from reflowshock.fem.loads.structure_pulses import pulse_durations, pulses_of
 
     numerics = case.dynamics.numerics
     explicit = numerics.explicit_step or numerics.step_fraction * critical_step(case, layers)
@@ -142,7 +142,7 @@ def step_problems(case: StructureCase) -> Iterator[Problem]:
 
 def shorter_than_window(case: StructureCase, window: float) -> Iterator[Problem]:
     """Find pulses that are over before two models meet again."""
-    from reflowshock.fem.problem.structure_pulses import pulse_durations, pulses_of
+    from reflowshock.fem.loads.structure_pulses import pulse_durations, pulses_of
 
     for name, pulse in pulses_of(case.loads).items():
         shortest = min(pulse_durations({name: pulse}), default=window)

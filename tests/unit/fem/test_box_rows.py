@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
+from reflowshock.cases.hard.trials.grids import grid
 from reflowshock.fem.elements.element import Elements, element_kind, element_stiffness
 from reflowshock.fem.forces.box_rows import BoxRows
 from reflowshock.fem.forces.force_congruent import CongruentElements
 from reflowshock.fem.kernels.box_rows import LONGEST
 from reflowshock.fem.materials.elasticity import elasticity_matrix
 from reflowshock.fem.materials.library import FR4, SAC405
-from reflowshock.fem.trials.grids import grid
 
 MATERIALS = np.array([elasticity_matrix(FR4), elasticity_matrix(SAC405)])
 

@@ -5,14 +5,14 @@ import tracemalloc
 import numpy as np
 import pytest
 
+from reflowshock.cases.hard.trials.bodies import dns_body, motion_of
+from reflowshock.cases.hard.trials.grids import grid, mesh_of, on
 from reflowshock.fem.dynamics.central_difference import Motion
 from reflowshock.fem.kernels.damping import add_damping, power
 from reflowshock.fem.kernels.motion import STRIP
 from reflowshock.fem.loads.damping import RayleighDamping
 from reflowshock.fem.loads.load import BodyAcceleration
-from reflowshock.fem.problem.pulse import Constant
-from reflowshock.fem.trials.bodies import dns_body, motion_of
-from reflowshock.fem.trials.grids import grid, mesh_of, on
+from reflowshock.fem.loads.pulse import Constant
 from tests.support.fem_bodies import STEEL, dense_stiffness
 
 GRAVITY = np.array([0.3, -2.0, 9.81])

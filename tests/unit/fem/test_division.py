@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from reflowshock.cases.hard.trials.coupled import surveyed
 from reflowshock.fem.division.buffer import grown
 from reflowshock.fem.division.checks import check_division
 from reflowshock.fem.division.divide import divide, scheme_for
@@ -15,8 +16,7 @@ from reflowshock.fem.materials.library import SAC305
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.mesh import append
 from reflowshock.fem.model.steps import steps_of_division
-from reflowshock.fem.problem.parameters import Coupling
-from reflowshock.fem.trials.divided import surveyed
+from reflowshock.fem.problem.shock import Coupling
 from tests.support.fem_models import small_assembly
 
 ELASTIC, YIELDING = Materials(), Materials(solder=SAC305)

@@ -7,7 +7,7 @@ from reflowshock.fem.estimates.material_effects import failure_effect, material_
 from reflowshock.fem.materials.library import SAC305, SILICON, SNPB
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.output.failure import failed_joints, failure_criteria, judge, worst
-from reflowshock.fem.problem.parameters import Failure
+from reflowshock.fem.problem.shock import Failure
 
 HISTORY = {
     "joints": np.array(["A1", "A2"]),

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
+from reflowshock.cases.hard.trials.boxes import KINDS, elements_of
+from reflowshock.cases.hard.trials.grids import grid
 from reflowshock.fem.elements.kind import ElementKind
 from reflowshock.fem.forces.force import linear_terms
 from reflowshock.fem.forces.force_assembled import AssembledElements
 from reflowshock.fem.forces.force_congruent import FEW
-from reflowshock.fem.trials.boxes import KINDS, elements_of
-from reflowshock.fem.trials.grids import grid
 from tests.support.fem_bodies import STEEL
 
 KIND: ElementKind = KINDS["incompatible_modes"]

@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import pytest
 
+from reflowshock.cases.hard.trials.grids import joint_mesh
 from reflowshock.fem.division.fine_joints import read_coarse, with_coarse_joints
 from reflowshock.fem.division.tables import joined
 from reflowshock.fem.errors import MeshError
 from reflowshock.fem.mesh.mesh import append
 from reflowshock.fem.mesh.watch_table import joint_names, whole_watch
-from reflowshock.fem.trials.grids import joint_mesh
 from tests.support.fem_models import SITES, small_assembly
 
 

@@ -3,13 +3,13 @@ import pytest
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from reflowshock.cases.hard.trials.bodies import dns_body
 from reflowshock.fem.errors import AgreedError
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.mesh import append
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.factorisation import Factorisation
 from reflowshock.fem.model.global_matrix import Equations
-from reflowshock.fem.trials.bodies import dns_body
 from tests.support.fem_bodies import STEEL, dense_stiffness
 from tests.support.fem_models import bar, small_assembly
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
+from reflowshock.cases.hard.trials.bodies import force_of, nonlinear
 from reflowshock.fem.elements.element import Elements, element_kind, element_stiffness
 from reflowshock.fem.elements.stress import symmetric, voigt
 from reflowshock.fem.errors import MeshError
@@ -13,7 +14,6 @@ from reflowshock.fem.materials.elasticity import elasticity_matrix
 from reflowshock.fem.materials.library import FR4, SAC405
 from reflowshock.fem.materials.parameters import Isotropic, JohnsonCook
 from reflowshock.fem.statics.hencky import HenckyElements
-from reflowshock.fem.trials.bodies import force_of, nonlinear
 
 IDEAL = SAC405.model_copy(update={"plasticity": JohnsonCook(A=30e6)})
 SHEAR_TWICE = np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0])

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from reflowshock.cases.hard.trials.grids import grid
 from reflowshock.fem.elements.element import Elements, critical_steps, element_geometry, element_stiffness, lumped_mass
 from reflowshock.fem.errors import MeshError
 from reflowshock.fem.estimates.estimate import box_critical_step
@@ -11,7 +12,6 @@ from reflowshock.fem.forces.force_congruent import CongruentElements, is_box, pa
 from reflowshock.fem.kernels.hexahedron import GAUSS, SIDES, shape_derivatives
 from reflowshock.fem.materials.elasticity import elasticity_matrix
 from reflowshock.fem.materials.library import COPPER, FR4, SAC405, SILICON
-from reflowshock.fem.trials.grids import grid
 
 RANDOM = np.random.default_rng(7)
 

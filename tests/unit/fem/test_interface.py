@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from reflowshock.cases.hard.trials.grids import COPPER, GAP
 from reflowshock.fem.division.tables import joined
 from reflowshock.fem.estimates.estimate import WindowPlan, shortened
 from reflowshock.fem.mesh.mesh import append
@@ -14,11 +15,10 @@ from reflowshock.fem.mesh.watch_table import whole_watch
 from reflowshock.fem.output.compare import compare_histories
 from reflowshock.fem.output.interface import picture_windows
 from reflowshock.fem.problem.inputs import RunInput
-from reflowshock.fem.problem.parameters import Shock
+from reflowshock.fem.problem.shock import Shock
 from reflowshock.fem.problem.shock_checks import problems
 from reflowshock.fem.run import time_loop
 from reflowshock.fem.run.shock_run import run
-from reflowshock.fem.trials.grids import COPPER, GAP
 from tests.support.fem_models import SITES, small_assembly, write_small_assembly
 
 TIMES = 4e-6, 1e-5

@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from reflowshock.cases.hard.trials.coupled import surveyed
+from reflowshock.cases.hard.trials.grids import grid, mesh_of
 from reflowshock.fem.division.checks import check_division
 from reflowshock.fem.division.divide import divide
 from reflowshock.fem.division.tables import prepare
@@ -10,8 +12,6 @@ from reflowshock.fem.errors import CutError, MeshError
 from reflowshock.fem.mesh.coupling_interface import find_cut
 from reflowshock.fem.mesh.mesh import MeshData, append, boundary_facets, cells_of_facets, merge_nodes, select
 from reflowshock.fem.mesh.mesh_file import read_mesh
-from reflowshock.fem.trials.divided import surveyed
-from reflowshock.fem.trials.grids import grid, mesh_of
 from tests.support.fem_models import board_mesh, small_assembly, write_msh
 
 

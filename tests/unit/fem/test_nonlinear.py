@@ -6,6 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from reflowshock.cases.hard.trials.bodies import SOLDER, force_of, nonlinear
+from reflowshock.cases.hard.trials.boxes import KINDS, box, elements_of
 from reflowshock.fem.elements.one_point import hourglass_control
 from reflowshock.fem.elements.stress import von_mises
 from reflowshock.fem.errors import InvertedElementError
@@ -15,9 +17,6 @@ from reflowshock.fem.forces.nonlinear_blocks import TEN_NODES, elastic_constants
 from reflowshock.fem.kernels.nonlinear import Path
 from reflowshock.fem.kernels.plasticity import yield_stress
 from reflowshock.fem.materials.library import FR4
-from reflowshock.fem.trials.bodies import force_of, nonlinear
-from reflowshock.fem.trials.boxes import KINDS, box, elements_of
-from reflowshock.fem.trials.metals import SOLDER
 from tests.support.fem_nonlinear import HexahedronTwin, PointTwin
 
 LINE = np.linspace(0.0, 1.0, 4)

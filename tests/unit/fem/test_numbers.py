@@ -25,7 +25,7 @@ from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.mesh import append
 from reflowshock.fem.mesh.watch_table import centre_nodes, whole_watch
 from reflowshock.fem.output.compare import compare_histories
-from reflowshock.fem.problem.parameters import Ranks
+from reflowshock.fem.problem.shock import Ranks
 from tests.support.fem_models import BOARD_Z, small_assembly
 
 

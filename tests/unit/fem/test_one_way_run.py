@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from reflowshock.cases.hard.trials.grids import joint_mesh
 from reflowshock.fem.errors import AgreedError
 from reflowshock.fem.mesh.mesh import append
 from reflowshock.fem.problem.inputs import RunInput
 from reflowshock.fem.problem.shock_checks import problems
 from reflowshock.fem.run.shock_run import run
-from reflowshock.fem.trials.grids import joint_mesh
 from tests.support.fem_models import SITES, write_msh, write_small_assembly
 
 SHOCK = {

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from reflowshock.cases.hard.trials.grids import grid, mesh_of
 from reflowshock.fem.parallel.partition import partition
-from reflowshock.fem.trials.grids import grid, mesh_of
 
 
 def plate(count: int = 24):

@@ -8,6 +8,7 @@ import pytest
 from mpi4py import MPI
 from pydantic import ValidationError
 
+from reflowshock.cases.hard.trials.grids import grid, joint_mesh, mesh_of
 from reflowshock.fem.coupling.planner import Load, Measured, keep, kept, plan_from, plan_ranks, words
 from reflowshock.fem.coupling.speeds import (
     Kind,
@@ -30,8 +31,7 @@ from reflowshock.fem.estimates.placement import (
 )
 from reflowshock.fem.materials.library import LIBRARY
 from reflowshock.fem.parallel.communicators import Communicators
-from reflowshock.fem.problem.parameters import Ranks
-from reflowshock.fem.trials.grids import grid, joint_mesh, mesh_of
+from reflowshock.fem.problem.shock import Ranks
 
 EVEN = WindowCost(ModelCost(1e-3, 0.0, 1), ModelCost(1e-3, 0.0, 8), 1e-5)
 KIND = Kind([LIBRARY["FR4"], LIBRARY["copper"]], "incompatible_modes", "small", 1e-8)

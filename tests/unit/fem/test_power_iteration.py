@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from reflowshock.cases.hard.trials.bodies import dns_body
 from reflowshock.fem.mesh.mesh import append
 from reflowshock.fem.model.power_iteration import highest_frequency, margin_after, random_normal, steps_for
-from reflowshock.fem.trials.bodies import dns_body
 from tests.support.fem_bodies import dense_stiffness
 from tests.support.fem_models import bar, small_assembly
 

@@ -4,9 +4,7 @@ import numpy as np
 import pytest
 
 from reflowshock.fem.errors import LoadError, PulseError
-from reflowshock.fem.mesh.facet import area_vectors
-from reflowshock.fem.mesh.facet_areas import outward_areas
-from reflowshock.fem.problem.pulse import (
+from reflowshock.fem.loads.pulse import (
     SERVICE_CONDITIONS,
     Constant,
     HalfSine,
@@ -14,7 +12,9 @@ from reflowshock.fem.problem.pulse import (
     Tabulated,
     service_condition,
 )
-from reflowshock.fem.problem.pulse_table import read_pulse
+from reflowshock.fem.loads.pulse_table import read_pulse
+from reflowshock.fem.mesh.facet import area_vectors
+from reflowshock.fem.mesh.facet_areas import outward_areas
 from tests.support.fem_models import bar
 
 PULSES = {

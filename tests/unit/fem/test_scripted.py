@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from reflowshock.cases.hard.trials.pairs import SCHEMES, Pair
 from reflowshock.fem.coupling.gravouil_combescure import GravouilCombescure
 from reflowshock.fem.coupling.held_velocity import HeldVelocity, local_cut
 from reflowshock.fem.coupling.one_way import OneWay
-from reflowshock.fem.coupling.recording import record, replay, save_recording
-from reflowshock.fem.coupling.scripted import ScriptedDriver, ScriptedMacro, ScriptedMeso, scripted_cut
 from reflowshock.fem.dynamics.participant import uncut_motion
 from reflowshock.fem.errors import RecordingError
 from reflowshock.fem.loads.load import half_sine_drop
 from reflowshock.fem.parallel.exchange import CutChannels
-from reflowshock.fem.trials.pairs import SCHEMES, Pair
+from tests.support.recording import record, replay, save_recording
+from tests.support.scripted import ScriptedDriver, ScriptedMacro, ScriptedMeso, scripted_cut
 
 WINDOWS = 20
 

@@ -5,18 +5,18 @@ import pytest
 from mpi4py import MPI
 from pydantic import ValidationError
 
+from reflowshock.cases.hard.trials.bodies import dns_body, motion_of
+from reflowshock.cases.hard.trials.grids import grid, mesh_of, on
 from reflowshock.fem.dynamics.energy_balance import SUMS, Ledger
 from reflowshock.fem.errors import EnergyError, LoadError
 from reflowshock.fem.loads.large_mass import LargeMass
 from reflowshock.fem.loads.load import BodyAcceleration, PrescribedMotion
+from reflowshock.fem.loads.pulse import Constant
+from reflowshock.fem.loads.shock_pulse import shock_pulse
 from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.problem import shock_checks
-from reflowshock.fem.problem.parameters import Damping, Shock
-from reflowshock.fem.problem.pulse import Constant
-from reflowshock.fem.problem.shock_pulse import shock_pulse
-from reflowshock.fem.trials.bodies import dns_body, motion_of
-from reflowshock.fem.trials.grids import grid, mesh_of, on
+from reflowshock.fem.problem.shock import Damping, Shock
 from tests.support.fem_bodies import STEEL
 
 G = 9.80665

@@ -11,8 +11,8 @@ from reflowshock.fem.errors import AgreedError, EnergyError
 from reflowshock.fem.loads.follower_pressure import FollowerPressure
 from reflowshock.fem.loads.load import NodalForces
 from reflowshock.fem.loads.structure_loads import structure_loads
+from reflowshock.fem.loads.structure_pulses import pulses_of
 from reflowshock.fem.output.compare_structures import solver_differences
-from reflowshock.fem.problem.structure_pulses import pulses_of
 from reflowshock.fem.run.program import main
 from reflowshock.fem.run.structure_run import run_structure
 from reflowshock.fem.setup.structure_model import build_structure

@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from reflowshock.cases.hard.trials.grids import GAP
+from reflowshock.cases.hard.trials.packages import MM, board, package
 from reflowshock.fem.estimates.thermal_effects import (
     NEGLIGIBLE,
     PackageSizes,
@@ -21,11 +23,9 @@ from reflowshock.fem.statics.pads import Pads
 from reflowshock.fem.statics.plates import RigidPlates
 from reflowshock.fem.statics.state import Assembly
 from reflowshock.fem.statics.structure import ThermalStructure
-from reflowshock.fem.trials.grids import GAP
 from reflowshock.meshing.board.heated_assembly import write_heated_assembly
 from reflowshock.meshing.board.pads import pad_table
 from reflowshock.meshing.board.parameters import Warpage
-from reflowshock.meshing.trials.models import MM, board, package
 from tests.support.thermal_models import REFERENCE, Layers, pads_at, small_structure, structure_of
 
 SIZES = PackageSizes(

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from reflowshock.cases.hard.trials.grids import joint_mesh
 from reflowshock.fem.errors import TieError
 from reflowshock.fem.mesh.mesh import MeshData, append
 from reflowshock.fem.mesh.tie import Tie, check_tie, closest_facets, net_load, project, tie_joints
-from reflowshock.fem.trials.grids import joint_mesh
 from tests.support.fem_models import package_mesh, small_assembly
 
 SQUARE = np.array([[[0.0, 0, 0], [2, 0, 0], [2, 1, 0], [0, 1, 0]]])

@@ -1,11 +1,11 @@
 import numpy as np
 import pytest
 
+from reflowshock.cases.hard.trials.packages import MM, PLATE, board, package
 from reflowshock.meshing.board.assembly import write_assembly
 from reflowshock.meshing.board.estimate import count_elements
 from reflowshock.meshing.board.parameters import Warpage
 from reflowshock.meshing.core.hexahedra import scaled_jacobian
-from reflowshock.meshing.trials.models import MM, PLATE, board, package
 from tests.support.mesh_file import MeshFile
 
 

@@ -1,8 +1,8 @@
 import pytest
 
+from reflowshock.cases.hard.trials.packages import MM, board, package
 from reflowshock.meshing.board.checks import problems
 from reflowshock.meshing.board.parameters import Warpage
-from reflowshock.meshing.trials.models import MM, board, package
 
 
 def found(the_package, the_board, corner=0.0):

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
+from reflowshock.cases.hard.trials.packages import MM, PLATE, board, package, side_of
+from reflowshock.cases.hard.trials.surfaces import barrel
 from reflowshock.meshing.board.pads import pad_table
 from reflowshock.meshing.board.parameters import Warpage
 from reflowshock.meshing.core.hexahedra import quad_areas, volumes
 from reflowshock.meshing.joint.solder_mesh import JointMeshError, joint_quality, mesh_coarse_joint, mesh_joint
 from reflowshock.meshing.surface.closed_surface import enclosed_volume
-from reflowshock.meshing.trials.models import MM, PLATE, board, package, side_of
-from reflowshock.meshing.trials.surfaces import barrel
 
 WARPAGE = Warpage(corner=0.03 * MM)
 

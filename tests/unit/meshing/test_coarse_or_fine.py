@@ -6,6 +6,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from reflowshock.cases.hard.trials.packages import MM, board, package, side_of
+from reflowshock.cases.hard.trials.surfaces import barrel
 from reflowshock.fem.division.fine_joints import copied_joints, copies, with_coarse_joints
 from reflowshock.fem.mesh.mesh import MeshData, append
 from reflowshock.fem.mesh.mesh_file import read_mesh
@@ -13,8 +15,6 @@ from reflowshock.meshing.board.pads import pad_table
 from reflowshock.meshing.board.parameters import Warpage
 from reflowshock.meshing.joint.joints_file import write_joints
 from reflowshock.meshing.joint.solder_mesh import joint_quality, mesh_coarse_or_fine, mesh_joint
-from reflowshock.meshing.trials.models import MM, board, package, side_of
-from reflowshock.meshing.trials.surfaces import barrel
 from reflowshock.workflow.package_report import mesh_tables
 
 BULGES = {"A4": 0.25 * MM, "B4": 0.04 * MM}  # two layers cannot hold the first

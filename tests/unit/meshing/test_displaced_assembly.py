@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from reflowshock.cases.hard.trials.packages import MM, PLATE, board, package
 from reflowshock.meshing.board.assembly import write_assembly
 from reflowshock.meshing.board.displaced_assembly import ContactError, write_displaced_assembly
 from reflowshock.meshing.board.displacement import DisplacementError, computed, prescribed
@@ -10,7 +11,6 @@ from reflowshock.meshing.board.package_side import PackageSide, underside
 from reflowshock.meshing.board.pads import lift
 from reflowshock.meshing.board.parameters import Warpage
 from reflowshock.meshing.core.structured_face import NotStructuredError, StructuredFace
-from reflowshock.meshing.trials.models import MM, PLATE, board, package
 from tests.support.mesh_file import MeshFile
 
 PACKAGE = ("substrate", "die")

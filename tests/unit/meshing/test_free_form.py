@@ -4,6 +4,8 @@ import gmsh
 import numpy as np
 import pytest
 
+from reflowshock.cases.hard.trials.packages import MM, board, package, side_of
+from reflowshock.cases.hard.trials.surfaces import barrel, bridged_pair, with_void
 from reflowshock.meshing.board.pads import pad_table
 from reflowshock.meshing.board.parameters import Warpage
 from reflowshock.meshing.core.gmsh_session import gmsh_model
@@ -12,9 +14,6 @@ from reflowshock.meshing.core.quadratic_tetrahedra import write_tetrahedra
 from reflowshock.meshing.joint.joints_file import write_joints
 from reflowshock.meshing.joint.solder_mesh import joint_quality, mesh_bridge, mesh_joint
 from reflowshock.meshing.surface.closed_surface import enclosed_volume
-from reflowshock.meshing.trials.level_sets import bridged_pair, with_void
-from reflowshock.meshing.trials.models import MM, board, package, side_of
-from reflowshock.meshing.trials.surfaces import barrel
 
 FLAT = Warpage()
 

@@ -4,9 +4,9 @@ import meshio
 import numpy as np
 import pytest
 
+from reflowshock.cases.hard.trials.packages import MM, PLATE, board, package
 from reflowshock.meshing.board.assembly import write_assembly
 from reflowshock.meshing.board.heated_assembly import write_heated_assembly
-from reflowshock.meshing.trials.models import MM, PLATE, board, package
 
 
 @pytest.mark.parametrize("copper", [{}, PLATE])

@@ -3,14 +3,14 @@ import meshio
 import numpy as np
 import pytest
 
+from reflowshock.cases.hard.trials.packages import MM, board, package, side_of
+from reflowshock.cases.hard.trials.surfaces import barrel
 from reflowshock.meshing.board.pads import pad_table
 from reflowshock.meshing.board.parameters import Warpage
 from reflowshock.meshing.core.gmsh_session import gmsh_model
 from reflowshock.meshing.core.hexahedra import volumes
 from reflowshock.meshing.joint.joints_file import write_joints
 from reflowshock.meshing.joint.solder_mesh import joint_quality, mesh_joint
-from reflowshock.meshing.trials.models import MM, board, package, side_of
-from reflowshock.meshing.trials.surfaces import barrel
 
 WARPAGE = Warpage(corner=0.03 * MM)
 

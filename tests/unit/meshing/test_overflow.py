@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from reflowshock.cases.hard.trials.joints import Underside
+from reflowshock.cases.hard.trials.packages import MM, package
+from reflowshock.cases.hard.trials.surfaces import barrel, laid_between
 from reflowshock.meshing.board.pads import PadSite
 from reflowshock.meshing.joint.joint_mesh import JointMeshError
 from reflowshock.meshing.joint.solder_mesh import mesh_joint
 from reflowshock.meshing.surface.closed_surface import ClosedSurface, pad_planes
-from reflowshock.meshing.trials.joints import Underside
-from reflowshock.meshing.trials.models import MM, package
-from reflowshock.meshing.trials.surfaces import barrel, laid_between
 from tests.support.many_joints import hooked
 
 SLOPE, ASIDE, PAD = 0.02, 0.05 * MM, 0.24 * MM

@@ -3,10 +3,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from reflowshock.cases.hard.trials.packages import MM
+from reflowshock.cases.hard.trials.surfaces import barrel, laid_between
 from reflowshock.meshing.board.pad_planes import PadPlanes
 from reflowshock.meshing.surface.closed_surface import enclosed_volume, measure, pad_planes
-from reflowshock.meshing.trials.models import MM
-from reflowshock.meshing.trials.surfaces import barrel, laid_between
 
 SMALL = st.floats(-0.08, 0.08)
 

@@ -1,9 +1,9 @@
 import pytest
 from scipy.spatial.transform import Rotation
 
+from reflowshock.cases.hard.trials.packages import MM, board, package
 from reflowshock.meshing.board.pads import has_rim, joint_name, pad_table, read_pads, row_name, write_pads
 from reflowshock.meshing.board.parameters import Warpage
-from reflowshock.meshing.trials.models import MM, board, package
 
 
 @pytest.mark.parametrize(

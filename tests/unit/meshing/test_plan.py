@@ -3,8 +3,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from reflowshock.cases.hard.trials.packages import MM, board, package
 from reflowshock.meshing.board.plan import Interval, board_plan, footprint, package_plan, patch
-from reflowshock.meshing.trials.models import MM, board, package
 
 
 def test_graded_lines_keep_their_ratio():

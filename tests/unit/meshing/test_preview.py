@@ -2,9 +2,9 @@ import matplotlib.image
 import numpy as np
 import pytest
 
+from reflowshock.cases.hard.trials.packages import board, package
 from reflowshock.meshing.board.assembly import write_assembly
 from reflowshock.meshing.core.preview import COLOURS, colour, write_preview
-from reflowshock.meshing.trials.models import board, package
 
 
 @pytest.mark.parametrize(

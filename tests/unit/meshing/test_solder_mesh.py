@@ -4,14 +4,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from reflowshock.cases.hard.trials.packages import MM, PLATE, board, package, side_of
+from reflowshock.cases.hard.trials.surfaces import barrel, revolve
 from reflowshock.meshing.board.pads import lift, pad_table
 from reflowshock.meshing.board.parameters import Warpage
 from reflowshock.meshing.core.hexahedra import quad_areas, volumes
 from reflowshock.meshing.joint.joint_place import JointPlace
 from reflowshock.meshing.joint.solder_mesh import JointMeshError, joint_quality, mesh_joint
 from reflowshock.meshing.surface.closed_surface import close_surface
-from reflowshock.meshing.trials.models import MM, PLATE, board, package, side_of
-from reflowshock.meshing.trials.surfaces import barrel, revolve
 
 WARPAGE = Warpage(corner=0.03 * MM)
 

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from reflowshock.cases.hard.trials.packages import MM
 from reflowshock.meshing.surface.closed_surface import FREE, enclosed_volume, measure
 from reflowshock.meshing.surface.sphere_surface import sphere_surface
 from reflowshock.meshing.surface.truncated_sphere import TruncatedSphere
-from reflowshock.meshing.trials.models import MM
 
 
 @pytest.mark.parametrize(("board", "package", "volume"), [(0.24, 0.24, 0.0724), (0.3, 0.2, 0.09), (0.24, 0.24, 0.03)])

@@ -1,6 +1,8 @@
 import numpy as np
 import pytest
 
+from reflowshock.cases.hard.trials.packages import MM
+from reflowshock.cases.hard.trials.surfaces import barrel, truncated_sphere
 from reflowshock.meshing.surface.closed_surface import (
     BOARD_PAD,
     FREE,
@@ -12,8 +14,6 @@ from reflowshock.meshing.surface.closed_surface import (
     read_surface,
     write_surface,
 )
-from reflowshock.meshing.trials.models import MM
-from reflowshock.meshing.trials.surfaces import barrel, truncated_sphere
 
 
 @pytest.fixture

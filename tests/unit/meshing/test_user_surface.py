@@ -4,15 +4,14 @@ import meshio
 import numpy as np
 import pytest
 
+from reflowshock.cases.hard.trials import joints
+from reflowshock.cases.hard.trials.packages import MM, board, package, side_of
+from reflowshock.cases.hard.trials.surfaces import barrel, of_level_set, with_void
 from reflowshock.meshing.board.pads import pad_table
 from reflowshock.meshing.board.parameters import Warpage
 from reflowshock.meshing.joint.solder_mesh import joint_quality, mesh_joint
 from reflowshock.meshing.surface.closed_surface import SurfaceError, enclosed_volume, measure
 from reflowshock.meshing.surface.user_surface import file_volume, load_surface
-from reflowshock.meshing.trials import faults
-from reflowshock.meshing.trials.level_sets import of_level_set, with_void
-from reflowshock.meshing.trials.models import MM, board, package, side_of
-from reflowshock.meshing.trials.surfaces import barrel
 
 SITE = {site.name: site for site in pad_table(package(), board(), Warpage())}["A4"]
 SHAPE = barrel(SITE.gap, 0.04 * MM)
@@ -77,15 +76,15 @@ def test_heights_are_stretched_to_the_gap_and_tilt_of_the_site(tmp_path):
 @pytest.mark.parametrize(
     ("fault", "told"),
     [
-        (faults.hole, r"open edge: a hole \(3 such edges, allowed 0\), first at \("),
-        (faults.flipped, r"triangle that faces another way than its neighbour"),
-        (faults.inside_out, r"oriented inwards"),
-        (faults.doubled, r"edge of more than two triangles: a double shell"),
-        (faults.two_shells, r"second shell that faces outwards, allowed are voids"),
-        (faults.crossing, r"surface crosses itself at \("),
-        (faults.void_outside, r"void that lies outside the body"),
-        (faults.round_top, r"its upper end, z = .* is flat on a disc of radius"),
-        (faults.far_too_high, r"flat ends are .* m apart, allowed"),
+        (joints.hole, r"open edge: a hole \(3 such edges, allowed 0\), first at \("),
+        (joints.flipped, r"triangle that faces another way than its neighbour"),
+        (joints.inside_out, r"oriented inwards"),
+        (joints.doubled, r"edge of more than two triangles: a double shell"),
+        (joints.two_shells, r"second shell that faces outwards, allowed are voids"),
+        (joints.crossing, r"surface crosses itself at \("),
+        (joints.void_outside, r"void that lies outside the body"),
+        (joints.round_top, r"its upper end, z = .* is flat on a disc of radius"),
+        (joints.far_too_high, r"flat ends are .* m apart, allowed"),
     ],
     ids=lambda value: getattr(value, "__name__", ""),
 )

@@ -55,7 +55,8 @@ def test_the_user_decides_if_he_wants_to(switch):
 
 
 @pytest.mark.parametrize(
-    "module", ["parameters.effects", "parameters.checks", "parameters.estimate", "core.geometry", "parameters.solder"]
+    "module",
+    ["parameters.effects", "parameters.checks", "parameters.estimate", "core.geometry", "parameters.solder"],
 )
 def test_planning_loads_neither_numba_nor_petsc(module):
     code = f"import sys, reflowshock.particles.{module}; assert not {{'numba', 'petsc4py'}} & set(sys.modules)"

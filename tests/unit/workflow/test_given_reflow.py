@@ -6,10 +6,10 @@ import meshio
 import numpy as np
 import pytest
 
+from reflowshock.cases.hard.trials.packages import MM
+from reflowshock.cases.hard.trials.surfaces import barrel
 from reflowshock.meshing.board.pads import pad_table, write_pads
 from reflowshock.meshing.board.parameters import Warpage
-from reflowshock.meshing.trials.models import MM
-from reflowshock.meshing.trials.surfaces import barrel
 from reflowshock.workflow.board_drop.forecast import forecast
 from reflowshock.workflow.case.run import Run
 from reflowshock.workflow.package import findings

@@ -10,14 +10,13 @@ import meshio
 import numpy as np
 import pytest
 
+from reflowshock.cases.hard.trials.packages import MM
+from reflowshock.cases.hard.trials.surfaces import barrel, bridged_pair, revolve
 from reflowshock.meshing.board.assembly import write_assembly
 from reflowshock.meshing.board.pads import pad_table, write_pads
 from reflowshock.meshing.board.parameters import Warpage
 from reflowshock.meshing.core.outlines import outlines
 from reflowshock.meshing.surface.closed_surface import enclosed_volume, read_surface
-from reflowshock.meshing.trials.level_sets import bridged_pair
-from reflowshock.meshing.trials.models import MM
-from reflowshock.meshing.trials.surfaces import barrel, revolve
 from reflowshock.particles.scenes.products import write_shapes
 from reflowshock.particles.steps.shape import JointShape, Snapshot
 from reflowshock.workflow.board_drop.joint_meshes import mesh_real_joints

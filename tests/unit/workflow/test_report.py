@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from reflowshock.fem.output.failure import failure_criteria, judge
-from reflowshock.fem.problem.parameters import Failure
+from reflowshock.fem.problem.shock import Failure
 from reflowshock.workflow.package_report import joint_tables
 from reflowshock.workflow.package_report.array_map import array_map
 from reflowshock.workflow.package_report.shock import ranking_mode

@@ -18,7 +18,7 @@ import pytest
 from hypothesis import strategies as st
 from pydantic import Field
 
-from reflowshock.fem.trials.parameters import Impact, PairRun, Turns
+from reflowshock.cases.hard.trials.elements import Impact, PairRun, Turns
 from reflowshock.particles.parameters.solder import Parameters
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.case.units import UnitError
@@ -112,20 +112,19 @@ def test_errors_and_nan_are_misses(fate):
 
 def test_no_measure_hides_nan(monkeypatch):
     """The largest of zero and nan is zero to Python: a trial that compares so would survive without a number."""
-    from reflowshock.fem.trials import fields, impact
-    from reflowshock.workflow.stress_test import trials_reflow
+    from reflowshock.cases.hard.trials import fields, motion, reflow
 
     energies = np.array([1.0, math.nan, 0.5])
-    told = {name: found.value for name, found in trials_reflow._energy(energies).items()}
+    told = {name: found.value for name, found in reflow._energy(energies).items()}
     monkeypatch.setattr(fields, "force_of", lambda term, displacement: np.full_like(displacement, math.nan))
     told["force_error"] = fields.turns(Turns(turns=1, cells=1))["force_error"]
-    monkeypatch.setattr(impact, "march", lambda *_: np.outer(energies, np.ones(4)))
-    told |= impact.impact(Impact())
+    monkeypatch.setattr(motion, "march", lambda *_: np.outer(energies, np.ones(4)))
+    told |= motion.impact(Impact())
     assert all(math.isnan(told[name]) for name in told if name != "plastic_share"), told
 
 
 def test_a_push_in_the_middle_of_a_run_counts(monkeypatch):
-    from reflowshock.fem.trials import windows
+    from reflowshock.cases.hard.trials import windows
 
     pushes = iter([0.0] * 100 + [0.5] + [0.0] * 100)
     monkeypatch.setattr(windows, "momentum_change", lambda *_: next(pushes))

@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 
 from reflowshock.fem.estimates.effects import Effect, weight
-from reflowshock.fem.problem.parameters import Shock
-from reflowshock.fem.problem.pulse import STANDARD_GRAVITY, HalfSine, Pulse, Tabulated, service_condition
-from reflowshock.fem.problem.pulse_table import read_pulse
+from reflowshock.fem.loads.pulse import STANDARD_GRAVITY, HalfSine, Pulse, Tabulated, service_condition
+from reflowshock.fem.loads.pulse_table import read_pulse
+from reflowshock.fem.problem.shock import Shock
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,12 +14,13 @@ from reflowshock.fem.division.whole import Whole
 from reflowshock.fem.dynamics.participant import uncut_motion
 from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.mesh.supports import SYMMETRY
-from reflowshock.fem.model.body import Body, Pieces, Response, make_body, make_pieces
+from reflowshock.fem.model.assembly import Pieces, Response, make_body, make_pieces
+from reflowshock.fem.model.body import Body
+from reflowshock.fem.output.cooling_report import Unbalanced, write_cooling
 from reflowshock.fem.parallel.agreement import agreed
 from reflowshock.fem.parallel.local_mesh import distribute
 from reflowshock.fem.parallel.whereabouts import HERE
 from reflowshock.fem.problem.inputs import CoolingInput
-from reflowshock.fem.statics.cooling_report import Unbalanced, write_cooling
 from reflowshock.fem.statics.equilibrium import Equilibrium, Statics
 from reflowshock.fem.statics.initial_state import Cooling, begun
 from reflowshock.fem.statics.pins import pins

@@ -1,4 +1,4 @@
-"""Bodies on one rank from meshes in memory, through the program's own chain."""
+"""Bodies of one rank from meshes in memory, through the program's own chain, and metals for them."""
 
 import numpy as np
 from mpi4py import MPI
@@ -10,11 +10,20 @@ from reflowshock.fem.forces.force_nonlinear import NonlinearElements
 from reflowshock.fem.kernels.nonlinear import Path
 from reflowshock.fem.kernels.plasticity import plastic_constants
 from reflowshock.fem.materials.library import FR4
-from reflowshock.fem.materials.parameters import Material
+from reflowshock.fem.materials.parameters import Isotropic, JohnsonCook, Material
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.mesh import MeshData
-from reflowshock.fem.model.body import Body, Pieces, Response, make_body, make_pieces
+from reflowshock.fem.model.assembly import Pieces, Response, make_body, make_pieces
+from reflowshock.fem.model.body import Body
 from reflowshock.fem.parallel.local_mesh import distribute
+
+SOLDER = Isotropic(
+    density=7400.0,
+    young_modulus=50e9,
+    poisson_ratio=0.36,
+    plasticity=JohnsonCook(A=40e6, B=300e6, n=0.7, C=0.05, reference_rate=1.0),
+)
+LINEAR_HARDENING = SOLDER.model_copy(update={"plasticity": JohnsonCook(A=40e6, B=500e6, n=1.0)})
 
 
 def dns_pieces(mesh: MeshData, materials: Materials) -> tuple[Pieces, Tables]:

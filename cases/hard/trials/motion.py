@@ -1,26 +1,34 @@
-"""Trial of a free body that flies with energy in all its modes, at a step close to the critical one or above."""
+"""Trials of one model that moves: free flight close to the critical step, a rod that strikes a wall, a short pulse."""
+
+from collections.abc import Callable
 
 import numpy as np
 from mpi4py import MPI
 
+from reflowshock.cases.hard.trials.bodies import SOLDER, dns_body, motion_of, nonlinear_body
+from reflowshock.cases.hard.trials.boxes import YOUNG, distorted, laminate
+from reflowshock.cases.hard.trials.elements import Flight, Impact, PulseTrial
+from reflowshock.cases.hard.trials.grids import grid, mesh_of, on
+from reflowshock.fem.division.checks import check_pulses
 from reflowshock.fem.division.tables import Tables, prepare
 from reflowshock.fem.dynamics.central_difference import Motion
 from reflowshock.fem.dynamics.energy_balance import Ledger, ledger_sums
 from reflowshock.fem.dynamics.participant import Alone, uncut_motion
 from reflowshock.fem.estimates.estimate import WindowPlan, damped_critical_step
+from reflowshock.fem.forces.force import Kinematics
 from reflowshock.fem.loads.damping import RayleighDamping
-from reflowshock.fem.loads.load import Load
+from reflowshock.fem.loads.load import BodyAcceleration, Load
+from reflowshock.fem.loads.pulse import Constant, HalfSine, Haversine, Pulse, Tabulated
 from reflowshock.fem.materials.library import COPPER
+from reflowshock.fem.materials.parameters import Material
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.mesh.tie import net_load
-from reflowshock.fem.model.body import Pieces, Response, make_body, make_pieces
+from reflowshock.fem.model.assembly import Pieces, Response, make_body, make_pieces
+from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.power_iteration import highest_frequency
 from reflowshock.fem.model.steps import mass_factor
 from reflowshock.fem.parallel.local_mesh import distribute
-from reflowshock.fem.trials.distortion import YOUNG, distorted, laminate
-from reflowshock.fem.trials.grids import mesh_of
-from reflowshock.fem.trials.parameters import Flight
 
 HEIGHT = 1e-3  # of a box [m]
 SPEED = np.array([1.0, -2.0, 3.0])  # of the body as a whole [m/s]
@@ -118,3 +126,108 @@ def momentum_scale(motion: Motion) -> np.ndarray:
     """Return the sums of magnitudes of linear and angular momenta (2,)."""
     points, amount = motion.body.local.points, motion.body.mass[:, None] * motion.present_velocity()
     return np.array([np.linalg.norm(amount, axis=1).sum(), np.linalg.norm(np.cross(points, amount), axis=1).sum()])
+
+
+FRACTION = 0.9  # of the critical step, the program's default
+DIRECTION = np.array([0.6, 0.0, 0.8])
+AFTER = 5  # steps after the pulse
+
+
+def pulse(given: PulseTrial) -> dict[str, float]:
+    """Return the error of speed and way after the pulse, and what the strains hold of what it gave.
+
+    Raises:
+        PulseError: The pulse is over before the step is.
+    """
+    body, critical = dns_body(block())
+    step = FRACTION * critical
+    duration = given.steps * step
+    check_pulses([duration], step, FRACTION)
+    course = course_of(given, duration)
+    motion = motion_of(body, step, [BodyAcceleration(DIRECTION, course)])
+    for _ in range(int(np.ceil(given.steps)) + AFTER):
+        motion.advance()
+        motion.update_force()
+    speed, way = motion.present_velocity() @ DIRECTION, motion.displacement @ DIRECTION
+    exact = np.array([course.integral(motion.time), course.double_integral(motion.time)])
+    scale = np.where(exact > 0.0, exact, 1.0)
+    errors = [np.abs(found - value).max() for found, value in zip((speed, way), exact, strict=True)] / scale
+    given_energy = max(float(motion.external_work), float(np.finfo(float).tiny))
+    return {
+        "velocity_error": float(errors[0]),
+        "displacement_error": float(errors[1]),
+        "strain_energy": motion.internal_energy().total / given_energy,
+        "energy_error": motion.kinetic_energy() / given_energy - 1.0 if given.peak else 0.0,
+    }
+
+
+def block() -> MeshData:
+    """Return a block of board that nothing holds."""
+    line = np.linspace(0.0, 1e-3, 3)
+    return mesh_of(*grid(line, line, line), "board", {})
+
+
+def course_of(given: PulseTrial, duration: float) -> Pulse:
+    """Return the pulse of a duration [s]."""
+    if given.pulse == "triangle":
+        return Tabulated(np.array([0.0, 0.5, 1.0]) * duration, np.array([0.0, given.peak, 0.0]))
+    if given.pulse == "constant":
+        return Constant(given.peak, duration)
+    return (HalfSine if given.pulse == "half_sine" else Haversine)(given.peak, duration)
+
+
+def impact(given: Impact) -> dict[str, float]:
+    """Return the largest imbalance of energy, what plastic flow has taken, and whether it ever gave any back."""
+
+    def skew(points: np.ndarray) -> np.ndarray:
+        return points + np.outer(points[:, 1], [0.0, 0.0, given.skew])
+
+    mesh = rod(6e-3, 1e-3, (18, 3), skew)
+    body, motion = explicit(mesh, SOLDER, given.kinematics, given.element, given.step_fraction)
+    motion.velocity[:, 0] = np.where(body.free[:, 0], -given.speed, 0.0)
+    energies = march(motion, given.steps)
+    first = energies[0].sum()
+    return {
+        "energy_error": imbalance(energies),
+        "plastic_share": float(energies[-1, 2] / first),
+        "plastic_return": float(np.abs(np.diff(energies[:, 2]).min(initial=0.0)) / first),
+        "hourglass_share": float(np.abs(energies[:, 3]).max() / first),
+    }
+
+
+def rod(
+    length: float,
+    width: float,
+    counts: tuple[int, int],
+    move: Callable[[np.ndarray], np.ndarray] = lambda points: points,
+) -> MeshData:
+    """Return a rod along x, held at x = 0 in that direction."""
+    across = np.linspace(0, width, counts[1] + 1)
+    points, cells = grid(np.linspace(0, length, counts[0] + 1), across, across)
+    return mesh_of(move(points), cells, "board", {"symmetry_x": on(0, 0.0), "symmetry_y": on(1, 0.0)})
+
+
+def explicit(
+    mesh: MeshData, material: Material, kinematics: Kinematics, formulation: str, fraction: float
+) -> tuple[Body, Motion]:
+    """Return a body of one material and its motion at a fraction of the critical step of its elements."""
+    _, critical = nonlinear_body(mesh, material, Response(kinematics, np.inf), formulation)
+    body, _ = nonlinear_body(mesh, material, Response(kinematics, fraction * critical), formulation)
+    return body, motion_of(body, fraction * critical)
+
+
+def march(motion: Motion, steps: int) -> np.ndarray:
+    """Take steps; return kinetic, strain, plastic and hourglass energy at each: (steps + 1, 4)."""
+    energies = []
+    for _ in range(steps + 1):
+        held = motion.internal_energy()
+        energies.append([motion.kinetic_energy(), held.strain, held.plastic, held.hourglass])
+        motion.advance()
+        motion.update_force()
+    return np.array(energies)
+
+
+def imbalance(energies: np.ndarray) -> float:
+    """Return the largest change of the sum of energies (steps + 1, k) over the first one."""
+    total = energies.sum(axis=1)
+    return float(np.abs(total - total[0]).max() / total[0])

@@ -1,20 +1,26 @@
-"""Trials of elements whose nodes all move as one field says: patch tests, turns, tension and compression."""
+"""Trials of elements with one field of strain: patch tests, turns, tension, compression, and a pull across a tie."""
 
 from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
+from mpi4py import MPI
 from scipy.spatial.transform import Rotation
 
+from reflowshock.cases.hard.trials.bodies import LINEAR_HARDENING, force_of, nonlinear
+from reflowshock.cases.hard.trials.boxes import YOUNG, body_of, distorted, laminate, stiffness_matrix
+from reflowshock.cases.hard.trials.elements import Compression, Patch, Tension, Tied, Turns
+from reflowshock.cases.hard.trials.grids import mesh_of, on
+from reflowshock.fem.division.tables import prepare
 from reflowshock.fem.elements.element import Elements, element_geometry
 from reflowshock.fem.elements.stress import element_stress, symmetric
 from reflowshock.fem.forces.force import linear_terms
 from reflowshock.fem.forces.force_nonlinear import NonlinearElements
-from reflowshock.fem.mesh.mesh import boundary_facets
-from reflowshock.fem.trials.bodies import force_of, nonlinear
-from reflowshock.fem.trials.distortion import body_of, laminate
-from reflowshock.fem.trials.metals import LINEAR_HARDENING
-from reflowshock.fem.trials.parameters import Compression, Patch, Tension, Turns
+from reflowshock.fem.materials.roles import Materials
+from reflowshock.fem.mesh.mesh import MeshData, append, boundary_facets
+from reflowshock.fem.model.assembly import make_body, make_pieces
+from reflowshock.fem.model.body import Body
+from reflowshock.fem.parallel.local_mesh import distribute
 
 AXIS = np.array([0.48, -0.6, 0.64])
 LARGE = 0.3  # largest component of a displacement gradient of finite strain
@@ -140,3 +146,74 @@ def follow(term: NonlinearElements, path: Callable[[float], np.ndarray], steps: 
     means = term.means(np.arange(len(term.numbers))).stress
     left = np.abs(force[inner_nodes(elements)]).max(initial=0.0) / np.abs(force).max()
     return Followed(symmetric(means[:1])[0], float(np.abs(means - means[0]).max() / np.abs(means).max()), float(left))
+
+
+SIDE, HEIGHT, LAYERS = 3e-3, 2e-3, 3  # of a block [m], and its layers of elements
+PULL = 1e-3  # displacement of the upper face over the height of both blocks
+
+
+def tied(given: Tied) -> dict[str, float]:
+    """Return how far stresses are from the one that is the same everywhere, at worst and in the mean, and the force.
+
+    Without lateral contraction two blocks that are pulled have one stress, whatever their moduli. Nodes that follow a
+    face at points give its forces back so that their sum and moment are kept, but not those of each node: stresses next
+    to the tie are wrong by what `stress_error` says, and the pull by far less.
+    """
+    body = body_of_blocks(given)
+    displacement, top = pulled(body)
+    elements = body.elements
+    moduli = elements.elasticity[elements.material]
+    stress = element_stress(body.geometry.gradient, moduli, displacement[elements.cells])[:, 2]
+    exact = PULL * 2 * HEIGHT / (HEIGHT / YOUNG + HEIGHT * given.contrast / YOUNG)
+    force = stiffness_matrix(elements) @ displacement.ravel()
+    volume = body.geometry.volume
+    return {
+        "stress_error": float(np.abs(stress / exact - 1.0).max()),
+        "mean_stress_error": float(volume @ np.abs(stress / exact - 1.0) / volume.sum()),
+        "pull_error": float(force.reshape(-1, 3)[top, 2].sum() / (exact * SIDE**2) - 1.0),
+    }
+
+
+def body_of_blocks(given: Tied) -> Body:
+    """Return both blocks as one body: the program's own tie, which it checks."""
+    item = prepare(append(blocks(given)), "dns")["dns"]
+    soft = laminate(0.0, young=YOUNG / given.contrast)
+    pieces = make_pieces(
+        distribute(MPI.COMM_SELF, item.mesh),
+        item.tables,
+        Materials(board=laminate(0.0), substrate=soft),
+        given.element,
+    )
+    return make_body(MPI.COMM_SELF, pieces, item.tables, np.ones(len(pieces.steps)))
+
+
+def blocks(given: Tied) -> list[MeshData]:
+    """Return the lower, coarse block and the upper one, whose nodes follow the lower one's face."""
+    made = []
+    for name, count, low in (("board", given.coarse, 0.0), ("substrate", round(given.coarse * given.ratio), HEIGHT)):
+        flat = np.linspace(0.0, SIDE, count + 1)
+        lines = (flat, flat, np.linspace(low, low + HEIGHT, LAYERS + 1))
+        points, cells = distorted(given.element, lines, given.quality, given.seed, faces=False)
+        role = "master@tie" if low == 0.0 else "slave@tie"
+        made.append(mesh_of(points, cells, name, {role: on(2, HEIGHT)}))
+    return made
+
+
+def pulled(body: Body) -> tuple[np.ndarray, np.ndarray]:
+    """Return the displacement (n, 3) of a body whose upper face is pulled, and the nodes (k,) of that face.
+
+    Nodes at x = 0, y = 0 and z = 0 keep that coordinate.
+    """
+    points = body.local.points
+    count, tie = len(points), np.kron(body.tie.matrix(len(points)).toarray(), np.eye(3))
+    stiffness = tie.T @ (stiffness_matrix(body.elements) @ tie)
+    top = np.flatnonzero(points[:, 2] > 2 * HEIGHT - 1e-9)
+    given, known = np.zeros((count, 3)), np.abs(points) < 1e-9
+    given[top, 2], known[top, 2] = PULL * 2 * HEIGHT, True
+    known[body.tie.slave] = True
+    free = ~known.ravel()
+    displacement = given.ravel()
+    displacement[free] = np.linalg.solve(stiffness[np.ix_(free, free)], -(stiffness @ displacement)[free])
+    result = displacement.reshape(-1, 3)
+    body.tie.spread(result)
+    return result, top

@@ -8,8 +8,8 @@ from reflowshock.meshing.board.parameters import JointNumerics, Parameters
 from reflowshock.workflow.stress_test.trial import Measured, Refused, Trial
 
 if TYPE_CHECKING:
+    from reflowshock.cases.hard.trials.joints import Meshed
     from reflowshock.meshing.surface.closed_surface import ClosedSurface
-    from reflowshock.meshing.trials.joints import Meshed
 
 PI = 3.14159265
 Fault = Literal[
@@ -31,8 +31,7 @@ class Barrel(Parameters):
 
     def surface(self) -> "ClosedSurface":
         """The closed surface."""
-        from reflowshock.meshing.trials.level_sets import with_void
-        from reflowshock.meshing.trials.surfaces import barrel
+        from reflowshock.cases.hard.trials.surfaces import barrel, with_void
 
         whole = barrel(self.gap, self.bulge, self.lower, self.upper)
         return whole if self.void is None else with_void(whole, (0.0, 0.0, 0.5 * self.gap), self.void)
@@ -48,7 +47,7 @@ class Overflow(Parameters):
 
     def surface(self) -> "ClosedSurface":
         """The closed surface."""
-        from reflowshock.meshing.trials.surfaces import overflow
+        from reflowshock.cases.hard.trials.surfaces import overflow
 
         return overflow(self.gap, self.angle, self.reach)
 
@@ -64,7 +63,7 @@ class Lobed(Parameters):
 
     def surface(self) -> "ClosedSurface":
         """The closed surface."""
-        from reflowshock.meshing.trials.surfaces import lobed
+        from reflowshock.cases.hard.trials.surfaces import lobed
 
         return lobed(self.gap, self.radius, self.lobes, self.depth)
 
@@ -78,7 +77,7 @@ class Hooked(Parameters):
 
     def surface(self) -> "ClosedSurface":
         """The closed surface."""
-        from reflowshock.meshing.trials.level_sets import hooked
+        from reflowshock.cases.hard.trials.surfaces import hooked
 
         return hooked(self.gap, self.reach)
 
@@ -93,8 +92,8 @@ class Bridged(Parameters):
 
     def surface(self) -> "ClosedSurface":
         """The closed surface."""
-        from reflowshock.meshing.trials.joints import PAIR
-        from reflowshock.meshing.trials.level_sets import bridged_pair
+        from reflowshock.cases.hard.trials.joints import PAIR
+        from reflowshock.cases.hard.trials.surfaces import bridged_pair
 
         return bridged_pair(self.gap, PAIR, self.radius, self.bridge)
 
@@ -132,9 +131,9 @@ def body(parameters: BodyTrial) -> dict[str, Measured]:
     """Mesh a body."""
     from math import tan
 
+    from reflowshock.cases.hard.trials.joints import mesh_at, sites_of
+    from reflowshock.cases.hard.trials.surfaces import laid_between
     from reflowshock.meshing.joint.solder_mesh import JointMeshError
-    from reflowshock.meshing.trials.joints import mesh_at, sites_of
-    from reflowshock.meshing.trials.surfaces import laid_between
 
     shape = parameters.shape
     surface = laid_between(shape.surface(), (parameters.offset, 0.0), (tan(parameters.tilt), 0.0))
@@ -147,8 +146,8 @@ def body(parameters: BodyTrial) -> dict[str, Measured]:
 
 def warped(parameters: WarpedTrial) -> dict[str, Measured]:
     """Mesh a joint under a warped package."""
+    from reflowshock.cases.hard.trials.joints import mesh_warped
     from reflowshock.meshing.joint.solder_mesh import JointMeshError
-    from reflowshock.meshing.trials.joints import mesh_warped
 
     discs = parameters.lower, parameters.upper
     try:
@@ -160,8 +159,8 @@ def warped(parameters: WarpedTrial) -> dict[str, Measured]:
 
 def given(parameters: GivenTrial) -> dict[str, Measured]:
     """Read a triangulation from a file and mesh it."""
+    from reflowshock.cases.hard.trials.joints import load_given, mesh_given
     from reflowshock.meshing.surface.closed_surface import SurfaceError, enclosed_volume
-    from reflowshock.meshing.trials.given import load_given, mesh_given
 
     try:
         surface, exact = load_given(parameters.fault, parameters.bulge, parameters.noise, parameters.turn)
@@ -172,7 +171,7 @@ def given(parameters: GivenTrial) -> dict[str, Measured]:
 
 
 def _measured(made: "Meshed") -> dict[str, Measured]:
-    from reflowshock.meshing.trials.joints import measured
+    from reflowshock.cases.hard.trials.joints import measured
 
     return {name: Measured(value, MEASURES[name]) for name, value in measured(made).items()}
 

@@ -1,10 +1,15 @@
-"""A joint of known shape is meshed in its place, and the mesh measured again: its volume, elements and head."""
+"""Joints of known shape are meshed in their place and measured; triangulations as from elsewhere, faulty or not."""
 
+import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
+import meshio
 import numpy as np
 
+from reflowshock.cases.hard.trials.packages import MM, board, package, side_of
+from reflowshock.cases.hard.trials.surfaces import barrel, sphere
 from reflowshock.meshing.board.pad_planes import PadPlanes
 from reflowshock.meshing.board.pads import PadSite, lift, pad_table
 from reflowshock.meshing.board.parameters import JointNumerics, Warpage
@@ -13,8 +18,7 @@ from reflowshock.meshing.joint.joint_mesh import JointMesh, joint_quality
 from reflowshock.meshing.joint.joint_place import Underside as Placed
 from reflowshock.meshing.joint.solder_mesh import mesh_bridge, mesh_joint
 from reflowshock.meshing.surface.closed_surface import ClosedSurface, enclosed_volume, pad_planes
-from reflowshock.meshing.trials.models import MM, board, package, side_of
-from reflowshock.meshing.trials.surfaces import barrel
+from reflowshock.meshing.surface.user_surface import load_surface
 
 PAIR = 1.0 * MM  # distance of two joints that are one body
 
@@ -149,3 +153,122 @@ def head_error(meshed: Meshed) -> float:
     points = made.points[np.unique(np.concatenate([quads.ravel() for quads in heads]))]
     place = meshed.side.height(points[:, 0], points[:, 1]) - meshed.copper
     return float(np.abs(points[:, 2] - place).max())
+
+
+Triangulation = tuple[np.ndarray, np.ndarray]
+
+
+def no_fault(points: np.ndarray, triangles: np.ndarray) -> Triangulation:
+    """Leave it as it is."""
+    return points, triangles
+
+
+def hole(points: np.ndarray, triangles: np.ndarray) -> Triangulation:
+    """A triangle is missing."""
+    return points, np.delete(triangles, 700, axis=0)
+
+
+def flipped(points: np.ndarray, triangles: np.ndarray) -> Triangulation:
+    """A triangle faces inwards."""
+    triangles = triangles.copy()
+    triangles[700] = triangles[700, ::-1]
+    return points, triangles
+
+
+def inside_out(points: np.ndarray, triangles: np.ndarray) -> Triangulation:
+    """All triangles face inwards."""
+    return points, triangles[:, ::-1]
+
+
+def doubled(points: np.ndarray, triangles: np.ndarray) -> Triangulation:
+    """All triangles are there twice."""
+    return points, np.vstack([triangles, triangles])
+
+
+def two_shells(points: np.ndarray, triangles: np.ndarray) -> Triangulation:
+    """A second surface inside the first faces outwards."""
+    return np.vstack([points, 0.99 * points]), np.vstack([triangles, triangles + len(points)])
+
+
+def crossing(points: np.ndarray, triangles: np.ndarray) -> Triangulation:
+    """A dent on one side reaches through the other."""
+    points = points.copy()
+    near = np.exp(-(((points - [0.28 * MM, 0.0, 0.5 * np.ptp(points[:, 2])]) / (0.06 * MM)) ** 2).sum(axis=1))
+    points[:, 0] -= 0.7 * MM * near
+    return points, triangles
+
+
+def void_outside(points: np.ndarray, triangles: np.ndarray) -> Triangulation:
+    """A void lies beside the body."""
+    more, shell = sphere((1.0 * MM, 0.0, 0.1 * MM), 0.05 * MM)
+    return np.vstack([points, more]), np.vstack([triangles, shell[:, ::-1] + len(points)])
+
+
+def round_top(points: np.ndarray, triangles: np.ndarray) -> Triangulation:
+    """The upper end is not flat."""
+    points = points.copy()
+    height = np.ptp(points[:, 2])
+    points[:, 2] -= 0.2 * (points[:, 0] ** 2 + points[:, 1] ** 2) / (0.3 * MM) * (points[:, 2] / height)
+    return points, triangles
+
+
+def far_too_high(points: np.ndarray, triangles: np.ndarray) -> Triangulation:
+    """The body does not fit its gap."""
+    return points * [1.0, 1.0, 1.3], triangles
+
+
+FAULTS = {
+    fault.__name__: fault
+    for fault in (
+        no_fault,
+        hole,
+        flipped,
+        inside_out,
+        doubled,
+        two_shells,
+        crossing,
+        void_outside,
+        round_top,
+        far_too_high,
+    )
+}
+
+
+NAME = "A4"
+
+
+def site() -> PadSite:
+    """Where it goes: the corner joint of a small, flat package."""
+    return {place.name: place for place in pad_table(package(), board(), Warpage())}[NAME]
+
+
+def load_given(fault: str, bulge: float, noise: float, turn: float) -> tuple[ClosedSurface, ClosedSurface]:
+    """Write a barrel and read it.
+
+    Args:
+        fault: name of one of `FAULTS`.
+        bulge: of the barrel [m].
+        noise: standard deviation of what is added to its vertices [m].
+        turn: about the x axis [rad].
+
+    Returns:
+        What was read, and the barrel.
+
+    Raises:
+        SurfaceError: it is refused.
+    """
+    exact = barrel(site().gap, bulge)
+    points, triangles = FAULTS[fault](exact.points, exact.triangles.astype(np.int64))
+    points = points + np.random.default_rng(2).normal(0.0, noise, points.shape)
+    cosine, sine = np.cos(turn), np.sin(turn)
+    points = points @ np.array([[1.0, 0.0, 0.0], [0.0, cosine, sine], [0.0, -sine, cosine]])
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "joint.stl"
+        meshio.write(path, meshio.Mesh(points / MM, [("triangle", triangles)]))
+        return load_surface(path, "mm", site()), exact
+
+
+def mesh_given(surface: ClosedSurface) -> Meshed:
+    """Mesh what was read; JointMeshError where no mesh meets its bars."""
+    whole, side = package(), side_of(Warpage(), package())
+    return Meshed(mesh_joint(surface, site(), whole, side), surface, side, whole.copper.thickness)

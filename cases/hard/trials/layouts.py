@@ -2,15 +2,15 @@
 
 import numpy as np
 
+from reflowshock.cases.hard.trials.coupled import Coupled, models_of
+from reflowshock.cases.hard.trials.elements import Layout
+from reflowshock.cases.hard.trials.grids import grid, joint_mesh, mesh_of, on
+from reflowshock.cases.hard.trials.pairs import FRACTION
+from reflowshock.cases.hard.trials.windows import through
 from reflowshock.fem.coupling.scheme import scheme_of
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.mesh import MeshData, append
-from reflowshock.fem.problem.parameters import Coupling
-from reflowshock.fem.trials.coupled import Coupled, models_of
-from reflowshock.fem.trials.grids import grid, joint_mesh, mesh_of, on
-from reflowshock.fem.trials.pairs import FRACTION
-from reflowshock.fem.trials.parameters import Layout
-from reflowshock.fem.trials.windows import through
+from reflowshock.fem.problem.shock import Coupling
 
 SIZE, LAYER = 0.5e-3, 0.25e-3  # of an element of board [m]
 

@@ -1,4 +1,4 @@
-"""Two coupled models on one rank: any scheme, by the program's own operators and division."""
+"""Two coupled models on one rank: any scheme, by the program's own operators, division and checks."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -11,22 +11,52 @@ from reflowshock.fem.coupling.gravouil_combescure import GravouilCombescure
 from reflowshock.fem.coupling.held_velocity import Answered
 from reflowshock.fem.coupling.impulse import Impulse
 from reflowshock.fem.coupling.scheme import Scheme
+from reflowshock.fem.division.checks import check_division
+from reflowshock.fem.division.divide import divide
 from reflowshock.fem.division.division import Division
-from reflowshock.fem.division.tables import ModelInput, Tables, model_inputs
+from reflowshock.fem.division.rules import Rules
+from reflowshock.fem.division.tables import ModelInput, Tables, joined, model_inputs
+from reflowshock.fem.division.whole import Survey, Treatment, Whole, survey
 from reflowshock.fem.dynamics.central_difference import Motion
 from reflowshock.fem.dynamics.energy_balance import ENERGIES, ledger_sums
 from reflowshock.fem.dynamics.participant import Participant
 from reflowshock.fem.estimates.estimate import WindowPlan
 from reflowshock.fem.loads.load import Load
+from reflowshock.fem.materials.elasticity import role_of_part
+from reflowshock.fem.materials.parameters import Material
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.mesh.tie import net_load
-from reflowshock.fem.model.body import Body, Pieces, Response, make_body, make_pieces
+from reflowshock.fem.model.assembly import Pieces, Response, make_body, make_pieces
+from reflowshock.fem.model.body import Body
 from reflowshock.fem.parallel.communicators import Role
 from reflowshock.fem.parallel.exchange import CutChannels
 from reflowshock.fem.parallel.local_mesh import distribute
-from reflowshock.fem.problem.parameters import Coupling
-from reflowshock.fem.trials.divided import Divide, checked, surveyed
+from reflowshock.fem.problem.shock import Coupling
+
+Divide = Callable[[Whole, Survey, Rules], Division]
+DEFAULTS, HELD = Materials(), Coupling(scheme="held_velocity")
+DURATION = 1e-2  # [s] so long that a whole number of windows shortens none
+
+
+def surveyed(
+    mesh: MeshData,
+    materials: Materials | dict[str, Material] = DEFAULTS,
+    fraction: float = 0.9,
+    coupling: Coupling = HELD,
+) -> tuple[Whole, Survey, Rules]:
+    """Return a mesh, its survey, and the rules of its division, in which boards are coarse."""
+    whole = joined(mesh)
+    coarse = whole.mesh.in_parts(lambda name: role_of_part(name) == "board")
+    return whole, survey(whole.mesh, materials, Treatment()), Rules(coupling, coarse, fraction, 0.0, DURATION, 1)
+
+
+def checked(whole: Whole, found: Survey, rules: Rules) -> Division:
+    """Divide as the program does, its checks included."""
+    division = divide(whole, found, rules)
+    check_division(whole, found, division, rules)
+    return division
+
 
 MANY = 1e5  # elements that each of a mesh stands for where costs are weighed, so that levels are worth while
 

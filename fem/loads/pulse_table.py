@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reflowshock.fem.errors import PulseError
-from reflowshock.fem.problem.pulse import STANDARD_GRAVITY, Tabulated
+from reflowshock.fem.loads.pulse import STANDARD_GRAVITY, Tabulated
 
 MOST_LINES = 1_500_000
 LONGEST = 60  # characters of a cell in an error

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from reflowshock.fem.problem.pulse import Constant, HalfSine, Haversine, Pulse, Tabulated, service_condition
-from reflowshock.fem.problem.pulse_table import read_pulse
+from reflowshock.fem.loads.pulse import Constant, HalfSine, Haversine, Pulse, Tabulated, service_condition
+from reflowshock.fem.loads.pulse_table import read_pulse
 from reflowshock.fem.problem.structure import InputG, StructureLoad
 
 SHAPES: dict[str, type[HalfSine] | type[Haversine]] = {"half_sine": HalfSine, "haversine": Haversine}

@@ -6,18 +6,14 @@ All values are SI floats; see ``meshing.board.parameters`` for what the unit str
 import math
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator
+from pydantic import Field, ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
+
+from reflowshock.fem.parameters import Parameters
 
 MOST_RANKS = 100_000  # of one run
 MOST_LEVELS = 4  # below the window, that "auto" tries
 ServiceCondition = Literal["A", "B", "C", "D", "E", "F", "G", "H"]
-
-
-class Parameters(BaseModel):
-    """Base of all parameter models: immutable, unknown keys are errors."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
 
 class Ranks(Parameters):

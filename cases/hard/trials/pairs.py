@@ -7,6 +7,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from reflowshock.cases.hard.trials.coupled import Coupled, Models, models_of, surveyed
+from reflowshock.cases.hard.trials.grids import grid, mesh_of, on
 from reflowshock.fem.coupling.held_velocity import Answered, HeldVelocity, Macro
 from reflowshock.fem.coupling.scheme import scheme_of
 from reflowshock.fem.dynamics.central_difference import Motion
@@ -18,10 +20,7 @@ from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.mesh import MeshData, append
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.parallel.exchange import CutChannels
-from reflowshock.fem.problem.parameters import Coupling
-from reflowshock.fem.trials.coupled import Coupled, Models, models_of
-from reflowshock.fem.trials.divided import surveyed
-from reflowshock.fem.trials.grids import grid, mesh_of, on
+from reflowshock.fem.problem.shock import Coupling
 
 SIZE, THICKNESS = 0.5e-3, 0.25e-3  # of a board element [m]
 FRACTION = 0.9  # of the critical step of elements, the program's default

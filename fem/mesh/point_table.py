@@ -1,0 +1,105 @@
+"""Watch points of a structure and its supports in input numbers."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reflowshock.fem.errors import MeshError
+from reflowshock.fem.mesh.mesh import MeshData
+from reflowshock.fem.mesh.recovery import fit, patch
+
+ROUNDING = 1e-9  # of the mesh: closer than that is the same place
+Support = tuple[NDArray[np.integer], NDArray[np.bool_]]
+COMPONENTS = {"displacement": 3, "velocity": 3, "strain": 6, "stress": 6, "plastic_strain": 1}
+
+
+@dataclass(frozen=True, slots=True)
+class PointTable:
+    """Watch points and supports in input numbers.
+
+    Attributes:
+        names: Of the points.
+        nodes: ``(p,)`` the node nearest to each point.
+        points: ``(p, 3)`` [m] where these nodes are.
+        strain_points: ``(p, 3)`` [m] where strain and stress are taken.
+        cells: ``(k,)`` elements whose means give strain and stress.
+        owner: ``(k,)`` the point that each belongs to.
+        weight: ``(k,)`` of each in its point's value.
+        supports: Name -> nodes of a support, and ``(3,)`` which components it holds.
+        quantities: What is watched, of ``COMPONENTS``.
+        extent: Of the mesh [m].
+    """
+
+    names: tuple[str, ...]
+    nodes: NDArray[np.integer]
+    points: NDArray[np.float64]
+    strain_points: NDArray[np.float64]
+    cells: NDArray[np.integer]
+    owner: NDArray[np.int64]
+    weight: NDArray[np.float64]
+    supports: dict[str, Support]
+    quantities: tuple[str, ...]
+    extent: float
+
+    @property
+    def displaced(self) -> list[str]:
+        """Return the names of the points whose strain and stress are those of another place than their node."""
+        away = np.linalg.norm(self.strain_points - self.points, axis=1)
+        names = zip(self.names, away.tolist(), strict=True)
+        return [name for name, distance in names if distance > ROUNDING * self.extent]
+
+
+def point_table(
+    mesh: MeshData,
+    wanted: Mapping[str, tuple[float, float, float]],
+    supports: dict[str, Support],
+    yields: bool = False,
+) -> PointTable:
+    """Find the nodes and the elements of watch points.
+
+    Args:
+        mesh: The whole mesh.
+        wanted: Name -> place [m].
+        supports: Name -> nodes and held components.
+        yields: Whether plastic strain is watched, too.
+
+    Raises:
+        MeshError: A point lies outside the mesh.
+    """
+    nodes = np.array([nearest_node(mesh, name, np.array(place)) for name, place in wanted.items()], np.int64)
+    patches = [patch(mesh, int(node)) for node in nodes]
+    centres = [mesh.points[mesh.cells[cells]].mean(axis=1) for cells in patches]
+    touching = [int((mesh.cells[cells] == node).any(axis=1).sum()) for cells, node in zip(patches, nodes, strict=True)]
+    weights = [
+        fit(around, count, mesh.points[node]) for around, count, node in zip(centres, touching, nodes, strict=True)
+    ]
+    places = [weight @ around for weight, around in zip(weights, centres, strict=True)]
+    return PointTable(
+        names=tuple(wanted),
+        nodes=nodes,
+        points=mesh.points[nodes],
+        strain_points=np.array(places).reshape(-1, 3),
+        cells=np.concatenate([np.empty(0, np.int64), *patches]),
+        owner=np.repeat(np.arange(len(nodes)), [len(cells) for cells in patches]),
+        weight=np.concatenate([np.empty(0), *weights]),
+        supports=supports,
+        quantities=tuple(name for name in COMPONENTS if yields or name != "plastic_strain"),
+        extent=float(np.ptp(mesh.points, axis=0).max()),
+    )
+
+
+def nearest_node(mesh: MeshData, name: str, place: NDArray[np.float64]) -> int:
+    """Return the node nearest to a place [m]; errors as ``point_table``."""
+    distance = np.linalg.norm(mesh.points - place, axis=1)
+    node = int(np.argmin(distance))
+    around = mesh.points[mesh.cells[(mesh.cells == node).any(axis=1)]]
+    size = float(np.linalg.norm(np.ptp(around, axis=1), axis=1).max())
+    if distance[node] > size:
+        at, there = (", ".join(f"{value:.6g}" for value in point) for point in (place, mesh.points[node]))
+        raise MeshError(
+            f"watch.{name}.at = ({at}) m lies outside the mesh: the nearest node is ({there}) m, {distance[node]:.3g} m"
+            f" away, more than the size {size:.3g} m of its elements"
+        )
+    return node

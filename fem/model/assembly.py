@@ -1,0 +1,184 @@
+"""From the mesh of a rank and the tables of its model to a body: materials, masses, force terms, tie."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from reflowshock.fem.division.tables import Tables
+from reflowshock.fem.elements.element import Elements, critical_steps, element_geometry, lumped_mass
+from reflowshock.fem.elements.hexahedron import HEXAHEDRON
+from reflowshock.fem.elements.kind import Geometry
+from reflowshock.fem.elements.mesh_elements import elements_of
+from reflowshock.fem.errors import MassError, RankError
+from reflowshock.fem.forces.force import ForceTerm, Kinematics, force_terms, linear_terms
+from reflowshock.fem.materials.elasticity import materials_of_parts
+from reflowshock.fem.materials.parameters import Material
+from reflowshock.fem.materials.roles import Materials
+from reflowshock.fem.mesh.tie import Tie
+from reflowshock.fem.model.body import Body
+from reflowshock.fem.model.step_levels import Levels, LocalSteps, check_elastic
+from reflowshock.fem.parallel.exchange import SharedNodes
+from reflowshock.fem.parallel.local_mesh import LocalMesh
+
+MASS_TOLERANCE = 1e-10
+
+
+@dataclass(frozen=True, slots=True)
+class Pieces:
+    """The elements of one rank before their masses are fixed.
+
+    Attributes:
+        local: The rank's mesh.
+        elements: Its elements with the density of their material.
+        geometry: Their volumes and mean gradients.
+        steps: ``(ne,)`` critical step of each element [s].
+        roles: ``(ne,)`` material role of each element.
+        parts: ``(ne,)`` part of each element.
+        materials: Material of each part.
+    """
+
+    local: LocalMesh
+    elements: Elements
+    geometry: Geometry
+    steps: NDArray[np.float64]
+    roles: NDArray[np.str_]
+    parts: NDArray[np.int32]
+    materials: tuple[Material, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Response:
+    """What the internal force depends on besides elements and materials.
+
+    Attributes:
+        kinematics: Whether rotations and strains are small.
+        step: dt [s], of laws that depend on the rate, and of levels below it; infinity stands for slow.
+        stiffness: beta of damping [s], which levels make room for.
+    """
+
+    kinematics: Kinematics = "small"
+    step: float = np.inf
+    stiffness: float = 0.0
+
+
+def make_pieces(
+    local: LocalMesh,
+    tables: Tables,
+    materials: Materials | Mapping[str, Material],
+    formulation: str = HEXAHEDRON.name,
+) -> Pieces:
+    """Give the local elements their materials, and find their critical steps.
+
+    Args:
+        local: The rank's mesh.
+        tables: The model's tables.
+        materials: Material of each role, or of each part.
+        formulation: Of hexahedra, see ``element.element_kind``.
+
+    Raises:
+        RankError: There is no element on this rank.
+        MeshError: An element is turned inside out.
+    """
+    if not len(local.cells):
+        raise RankError("a rank has no element of the mesh: take fewer ranks")
+    local = local.with_nodes(*masters_of(local, tables))
+    number = tables.part[local.cell_numbers]
+    names, assigned = materials_of_parts(tables.part_names, materials)
+    elements = elements_of(local.points, local.cells, number, assigned, formulation)
+    geometry = element_geometry(elements.points, elements.cells)
+    steps = critical_steps(elements, geometry.nodal_volume)
+    roles = np.array(names)[number]
+    return Pieces(local, elements, geometry, steps, roles, number, assigned)
+
+
+def masters_of(local: LocalMesh, tables: Tables) -> tuple[NDArray[np.integer], NDArray[np.float64]]:
+    """Return the masters of this rank's slaves: nodes ``(k,)``, points ``(k, 3)`` [m]."""
+    here = local.locate(tables.tie.slave) >= 0
+    return tables.tie.master[here].ravel(), tables.master_points[here].reshape(-1, 3)
+
+
+def local_tie(local: LocalMesh, tie: Tie) -> Tie:
+    """Return the rows of a tie that belong to this rank's nodes, in local numbers."""
+    slave = local.locate(tie.slave)
+    here = slave >= 0
+    return Tie(slave[here], local.locate(tie.master[here].ravel()).reshape(-1, 4), tie.weight[here])
+
+
+def make_body(
+    comm: MPI.Comm,
+    pieces: Pieces,
+    tables: Tables,
+    mass_factor: NDArray[np.float64],
+    response: Response | None = Response(),
+) -> Body:
+    """Assemble masses and forces of a model; collective.
+
+    Args:
+        comm: Communicator of the model.
+        pieces: The rank's elements.
+        tables: The model's tables.
+        mass_factor: ``(ne,)`` factor on the density of each element.
+        response: Kinematics and step; None for elastic terms at small strains whatever the materials.
+    """
+    local = pieces.local
+    plain = pieces.elements
+    elements = replace(plain, density=plain.density * mass_factor)
+    shared = SharedNodes(comm, local.nodes)
+    tie = local_tie(local, tables.tie)
+    mass = assembled_mass(elements, pieces.geometry, tie, shared)
+    check_mass(comm, float(mass[shared.owned].sum()), float(elements.density @ pieces.geometry.volume))
+    free = np.ones((len(local.nodes), 3), dtype=bool)
+    held = local.locate(tables.held_nodes)
+    free[held[held >= 0]] = ~tables.held[held >= 0]
+    free[tie.slave] = False
+    cut = local.locate(tables.cut).astype(np.int32)
+    body = Body(local, elements, pieces.geometry, [], tie, shared, cut, mass, free)
+    terms = response_terms(comm, body, pieces.materials, tables, response) if response else linear_terms(elements)
+    warm_up(terms, len(mass))
+    return replace(body, terms=terms)
+
+
+def response_terms(
+    comm: MPI.Comm, body: Body, materials: Sequence[Material], tables: Tables, response: Response
+) -> list[ForceTerm]:
+    """Return the force terms of a body, one of them with all elements that take smaller steps; collective.
+
+    Raises:
+        LevelError: Not all elements of a body with levels are linear elastic; on every rank.
+    """
+    if not tables.level.any():
+        return force_terms(body.elements, materials, response.kinematics, response.step)
+    check_elastic(materials, response.kinematics, tables.ratios)
+    level = tables.level[body.local.cell_numbers]
+    levels = LocalSteps.build(
+        comm, body, Levels(level, tables.ratios, response.step, response.stiffness / response.step)
+    )
+    return [*linear_terms(body.elements.subset(level == 0)), levels]
+
+
+def warm_up(terms: Sequence[ForceTerm], count: int) -> None:
+    """Have the kernels of terms compiled before the first step, whose time is measured; rest leaves no path."""
+    for term in terms:
+        term.add(np.zeros((count, 3)), np.zeros((count, 3)))
+
+
+def assembled_mass(elements: Elements, geometry: Geometry, tie: Tie, shared: SharedNodes) -> NDArray[np.float64]:
+    """Return the lumped mass ``(n,)`` [kg] summed over ranks, the slaves' moved to their masters: rowsum(N^T M N)."""
+    column = np.repeat(lumped_mass(elements, geometry.nodal_volume)[:, None], 3, axis=1)
+    tie.gather(column)
+    shared.add(column)
+    return np.ascontiguousarray(column[:, 0])
+
+
+def check_mass(comm: MPI.Comm, lumped: float, integrated: float) -> None:
+    """Compare the sum of lumped masses with density times volume over all ranks.
+
+    Raises:
+        MassError: They differ by more than 1e-10.
+    """
+    lumped, integrated = comm.allreduce(lumped), comm.allreduce(integrated)
+    if abs(lumped - integrated) > MASS_TOLERANCE * integrated:
+        raise MassError(f"lumped masses add up to {lumped:.12e} kg, density times volume to {integrated:.12e} kg")
