@@ -3,9 +3,6 @@
 from cmath import sqrt as complex_sqrt
 from math import sqrt
 
-from scipy.optimize import newton
-from scipy.special import jve
-
 
 def rayleigh_frequency(mode: int, radius: float, density: float, surface_tension: float) -> float:
     """Angular frequency without viscosity, omega^2 = n (n - 1)(n + 2) gamma / (rho R^3) [rad/s]."""
@@ -28,6 +25,9 @@ def viscous_oscillation(mode: int, frequency: float, diffusion_rate: float) -> t
         frequency: Rayleigh's omega [rad/s].
         diffusion_rate: nu* = mu / (rho R^2) [1/s].
     """
+    from scipy.optimize import newton  # plans and stages that need no root start without them
+    from scipy.special import jve
+
     ratio = (frequency / diffusion_rate) ** 2
 
     def residual(s: complex) -> complex:

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from reflowshock.particles.parameters.checks import Problem as ParticlesProblem
 
 LONGEST = 120  # characters of a value or key in a message
+MOST_SHOWN = 30  # problems of one file
 Places = Callable[[str], Place | None]
 
 
@@ -79,8 +80,10 @@ class CaseError(ValueError):
         super().__init__("\n".join(self.lines()))
 
     def lines(self) -> list[str]:
-        """One line a problem, each beginning with where the value was given."""
-        return [f"{self._place(problem)}: {problem}" for problem in self.problems]
+        """One line a problem, each beginning with where the value was given; the first of many, and how many more."""
+        lines = [f"{self._place(problem)}: {problem}" for problem in self.problems[:MOST_SHOWN]]
+        more = len(self.problems) - MOST_SHOWN
+        return [*lines, f"{one_line(self.source)}: {more} more problems"] if more > 0 else lines
 
     def _place(self, problem: Problem) -> str:
         origin = self._origin(problem)

@@ -25,7 +25,7 @@ from reflowshock.workflow.reflow.rigid_balance import RigidBalance
 from reflowshock.workflow.reflow.start import scale_of, start
 
 if TYPE_CHECKING:
-    from reflowshock.fem.statics.state import Structure
+    from reflowshock.fem.statics.state import HeatedStructure
     from reflowshock.meshing.board.pads import PadSite
     from reflowshock.particles.core.geometry import JointGeometry
     from reflowshock.particles.steps.shape import JointShape
@@ -109,14 +109,16 @@ def reflow_heated(run: Run[PackageCase], thermal: Thermal, pads: "list[PadSite]"
         )
 
 
-def _start(structure: "Structure", drawn: "dict[str, JointGeometry]", case: PackageCase, first: LoadStep) -> Coupled:
+def _start(
+    structure: "HeatedStructure", drawn: "dict[str, JointGeometry]", case: PackageCase, first: LoadStep
+) -> Coupled:
     """Begin with pads where the structure has them without solder."""
     modes = structure.rigid_modes
     alone = structure.solve(first.temperature, first.corner, *_nothing(structure))
     return start(list(placed(drawn, alone.pad_motion).values()), case.solder, modes)
 
 
-def _nothing(structure: "Structure") -> tuple[np.ndarray, np.ndarray]:
+def _nothing(structure: "HeatedStructure") -> tuple[np.ndarray, np.ndarray]:
     """No wrenches, no rigid motions."""
     motion = structure.rigid_modes.pad_motion
     return np.zeros(motion.shape[1:]), np.zeros(len(motion))
@@ -131,11 +133,11 @@ def all_inputs(case: PackageCase, pads: "list[PadSite]") -> tuple:
 
 def _records() -> tuple[type, ...]:
     """What the file of a coupling consists of."""
-    from reflowshock.fem.statics.state import State
+    from reflowshock.fem.statics.state import HeatedState
     from reflowshock.particles.core.geometry import JointGeometry
     from reflowshock.particles.scenes.orientation import Orientation
 
-    return Coupled, RigidBalance, State, Exchange, Left, Source, Alike, JointGeometry, Orientation
+    return Coupled, RigidBalance, HeatedState, Exchange, Left, Source, Alike, JointGeometry, Orientation
 
 
 class Saved:

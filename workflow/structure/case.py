@@ -4,7 +4,7 @@ from pathlib import Path
 
 from pydantic import Field
 
-from reflowshock.fem.problem.structure import StructureScene
+from reflowshock.fem.problem.structure import StructureProblem
 from reflowshock.meshing.board.box_plan import Box, BoxHoles, BoxLayer
 from reflowshock.workflow.case.case import Case
 from reflowshock.workflow.case.stage import Pipeline, Stage, report_of
@@ -27,7 +27,7 @@ STRUCTURE = Pipeline(
 )
 
 
-class StructureCase(StructureScene, Case):
+class StructureCase(StructureProblem, Case):
     """A box of layers under supports and loads."""
 
     kind = "structure"
@@ -62,9 +62,9 @@ class StructureCase(StructureScene, Case):
         return {key: path for key, (path, _) in self.pulse_tables.items()}
 
     @property
-    def scene(self) -> StructureScene:
+    def scene(self) -> StructureProblem:
         """All of it as the solver takes it."""
-        return StructureScene(**{name: getattr(self, name) for name in StructureScene.model_fields})
+        return StructureProblem(**{name: getattr(self, name) for name in StructureProblem.model_fields})
 
     @property
     def box(self) -> Box:

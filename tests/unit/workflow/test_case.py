@@ -183,3 +183,13 @@ def test_values_are_shown_in_the_units_of_users():
 
 def test_cores_are_those_of_this_process():
     assert available_cores() == len(os.sched_getaffinity(0))
+
+
+def test_of_many_problems_the_first_are_shown(tmp_path):
+    case = tmp_path / "case.toml"
+    case.write_text("".join(f"wrong{number} = 1\n" for number in range(1000)) + SMALL_CASE.read_text())
+    with pytest.raises(CaseError) as caught:
+        read_case(case)
+    lines = str(caught.value).splitlines()
+    assert len(lines) == 31
+    assert "wrong0" in lines[0] and lines[-1].endswith(": 970 more problems")

@@ -12,7 +12,7 @@ SIDE = "pad_package@"
 
 
 @dataclass(frozen=True, slots=True)
-class InterfaceTable:
+class JointInterfaceTable:
     """The facets of all joints, alike in all models of a run but for the cells.
 
     Attributes:
@@ -29,7 +29,7 @@ class InterfaceTable:
     corners: NDArray[np.float64]
     cells: NDArray[np.integer]
 
-    def within(self, cell_number: NDArray[np.int32]) -> "InterfaceTable":
+    def within(self, cell_number: NDArray[np.int32]) -> "JointInterfaceTable":
         """Return the table of a model, in its numbers of cells ``(ne,)``: -1 for what it has not."""
         return replace(self, cells=cell_number[self.cells])
 
@@ -44,7 +44,7 @@ class InterfaceTable:
         return found
 
 
-def whole_interface(mesh: MeshData) -> InterfaceTable:
+def whole_joint_interface(mesh: MeshData) -> JointInterfaceTable:
     """Return the table of a mesh before it is divided; ``watch_table`` refuses facets that belong to no solder."""
     joints = joint_names(mesh)
     facets = [mesh.facets_of(f"{SIDE}{name}") for name in joints]
@@ -53,7 +53,7 @@ def whole_interface(mesh: MeshData) -> InterfaceTable:
         solder = mesh.in_parts(f"solder@{name}".__eq__).nonzero()[0]
         cells.append(solder[cells_of_facets(mesh.cells[solder], some)])
     nodes = np.concatenate([*facets, np.empty((0, 4), np.int32)])
-    return InterfaceTable(
+    return JointInterfaceTable(
         joints=joints,
         joint=np.repeat(np.arange(len(joints)), [len(some) for some in facets]),
         nodes=nodes,

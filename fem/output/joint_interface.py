@@ -12,7 +12,7 @@ from reflowshock.data_file import columns, rows
 from reflowshock.fem.dynamics.participant import Participant
 from reflowshock.fem.elements.stress import von_mises
 from reflowshock.fem.estimates.estimate import WindowPlan
-from reflowshock.fem.mesh.interface_table import InterfaceTable
+from reflowshock.fem.mesh.joint_interface import JointInterfaceTable
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.stress_recovery import StressRecovery
 from reflowshock.fem.parallel.communicators import Role
@@ -26,15 +26,15 @@ def picture_windows(times: Iterable[float], plan: WindowPlan) -> frozenset[int]:
     return frozenset(window for window in windows if window <= plan.windows)
 
 
-class InterfaceStress:
-    """Von Mises stress of the solder elements at the package's pads; a ``march.Pictures``.
+class JointInterfaceStress:
+    """Von Mises stress of the solder elements at the package's pads; a ``time_loop.Pictures``.
 
     Attributes:
         windows: At whose ends it is taken.
     """
 
     def __init__(
-        self, world: MPI.Comm, tables: Mapping[Role, tuple[InterfaceTable, Body]], windows: frozenset[int]
+        self, world: MPI.Comm, tables: Mapping[Role, tuple[JointInterfaceTable, Body]], windows: frozenset[int]
     ) -> None:
         """Find this rank's elements in the tables of its models."""
         self.windows, self._world = windows, world
@@ -46,10 +46,10 @@ class InterfaceStress:
             self._shares[role] = here, StressRecovery(body, cells[here])
         self._rows: list[dict[str, Any]] = []
 
-    def sample(self, crew: Mapping[Role, Participant]) -> None:
+    def sample(self, participants: Mapping[Role, Participant]) -> None:
         """Take the stress as it is now; collective over all models."""
         stress = np.zeros(len(self._table.cells))
-        for role, participant in crew.items():
+        for role, participant in participants.items():
             motion, (rows, recovery) = participant.motion, self._shares[role]
             stress[rows] = von_mises(recovery.stress(motion.displacement - motion.base_displacement()))
             time = motion.time

@@ -12,10 +12,10 @@ from reflowshock.fem.estimates.estimate import WindowPlan
 from reflowshock.fem.loads.load import Load
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.parallel.communicators import Communicators, Role
-from reflowshock.fem.parallel.exchange import CutChannels, MessageClock
+from reflowshock.fem.parallel.exchange import InterfaceChannels, MessageClock
 
 
-class Crew(NamedTuple):
+class CoupledRun(NamedTuple):
     """Participants of this rank in the order of their turns, clocks of their channels, what was checked before."""
 
     participants: dict[Role, Participant]
@@ -29,7 +29,7 @@ def couple(
     loads: Mapping[Role, list[Load]],
     plan: WindowPlan,
     scheme: Scheme,
-) -> "Crew":
+) -> "CoupledRun":
     """Open the channels of a coupled run, check what must be exact, and make the participants; collective.
 
     Args:
@@ -42,13 +42,13 @@ def couple(
     Raises:
         AgreedError: Fields, forces or masses that are not exact; on every rank.
     """
-    absent = np.full_like(next(iter(bodies.values())).cut, -1)
-    macro, meso = (bodies[role].cut if role in bodies else absent for role in ("macro", "meso"))
-    channels = CutChannels.open(comms.world, macro, meso, receiver_waits=len(comms.models) == 1)
+    absent = np.full_like(next(iter(bodies.values())).interface, -1)
+    macro, meso = (bodies[role].interface if role in bodies else absent for role in ("macro", "meso"))
+    channels = InterfaceChannels.open(comms.world, macro, meso, receiver_waits=len(comms.models) == 1)
     checked = self_check(comms.world, bodies, channels)
     checked.judge()
     if comms.world.rank == 0:
         print(checked.words, flush=True)
     make = {"macro": scheme.macro, "meso": scheme.meso}
     made = {role: make[role](bodies[role], loads[role], plan, channels) for role in scheme.order if role in bodies}
-    return Crew({role: made[role] for role in comms.models}, channels.clocks, checked)
+    return CoupledRun({role: made[role] for role in comms.models}, channels.clocks, checked)

@@ -10,7 +10,7 @@ from reflowshock.fem.division.tables import Tables
 from reflowshock.fem.division.whole import Whole
 from reflowshock.fem.errors import MeshError
 from reflowshock.fem.materials.elasticity import role_of_part
-from reflowshock.fem.mesh.coupling_interface import find_cut
+from reflowshock.fem.mesh.coupling_interface import find_interface
 from reflowshock.fem.mesh.mesh import MeshData, merge_nodes
 from reflowshock.fem.mesh.supports import SYMMETRY, held_components
 from reflowshock.fem.mesh.tie import Tie
@@ -34,7 +34,7 @@ class ThermalTables(Tables):
 
 def connected(mesh: MeshData) -> MeshData:
     """Let board and patch share their nodes."""
-    macro, meso = find_cut(mesh)
+    macro, meso = find_interface(mesh)
     return merge_nodes(mesh, meso, macro)[0]
 
 

@@ -11,7 +11,7 @@ from reflowshock.fem.model.body import Body
 from reflowshock.fem.parallel.portable import State
 
 
-class Moving(Protocol):
+class Motion(Protocol):
     """The state of one model on one rank; energies and works are those of the rank's share [J].
 
     Attributes:
@@ -74,4 +74,4 @@ class Moving(Protocol):
         """Continue from the values of what ``state`` returned."""
 
     def step_energy(self, foreign: NDArray[np.float64]) -> float:
-        """Return what exceeds the strain energy where the step is too large for stability, see ``motion.Motion``."""
+        """Return what exceeds the strain energy where the step is too large for stability, see ``ExplicitMotion``."""
