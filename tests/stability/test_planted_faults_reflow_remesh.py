@@ -4,12 +4,11 @@ from dataclasses import replace
 
 import pytest
 
-from reflowshock.meshing.joint import levels
-from reflowshock.meshing.joint.joint_place import JointPlace
+from reflowshock.meshing.joint import swept as levels
+from reflowshock.meshing.joint.joint_mesh import JointPlace
 from reflowshock.meshing.surface import user_surface
-from reflowshock.particles.physics.force_gravity import Gravity
-from reflowshock.particles.physics.force_wetting import Wetting
-from reflowshock.particles.steps.inertial_flow import InertialFlow
+from reflowshock.particles.physics.forces import Gravity, Wetting
+from reflowshock.particles.steps.inertial_step import InertialFlow
 from reflowshock.workflow.stress_test.command import HARD
 from reflowshock.workflow.stress_test.hard_case import read_hard_cases
 from reflowshock.workflow.stress_test.verdict import attempt

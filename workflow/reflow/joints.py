@@ -12,7 +12,7 @@ from reflowshock.workflow.reflow.pool import JointPool, ReflowError
 if TYPE_CHECKING:
     from reflowshock.meshing.board.pads import PadSite
     from reflowshock.particles.core.geometry import JointGeometry
-    from reflowshock.particles.scenes.bridges import Contact
+    from reflowshock.particles.scenes.bridge import Contact
     from reflowshock.particles.scenes.orientation import Orientation
     from reflowshock.particles.steps.shape import JointShape
 
@@ -130,7 +130,7 @@ def mark_bridges(records: dict[str, dict], pads: "Sequence[PadSite]", mirrored: 
     Returns:
         The pairs that touch, the largest overlap first.
     """
-    from reflowshock.particles.scenes.bridges import contacts, neighbours
+    from reflowshock.particles.scenes.bridge import contacts, neighbours
 
     places = {pad.name: (pad.x, pad.y) for pad in pads}
     widths = {name: records[name]["metrics"]["max_width"]["value"] for name in places}

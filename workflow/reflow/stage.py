@@ -90,7 +90,7 @@ def _between_plates(run: Run[PackageCase], pads: "list[PadSite]") -> Reflowed:
 
 def _heated(run: Run[PackageCase], pads: "list[PadSite]", mesh: Path) -> Reflowed:
     """All joints through the load steps of temperature, with board and package, which are meshed for it."""
-    from reflowshock.meshing.board.heated_assembly import write_heated_assembly
+    from reflowshock.meshing.board.assembly import write_heated_assembly
 
     assert run.case.thermal is not None
     write_heated_assembly(run.case.package, run.case.board, mesh)

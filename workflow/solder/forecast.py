@@ -88,7 +88,7 @@ def _towards_rest(case: SceneCase, effects: Mapping[str, Any], particles: int, s
 def _of_oscillation(case: OscillationCase) -> SceneForecast:
     from reflowshock.particles.parameters.effects import decide_oscillation
     from reflowshock.particles.parameters.estimate import inertial_seconds
-    from reflowshock.particles.parameters.scene_oscillation import rayleigh_period
+    from reflowshock.particles.parameters.scenes import rayleigh_period
     from reflowshock.particles.steps.time_step import capillary_limit
 
     scene, solder = case.oscillation, case.molten

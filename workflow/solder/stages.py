@@ -66,7 +66,7 @@ def reflow_oscillation(run: Run[OscillationCase], folder: Path) -> Findings:
     """Let a free drop swing."""
     from reflowshock.particles.core.checkpoint import Checkpoint
     from reflowshock.particles.parameters.effects import decide_oscillation
-    from reflowshock.particles.scenes.oscillation import solve_oscillation
+    from reflowshock.particles.scenes.free_drop import solve_oscillation
     from reflowshock.particles.scenes.products import write_body
 
     scene, solder = run.case.oscillation, run.case.molten

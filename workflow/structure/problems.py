@@ -10,7 +10,7 @@ from reflowshock.workflow.structure.references import reference_problems
 def structure_problems(case: StructureCase) -> list[Problem]:
     """Find what does not fit together: materials, places, facet sets, loads, references."""
     from reflowshock.fem.problem import structure_checks
-    from reflowshock.meshing.board.box_checks import box_problems
+    from reflowshock.meshing.board.box_plan import box_problems
     from reflowshock.workflow.structure.findings import waves_that_do_not_pass
 
     boxes = [Problem(found.key, found.message, found.value, found.allowed) for found in box_problems(case.box)]

@@ -79,7 +79,7 @@ BAD_VALUES = {
     ),
     "volume that cannot fit its gap": (
         "solder.volume=5 mm^3",
-        ["solder.volume", '"5 mm^3"', "cannot fit", "< 0.31"],
+        ["solder.volume", '"5 mm^3"', "does not fit", "< 0.31"],
     ),
     "package larger than the board": (
         "package.substrate.length=250 mm",

@@ -15,7 +15,7 @@ from reflowshock.cases.hard.trials.surfaces import barrel, bridged_pair, revolve
 from reflowshock.meshing.board.assembly import write_assembly
 from reflowshock.meshing.board.pads import pad_table, write_pads
 from reflowshock.meshing.board.parameters import Warpage
-from reflowshock.meshing.core.outlines import outlines
+from reflowshock.meshing.core.facets import outlines
 from reflowshock.meshing.surface.closed_surface import enclosed_volume, read_surface
 from reflowshock.particles.scenes.products import write_shapes
 from reflowshock.particles.steps.shape import JointShape, Snapshot

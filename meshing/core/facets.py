@@ -1,6 +1,38 @@
-"""Horizontal sections of a triangulated body: oriented segments, area, centroid, radius by angle."""
+"""Sets of facets: connected pieces, outlines, horizontal sections, nearest points."""
 
 import numpy as np
+
+
+def pieces(facets: np.ndarray) -> list[np.ndarray]:
+    """Return the pieces of facets (f, m) that hang together by edges: row numbers of each, largest piece first."""
+    ends = np.sort(np.stack([facets, np.roll(facets, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
+    edges = np.unique(ends, axis=0, return_inverse=True)[1].reshape(facets.shape)
+    label = np.arange(int(edges.max()) + 1)
+    while True:
+        previous = label.copy()
+        np.minimum.at(label, edges, label[edges].min(axis=1)[:, None])
+        label = label[label]
+        if np.array_equal(label, previous):
+            break
+    own = label[edges[:, 0]]
+    found = [np.flatnonzero(own == value) for value in np.unique(own)]
+    return sorted(found, key=len, reverse=True)
+
+
+def outlines(facets: np.ndarray) -> list[np.ndarray]:
+    """Return the closed lines along the edges that one facet (f, m) has, in its direction; longest first."""
+    first, second = facets.ravel(), np.roll(facets, -1, axis=1).ravel()
+    count = int(facets.max()) + 1
+    forward, backward = first * np.int64(count) + second, second * np.int64(count) + first
+    alone = ~np.isin(forward, backward)
+    following = dict(zip(first[alone].tolist(), second[alone].tolist(), strict=True))
+    lines = []
+    while following:
+        line = [next(iter(following))]
+        while line[-1] in following:
+            line.append(following.pop(line[-1]))
+        lines.append(np.array(line[:-1]))
+    return sorted(lines, key=len, reverse=True)
 
 
 def cut_segments(points: np.ndarray, triangles: np.ndarray, height: float) -> np.ndarray:
@@ -72,3 +104,20 @@ def _crossing(points: np.ndarray, first: np.ndarray, second: np.ndarray, height:
     low, high = np.minimum(first, second), np.maximum(first, second)
     share = (height - points[low, 2]) / (points[high, 2] - points[low, 2])
     return points[low, :2] + share[:, None] * (points[high, :2] - points[low, :2])
+
+
+def nearest_on_triangles(points: np.ndarray, triangles: np.ndarray, queries: np.ndarray) -> np.ndarray:
+    """Return the point nearest to each query (q, 3) on triangles (t, 3): (q, 3) [m]."""
+    import pyvista
+
+    surface = pyvista.PolyData.from_regular_faces(points, triangles)
+    return np.asarray(surface.find_closest_cell(queries, return_closest_point=True)[1])
+
+
+def nearest_on_line(line: np.ndarray, queries: np.ndarray) -> np.ndarray:
+    """Return the point nearest to each query (q, 3) on a closed polygon (k, 3): (q, 3) [m]."""
+    along = np.roll(line, -1, axis=0) - line
+    share = np.einsum("qki,ki->qk", queries[:, None] - line, along) / np.einsum("ki,ki->k", along, along)
+    found = line + np.clip(share, 0.0, 1.0)[..., None] * along
+    nearest = np.linalg.norm(found - queries[:, None], axis=2).argmin(axis=1)
+    return found[np.arange(len(queries)), nearest]
