@@ -2,8 +2,8 @@
 
 A law is given by its stored energy; its stress and its tangent follow. Viscoelastic laws have internal variables at the
 integration points, which change once a step. This is for laws that the program's own elements do not have, and to check
-them. DOLFINx takes 8 to 50 times as long as own linear elements, 3 to 6 times as long as own ones at finite strain (half
-as long as fully integrated hexahedra, which have modes to solve for), with internal variables 10 to 80 times.
+them. DOLFINx takes 8 to 50 times as long as own linear elements, 3 to 6 times as long as own ones at finite strain (but
+half as long as fully integrated hexahedra, whose modes are solved for), with internal variables 10 to 80 times.
 """
 
 from collections.abc import Callable, Mapping
