@@ -18,7 +18,7 @@ from reflowshock.meshing.board.pads import PadSite, pad_table
 from reflowshock.meshing.joint.joints_file import write_joints
 from reflowshock.meshing.joint.solder_mesh import JointMesh, mesh_coarse_joint, mesh_joint
 from reflowshock.meshing.surface.closed_surface import ClosedSurface
-from reflowshock.workflow.board_drop.case import BoardDropCase
+from reflowshock.workflow.package.case import BoardDropCase
 from reflowshock.workflow.pipeline.reader import read_case
 from tests.support.fem_models import write_msh
 

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from reflowshock.workflow.jobs.batch import show_products
 from reflowshock.workflow.pipeline.reader import read_case
-from reflowshock.workflow.store.batch import show_products
 from reflowshock.workflow.store.point import Point
 from reflowshock.workflow.store.state import examine
 from reflowshock.workflow.store.store import Store

@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from reflowshock.workflow.store.engine import SNAKEFILE
+from reflowshock.workflow.jobs.engine import SNAKEFILE
 from tests.support.faults import DROP, SMALL_DROP, run_drop
 from tests.support.workflow_command import wait_until
 

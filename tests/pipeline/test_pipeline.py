@@ -13,7 +13,7 @@ import psutil
 import pytest
 
 from reflowshock.particles.scenes.products import read_shapes
-from reflowshock.workflow.case.stage_table import BOARD_DROP
+from reflowshock.workflow.package.case import BOARD_DROP
 from tests.support.workflow_command import SMALL_CASE, break_off, command_line, reflowshock, wait_until
 
 NAMES = BOARD_DROP.names

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from reflowshock.workflow.board_drop.shock_cooling import begun
+from reflowshock.workflow.board_drop.stages import shock
 from reflowshock.workflow.case.problems import CaseError
+from reflowshock.workflow.case.run import Findings, Run
 from reflowshock.workflow.pipeline.reader import read_case
-from reflowshock.workflow.pipeline.stage_runner import Findings, Run
-from reflowshock.workflow.stages import shock
 from tests.support.workflow_command import SMALL_CASE
 
 COOLED = (

@@ -10,7 +10,7 @@ from pathlib import Path
 import psutil
 import pytest
 
-from reflowshock.workflow.cluster.checks import PLUGIN
+from reflowshock.workflow.jobs.checks import PLUGIN
 from tests.support.one_node_slurm import NoSlurm, OneNode, one_node_slurm
 from tests.support.workflow_command import wait_until
 

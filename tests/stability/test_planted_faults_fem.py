@@ -9,7 +9,7 @@ from reflowshock.fem.coupling import held_velocity
 from reflowshock.fem.division import whole
 from reflowshock.fem.forces.force_assembled import AssembledElements
 from reflowshock.fem.forces.force_nonlinear import NonlinearElements
-from reflowshock.workflow.pipeline.template import CASES
+from reflowshock.workflow.case.case import CASES
 from reflowshock.workflow.stress_test.hard_case import HardCase, read_hard_cases
 from reflowshock.workflow.stress_test.verdict import attempt
 

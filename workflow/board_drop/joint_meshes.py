@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from reflowshock.workflow.board_drop.bridged_joints import mesh_bridges
-from reflowshock.workflow.board_drop.case import BoardDropCase, PackageCase
 from reflowshock.workflow.board_drop.fine_joints import needs_coarse_joints
 from reflowshock.workflow.board_drop.identical_joints import PREFIX, identical_sphere
-from reflowshock.workflow.pipeline.stage_runner import Run
+from reflowshock.workflow.case.run import Run
+from reflowshock.workflow.package.case import BoardDropCase, PackageCase
 from reflowshock.workflow.process.products import write_json
 
 if TYPE_CHECKING:

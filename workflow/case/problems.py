@@ -4,8 +4,12 @@ import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 from reflowshock.workflow.case.toml_places import Place
+
+if TYPE_CHECKING:
+    from reflowshock.particles.parameters.checks import Problem as ParticlesProblem
 
 LONGEST = 120  # characters of a value or key in a message
 MOST_SHOWN = 30  # problems of one file
@@ -133,3 +137,8 @@ def shortened(text: str) -> str:
 def one_line(text: str) -> str:
     """Write characters that move the cursor, or that no terminal shows, as their escapes."""
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+
+
+def of_particles(found: "Sequence[ParticlesProblem]") -> list[Problem]:
+    """Say what the checks of the particles found, in the words of a case file."""
+    return [Problem(problem.key, problem.message, problem.value or None, problem.allowed) for problem in found]

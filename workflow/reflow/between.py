@@ -12,7 +12,7 @@ from reflowshock.fem.problem.thermal import Thermal
 if TYPE_CHECKING:
     from reflowshock.fem.statics.state import HeatedStructure
     from reflowshock.meshing.board.pads import PadSite
-    from reflowshock.workflow.board_drop.case import PackageCase
+    from reflowshock.workflow.package.case import PackageCase
 
 
 def thermal_effects(case: "PackageCase", thermal: Thermal) -> dict:

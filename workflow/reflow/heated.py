@@ -10,15 +10,14 @@ import numpy as np
 from reflowshock.fem import statics
 from reflowshock.fem.parallel.checkpoint_files import digest_of_files
 from reflowshock.fem.problem.thermal import KELVIN, Thermal
-from reflowshock.workflow.board_drop.case import PackageCase
-from reflowshock.workflow.board_drop.findings import at_most, metric
-from reflowshock.workflow.board_drop.reflow_pool import Alike, joint_geometries
-from reflowshock.workflow.pipeline.stage_runner import Run
+from reflowshock.workflow.case.run import Run, at_most, metric
+from reflowshock.workflow.package.case import PackageCase
 from reflowshock.workflow.process.progress import ProgressBar, progress_bar
 from reflowshock.workflow.reflow.array import JointArray, Left, Source
 from reflowshock.workflow.reflow.between import frozen_displacement, open_structure, thermal_effects
 from reflowshock.workflow.reflow.coupling import Coupled, Coupling, Exchange, placed
 from reflowshock.workflow.reflow.forecast import thermal_effect
+from reflowshock.workflow.reflow.joints import Alike, joint_geometries
 from reflowshock.workflow.reflow.load_steps import LoadStep, load_steps
 from reflowshock.workflow.reflow.open_pool import open_pool
 from reflowshock.workflow.reflow.pool import Shares

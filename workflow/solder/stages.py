@@ -3,10 +3,10 @@
 from dataclasses import replace
 from pathlib import Path
 
-from reflowshock.workflow.board_drop import findings
-from reflowshock.workflow.pipeline.stage_runner import Findings, Run, StageFunction
+from reflowshock.workflow.case.run import Findings, Run
 from reflowshock.workflow.process.products import write_json
 from reflowshock.workflow.process.progress import progress_bar
+from reflowshock.workflow.solder import findings
 from reflowshock.workflow.solder.case import DropCase, DropsCase, JointCase, OscillationCase
 
 
@@ -76,11 +76,3 @@ def reflow_oscillation(run: Run[OscillationCase], folder: Path) -> Findings:
     write_body(folder, shape, None)
     found = findings.of_oscillation(shape.metrics, decide_oscillation(solder))
     return replace(found, continued="the drop" if checkpoint.continued else "")
-
-
-REFLOW_SCENES: dict[str, StageFunction] = {
-    DropCase.kind: reflow_drop,
-    JointCase.kind: reflow_joint,
-    DropsCase.kind: reflow_drops,
-    OscillationCase.kind: reflow_oscillation,
-}

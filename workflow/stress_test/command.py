@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from reflowshock.fem.names import nearest
+from reflowshock.workflow.case.case import CASES
 from reflowshock.workflow.case.problems import CaseError, Problem
-from reflowshock.workflow.pipeline.template import CASES
 from reflowshock.workflow.process.terminal import console
 from reflowshock.workflow.store.folders import locked
 from reflowshock.workflow.stress_test.families import FAMILIES, random_trials

@@ -7,7 +7,7 @@ from pydantic import Field
 
 from reflowshock.particles.parameters.scenes import Drop, Drops, Fluid, Joint, Liquid, Oscillation
 from reflowshock.particles.parameters.solder import Parameters, Solder, Switch
-from reflowshock.workflow.case.kind import of_particles
+from reflowshock.workflow.case.problems import of_particles
 from reflowshock.workflow.stress_test.trial import Measured, Refused, Trial
 
 if TYPE_CHECKING:

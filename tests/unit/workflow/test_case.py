@@ -6,8 +6,10 @@ from pathlib import Path
 import pytest
 
 from reflowshock.fem.materials.library import SAC305
+from reflowshock.workflow.case.fields import display_values
 from reflowshock.workflow.case.problems import CaseError
-from reflowshock.workflow.pipeline.reader import available_cores, display_values, read_case
+from reflowshock.workflow.pipeline.reader import read_case
+from reflowshock.workflow.process.environment import available_cores
 from tests.support.workflow_command import SMALL_CASE
 
 BAD_VALUES = {

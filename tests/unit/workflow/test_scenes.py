@@ -6,13 +6,15 @@ from pathlib import Path
 import jsonschema
 import pytest
 
-from reflowshock.workflow.board_drop.case import BoardDropCase
+from reflowshock.workflow.case.fields import display_values
 from reflowshock.workflow.case.problems import CaseError
-from reflowshock.workflow.pipeline.reader import display_values, read_case
+from reflowshock.workflow.package.case import BoardDropCase
+from reflowshock.workflow.pipeline.reader import read_case
 from reflowshock.workflow.pipeline.schema import case_schema
 from reflowshock.workflow.pipeline.template import templates, write_new_case
 from reflowshock.workflow.solder.case import DropCase, JointCase
 from reflowshock.workflow.solder.forecast import forecast_scene
+from reflowshock.workflow.solder.problems import of_joint
 from reflowshock.workflow.store.keys import stage_inputs
 from tests.support.workflow_command import WHO_COMPUTES
 
@@ -89,7 +91,7 @@ def test_bad_values_are_named(path, setting, words):
 def test_a_neck_must_be_resolved_and_an_open_joint_is_left_to_the_flow():
     text = problems_of(JOINT, "joint.volume=0.024 mm^3", "joint.spacing=0.1 mm")
     assert "joint.spacing" in text and "neck" in text
-    assert read_case(JOINT, ["joint.volume=0.01 mm^3"]).problems() == []
+    assert of_joint(read_case(JOINT, ["joint.volume=0.01 mm^3"])) == []
 
 
 def test_a_spacing_larger_than_the_drop(tmp_path):
