@@ -25,7 +25,7 @@ def kicked(pair: Pair) -> Coupled:
 
 
 def gap(coupled: Coupled) -> np.ndarray:
-    """Return the gap at the interface (nc, 3) [m], each side's displacement plus (step / 2)^2 times its acceleration."""
+    """Return the gap at the interface (nc, 3) [m], displacements plus (step / 2)^2 times its acceleration."""
     moved = []
     for part in coupled.parts:
         motion, interface = part.motion, part.motion.body.interface
