@@ -6,8 +6,9 @@
 Two systems: metrics agree to a relative difference of 1e-6; those without a unit also if they differ by less than 1e-6
 (errors and residuals are near zero, and what they are relative to is one). Two checkouts on one system: every metric
 and every array of histories, shapes and meshes is equal to the bit; on two ranks, whose shares of the mesh follow
-speeds measured at the start, to 1e-6, but for the energy balance, which is their rounding. Words and counts are the same. Only what the machine decides is left out: times,
-speeds, shares of time, and how its library of solvers stores a factor.
+speeds measured at the start, to 1e-6, but for the energy balance, which is their rounding. Words and counts are the
+same. Only what the machine decides is left out: times, speeds, shares of time, and how its library of solvers stores a
+factor.
 """
 
 import argparse
