@@ -11,10 +11,12 @@ from reflowshock.fem.errors import LoadError, MeshError
 from reflowshock.fem.estimates.material_effects import plastic_laws
 from reflowshock.fem.mesh.facet_areas import OutwardFacets, facet_set, outward_areas, outward_facets
 from reflowshock.fem.mesh.mesh import MeshData
+from reflowshock.fem.mesh.point_shares import point_shares
 from reflowshock.fem.mesh.point_table import PointTable, point_table
 from reflowshock.fem.mesh.tie import tie_joints
-from reflowshock.fem.problem.structure import AXES, InputG, PrescribedMotion, Pressure, StructureProblem
+from reflowshock.fem.problem.structure import AXES, InputG, PointForce, PrescribedMotion, Pressure, StructureProblem
 
+Shares = tuple[NDArray[np.integer], NDArray[np.float64]]
 NODES = {"hexahedron": 8, "tetrahedron": 4, "tetrahedron_quadratic": 10}
 
 
@@ -26,12 +28,15 @@ class StructureTables(Tables):
         nodes_of: Name -> nodes of a facet set that supports or motions act on.
         areas: Name -> nodes and outward areas of a facet set under pressure, see ``facet_areas.outward_areas``.
         pressed: Name -> the same facet set, for a pressure that follows it.
+        pushed: Name of a force at a point -> nodes and their shares in it; on planes of symmetry they add up to the
+            part that the meshed body bears.
         watch: Watch points and supports.
     """
 
     nodes_of: dict[str, NDArray[np.integer]]
     areas: dict[str, tuple[NDArray[np.integer], NDArray[np.float64]]]
     pressed: dict[str, OutwardFacets]
+    pushed: dict[str, Shares]
     watch: PointTable
 
 
@@ -51,7 +56,7 @@ def structure_tables(whole: Whole, problem: StructureProblem) -> StructureTables
 
     Raises:
         MeshError: Watch points outside.
-        LoadError: A facet set without facets, or a prescribed motion of what is held.
+        LoadError: A facet set without facets, a force outside, or a prescribed motion of what is held.
     """
     mesh, tie = whole.mesh, whole.tie
     moved = [load.on for load in problem.loads.values() if isinstance(load, PrescribedMotion)]
@@ -73,8 +78,19 @@ def structure_tables(whole: Whole, problem: StructureProblem) -> StructureTables
         nodes_of=nodes_of,
         areas={name: outward_areas(mesh, name) for name in sorted(pressed)},
         pressed={name: outward_facets(mesh, name) for name in sorted(pressed)},
+        pushed=pushed_nodes(mesh, problem),
         watch=point_table(mesh, points, supports, yields=bool(plastic_laws(problem.layer_materials))),
     )
+
+
+def pushed_nodes(mesh: MeshData, problem: StructureProblem) -> dict[str, Shares]:
+    """Return the nodes at forces and their shares, see ``StructureTables.pushed``; errors as ``structure_tables``."""
+    found: dict[str, Shares] = {}
+    for name, load in problem.loads.items():
+        if isinstance(load, PointForce):
+            nodes, shares = point_shares(mesh, f"loads.{name}.at", load.at)
+            found[name] = nodes, shares * 0.5 ** len(problem.structure.planes_at(load.at))
+    return found
 
 
 def check_layers(mesh: MeshData, problem: StructureProblem) -> None:

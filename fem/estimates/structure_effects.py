@@ -22,7 +22,7 @@ def effects(problem: StructureProblem, added_mass: float, neglected_strain: floa
 
 
 def _loads(problem: StructureProblem) -> Iterator[tuple[str, bool, str]]:
-    for kind in ("input_g", "gravity", "pressure", "motion"):
+    for kind in ("input_g", "gravity", "pressure", "motion", "point_force"):
         names = [f"loads.{name}" for name, load in problem.loads.items() if load.kind == kind]
         effect = "prescribed_motion" if kind == "motion" else kind
         yield effect, bool(names), ", ".join(names) or f"no load of kind {kind}"

@@ -22,6 +22,7 @@ QUANTITIES: dict[str, dict[str, float]] = {
     "acceleration": {"m/s^2": 1.0, "mm/s^2": 1e-3, "G": STANDARD_GRAVITY},
     "pressure": {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9},
     "velocity": {"m/s": 1.0, "mm/s": 1e-3, "mm/ms": 1.0},
+    "force": {"N": 1.0, "mN": 1e-3, "kN": 1e3},
 }
 
 

@@ -14,7 +14,7 @@ from reflowshock.fem.loads.load import BodyAcceleration, Load, NodalForces, Pres
 from reflowshock.fem.loads.pulse import Pulse
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.problem.shock import Damping
-from reflowshock.fem.problem.structure import AXES, Gravity, InputG, Pressure, StructureProblem
+from reflowshock.fem.problem.structure import AXES, Gravity, InputG, PointForce, Pressure, StructureProblem
 
 
 def structure_loads(
@@ -36,6 +36,9 @@ def structure_loads(
         elif isinstance(load, InputG | Gravity):
             push = -1.0 if isinstance(load, InputG) else 1.0  # seen from the supports, the body is pushed the other way
             made.append(BodyAcceleration(push * unit(load.direction), pulse))
+        elif isinstance(load, PointForce):
+            nodes, shares = tables.pushed[name]
+            made.append(NodalForces.build(body, nodes, np.outer(shares, unit(load.direction)), pulse))
         else:
             local = body.local.locate(tables.nodes_of[load.on])
             made.append(PrescribedVelocity(local[local >= 0], AXES.index(load.component), pulse))

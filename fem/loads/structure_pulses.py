@@ -10,7 +10,13 @@ from reflowshock.fem.loads.pulse_table import read_pulse
 from reflowshock.fem.problem.structure import InputG, StructureLoad
 
 SHAPES: dict[str, type[HalfSine] | type[Haversine]] = {"half_sine": HalfSine, "haversine": Haversine}
-QUANTITY = {"input_g": "acceleration", "gravity": "acceleration", "pressure": "pressure", "motion": "velocity"}
+QUANTITY = {
+    "input_g": "acceleration",
+    "gravity": "acceleration",
+    "pressure": "pressure",
+    "motion": "velocity",
+    "point_force": "force",
+}
 
 
 def pulses_of(loads: Mapping[str, StructureLoad]) -> dict[str, Pulse]:

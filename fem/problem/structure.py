@@ -16,6 +16,7 @@ from reflowshock.fem.parameters import Parameters
 from reflowshock.fem.problem.shock import MOST_RANKS, Coupling, Damping, ServiceCondition
 
 AXES = "xyz"
+ROUNDING = 1e-9  # of the box: closer than that is the same place
 SMALLER = 0.5  # of the longest step of a layer: below it a layer is fine, unless the user names those that are
 Axis = Literal["x", "y", "z"]
 Direction = tuple[float, float, float]
@@ -93,6 +94,15 @@ class Structure(Parameters):
         sides = ("x_min", "x_max", "y_min", "y_max", "z_min", "z_max")
         return sides if self.holes is None else (*sides, "mounting_holes")
 
+    @property
+    def margin(self) -> float:
+        """Return the distance [m] below which two places are the same."""
+        return ROUNDING * max(self.length, self.width, self.thickness)
+
+    def planes_at(self, place: tuple[float, float, float]) -> tuple[Axis, ...]:
+        """Return the planes of symmetry on which a place [m] lies."""
+        return tuple(axis for axis in dict.fromkeys(self.symmetry) if abs(place[AXES.index(axis)]) <= self.margin)
+
 
 def _each(factor: float, counts: tuple[int, int]) -> tuple[int, int]:
     return _times(factor, counts[0]), _times(factor, counts[1])
@@ -161,7 +171,20 @@ class Gravity(Pulsed):
     direction: Direction = (0.0, 0.0, -1.0)
 
 
-StructureLoad = Annotated[InputG | Pressure | PrescribedMotion | Gravity, Field(discriminator="kind")]
+class PointForce(Pulsed):
+    """Force at a point, shared by the nodes of the element there; its direction stays also where the body turns.
+
+    It is the force on the whole body: with a plane of symmetry its mirror image acts as well, and of a force on that
+    plane each half bears half. Strains within an element of the point depend on the mesh.
+    """
+
+    kind: Literal["point_force"] = "point_force"
+    at: Annotated[tuple[float, float, float], "mm"]
+    direction: Direction
+    peak: Annotated[float | None, "N"] = Field(None, gt=0)
+
+
+StructureLoad = Annotated[InputG | Pressure | PrescribedMotion | Gravity | PointForce, Field(discriminator="kind")]
 
 
 class WatchPoint(Parameters):

@@ -9,13 +9,12 @@ from reflowshock.fem.problem.structure import (
     AXES,
     Gravity,
     InputG,
+    PointForce,
     PrescribedMotion,
     Pressure,
     StructureLoad,
     StructureProblem,
 )
-
-ROUNDING = 1e-9  # of the box: a watch point on its surface is inside
 
 
 def problems(problem: StructureProblem) -> list[Problem]:
@@ -66,7 +65,10 @@ def _supports(problem: StructureProblem) -> Iterator[Problem]:
 def _load(key: str, load: StructureLoad, problem: StructureProblem) -> Iterator[Problem]:
     if isinstance(load, Pressure | PrescribedMotion):
         yield from unknown_name(f"{key}.on", load.on, problem.structure.facet_sets, "facet set")
-    if isinstance(load, InputG | Gravity) and not math.hypot(*load.direction) > 0.0:
+    if isinstance(load, PointForce):
+        yield from _inside(f"{key}.at", load.at, problem)
+        yield from _in_hole(f"{key}.at", load.at, problem)
+    if isinstance(load, InputG | Gravity | PointForce) and not math.hypot(*load.direction) > 0.0:
         yield Problem(f"{key}.direction", list(load.direction), "has no length", "any vector but zero")
     if isinstance(load, InputG) and load.method == "direct" and not _is_held(problem):
         yield Problem(
@@ -126,14 +128,19 @@ def _symmetry(problem: StructureProblem) -> Iterator[Problem]:
     vectors["dynamics.initial_velocity"] = problem.dynamics.initial_velocity
     for axis in problem.structure.symmetry:
         for key, vector in vectors.items():
-            if vector[AXES.index(axis)]:
-                message = (
-                    f"crosses the plane of symmetry {axis} = 0, on both sides of which it would have to be mirrored"
-                )
-                yield Problem(key, list(vector), message, f"0 along {axis}, or no symmetry in {axis}")
+            yield from _across(axis, key, vector)
         for name, load in problem.loads.items():
+            if isinstance(load, PointForce) and axis in problem.structure.planes_at(load.at):
+                yield from _across(axis, f"loads.{name}.direction", load.direction)
             if isinstance(load, Pressure) and load.on == f"{axis}_min":
                 yield Problem(f"loads.{name}.on", load.on, "is a plane of symmetry inside the body", f"{axis}_max")
+
+
+def _across(axis: str, key: str, vector: tuple[float, float, float]) -> Iterator[Problem]:
+    """Yield a vector that is not its own mirror image."""
+    if vector[AXES.index(axis)]:
+        message = f"crosses the plane of symmetry {axis} = 0, on both sides of which it would have to be mirrored"
+        yield Problem(key, list(vector), message, f"0 along {axis}, or no symmetry in {axis}")
 
 
 def _is_held(problem: StructureProblem) -> bool:
@@ -191,14 +198,29 @@ def _pulse(key: str, load: StructureLoad) -> Iterator[Problem]:
 
 
 def _watch(problem: StructureProblem) -> Iterator[Problem]:
-    low, high = problem.structure.corners
-    margin = ROUNDING * max(problem.structure.length, problem.structure.width, problem.structure.thickness)
     for name, point in problem.watch.items():
-        nearest = [min(max(x, a), b) for x, a, b in zip(point.at, low, high, strict=True)]
-        distance = math.dist(point.at, nearest)
-        if distance > margin:
-            message = f"lies {distance:.3g} m outside the meshed body; the nearest point of it is {_metres(nearest)}"
-            yield Problem(f"watch.{name}.at", _metres(point.at), message, f"{_metres(low)} to {_metres(high)}")
+        yield from _inside(f"watch.{name}.at", point.at, problem)
+
+
+def _inside(key: str, place: tuple[float, float, float], problem: StructureProblem) -> Iterator[Problem]:
+    """Yield a place [m] outside the box."""
+    low, high = problem.structure.corners
+    nearest = [min(max(x, a), b) for x, a, b in zip(place, low, high, strict=True)]
+    distance = math.dist(place, nearest)
+    if distance > problem.structure.margin:
+        message = f"lies {distance:.3g} m outside the meshed body; the nearest point of it is {_metres(nearest)}"
+        yield Problem(key, _metres(place), message, f"{_metres(low)} to {_metres(high)}")
+
+
+def _in_hole(key: str, place: tuple[float, float, float], problem: StructureProblem) -> Iterator[Problem]:
+    """Yield a place [m] inside a mounting hole."""
+    holes = problem.structure.holes
+    if holes is None:
+        return
+    radius = math.hypot(*(abs(x) - 0.5 * spacing for x, spacing in zip(place, holes.spacing, strict=False)))
+    if radius < 0.5 * holes.diameter - problem.structure.margin:
+        allowed = f">= {0.5 * holes.diameter:.6g} m from the axis of the hole"
+        yield Problem(key, _metres(place), f"lies in a mounting hole, {radius:.3g} m from its axis", allowed)
 
 
 def _metres(point: Iterable[float]) -> str:

@@ -247,6 +247,9 @@ def restricted(
             name: replace(item, facets=part.number[item.facets], cells=cell[item.cells])
             for name, item in tables.pressed.items()
         },
+        pushed={
+            name: (present(node[nodes]), share[node[nodes] >= 0]) for name, (nodes, share) in tables.pushed.items()
+        },
         watch=replace(
             tables.watch,
             nodes=node[tables.watch.nodes],

@@ -7,12 +7,14 @@ import numpy as np
 import pytest
 
 from tests.support.fem_program import run_program
-from tests.support.fem_structures import LENGTH, WIDTH, strip_mesh, write_structure
+from tests.support.fem_structures import LENGTH, WIDTH, strip_mesh, structure_tables_of, write_structure
 
 LOADS = {
     "drop": {"kind": "input_g", "peak": 1e4, "duration": 4e-5, "direction": [0.0, 0.0, 1.0]},
     "push": {"kind": "pressure", "on": "z_max", "peak": 1e5, "pulse": "constant"},
     "pull": {"kind": "motion", "on": "x_max", "component": "x", "peak": 0.1, "duration": 4e-5},
+    "poke": {"kind": "point_force", "at": [1e-4, 1e-3, 7e-4], "direction": [1.0, 2.0, 3.0], "peak": 20.0}
+    | {"duration": 4e-5},  # in an element beside the middle, which both ranks touch
 }
 WATCH = {
     "tip": {"at": [LENGTH / 2, 0.0, 0.0]},
@@ -27,6 +29,9 @@ DYNAMICS = {
 FINITE = DYNAMICS | {"duration": 1e-5, "kinematics": "finite", "damping": {"mass_coefficient": 100.0}}
 
 
+LONGER = structure_tables_of()["structure"] | {"length": 1.2 * LENGTH}  # than the mesh
+OUTSIDE = {"kind": "point_force", "at": [0.55 * LENGTH, 0.0, 0.0], "direction": [0.0, 0.0, 1.0], "peak": 1.0}
+OUTSIDE |= {"pulse": "constant"}
 CRUSHED = {
     "loads": {"push": {"kind": "pressure", "on": "z_max", "peak": 1e12, "pulse": "constant"}},
     "dynamics": {"duration": 1e-4, "kinematics": "finite"},
@@ -61,6 +66,7 @@ def test_two_ranks_give_what_one_gives(tmp_path, solver, dynamics):
     [
         ({"watch": {"far": {"at": [1.0, 0.0, 0.0]}}}, "lies 0.99 m outside"),
         ({"supports": {"clamp": {"on": "mounting_holes", "hold": ["x"]}}}, "no such facet set"),
+        ({"structure": LONGER, "loads": {"poke": OUTSIDE}}, "loads.poke.at = (0.011, 0, 0) m lies outside the mesh"),
         (CRUSHED, "m, is turned inside out"),
     ],
 )

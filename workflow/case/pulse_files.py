@@ -5,7 +5,7 @@ from pathlib import Path
 
 from reflowshock.workflow.case.problems import Problem
 
-UNITS = {"acceleration": "m/s^2", "pressure": "Pa", "velocity": "m/s"}
+UNITS = {"acceleration": "m/s^2", "pressure": "Pa", "velocity": "m/s", "force": "N"}
 Tables = Mapping[str, tuple[Path, str]]
 
 

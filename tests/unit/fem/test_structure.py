@@ -151,6 +151,8 @@ def test_both_solvers_agree_under_all_loads(tmp_path):
         "drop": drop,
         "push": {"kind": "pressure", "on": "z_max", "peak": 1e5, "duration": 6e-5},
         "pull": {"kind": "motion", "on": "x_max", "component": "x", "peak": 0.1, "duration": 4e-5},
+        "poke": {"kind": "point_force", "at": [1e-3, 1e-3, 7e-4], "direction": [1.0, 1.0, 1.0], "peak": 5.0}
+        | {"duration": 5e-5},
     }
     numerics = {"history_samples": 100, "field_samples": 2, "implicit_step": 2e-7}
     changes = {"loads": loads, "dynamics": {"duration": 1e-4, "numerics": numerics}}

@@ -20,6 +20,8 @@ LOADS = {
     "side": {"kind": "pressure", "on": "x_max", "peak": 1e5, "duration": 1e-5},
     "pull": {"kind": "motion", "on": "z_max", "component": "z", "peak": 0.1, "duration": 1e-5},
     "drop": {"kind": "input_g", "peak": 1e4, "duration": 2e-5, "direction": [1.0, 0.0, 0.2]},
+    "poke": {"kind": "point_force", "at": [2e-4, 3e-4, 6.1e-3], "direction": [1.0, 1.0, 1.0], "peak": 0.2}
+    | {"duration": 1e-5},  # in the fine layer, beside the tie
 }
 TABLES = {
     "supports": {
@@ -47,6 +49,7 @@ def test_fine_layers_are_those_of_small_steps_and_all_is_counted_once(tmp_path):
     (area,) = tables.areas.values()
     assert sum(item.areas["x_max"][1].sum(axis=0) for item in inputs) == pytest.approx(area[1].sum(axis=0))
     assert sum(len(item.areas["x_max"][0]) for item in inputs) == len(area[0])
+    assert sum(item.pushed["poke"][1].sum() for item in inputs) == pytest.approx(1.0)
     for name, nodes in tables.nodes_of.items():
         assert sum(len(item.nodes_of[name]) for item in inputs) == len(nodes)
     for of_watch in ("nodes", "cells"):
@@ -102,8 +105,13 @@ def test_two_models_move_as_one(tmp_path, scheme):
         ({"kind": "pressure", "on": "z_max", "peak": 1e5, "duration": 3e-5}, "z_min"),
         ({"kind": "motion", "on": "z_max", "component": "z", "peak": 0.1, "duration": 3e-5}, "z_min"),
         ({"kind": "input_g", "peak": 1e4, "duration": 3e-5}, "z_max"),
+        (
+            {"kind": "point_force", "at": [0.0, 0.0, 7e-3], "direction": [0.0, 0.0, 1.0], "peak": 0.4}
+            | {"duration": 3e-5},
+            "z_min",
+        ),
     ],
-    ids=["pressure", "motion", "support"],
+    ids=["pressure", "motion", "support", "point_force"],
 )
 def test_what_acts_on_fine_elements_strains_them_as_in_one_model(tmp_path, load, clamped):
     """Nine steps a window at the end: by the window alone strains are 100 times too large, at a support 1.5 times."""

@@ -7,6 +7,7 @@ from reflowshock.fem.problem.structure_checks import check, problems
 
 TIN = {"kind": "isotropic", "density": 7400.0, "young_modulus": 50e9, "poisson_ratio": 0.36}
 HELD = {"on": "mounting_holes", "hold": ["x", "y", "z"]}
+POKE = {"kind": "point_force", "at": [0.02, 0.0, 1e-3], "direction": [0.0, 0.0, -1.0], "table": "force.csv"}
 SHAKEN = {"kind": "input_g", "service_condition": "B", "method": "large_mass"}
 YIELDING = TIN | {"plasticity": {"A": 40e6}}
 
@@ -76,6 +77,21 @@ def test_own_materials_go_before_those_of_the_library():
             {"loads": {"fall": {"kind": "gravity", "direction": [0.0, 0.0, 0.0]}}},
             "loads.fall.direction = [0.0, 0.0, 0.0]: has no length",
         ),
+        (
+            {"loads": {"poke": POKE | {"at": [0.02, 0.0, 2e-3]}}},
+            "loads.poke.at = (0.02, 0, 0.002) m: lies 0.001 m outside the meshed body; the nearest point of it is"
+            " (0.02, 0, 0.001) m",
+        ),
+        (
+            {"loads": {"poke": POKE | {"at": [0.0525, -0.0345, 0.0]}}},
+            "loads.poke.at = (0.0525, -0.0345, 0) m: lies in a mounting hole, 0.001 m from its axis; allowed:",
+        ),
+        ({"loads": {"poke": POKE | {"direction": [0.0, 0.0, 0.0]}}}, "direction = [0.0, 0.0, 0.0]: has no length"),
+        (
+            {"loads": {"poke": POKE | {"at": [0.0, 0.0, 0.0], "direction": [1.0, 0.0, 1.0]}}},
+            "loads.poke.direction = [1.0, 0.0, 1.0]: crosses the plane of symmetry x = 0",
+        ),
+        ({"loads": {"poke": POKE | {"peak": 10.0}}}, "loads.poke: is given by peak and table"),
         (
             {"supports": {}, "loads": {"drop": SHAKEN}},
             "loads.drop.method = large_mass: needs a support",
@@ -167,6 +183,12 @@ def test_what_does_not_fit_is_said(changes, message):
 def test_large_mass_with_supports_across_its_direction():
     supports = {"holes": HELD, "rail": {"on": "y_min", "hold": ["y"]}}
     assert not problems(scene(supports=supports, loads={"drop": SHAKEN, "weight": {"kind": "gravity"}}))
+
+
+def test_a_force_beside_a_plane_of_symmetry_may_point_anywhere():
+    """Its mirror image acts as well; holes end at their walls."""
+    at_wall = POKE | {"at": [0.0525, -0.037, 0.0]}
+    assert not problems(scene(loads={"poke": POKE | {"direction": [1.0, 0.0, 0.0]}, "at_wall": at_wall}))
 
 
 def test_gravity_needs_neither_peak_nor_duration():

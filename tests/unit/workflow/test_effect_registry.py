@@ -27,7 +27,8 @@ from tests.support.workflow_command import SMALL_CASE
 
 CASES = Path(__file__).parents[3] / "cases"
 FILES = [*sorted(CASES.glob("*/case.toml")), SMALL_CASE]
-METHOD = {"input_g", "pressure", "prescribed_motion", "initial_velocity", "hourglass_stiffness"}  # loads, formulation
+LOADS = {"input_g", "pressure", "prescribed_motion", "point_force", "initial_velocity"}
+METHOD = {*LOADS, "hourglass_stiffness"}  # and the formulation
 SLOW = "shock.peak_acceleration=2 G"
 HEATED = CASES / "hu_bga_drop/case.toml"
 DROP = CASES / "sessile_drop/case.toml"

@@ -16,6 +16,7 @@ from reflowshock.workflow.structure.forecast import forecast_structure
 from reflowshock.workflow.structure.report import meshed_part
 
 BOARD = Path(__file__).resolve().parents[2] / "pipeline" / "structure.toml"
+POKE = "kind='point_force',at=['1 mm','-2 mm','0 mm'],direction=[0,0,-1]"
 FINITE = ["dynamics.solver=explicit", "dynamics.kinematics=finite"]
 SECOND_LAYER = "structure.layers.cover.material=coper"
 BAD_VALUES = {
@@ -42,6 +43,10 @@ BAD_VALUES = {
     "facet set": ("supports.holes.on=mounting_hole", ["supports.holes.on", "did you mean mounting_holes?"]),
     "point outside": ('watch.centre.at=["1 m","0 m","0 m"]', ["watch.centre.at", "outside the meshed body"]),
     "holes outside": ('structure.holes.spacing=["29 mm","14 mm"]', ["holes.spacing", '"29 mm"', "4 mm to 27 mm"]),
+    "force without unit": (f"loads.poke={{{POKE},peak=3}}", ["loads.poke.peak", 'such as "3 N"']),
+    "force without course": (f"loads.poke={{{POKE}}}", ["loads.poke: is given by nothing", "peak, or table"]),
+    "force without place": ("loads.poke={kind='point_force',peak='1 N'}", ["loads.poke.at: is missing"]),
+    "force outside": (f"loads.poke={{{POKE},peak='1 N',duration='1 ms'}}", ["loads.poke.at", "outside the meshed"]),
     "unknown solver": ("dynamics.solver=implict", ["dynamics.solver", "did you mean implicit?"]),
     "too many ranks": ("dynamics.ranks=4096", ["dynamics.ranks", "4096 MPI ranks", "--oversubscribe"]),
     "other case": ("structure.layers.cover.material=fr4", ["did you mean FR4?"]),
@@ -176,6 +181,26 @@ def test_an_unreadable_table_is_refused(tmp_path):
     path.write_text(BOARD.read_text().replace('peak = "1000 G"\nduration = "0.1 ms"\n', 'table = "pulse.csv"\n'))
     with pytest.raises(CaseError, match=r"loads\.drop\.table = .*there is no such file"):
         read_case(path)
+
+
+def test_a_force_is_in_the_schema_the_template_and_the_plan(tmp_path):
+    (tmp_path / "force.csv").write_text("time [ms], force [mN]\n0,0\n0.1,1000\n")
+    (tmp_path / "case.toml").write_text(BOARD.read_text())
+    poke = POKE.replace("-2 mm", "2 mm")
+    given = [f"loads.poke={{{poke},peak='2 kN',duration='0.1 ms'}}", f"loads.push={{{poke},table='force.csv'}}"]
+    case = read_case(tmp_path / "case.toml", given)
+    assert case.loads["poke"].peak == 2000.0
+    assert forecast_structure(case).effects["point_force"] == {"on": True, "why": "loads.poke, loads.push"}
+    again = tmp_path / "again.toml"
+    again.write_text(case_text(case, "structure"))
+    assert 'kind = "point_force"' in again.read_text()
+    assert display_values(read_case(again)) == display_values(case)
+    jsonschema.validate(tomllib.loads(again.read_text()), case_schema())
+    with pytest.raises(CaseError, match="is not plausible"):
+        read_case(tmp_path / "case.toml", [f"loads.poke={{{poke},peak='1e4 kN',duration='0.1 ms'}}"])
+    (tmp_path / "force.csv").write_text("time [ms], force [G]\n0,0\n0.1,1\n")
+    with pytest.raises(CaseError, match="needs its unit in brackets, one of N, mN, kN"):
+        read_case(tmp_path / "case.toml", given)
 
 
 @pytest.mark.parametrize(
