@@ -8,9 +8,8 @@ from numpy.typing import NDArray
 
 from reflowshock.fem.division.checks import check_division
 from reflowshock.fem.division.divide import divide
-from reflowshock.fem.division.division import Division
+from reflowshock.fem.division.division import Division, Rules
 from reflowshock.fem.division.record import coupling_record
-from reflowshock.fem.division.rules import Rules
 from reflowshock.fem.division.structure_tables import StructureTables, structure_tables, tied
 from reflowshock.fem.division.tables import split
 from reflowshock.fem.division.whole import Survey, Whole, survey
