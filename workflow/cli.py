@@ -144,12 +144,12 @@ def accuracy(
     oversubscribe: Oversubscribe = False,
     force: Force = False,
 ) -> None:
-    """Measure what accuracy costs: a ladder of settings, their errors and times; recommend some and run them."""
-    from reflowshock.workflow.accuracy.command import read_wish, show
+    """Measure what accuracy costs: a study of settings, their errors and times; recommend some and run them."""
+    from reflowshock.workflow.accuracy.command import read_request, show
 
-    wish = replace(read_wish(case, settings or [], tolerance, budget), oversubscribe=oversubscribe, force=force)
+    request = replace(read_request(case, settings or [], tolerance, budget), oversubscribe=oversubscribe, force=force)
     try:
-        kept = show(wish, out, console)
+        kept = show(request, out, console)
     except KeyboardInterrupt as error:
         print_error("interrupted; complete points and checkpoints are kept: the same command continues")
         raise typer.Exit(1) from error

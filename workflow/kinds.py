@@ -17,7 +17,7 @@ from reflowshock.workflow.case.case import Case
 from reflowshock.workflow.case.forecast import Size, Toggle
 from reflowshock.workflow.case.problems import CaseError, Problem
 from reflowshock.workflow.case.run import StageFunction
-from reflowshock.workflow.convergence.series import Ladder
+from reflowshock.workflow.convergence.series import ConvergenceStudy
 from reflowshock.workflow.package.case import BoardDropCase, PackageCase
 from reflowshock.workflow.reflow.stage import reflow
 from reflowshock.workflow.solder import problems as solder_checks
@@ -32,7 +32,7 @@ from reflowshock.workflow.structure.plan import structure_tables
 from reflowshock.workflow.structure.problems import structure_problems
 
 
-class Forecast(Protocol):
+class PackageForecast(Protocol):
     """What the forecasts of all kinds say."""
 
     @property
@@ -57,19 +57,19 @@ class Kind:
         plan: what the plan shows below stages and effects, of a case and its forecast.
         acts: what its effects belong to, for readers.
         report: adds its sections to the context of a report: run folder, case, context, summary.
-        ladder: its convergence study.
+        study: its convergence study.
         toggles: effect -> the case with that effect the other way, where the forecast knows what it costs.
     """
 
     case: type[Case]
     problems: Callable[[Any], list[Problem]]
     stages: Mapping[str, StageFunction]
-    forecast: Callable[[Any], Forecast]
+    forecast: Callable[[Any], PackageForecast]
     size: Callable[[Any], Size]
     plan: Callable[[Any, Any], Iterable[RenderableType]]
     acts: str
     report: Callable[[Path, Any, dict, dict], None]
-    ladder: Callable[[Any], Ladder]
+    study: Callable[[Any], ConvergenceStudy]
     toggles: Callable[[Any], Mapping[str, Toggle]] = lambda case: {}
 
     @property
@@ -105,22 +105,22 @@ def _scene_report(run_folder: Path, case: Case, context: dict, summary: dict) ->
         add_scene(run_folder, case.kind, context, summary)
 
 
-def _package_ladder(case: PackageCase) -> Ladder:
-    from reflowshock.workflow.convergence.packages import package_ladder
+def _package_study(case: PackageCase) -> ConvergenceStudy:
+    from reflowshock.workflow.convergence.packages import package_study
 
-    return package_ladder(case)
-
-
-def _structure_ladder(case: StructureCase) -> Ladder:
-    from reflowshock.workflow.convergence.structures import structure_ladder
-
-    return structure_ladder(case)
+    return package_study(case)
 
 
-def _scene_ladder(case: Case) -> Ladder:
-    from reflowshock.workflow.convergence.solder import LADDERS
+def _structure_study(case: StructureCase) -> ConvergenceStudy:
+    from reflowshock.workflow.convergence.structures import structure_study
 
-    return LADDERS[case.kind](case)
+    return structure_study(case)
+
+
+def _scene_study(case: Case) -> ConvergenceStudy:
+    from reflowshock.workflow.convergence.solder import STUDIES
+
+    return STUDIES[case.kind](case)
 
 
 def _scene(case: type[Case], problems: Callable[[Any], list[Problem]], reflow_scene: StageFunction) -> Kind:
@@ -134,7 +134,7 @@ def _scene(case: type[Case], problems: Callable[[Any], list[Problem]], reflow_sc
         scene_tables,
         "reflow",
         _scene_report,
-        _scene_ladder,
+        _scene_study,
     )
 
 
@@ -152,7 +152,7 @@ PACKAGE = Kind(
     plan=package_tables,
     acts="reflow",
     report=_package_report,
-    ladder=_package_ladder,
+    study=_package_study,
     toggles=shock_effects.toggles,
 )
 BOARD_DROP = replace(
@@ -176,7 +176,7 @@ STRUCTURE = Kind(
     plan=structure_tables,
     acts="motion",
     report=_structure_report,
-    ladder=_structure_ladder,
+    study=_structure_study,
     toggles=structure_forecast.toggles,
 )
 KINDS = (

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from rich.console import RenderableType
 from rich.table import Table
 
-from reflowshock.workflow.board_drop.forecast import Forecast
+from reflowshock.workflow.board_drop.forecast import PackageForecast
 from reflowshock.workflow.board_drop.shock_forecast import ShockForecast
 from reflowshock.workflow.case.text import duration, short
 from reflowshock.workflow.package.case import BoardDropCase, PackageCase
@@ -14,7 +14,7 @@ from reflowshock.workflow.process.plan_table import REFLOW_SPEED, new_table
 from reflowshock.workflow.process.terminal import styled
 
 
-def package_tables(case: PackageCase, outlook: Forecast) -> Iterator[RenderableType]:
+def package_tables(case: PackageCase, outlook: PackageForecast) -> Iterator[RenderableType]:
     """Yield sizes and, where the board is dropped, the shock; then what the costs assume."""
     yield _sizes(case, outlook) if outlook.parts else f"\n{_joints(case, outlook)}"
     if not isinstance(case, BoardDropCase) or outlook.shock is None:
@@ -26,7 +26,7 @@ def package_tables(case: PackageCase, outlook: Forecast) -> Iterator[RenderableT
     yield styled("[dim]and the reflow speed in particles/parameters/estimate.py, both as benchmarks/ measured them.")
 
 
-def _sizes(case: PackageCase, outlook: Forecast) -> Table:
+def _sizes(case: PackageCase, outlook: PackageForecast) -> Table:
     table = new_table("\nSizes and critical time steps", "part", "hexahedra", "critical step", "time step")
     step = {name: level for level in (outlook.shock.levels if outlook.shock else ()) for name in level.parts}
     for name, part in outlook.parts.items():
@@ -41,7 +41,7 @@ def _sizes(case: PackageCase, outlook: Forecast) -> Table:
     return table
 
 
-def _joints(case: PackageCase, outlook: Forecast) -> str:
+def _joints(case: PackageCase, outlook: PackageForecast) -> str:
     smallest, largest = outlook.particles
     particles = f"{smallest}" if smallest == largest else f"{smallest} to {largest}"
     distinct = f"up to {outlook.distinct}" if outlook.load_steps else f"{outlook.distinct}"

@@ -10,7 +10,7 @@ CPU_INFO = Path("/proc/cpuinfo")
 
 
 @dataclass(frozen=True, slots=True)
-class Machine:
+class Host:
     """Model of the processor, and the cores that a program may use."""
 
     processor: str
@@ -20,9 +20,9 @@ class Machine:
         return f"{self.processor}, {self.cores} {'core' if self.cores == 1 else 'cores'}"
 
 
-def this_machine() -> Machine:
+def this_host() -> Host:
     """Return the machine that this process is on."""
-    return Machine(_model() or platform.processor() or platform.machine(), available_cores())
+    return Host(_model() or platform.processor() or platform.machine(), available_cores())
 
 
 def _model() -> str:

@@ -40,10 +40,10 @@ def section(accuracy: Accuracy, remarks: tuple[str, ...] = (), elsewhere: bool =
         {}
         if chosen is None
         else {
-            "chosen": chosen.rung.name,
+            "chosen": chosen.run.name,
             "why": chosen.why[0].upper() + chosen.why[1:],
-            "advice": "\n".join(tables.as_lines(chosen.rung.settings)),
-            "options": tables.as_options(chosen.rung.settings),
+            "advice": "\n".join(tables.as_lines(chosen.run.settings)),
+            "options": tables.as_options(chosen.run.settings),
         }
     )
     stages = dict.fromkeys(stage for one in accuracy.measurements for stage in one.stages)
@@ -84,7 +84,7 @@ def markdown(accuracy: Accuracy) -> str:
     blocks = [_markdown(tables.runs(accuracy)), f"{legend}.", _markdown(tables.orders(accuracy))]
     told = tables.prediction(accuracy)
     if told is not None and accuracy.recommended is not None:
-        options = tables.as_options(accuracy.recommended.rung.settings)
+        options = tables.as_options(accuracy.recommended.run.settings)
         blocks += [f"Recommended: `{options}`, {accuracy.recommended.why}.", _markdown(told)]
     return "\n\n".join([*blocks, f"Measured by `{accuracy.command}` on {accuracy.machine}."]) + "\n"
 

@@ -27,8 +27,8 @@ def figure(accuracy: Accuracy):
     """Plot the judged error against wall time and core-seconds, both logarithmic.
 
     Returns:
-        A figure of matplotlib: marks of one colour for each knob, the front as a line, tolerance, recommendation, and
-        the cost of the finest run where others are compared with it.
+        A figure of matplotlib: marks of one colour for each parameter, the front as a line, tolerance,
+        recommendation, and the cost of the finest run where others are compared with it.
     """
     with pyplot.rc_context(STYLE):
         drawing, axes = pyplot.subplots(1, 2, figsize=(9.6, 4.6), sharey=True, constrained_layout=True)
@@ -55,19 +55,19 @@ def _plain(axis) -> None:
 def _panel(axis, accuracy: Accuracy, cost: str) -> None:
     known = compared(accuracy)
     costs, errors = [getattr(one, cost) for one in known], [_error(one, accuracy) for one in known]
-    for number, knob in enumerate(dict.fromkeys(one.knob for one in known)):
-        here = [place for place, one in enumerate(known) if one.knob == knob]
+    for number, parameter in enumerate(dict.fromkeys(one.parameter for one in known)):
+        here = [place for place, one in enumerate(known) if one.parameter == parameter]
         style = {"color": COLOURS[number % len(COLOURS)], "marker": MARKERS[number % len(MARKERS)]}
-        axis.plot([costs[k] for k in here], [errors[k] for k in here], ls="", ms=5, label=knob, **style)
+        axis.plot([costs[k] for k in here], [errors[k] for k in here], ls="", ms=5, label=parameter, **style)
     best = front(costs, errors)
     line = {"color": "#333333", "lw": 0.9, "alpha": 0.6, "zorder": 1, "label": "Pareto front"}
     axis.step([costs[k] for k in best], [errors[k] for k in best], where="post", **line)
     for place in best[:LABELLED]:
         position = (costs[place], errors[place])
-        axis.annotate(known[place].rung, position, (4, 3), textcoords="offset points", fontsize=6)
+        axis.annotate(known[place].run, position, (4, 3), textcoords="offset points", fontsize=6)
     for one in every_run(accuracy):
         if one.value is not None and one.stages and not one.errors:  # the finest, whose own error is not known
-            label = f"cost of the finest run, {one.rung}"
+            label = f"cost of the finest run, {one.run}"
             axis.axvline(getattr(one, cost), color="#5f6c7b", lw=1.2, ls=":", label=label)
     if accuracy.tolerance is not None:
         axis.axhline(100.0 * accuracy.tolerance, color="#b3261e", lw=0.9, ls="--", label="tolerance")

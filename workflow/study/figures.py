@@ -8,12 +8,12 @@ from matplotlib.figure import Figure
 
 from reflowshock.workflow.case.text import SHOWN
 from reflowshock.workflow.report.curves import STYLE, pyplot
-from reflowshock.workflow.study.main_effects import Effect
+from reflowshock.workflow.study.main_effects import MainEffect
 
 BLUE, RED, GREY = "#0b5fa5", "#d1495b", "#9aa5b1"
 
 
-def main_effects(effects: Sequence[tuple[str, str, Sequence[Effect]]]) -> Figure:
+def main_effects(effects: Sequence[tuple[str, str, Sequence[MainEffect]]]) -> Figure:
     """Draw main effects: means at each value of a factor with least and largest, or samples with their trend.
 
     Args:
@@ -34,13 +34,13 @@ def main_effects(effects: Sequence[tuple[str, str, Sequence[Effect]]]) -> Figure
         return figure
 
 
-def axis_title(effect: Effect) -> str:
+def axis_title(effect: MainEffect) -> str:
     """Name a factor in two lines that fit a panel, with its unit."""
     table, _, name = effect.factor.keys[0].rpartition(".")
     return f"{table}\n{name} [{effect.unit}]" if effect.unit else f"{table}\n{name}"
 
 
-def _means(axis: Axes, effect: Effect, factor: float) -> None:
+def _means(axis: Axes, effect: MainEffect, factor: float) -> None:
     levels = effect.levels
     places = np.arange(len(levels))
     mean, low, high = (
@@ -55,7 +55,7 @@ def _means(axis: Axes, effect: Effect, factor: float) -> None:
     axis.margins(x=0.15)
 
 
-def _samples(axis: Axes, effect: Effect, factor: float) -> None:
+def _samples(axis: Axes, effect: MainEffect, factor: float) -> None:
     values = np.array(effect.values, dtype=float)
     axis.plot(values, factor * effect.metrics, ".", color=BLUE, markersize=6)
     if len(set(effect.values)) > 1:

@@ -1,4 +1,4 @@
-"""What a study will compute: products that are there, that are missing, and what these are foreseen to cost."""
+"""What a study will compute: products that are there, that are missing, and what these are predicted to cost."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ class StageOutlook:
         points: number of points that need one.
         products: number of distinct ones.
         missing: number of those that will be computed.
-        seconds: wall time [s] foreseen for these, one after the other; None where there is no forecast.
+        seconds: wall time [s] predicted for these, one after the other; None where there is no forecast.
     """
 
     stage: str

@@ -67,9 +67,9 @@ def test_a_point_has_a_run_folder_as_any_other(tmp_path):
     assert (store.run_folder(point) / "geometry/assembly.msh").samefile(
         store.product(point, "geometry") / "assembly.msh"
     )
-    verdicts = examine(store, point)
-    assert not verdicts["geometry"].stale
-    assert verdicts["reflow"].missing
+    states = examine(store, point)
+    assert not states["geometry"].stale
+    assert states["reflow"].missing
 
 
 def test_why_a_point_is_not_complete_is_told(tmp_path):
