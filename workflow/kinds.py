@@ -209,10 +209,10 @@ def kind_named_in(table: Mapping) -> Kind:
         return next(kind for kind in KINDS if kind.name == found[0])
     choice = "exactly one of " + ", ".join(f"[{name}]" for name in NAMES)
     if found:
-        message = "is of several kinds at once: it has " + " and ".join(f"[{name}]" for name in found)
+        message = "has the tables of several kinds: " + " and ".join(f"[{name}]" for name in found)
         raise CaseError("case", [Problem("", message, None, choice)])
     if isinstance(table.get("study"), dict):
-        raise CaseError("case", [Problem("", "is a study, not a case; use: reflowshock study")])
+        raise CaseError("case", [Problem("", "is a study, not a case; use reflowshock study")])
     hint = next((f"[{near}]" for name in table if (near := nearest(name, NAMES))), "")
     raise CaseError("case", [Problem("", "does not say what kind of case it is", None, choice, hint)])
 

@@ -50,7 +50,7 @@ def reason(state: StageState, case: Case) -> str:
     """Say why a stage will run or not."""
     if not state.stale:
         redone = ", ".join(state.because_of)
-        return f"up to date, if {redone} comes out the same" if redone else "up to date"
+        return f"up to date if {redone} gives the same result" if redone else "up to date"
     if state.missing:
         return "no product yet"
     if state.damaged:

@@ -43,7 +43,7 @@ def run_case(store: Store, point: Point, until: str, machine: Machine, *, force:
         wanted = {stage.name: states[stage.name] for stage in point.case.pipeline.upstream(until)}
         _tell_damage(wanted)
         for name in show_products(store, point):
-            console.print(f"put back {store.folder / name}")
+            console.print(f"restored {store.folder / name}")
         if any(state.stale for state in wanted.values()):
             watched = replace(machine, each_second=machine.each_second or _shower(store, point))
             run_points(store, [point], until, watched, lock)
@@ -120,13 +120,15 @@ def verify(store: Store, point: Point) -> bool:
         if state.damaged:
             print_error(f"{name}: {why_stale(state)}")
         elif state.stale:
-            print_error(f"{name}: {why_stale(state)}" if state.missing else f"{name}: is not of this case as it is now")
+            print_error(
+                f"{name}: {why_stale(state)}" if state.missing else f"{name}: belongs to other settings of this case"
+            )
         else:
             record = store.record(point, name) or {"files": {}}
             console.print(f"ok     {name:<11} {len(record['files']) + 1} files")
     lost = not_as_put(store, store.folder)
     for told in lost:
-        print_error(f"{told}; `reflowshock run` puts it back")
+        print_error(f"{told}; `reflowshock run` restores it")
     return not lost and not any(state.stale for state in states.values())
 
 
@@ -156,7 +158,7 @@ def clean(folder: Path, name: str, *, unused: bool = False, force: bool = False)
         left = remove_own(folder)
     console.print(f"removed {folder}" if not folder.exists() else f"removed all products from {folder}")
     if left:
-        console.print(f"kept what is not the program's: {', '.join(left)}")
+        console.print(f"kept files that the program did not write: {', '.join(left)}")
 
 
 def _shower(store: Store, point: Point) -> Callable[[], None]:

@@ -104,7 +104,7 @@ def _share(text: str) -> float:
     except ValueError:
         share = 0.0
     if rest or not 0.0 < share < 1.0:  # nan is neither
-        message = "is no share of the answer"
+        message = "is not a valid relative error"
         raise CaseError("command line", [Problem("--tolerance", message, text, '"0.0001%" to "99%", e.g. "2%"')])
     return share
 
@@ -116,7 +116,7 @@ def _seconds(text: str) -> float:
     except UnitError as error:
         raise CaseError("command line", [Problem("--budget", str(error), text, 'a time, e.g. "10min"')]) from error
     if not seconds > 0.0:
-        raise CaseError("command line", [Problem("--budget", "is no time to spend", text, "> 0 s")])
+        raise CaseError("command line", [Problem("--budget", "is not a valid time", text, "> 0 s")])
     return seconds
 
 
@@ -186,11 +186,14 @@ def show(request: AccuracyRequest, out: Path | None, console: Console) -> bool:
     tried = (*_left_out(runner), *_impossible(runner), *_failed(runner))
     remarks = (*tried, *unproved(accuracy), *_unhealthy(accuracy, runner), *_own_size(request, accuracy))
     write_pages(folder, accuracy, remarks)
-    console.print(
-        table(tables.runs(accuracy), f"Errors and costs, the least of all times that it was run: {accuracy.machine}")
-    )
+    console.print(table(tables.runs(accuracy), f"Errors and costs (smallest of repeated runs) on {accuracy.machine}"))
     console.print(styled("[dim]{}", tables.legend(accuracy)), soft_wrap=True)
-    console.print(table(tables.orders(accuracy), "Orders in h, the value of a parameter; core-seconds t0 + D h^-q"))
+    console.print(
+        table(
+            tables.orders(accuracy),
+            "Observed orders in h, the value of the parameter; cost in core-seconds: t0 + D h^-q",
+        )
+    )
     for remark in remarks:
         console.print(f"\n{remark}", soft_wrap=True)
     _show_choice(accuracy, console)
@@ -214,7 +217,7 @@ def _compute(
     request: AccuracyRequest,
 ) -> Mapping[str, str]:
     """Compute points one stage at a time, so that measurements do not disturb each other; show how far it is."""
-    again = " once more, for their times" if store.folder.name.startswith("again") else ""
+    again = " again, to measure their times" if store.folder.name.startswith("again") else ""
     with progress_bar(f"{len(points)} point{'s' if len(points) > 1 else ''}{again}") as progress:
 
         def count() -> None:
@@ -231,8 +234,8 @@ def _left_out(runner: StudyRunner) -> list[str]:
     texts = [f"{name} (about {duration(seconds)})" for name, seconds in runner.left_out.items()]
     limited = runner.budget < float("inf")
     why = "did not fit into what was left of the budget" if limited else f"take more than {duration(runner.longest)}"
-    more = "" if limited else "; a budget pays for them, e.g. --budget 10h"
-    return [f"Not run, since they {why}: {', '.join(texts)}{more}."]
+    more = "" if limited else "; to run them, give a budget, e.g. --budget 10h"
+    return [f"Not run because they {why}: {', '.join(texts)}{more}."]
 
 
 def _impossible(runner: StudyRunner) -> list[str]:
@@ -242,7 +245,7 @@ def _impossible(runner: StudyRunner) -> list[str]:
 def _failed(runner: StudyRunner) -> list[str]:
     """Say how runs that failed are tried again, which no call does by itself."""
     work = runner.stores[0].home / "work"
-    return [f"Runs that failed are not tried again, unless you remove {work}."] if runner.failed else []
+    return [f"Failed runs are not repeated unless you remove {work}."] if runner.failed else []
 
 
 def unproved(accuracy: Accuracy) -> list[str]:
@@ -252,7 +255,7 @@ def unproved(accuracy: Accuracy) -> list[str]:
         return []
     why = chosen.found.failed if chosen.found is not None else "it did not fit into what was left of the budget"
     predicted = f"its error of {percent(chosen.error)} and {chosen.core_seconds:.2f} core-seconds"
-    return [f"The recommendation was not run ({why}): {predicted} are predicted, not found."]
+    return [f"The recommendation was not run ({why}): {predicted} are predicted, not measured."]
 
 
 def _unhealthy(accuracy: Accuracy, runner: StudyRunner) -> list[str]:
@@ -262,7 +265,7 @@ def _unhealthy(accuracy: Accuracy, runner: StudyRunner) -> list[str]:
         return []
     point = runner.points[chosen.run.name]
     missed = failed_checks(runner.stores[0], point, runner.study.until)
-    return [f"Checks of the recommended run that do not hold: {'; '.join(missed)}."] if missed else []
+    return [f"Failed checks of the recommended run: {'; '.join(missed)}."] if missed else []
 
 
 def _own_size(request: AccuracyRequest, accuracy: Accuracy) -> list[str]:
@@ -272,8 +275,8 @@ def _own_size(request: AccuracyRequest, accuracy: Accuracy) -> list[str]:
     told = [f"{duration(total(known, _case(request.case, own)))} as it is"]
     if chosen is not None and own != request.settings:
         told.append(f"{duration(total(known, _case(request.case, own | dict(chosen.run.settings))))} as recommended")
-    how = f"times measured over predicted of the nearest of {known.points} points" if known.points else "not measured"
-    return [f"Wall time of the case at its own size: about {', '.join(told)} (forecast, {how})."]
+    how = f"corrected by the measured time of the nearest of {known.points} runs" if known.points else "not measured"
+    return [f"Wall time of the case at full size: about {', '.join(told)} (forecast, {how})."]
 
 
 def _case(path: Path, settings: Mapping[str, str]) -> Case:
@@ -288,7 +291,7 @@ def total(known, case: Case) -> float:
 def _show_choice(accuracy: Accuracy, console: Console) -> None:
     chosen = accuracy.recommended
     if chosen is None:
-        console.print(styled("\n[bold]Nothing to recommend[/]: no run has a known error within the budget."))
+        console.print(styled("\n[bold]Nothing to recommend[/]: no run within the budget has a known error."))
         return
     advice = styled("\n[bold]Recommended: {}[/], {}. In the case file:\n", chosen.run.name, chosen.why)
     console.print(advice, soft_wrap=True)

@@ -60,11 +60,11 @@ def recommend(
         return None
     good = [one for one in within if goal.tolerance is not None and one.bound <= goal.tolerance]
     if good:
-        chosen, why = min(good, key=lambda one: one.core_seconds), "the cheapest within the tolerance"
+        chosen, why = min(good, key=lambda one: one.core_seconds), "the cheapest setting within the tolerance"
     else:
         chosen = min(within, key=lambda one: one.bound)
-        why = "the most accurate" + (" within the budget" if goal.core_seconds < float("inf") else "")
-        why += "" if goal.tolerance is None else "; none is within the tolerance"
+        why = "the most accurate setting" + (" within the budget" if goal.core_seconds < float("inf") else "")
+        why += "" if goal.tolerance is None else "; no setting is within the tolerance"
     place = "measured" if chosen.measured else _place(chosen.run, measurements)
     error, cost = _predicted(chosen, fits, study.judged)
     return Recommended(chosen.run, f"{why}, {place}", error, cost)

@@ -65,7 +65,7 @@ def _answers(case: StructureCase) -> tuple[Mapping[str, str], Measure]:
         if isinstance(reference, Cantilever):
             return SWING, _swing
     if not case.watch:
-        message = "has no point, and nothing exact is known: there is nothing that could be compared"
+        message = "has no watch point, and there is no exact reference: nothing can be compared"
         raise CaseError("case", [Problem("watch", message, None, "tables [watch.NAME]")])
     return CURVES, _curves
 

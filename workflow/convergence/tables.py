@@ -71,7 +71,7 @@ def legend(accuracy: Accuracy) -> str:
     """Say what marks and errors mean."""
     names = [f"{short(name)}: {words}" for name, words in accuracy.errors.items() if short(name) != words]
     usual = usually_against(accuracy)
-    reference = [f"compared with {usual}, where nothing else is said"] if usual else []
+    reference = [f"compared with {usual} unless stated otherwise"] if usual else []
     return "; ".join([f"{ON_FRONT} on the Pareto front", *reference, *names])
 
 

@@ -27,7 +27,7 @@ def show_registry(console: Console) -> None:
                 _add(table, effect)
         console.print(table)
     console.print(
-        styled("\n[dim]An effect that is off is absent: no memory, no work, no branch. `effects CASE` says what acts.")
+        styled("\n[dim]An effect that is off costs nothing. `reflowshock effects CASE` shows which effects act.")
     )
 
 
@@ -36,7 +36,7 @@ def _add(table: Table, effect: Effect) -> None:
     if effect.threshold is not None:
         lines.insert(2, ("threshold", f"acts {effect.acts} {effect.threshold:g}"))
     if effect.name in measured():
-        lines.append(("cost", f"adds {per_cent(measured()[effect.name] - 1.0)} of a step without it ({MEASURED.name})"))
+        lines.append(("cost", f"adds {per_cent(measured()[effect.name] - 1.0)} to a step ({MEASURED.name})"))
     lines.append(("source", effect.source))
     for place, (title, text) in enumerate(lines):
         name = effect.name.replace("_", " ") if place == 0 else ""

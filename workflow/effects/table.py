@@ -8,8 +8,8 @@ from reflowshock.workflow.effects.costs import cost_shares
 
 HEAD = ("effect", "", "influence", "cost", "why")
 CAPTION = (
-    "influence: expected change of the answer; where off, what is left out. cost: share of the predicted time; where"
-    " off, what it would add (below 0: it saves time). –: nothing foresees it."
+    "influence: expected change of the result; if off, the error of leaving it out. cost: share of the predicted time;"
+    " if off, what it would add (below 0: it saves time). –: not predicted."
 )
 
 

@@ -18,7 +18,7 @@ from reflowshock.workflow.store.view import show
 
 BATCH = "batch"  # below the store: jobs, logs and marks of the last call
 JOBS = f"{BATCH}/jobs.json"
-UNTRIED = "was not reached"
+UNTRIED = "was not started"
 LEAST_FREE = 2**20  # bytes of a device on which a stage could still have said why it ended
 
 
@@ -188,10 +188,10 @@ def _untold(store: Store, point: Point, stage: str, state: StageState) -> str:
         told = UNTRIED if state.missing else f"{UNTRIED}: {why_stale(state)}"
         return f"{told}; see {said}\n{last_words(store.home)}" if said.is_file() else told
     words = log.read_text(encoding="utf-8", errors="replace").strip().splitlines()
-    last = f'; its last words: "{words[-1].strip()}"' if words else ""
+    last = f'; last output: "{words[-1].strip()}"' if words else ""
     if shutil.disk_usage(store.home).free < LEAST_FREE:
         return f"no space left on the device of {store.home}"
-    return f"ended without an error of its own, as when it is killed{last}; see {log}"
+    return f"ended without an error message (it may have been killed){last}; see {log}"
 
 
 def _run(store: Store, jobs: Sequence[Job], machine: Machine, lock: int) -> bool:

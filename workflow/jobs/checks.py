@@ -42,7 +42,7 @@ def check_slurm(profile: Profile, cases: Sequence[Case]) -> Partition:
 
 def _missing() -> Iterator[Problem]:
     if shutil.which("sbatch") is None:
-        where = "a machine from which Slurm takes jobs, or --executor local"
+        where = "a machine with Slurm's commands, or --executor local"
         yield Problem("--executor", "sbatch is not installed here", "slurm", where)
     if find_spec(PLUGIN) is None:
         message = "Snakemake's plugin for Slurm is not installed; pip install 'reflowshock[cluster]' brings it"
@@ -66,5 +66,7 @@ def _chosen(profile: Profile, found: Sequence[Partition]) -> Partition:
 def _too_large(case: Case, partition: Partition) -> Iterator[Problem]:
     for key, ranks in case.ranks_by_key.items():
         if ranks > partition.cores:
-            message = f"asks for {ranks} MPI ranks, Slurm's partition {partition.name} has {partition.cores} cores"
-            yield Problem(key, message, ranks, f"<= {partition.cores} in all")
+            message = (
+                f"asks for {ranks} MPI ranks, but the Slurm partition {partition.name} has {partition.cores} cores"
+            )
+            yield Problem(key, message, ranks, f"<= {partition.cores} in total")

@@ -41,7 +41,9 @@ def snakemake(
     """
     jobs = " ".join(executor.left_over(home))
     if jobs:
-        raise RunFolderBusy(f"jobs of an earlier command are at work in {home}: wait for them, or: scancel {jobs}")
+        raise RunFolderBusy(
+            f"jobs of an earlier command are still running in {home}: wait for them, or use: scancel {jobs}"
+        )
     command = [
         *executor.guard, sys.executable, "-m", "snakemake", *executor.options, "--snakefile", str(SNAKEFILE),
         "--rerun-triggers", "mtime", "--rerun-incomplete", "--nolock", "--keep-going", *arguments,

@@ -163,5 +163,5 @@ def executor_for(
         chosen = read_profile(profile)
         return Slurm(chosen, at_once or JOBS, check_slurm(chosen, cases).largest, oversubscribe)
     if profile is not None:
-        raise CaseError("run", [Problem("--profile", "is of a cluster", str(profile), "with --executor slurm")])
+        raise CaseError("run", [Problem("--profile", "needs a cluster", str(profile), "with --executor slurm")])
     return Local(at_once or available_cores(), oversubscribe)

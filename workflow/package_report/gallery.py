@@ -12,7 +12,7 @@ from reflowshock.workflow.package_report.joint_records import by_shape
 from reflowshock.workflow.report.pictures import MILLI, new_plotter, save
 
 FREE, WIDTH = 0, 1800
-DEVIATION = "deviation [um]"
+DEVIATION = "deviation [µm]"
 LINES, LINE = 6, 31  # of text beneath a joint; pixels of one
 BAR = 100  # pixels beneath all rows
 MAXIMUM_NAMES = 4
@@ -85,9 +85,9 @@ def caption(names: Sequence[str], joint: Mapping[str, Any], surface: pyvista.Dat
     deviation = free_of(surface)[DEVIATION]
     lines = [
         " ".join(names[:MAXIMUM_NAMES]) + more,
-        f"{1e6 * joint['standoff']:.1f} x {1e6 * joint['max_width']:.1f} um",
+        f"{1e6 * joint['standoff']:.1f} x {1e6 * joint['max_width']:.1f} µm",
         f"{joint['angles']} deg" if "angles" in joint else "",
-        f"{deviation.min():+.1f} to {deviation.max():+.1f} um",
+        f"{deviation.min():+.1f} to {deviation.max():+.1f} µm",
         f"tilt {1e3 * joint['tilted']:.1f} mrad" if "tilted" in joint else "",
     ]
     return "\n".join(line for line in lines if line)
@@ -125,7 +125,7 @@ def _add_text(plotter: pyvista.Plotter, text: str, place: np.ndarray) -> None:
 
 def _add_bar(plotter: pyvista.Plotter) -> None:
     plotter.add_scalar_bar(
-        title="deviation from the truncated sphere of the same volume [um]",
+        title="deviation from the truncated sphere of the same volume [µm]",
         n_labels=5,
         fmt="%+.0f",
         vertical=False,

@@ -83,7 +83,7 @@ def ranked_joints(
         "pad",
         "time [ms]",
         "peel stress [MPa]",
-        "largest in an element [MPa]",
+        "largest element value [MPa]",
         "standoff [µm]",
         "width [µm]",
         *(["plastic work at pad [kJ/m³]"] if "plastic_work_board" in history else []),

@@ -8,7 +8,7 @@ from reflowshock.workflow.package_report import joint_tables, mesh_tables
 from reflowshock.workflow.package_report.joint_records import bridge_records, joint_records
 from reflowshock.workflow.process.products import read_json
 
-BRIDGE_CAPTION = "as one body: particles and free surface, right by pressure above ambient."
+BRIDGE_CAPTION = "as one body: particles and free surface; right: coloured by pressure above ambient."
 
 
 def add_joints(run_folder: Path, context: dict) -> None:

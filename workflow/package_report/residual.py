@@ -47,7 +47,7 @@ def table(joints: Mapping[str, list]) -> dict:
     """Stress of every joint before the shock, the largest first."""
     columns = [joints[name] for name in (*SIDES, "von_mises_max")]
     strains = joints.get("plastic_strain_max")
-    heads = ["at the board's pad [MPa]", "at the package's pad [MPa]", "largest in an element [MPa]"]
+    heads = ["at the board's pad [MPa]", "at the package's pad [MPa]", "largest element value [MPa]"]
     order = sorted(range(len(joints["joints"])), key=lambda k: -max(joints[side][k] for side in SIDES))
     rows = [
         [

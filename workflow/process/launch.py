@@ -26,9 +26,9 @@ QUIET = ("--mca", "orte_execute_quiet", "1")  # of Open MPI 4; 5 has no option -
 END_WITH_PARENT = ("setpriv", "--pdeathsig", "TERM")
 DIE_WITH_PARENT = ("setpriv", "--pdeathsig", "KILL")
 ENDINGS: dict[int, str] = {
-    signal.SIGKILL: "was killed, as the system does when memory is short",
-    signal.SIGXFSZ: "was ended, since a file exceeded the largest allowed size (ulimit -f)",
-    signal.SIGXCPU: "was ended, since it took all the processor time allowed (ulimit -t)",
+    signal.SIGKILL: "was killed, probably because memory ran out",
+    signal.SIGXFSZ: "was ended because a file exceeded the largest allowed size (ulimit -f)",
+    signal.SIGXCPU: "was ended because it exceeded the processor time limit (ulimit -t)",
     signal.SIGSEGV: "crashed (segmentation fault)",
     signal.SIGBUS: "crashed (bus error, as when no space is left for a file in memory)",
 }
@@ -94,7 +94,7 @@ def launch(command: Sequence[str], on_line: Callable[[str], None], log: Path, pa
             raise
     if code != 0:
         lines = _read(log) + _read(log.with_name(ERROR))
-        words = "\n".join(lines[-LAST_LINES:]) or "it said nothing"
+        words = "\n".join(lines[-LAST_LINES:]) or "it wrote no message"
         said, words = (without_traceback(text, log) for text in (told(lines), words))
         if watch.told:
             raise LaunchError(f"{watch.told}; {said}".removesuffix("; "))

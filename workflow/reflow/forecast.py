@@ -46,8 +46,8 @@ def thermal_effect(thermal: Thermal, steps: list[LoadStep]) -> dict:
     """Say at which temperatures solder is liquid, as an effect."""
     low, high = (extreme(step.temperature for step in steps) for extreme in (min, max))
     reference = thermal.reference - KELVIN
-    why = f"solder is liquid in {len(steps)} load steps from {low - KELVIN:.4g} to {high - KELVIN:.4g} degC"
-    return {"on": bool(high > low or high != thermal.reference), "why": f"{why}, all is flat at {reference:.4g} degC"}
+    why = f"solder is liquid in {len(steps)} load steps from {low - KELVIN:.4g} to {high - KELVIN:.4g} °C"
+    return {"on": bool(high > low or high != thermal.reference), "why": f"{why}, all is flat at {reference:.4g} °C"}
 
 
 def problems(
@@ -72,7 +72,7 @@ def _no_room(solder: Solder, gap: float, thermal: Thermal, pitch: float) -> Iter
     if thermal.corner_displacement is None or lowest >= 0.0 or gap + lowest > needed:
         return
     limit = (needed - gap) * thermal.corner_displacement / lowest
-    message = f"leaves {1e3 * (gap + lowest):.4g} mm of the gap of {1e3 * gap:.4g} mm, too little for the solder"
+    message = f"leaves {1e3 * (gap + lowest):.4g} mm of the {1e3 * gap:.4g} mm gap, too little for the solder"
     value = f"{1e3 * thermal.corner_displacement:.4g} mm"
     yield Problem("thermal.corner_displacement", message, value, f"> {1e3 * limit:.4g} mm")
 
@@ -87,5 +87,8 @@ def _no_time(solder: Solder, geometries: "Mapping[str, JointGeometry]") -> Itera
             if effect["on"]:
                 key = "solder.process_time" if getattr(solder.effects, name) == "auto" else f"solder.effects.{name}"
                 yield Problem(
-                    key, f"load steps of [thermal] are at rest, but {effect['why']}", None, "a slower process"
+                    key,
+                    f"cannot be combined with [thermal], whose load steps are at rest: {effect['why']}",
+                    None,
+                    "a slower process",
                 )

@@ -177,7 +177,7 @@ class Telling:
         busy = [f"{name} {share:.0%}" for name, share in shares.items() if 0.0 < share < 1.0]
         self._bar(
             self._done / len(self._steps),
-            f"load step {self._done + 1} of {len(self._steps)}, {step.temperature - KELVIN:.0f} degC, "
+            f"load step {self._done + 1} of {len(self._steps)}, {step.temperature - KELVIN:.0f} °C, "
             f"exchange {self._number + 1}{self._residual}: {finished} of {len(shares)} joints {' '.join(busy)}",
         )
 

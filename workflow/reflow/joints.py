@@ -175,7 +175,7 @@ def refuse_joints_without_mesh(records: Mapping[str, dict], verdicts: Sequence[s
     for verdict in verdicts:
         names = [name for name, record in records.items() if record["verdict"] == verdict]
         if names:
-            raise ReflowError(f"{', '.join(names)} {verdict}: there is no such joint to mesh, see reflow/joints.json")
+            raise ReflowError(f"{', '.join(names)} {verdict}: such a joint cannot be meshed, see reflow/joints.json")
 
 
 def solve_joints(

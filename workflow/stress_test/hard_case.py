@@ -178,7 +178,9 @@ def _combinations(head: HardCaseFile, problems: list[Problem]) -> Iterator[tuple
         table = deepcopy(head.parameters)
         for key, value in zip(varied, choice, strict=True):
             if not set_value(table, key.split("."), value):
-                problems.append(Problem(f"vary.{key}", "is below a key that has a value, not a table", value))
+                problems.append(
+                    Problem(f"vary.{key}", "cannot be set: the key above it has a value, not a table", value)
+                )
                 return
         words = (f"{key.split('.')[-1].replace('_', ' ')} {value}" for key, value in zip(varied, choice, strict=True))
         yield ", ".join(words), table

@@ -174,7 +174,7 @@ def waves_that_do_not_pass(case: StructureCase) -> Iterator[Problem]:
             starts = [start for _, start in exact_layers.passes(layers_of(case), heights).values()]
             least = max(starts) + 0.5 * _pulse_of(case, reference.load).duration
             if case.dynamics.duration < least:
-                message = f"ends before the waves of references.{key} have passed its watch points"
+                message = f"ends before the waves of references.{key} have passed the watch points"
                 yield Problem("dynamics.duration", message, short(case.dynamics.duration), f">= {short(least)}")
 
 

@@ -122,14 +122,12 @@ def step_problems(case: StructureCase) -> Iterator[Problem]:
         with np.errstate(all="ignore"):
             layers = forecast_layers(case)
     except np.linalg.LinAlgError:
-        yield Problem(
-            "structure", "has elements without a time step: sizes, densities or moduli are beyond all numbers"
-        )
+        yield Problem("structure", "has elements without a time step: sizes, densities or moduli are out of range")
         return
     numerics, critical = case.dynamics.numerics, critical_step(case, layers)
     exact = numerics.critical_step == "element" and case.structure.holes is None
     if numerics.explicit_step and exact and numerics.explicit_step > critical and "explicit" in case.dynamics.solvers:
-        message = "is above the critical step, beyond which every motion grows"
+        message = "is above the critical step: the solution would be unstable"
         allowed = f"<= {short(critical)}; critical_step = power_iteration may allow more"
         yield Problem("dynamics.numerics.explicit_step", message, short(numerics.explicit_step), allowed)
     steps = forecast_steps(case, layers)
@@ -147,7 +145,7 @@ def shorter_than_window(case: StructureCase, window: float) -> Iterator[Problem]
     for name, pulse in pulses_of(case.loads).items():
         shortest = min(pulse_durations({name: pulse}), default=window)
         if shortest < window:
-            message = f"is shorter than a window of {short(window)}, the time between two exchanges of the models"
+            message = f"is shorter than one coupling window ({short(window)})"
             allowed = f">= {short(window)}, smaller elements of the coarse layers, or no dynamics.coupling"
             yield Problem(f"loads.{name}.duration", message, short(shortest), allowed)
 

@@ -107,16 +107,14 @@ def _heights(key: str, reference: BarWave | LayeredBar, scene: StructureProblem)
     heights = [scene.watch[name].at[2] for _, name in points]
     if not 0.0 <= heights[0] < heights[1] < lower <= upper < heights[2]:
         allowed = f"two heights below {1e3 * lower:g} mm, upwards, then one above {1e3 * upper:g} mm"
-        yield Problem(key, "the watch points are not in their layers", None, allowed)
+        yield Problem(key, "has watch points outside their layers", None, allowed)
 
 
 def _pressure(key: str, name: str, scene: StructureProblem, pulse: str) -> Iterator[Problem]:
     yield from _known(key, name, scene.loads, "load")
     load = scene.loads.get(name)
     if load is not None and not (isinstance(load, Pressure) and load.peak is not None and load.pulse == pulse):
-        yield Problem(
-            key, f"is not a {pulse} pressure that is given by its peak", name, f'a pressure with pulse = "{pulse}"'
-        )
+        yield Problem(key, f"is not a {pulse} pressure given by its peak", name, f'a pressure with pulse = "{pulse}"')
 
 
 def _pulse(key: str, name: str, scene: StructureProblem) -> Iterator[Problem]:

@@ -96,7 +96,7 @@ def show_outlook(points: Points, store: Store) -> None:
     )
     console.print(table)
     if points.impossible:
-        console.print(f"{len(points.impossible)} points cannot be and are skipped")
+        console.print(f"{len(points.impossible)} points are not possible and are skipped")
 
 
 def predicted_study_seconds(points: Points, store: Store) -> float:
@@ -172,7 +172,9 @@ def warn_of_metrics(points: Points, store: Store, first: Point) -> None:
         if name not in known:
             hint = nearest(name, sorted(known))
             told = f"; did you mean {hint}?" if hint else ""
-            print_error(f"the first point has no number {name}{told} Ctrl-C stops the study and keeps what is finished")
+            print_error(
+                f"the first point has no numeric metric {name}{told} Ctrl-C stops the study and keeps finished results"
+            )
 
 
 def has_metrics(study: Study, rows: Sequence[Row]) -> bool:
@@ -181,7 +183,7 @@ def has_metrics(study: Study, rows: Sequence[Row]) -> bool:
     missing_ones = [name for name in study.metrics if known and name not in known]
     for name in missing_ones:
         hint = nearest(name, sorted(known))
-        print_error(f"no point has a number {name}" + (f"; did you mean {hint}?" if hint else ""))
+        print_error(f"no point has a numeric metric {name}" + (f"; did you mean {hint}?" if hint else ""))
     return not missing_ones
 
 

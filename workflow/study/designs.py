@@ -86,10 +86,10 @@ def grid_axes(table: Mapping[str, object], problems: list[Problem]) -> Iterator[
             continue
         points = [_level(keys, value) for value in values]
         if len({tuple(point.items()) for point in points if point is not None}) < len(points) - points.count(None):
-            problems.append(Problem(f"grid.{text}", "has a value twice", values, VALUES))
+            problems.append(Problem(f"grid.{text}", "contains a value twice", values, VALUES))
         if None in points:
             problems.append(
-                Problem(f"grid.{text}", f"has values that are not one for each of {len(keys)} keys", values, VALUES)
+                Problem(f"grid.{text}", f"must have one value for each of its {len(keys)} keys", values, VALUES)
             )
         yield Design((Factor(keys),), tuple(point for point in points if point is not None))
 

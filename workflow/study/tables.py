@@ -7,8 +7,8 @@ from reflowshock.workflow.study.main_effects import MainEffect, effect_of, measu
 from reflowshock.workflow.study.results import HEALTHY, UNHEALTHY, Row
 from reflowshock.workflow.study.study_file import Study
 
-MIXED = "{} of {} points have no result: means at the values of a factor then differ also by what other factors do."
-UNSOUND = "{} of {} points, which count in the means, broke a check."
+MIXED = "{} of {} points have no result, so means at the values of a factor also differ by the other factors."
+UNSOUND = "{} of {} points failed a check; they count in the means."
 
 
 def ranking(study: Study, rows: Sequence[Row]) -> dict:

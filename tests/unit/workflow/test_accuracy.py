@@ -197,7 +197,7 @@ def test_a_recommendation_that_was_not_run_is_told(done):
     accuracy = done[0]
     assert unproved(accuracy) == []
     (told,) = unproved(replace(accuracy, recommended=replace(accuracy.recommended, found=None)))
-    assert "was not run (it did not fit into what was left of the budget)" in told and "predicted, not found" in told
+    assert "was not run (it did not fit into what was left of the budget)" in told and "predicted, not measured" in told
 
 
 def test_settings_can_be_pasted():
@@ -215,9 +215,9 @@ def test_checks_and_runs_that_failed_are_told(tmp_path, monkeypatch, capsys):
     with pytest.raises(SystemExit):
         main()
     said = capsys.readouterr().out
-    assert "Checks of the recommended run that do not hold: reflow: volume drift" in said
+    assert "Failed checks of the recommended run: reflow: volume drift" in said
     place = tmp_path / ".store/work"
-    assert f"Runs that failed are not tried again, unless you remove {place}." in said.replace("\n", "")
+    assert f"Failed runs are not repeated unless you remove {place}." in said.replace("\n", "")
 
 
 @pytest.mark.parametrize(("tolerance", "code"), [("0.2%", 0), ("0.0001%", 1)])

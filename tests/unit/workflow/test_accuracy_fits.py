@@ -135,7 +135,7 @@ def test_a_measurement_comes_back_from_its_file(tmp_path: Path):
     ):
         write_accuracy(tmp_path, accuracy)
         assert read_accuracy(tmp_path / "accuracy.json") == accuracy
-    assert read_accuracy(tmp_path / "no such file") is None
+    assert read_accuracy(tmp_path / "does not exist") is None
     assert all(read_accuracy(path) for path in CASES.glob("*/accuracy.json"))
     (tmp_path / "accuracy.json").write_text('{"of": "another version"}')
     assert read_accuracy(tmp_path / "accuracy.json") is None
@@ -149,7 +149,7 @@ def test_what_is_finer_than_all_runs_that_came_to_their_end_is_not_chosen():
     failed = Measurement("size 0.01", "size", 0.01, {}, "abc", {}, {}, "it broke")
     measured = {one.name: _measurement(one) for one in RUNS} | {failed.run: failed}
     chosen = recommend(study, measured, fits_of(study, measured), Goal(0.02**2))
-    assert chosen.run.name == "size 0.05" and "none is within the tolerance" in chosen.why
+    assert chosen.run.name == "size 0.05" and "no setting is within the tolerance" in chosen.why
 
 
 def _measurement(one: StudyRun) -> Measurement:

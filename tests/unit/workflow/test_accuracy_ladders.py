@@ -44,7 +44,7 @@ def test_histories_of_other_steps_are_compared_at_the_same_times():
 def test_a_structure_of_which_nothing_could_be_compared_has_no_study():
     case = read_case(SMALL_CASE.with_name("structure.toml"))
     assert structure_study(case).judged == "displacement"
-    with pytest.raises(CaseError, match="watch: has no point"):
+    with pytest.raises(CaseError, match="watch: has no watch point"):
         structure_study(case.model_copy(update={"watch": {}}))
 
 

@@ -136,7 +136,7 @@ def test_partitions_and_jobs_of_a_folder(tmp_path, monkeypatch):
     assert partitions() == [Partition("short", 80, 32, False), Partition("long", 64, 64, True)]
     assert jobs_in(tmp_path) == ["7"]
     monkeypatch.setattr(checks, "_missing", lambda: ())
-    with pytest.raises(CaseError, match="asks for 70 MPI ranks, Slurm's partition long has 64 cores"):
+    with pytest.raises(CaseError, match="asks for 70 MPI ranks, but the Slurm partition long has 64 cores"):
         checks.check_slurm(Profile(tmp_path), [case("bga_drop", "shock.ranks.total=70")])
     program(tmp_path, "sinfo", "pass")
     with pytest.raises(CaseError, match="no partition"):

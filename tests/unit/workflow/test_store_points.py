@@ -76,12 +76,12 @@ def test_why_a_point_is_not_complete_is_told(tmp_path):
     store, point = Store(tmp_path), read_possible_points(SMALL_CASE, [{}])[0][0]
     make(store, point, ["geometry"])
     assert why(store, point, "geometry") == ""
-    assert why(store, point, "report") == "stage reflow: was not reached"
+    assert why(store, point, "report") == "stage reflow: was not started"
     log = log_of(store, point, "reflow")
     log.parent.mkdir(parents=True)
     log.write_text("some words\nKilled\n")
     assert (
-        f'stage reflow: ended without an error of its own, as when it is killed; its last words: "Killed"; see {log}'
+        f'stage reflow: ended without an error message (it may have been killed); last output: "Killed"; see {log}'
         == (why(store, point, "report"))
     )
     message = store.work_folder(point, "reflow") / ".reflow.partial" / MESSAGE

@@ -139,10 +139,10 @@ def test_a_check_that_failed_is_named(store):
 def test_a_damaged_case_of_a_run_is_told(done):
     path = done.folder / CASE
     path.write_text(path.read_text().replace('"small"', '"smell"'))
-    with pytest.raises(CaseError, match="is not as it was written"):
+    with pytest.raises(CaseError, match="was changed since it was written"):
         read_case_of_run(done.folder)
     path.unlink()
-    with pytest.raises(CaseError, match="nothing was run"):
+    with pytest.raises(CaseError, match="is not a run folder"):
         read_case_of_run(done.folder)
 
 

@@ -284,7 +284,7 @@ def test_another_case_needs_force(store, what, name):
 
 
 @pytest.mark.parametrize(
-    ("names", "words"), [(["notes.txt"], "files that are not"), (["inputs", ".snakemake"], "earlier")]
+    ("names", "words"), [(["notes.txt"], "files that the program did not write"), (["inputs", ".snakemake"], "earlier")]
 )
 def test_a_folder_of_somebody_else_is_left_alone(tmp_path, names, words):
     for name in names:
@@ -297,7 +297,7 @@ def test_a_folder_of_somebody_else_is_left_alone(tmp_path, names, words):
 
 def test_no_run_folder_is_made_in_a_store(store):
     folder = store.home / "products/mine"
-    with pytest.raises(CaseError, match=r"is in a folder \.store"), locked(folder, "run", "small"):
+    with pytest.raises(CaseError, match=r"is inside \.store"), locked(folder, "run", "small"):
         pass
     assert not folder.exists()
 
@@ -325,7 +325,7 @@ def test_what_the_run_folder_lacks_is_told(store):
 
 def test_a_run_folder_has_one_user(tmp_path):
     first, second = locked(tmp_path, "run", "a"), locked(tmp_path, "run", "a")
-    with first, pytest.raises(RunFolderBusy, match="another run is at work"), second:
+    with first, pytest.raises(RunFolderBusy, match="another run is active"), second:
         pass
     with locked(tmp_path, "run", "a"):
         pass

@@ -164,7 +164,7 @@ def test_a_run_that_cannot_be_is_told_before_it_is_tried(monkeypatch, tmp_path):
     monkeypatch.setattr(hard_case, "trials", families.trials)
     drop = {"case": str(HARD.parent / "sessile_drop/case.toml"), "settings": {"drop": {"volum": "1 mm^3"}}}
     run = {"family": "reflow", "title": "a run", "why": "", "trial": "run", "bounds": {"shape_error": "1 %"}}
-    for parameters, told in (({"case": "no.toml"}, "there is no such file"), (drop, "did you mean drop.volume?")):
+    for parameters, told in (({"case": "no.toml"}, "does not exist"), (drop, "did you mean drop.volume?")):
         with pytest.raises(CaseError, match=f"parameters.*{told}"):
             hard_cases("reflow_run", run | {"parameters": parameters}, "reflow_run.toml", tmp_path)
 
