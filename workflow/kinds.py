@@ -20,15 +20,14 @@ from reflowshock.workflow.case.run import StageFunction
 from reflowshock.workflow.convergence.series import ConvergenceStudy
 from reflowshock.workflow.package.case import BoardDropCase, PackageCase
 from reflowshock.workflow.reflow.stage import reflow
-from reflowshock.workflow.solder import problems as solder_checks
+from reflowshock.workflow.solder import case as solder_checks
 from reflowshock.workflow.solder import stages as solder_stages
 from reflowshock.workflow.solder.case import DropCase, DropsCase, JointCase, OscillationCase
-from reflowshock.workflow.solder.forecast import forecast_scene, scene_size
-from reflowshock.workflow.solder.plan import scene_tables
+from reflowshock.workflow.solder.forecast import forecast_scene, scene_size, scene_tables
 from reflowshock.workflow.structure import forecast as structure_forecast
 from reflowshock.workflow.structure import stages as structure_stages
 from reflowshock.workflow.structure.case import StructureCase
-from reflowshock.workflow.structure.plan import structure_tables
+from reflowshock.workflow.structure.forecast import structure_tables
 from reflowshock.workflow.structure.problems import structure_problems
 
 

@@ -10,8 +10,7 @@ from reflowshock.workflow.case.fields import display, leaves
 from reflowshock.workflow.case.text import duration
 from reflowshock.workflow.effects.page import effects_table
 from reflowshock.workflow.kinds import kind_of, stage_seconds
-from reflowshock.workflow.process.plan_table import new_table
-from reflowshock.workflow.process.terminal import styled
+from reflowshock.workflow.process.terminal import new_table, styled
 from reflowshock.workflow.store.keys import Change
 from reflowshock.workflow.store.point import Point
 from reflowshock.workflow.store.state import StageState, examine, why_stale

@@ -17,16 +17,14 @@ from reflowshock.workflow.case.text import duration, percent
 from reflowshock.workflow.case.units import UnitError, to_si
 from reflowshock.workflow.convergence import tables
 from reflowshock.workflow.convergence.calibration import calibration, default_folder
-from reflowshock.workflow.convergence.machine import this_host
-from reflowshock.workflow.convergence.measured import FILE, Accuracy, Recommended, fits_of, write_accuracy
+from reflowshock.workflow.convergence.measured import FILE, Accuracy, Recommended, fits_of, this_host, write_accuracy
 from reflowshock.workflow.convergence.page import PAGE, PICTURE, write_pages
 from reflowshock.workflow.convergence.series import ConvergenceStudy
 from reflowshock.workflow.jobs import batch
 from reflowshock.workflow.kinds import kind_of, stage_seconds
 from reflowshock.workflow.pipeline.reader import read_case
 from reflowshock.workflow.process.environment import available_cores
-from reflowshock.workflow.process.progress import progress_bar
-from reflowshock.workflow.process.terminal import styled
+from reflowshock.workflow.process.terminal import progress_bar, styled
 from reflowshock.workflow.store.folders import check_folder, locked
 from reflowshock.workflow.store.point import Point
 from reflowshock.workflow.store.state import failed_checks

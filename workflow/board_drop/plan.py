@@ -10,8 +10,7 @@ from reflowshock.workflow.board_drop.shock_forecast import ShockForecast
 from reflowshock.workflow.case.text import duration, short
 from reflowshock.workflow.package.case import BoardDropCase, PackageCase
 from reflowshock.workflow.process.environment import available_cores
-from reflowshock.workflow.process.plan_table import REFLOW_SPEED, new_table
-from reflowshock.workflow.process.terminal import styled
+from reflowshock.workflow.process.terminal import REFLOW_SPEED, new_table, styled
 
 
 def package_tables(case: PackageCase, outlook: PackageForecast) -> Iterator[RenderableType]:

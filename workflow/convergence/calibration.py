@@ -6,8 +6,7 @@ from math import log
 from pathlib import Path
 
 from reflowshock.workflow.case.case import Case
-from reflowshock.workflow.convergence.machine import this_host
-from reflowshock.workflow.convergence.measured import FILE, StageCost, read_accuracy
+from reflowshock.workflow.convergence.measured import FILE, StageCost, read_accuracy, this_host
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,14 +1,41 @@
 """`accuracy.json`: what was measured in a convergence study, on which machine, and what follows from it."""
 
 import json
+import platform
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from reflowshock.workflow.convergence.errors import Error
-from reflowshock.workflow.convergence.machine import Host
 from reflowshock.workflow.convergence.orders import CostFit, ErrorFit, fit_cost, fit_error
 from reflowshock.workflow.convergence.series import ConvergenceStudy, StudyRun
+from reflowshock.workflow.process.environment import available_cores
+
+CPU_INFO = Path("/proc/cpuinfo")
+
+
+@dataclass(frozen=True, slots=True)
+class Host:
+    """Model of the processor, and the cores that a program may use."""
+
+    processor: str
+    cores: int
+
+    def __str__(self) -> str:
+        return f"{self.processor}, {self.cores} {'core' if self.cores == 1 else 'cores'}"
+
+
+def this_host() -> Host:
+    """Return the machine that this process is on."""
+    return Host(_model() or platform.processor() or platform.machine(), available_cores())
+
+
+def _model() -> str:
+    if not CPU_INFO.is_file():
+        return ""
+    lines = (line.partition(":") for line in CPU_INFO.read_text(encoding="utf-8").splitlines())
+    return next((value.strip() for key, _, value in lines if key.strip() == "model name"), "")
+
 
 FILE = "accuracy.json"
 

@@ -1,13 +1,17 @@
 """Convergence studies: the settings of a case whose errors and costs are measured. Each kind of case has its own."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
 
 from reflowshock.workflow.case.case import Case
+
+Arrays = Mapping[str, NDArray]
+
 
 Values = float | NDArray[np.float64]
 
@@ -119,3 +123,24 @@ class ConvergenceStudy:
     def judged(self) -> str:
         """Name of the quantity that the tolerance is meant for."""
         return next(iter(self.errors))
+
+
+def at_same_times(history: Arrays, names: Iterable[str], duration: float, count: int) -> NDArray[np.float64]:
+    """Interpolate arrays of a history at evenly spaced times.
+
+    Args:
+        history: of a run; ``time`` (s,) [s].
+        names: of arrays (s, ...).
+        duration: of the motion [s]; runs end there but for a rounding of their steps.
+        count: of the times.
+
+    Returns:
+        All values, one array after the other, each in the order of times.
+    """
+    times = common_times(duration, count)
+    return np.concatenate([CubicSpline(history["time"], history[name])(times).ravel() for name in names])
+
+
+def common_times(duration: float, count: int) -> NDArray[np.float64]:
+    """Return evenly spaced times (count,) [s] from zero to the end of the motion."""
+    return np.linspace(0.0, duration, count)

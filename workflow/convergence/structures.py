@@ -8,14 +8,20 @@ from typing import Any
 
 from reflowshock.workflow.case.problems import CaseError, Problem
 from reflowshock.workflow.case.units import from_si
-from reflowshock.workflow.convergence.histories import at_same_times, common_times
-from reflowshock.workflow.convergence.series import ConvergenceStudy, Parameter, Quantity, StudyRun
+from reflowshock.workflow.convergence.series import (
+    ConvergenceStudy,
+    Parameter,
+    Quantity,
+    StudyRun,
+    at_same_times,
+    common_times,
+)
 from reflowshock.workflow.process.environment import available_cores
 from reflowshock.workflow.store.product import read_record
 from reflowshock.workflow.structure.case import StructureCase
 from reflowshock.workflow.structure.findings import exact_velocities, read_history, read_places, wave_points
-from reflowshock.workflow.structure.launch import solver_folders
 from reflowshock.workflow.structure.references import BarWave, Cantilever, LayeredBar
+from reflowshock.workflow.structure.stages import solver_folders
 
 SECOND = 2.0  # order of central differences and of trilinear elements (Hughes, The Finite Element Method, 9.2)
 REFINED = (0.3, 0.4, 0.5, 0.6, 0.8, 1.0, 1.2, 1.5, 2.0, 2.5, 4.0)  # times the numbers of elements of the case

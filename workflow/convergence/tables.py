@@ -1,14 +1,29 @@
-"""Tables of what accuracy costs: for the terminal, the page, a report and a README."""
+"""Tables of what accuracy costs, with the Pareto front: for the terminal, the page, a report and a README."""
 
 import shlex
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from reflowshock.workflow.case.problems import as_toml
 from reflowshock.workflow.case.scales import override_value
 from reflowshock.workflow.case.text import number, percent
 from reflowshock.workflow.convergence.measured import Accuracy, Fit, Measurement
-from reflowshock.workflow.convergence.pareto import front
+
+
+def front(costs: Sequence[float], errors: Sequence[float]) -> list[int]:
+    """Return which runs are on the front, the cheapest first.
+
+    Args:
+        costs: of each run.
+        errors: of each run, equally many.
+    """
+    best, chosen = float("inf"), []
+    for place in sorted(range(len(costs)), key=lambda k: (costs[k], errors[k])):
+        if errors[place] < best:
+            best = errors[place]
+            chosen.append(place)
+    return chosen
+
 
 LONGEST_MESSAGE = 90
 ON_FRONT = "*"

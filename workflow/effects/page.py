@@ -7,13 +7,10 @@ from rich.console import Console
 from rich.table import Table
 
 from reflowshock.workflow.case.case import Case
-from reflowshock.workflow.effects.costs import MEASURED, measured
-from reflowshock.workflow.effects.effect import Effect
-from reflowshock.workflow.effects.registry import registry
-from reflowshock.workflow.effects.table import CAPTION, HEAD, per_cent, rows
+from reflowshock.workflow.effects.registry import Effect, registry
+from reflowshock.workflow.effects.table import CAPTION, HEAD, MEASURED, measured, per_cent, rows
 from reflowshock.workflow.kinds import kind_of
-from reflowshock.workflow.process.plan_table import new_table
-from reflowshock.workflow.process.terminal import styled
+from reflowshock.workflow.process.terminal import new_table, styled
 
 FIELDS = (("adds", "adds"), ("number", "number"), ("influence", "influence"), ("switch", "key"), ("place", "object"))
 

@@ -7,9 +7,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from reflowshock.workflow.jobs.engine import SAID, last_words, snakemake
+from reflowshock.workflow.jobs.engine import SAID, JobOutput, failures_of, last_words, snakemake
 from reflowshock.workflow.jobs.executor import Executor, Jobs, Local, Slurm
-from reflowshock.workflow.jobs.job_output import JobOutput, failures_of
 from reflowshock.workflow.store.point import Point
 from reflowshock.workflow.store.product import discard
 from reflowshock.workflow.store.state import StageState, examine, why_stale

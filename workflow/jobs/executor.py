@@ -12,9 +12,8 @@ from typing import Any, Protocol
 
 from reflowshock.workflow.case.case import Case
 from reflowshock.workflow.case.problems import CaseError, Problem
-from reflowshock.workflow.jobs.checks import check_slurm
+from reflowshock.workflow.jobs.checks import NoAnswer, cancel, check_slurm, jobs_in
 from reflowshock.workflow.jobs.profile import Profile, read_profile
-from reflowshock.workflow.jobs.queue import NoAnswer, cancel, jobs_in
 from reflowshock.workflow.pipeline.resources import MOST_CORES, stage_resources
 from reflowshock.workflow.process.environment import available_cores
 from reflowshock.workflow.process.launch import DIE_WITH_PARENT, LAUNCHER, end_group

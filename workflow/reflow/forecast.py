@@ -1,4 +1,4 @@
-"""What a reflow that is coupled with board and package would be like, before it runs."""
+"""Load steps of a reflow that is coupled with board and package, and what it would be like before it runs."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -8,11 +8,35 @@ from reflowshock.fem.problem.thermal import KELVIN, Thermal
 from reflowshock.particles.parameters.solder import Solder
 from reflowshock.workflow.case.problems import Problem
 from reflowshock.workflow.reflow.between import thermal_effects
-from reflowshock.workflow.reflow.load_steps import LoadStep, load_steps
 
 if TYPE_CHECKING:
     from reflowshock.particles.core.geometry import JointGeometry
     from reflowshock.workflow.package.case import PackageCase
+
+from itertools import groupby
+
+
+@dataclass(frozen=True, slots=True)
+class LoadStep:
+    """What acts on board and package besides the solder: temperature [K], displacement of the die's corner [m]."""
+
+    temperature: float
+    corner: float
+
+
+def load_steps(thermal: Thermal) -> list[LoadStep]:
+    """Return the load steps with liquid solder, in order; in the last one its shape freezes.
+
+    Those of the heating divide the way from the reference to the peak evenly; cooling takes the same ones backwards.
+    Melting and solidification are load steps of their own.
+    """
+    rise = (thermal.peak - thermal.reference) / thermal.steps
+    way = [thermal.reference + rise * number for number in range(thermal.steps)] if rise > 0.0 else []
+    heating = [thermal.melting, *(value for value in way if value > thermal.melting), thermal.peak]
+    cooling = [*(value for value in reversed(way) if value > thermal.solidification), thermal.solidification]
+    temperatures = [value for value, _ in groupby(heating + cooling)]
+    return [LoadStep(value, thermal.corner(value)) for value in temperatures]
+
 
 # Measured with the structures of tests/verification/test_workflow_coupling.py: a package that floats is sought by
 # three or four exchanges a load step, forces that bend need two, and one way none beyond the first.

@@ -1,13 +1,24 @@
-"""Effects, size and cost of the reflow of solder alone, from the parameters of the scene."""
+"""Effects, size and cost of the reflow of solder alone, and its table of the plan."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from math import ceil
 from typing import Any
 
+from rich.console import RenderableType
+
 from reflowshock.workflow.case.case import Case
 from reflowshock.workflow.case.forecast import BYTES_OF_PARTICLE, Size
+from reflowshock.workflow.case.text import short
+from reflowshock.workflow.process.terminal import REFLOW_SPEED, new_table, styled
 from reflowshock.workflow.solder.case import DropCase, DropsCase, JointCase, OscillationCase, SceneCase
+
+SCHEMES = {
+    "energy": "minimum energy of the tracked surface at constant volume",
+    "inertia": "moving tetrahedra, second order in space and time; cost of the maximum number of steps",
+    "gripc": "pressure correction of Hu et al., for comparison only; its steps are not part of the predicted cost",
+}
+
 
 SECONDS_TO_START = 2.0  # until a stage has loaded its libraries and kernels
 
@@ -117,3 +128,17 @@ def scene_size(case: Case) -> Size:
     """Predict what the stages of a case take."""
     outlook = forecast_scene(case)
     return Size(outlook.seconds, 1, BYTES_OF_PARTICLE * outlook.particles)
+
+
+def scene_tables(case: Case, outlook: SceneForecast) -> Iterator[RenderableType]:
+    """Yield particles, scheme and time steps; then what the costs assume."""
+    table = new_table("\nReflow", "what", "value", "remark")
+    table.add_row("particles", f"{outlook.particles}", f"{1e6 * outlook.spacing:.3g} µm spacing at the start")
+    table.add_row("scheme", outlook.scheme, SCHEMES[outlook.scheme])
+    table.add_row(
+        "capillary limit", short(outlook.capillary_limit), "largest stable time step of explicit surface tension"
+    )
+    ratio = outlook.largest_step / outlook.capillary_limit
+    table.add_row("largest time step", short(outlook.largest_step), f"{ratio:.3g} times the limit")
+    yield table
+    yield styled("\n[dim]{}", REFLOW_SPEED)

@@ -12,9 +12,7 @@ from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.case.text import duration
 from reflowshock.workflow.jobs.batch import Machine, missing, run_points, show_products
 from reflowshock.workflow.pipeline.points import PointsError, read_possible_points
-from reflowshock.workflow.process.plan_table import new_table
-from reflowshock.workflow.process.progress import progress_bar
-from reflowshock.workflow.process.terminal import console, print_error
+from reflowshock.workflow.process.terminal import console, new_table, print_error, progress_bar
 from reflowshock.workflow.store.folders import locked
 from reflowshock.workflow.store.point import Point
 from reflowshock.workflow.store.product import discard
@@ -22,8 +20,7 @@ from reflowshock.workflow.store.store import Store
 from reflowshock.workflow.store.view import adopt
 from reflowshock.workflow.study import tables
 from reflowshock.workflow.study.main_effects import is_number
-from reflowshock.workflow.study.outlook import outlook
-from reflowshock.workflow.study.progress import teller
+from reflowshock.workflow.study.progress import outlook, teller
 from reflowshock.workflow.study.results import HEALTHY, IMPOSSIBLE, Row, row_of
 from reflowshock.workflow.study.study_file import Study, read_study
 

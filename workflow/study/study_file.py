@@ -15,9 +15,16 @@ from reflowshock.workflow.case.toml_file import parse_toml, read_text
 from reflowshock.workflow.case.toml_places import Places
 from reflowshock.workflow.case.validation import translate
 from reflowshock.workflow.kinds import NAMES
-from reflowshock.workflow.study.designs import MOST_POINTS, Design, TooManyPoints, grid_axes, list_axis, sampled
-from reflowshock.workflow.study.hypercube import Hypercube
-from reflowshock.workflow.study.setting_text import as_text
+from reflowshock.workflow.study.designs import (
+    MOST_POINTS,
+    Design,
+    Hypercube,
+    TooManyPoints,
+    as_text,
+    grid_axes,
+    list_axis,
+    sampled,
+)
 
 DESIGNS = "at least one of [grid], [[list]], [latin_hypercube]"
 

@@ -8,7 +8,6 @@ import pytest
 from reflowshock.workflow.accuracy.recommend import Goal, recommend
 from reflowshock.workflow.case.case import CASES
 from reflowshock.workflow.convergence.errors import Error, errors_of, richardson
-from reflowshock.workflow.convergence.machine import this_host
 from reflowshock.workflow.convergence.measured import (
     Accuracy,
     Measurement,
@@ -16,11 +15,12 @@ from reflowshock.workflow.convergence.measured import (
     StageCost,
     fits_of,
     read_accuracy,
+    this_host,
     write_accuracy,
 )
 from reflowshock.workflow.convergence.orders import fit_cost, fit_error
-from reflowshock.workflow.convergence.pareto import front
 from reflowshock.workflow.convergence.series import ConvergenceStudy, Parameter, Quantity, StudyRun
+from reflowshock.workflow.convergence.tables import front
 
 SIZES = (0.4, 0.2, 0.1, 0.05)
 

@@ -9,10 +9,9 @@ from reflowshock.workflow.accuracy.recommend import Goal, recommend
 from reflowshock.workflow.case.case import CASES
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.convergence.errors import Error, errors_of
-from reflowshock.workflow.convergence.histories import at_same_times
 from reflowshock.workflow.convergence.measured import Measurement, StageCost, fits_of
 from reflowshock.workflow.convergence.packages import SAME_MESH, package_study
-from reflowshock.workflow.convergence.series import ConvergenceStudy, Parameter, StudyRun
+from reflowshock.workflow.convergence.series import ConvergenceStudy, Parameter, StudyRun, at_same_times
 from reflowshock.workflow.convergence.structures import structure_study
 from reflowshock.workflow.pipeline.reader import read_case
 from reflowshock.workflow.structure.findings import exact_velocities, wave_points

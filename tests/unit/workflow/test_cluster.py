@@ -6,11 +6,12 @@ from pathlib import Path
 import pytest
 
 from reflowshock.workflow.case.problems import CaseError
-from reflowshock.workflow.jobs import checks, queue
+from reflowshock.workflow.jobs import checks
+from reflowshock.workflow.jobs import checks as queue
+from reflowshock.workflow.jobs.checks import Partition, jobs_in, partitions
+from reflowshock.workflow.jobs.engine import JobOutput, failures_of
 from reflowshock.workflow.jobs.executor import ExecutorName, Local, Slurm, executor_for
-from reflowshock.workflow.jobs.job_output import JobOutput, failures_of
 from reflowshock.workflow.jobs.profile import FILE, SHIPPED, Profile, read_profile
-from reflowshock.workflow.jobs.queue import Partition, jobs_in, partitions
 from reflowshock.workflow.pipeline.reader import read_case
 from reflowshock.workflow.pipeline.resources import stage_resources
 from reflowshock.workflow.process.launch import LAUNCHER, mpi_command

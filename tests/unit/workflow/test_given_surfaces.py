@@ -19,8 +19,7 @@ from reflowshock.meshing.core.facets import outlines
 from reflowshock.meshing.surface.closed_surface import enclosed_volume, read_surface
 from reflowshock.particles.scenes.products import write_shapes
 from reflowshock.particles.steps.shape import JointShape, Snapshot
-from reflowshock.workflow.board_drop.joint_meshes import mesh_real_joints
-from reflowshock.workflow.board_drop.joint_surfaces import write_surfaces
+from reflowshock.workflow.board_drop.joint_meshes import mesh_real_joints, write_surfaces
 from reflowshock.workflow.case.fields import display_values
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.case.run import Run

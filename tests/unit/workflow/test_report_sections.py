@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 import pyvista
 
-from reflowshock.workflow.package_report import cost, gallery, mesh_tables, residual, shape_effect, shock, warpage
+from reflowshock.workflow.package_report import cost, gallery, shape_effect, shock, warpage
 from reflowshock.workflow.package_report import interface as section
-from reflowshock.workflow.package_report.array_map import array_map
+from reflowshock.workflow.package_report import joint_tables as mesh_tables
+from reflowshock.workflow.package_report import shock as residual
+from reflowshock.workflow.package_report.gallery import array_map
 from reflowshock.workflow.package_report.joint_records import joint_records
 from reflowshock.workflow.package_report.joints import headline
 from tests.support.chain_products import BOW, MICRO, MILLI, bowed_structure, interface

@@ -12,9 +12,8 @@ from reflowshock.workflow.package.case import BoardDropCase
 from reflowshock.workflow.pipeline.reader import read_case
 from reflowshock.workflow.pipeline.schema import case_schema
 from reflowshock.workflow.pipeline.template import templates, write_new_case
-from reflowshock.workflow.solder.case import DropCase, JointCase
+from reflowshock.workflow.solder.case import DropCase, JointCase, of_joint
 from reflowshock.workflow.solder.forecast import forecast_scene
-from reflowshock.workflow.solder.problems import of_joint
 from reflowshock.workflow.store.keys import stage_inputs
 from tests.support.workflow_command import WHO_COMPUTES
 

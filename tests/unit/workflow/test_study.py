@@ -13,13 +13,10 @@ from reflowshock.workflow.pipeline.points import PointsError
 from reflowshock.workflow.store.store import Store
 from reflowshock.workflow.study import tables
 from reflowshock.workflow.study.command import read_points_of, results, run_study
-from reflowshock.workflow.study.designs import Factor
-from reflowshock.workflow.study.hypercube import Hypercube
+from reflowshock.workflow.study.designs import Factor, Hypercube, as_text, between
 from reflowshock.workflow.study.main_effects import effect_of, ranked
-from reflowshock.workflow.study.outlook import outlook
-from reflowshock.workflow.study.progress import seconds_left
+from reflowshock.workflow.study.progress import outlook, seconds_left
 from reflowshock.workflow.study.results import HEALTHY, IMPOSSIBLE, UNHEALTHY, Row, columns, write_csv, write_parquet
-from reflowshock.workflow.study.setting_text import as_text, between
 from reflowshock.workflow.study.study_file import read_study
 from tests.support.workflow_command import SMALL_CASE
 
