@@ -20,10 +20,10 @@ from reflowshock.workflow.case.run import StageFunction
 from reflowshock.workflow.convergence.series import ConvergenceStudy
 from reflowshock.workflow.package.case import BoardDropCase, PackageCase
 from reflowshock.workflow.reflow.stage import reflow
-from reflowshock.workflow.solder import case as solder_checks
+from reflowshock.workflow.solder import case as solder_case
 from reflowshock.workflow.solder import stages as solder_stages
 from reflowshock.workflow.solder.case import DropCase, DropsCase, JointCase, OscillationCase
-from reflowshock.workflow.solder.forecast import forecast_scene, scene_size, scene_tables
+from reflowshock.workflow.solder.forecast import forecast_solder, solder_size, solder_tables
 from reflowshock.workflow.structure import forecast as structure_forecast
 from reflowshock.workflow.structure import stages as structure_stages
 from reflowshock.workflow.structure.case import StructureCase
@@ -97,11 +97,11 @@ def _structure_report(run_folder: Path, case: StructureCase, context: dict, summ
     add_structure(run_folder, case, context, summary["metrics"])
 
 
-def _scene_report(run_folder: Path, case: Case, context: dict, summary: dict) -> None:
+def _solder_report(run_folder: Path, case: Case, context: dict, summary: dict) -> None:
     if (run_folder / "reflow/shape.h5").exists():
-        from reflowshock.workflow.solder.report import add_scene
+        from reflowshock.workflow.solder.report import add_solder
 
-        add_scene(run_folder, case.kind, context, summary)
+        add_solder(run_folder, case.kind, context, summary)
 
 
 def _package_study(case: PackageCase) -> ConvergenceStudy:
@@ -116,24 +116,24 @@ def _structure_study(case: StructureCase) -> ConvergenceStudy:
     return structure_study(case)
 
 
-def _scene_study(case: Case) -> ConvergenceStudy:
+def _solder_study(case: Case) -> ConvergenceStudy:
     from reflowshock.workflow.convergence.solder import STUDIES
 
     return STUDIES[case.kind](case)
 
 
-def _scene(case: type[Case], problems: Callable[[Any], list[Problem]], reflow_scene: StageFunction) -> Kind:
+def _solder_kind(case: type[Case], problems: Callable[[Any], list[Problem]], reflow_solder: StageFunction) -> Kind:
     """Return a kind of case of solder alone."""
     return Kind(
         case,
         problems,
-        {"reflow": reflow_scene},
-        forecast_scene,
-        scene_size,
-        scene_tables,
+        {"reflow": reflow_solder},
+        forecast_solder,
+        solder_size,
+        solder_tables,
         "reflow",
-        _scene_report,
-        _scene_study,
+        _solder_report,
+        _solder_study,
     )
 
 
@@ -180,10 +180,10 @@ STRUCTURE = Kind(
 )
 KINDS = (
     BOARD_DROP,
-    _scene(DropCase, solder_checks.of_drop, solder_stages.reflow_drop),
-    _scene(JointCase, solder_checks.of_joint, solder_stages.reflow_joint),
-    _scene(DropsCase, solder_checks.of_drops, solder_stages.reflow_drops),
-    _scene(OscillationCase, solder_checks.of_oscillation, solder_stages.reflow_oscillation),
+    _solder_kind(DropCase, solder_case.of_drop, solder_stages.reflow_drop),
+    _solder_kind(JointCase, solder_case.of_joint, solder_stages.reflow_joint),
+    _solder_kind(DropsCase, solder_case.of_drops, solder_stages.reflow_drops),
+    _solder_kind(OscillationCase, solder_case.of_oscillation, solder_stages.reflow_oscillation),
     STRUCTURE,
     PACKAGE,
 )

@@ -76,7 +76,7 @@ def forecast(case: PackageCase) -> PackageForecast:
 
 
 def _heated(of_reflow: PackageForecast, case: PackageCase, thermal: Thermal) -> PackageForecast:
-    """Foresee a reflow in load steps: how many joints the structure makes distinct is not known, all may be."""
+    """Predict a reflow in load steps: how many joints the structure makes distinct is not known, all may be."""
     heated = forecast_heated(case, thermal)
     share = of_reflow.joints / of_reflow.distinct
     return replace(

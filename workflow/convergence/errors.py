@@ -120,7 +120,7 @@ def richardson(sizes: Sequence[float], values: Sequence[Values], order: float | 
         return None
     coarse, fine = (np.asarray(values[k]) - np.asarray(values[k + 1]) for k in (0, 1))
     if np.sum(coarse * fine) <= 0.0:
-        return None  # the answers swing
+        return None  # the answers oscillate
     ratio = _norm(coarse) / _norm(fine)
 
     def excess(power: float) -> float:

@@ -149,7 +149,7 @@ def _other_solvers(case: StructureCase) -> list[Parameter]:
 
 
 def _is_linear(case: StructureCase) -> bool:
-    yielding = any(material.plasticity is not None for material in case.scene.layer_materials.values())
+    yielding = any(material.plasticity is not None for material in case.problem.layer_materials.values())
     return not yielding and case.dynamics.kinematics == "small"
 
 

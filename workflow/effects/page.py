@@ -1,4 +1,4 @@
-"""The page of the registry, and that of a scene, in a terminal."""
+"""The page of the registry, and that of a case, in a terminal."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -41,7 +41,7 @@ def _add(table: Table, effect: Effect) -> None:
 
 
 def effects_table(case: Case, effects: Mapping[str, Any], of_what: str) -> Table:
-    """Return the effects of a scene: on or off, expected influence, share of the cost, why."""
+    """Return the effects of a case: on or off, expected influence, share of the cost, why."""
     table = new_table(f"\nEffects of the {of_what}", *HEAD)
     for name, acts, influence, cost, why in rows(case, effects):
         table.add_row(name, styled("[green]on[/]" if acts else "[dim]off[/]"), influence, cost, why)

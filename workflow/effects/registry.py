@@ -9,7 +9,7 @@ APART = "_in_the_shock"
 
 @dataclass(frozen=True, slots=True)
 class Effect:
-    """An effect: an object in a list, absent where the scene does not call for it.
+    """An effect: an object in a list, absent where the case does not call for it.
 
     Attributes:
         name: as in plans, reports and ``summary.json``.
@@ -21,7 +21,7 @@ class Effect:
         switch: the key of a case file, and its values.
         source: of the number or the law.
         acts: whether it acts above or below the threshold.
-        threshold: of the number; None where the scene says itself whether the effect is there.
+        threshold: of the number; None where the case says itself whether the effect is there.
     """
 
     name: str

@@ -24,7 +24,7 @@ def measured() -> dict[str, float]:
 def cost_shares(case: Case, effects: Mapping[str, Any]) -> dict[str, float]:
     """Return effect -> its share of the predicted cost; of one that is off, what it would add.
 
-    Negative where the effect saves time. Effects whose cost is neither foreseen nor measured are left out.
+    Negative where the effect saves time. Effects whose cost is neither predicted nor measured are left out.
     """
     try:
         seconds = stage_seconds(case)
@@ -63,7 +63,7 @@ CAPTION = (
 
 
 def rows(case: Case, effects: Mapping[str, Any]) -> Iterator[tuple[str, bool, str, str, str]]:
-    """Yield name, whether it is on, influence, cost and why of each effect of a scene."""
+    """Yield name, whether it is on, influence, cost and why of each effect of a case."""
     shares = cost_shares(case, effects)
     for name, decision in effects.items():
         influence, share = decision.get("influence"), shares.get(name)

@@ -123,7 +123,7 @@ class Slurm:
         return (*jobs, "--nocolor", "--quiet", "progress", "host")
 
     def jobs(self, case: Case) -> Jobs:
-        """What ``plan`` foresees, with a margin."""
+        """What ``plan`` predicts, with a margin."""
         wanted = stage_resources(case, self.profile.walltime_factor, self.largest)
         return {stage: resources.of_rule(self.profile.launcher) for stage, resources in wanted.items()}
 

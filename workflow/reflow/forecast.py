@@ -45,7 +45,7 @@ EXCHANGES_TO_FLOAT, EXCHANGES_TO_BEND, EXCHANGES_ONE_WAY = 4, 2, 1
 
 @dataclass(frozen=True, slots=True)
 class HeatedForecast:
-    """What is foreseen.
+    """What is predicted.
 
     Attributes:
         effects: effect -> {"on", "why"}.
@@ -59,7 +59,7 @@ class HeatedForecast:
 
 
 def forecast_heated(case: "PackageCase", thermal: Thermal) -> HeatedForecast:
-    """Foresee load steps, exchanges and effects."""
+    """Predict load steps, exchanges and effects."""
     steps, effects = load_steps(thermal), thermal_effects(case, thermal)
     each = EXCHANGES_TO_BEND if effects["solder_force"]["on"] else EXCHANGES_ONE_WAY
     each = EXCHANGES_TO_FLOAT if thermal.package == "floating" else each

@@ -15,7 +15,7 @@ def _one_body(scene: str) -> Pipeline:
     return Pipeline((reflow, report_of("reflow")))
 
 
-class SceneCase(Case):
+class SolderCase(Case):
     """Molten solder alone, without package and board; the table that names the kind holds its scene."""
 
     gravity: Switch = "auto"
@@ -27,7 +27,7 @@ class SceneCase(Case):
         return self.solder.resolve(getattr(self, self.kind), self.gravity)
 
 
-class DropCase(SceneCase):
+class DropCase(SolderCase):
     """A drop of solder on a wall or pad."""
 
     kind = "drop"
@@ -36,7 +36,7 @@ class DropCase(SceneCase):
     drop: Drop
 
 
-class JointCase(SceneCase):
+class JointCase(SolderCase):
     """A joint of solder between two pads."""
 
     kind = "joint"
@@ -45,7 +45,7 @@ class JointCase(SceneCase):
     joint: Joint
 
 
-class DropsCase(SceneCase):
+class DropsCase(SolderCase):
     """Two drops that become one, or stay apart."""
 
     kind = "drops"
@@ -55,7 +55,7 @@ class DropsCase(SceneCase):
 
 
 class OscillationCase(Case):
-    """A free drop that swings."""
+    """A free drop that oscillates."""
 
     kind = "oscillation"
     stages = _one_body("oscillation")

@@ -15,7 +15,7 @@ DROP_ERROR = 0.01  # of a drop's height and width, against the Young-Laplace sha
 PRESSURE_ERROR = 0.005  # of a drop's mean pressure, against the Young-Laplace shape
 PRESSURE_SCATTER = 0.01  # of the pressures in a drop, over the capillary pressure
 ANGLE_EXCESS = 3.0  # of contact angles beyond the receding and the advancing one [deg]
-PERIOD_ERROR = 0.01  # of a drop that swings, against Reid: exact at small amplitude
+PERIOD_ERROR = 0.01  # of an oscillating drop, against Reid: exact at small amplitude
 DECAY_ERROR = 0.10  # of its decay rate, against Reid
 JOINT_ERROR = 0.005  # of a joint's width and waist, against the Young-Laplace shape
 AXIAL_FORCE_ERROR = 0.02  # of a joint, against the Young-Laplace shape, over pi times radius times surface tension
@@ -85,16 +85,16 @@ def reflow_drops(run: Run[DropsCase], folder: Path) -> Findings:
 
 
 def reflow_oscillation(run: Run[OscillationCase], folder: Path) -> Findings:
-    """Let a free drop swing."""
+    """Let a free drop oscillate."""
     from reflowshock.particles.core.checkpoint import Checkpoint
     from reflowshock.particles.parameters.effects import decide_oscillation
     from reflowshock.particles.scenes.free_drop import solve_oscillation
     from reflowshock.particles.scenes.products import write_body
 
-    scene, solder = run.case.oscillation, run.case.molten
-    checkpoint = Checkpoint(run.checkpoints("reflow") / "drop", (scene, solder))
-    with progress_bar(f"oscillation of {scene.particles} particles") as progress:
-        shape = solve_oscillation(scene, solder, progress, checkpoint)
+    oscillation, solder = run.case.oscillation, run.case.molten
+    checkpoint = Checkpoint(run.checkpoints("reflow") / "drop", (oscillation, solder))
+    with progress_bar(f"oscillation of {oscillation.particles} particles") as progress:
+        shape = solve_oscillation(oscillation, solder, progress, checkpoint)
     write_body(folder, shape, None)
     found = of_oscillation(shape.metrics, decide_oscillation(solder))
     return replace(found, continued="the drop" if checkpoint.continued else "")
@@ -134,7 +134,7 @@ def of_drops(metrics: Numbers, expected: int, effects: Mapping[str, Any]) -> Fin
 
 
 def of_oscillation(metrics: Numbers, effects: Mapping[str, Any]) -> Findings:
-    """Judge a drop that swings by volume, and by Reid's period and decay rate."""
+    """Judge an oscillating drop by volume, and by Reid's period and decay rate."""
     limits = {"period_error": PERIOD_ERROR, "decay_rate_error": DECAY_ERROR}
     return Findings(_known(metrics), _at_rest(metrics, limits), dict(effects))
 

@@ -146,7 +146,7 @@ def bars_of(case: StructureCase, reference: BarWave) -> exact_bar.Bars:
     """Return the two layers as bars."""
     from reflowshock.fem.materials.elasticity import elasticity_matrix
 
-    layers, materials = case.structure.layers.values(), case.scene.layer_materials.values()
+    layers, materials = case.structure.layers.values(), case.problem.layer_materials.values()
     lower, upper = (float(elasticity_matrix(material)[2, 2]) for material in materials)
     below, above = (material.density for material in materials)
     first, second = (layer.thickness for layer in layers)
@@ -157,7 +157,7 @@ def layers_of(case: StructureCase) -> exact_layers.Layers:
     """Return all layers as bars."""
     from reflowshock.fem.materials.elasticity import elasticity_matrix
 
-    materials = case.scene.layer_materials.values()
+    materials = case.problem.layer_materials.values()
     return exact_layers.Layers(
         tuple(layer.thickness for layer in case.structure.layers.values()),
         tuple(float(elasticity_matrix(material)[2, 2]) for material in materials),
@@ -182,7 +182,7 @@ def strip_of(case: StructureCase, reference: Cantilever) -> exact_cantilever.Str
     """Return the only layer as a strip."""
     from reflowshock.fem.materials.elasticity import elasticity_matrix
 
-    (material,) = case.scene.layer_materials.values()
+    (material,) = case.problem.layer_materials.values()
     pressure, body = case.loads[reference.load].peak or 0.0, case.structure
     return exact_cantilever.Strip(body.length, body.thickness, elasticity_matrix(material), material.density, pressure)
 

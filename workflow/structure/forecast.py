@@ -81,13 +81,13 @@ def forecast_structure(case: StructureCase) -> StructureForecast:
     steps = forecast_steps(case, layers)
     counts = {solver: ceil(dynamics.duration / step) for solver, step in steps.items()}
     elements = sum(layer.elements for layer in layers.values())
-    solvers = forecast_solvers(case.scene, elements, counts["explicit"], counts["implicit"])
+    solvers = forecast_solvers(case.problem, elements, counts["explicit"], counts["implicit"])
     coupled = forecast_coupled(case, layers, solvers.explicit.seconds / counts["explicit"] / elements)
     alone = solvers.explicit.seconds / case.ranks
     cost = {"explicit": alone, "implicit": solvers.implicit.seconds, "dns": alone}
     cost |= {"explicit": coupled.seconds / case.ranks} if coupled else {}
     seconds = {"shock": sum(SECONDS_TO_START + cost[solver] for solver in dynamics.solvers)}
-    return StructureForecast(effects(case.scene, added_mass(case, layers)), layers, steps, solvers, coupled, seconds)
+    return StructureForecast(effects(case.problem, added_mass(case, layers)), layers, steps, solvers, coupled, seconds)
 
 
 def forecast_coupled(case: StructureCase, layers: Mapping[str, LayerForecast], update: float) -> CoupledForecast | None:
@@ -172,7 +172,7 @@ def forecast_layers(case: StructureCase) -> dict[str, LayerForecast]:
     from reflowshock.fem.elements.box_step import box_element_step
     from reflowshock.meshing.board.box_plan import count_box
 
-    body, materials = case.structure, case.scene.layer_materials
+    body, materials = case.structure, case.problem.layer_materials
     layers = {}
     for name, part in count_box(case.box).items():
         step = box_element_step(body.element, body.formulation, materials[name], np.array(part.smallest))
@@ -183,7 +183,7 @@ def forecast_layers(case: StructureCase) -> dict[str, LayerForecast]:
 
 def added_mass(case: StructureCase, layers: Mapping[str, LayerForecast]) -> float:
     """Predict the mass [kg] that scaling adds: it raises the steps of some layers to the smallest of the others."""
-    body, materials = case.structure, case.scene.layer_materials
+    body, materials = case.structure, case.problem.layer_materials
     target = min(layer.critical_step for layer in layers.values() if not layer.mass_scaled)
     area = case.box.extent(0) * case.box.extent(1)
     return sum(

@@ -28,7 +28,7 @@ def run_solver(run: Run[StructureCase], folder: Path, solver: str) -> None:
         "solver": solver,
         "mesh": str(run.folder.resolve() / "geometry/structure.msh"),
         "checkpoints": str(run.checkpoints("shock").resolve() / solver),
-        **run.case.scene.model_dump(mode="json"),
+        **run.case.problem.model_dump(mode="json"),
     }
     run_fem(run, folder, request, f"shock, {solver} solver")
 

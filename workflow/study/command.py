@@ -67,7 +67,7 @@ def read_points_of(path: Path, oversubscribe: bool = False, force: bool = False)
 
 
 def show_outlook(points: Points, store: Store) -> None:
-    """Print what would be computed, and its foreseen cost."""
+    """Print what would be computed, and its predicted cost."""
     every = list(points.possible.values())
     stages = outlook(every, missing(store, every, LAST))
     table = new_table(

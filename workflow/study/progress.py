@@ -93,7 +93,7 @@ class StageOutlook:
 
 
 def outlook(points: Sequence[Point], jobs: Sequence[Job]) -> list[StageOutlook]:
-    """Foresee what a study will compute.
+    """Predict what a study will compute.
 
     Args:
         points: all of them.
