@@ -4,14 +4,14 @@ from pathlib import Path
 
 import pytest
 
+from reflowshock.cases.hard.hard_case import HardCase, read_hard_cases
 from reflowshock.cases.hard.trials import motion
+from reflowshock.cases.hard.verdict import attempt
 from reflowshock.fem.coupling import held_velocity
 from reflowshock.fem.division import whole
 from reflowshock.fem.forces.force_assembled import AssembledElements
 from reflowshock.fem.forces.force_nonlinear import NonlinearElements
 from reflowshock.workflow.pipeline.template import CASES
-from reflowshock.workflow.stress_test.hard_case import HardCase, read_hard_cases
-from reflowshock.workflow.stress_test.verdict import attempt
 
 ELSEWHERE = {  # asserted by tests of their own, which are slow
     "elements_order_hexahedra",

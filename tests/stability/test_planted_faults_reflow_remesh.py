@@ -4,6 +4,8 @@ from dataclasses import replace
 
 import pytest
 
+from reflowshock.cases.hard.hard_case import read_hard_cases
+from reflowshock.cases.hard.verdict import attempt
 from reflowshock.meshing.joint import levels
 from reflowshock.meshing.joint.joint_place import JointPlace
 from reflowshock.meshing.surface import user_surface
@@ -11,8 +13,6 @@ from reflowshock.particles.physics.force_gravity import Gravity
 from reflowshock.particles.physics.force_wetting import Wetting
 from reflowshock.particles.steps.inertial_flow import InertialFlow
 from reflowshock.workflow.stress_test.command import HARD
-from reflowshock.workflow.stress_test.hard_case import read_hard_cases
-from reflowshock.workflow.stress_test.verdict import attempt
 
 
 def flip(patch, owner, name):

@@ -17,23 +17,24 @@ import psutil
 import pytest
 from hypothesis import strategies as st
 from pydantic import Field
-
-from reflowshock.cases.hard.trials.elements import Impact, PairRun, Turns
-from reflowshock.particles.parameters.solder import Parameters
-from reflowshock.workflow.case.problems import CaseError
-from reflowshock.workflow.case.units import UnitError
-from reflowshock.workflow.stress_test import families, hard_case, sample
-from reflowshock.workflow.stress_test.bound import read_bound
 from reflowshock.workflow.stress_test.case_file import hard_case_text
-from reflowshock.workflow.stress_test.command import HARD, Request, stress_test
-from reflowshock.workflow.stress_test.hard_case import hard_cases, read_hard_cases
 from reflowshock.workflow.stress_test.pool import Pool
 from reflowshock.workflow.stress_test.random_cases import drawn
 from reflowshock.workflow.stress_test.random_trial import RandomTrial, quantities
 from reflowshock.workflow.stress_test.results import write_results
+
+from reflowshock.cases.hard import hard_case, sample
+from reflowshock.cases.hard.bound import read_bound
+from reflowshock.cases.hard.hard_case import hard_cases, read_hard_cases
+from reflowshock.cases.hard.trial import Measured, Refused, Trial
+from reflowshock.cases.hard.trials.coupling import PairRun
+from reflowshock.cases.hard.trials.elements import Impact, Turns
+from reflowshock.cases.hard.verdict import attempt
+from reflowshock.particles.parameters.solder import Parameters
+from reflowshock.workflow.case.problems import CaseError
+from reflowshock.workflow.case.units import UnitError
+from reflowshock.workflow.stress_test.command import HARD, Request, stress_test
 from reflowshock.workflow.stress_test.sample import try_sample
-from reflowshock.workflow.stress_test.trial import Measured, Refused, Trial
-from reflowshock.workflow.stress_test.verdict import attempt
 from tests.support.workflow_command import wait_until
 
 
