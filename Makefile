@@ -17,8 +17,8 @@ test: setup  ## run every check and test, on all cores
 	@.ci/setup-slurm
 	$(PYTHON) -m pytest --numprocesses=logical --maxprocesses=8 --dist=loadfile
 
-test-long: setup  ## the expensive sweeps: 50 interrupts, damage, random hard cases on three new seeds
-	REFLOWSHOCK_LONG=1 $(PYTHON) -m pytest tests/faults --numprocesses=logical --maxprocesses=4
+test-long: setup  ## the sweeps that `make test` leaves out: 50 interrupts, ..., random hard cases on three new seeds
+	$(PYTHON) -m pytest -m long --numprocesses=logical --maxprocesses=4
 	@for seed in $$($(PYTHON) -c 'import random; print(*random.sample(range(10**6), 3))'); do echo "seed $$seed"; \
 	    $(PYTHON) -m reflowshock stress-test --random 500 --seed $$seed --out runs/stress-test-$$seed || exit 1; done
 

@@ -28,7 +28,7 @@ from mpi4py import MPI
 from reflowshock.cases.hard.trials.boxes import KINDS, box
 from reflowshock.cases.hard.trials.grids import CYCLIC
 from reflowshock.fem.division.tables import prepare
-from reflowshock.fem.dynamics.central_difference import Motion
+from reflowshock.fem.dynamics.central_difference import ExplicitMotion
 from reflowshock.fem.dynamics.implicit import ImplicitMotion
 from reflowshock.fem.dynamics.modal import natural_modes
 from reflowshock.fem.elements.element import critical_steps
@@ -36,7 +36,7 @@ from reflowshock.fem.forces.force import Kinematics
 from reflowshock.fem.materials.parameters import Isotropic
 from reflowshock.fem.mesh.facet import area_vectors
 from reflowshock.fem.mesh.mesh import MeshData, boundary_facets
-from reflowshock.fem.model.assembly import Response, make_body, make_pieces
+from reflowshock.fem.model.assembly import ForceOptions, make_body, make_pieces
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.factorisation import Factorisation
 from reflowshock.fem.model.global_matrix import Equations
@@ -108,7 +108,7 @@ class Problem:
         item = prepare(mesh, "dns")["dns"]
         formulation = self.kind if KINDS[self.kind].nodes == 8 else "incompatible_modes"
         pieces = make_pieces(distribute(MPI.COMM_SELF, mesh), item.tables, {"board": material}, formulation)
-        body = make_body(MPI.COMM_SELF, pieces, item.tables, np.ones(len(pieces.steps)), Response(kinematics))
+        body = make_body(MPI.COMM_SELF, pieces, item.tables, np.ones(len(pieces.steps)), ForceOptions(kinematics))
         body.free[self.held(body.local.points)] = False
         return body
 
@@ -146,7 +146,7 @@ def answers(body: Body) -> dict:
     return {"deflection": deflection(body, equations), "frequency": frequency}
 
 
-def seconds_a_step(motion: Motion | ImplicitMotion) -> float:
+def seconds_a_step(motion: ExplicitMotion | ImplicitMotion) -> float:
     """Processor seconds of a whole step, force included; best of three batches."""
 
     def batch(steps: int) -> float:
@@ -160,9 +160,9 @@ def seconds_a_step(motion: Motion | ImplicitMotion) -> float:
     return min(batch(steps) for _ in range(3))
 
 
-def explicit_motion(body: Body, step: float) -> Motion:
+def explicit_motion(body: Body, step: float) -> ExplicitMotion:
     """The motion of a body by explicit steps [s]."""
-    return Motion(body, [], step, np.empty(0, np.int32), np.zeros(len(body.mass)))
+    return ExplicitMotion(body, [], step, np.empty(0, np.int32), np.zeros(len(body.mass)))
 
 
 def speeds(cells: tuple[int, int]) -> dict:

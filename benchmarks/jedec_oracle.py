@@ -132,7 +132,7 @@ def run(setting: Setting) -> tuple[dict, dict[str, np.ndarray]]:
         "seconds_per_step": seconds / steps,
         "seconds": setup + seconds,
         "forecast_seconds": forecast.seconds,
-        "energy_balance_error": history.ledger.balance_error,
+        "energy_balance_error": history.balance.balance_error,
     }
     motion = participant.motion
     if isinstance(motion, ImplicitMotion):

@@ -2,12 +2,12 @@
 
     PYTHONPATH=. python benchmarks/step_scaling.py  (half a minute; writes results/step_scaling.json)
 
-The script starts itself on two MPI ranks. Rank 0 first measures a model of its own (``COMM_SELF``) while rank 1
-sleeps, then both step the same cube cut in two by DOLFINx, and so on in turns. A step is Motion.advance and
-Motion.update_force: update of velocities and displacements, internal force, sum over the copies of shared nodes;
-``drop`` is the same step under a body force, whose work needs the momentum. Ranks wait for each other, so that on a
-loaded machine what other programs take counts twice: times are the least wall seconds of single calls, of the slower
-rank, at a moment when no other program came between.
+The script starts itself on two MPI ranks. Rank 0 first measures a model of its own (``COMM_SELF``) while rank 1 sleeps,
+then both step the same cube cut in two by DOLFINx, and so on in turns. A step is ExplicitMotion.advance and
+ExplicitMotion.update_force: update of velocities and displacements, internal force, sum over the copies of shared
+nodes; ``drop`` is the same step under a body force, whose work needs the momentum. Ranks wait for each other, so that
+on a loaded machine what other programs take counts twice: times are the least wall seconds of single calls, of the
+slower rank, at a moment when no other program came between.
 """
 
 import json
@@ -26,7 +26,7 @@ from benchmarks.support import turns
 from benchmarks.support.cube import STEEL, cube
 from reflowshock.cases.hard.trials.bodies import motion_of
 from reflowshock.fem.division.tables import prepare
-from reflowshock.fem.dynamics.central_difference import Motion
+from reflowshock.fem.dynamics.central_difference import ExplicitMotion
 from reflowshock.fem.loads.load import Load, half_sine_drop
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.model.assembly import make_body, make_pieces
@@ -40,7 +40,7 @@ PULSE = half_sine_drop(peak=1.5e4, duration=5e-4)
 NAP = 1e-3  # [s]
 
 
-def motion_on(comm: MPI.Comm, loads: list[Load]) -> Motion:
+def motion_on(comm: MPI.Comm, loads: list[Load]) -> ExplicitMotion:
     """Return the cube at rest, distributed over the ranks."""
     item = prepare(cube(), "dns")["dns"]
     pieces = make_pieces(distribute(comm, item.mesh if comm.rank == 0 else None), item.tables, Materials(board=STEEL))
@@ -48,7 +48,7 @@ def motion_on(comm: MPI.Comm, loads: list[Load]) -> Motion:
     return motion_of(body, FRACTION * comm.allreduce(float(pieces.steps.min()), MPI.MIN), loads)
 
 
-def step(motion: Motion) -> Callable[[], None]:
+def step(motion: ExplicitMotion) -> Callable[[], None]:
     def work() -> None:
         motion.advance()
         motion.update_force()
@@ -56,7 +56,7 @@ def step(motion: Motion) -> Callable[[], None]:
     return work
 
 
-def force(motion: Motion) -> Callable[[], None]:
+def force(motion: ExplicitMotion) -> Callable[[], None]:
     scratch = np.zeros_like(motion.force)
 
     def work() -> None:

@@ -33,12 +33,11 @@ from reflowshock.fem.mesh.mesh import MeshData, append, without_unused_nodes
 from reflowshock.fem.model.factorisation import Factorisation
 from reflowshock.fem.problem.thermal import Thermal
 from reflowshock.fem.statics.pads import Pads
-from reflowshock.fem.statics.scene import thermal_tables
 from reflowshock.fem.statics.state import Assembly
 from reflowshock.fem.statics.structure import ThermalStructure
+from reflowshock.fem.statics.thermal_tables import thermal_tables
 from reflowshock.fem.statics.thermoelastic import Thermoelastic
-from reflowshock.meshing.board.assembly import write_assembly
-from reflowshock.meshing.board.heated_assembly import write_heated_assembly
+from reflowshock.meshing.board.assembly import write_assembly, write_heated_assembly
 from reflowshock.meshing.board.pads import pad_table
 from reflowshock.workflow.pipeline.reader import read_case
 

@@ -52,7 +52,7 @@ def row(name: str, scene: DropScene, fraction: float, folder: Path) -> dict:
         "m": run.plan.substeps,
         "f": run.elements.get("meso", 0) / sum(run.elements.values()),
         "seconds": seconds,
-        "balance_error": run.history.ledger.balance_error,
+        "balance_error": run.history.balance.balance_error,
         **{metric: errors[metric] for metric in ERRORS},
     }
 

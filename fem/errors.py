@@ -9,8 +9,8 @@ class TieError(ValueError):
     """A joint node that has no facet to be tied to."""
 
 
-class CutError(ValueError):
-    """A cut between macro and meso model that does not fit or is not stable."""
+class CouplingError(ValueError):
+    """An interface between macro and meso model that does not fit or is not stable."""
 
 
 class LevelError(ValueError):

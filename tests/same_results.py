@@ -70,7 +70,7 @@ def run_cases(folder: Path, checkout: Path, names: list[str]) -> int:
     missing = 0
     for name in names:
         path, settings = EVERY_CASE[name]
-        line = [sys.executable, "-m", "reflowshock", "run", str(checkout / path), "--out", str(folder.resolve() / name)]
+        line = [sys.executable, "-m", "workflow", "run", str(checkout / path), "--out", str(folder.resolve() / name)]
         line += [item for setting in settings for item in ("--set", setting)]
         begin, environment = time.perf_counter(), os.environ | {"PYTHONPATH": str(checkout)}
         result = subprocess.run(line, capture_output=True, text=True, cwd=checkout, env=environment, check=False)

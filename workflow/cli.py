@@ -9,14 +9,15 @@ from typing import Annotated
 import typer
 
 from reflowshock.workflow import __version__
-from reflowshock.workflow.cluster.executor import JOBS, ExecutorName, executor_for
-from reflowshock.workflow.pipeline.reader import available_cores, read_case
-from reflowshock.workflow.process.environment import prepare
+from reflowshock.workflow.jobs.executor import JOBS, ExecutorName, executor_for
+from reflowshock.workflow.pipeline.points import read_case_of_run
+from reflowshock.workflow.pipeline.reader import read_case
+from reflowshock.workflow.process.environment import available_cores, prepare
 from reflowshock.workflow.process.last_word import answer, heed_signals, last_word, remember_run_folder
 from reflowshock.workflow.process.terminal import console, print_error
 from reflowshock.workflow.store.folders import check_folder, read_mark
 from reflowshock.workflow.store.point import Point
-from reflowshock.workflow.store.store import Store, read_case_of_run
+from reflowshock.workflow.store.store import Store
 
 app = typer.Typer(
     name="reflowshock",
@@ -80,8 +81,8 @@ def plan(
     force: Force = False,
 ) -> None:
     """Show what a run would do and cost; runs nothing."""
-    from reflowshock.workflow.pipeline.run import WHAT
     from reflowshock.workflow.plan import show_plan
+    from reflowshock.workflow.run import WHAT
 
     store, point = _load(case, settings, out, oversubscribe, force)
     check_folder(store.folder, WHAT, point.case.case.name, force)
@@ -102,10 +103,10 @@ def run(
     yes: Yes = False,
 ) -> None:
     """Run what is missing, stale or damaged."""
+    from reflowshock.workflow.jobs.batch import machine_of
     from reflowshock.workflow.pipeline.gate import ask_if_long
-    from reflowshock.workflow.pipeline.run import WHAT, run_case
     from reflowshock.workflow.plan import predicted_seconds
-    from reflowshock.workflow.store.batch import machine_of
+    from reflowshock.workflow.run import WHAT, run_case
 
     store, point = _load(case, settings, out, oversubscribe or executor != ExecutorName.LOCAL, force)
     if until not in point.case.pipeline.names:
@@ -144,7 +145,7 @@ def accuracy(
     force: Force = False,
 ) -> None:
     """Measure what accuracy costs: a ladder of settings, their errors and times; recommend some and run them."""
-    from reflowshock.workflow.convergence.command import read_wish, show
+    from reflowshock.workflow.accuracy.command import read_wish, show
 
     wish = replace(read_wish(case, settings or [], tolerance, budget), oversubscribe=oversubscribe, force=force)
     try:
@@ -158,7 +159,7 @@ def accuracy(
 @app.command()
 def status(case: CasePath, settings: Settings = None, out: Out = None) -> None:
     """Show what a run folder holds: stages done, stale, damaged or missing, their times and main figures."""
-    from reflowshock.workflow.pipeline.status import show_status
+    from reflowshock.workflow.status import show_status
 
     show_status(*_load(case, settings, out, True, True), console)
 
@@ -166,8 +167,8 @@ def status(case: CasePath, settings: Settings = None, out: Out = None) -> None:
 @app.command()
 def report(case: CasePath, settings: Settings = None, out: Out = None) -> None:
     """Write the report again, from the products that are there and the values that they were made with."""
-    from reflowshock.workflow.pipeline.run import report_again
-    from reflowshock.workflow.report.page import write_report
+    from reflowshock.workflow.pipeline.report import write_report
+    from reflowshock.workflow.run import report_again
     from reflowshock.workflow.stages import report as stage_function
 
     store, point = _load(case, settings, out, True, True)
@@ -182,7 +183,7 @@ def report(case: CasePath, settings: Settings = None, out: Out = None) -> None:
 @app.command()
 def verify(case: CasePath, settings: Settings = None, out: Out = None) -> None:
     """Look at every file of a run folder: are all products there, and as they were written?"""
-    from reflowshock.workflow.pipeline.run import verify as verify_run
+    from reflowshock.workflow.run import verify as verify_run
 
     raise typer.Exit(0 if verify_run(*_load(case, settings, out, True, True)) else 1)
 
@@ -198,7 +199,7 @@ def clean(
     force: Force = False,
 ) -> None:
     """Remove what the program has written into a case's run folder."""
-    from reflowshock.workflow.pipeline.run import clean as clean_run
+    from reflowshock.workflow.run import clean as clean_run
 
     store, point = _load(case, settings, out, True, True)
     clean_run(store.folder, point.case.case.name, unused=unused, force=force)
@@ -262,8 +263,8 @@ def study(
     yes: Yes = False,
 ) -> None:
     """Run a case at many settings; only what is missing. Results as tables, plots and a page."""
+    from reflowshock.workflow.jobs.batch import machine_of
     from reflowshock.workflow.pipeline.gate import ask_if_long
-    from reflowshock.workflow.store.batch import machine_of
     from reflowshock.workflow.study.command import predicted_study_seconds, read_points_of, run_study, show_outlook
 
     points = read_points_of(study, oversubscribe or executor != ExecutorName.LOCAL, force)
@@ -302,12 +303,13 @@ def stage(
     mark: Annotated[Path | None, typer.Option(help="file that says to Snakemake that it is done")] = None,
 ) -> None:
     """Make one product, in the store that is the working directory; Snakemake calls this."""
-    from reflowshock.workflow.pipeline.stage_runner import Run, execute
-    from reflowshock.workflow.stages import STAGE_FUNCTIONS
+    from reflowshock.workflow.case.run import Run
+    from reflowshock.workflow.pipeline.stage_runner import execute
+    from reflowshock.workflow.stages import stage_function
 
     product, folder = Path("products", f"{name}-{key}"), Path("work", f"{name}-{key}")
     run = Run(folder, read_case_of_run(folder), cores, oversubscribe)
-    if not execute(name, STAGE_FUNCTIONS[run.case.kind][name], run, product):
+    if not execute(name, stage_function(run.case, name), run, product):
         raise typer.Exit(1)
     shutil.rmtree(folder)
     if mark is not None:

@@ -1,103 +1,28 @@
-"""The pipelines, one function a stage; which kind of case has which stages stands at the end.
+"""The data path of a run: which function makes the product of a stage.
 
-Package on a board: geometry -> reflow -> surface -> solder_mesh -> shock -> report, the shock only where it is given.
-Scenes of solder alone (their reflow is in `scene_stages.py`): reflow -> report. Structures (`structure/stages.py`):
-geometry -> shock -> comparison -> report.
+Package on a board: geometry -> reflow -> surface -> solder_mesh -> shock -> report (`board_drop/stages.py`,
+`reflow/stage.py`), the shock only where the case has one. Structure: geometry -> shock -> comparison -> report
+(`structure/stages.py`). Solder alone: reflow -> report (`solder/stages.py`).
 
-Each reads products of earlier stages from ``run.folder``, writes its own into ``folder``, and returns what it found.
-Packages are imported inside the functions, so that a stage loads only what it uses.
+Each stage reads products of earlier stages from ``run.folder``, writes its own into ``folder``, and returns what it
+found. Packages are imported inside the functions, so that a stage loads only what it uses.
 """
 
-from dataclasses import replace
 from pathlib import Path
 
-from reflowshock.workflow.board_drop import findings, identical_joints
-from reflowshock.workflow.board_drop.case import BoardDropCase, PackageCase
-from reflowshock.workflow.pipeline.stage_runner import Findings, Run, StageFunction
-from reflowshock.workflow.process.products import read_json, write_json
-from reflowshock.workflow.reflow.stage import reflow
-from reflowshock.workflow.solder.stages import REFLOW_SCENES
-from reflowshock.workflow.structure.case import StructureCase
-from reflowshock.workflow.structure.stages import STRUCTURE_STAGES
+from reflowshock.workflow.case.case import Case
+from reflowshock.workflow.case.run import Findings, Run, StageFunction
+from reflowshock.workflow.kinds import kind_of
 
 
-def geometry(run: Run[PackageCase], folder: Path) -> Findings:
-    """Mesh board and package, both flat; tabulate the pads."""
-    from reflowshock.meshing.board.assembly import write_assembly
-    from reflowshock.meshing.board.pads import pad_table, write_pads
-    from reflowshock.meshing.board.parameters import Warpage
-    from reflowshock.meshing.core.preview import write_preview
-
-    case = run.case
-    pads = pad_table(case.package, case.board, Warpage())
-    write_pads(folder / "pads.json", pads)
-    counts = write_assembly(case.package, case.board, folder / "assembly.msh")
-    write_preview([folder / "assembly.msh"], folder / "preview.png")
-    return findings.of_geometry(len(pads), counts)
-
-
-def surface(run: Run[PackageCase], folder: Path) -> Findings:
-    """Close the surface of each joint, or take the one that the user gives, and measure it."""
-    from reflowshock.workflow.board_drop.joint_surfaces import write_surfaces
-
-    surfaces = write_surfaces(run, folder)
-    write_json(folder / "surfaces.json", surfaces)
-    return findings.of_surface(surfaces)
-
-
-def solder_mesh(run: Run[PackageCase], folder: Path) -> Findings:
-    """Put the package where the solder froze and mesh every joint in its place; once more if all were alike."""
-    from reflowshock.workflow.board_drop.fine_joints import coarse_joints_effect
-    from reflowshock.workflow.board_drop.joint_meshes import mesh_identical_joints, mesh_real_joints
-
-    case, qualities = run.case, mesh_real_joints(run, folder)
-    if not isinstance(case, BoardDropCase):
-        return findings.of_solder_mesh(qualities, {})
-    if case.shock.identical_joints:
-        qualities |= mesh_identical_joints(run, folder)
-    effects = coarse_joints_effect(case.shock.coupling) | identical_joints.identical_joints_effect(case)
-    return findings.of_solder_mesh(qualities, effects)
-
-
-def shock(run: Run[BoardDropCase], folder: Path) -> Findings:
-    """Drop the board: each mode is one MPI run of the package fem; two modes are compared, and identical joints."""
-    from reflowshock.workflow.board_drop.reflow_pool import refuse_joints_without_mesh
-    from reflowshock.workflow.board_drop.shock_cooling import with_cooling
-    from reflowshock.workflow.board_drop.shock_effects import with_influence
-    from reflowshock.workflow.board_drop.shock_launch import find_fine_joints, read_results, run_mode
-
-    joints = read_json(run.folder / "reflow/joints.json")
-    refuse_joints_without_mesh({name: joints[name] for name in joints if name not in run.case.package.surfaces})
-    fine = find_fine_joints(run, folder)
-    for mode in run.case.shock.numerics.modes:
-        run_mode(run, folder / mode, mode, fine)
-    results = read_results(folder)
-    found = findings.of_shock(results, folder, run.case.board.thickness)
-    found = replace(found, effects=with_influence(found.effects, run.case))
-    if run.case.shock.identical_joints:
-        main = next(iter(results))
-        run_mode(run, folder / identical_joints.FOLDER, main, fine, identical_joints.PREFIX)
-        found = identical_joints.compared(found, run, folder, main)
-    return with_cooling(found, run.case, folder)
+def stage_function(case: Case, name: str) -> StageFunction:
+    """Return the function of a stage of a case."""
+    return report if name == "report" else kind_of(case).stages[name]
 
 
 def report(run: Run, folder: Path) -> Findings:
     """Write report.html and summary.json from the products."""
-    from reflowshock.workflow.report.page import write_report
+    from reflowshock.workflow.pipeline.report import write_report
 
     write_report(run.folder, run.case, folder)
     return Findings()
-
-
-STAGE_FUNCTIONS: dict[str, dict[str, StageFunction]] = {
-    PackageCase.kind: {
-        "geometry": geometry,
-        "reflow": reflow,
-        "surface": surface,
-        "solder_mesh": solder_mesh,
-        "shock": shock,
-        "report": report,
-    },
-    StructureCase.kind: {**STRUCTURE_STAGES, "report": report},
-    **{kind: {"reflow": reflow_scene, "report": report} for kind, reflow_scene in REFLOW_SCENES.items()},
-}

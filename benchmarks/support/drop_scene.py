@@ -12,14 +12,13 @@ from reflowshock.fem.mesh.mesh_file import read_mesh
 from reflowshock.fem.problem.inputs import RunInput
 from reflowshock.fem.problem.shock import Ranks
 from reflowshock.meshing.board.assembly import write_assembly
-from reflowshock.meshing.board.displaced_assembly import write_displaced_assembly
-from reflowshock.meshing.board.displacement import prescribed
+from reflowshock.meshing.board.displaced_assembly import prescribed, write_displaced_assembly
 from reflowshock.meshing.board.package_side import PackageSide
 from reflowshock.meshing.board.pads import PadSite, pad_table
 from reflowshock.meshing.joint.joints_file import write_joints
 from reflowshock.meshing.joint.solder_mesh import JointMesh, mesh_coarse_joint, mesh_joint
 from reflowshock.meshing.surface.closed_surface import ClosedSurface
-from reflowshock.workflow.board_drop.case import BoardDropCase
+from reflowshock.workflow.package.case import BoardDropCase
 from reflowshock.workflow.pipeline.reader import read_case
 from tests.support.fem_models import write_msh
 

@@ -9,15 +9,15 @@ from reflowshock.fem.estimates.placement import shared
 from reflowshock.fem.loads.shock_pulse import shock_pulse
 from reflowshock.fem.parallel.communicators import Communicators
 from reflowshock.fem.problem.inputs import RunInput
-from reflowshock.fem.run.shock_run import make_crew, make_history, planned
-from reflowshock.fem.setup.shock_models import build_models, divided_scene
+from reflowshock.fem.run.shock_run import make_history, make_participants, planned
+from reflowshock.fem.setup.shock_models import build_models, divided_package
 
 
 class ProgramRun:
     """Models, participants and history of an input, at rest.
 
     Attributes:
-        crew: The participants.
+        participants: The participants.
         plan: Window and substeps.
         elements: Elements of each model.
         setup: Processor seconds until it could start.
@@ -27,22 +27,22 @@ class ProgramRun:
     def __init__(self, request: RunInput) -> None:
         """Build the models."""
         begin = process_time()
-        divided = divided_scene(MPI.COMM_SELF, request)
+        divided = divided_package(MPI.COMM_SELF, request)
         comms = Communicators(MPI.COMM_SELF, shared(tuple(divided.tables), 1))
         models, steps = build_models(comms, divided, request, {})
         pulse = shock_pulse(request.shock).pulse
         steps = planned(steps, request, pulse)
         self.plan = steps.plan
-        self.crew = make_crew(comms, models, (steps, divided.scheme), request.shock).participants
+        self.participants = make_participants(comms, models, (steps, divided.scheme), request.shock).participants
         self.elements = {role: len(model.body.local.cells) for role, model in models.items()}
         self.setup = process_time() - begin
         self.history = make_history(comms, models, steps, pulse, request)
 
     def window(self) -> None:
         """Go on by one window."""
-        for participant in self.crew.values():
+        for participant in self.participants.values():
             participant.begin_window()
-        for participant in self.crew.values():
+        for participant in self.participants.values():
             participant.finish_window()
 
     def step(self, seconds: float) -> float:
@@ -55,12 +55,12 @@ class ProgramRun:
 
     def to_end(self) -> tuple[dict[str, np.ndarray], float]:
         """Go to the end with samples; return them and the processor seconds of all windows."""
-        self.history.sample(self.crew)
+        self.history.sample(self.participants)
         seconds = 0.0
         for window in range(1, self.plan.windows + 1):
             begin = process_time()
             self.window()
             seconds += process_time() - begin
             if window % self.plan.stride == 0 or window == self.plan.windows:
-                self.history.sample(self.crew)
+                self.history.sample(self.participants)
         return self.history.arrays(), seconds

@@ -10,7 +10,7 @@ import pytest
 
 from reflowshock.cases.hard.hard_case import HardCase, read_hard_cases
 from reflowshock.cases.hard.random_cases import LONGEST_SEARCH, RandomFile, read_random_file
-from reflowshock.cases.hard.verdict import Verdict, attempt
+from reflowshock.cases.hard.verdict import attempt
 from reflowshock.workflow.case.problems import CaseError
 
 HARD = Path(__file__).resolve().parent
@@ -104,6 +104,3 @@ class Search(pytest.Item):
         count, number = self.drawn
         found = self.file.simplest(count, self.config.getoption("random_seed"), number)
         self.user_properties.append(("simplest", found))
-
-
-__all__ = ["HARD", "Verdict"]

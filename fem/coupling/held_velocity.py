@@ -1,9 +1,8 @@
-"""Held velocity: the cut moves at the macro model's velocity over a window, the meso model's force comes back.
+"""Held velocity: the interface moves at the macro model's velocity over a window, the meso model's force comes back.
 
-A window (the cut lies two layers of elements inside the board):
-macro: a_n = (F_ext + F_c - F_int) / (M + M_interface) -> v^{n+1/2}, U^{n+1}; the cut's v^{n+1/2} goes to the meso
-model, which takes m substeps with it WHILE the macro model computes F_int(U^{n+1}); F_c = -(K u)_cut comes back at the
-end.
+A window (the interface lies two layers of elements inside the board):
+macro: a_n = (F_ext + F_c - F_int) / (M + M_interface) -> v^{n+1/2}, U^{n+1}; the interface's v^{n+1/2} goes to the meso
+model, which takes m substeps with it WHILE the macro model computes F_int(U^{n+1}); F_c = -(K u)_c comes back last.
 """
 
 from collections.abc import Mapping
@@ -12,14 +11,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from reflowshock.fem.dynamics.central_difference import Motion
+from reflowshock.fem.dynamics.central_difference import ExplicitMotion
 from reflowshock.fem.dynamics.participant import Continued
 from reflowshock.fem.estimates.estimate import WindowPlan
 from reflowshock.fem.kernels.motion import add_impulse, add_rows
 from reflowshock.fem.loads.load import Load
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.parallel.communicators import Role
-from reflowshock.fem.parallel.exchange import CutChannels
+from reflowshock.fem.parallel.exchange import InterfaceChannels
 from reflowshock.fem.parallel.portable import Rows, State
 
 
@@ -28,39 +27,41 @@ class HeldVelocity:
 
     order: tuple[Role, Role] = ("meso", "macro")
 
-    def macro(self, body: Body, loads: list[Load], plan: WindowPlan, channels: CutChannels) -> "Macro":
+    def macro(
+        self, body: Body, loads: list[Load], plan: WindowPlan, channels: InterfaceChannels
+    ) -> "HeldVelocityMacro":
         """Return the macro model's participant."""
-        return Macro(body, loads, plan, channels)
+        return HeldVelocityMacro(body, loads, plan, channels)
 
-    def meso(self, body: Body, loads: list[Load], plan: WindowPlan, channels: CutChannels) -> "Meso":
+    def meso(self, body: Body, loads: list[Load], plan: WindowPlan, channels: InterfaceChannels) -> "HeldVelocityMeso":
         """Return the meso model's participant."""
-        return Meso(body, loads, plan, channels)
+        return HeldVelocityMeso(body, loads, plan, channels)
 
 
 class Answered(Continued):
-    """A macro model that takes one step a window and gets a force at the cut back."""
+    """A macro model that takes one step a window and gets a force at the interface back."""
 
-    motion: Motion
+    motion: ExplicitMotion
 
-    def __init__(self, motion: Motion, plan: WindowPlan, channels: CutChannels) -> None:
+    def __init__(self, motion: ExplicitMotion, plan: WindowPlan, channels: InterfaceChannels) -> None:
         """Take a motion that is ready to advance by windows."""
         self.motion, self.plan, self._channels = motion, plan, channels
         self._received = np.zeros_like(motion.force)
-        self._cut, self._counted = local_cut(motion.body), counted_cut(motion.body)
+        self._interface, self._counted = local_interface(motion.body), counted_interface(motion.body)
         self.interface_work = 0.0
 
     def take_force(self) -> None:
-        """Receive the meso model's force, and count the work across the cut."""
+        """Receive the meso model's force, and count the work across the interface."""
         motion, counted, half = self.motion, self._counted, 0.5 * self.motion.step
         impulse = np.zeros((len(counted), 3))
         add_impulse(counted, self._received, half, impulse)
         self._channels.forces.receive(self._received)
         add_impulse(counted, self._received, half, impulse)
-        add_rows(self._cut, self._received, motion.force)
+        add_rows(self._interface, self._received, motion.force)
         self.interface_work -= float(np.vdot(impulse, motion.velocity[counted]))
 
-    def cut_force(self) -> NDArray[np.float64]:
-        """Return the received force at the cut."""
+    def interface_force(self) -> NDArray[np.float64]:
+        """Return the received force at the interface."""
         return self._received
 
     def foreign_force(self) -> NDArray[np.float64]:
@@ -77,17 +78,19 @@ class Answered(Continued):
         self._received[:] = state["received"]
 
 
-class Macro(Answered):
+class HeldVelocityMacro(Answered):
     """The board: one step a window."""
 
-    def __init__(self, body: Body, loads: list[Load], plan: WindowPlan, channels: CutChannels) -> None:
-        """Receive the interface mass and start at rest; a ``Meso`` must have sent it."""
+    def __init__(self, body: Body, loads: list[Load], plan: WindowPlan, channels: InterfaceChannels) -> None:
+        """Receive the interface mass and start at rest; a ``HeldVelocityMeso`` must have sent it."""
         mass = np.zeros((len(body.mass), 3))
         channels.forces.receive(mass)
-        super().__init__(Motion(body, loads, plan.window, np.empty(0, np.int32), mass[:, 0].copy()), plan, channels)
+        super().__init__(
+            ExplicitMotion(body, loads, plan.window, np.empty(0, np.int32), mass[:, 0].copy()), plan, channels
+        )
 
     def begin_window(self) -> None:
-        """Move, and send the cut's velocity."""
+        """Move, and send the interface's velocity."""
         self.motion.advance()
         self._channels.velocities.send(self.motion.velocity)
 
@@ -97,7 +100,7 @@ class Macro(Answered):
         self.take_force()
 
 
-class WindowMotion(Motion):
+class WindowMotion(ExplicitMotion):
     """The motion of a model beside another one that takes whole windows: body accelerations push both alike.
 
     All substeps of a window are pushed as it begins, the first also by what makes the mean velocity of the window that
@@ -112,7 +115,7 @@ class WindowMotion(Motion):
         held: NDArray[np.integer],
         extra_mass: NDArray[np.float64],
     ) -> None:
-        """Start at rest; ``held`` and ``extra_mass`` as those of ``Motion``."""
+        """Start at rest; ``held`` and ``extra_mass`` as those of ``ExplicitMotion``."""
         self._substeps = plan.substeps
         super().__init__(body, loads, plan.step, held, extra_mass)
 
@@ -130,39 +133,39 @@ class WindowMotion(Motion):
 
 
 class Driven(Continued):
-    """A meso model whose cut moves at the macro model's velocity."""
+    """A meso model whose interface moves at the macro model's velocity."""
 
     motion: WindowMotion
 
-    def __init__(self, body: Body, loads: list[Load], plan: WindowPlan, channels: CutChannels) -> None:
+    def __init__(self, body: Body, loads: list[Load], plan: WindowPlan, channels: InterfaceChannels) -> None:
         """Start at rest."""
         self._channels = channels
-        self.motion = WindowMotion(body, loads, plan, local_cut(body), np.zeros(len(body.mass)))
+        self.motion = WindowMotion(body, loads, plan, local_interface(body), np.zeros(len(body.mass)))
         self.plan = plan
         self.interface_work = 0.0
-        self._cut, self._counted = local_cut(body), counted_cut(body)
+        self._interface, self._counted = local_interface(body), counted_interface(body)
         self._zero = np.zeros((len(body.mass), 3))
 
     def follow(self) -> float:
-        """Take m substeps at the received velocity of the cut; return the work that came in across it [J].
+        """Take m substeps at the received velocity of the interface; return the work that came in across it [J].
 
-        Inside the window the cut falls as all else does, and ends where the macro model's is.
+        Inside the window the interface falls as all else does, and ends where the macro model's is.
         """
         motion, count = self.motion, self.plan.substeps
         self._channels.velocities.receive(motion.velocity)
-        given, impulse = motion.velocity[self._cut], np.zeros((len(self._counted), 3))
+        given, impulse = motion.velocity[self._interface], np.zeros((len(self._counted), 3))
         acceleration = motion.window_acceleration(motion.time)
         falls = motion.step * np.outer(np.arange(count) - 0.5 * (count - 1), acceleration)
         sums = [motion.force[self._counted].sum(axis=0)]
         add_impulse(self._counted, motion.force, 0.5 * motion.step, impulse)
         for fall in falls:
-            motion.velocity[self._cut] = given + fall
+            motion.velocity[self._interface] = given + fall
             motion.advance()
             motion.update_force()
             add_impulse(self._counted, motion.force, motion.step, impulse)
             sums.append(motion.force[self._counted].sum(axis=0))
         add_impulse(self._counted, motion.force, -0.5 * motion.step, impulse)
-        motion.velocity[self._cut] = given
+        motion.velocity[self._interface] = given
         mean = 0.5 * motion.step * (np.array(sums[1:]) + np.array(sums[:-1]))
         return -float(np.sum(impulse * motion.velocity[self._counted]) + np.sum(mean * falls))
 
@@ -174,32 +177,32 @@ class Driven(Continued):
         return self._zero
 
 
-class Meso(Driven):
+class HeldVelocityMeso(Driven):
     """Joints, package and the uppermost board layers: m substeps a window."""
 
-    def __init__(self, body: Body, loads: list[Load], plan: WindowPlan, channels: CutChannels) -> None:
+    def __init__(self, body: Body, loads: list[Load], plan: WindowPlan, channels: InterfaceChannels) -> None:
         """Send the interface mass and start at rest."""
         channels.forces.send(np.repeat(body.mass[:, None], 3, axis=1))
         super().__init__(body, loads, plan, channels)
-        self._cut_force = np.zeros((len(body.mass), 3))
+        self._interface_force = np.zeros((len(body.mass), 3))
 
     def begin_window(self) -> None:
-        """Take m substeps, then send the force of the cut."""
+        """Take m substeps, then send the force of the interface."""
         self.interface_work += self.follow()
         self._channels.forces.send(self.motion.force)
 
-    def cut_force(self) -> NDArray[np.float64]:
+    def interface_force(self) -> NDArray[np.float64]:
         """Return the force that was sent."""
-        self._cut_force[self._counted] = self.motion.force[self._counted]
-        return self._cut_force
+        self._interface_force[self._counted] = self.motion.force[self._counted]
+        return self._interface_force
 
 
-def local_cut(body: Body) -> NDArray[np.int32]:
-    """Return the cut nodes that this rank has, local numbers."""
-    return body.cut[body.cut >= 0]
+def local_interface(body: Body) -> NDArray[np.int32]:
+    """Return the interface nodes that this rank has, local numbers."""
+    return body.interface[body.interface >= 0]
 
 
-def counted_cut(body: Body) -> NDArray[np.int32]:
-    """Return the local cut nodes that count on this rank: those that it owns."""
-    here = local_cut(body)
+def counted_interface(body: Body) -> NDArray[np.int32]:
+    """Return the local interface nodes that count on this rank: those that it owns."""
+    here = local_interface(body)
     return here[body.shared.owned[here]]

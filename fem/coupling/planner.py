@@ -51,7 +51,7 @@ ALTERNATING: tuple[SchemeName, ...] = ("gravouil_combescure", "impulse")  # sche
 
 
 @dataclass(frozen=True, slots=True)
-class Load:
+class ModelWork:
     """A model that is to be distributed.
 
     Attributes:
@@ -99,20 +99,24 @@ class Measured:
 
 def loads_of(
     divided: "Divided[Tables]", materials: Materials | Mapping[str, Material], treatment: Treatment
-) -> dict[Role, Load]:
+) -> dict[Role, ModelWork]:
     """Return the models of a divided mesh as what is to be distributed."""
-    loads: dict[Role, Load] = {}
+    loads: dict[Role, ModelWork] = {}
     for role, tables in divided.tables.items():
         _, assigned = materials_of_parts(tables.part_names, materials)
         step = divided.steps.step_of(role)
         kind = Kind(assigned, treatment.formulation, treatment.kinematics, step)
         steps = round(divided.steps.plan.window / step)
-        loads[role] = Load(divided.meshes.get(role), tables.level, tables.ratios, steps, kind)
+        loads[role] = ModelWork(divided.meshes.get(role), tables.level, tables.ratios, steps, kind)
     return loads
 
 
 def plan_ranks(
-    world: MPI.Comm, loads: Mapping[Role, Load], ranks: Ranks, folder: Path | None, scheme: SchemeName = "held_velocity"
+    world: MPI.Comm,
+    loads: Mapping[Role, ModelWork],
+    ranks: Ranks,
+    folder: Path | None,
+    scheme: SchemeName = "held_velocity",
 ) -> Plan:
     """Measure, predict, choose, and say so; collective.
 
@@ -136,7 +140,7 @@ def plan_ranks(
     return plan or Plan(told[0], {}, told[1])
 
 
-def measure(world: MPI.Comm, loads: Mapping[Role, Load], family: Mapping[Role, NDArray[np.int8]]) -> Measured:
+def measure(world: MPI.Comm, loads: Mapping[Role, ModelWork], family: Mapping[Role, NDArray[np.int8]]) -> Measured:
     """Time each family of elements on a sample from the model that has most of it; collective."""
     found: dict[int, tuple[MeshData, MeshData, Kind]] = {}
     for role in sorted(family, key=lambda role: len(family[role])):
@@ -175,7 +179,7 @@ def keep(folder: Path, measured: Measured) -> None:
 
 
 def plan_from(
-    loads: Mapping[Role, Load], family: Mapping[Role, NDArray[np.int8]], ranks: Ranks, known: tuple[Measured, bool]
+    loads: Mapping[Role, ModelWork], family: Mapping[Role, NDArray[np.int8]], ranks: Ranks, known: tuple[Measured, bool]
 ) -> Plan:
     """Choose a placement, and the rank of each cell, from a measurement and from whether two models work at once."""
     measured, overlap = known
@@ -204,7 +208,7 @@ def plan_from(
 
 
 def rank_seconds(
-    load: Load, family: NDArray[np.int8], cost: StepCost
+    load: ModelWork, family: NDArray[np.int8], cost: StepCost
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the seconds ``(ranks,)`` of a window that all elements of a model take, and those of calls."""
     rates, count = load.rates, len(FAMILIES)
@@ -214,7 +218,7 @@ def rank_seconds(
     return cost.element @ updates, cost.fixed @ calls + CALLS * load.steps
 
 
-def level_work(load: Load, family: NDArray[np.int8], cost: StepCost) -> NDArray[np.float64]:
+def level_work(load: ModelWork, family: NDArray[np.int8], cost: StepCost) -> NDArray[np.float64]:
     """Return the seconds ``(ne, levels)`` of a window that each element takes, in the column of its level."""
     work = np.zeros((len(family), len(load.rates)))
     work[np.arange(len(family)), load.level] = cost.element.mean(axis=0)[family] * load.rates[load.level]

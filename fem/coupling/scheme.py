@@ -13,7 +13,7 @@ from reflowshock.fem.estimates.estimate import WindowPlan
 from reflowshock.fem.loads.load import Load
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.parallel.communicators import Role
-from reflowshock.fem.parallel.exchange import CutChannels
+from reflowshock.fem.parallel.exchange import InterfaceChannels
 
 Direction = Literal["two_way", "one_way"]
 
@@ -27,10 +27,10 @@ class Scheme(Protocol):
 
     order: tuple[Role, Role]
 
-    def macro(self, body: Body, loads: list[Load], plan: WindowPlan, channels: CutChannels) -> Participant:
+    def macro(self, body: Body, loads: list[Load], plan: WindowPlan, channels: InterfaceChannels) -> Participant:
         """Return the macro model's participant; collective over its ranks."""
 
-    def meso(self, body: Body, loads: list[Load], plan: WindowPlan, channels: CutChannels) -> Participant:
+    def meso(self, body: Body, loads: list[Load], plan: WindowPlan, channels: InterfaceChannels) -> Participant:
         """Return the meso model's participant; collective over its ranks."""
 
 
@@ -41,11 +41,11 @@ class LocalSteps:
         """Take the scheme that couples at whole windows."""
         self._scheme, self.order = scheme, scheme.order
 
-    def macro(self, body: Body, loads: list[Load], plan: WindowPlan, channels: CutChannels) -> Participant:
+    def macro(self, body: Body, loads: list[Load], plan: WindowPlan, channels: InterfaceChannels) -> Participant:
         """Return the macro model's participant."""
         return self._scheme.macro(body, loads, replace(plan, substeps=1), channels)
 
-    def meso(self, body: Body, loads: list[Load], plan: WindowPlan, channels: CutChannels) -> Participant:
+    def meso(self, body: Body, loads: list[Load], plan: WindowPlan, channels: InterfaceChannels) -> Participant:
         """Return the meso model's participant."""
         return self._scheme.meso(body, loads, replace(plan, substeps=1), channels)
 

@@ -1,4 +1,4 @@
-"""What must be exact between two models before they move: fields through tie and cut, forces back, masses."""
+"""What must be exact between two models before they move: fields through tie and interface, forces back, masses."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
@@ -13,7 +13,7 @@ from reflowshock.fem.estimates.placement import Role
 from reflowshock.fem.mesh.tie import EXACT, net_load
 from reflowshock.fem.model.assembly import MASS_TOLERANCE
 from reflowshock.fem.model.body import Body
-from reflowshock.fem.parallel.exchange import CutChannels
+from reflowshock.fem.parallel.exchange import InterfaceChannels
 
 RIGID = np.array([[0.0, -0.7, 0.4], [0.7, 0.0, -0.9], [-0.4, 0.9, 0.0]])
 LINEAR = np.array([[0.3, -1.0, 0.5], [1.0, 0.2, -0.7], [-0.4, 0.6, 1.0]])
@@ -25,12 +25,12 @@ class SelfCheck:
     """What was found, the same on all ranks.
 
     Attributes:
-        rigid: Largest error of a rigid motion at slaves and cut, of its size.
+        rigid: Largest error of a rigid motion at slaves and interface, of its size.
         linear: The same of a linear field.
         tie: Net force and moment that ties lose, of the sum of magnitudes.
-        cut: The same of the cut.
+        cut: The same of the coupling interface.
         macro_mass: Mass of the macro model [kg].
-        interface_mass: Mass that the meso model gives to the nodes of the cut [kg].
+        interface_mass: Mass that the meso model gives to the nodes of the interface [kg].
         meso_mass: Its other mass [kg].
         volume_mass: Density times volume of both [kg].
     """
@@ -49,7 +49,7 @@ class SelfCheck:
         """Return it in a line."""
         return (
             f"self-check: rigid motion {self.rigid:.1e}, linear field {self.linear:.1e}, net force and moment through"
-            f" tie {self.tie:.1e} and cut {self.cut:.1e}; mass {self.macro_mass:.6e} + {self.interface_mass:.6e}"
+            f" tie {self.tie:.1e} and interface {self.cut:.1e}; mass {self.macro_mass:.6e} + {self.interface_mass:.6e}"
             f" (interface) + {self.meso_mass:.6e} = {self.volume_mass:.6e} kg"
         )
 
@@ -70,19 +70,23 @@ def recorded(checked: SelfCheck | None) -> dict[str, Any]:
     return {"self_check": asdict(checked)} if checked else {}
 
 
-def self_check(world: MPI.Comm, bodies: Mapping[Role, Body], channels: CutChannels) -> SelfCheck:
-    """Try the ties and the cut of two models; collective over ``world``."""
+def self_check(world: MPI.Comm, bodies: Mapping[Role, Body], channels: InterfaceChannels) -> SelfCheck:
+    """Try the ties and the interface of two models; collective over ``world``."""
     size = max(float(np.ptp(body.local.points, axis=0).max()) for body in bodies.values())
     size = world.allreduce(size, MPI.MAX)
     rigid, linear = (field_error(bodies, channels, gradient, size) for gradient in (RIGID, LINEAR))
-    tie, cut = load_errors(world, bodies, channels, size)
+    tie, interface = load_errors(world, bodies, channels, size)
     return SelfCheck(
-        world.allreduce(rigid, MPI.MAX), world.allreduce(linear, MPI.MAX), tie, cut, *world.allreduce(masses(bodies))
+        world.allreduce(rigid, MPI.MAX),
+        world.allreduce(linear, MPI.MAX),
+        tie,
+        interface,
+        *world.allreduce(masses(bodies)),
     )
 
 
 def field_error(
-    bodies: Mapping[Role, Body], channels: CutChannels, gradient: NDArray[np.float64], size: float
+    bodies: Mapping[Role, Body], channels: InterfaceChannels, gradient: NDArray[np.float64], size: float
 ) -> float:
     """Return the largest error of a linear field on this rank, at slaves and where the meso model received it."""
     error = 0.0
@@ -92,7 +96,7 @@ def field_error(
         values = exact.copy()
         wanted = body.tie.slave
         if role == "meso":
-            here = body.cut[body.cut >= 0]
+            here = body.interface[body.interface >= 0]
             values[here] = np.nan
             channels.velocities.receive(values)
             wanted = np.concatenate([wanted, here])
@@ -104,9 +108,9 @@ def field_error(
 
 
 def load_errors(
-    world: MPI.Comm, bodies: Mapping[Role, Body], channels: CutChannels, size: float
+    world: MPI.Comm, bodies: Mapping[Role, Body], channels: InterfaceChannels, size: float
 ) -> tuple[float, float]:
-    """Return the net load that ties, and that the cut, lose of the sum of magnitudes; collective."""
+    """Return the net load that ties, and that the interface, lose of the sum of magnitudes; collective."""
     lost, amount = np.zeros((2, 6)), np.zeros(2)
     for role in sorted(bodies, reverse=True):  # now the meso model sends
         body = bodies[role]
@@ -118,7 +122,7 @@ def load_errors(
         body.tie.gather(force)
         body.shared.add(force)
         lost[0] -= net_load(points[owned], force[owned])
-        here = body.cut[body.cut >= 0]
+        here = body.interface[body.interface >= 0]
         here = here[owned[here]]
         if role == "meso":
             force = np.sin(size * 7.0 + 1e3 * points / size)  # the same on all copies of a node
@@ -131,16 +135,16 @@ def load_errors(
             lost[1] -= net_load(points[here], force[here])
     lost, amount = world.allreduce(lost), world.allreduce(amount)
     scale = np.where(amount > 0.0, amount, 1.0)[:, None] * np.array([1.0] * 3 + [size] * 3)
-    tie, cut = np.abs(lost / scale).max(axis=1)
-    return float(tie), float(cut)
+    tie, interface = np.abs(lost / scale).max(axis=1)
+    return float(tie), float(interface)
 
 
 def masses(bodies: Mapping[Role, Body]) -> NDArray[np.float64]:
-    """Return this rank's masses ``(4,)`` [kg]: macro model, cut and rest of the meso model, density times volume."""
+    """Return this rank's masses ``(4,)`` [kg]: macro model, interface, rest of the meso model, density times volume."""
     found = np.zeros(4)
     for role, body in bodies.items():
         own = np.where(body.shared.owned, body.mass, 0.0)
-        at_cut = float(own[body.cut[body.cut >= 0]].sum())
-        found[:3] += [own.sum(), 0.0, 0.0] if role == "macro" else [0.0, at_cut, own.sum() - at_cut]
+        at_interface = float(own[body.interface[body.interface >= 0]].sum())
+        found[:3] += [own.sum(), 0.0, 0.0] if role == "macro" else [0.0, at_interface, own.sum() - at_interface]
         found[3] += float(body.elements.density @ body.geometry.volume)
     return found

@@ -1,4 +1,4 @@
-"""Layers of cells around some nodes: between what is fine and a cut at which velocities are held."""
+"""Layers of cells around some nodes: between what is fine and an interface at which velocities are held."""
 
 import numpy as np
 from numpy.typing import NDArray

@@ -12,7 +12,7 @@ from reflowshock.fem.division.divide import cut_nodes, seeds_of
 from reflowshock.fem.division.division import BUFFERED, Division
 from reflowshock.fem.division.rules import Rules
 from reflowshock.fem.division.whole import Survey, Whole
-from reflowshock.fem.errors import CutError, PulseError
+from reflowshock.fem.errors import CouplingError, PulseError
 from reflowshock.fem.estimates.estimate import damped_critical_step
 
 ROUNDING = 1e-9
@@ -22,11 +22,11 @@ def check_division(whole: Whole, survey: Survey, division: Division, rules: Rule
     """Check models and steps of a division.
 
     Raises:
-        CutError: A model without cells, a step above that of its cells, a buffer that is too thin or of foreign cells.
+        CouplingError: A model without cells, a step above that of its cells, a buffer that is too thin or not of board.
     """
     for role, cells in (("macro", division.macro), ("meso", division.meso)):
         if not cells.any():
-            raise CutError(nothing_left(role, whole, rules))
+            raise CouplingError(nothing_left(role, whole, rules))
     if division.scheme in BUFFERED and not division.overlaps:
         check_buffer(whole, survey, division, rules)
     if division.scheme == "local_steps":
@@ -49,24 +49,24 @@ def nothing_left(role: str, whole: Whole, rules: Rules) -> str:
 
 
 def check_buffer(whole: Whole, survey: Survey, division: Division, rules: Rules) -> None:
-    """Check that layers of board elements lie between the cut and all that is finer; errors as ``check_division``.
+    """Check that layers of board lie between the interface and all that is finer; errors as ``check_division``.
 
-    A joint on an element that touches the cut makes the window unstable (tests/stability/test_fem_window.py), and so do
-    stiff elements that touch it (PHYSICS 4).
+    A joint on an element that touches the interface makes the window unstable (tests/stability/test_fem_window.py), and
+    so do stiff elements that touch it (PHYSICS 4).
     """
     cells = whole.mesh.cells
-    at_cut = touching(cells, cut_nodes(cells, division.meso, len(whole.mesh.points)))
-    foreign = at_cut & ~rules.coarse
+    at_interface = touching(cells, cut_nodes(cells, division.meso, len(whole.mesh.points)))
+    foreign = at_interface & ~rules.coarse
     if foreign.any():
         roles = ", ".join(np.unique(survey.role[foreign]).tolist())
-        raise CutError(
-            f"elements that touch the cut must belong to the board, found {np.sum(foreign)} of {roles}, the first"
-            f" {place_of(whole, foreign)}: scheme = local_steps may cut there"
+        raise CouplingError(
+            f"elements that touch the interface must belong to the board, found {np.sum(foreign)} of {roles}, the first"
+            f" {place_of(whole, foreign)}: the interface may be there with scheme = local_steps"
         )
     layers = rules.coupling.buffer_layers
     close = division.macro & grown(cells, seeds_of(whole, ~rules.coarse), rules.coarse, layers)
     if close.any():
-        raise CutError(
+        raise CouplingError(
             f"{np.sum(close)} elements of the macro model are too close to the joints, the first"
             f" {place_of(whole, close)}: at least two layers of board elements must lie between"
             f" (coupling.buffer_layers = {layers})"
@@ -78,13 +78,13 @@ def check_linear(survey: Survey, division: Division, rules: Rules) -> None:
     path = division.meso & ~survey.linear
     if path.any():
         roles = ", ".join(np.unique(survey.role[path]).tolist())
-        raise CutError(
+        raise CouplingError(
             f"coupling.scheme = local_steps is for linear elastic elements at small strains: {np.sum(path)} elements of"
             f" {roles} have a path; held_velocity or gravouil_combescure serve them"
         )
     largest = LARGEST_DAMPING * division.plan.window
     if rules.stiffness > largest:
-        raise CutError(
+        raise CouplingError(
             f"stiffness-proportional damping of {rules.stiffness:.3g} s is too large for coupling.scheme = local_steps"
             f" with a window of {division.plan.window:.3g} s: at most {largest:.3g} s, or scheme = held_velocity"
         )
@@ -96,7 +96,7 @@ def check_steps(whole: Whole, survey: Survey, division: Division, rules: Rules) 
         above = cells & (step > (1.0 + ROUNDING) * rules.fraction * critical)
         if above.any():
             lowest = float(critical[above].min())
-            raise CutError(
+            raise CouplingError(
                 f"{name} of {step:.4g} s is above step_fraction = {rules.fraction:g} of the critical step of"
                 f" {np.sum(above)} elements ({', '.join(np.unique(survey.role[above]).tolist())}), the first"
                 f" {place_of(whole, above)}: at most {rules.fraction * lowest:.4g} s is stable"

@@ -1,4 +1,4 @@
-"""Which coupling scheme a scene calls for, and why."""
+"""Which coupling scheme a problem calls for, and why."""
 
 from dataclasses import dataclass
 

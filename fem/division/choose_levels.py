@@ -4,13 +4,16 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from reflowshock.fem.division.chebyshev import Substeps
 from reflowshock.fem.errors import LevelError
-from reflowshock.fem.mesh.tie import Tie
+
+if TYPE_CHECKING:  # a plan loads no compiled kernels
+    from reflowshock.fem.mesh.tie import Tie
 
 SUBSTEP_COST = 500.0  # updates of boxes in the time of one substep without elements: kernel calls, messages
 LARGEST_RATIO = 64
@@ -51,7 +54,7 @@ class Pace:
 
 
 def choose_levels(
-    cells: NDArray[np.int32], tie: Tie, pace: Pace, most: int
+    cells: NDArray[np.int32], tie: "Tie", pace: Pace, most: int
 ) -> tuple[NDArray[np.int32], tuple[int, ...]]:
     """Choose the levels of all elements of a mesh.
 
@@ -86,7 +89,7 @@ def choose_levels(
     return np.sum(needed[:, None] < least_steps(ratios, pace)[:-1], axis=1, dtype=np.int32), ratios
 
 
-def governing_steps(cells: NDArray[np.int32], tie: Tie, steps: NDArray[np.float64]) -> NDArray[np.float64]:
+def governing_steps(cells: NDArray[np.int32], tie: "Tie", steps: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return for each element the smallest of the steps ``(ne,)`` of all elements that share a node with it.
 
     Slaves stand for their masters. The level of an element is that of the largest at one of its nodes, which is that

@@ -34,7 +34,7 @@ def divide(whole: Whole, survey: Survey, rules: Rules) -> Division:
 
 
 def scheme_for(whole: Whole, survey: Survey, rules: Rules) -> Choice:
-    """Return the scheme that the user wants, or that the scene calls for, and why."""
+    """Return the scheme that the user wants, or that the problem calls for, and why."""
     wanted = rules.coupling.scheme
     if rules.copied is not None:
         return Choice("held_velocity", "coupling.direction = one_way: nothing comes back that could grow")
@@ -59,7 +59,7 @@ def seeds_of(whole: Whole, fine: NDArray[np.bool_]) -> NDArray[np.bool_]:
 def by_buffer(whole: Whole, survey: Survey, rules: Rules) -> Division:
     """Give the meso model all that is no board, and some layers of board around it: held velocity.
 
-    The window follows the macro model and all cells that touch the cut (PHYSICS 4).
+    The window follows the macro model and all cells that touch the interface (PHYSICS 4).
     """
     cells = whole.mesh.cells
     buffer = grown(cells, seeds_of(whole, ~rules.coarse), rules.coarse, rules.coupling.buffer_layers)
@@ -67,7 +67,7 @@ def by_buffer(whole: Whole, survey: Survey, rules: Rules) -> Division:
 
 
 def carried(whole: Whole, survey: Survey, rules: Rules) -> Division:
-    """Give the models the cells that they have with held velocity; the cut is the meso model's: impulses."""
+    """Give the models the cells that they have with held velocity; the interface is the meso model's: impulses."""
     return replace(by_buffer(whole, survey, rules), scheme="impulse")
 
 
@@ -99,7 +99,7 @@ def cut_nodes(cells: NDArray[np.int32], meso: NDArray[np.bool_], count: int) -> 
 
 
 def at_ties(_whole: Whole, survey: Survey, rules: Rules) -> Division:
-    """Give the meso model all that is no board: Gravouil-Combescure, whose cut are the nodes tied to."""
+    """Give the meso model all that is no board: Gravouil-Combescure, whose interface is the nodes tied to."""
     return two_steps("gravouil_combescure", rules, (rules.coarse, ~rules.coarse), (rules.coarse, survey.step))
 
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from reflowshock.fem.estimates.estimate import WindowPlan
 
 SchemeName = Literal["held_velocity", "local_steps", "impulse", "gravouil_combescure"]
-BUFFERED: tuple[SchemeName, ...] = ("held_velocity", "impulse")  # schemes whose cut lies below layers of board
+BUFFERED: tuple[SchemeName, ...] = ("held_velocity", "impulse")  # schemes whose interface lies below layers of board
 
 
 @dataclass(frozen=True, slots=True)

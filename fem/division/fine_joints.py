@@ -1,4 +1,4 @@
-"""Which joints of a scene are fine: all others have the coarse mesh."""
+"""Which joints of a package are fine: all others have the coarse mesh."""
 
 from collections.abc import Collection
 from dataclasses import replace
@@ -12,13 +12,13 @@ from reflowshock.fem.mesh.mesh import MeshData, append, select
 from reflowshock.fem.mesh.mesh_file import read_mesh, read_meshes
 from reflowshock.fem.mesh.watch_table import joint_names
 from reflowshock.fem.names import nearest
-from reflowshock.fem.problem.inputs import SceneInput
+from reflowshock.fem.problem.inputs import PackageInput
 
 COPY = "_coarse@"
 KEY = "shock.coupling.fine_joints"
 
 
-def read_scene(request: SceneInput) -> MeshData:
+def read_package(request: PackageInput) -> MeshData:
     """Read the meshes of a run, each joint fine or coarse as it asks for.
 
     Raises:

@@ -9,7 +9,7 @@ from reflowshock.fem.division.whole import Survey
 
 
 def coupling_record(division: Division, survey: Survey, cut_nodes: int) -> dict[str, Any]:
-    """Return scheme and why, share of the meso model, nodes of the cut, levels of time steps with their elements."""
+    """Return the scheme and why, the share of the meso model, its interface, levels of steps with their elements."""
     plan = division.plan
     held = division.scheme != "local_steps"
     level = division.meso.astype(np.int32) if held else division.level

@@ -44,7 +44,7 @@ def part_of(whole: Whole, cells: NDArray[np.bool_]) -> Part:
     return Part(mesh, tie, number, cell_number, len(mesh.points) + len(absent))
 
 
-def cut_between(whole: Whole, macro: Part, meso: Part) -> NDArray[np.intp]:
+def interface_between(whole: Whole, macro: Part, meso: Part) -> NDArray[np.intp]:
     """Return the nodes ``(nc,)`` of the whole mesh that both models have and that move on their own.
 
     A slave that both have follows its masters in both: they are the nodes that couple.

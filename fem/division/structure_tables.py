@@ -13,7 +13,7 @@ from reflowshock.fem.mesh.facet_areas import OutwardFacets, facet_set, outward_a
 from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.mesh.point_table import PointTable, point_table
 from reflowshock.fem.mesh.tie import tie_joints
-from reflowshock.fem.problem.structure import AXES, InputG, PrescribedMotion, Pressure, StructureScene
+from reflowshock.fem.problem.structure import AXES, InputG, PrescribedMotion, Pressure, StructureProblem
 
 NODES = {"hexahedron": 8, "tetrahedron": 4, "tetrahedron_quadratic": 10}
 
@@ -35,18 +35,18 @@ class StructureTables(Tables):
     watch: PointTable
 
 
-def tied(mesh: MeshData, scene: StructureScene) -> Whole:
+def tied(mesh: MeshData, problem: StructureProblem) -> Whole:
     """Tie the layers of a structure whose elements differ.
 
     Raises:
         MeshError: Cells of another shape, layers without elements or elements without layers.
         TieError: Layers whose elements differ do not touch.
     """
-    check_layers(mesh, scene)
+    check_layers(mesh, problem)
     return Whole(*tie_joints(mesh))
 
 
-def structure_tables(whole: Whole, scene: StructureScene) -> StructureTables:
+def structure_tables(whole: Whole, problem: StructureProblem) -> StructureTables:
     """Build the tables of a structure.
 
     Raises:
@@ -54,18 +54,18 @@ def structure_tables(whole: Whole, scene: StructureScene) -> StructureTables:
         LoadError: A facet set without facets, or a prescribed motion of what is held.
     """
     mesh, tie = whole.mesh, whole.tie
-    moved = [load.on for load in scene.loads.values() if isinstance(load, PrescribedMotion)]
-    sets = [*(support.on for support in scene.supports.values()), *moved]
+    moved = [load.on for load in problem.loads.values() if isinstance(load, PrescribedMotion)]
+    sets = [*(support.on for support in problem.supports.values()), *moved]
     nodes_of: dict[str, NDArray[np.integer]] = {}
     for name in sets:  # slaves follow their masters
         nodes_of[name] = np.setdiff1d(facet_set(mesh, name), tie.slave)
-    pressed = {load.on for load in scene.loads.values() if isinstance(load, Pressure)}
-    held = held_by_supports(mesh, scene)
-    check_motions(scene, nodes_of, held)
-    check_shaken(scene, nodes_of, held)
-    points = {name: point.at for name, point in scene.watch.items()}
+    pressed = {load.on for load in problem.loads.values() if isinstance(load, Pressure)}
+    held = held_by_supports(mesh, problem)
+    check_motions(problem, nodes_of, held)
+    check_shaken(problem, nodes_of, held)
+    points = {name: point.at for name, point in problem.watch.items()}
     supports = {
-        name: (nodes_of[support.on], np.isin(list(AXES), support.hold)) for name, support in scene.supports.items()
+        name: (nodes_of[support.on], np.isin(list(AXES), support.hold)) for name, support in problem.supports.items()
     }
     return StructureTables.undivided(
         whole,
@@ -73,19 +73,19 @@ def structure_tables(whole: Whole, scene: StructureScene) -> StructureTables:
         nodes_of=nodes_of,
         areas={name: outward_areas(mesh, name) for name in sorted(pressed)},
         pressed={name: outward_facets(mesh, name) for name in sorted(pressed)},
-        watch=point_table(mesh, points, supports, yields=bool(plastic_laws(scene.layer_materials))),
+        watch=point_table(mesh, points, supports, yields=bool(plastic_laws(problem.layer_materials))),
     )
 
 
-def check_layers(mesh: MeshData, scene: StructureScene) -> None:
+def check_layers(mesh: MeshData, problem: StructureProblem) -> None:
     """Compare the cells and the parts of the mesh with elements and layers; errors as ``tied``."""
-    element = scene.structure.element
+    element = problem.structure.element
     if mesh.shape.nodes != NODES[element]:
         raise MeshError(
             f"structure.element = {element} has {NODES[element]} nodes, the cells of the mesh ({mesh.shape.name}) have"
             f" {mesh.shape.nodes}"
         )
-    layers, parts = set(scene.structure.layers), set(mesh.part_names)
+    layers, parts = set(problem.structure.layers), set(mesh.part_names)
     if layers != parts:
         empty, foreign = ", ".join(sorted(layers - parts)), ", ".join(sorted(parts - layers))
         raise MeshError(
@@ -94,9 +94,9 @@ def check_layers(mesh: MeshData, scene: StructureScene) -> None:
         )
 
 
-def check_motions(scene: StructureScene, nodes_of: dict[str, NDArray[np.integer]], held: NDArray[np.bool_]) -> None:
+def check_motions(problem: StructureProblem, nodes_of: dict[str, NDArray[np.integer]], held: NDArray[np.bool_]) -> None:
     """Refuse prescribed motions of held components ``(n, 3)``; errors as ``structure_tables``."""
-    for name, load in scene.loads.items():
+    for name, load in problem.loads.items():
         if not isinstance(load, PrescribedMotion):
             continue
         nodes = nodes_of[load.on]
@@ -108,10 +108,10 @@ def check_motions(scene: StructureScene, nodes_of: dict[str, NDArray[np.integer]
             )
 
 
-def check_shaken(scene: StructureScene, nodes_of: dict[str, NDArray[np.integer]], held: NDArray[np.bool_]) -> None:
+def check_shaken(problem: StructureProblem, nodes_of: dict[str, NDArray[np.integer]], held: NDArray[np.bool_]) -> None:
     """Refuse a large mass on components ``(n, 3)`` that are held in space; errors as ``structure_tables``."""
-    for name in shaken_supports(scene):
-        nodes = nodes_of[scene.supports[name].on]
+    for name in shaken_supports(problem):
+        nodes = nodes_of[problem.supports[name].on]
         count = int(held[nodes].any(axis=1).sum())
         if count:
             raise LoadError(
@@ -120,17 +120,17 @@ def check_shaken(scene: StructureScene, nodes_of: dict[str, NDArray[np.integer]]
             )
 
 
-def shaken_supports(scene: StructureScene) -> list[str]:
+def shaken_supports(problem: StructureProblem) -> list[str]:
     """Return the supports that a large mass moves: those that hold all components, where an input-G asks for it."""
-    by_mass = any(isinstance(load, InputG) and load.method == "large_mass" for load in scene.loads.values())
-    return [name for name, support in scene.supports.items() if by_mass and set(support.hold) == set(AXES)]
+    by_mass = any(isinstance(load, InputG) and load.method == "large_mass" for load in problem.loads.values())
+    return [name for name, support in problem.supports.items() if by_mass and set(support.hold) == set(AXES)]
 
 
-def held_by_supports(mesh: MeshData, scene: StructureScene) -> NDArray[np.bool_]:
+def held_by_supports(mesh: MeshData, problem: StructureProblem) -> NDArray[np.bool_]:
     """Return ``(n, 3)``: components that supports and planes of symmetry hold at zero."""
-    shaken = shaken_supports(scene)
-    rules = [(support.on, support.hold) for name, support in scene.supports.items() if name not in shaken]
-    rules += [(f"{axis}_min", (axis,)) for axis in scene.structure.symmetry]
+    shaken = shaken_supports(problem)
+    rules = [(support.on, support.hold) for name, support in problem.supports.items() if name not in shaken]
+    rules += [(f"{axis}_min", (axis,)) for axis in problem.structure.symmetry]
     held = np.zeros((len(mesh.points), 3), dtype=bool)
     for name, components in rules:
         held[np.ix_(np.unique(facet_set(mesh, name)), np.array([AXES.index(axis) for axis in components]))] = True

@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reflowshock.fem.division.division import Division
-from reflowshock.fem.division.split import Part, cut_between, part_of
+from reflowshock.fem.division.split import Part, interface_between, part_of
 from reflowshock.fem.division.whole import Whole
 from reflowshock.fem.estimates.placement import Role
-from reflowshock.fem.mesh.coupling_interface import find_cut
-from reflowshock.fem.mesh.interface_table import InterfaceTable, whole_interface
+from reflowshock.fem.mesh.coupling_interface import find_interface
+from reflowshock.fem.mesh.joint_interface import JointInterfaceTable, whole_joint_interface
 from reflowshock.fem.mesh.mesh import MeshData, merge_nodes
 from reflowshock.fem.mesh.supports import HELD, held_components
 from reflowshock.fem.mesh.tie import Tie, tie_joints
@@ -31,7 +31,7 @@ class Tables:
         moved: Largest move of a slave onto its facet [m].
         held_nodes: ``(k,)`` nodes with a held component.
         held: ``(k, 3)`` which components.
-        cut: ``(nc,)`` nodes of the cut, in the same order on both sides.
+        interface: ``(nc,)`` nodes of the interface, in the same order on both sides.
         nodes: Number of nodes of the model.
         level: ``(ne,)`` int32 level of the step of each cell, 0 for the model's own step.
         ratios: Steps of level k + 1 in one of level k.
@@ -44,7 +44,7 @@ class Tables:
     moved: float
     held_nodes: NDArray[np.int64]
     held: NDArray[np.bool_]
-    cut: NDArray[np.int32]
+    interface: NDArray[np.int32]
     nodes: int
     level: NDArray[np.int32]
     ratios: tuple[int, ...]
@@ -67,7 +67,7 @@ class Tables:
             moved=whole.moved,
             held_nodes=held_nodes,
             held=held[held_nodes],
-            cut=np.empty(0, np.int32),
+            interface=np.empty(0, np.int32),
             nodes=len(whole.mesh.points),
             level=np.zeros(len(whole.mesh.cells), np.int32),
             ratios=(),
@@ -87,7 +87,7 @@ class JointTables(Tables):
 
     watch: WatchTable
     shaken: NDArray[np.int32]
-    interface: InterfaceTable
+    joint_interface: JointInterfaceTable
 
 
 TablesT_co = TypeVar("TablesT_co", bound=Tables, covariant=True)
@@ -106,9 +106,9 @@ def joined(data: MeshData) -> Whole:
     """Let board and patch share their nodes, and tie the joints.
 
     Raises:
-        CutError, TieError: They do not fit.
+        CouplingError, TieError: They do not fit.
     """
-    macro_nodes, meso_nodes = find_cut(data)
+    macro_nodes, meso_nodes = find_interface(data)
     return Whole(*tie_joints(merge_nodes(data, meso_nodes, macro_nodes)[0]))
 
 
@@ -130,44 +130,44 @@ def model_inputs(
     Raises:
         MeshError: A pad has no solder.
     """
-    scene = Scene.of(whole, rules)
+    package = WholePackage.of(whole, rules)
     if division == "dns":
         part = part_of(whole, np.ones(len(whole.mesh.cells), dtype=bool))
-        return {"dns": scene.model_input(part, np.empty(0, np.int32), (part.number, part.cell_number))}
+        return {"dns": package.model_input(part, np.empty(0, np.int32), (part.number, part.cell_number))}
     macro, meso = part_of(whole, division.macro), part_of(whole, division.meso)
-    cut = cut_between(whole, part_of(whole, division.around), meso)
+    interface = interface_between(whole, part_of(whole, division.around), meso)
     rest = np.where(macro.number < 0, meso.number, -1), np.where(macro.cell_number < 0, meso.cell_number, -1)
     inputs: dict[Role, ModelInput[JointTables]] = {
-        "macro": scene.model_input(macro, cut, (macro.number, macro.cell_number)),
-        "meso": scene.model_input(meso, cut, rest),
+        "macro": package.model_input(macro, interface, (macro.number, macro.cell_number)),
+        "meso": package.model_input(meso, interface, rest),
     }
     tables = replace(inputs["meso"].tables, level=division.level[division.meso], ratios=division.ratios)
     return inputs | {"meso": replace(inputs["meso"], tables=tables)}
 
 
 @dataclass(frozen=True, slots=True)
-class Scene:
+class WholePackage:
     """What is known of a package on a board before it is split: mesh and ties, held components ``(n, 3)``, watches."""
 
     whole: Whole
     held: NDArray[np.bool_]
     watch: WatchTable
-    interface: InterfaceTable
+    joint_interface: JointInterfaceTable
 
     @classmethod
-    def of(cls, whole: Whole, rules: Mapping[str, Sequence[int]]) -> "Scene":
+    def of(cls, whole: Whole, rules: Mapping[str, Sequence[int]]) -> "WholePackage":
         """Find out what is held and watched."""
         mesh = whole.mesh
-        return cls(whole, held_components(mesh, rules), whole_watch(mesh), whole_interface(mesh))
+        return cls(whole, held_components(mesh, rules), whole_watch(mesh), whole_joint_interface(mesh))
 
     def model_input(
-        self, part: Part, cut: NDArray[np.integer], counted: tuple[NDArray[np.int32], NDArray[np.int32]]
+        self, part: Part, interface: NDArray[np.integer], counted: tuple[NDArray[np.int32], NDArray[np.int32]]
     ) -> ModelInput[JointTables]:
         """Return a model with its tables.
 
         Args:
             part: Its part of the mesh.
-            cut: ``(nc,)`` nodes of the whole mesh that couple.
+            interface: ``(nc,)`` nodes of the whole mesh that couple.
             counted: Own numbers of the nodes ``(n,)`` and cells ``(ne,)`` that are watched and shaken in this model, -1
                 for those of another one.
         """
@@ -183,12 +183,12 @@ class Scene:
             moved=self.whole.moved,
             held_nodes=held_nodes,
             held=self.held[order][held_nodes],
-            cut=part.number[cut],
+            interface=part.number[interface],
             nodes=part.nodes,
             level=np.zeros(len(part.mesh.cells), np.int32),
             ratios=(),
             watch=self.watch.within(*counted),
             shaken=shaken[shaken >= 0],
-            interface=self.interface.within(counted[1]),
+            joint_interface=self.joint_interface.within(counted[1]),
         )
         return ModelInput(part.mesh, tables, np.flatnonzero(part.cell_number >= 0))

@@ -14,7 +14,7 @@ from reflowshock.fem.model.step_levels import levels_of
 from reflowshock.fem.parallel.portable import Rows, Same, Shares, State, Sum
 
 
-class Motion(Loaded):
+class ExplicitMotion(Loaded):
     """The state of one model on one rank, and its step.
 
     Half-kick, drift, force, half-kick, written with the velocity half a step back: v += dt (f / m + g), u += dt v.
@@ -27,7 +27,7 @@ class Motion(Loaded):
         slave_force: ``(ns, 3)`` [N] of this rank's elements on the slaves, before it is moved.
         gravity: ``(3,)`` [m/s^2], sum of the loads' accelerations at ``time``.
         mobility: ``(n, 3)`` [1/kg] inverse masses, zero where the velocity is prescribed.
-        ledger_mass: ``(n,)`` [kg] that counts in the ledger of this rank.
+        counted_mass: ``(n,)`` [kg] that counts in the energy balance of this rank.
     """
 
     def __init__(
@@ -39,8 +39,8 @@ class Motion(Loaded):
             body: The model.
             loads: What acts on it; damping comes last, since it needs all other forces.
             step: dt [s].
-            held: Local nodes whose velocity another model prescribes; their mass is in that model's ledger.
-            extra_mass: ``(n,)`` [kg] that another model adds at the cut.
+            held: Local nodes whose velocity another model prescribes; their mass is in that model's energy balance.
+            extra_mass: ``(n,)`` [kg] that another model adds at the interface.
         """
         self.body, self.step, self.time, self._body_work = body, step, 0.0, 0.0
         carried = [FineSupports()] if levels_of(body.terms) else []
@@ -49,8 +49,8 @@ class Motion(Loaded):
         free = body.free.copy()
         free[held] = False
         self.mobility = np.where(free, 1.0 / np.where(mass > 0.0, mass, np.inf)[:, None], 0.0)
-        self.ledger_mass = np.where(body.shared.owned, mass, 0.0)
-        self.ledger_mass[held] = 0.0
+        self.counted_mass = np.where(body.shared.owned, mass, 0.0)
+        self.counted_mass[held] = 0.0
         self._state = np.zeros((3, len(mass), 3))
         self.displacement, self.velocity, self.force = self._state
         self._tied = len(body.tie.slave) > 0
@@ -83,7 +83,7 @@ class Motion(Loaded):
         self.mobility[nodes, component] = 0.0
 
     def add_mass(self, nodes: NDArray[np.integer], mass: NDArray[np.float64]) -> None:
-        """Add masses ``(k,)`` [kg] that the ledger does not count to local nodes, all of whose components are free."""
+        """Add masses ``(k,)`` [kg] that the energy balance does not count to local nodes, all of them free."""
         self.mobility[nodes] = 1.0 / (1.0 / self.mobility[nodes] + mass[:, None])
 
     def launch(self, velocity: NDArray[np.float64]) -> None:
@@ -109,7 +109,7 @@ class Motion(Loaded):
         before, self.gravity = self.gravity, self.body_acceleration(self.time)
         mean = 0.5 * (before + self.gravity)
         if mean.any():
-            self._body_work += self.step * float(mean @ (self.ledger_mass @ self.velocity))
+            self._body_work += self.step * float(mean @ (self.counted_mass @ self.velocity))
 
     def update_force(self) -> None:
         """Evaluate the force at the present displacement, summed over ranks; once a step, for terms with a path."""
@@ -137,7 +137,7 @@ class Motion(Loaded):
         With this product its change over a step is exactly the work of the forces (central differences conserve it
         together with the strain energy), while m v^2 / 2 of the mean velocity is larger by m (a dt)^2 / 8.
         """
-        return 0.5 * float(np.einsum("n,ni,ni->", self.ledger_mass, self.velocity, self._following_velocity()))
+        return 0.5 * float(np.einsum("n,ni,ni->", self.counted_mass, self.velocity, self._following_velocity()))
 
     def present_velocity(self) -> NDArray[np.float64]:
         """Return the velocity ``(n, 3)`` [m/s] at ``time``, half a step after ``velocity``; not that of slaves."""
@@ -156,7 +156,7 @@ class Motion(Loaded):
         for load in self._loads:
             load.release(force)
         acceleration = (self._following_velocity() - self.velocity) / self.step - self.gravity
-        return self.ledger_mass[:, None] * acceleration - force
+        return self.counted_mass[:, None] * acceleration - force
 
     def step_energy(self, foreign: NDArray[np.float64]) -> float:
         """Return dt^2 f . M^-1 f / 8 [J] of this rank's share, f the internal force.

@@ -18,20 +18,20 @@ EXPLANATION = "most likely the time step is too large for this mesh and material
 
 INTERFACE = (
     "the coupling of both models holds most of what is missing: a smaller numerics.step_fraction or finer macro"
-    " elements resolve what crosses the cut"
+    " elements resolve what crosses the interface"
 )
 
 
-def ledger_sums(participant: Participant, sign: float) -> NDArray[np.float64]:
-    """Return this rank's part of the ledger: ``(24,)``.
+def energy_sums(participant: Participant, sign: float) -> NDArray[np.float64]:
+    """Return this rank's part of the energy balance: ``(24,)``.
 
     The energies of ``ENERGIES`` [J], where internal is elastic strain energy and interface the work put in by the macro
-    model minus that received by the meso model; the step energy (``Motion.step_energy``); net force and moment of the
-    cut, meso minus macro, and their scales; the same of the tie.
+    model minus that received by the meso model; the step energy (``ExplicitMotion.step_energy``); net force and moment
+    of the coupling interface, meso minus macro, and their scales; the same of the tie.
 
     Args:
         participant: The model on this rank.
-        sign: +1 for the macro model, -1 for the meso model, 0 without a cut.
+        sign: +1 for the macro model, -1 for the meso model, 0 without an interface.
     """
     motion = participant.motion
     with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is told by the judge
@@ -47,13 +47,13 @@ def ledger_sums(participant: Participant, sign: float) -> NDArray[np.float64]:
             motion.step_energy(participant.foreign_force()),
         ]
     body = motion.body
-    here = body.cut[body.cut >= 0]
+    here = body.interface[body.interface >= 0]
     here = here[body.shared.owned[here]]
-    points, cut = body.local.points[here], participant.cut_force()[here]
-    cut_load = -sign * net_load(points, cut)
-    cut_scale = 0.5 * abs(sign) * load_scale(points, cut)
+    points, interface = body.local.points[here], participant.interface_force()[here]
+    interface_load = -sign * net_load(points, interface)
+    interface_scale = 0.5 * abs(sign) * load_scale(points, interface)
     tie_load, tie_scale = tie_residual(participant)
-    return np.concatenate([energies, cut_load, cut_scale, tie_load, tie_scale])
+    return np.concatenate([energies, interface_load, interface_scale, tie_load, tie_scale])
 
 
 def load_scale(points: NDArray[np.float64], force: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -74,7 +74,7 @@ def tie_residual(participant: Participant) -> tuple[NDArray[np.float64], NDArray
 
 
 @dataclass(slots=True)
-class Ledger:
+class EnergyBalance:
     """Judges the sums of all ranks at each sample.
 
     Attributes:
@@ -101,7 +101,7 @@ class Ledger:
     latest: dict[str, float] = field(default_factory=dict)
 
     def judge(self, sums: NDArray[np.float64], time: float) -> dict[str, float]:
-        """Check a sample of ``ledger_sums`` added up over all ranks.
+        """Check a sample of ``energy_sums`` added up over all ranks.
 
         Returns:
             ``ENERGIES`` and the balance [J]: all energy that is there or was taken, minus the initial and the external.
@@ -149,14 +149,14 @@ class Ledger:
             )
 
     def _judge_forces(self, loads: NDArray[np.float64]) -> None:
-        """Note the residuals of cut and tie: two times net force, moment ``(6,)`` and scales ``(2,)``."""
+        """Note the residuals of interface and tie: two times net force, moment ``(6,)`` and scales ``(2,)``."""
         for load in (loads[:8], loads[8:]):
             scale = np.repeat(load[6:8], 3)
             ratio = np.divide(np.abs(load[:6]), scale, out=np.zeros(6), where=scale > 0.0)
             self.force_residual = max(self.force_residual, float(ratio.max()))
 
     def _taken_by_interface(self, found: dict[str, float]) -> bool:
-        """Return whether most of what is missing is the difference of both models' works across the cut."""
+        """Return whether most of what is missing is the difference of both models' works across the interface."""
         present = sum(found[name] for name in ENERGIES[:5]) - found["external"]
         return abs(present - self.initial + found["interface"]) < 0.5 * abs(found["interface"])
 

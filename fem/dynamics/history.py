@@ -9,7 +9,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from reflowshock.data_file import columns, fields_of, rows
-from reflowshock.fem.dynamics.energy_balance import Ledger, ledger_sums
+from reflowshock.fem.dynamics.energy_balance import EnergyBalance, energy_sums
 from reflowshock.fem.dynamics.participant import Participant
 from reflowshock.fem.dynamics.watch import Watch
 from reflowshock.fem.parallel.communicators import Role
@@ -21,29 +21,29 @@ Signal = Callable[[float], float]
 
 
 class History:
-    """Samples of the watch points, the ledger and given functions of time, equal on all ranks."""
+    """Samples of the watch points, the energy balance and given functions of time, equal on all ranks."""
 
     def __init__(
-        self, world: MPI.Comm, watches: Mapping[Role, Watch], ledger: Ledger, signals: Mapping[str, Signal]
+        self, world: MPI.Comm, watches: Mapping[Role, Watch], balance: EnergyBalance, signals: Mapping[str, Signal]
     ) -> None:
         """Start an empty history; ``watches`` are those of the models on this rank."""
-        self.ledger = ledger
+        self.balance = balance
         self._world, self._watches, self._signals = world, watches, signals
         self._watch = next(iter(watches.values()))
         self._rows: list[dict[str, NDArray[np.float64] | float]] = []
 
-    def sample(self, crew: Mapping[Role, Participant]) -> None:
+    def sample(self, participants: Mapping[Role, Participant]) -> None:
         """Add a sample; collective over all models.
 
         Args:
-            crew: The models on this rank.
+            participants: The models on this rank.
 
         Raises:
-            EnergyError: On every rank, see ``Ledger.judge``.
+            EnergyError: On every rank, see ``EnergyBalance.judge``.
         """
-        energies = self.check(crew)
+        energies = self.check(participants)
         sums, maxima = [], []
-        for role, participant in crew.items():
+        for role, participant in participants.items():
             time = participant.motion.time
             watched, largest = self._watches[role].sample(participant.motion)
             sums.append(watched)
@@ -53,19 +53,19 @@ class History:
             signals = {name: signal(time) for name, signal in self._signals.items()}
             self._rows.append({"time": time, **signals, **self._watch.row(total, most), **energies})
 
-    def check(self, crew: Mapping[Role, Participant]) -> dict[str, float]:
+    def check(self, participants: Mapping[Role, Participant]) -> dict[str, float]:
         """Judge the energies without a sample, and return them; collective over all models; errors as ``sample``."""
-        ledgers = [ledger_sums(participant, SIDE[role]) for role, participant in crew.items()]
-        time = next(iter(crew.values())).motion.time
-        return self.ledger.judge(self._combine(np.sum(ledgers, axis=0)), time)
+        parts = [energy_sums(participant, SIDE[role]) for role, participant in participants.items()]
+        time = next(iter(participants.values())).motion.time
+        return self.balance.judge(self._combine(np.sum(parts, axis=0)), time)
 
     def state(self) -> State:
-        """Return ledger and samples, for a checkpoint."""
-        return {"ledger": Same(fields_of(self.ledger)), "rows": Log(columns(self._rows))}
+        """Return energy balance and samples, for a checkpoint."""
+        return {"balance": Same(fields_of(self.balance)), "rows": Log(columns(self._rows))}
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """Continue from the values of what ``state`` returned."""
-        self.ledger, self._rows = Ledger(**state["ledger"]), rows(state["rows"])
+        self.balance, self._rows = EnergyBalance(**state["balance"]), rows(state["rows"])
 
     def _combine(self, part: NDArray[np.float64], operation: MPI.Op = MPI.SUM) -> NDArray[np.float64]:
         result = np.empty_like(part)

@@ -29,7 +29,7 @@ from reflowshock.fem.parallel.portable import Rows, Same, Shares, State, Sum
 
 
 @dataclass(frozen=True, slots=True)
-class Scheme:
+class HHTScheme:
     """Coefficients of one step: h [s], alpha."""
 
     step: float
@@ -54,7 +54,7 @@ class Scheme:
 
 
 class ImplicitMotion(Loaded):
-    """The state of one model on one rank, and its step; the surface of ``motion.Motion``.
+    """The state of one model on one rank, and its step; the surface of ``central_difference.ExplicitMotion``.
 
     Attributes:
         body: The model.
@@ -65,7 +65,7 @@ class ImplicitMotion(Loaded):
         force: ``(n, 3)`` [N] at ``time`` after ``update_force``, summed over ranks, without body force.
         slave_force: ``(ns, 3)`` [N] of this rank's elements on the slaves, before it is moved.
         gravity: ``(3,)`` [m/s^2], sum of the loads' accelerations at ``time``.
-        ledger_mass: ``(n,)`` [kg] that counts in the ledger of this rank.
+        counted_mass: ``(n,)`` [kg] that counts in the energy balance of this rank.
         factor: The factored matrix of a step.
     """
 
@@ -83,7 +83,7 @@ class ImplicitMotion(Loaded):
             ValueError: Step or alpha out of range.
             AgreedError: A material or kinematics is not linear, or memory ran out; on every rank.
         """
-        self._scheme = Scheme(step, alpha)
+        self._scheme = HHTScheme(step, alpha)
         agreed(comm, lambda: check_linear(body))
         self.body, self.step, self.time = body, step, 0.0
         self._loads = [load for load in loads if not isinstance(load, RayleighDamping)]
@@ -94,7 +94,7 @@ class ImplicitMotion(Loaded):
         self._state = np.zeros((6, count, 3))
         self.displacement, self.velocity, self.force, self._acceleration, self._drag, self._nodal = self._state
         self.slave_force = np.zeros((len(body.tie.slave), 3))
-        self.ledger_mass = np.where(owned, body.mass, 0.0)
+        self.counted_mass = np.where(owned, body.mass, 0.0)
         self._extra, self._free = np.zeros(count), body.free.copy()
         self.gravity = self.body_acceleration(0.0)
         for load in self._loads:
@@ -123,7 +123,7 @@ class ImplicitMotion(Loaded):
         self._free[nodes, component] = False
 
     def add_mass(self, nodes: NDArray[np.integer], mass: NDArray[np.float64]) -> None:
-        """Add masses ``(k,)`` [kg] that the ledger does not count to local nodes."""
+        """Add masses ``(k,)`` [kg] that the energy balance does not count to local nodes."""
         self._extra[nodes] += mass
 
     def acceleration(self, nodes: NDArray[np.integer] | slice = slice(None)) -> NDArray[np.float64]:
@@ -145,11 +145,11 @@ class ImplicitMotion(Loaded):
         self.restart()
 
     def restart(self) -> None:
-        """Take displacement and velocity as they are now for the state at ``time``, the start of the ledger."""
+        """Take displacement and velocity as they are now for the state at ``time``, the start of the energy balance."""
         self._update_force()
         mass = (self.body.mass + self._extra)[:, None]
         self._acceleration[:] = np.where(self._free, self._total_force() / np.where(mass > 0.0, mass, np.inf), 0.0)
-        self._before = self._ledger_fields()
+        self._before = self._balance_fields()
         self._older = self._total_force()
         self._works[:] = 0.0, 0.0, self._stored_apart()
 
@@ -180,7 +180,7 @@ class ImplicitMotion(Loaded):
     def update_force(self) -> None:
         """Evaluate the force of the motion at ``time``, summed over ranks, and the work of the step before."""
         self._update_force()
-        before, self._before = self._before, self._ledger_fields()
+        before, self._before = self._before, self._balance_fields()
         change, mean = self._before - before, 0.5 * (before + self._before)
         solved, prescribed = self._equations.own, self._prescribed & self.body.shared.owned[:, None]
         moved, held = change[0], mean[4] + mean[5]
@@ -196,7 +196,7 @@ class ImplicitMotion(Loaded):
         HHT method M a_bar - R_bar = alpha (R' - R_older) / 2, older by two steps.
 
         Args:
-            change: ``(6, n, 3)`` change of ``_ledger_fields`` over the step.
+            change: ``(6, n, 3)`` change of ``_balance_fields`` over the step.
             mean: Their means.
         """
         h, scheme, solved = self.step, self._scheme, self._equations.own
@@ -208,14 +208,14 @@ class ImplicitMotion(Loaded):
         apart = h**2 * (scheme.beta - 0.5 * scheme.gamma) * mean[3:].sum(axis=0) * change[2]
         return float(np.sum((h * mean[1] * unbalanced - apart)[solved]))
 
-    def _ledger_fields(self) -> NDArray[np.float64]:
+    def _balance_fields(self) -> NDArray[np.float64]:
         """Return displacement, velocity, acceleration, forces of loads, damping, elements: ``(6, n, 3)``."""
         elastic = self.force - self._nodal - self._drag
         external = self._total_force() - elastic - self._drag
         return np.array([self.displacement, self.velocity, self._acceleration, external, self._drag, elastic])
 
     def _stored_apart(self) -> float:
-        """Return the kinetic energy [J] of prescribed components less that of masses the ledger does not count."""
+        """Return the kinetic energy [J] of prescribed components less that of masses that do not count."""
         owned = self.body.shared.owned[:, None]
         mass = np.where(self._prescribed, self.body.mass[:, None], 0.0) - self._extra[:, None]
         return 0.5 * float(np.sum(np.where(owned, mass, 0.0) * self.velocity**2))
@@ -272,11 +272,11 @@ class ImplicitMotion(Loaded):
         force = self.force.copy()
         for load in self._loads:
             load.release(force)
-        return self.ledger_mass[:, None] * (self._acceleration - self.gravity) - force
+        return self.counted_mass[:, None] * (self._acceleration - self.gravity) - force
 
     def kinetic_energy(self) -> float:
         """Return the kinetic energy [J] of this rank's share."""
-        return 0.5 * float(self.ledger_mass @ np.sum(self.velocity**2, axis=1))
+        return 0.5 * float(self.counted_mass @ np.sum(self.velocity**2, axis=1))
 
     def step_energy(self, foreign: NDArray[np.float64]) -> float:
         """Return zero: no step is too large for stability."""

@@ -11,8 +11,8 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from reflowshock.fem.dynamics.central_difference import Motion
-from reflowshock.fem.dynamics.moving import Moving
+from reflowshock.fem.dynamics.central_difference import ExplicitMotion
+from reflowshock.fem.dynamics.motion import Motion
 from reflowshock.fem.estimates.estimate import WindowPlan
 from reflowshock.fem.loads.load import Load
 from reflowshock.fem.model.body import Body
@@ -24,14 +24,15 @@ class Participant(Protocol):
 
     Attributes:
         plan: Window and substeps.
-        interface_work: Work [J] of this rank's share across the cut: put in by the macro, received by the meso model.
+        interface_work: Work [J] of this rank's share across the interface: put in by the macro model, received by the
+            meso model.
     """
 
     plan: WindowPlan
     interface_work: float
 
     @property
-    def motion(self) -> Moving:
+    def motion(self) -> Motion:
         """Return its state."""
 
     def begin_window(self) -> None:
@@ -40,8 +41,8 @@ class Participant(Protocol):
     def finish_window(self) -> None:
         """Do the rest of the window."""
 
-    def cut_force(self) -> NDArray[np.float64]:
-        """Return the forces ``(n, 3)`` [N] across the cut as this participant knows them, zero elsewhere."""
+    def interface_force(self) -> NDArray[np.float64]:
+        """Return the forces ``(n, 3)`` [N] across the interface as this participant knows them, zero elsewhere."""
 
     def foreign_force(self) -> NDArray[np.float64]:
         """Return the part ``(n, 3)`` [N] of ``motion.force`` that belongs to the other model."""
@@ -61,11 +62,11 @@ class Continued:
         interface_work: See ``Participant``.
     """
 
-    motion: Moving
+    motion: Motion
     interface_work: float
 
     def state(self) -> State:
-        """Return the motion's state and the work across the cut."""
+        """Return the motion's state and the work across the interface."""
         return {"motion": self.motion.state(), "interface_work": Sum(self.interface_work)}
 
     def restore(self, state: Mapping[str, Any]) -> None:
@@ -75,9 +76,9 @@ class Continued:
 
 
 class Alone(Continued):
-    """One model without a cut: a DNS, all steps small, or a structure."""
+    """One model without an interface: a DNS, all steps small, or a structure."""
 
-    def __init__(self, motion: Moving, plan: WindowPlan) -> None:
+    def __init__(self, motion: Motion, plan: WindowPlan) -> None:
         """Take a motion that is ready to advance by the plan's steps."""
         self.motion = motion
         self.interface_work = 0.0
@@ -93,8 +94,8 @@ class Alone(Continued):
     def finish_window(self) -> None:
         """Do nothing: the window is done."""
 
-    def cut_force(self) -> NDArray[np.float64]:
-        """Return zero: there is no cut."""
+    def interface_force(self) -> NDArray[np.float64]:
+        """Return zero: there is no coupling interface."""
         return self._zero
 
     def foreign_force(self) -> NDArray[np.float64]:
@@ -102,6 +103,6 @@ class Alone(Continued):
         return self._zero
 
 
-def uncut_motion(body: Body, loads: list[Load], step: float) -> Motion:
-    """Return the motion from rest of a model without a cut."""
-    return Motion(body, loads, step, np.empty(0, np.int32), np.zeros(len(body.mass)))
+def explicit_motion(body: Body, loads: list[Load], step: float) -> ExplicitMotion:
+    """Return the motion from rest of a model without an interface."""
+    return ExplicitMotion(body, loads, step, np.empty(0, np.int32), np.zeros(len(body.mass)))

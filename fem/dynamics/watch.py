@@ -5,7 +5,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from reflowshock.fem.dynamics.moving import Moving
+from reflowshock.fem.dynamics.motion import Motion
 
 
 class Watch(Protocol):
@@ -17,7 +17,7 @@ class Watch(Protocol):
 
     labels: dict[str, NDArray]
 
-    def sample(self, motion: Moving) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def sample(self, motion: Motion) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return this rank's parts of the sums and of the maxima, of equal lengths in all models of a run."""
 
     def row(self, sums: NDArray[np.float64], maxima: NDArray[np.float64]) -> dict[str, NDArray[np.float64] | float]:

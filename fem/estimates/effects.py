@@ -9,7 +9,7 @@ NEGLIGIBLE_WEIGHT = 1e-3  # of the peak acceleration: weight below it is left ou
 STIFFENING_BOUND = 3.0
 # The same of boards held at four holes, whose edges draw in: from runs 0.11 (cases/jedec_board, 5.0 instead of 7.7
 # thicknesses), 0.35 (bare board of cases/bga_drop, 4.8 instead of 10.9) and 0.73 (the same at 150 G, 0.95 instead of
-# 1.09), so that what it foresees is right within a factor of two.
+# 1.09), so that what it predicts is right within a factor of two.
 STIFFENING_OF_BOARD = 0.35
 NEGLIGIBLE_STIFFENING = 1e-2  # of the deflection, by the bound
 ADDED_MASS_LIMIT = 0.05  # of the mass of the model, by mass scaling
@@ -23,7 +23,7 @@ def effect(on: bool, why: str, influence: float | None = None) -> Effect:
     Args:
         on: Whether it acts.
         why: And the reason.
-        influence: How much of the answer it is expected to change, or would; None where nothing foresees it.
+        influence: How much of the answer it is expected to change, or would; None where nothing predicts it.
     """
     return {"on": bool(on), "why": why} | ({} if influence is None else {"influence": float(influence)})
 

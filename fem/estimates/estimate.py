@@ -84,7 +84,7 @@ def window_plan(macro_step: float, meso_step: float, fraction: float, duration: 
     """Choose window and substeps from critical steps; runs of other steps have their samples at the same times.
 
     Args:
-        macro_step: Smallest element critical step of the macro model and of the elements that touch the cut [s].
+        macro_step: Smallest element critical step of the macro model and of the elements that touch the interface [s].
         meso_step: Smallest element critical step of the meso model [s].
         fraction: Of the critical step that is used.
         duration: Simulated time [s]; a whole number of samples, each a whole number of windows.

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from reflowshock.fem.estimates.estimate import largest_implicit_step
 from reflowshock.fem.estimates.factor_cost import box_factor
 from reflowshock.fem.estimates.material_effects import plastic_laws
-from reflowshock.fem.problem.structure import Dynamics, StructureScene
+from reflowshock.fem.problem.structure import Dynamics, StructureProblem
 
 # Measured by benchmarks/jedec_oracle.py on one core of an AMD EPYC (AVX-512), Debian 12: element updates per second of
 # whole explicit steps, linear and with plasticity or finite rotations; MUMPS 5.5 on the BLAS that Debian installs (an
@@ -28,7 +28,7 @@ FACTOR_RATE = 3.0e9  # operations per second of the factorisation
 SOLVE_RATE = 6.0e8  # entries of the factor per second of a solution
 ASSEMBLY_SECONDS = 2.0e-5  # [s] an equation
 EXPLICIT_OVERHEAD, IMPLICIT_OVERHEAD = 2.5e-5, 4.0e-4  # [s] a step, interpreter
-IMPLICIT_UPDATE = 3.0e-7  # [s] a step and node: forces, vectors, ledger
+IMPLICIT_UPDATE = 3.0e-7  # [s] a step and node: forces, vectors, energy balance
 # Cooling of joints that yield: a few Newton steps, each with some ten products.
 COOLING_TANGENTS, COOLING_SOLUTIONS = 10, 120
 TANGENT_RATE = 1.0e4  # elements that yield a second
@@ -53,8 +53,8 @@ class SolverForecast:
 
     Attributes:
         explicit: Cost of explicit steps.
-        implicit: Cost of implicit steps, of the linear model where the scene is not linear.
-        only_explicit: What of the scene only the explicit solver can do; empty where either can.
+        implicit: Cost of implicit steps, of the linear model where the problem is not linear.
+        only_explicit: What of the problem only the explicit solver can do; empty where either can.
     """
 
     explicit: SolverCost
@@ -77,18 +77,20 @@ class SolverForecast:
         return f"{chosen}; yielding, finite rotations and two-scale runs need explicit ones."
 
 
-def forecast_solvers(scene: StructureScene, elements: int, explicit_steps: int, implicit_steps: int) -> SolverForecast:
+def forecast_solvers(
+    problem: StructureProblem, elements: int, explicit_steps: int, implicit_steps: int
+) -> SolverForecast:
     """Predict the cost of both solvers on one core.
 
     Args:
-        scene: The structure.
+        problem: The structure.
         elements: Number of elements of its mesh.
         explicit_steps: Steps of the explicit solver.
         implicit_steps: Steps of the implicit solver, see ``implicit_step``.
     """
-    nodes = node_counts(scene)
-    reasons = nonlinearities(scene)
-    structure = scene.structure
+    nodes = node_counts(problem)
+    reasons = nonlinearities(problem)
+    structure = problem.structure
     kind = structure.formulation if structure.element == "hexahedron" else structure.element
     rate = (NONLINEAR_RATE if reasons else LINEAR_RATE)[kind]
     return SolverForecast(
@@ -124,19 +126,19 @@ def plate_nodes(elements: int) -> tuple[int, int, int]:
     return side + 1, side + 1, PLATE_LAYERS + 1
 
 
-def node_counts(scene: StructureScene) -> tuple[int, int, int]:
+def node_counts(problem: StructureProblem) -> tuple[int, int, int]:
     """Return the nodes along each side of the box; those that rings around holes add are left out."""
-    structure = scene.structure.refined
+    structure = problem.structure.refined
     layers = sum(layer.cells for layer in structure.layers.values())
     order = 2 if structure.element == "tetrahedron_quadratic" else 1
     return order * structure.cells[0] + 1, order * structure.cells[1] + 1, order * layers + 1
 
 
-def nonlinearities(scene: StructureScene) -> tuple[str, ...]:
-    """Return what makes a scene nonlinear, in words."""
-    plastic = ", ".join(plastic_laws(scene.layer_materials))
+def nonlinearities(problem: StructureProblem) -> tuple[str, ...]:
+    """Return what makes a problem nonlinear, in words."""
+    plastic = ", ".join(plastic_laws(problem.layer_materials))
     reasons = [f"plasticity (layers {plastic})"] if plastic else []
-    finite = scene.dynamics.kinematics == "finite"
+    finite = problem.dynamics.kinematics == "finite"
     return tuple(reasons + (["finite rotations (dynamics.kinematics)"] if finite else []))
 
 

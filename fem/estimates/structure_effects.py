@@ -5,36 +5,36 @@ from typing import Any
 
 from reflowshock.fem.estimates.material_effects import material_effects
 from reflowshock.fem.materials.kinematics import finite_rotation
-from reflowshock.fem.problem.structure import StructureScene
+from reflowshock.fem.problem.structure import StructureProblem
 
 
-def effects(scene: StructureScene, added_mass: float, neglected_strain: float | None = None) -> dict[str, Any]:
+def effects(problem: StructureProblem, added_mass: float, neglected_strain: float | None = None) -> dict[str, Any]:
     """Return name -> whether it is on, and why.
 
     Args:
-        scene: The structure.
+        problem: The structure.
         added_mass: Mass that scaling has added [kg].
         neglected_strain: Largest strain that a run of small kinematics has left out; None before a run.
     """
-    rotation = finite_rotation("dynamics", scene.dynamics.kinematics, neglected_strain)
-    others = [*_loads(scene), ("finite_rotation", *rotation), *_scheme(scene, added_mass)]
-    return material_effects(scene.layer_materials) | {name: {"on": on, "why": why} for name, on, why in others}
+    rotation = finite_rotation("dynamics", problem.dynamics.kinematics, neglected_strain)
+    others = [*_loads(problem), ("finite_rotation", *rotation), *_scheme(problem, added_mass)]
+    return material_effects(problem.layer_materials) | {name: {"on": on, "why": why} for name, on, why in others}
 
 
-def _loads(scene: StructureScene) -> Iterator[tuple[str, bool, str]]:
+def _loads(problem: StructureProblem) -> Iterator[tuple[str, bool, str]]:
     for kind in ("input_g", "gravity", "pressure", "motion"):
-        names = [f"loads.{name}" for name, load in scene.loads.items() if load.kind == kind]
+        names = [f"loads.{name}" for name, load in problem.loads.items() if load.kind == kind]
         effect = "prescribed_motion" if kind == "motion" else kind
         yield effect, bool(names), ", ".join(names) or f"no load of kind {kind}"
-    velocity = scene.dynamics.initial_velocity
+    velocity = problem.dynamics.initial_velocity
     yield "initial_velocity", any(velocity), f"dynamics.initial_velocity = {list(velocity)} m/s"
 
 
-def _scheme(scene: StructureScene, added_mass: float) -> Iterator[tuple[str, bool, str]]:
-    damping, numerics = scene.dynamics.damping, scene.dynamics.numerics
+def _scheme(problem: StructureProblem, added_mass: float) -> Iterator[tuple[str, bool, str]]:
+    damping, numerics = problem.dynamics.damping, problem.dynamics.numerics
     given = {name: value for name, value in damping.model_dump().items() if value and name != "frequency"}
     yield "damping", bool(given), ", ".join(f"{name} = {value:g}" for name, value in given.items()) or "none is given"
     scaled = f"dynamics.numerics.mass_scaled = {list(numerics.mass_scaled)}; adds {added_mass:.3e} kg"
     yield "mass_scaling", added_mass > 0.0, scaled
-    one_point = scene.structure.formulation == "one_point"
-    yield "hourglass_stiffness", one_point, f"structure.formulation = {scene.structure.formulation}"
+    one_point = problem.structure.formulation == "one_point"
+    yield "hourglass_stiffness", one_point, f"structure.formulation = {problem.structure.formulation}"

@@ -41,7 +41,7 @@ class PackageSizes:
 
 
 @dataclass(frozen=True, slots=True)
-class Layer:
+class PlateLayer:
     """A layer of a plate that bends both ways: E / (1 - nu) and E / (1 - nu^2) [Pa], expansion [1/K], thickness [m]."""
 
     both_ways: float
@@ -50,14 +50,14 @@ class Layer:
     thickness: float
 
     @classmethod
-    def of(cls, material: Material, thickness: float) -> "Layer":
+    def of(cls, material: Material, thickness: float) -> "PlateLayer":
         """Take the constants of a material in the plane, the stiffer axis of both."""
         constants = material.engineering_constants
         young, ratio = max(constants.young[:2]), constants.poisson[0]
         return cls(young / (1.0 - ratio), young / (1.0 - ratio**2), material.expansion[0], thickness)
 
 
-def curvature(lower: Layer, upper: Layer) -> float:
+def curvature(lower: PlateLayer, upper: PlateLayer) -> float:
     """Return the curvature [1/(m K)] of a plate of two layers, ends up if positive (Timoshenko, JOSA 11, 1925)."""
     m, n = lower.thickness / upper.thickness, lower.both_ways / upper.both_ways
     shape = 3.0 * (1.0 + m) ** 2 + (1.0 + m * n) * (m**2 + 1.0 / (m * n))
@@ -65,7 +65,7 @@ def curvature(lower: Layer, upper: Layer) -> float:
     return 6.0 * mismatch * (1.0 + m) ** 2 / ((lower.thickness + upper.thickness) * shape)
 
 
-def rigidity(lower: Layer, upper: Layer) -> float:
+def rigidity(lower: PlateLayer, upper: PlateLayer) -> float:
     """Return the flexural rigidity [N m] of two layers about their common neutral plane."""
     a, b = (layer.one_way * layer.thickness for layer in (lower, upper))
     own = sum(layer.one_way * layer.thickness**3 for layer in (lower, upper)) / 12.0
@@ -79,7 +79,7 @@ def warpage_number(thermal: Thermal, materials: Mapping[str, Material], sizes: P
     held together) against that of the board.
     """
     rise = thermal.peak - thermal.reference
-    lower, upper = Layer.of(materials["substrate"], sizes.substrate), Layer.of(materials["die"], sizes.die)
+    lower, upper = PlateLayer.of(materials["substrate"], sizes.substrate), PlateLayer.of(materials["die"], sizes.die)
     bow = MARGIN * abs(curvature(lower, upper)) * rise * sizes.reach**2 / 2.0
     forces = [layer.both_ways * layer.thickness for layer in (lower, upper)]
     together = sum(force * layer.expansion for force, layer in zip(forces, (lower, upper), strict=True)) / sum(forces)
@@ -97,7 +97,7 @@ def solder_force_number(materials: Mapping[str, Material], sizes: PackageSizes, 
     Each pad also dents what it lies on, by F / (2 a E) of a stiff disc on a half-space, E of its thickness.
     """
     pressure = 2.0 * pi * sizes.pad_radius * surface_tension / sizes.pitch**2
-    layers = [Layer.of(materials[role], getattr(sizes, role)) for role in ("board", "substrate", "die")]
+    layers = [PlateLayer.of(materials[role], getattr(sizes, role)) for role in ("board", "substrate", "die")]
     board, substrate = (layer.one_way * layer.thickness**3 / 12.0 for layer in layers[:2])
     both, bent = rigidity(layers[1], layers[2]), min(sizes.die_reach, sizes.reach)
     beyond = sizes.reach - bent

@@ -38,7 +38,7 @@ class ForceTerm(Protocol):
 def force_terms(
     elements: Elements, materials: Sequence[Material], kinematics: Kinematics = "small", step: float = np.inf
 ) -> list[ForceTerm]:
-    """Return the force terms of elements: linear ones, and one with a path where the scene calls for it.
+    """Return the force terms of elements: linear ones, and one with a path where the problem calls for it.
 
     Args:
         elements: The elements.

@@ -1,16 +1,16 @@
-"""Numba kernel of a velocity constraint at the cut: forces that make two models move alike."""
+"""Numba kernel of a velocity constraint at the interface: forces that make two models move alike."""
 
 from numba import njit
 
 
 @njit(cache=True)
 def link_velocities(rows, velocity, force, terms, link):
-    """Find the forces at the cut that give it a wanted velocity at the motion's time, and add them to its forces.
+    """Find the forces at the interface that give it a wanted velocity at the motion's time, and add them to its forces.
 
     v(t) = v(t - dt/2) + dt/2 (f + link) / m must be the target less what the link takes from the other model.
 
     Args:
-        rows: ``(k,)`` nodes of the cut.
+        rows: ``(k,)`` nodes of the interface.
         velocity: ``(n, 3)`` [m/s] half a step back.
         force: ``(n, 3)`` [N].
         terms: ``(4, k, 3)``: dt/2 / m [s/kg]; velocity by which both models part under a unit link [s/kg], infinite

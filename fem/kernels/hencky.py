@@ -40,7 +40,7 @@ class Shape(NamedTuple):
     weight: NDArray[np.float64]
 
 
-class State(NamedTuple):
+class ElementState(NamedTuple):
     """What an element, or each of many, is at a displacement.
 
     Attributes:
@@ -160,7 +160,7 @@ def hexahedra(corners, displacement, materials, states):
         corners: ``(ne, 8, 3)`` [m].
         displacement: ``(ne, 24)`` [m] at the nodes, less free expansion.
         materials: Elasticities ``(nm, 6, 6)`` [Pa], plastic constants ``(nm, 6)``, index of each element ``(ne,)``.
-        states: ``State`` of arrays ``(ne, 8, 7)``, ``(ne, 24)``, ``(ne, 24, 24)``, written.
+        states: ``ElementState`` of arrays ``(ne, 8, 7)``, ``(ne, 24)``, ``(ne, 24, 24)``, written.
 
     Returns:
         The first element whose modes found no equilibrium, or the number of elements.
@@ -172,7 +172,7 @@ def hexahedra(corners, displacement, materials, states):
         write_strains(corners[e], bench, shape.strain, shape.weight)
         unknowns[:NODAL], unknowns[NODAL:] = displacement[e], 0.0
         law = Law(elasticity[material[e]], plastic[material[e]])
-        if not relax_modes(shape, unknowns, law, State(states.points[e], force, tangent)):
+        if not relax_modes(shape, unknowns, law, ElementState(states.points[e], force, tangent)):
             return e
         states.force[e] = force[:NODAL]
         condense(tangent, NODAL)
@@ -188,12 +188,12 @@ def one_point(shape, displacement, materials, states):
         shape: ``Shape`` of arrays ``(ne, 1, 6, 24)``, ``(ne, 1)``: the mean strains.
         displacement: ``(ne, 24)`` [m] at the nodes, less free expansion.
         materials: As of ``hexahedra``.
-        states: ``State`` of arrays ``(ne, 1, 7)``, ``(ne, 24)``, ``(ne, 24, 24)``, written.
+        states: ``ElementState`` of arrays ``(ne, 1, 7)``, ``(ne, 24)``, ``(ne, 24, 24)``, written.
     """
     elasticity, plastic, material = materials
     for e in range(len(displacement)):
         law = Law(elasticity[material[e]], plastic[material[e]])
-        own = State(states.points[e], states.force[e], states.tangent[e])
+        own = ElementState(states.points[e], states.force[e], states.tangent[e])
         add_points(Shape(shape.strain[e], shape.weight[e]), displacement[e], law, own)
 
 

@@ -21,7 +21,7 @@ MASS_RATIO = 1e6  # large mass over the model's: the base deviates from its puls
 class LargeMass(Load):
     """Input-G by a large mass on the support nodes and the force that moves it; displacements are absolute.
 
-    The ledger leaves the large mass out: external work is what its nodes pass on to the model.
+    The energy balance leaves the large mass out: external work is what its nodes pass on to the model.
 
     Attributes:
         nodes: ``(k,)`` local nodes.

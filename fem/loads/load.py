@@ -2,7 +2,7 @@
 
 A step asks every load in turn: ``drive`` prescribes velocities, ``add`` adds forces at nodes, ``collect`` takes half a
 step's work. The work of a force over a step is the mean of its values at both ends times the displacement between
-them, so that with ``Motion.kinetic_energy`` the ledger of a linear model is exact at any step.
+them, so that with ``ExplicitMotion.kinetic_energy`` the energy balance of a linear model is exact at any step.
 """
 
 from abc import ABC, abstractmethod
@@ -39,7 +39,7 @@ class Loaded(ABC):
         force: ``(n, 3)`` [N] at ``time``, summed over ranks, slaves' moved to their masters; without body force.
         gravity: ``(3,)`` [m/s^2], sum of the loads' accelerations at ``time``.
         mobility: ``(n, 3)`` [1/kg] inverse masses, zero where the velocity is prescribed; of explicit steps.
-        ledger_mass: ``(n,)`` [kg] that counts in the energy balance of this rank.
+        counted_mass: ``(n,)`` [kg] that counts in the energy balance of this rank.
     """
 
     body: Body
@@ -50,7 +50,7 @@ class Loaded(ABC):
     force: NDArray[np.float64]
     gravity: NDArray[np.float64]
     mobility: NDArray[np.float64]
-    ledger_mass: NDArray[np.float64]
+    counted_mass: NDArray[np.float64]
     _loads: Sequence["Load"]
 
     @abstractmethod
@@ -86,7 +86,7 @@ class Load:
     """What acts on one model on one rank; each kind overrides its part. By itself it does nothing.
 
     Attributes:
-        account: Where the ledger puts the work.
+        account: Where the energy balance puts the work.
         kept: What changes with time, and what it is: a ``sum`` over ranks, the ``same`` on all, or of all ``nodes``.
         work: Work done on this rank's share of the model so far [J].
     """
@@ -224,7 +224,7 @@ def nodal(body: Body, pattern: NDArray[np.float64]) -> NodalPattern:
 
 
 def carried(body: Body, load: NDArray[np.float64], fall: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return what levels inside a body add to a load ``(n, 3)`` [N] and a fall, as ``LocalSteps.carry``; collective."""
+    """Return what levels add to a load ``(n, 3)`` [N] and a fall, see ``SubsteppedElements.carry``; collective."""
     force = sum((levels.carry(load, fall) for levels in levels_of(body.terms)), np.zeros_like(load))
     body.shared.add(force)
     return force
@@ -275,7 +275,7 @@ class FineSupports(Load):
 
 
 @dataclass
-class PrescribedMotion(Load):
+class PrescribedVelocity(Load):
     """One velocity component of some nodes follows a pulse; its work is that of the reaction.
 
     Attributes:
@@ -318,7 +318,7 @@ class PrescribedMotion(Load):
         """Add half a step's work of the reaction m a - f - m g."""
         before, after = self.mean(motion.time - self.step), self.mean(motion.time)
         acceleration = (after - before) / self.step - motion.gravity[self.component]
-        mass = motion.ledger_mass[self.nodes]
+        mass = motion.counted_mass[self.nodes]
         owned = motion.body.shared.owned[self.nodes]
         reaction = mass * acceleration - np.where(owned, motion.force[self.nodes, self.component], 0.0)
         self.work += 0.5 * self.step * float(reaction @ motion.velocity[self.nodes, self.component])

@@ -10,27 +10,27 @@ from reflowshock.fem.division.structure_tables import StructureTables, shaken_su
 from reflowshock.fem.loads.damping import RayleighDamping
 from reflowshock.fem.loads.follower_pressure import FollowerPressure
 from reflowshock.fem.loads.large_mass import LargeMass
-from reflowshock.fem.loads.load import BodyAcceleration, Load, NodalForces, PrescribedMotion
+from reflowshock.fem.loads.load import BodyAcceleration, Load, NodalForces, PrescribedVelocity
 from reflowshock.fem.loads.pulse import Pulse
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.problem.shock import Damping
-from reflowshock.fem.problem.structure import AXES, Gravity, InputG, Pressure, StructureScene
+from reflowshock.fem.problem.structure import AXES, Gravity, InputG, Pressure, StructureProblem
 
 
 def structure_loads(
-    comm: MPI.Comm, body: Body, tables: StructureTables, scene: StructureScene, pulses: Mapping[str, Pulse]
+    comm: MPI.Comm, body: Body, tables: StructureTables, problem: StructureProblem, pulses: Mapping[str, Pulse]
 ) -> list[Load]:
-    """Return the loads of a structure on this rank, in the order of the scene; collective."""
+    """Return the loads of a structure on this rank, in the order of the problem; collective."""
     made: list[Load] = []
-    for name, load in scene.loads.items():
+    for name, load in problem.loads.items():
         pulse = pulses[name]
-        if isinstance(load, Pressure) and scene.dynamics.kinematics == "finite":
+        if isinstance(load, Pressure) and problem.dynamics.kinematics == "finite":
             made.append(FollowerPressure.build(body, tables.pressed[load.on], pulse))
         elif isinstance(load, Pressure):
             nodes, areas = tables.areas[load.on]
             made.append(NodalForces.build(body, nodes, -areas, pulse))
         elif isinstance(load, InputG) and load.method == "large_mass":
-            shaken = [tables.nodes_of[scene.supports[support].on] for support in shaken_supports(scene)]
+            shaken = [tables.nodes_of[problem.supports[support].on] for support in shaken_supports(problem)]
             nodes = np.unique(np.concatenate(shaken))
             made.append(LargeMass.build(comm, body, nodes, (-unit(load.direction), pulse)))
         elif isinstance(load, InputG | Gravity):
@@ -38,7 +38,7 @@ def structure_loads(
             made.append(BodyAcceleration(push * unit(load.direction), pulse))
         else:
             local = body.local.locate(tables.nodes_of[load.on])
-            made.append(PrescribedMotion(local[local >= 0], AXES.index(load.component), pulse))
+            made.append(PrescribedVelocity(local[local >= 0], AXES.index(load.component), pulse))
     return made
 
 

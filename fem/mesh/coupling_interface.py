@@ -1,17 +1,17 @@
-"""The cut between the macro model (``board``) and the meso model: node-matching, inside the board."""
+"""The interface between the macro model (``board``) and the meso model: node-matching, inside the board."""
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from reflowshock.fem.errors import CutError
+from reflowshock.fem.errors import CouplingError
 from reflowshock.fem.mesh.mesh import MeshData, boundary_facets
 
-MATCH = 1e-6  # of the shortest edge of the cut
+MATCH = 1e-6  # of the shortest edge of the interface
 MACRO, PATCH = "board", "board_patch"
 
 
-def find_cut(mesh: MeshData) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+def find_interface(mesh: MeshData) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
     """Match the patch's faces inside the board with the board's nodes.
 
     Returns:
@@ -19,7 +19,7 @@ def find_cut(mesh: MeshData) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
         where the mesh has only one of the two parts.
 
     Raises:
-        CutError: A node of the patch has no partner in the board.
+        CouplingError: A node of the patch has no partner in the board.
     """
     board, patch = mesh.cells[mesh.in_parts(MACRO.__eq__)], mesh.cells[mesh.in_parts(PATCH.__eq__)]
     if not len(board) or not len(patch):
@@ -32,9 +32,9 @@ def find_cut(mesh: MeshData) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
     distance, nearest = cKDTree(mesh.points[candidates]).query(mesh.points[meso])
     if distance.max() > tolerance:
         position = ", ".join(f"{value:.6g}" for value in mesh.points[meso[np.argmax(distance)]])
-        raise CutError(
-            f"{np.sum(distance > tolerance)} of {len(meso)} nodes of {PATCH} on the cut have no partner in {MACRO}: the"
-            f" one at ({position}) m is {distance.max():.3e} m away, allowed are {tolerance:.3e} m"
+        raise CouplingError(
+            f"{np.sum(distance > tolerance)} of {len(meso)} nodes of {PATCH} on the interface have no partner in"
+            f" {MACRO}: the one at ({position}) m is {distance.max():.3e} m away, allowed are {tolerance:.3e} m"
         )
     return candidates[nearest], meso
 
@@ -43,7 +43,7 @@ def inner_facets(points: NDArray[np.float64], board: NDArray[np.int32], patch: N
     """Return the boundary facets of the patch that are not on a plane that bounds board and patch together.
 
     Raises:
-        CutError: There is none: board and patch do not touch.
+        CouplingError: There is none: board and patch do not touch.
     """
     both = points[np.unique(np.concatenate([board.ravel(), patch.ravel()]))]
     low, high = both.min(axis=0), both.max(axis=0)
@@ -53,5 +53,5 @@ def inner_facets(points: NDArray[np.float64], board: NDArray[np.int32], patch: N
     outer = (np.abs(corners - low) < off).all(axis=1) | (np.abs(corners - high) < off).all(axis=1)
     inner = facets[~outer.any(axis=1)]
     if not len(inner):
-        raise CutError(f"no face of {PATCH} lies inside the board: there is no cut")
+        raise CouplingError(f"no face of {PATCH} lies inside the board: there is no coupling interface")
     return inner

@@ -19,7 +19,7 @@ from reflowshock.fem.materials.parameters import Material
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.tie import Tie
 from reflowshock.fem.model.body import Body
-from reflowshock.fem.model.step_levels import Levels, LocalSteps, check_elastic
+from reflowshock.fem.model.step_levels import Levels, SubsteppedElements, check_elastic
 from reflowshock.fem.parallel.exchange import SharedNodes
 from reflowshock.fem.parallel.local_mesh import LocalMesh
 
@@ -50,7 +50,7 @@ class Pieces:
 
 
 @dataclass(frozen=True, slots=True)
-class Response:
+class ForceOptions:
     """What the internal force depends on besides elements and materials.
 
     Attributes:
@@ -112,7 +112,7 @@ def make_body(
     pieces: Pieces,
     tables: Tables,
     mass_factor: NDArray[np.float64],
-    response: Response | None = Response(),
+    response: ForceOptions | None = ForceOptions(),
 ) -> Body:
     """Assemble masses and forces of a model; collective.
 
@@ -134,15 +134,15 @@ def make_body(
     held = local.locate(tables.held_nodes)
     free[held[held >= 0]] = ~tables.held[held >= 0]
     free[tie.slave] = False
-    cut = local.locate(tables.cut).astype(np.int32)
-    body = Body(local, elements, pieces.geometry, [], tie, shared, cut, mass, free)
+    interface = local.locate(tables.interface).astype(np.int32)
+    body = Body(local, elements, pieces.geometry, [], tie, shared, interface, mass, free)
     terms = response_terms(comm, body, pieces.materials, tables, response) if response else linear_terms(elements)
     warm_up(terms, len(mass))
     return replace(body, terms=terms)
 
 
 def response_terms(
-    comm: MPI.Comm, body: Body, materials: Sequence[Material], tables: Tables, response: Response
+    comm: MPI.Comm, body: Body, materials: Sequence[Material], tables: Tables, response: ForceOptions
 ) -> list[ForceTerm]:
     """Return the force terms of a body, one of them with all elements that take smaller steps; collective.
 
@@ -153,7 +153,7 @@ def response_terms(
         return force_terms(body.elements, materials, response.kinematics, response.step)
     check_elastic(materials, response.kinematics, tables.ratios)
     level = tables.level[body.local.cell_numbers]
-    levels = LocalSteps.build(
+    levels = SubsteppedElements.build(
         comm, body, Levels(level, tables.ratios, response.step, response.stiffness / response.step)
     )
     return [*linear_terms(body.elements.subset(level == 0)), levels]

@@ -24,7 +24,7 @@ class Body:
         terms: Force terms.
         tie: Slaves and masters, local numbers.
         shared: Nodes that several ranks hold.
-        cut: ``(nc,)`` local number of each cut node, -1 where another rank has it.
+        interface: ``(nc,)`` local number of each interface node, -1 where another rank has it.
         mass: ``(n,)`` [kg] lumped mass, of slaves moved to their masters.
         free: ``(n, 3)`` whether a displacement component follows from forces.
         initial_stress: ``(ne, 6)`` [Pa] mean stress of linear elements at no displacement; None where there is none.
@@ -36,7 +36,7 @@ class Body:
     terms: list[ForceTerm]
     tie: Tie
     shared: SharedNodes
-    cut: NDArray[np.int32]
+    interface: NDArray[np.int32]
     mass: NDArray[np.float64]
     free: NDArray[np.bool_]
     initial_stress: NDArray[np.float64] | None = None

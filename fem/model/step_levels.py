@@ -51,7 +51,7 @@ class Levels:
 
 
 @dataclass(frozen=True, slots=True)
-class LocalSteps:
+class SubsteppedElements:
     """One level and all inside it.
 
     Its nodes are numbered anew: first those that move (free), then the ring. Slaves are eliminated: their masters are
@@ -87,12 +87,12 @@ class LocalSteps:
     history: dict[str, NDArray] = field(default_factory=dict)
 
     @classmethod
-    def build(cls, comm: MPI.Comm, body: Body, levels: Levels) -> "LocalSteps":
+    def build(cls, comm: MPI.Comm, body: Body, levels: Levels) -> "SubsteppedElements":
         """Build the levels below the step of a model, whose elements of level 0 are not in them; collective.
 
         Args:
             comm: Communicator of the model.
-            body: The model, whatever its terms. The nodes of its cut are held.
+            body: The model, whatever its terms. The nodes of its interface are held.
             levels: Levels of its elements, which must be linear elastic.
         """
         term = build_level(comm, body, levels, 1, np.arange(len(body.mass), dtype=np.int32))
@@ -159,9 +159,9 @@ class LocalSteps:
         return Energy(linear_energy(self, displacement, None).strain - hourglass, hourglass=hourglass)
 
 
-def levels_of(terms: Sequence[InternalForce]) -> list[LocalSteps]:
+def levels_of(terms: Sequence[InternalForce]) -> list[SubsteppedElements]:
     """Return those of some force terms that have levels."""
-    return [term for term in terms if isinstance(term, LocalSteps)]
+    return [term for term in terms if isinstance(term, SubsteppedElements)]
 
 
 def check_elastic(materials: Sequence[Material], kinematics: Kinematics, ratios: tuple[int, ...]) -> None:
@@ -179,7 +179,9 @@ def check_elastic(materials: Sequence[Material], kinematics: Kinematics, ratios:
         )
 
 
-def build_level(comm: MPI.Comm, body: Body, levels: Levels, number: int, around: NDArray[np.int32]) -> LocalSteps:
+def build_level(
+    comm: MPI.Comm, body: Body, levels: Levels, number: int, around: NDArray[np.int32]
+) -> SubsteppedElements:
     """Build a level and those inside it; collective.
 
     Args:
@@ -197,7 +199,7 @@ def build_level(comm: MPI.Comm, body: Body, levels: Levels, number: int, around:
         terms.append(build_level(comm, body, inner, number + 1, nodes))
     shared = SharedNodes(comm, body.local.nodes[nodes[:free]], body.shared.clock)
     mass = np.where(body.mass > 0.0, body.mass, np.inf)[nodes[:free], None]
-    made = LocalSteps(
+    made = SubsteppedElements(
         rows=positions(around, nodes),
         terms=terms,
         substeps=substeps,
@@ -211,8 +213,8 @@ def build_level(comm: MPI.Comm, body: Body, levels: Levels, number: int, around:
     return replace(made, at_once=arrays_at_once(made))
 
 
-def arrays_at_once(level: LocalSteps) -> tuple[tuple[NDArray, ...], ...]:
-    """Return what ``LocalSteps.at_once`` is for a level: Python between substeps costs as much as small levels do."""
+def arrays_at_once(level: SubsteppedElements) -> tuple[tuple[NDArray, ...], ...]:
+    """Return ``SubsteppedElements.at_once`` of a level: Python between substeps costs as much as small levels do."""
     inner = levels_of(level.terms)
     own = [term for term in level.terms if term not in inner]
     matrix = own[0] if len(own) == 1 else None
@@ -235,7 +237,7 @@ def level_nodes(body: Body, level: NDArray[np.int32], number: int) -> tuple[NDAr
     used[body.tie.master[used[body.tie.slave]]] = True
     outer = np.zeros((len(body.mass), 3))
     outer[body.elements.cells[level < number]] = 1.0
-    outer[body.cut[body.cut >= 0]] = 1.0
+    outer[body.interface[body.interface >= 0]] = 1.0
     body.tie.gather(outer)
     body.shared.add(outer)
     moves = outer[:, 0] == 0.0

@@ -28,7 +28,7 @@ class Steps:
         plan: Window, substeps.
         critical: Role -> smallest element critical step before mass scaling [s].
         smallest: Smallest critical step that the substeps follow, mass scaling and damping included [s].
-        cut: Smallest element critical step among those that touch the cut or belong to the macro model [s].
+        interface: Smallest element critical step among those that touch the interface or belong to the macro model [s].
         added_mass: Mass that scaling adds [kg].
         model_mass: Mass without scaling [kg].
         meso_step: Step of the meso model's motion [s], the window where its own steps are inside its force.
@@ -37,7 +37,7 @@ class Steps:
 
     plan: WindowPlan
     critical: dict[str, float]
-    cut: float
+    interface: float
     smallest: float
     added_mass: float
     model_mass: float
@@ -58,7 +58,7 @@ def steps_of_division(whole: Whole, survey: Survey, division: Division, rules: R
     return Steps(
         plan=division.plan,
         critical={role: float(survey.plain_step[survey.role == role].min()) for role in roles},
-        cut=float(critical[slow if slow.any() else ...].min()),  # of all where no macro model is left
+        interface=float(critical[slow if slow.any() else ...].min()),  # of all where no macro model is left
         smallest=float(critical.min()),
         added_mass=float(survey.added_mass[counted].sum()),
         model_mass=float(survey.mass[counted].sum()),

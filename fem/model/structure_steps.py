@@ -57,7 +57,7 @@ def check_step(dynamics: Dynamics, critical: float) -> None:
 def with_critical(steps: Steps, undamped: float, dynamics: Dynamics) -> Steps:
     """Return explicit steps with another critical step without damping [s]."""
     plan, critical = explicit_plan(dynamics, undamped)
-    return replace(steps, plan=plan, cut=critical, smallest=critical)
+    return replace(steps, plan=plan, interface=critical, smallest=critical)
 
 
 def implicit_steps(comm: MPI.Comm, pieces: Pieces, dynamics: Dynamics, pulses: Iterable[float]) -> Steps:
@@ -71,7 +71,7 @@ def implicit_steps(comm: MPI.Comm, pieces: Pieces, dynamics: Dynamics, pulses: I
 def window_plan(dynamics: Dynamics, largest: float) -> WindowPlan:
     """Return windows that end at the samples, fewer where the steps are; no step is above ``largest`` [s].
 
-    Runs of one scene by different solvers so have their samples at the same times, unless one has fewer steps.
+    Runs of one problem by different solvers so have their samples at the same times, unless one has fewer steps.
     """
     samples = min(dynamics.numerics.history_samples, at_least(dynamics.duration / largest))
     stride = at_least(dynamics.duration / samples / largest / LONGEST_WINDOW)
@@ -99,7 +99,7 @@ def make_steps(comm: MPI.Comm, pieces: Pieces, factor: NDArray[np.float64], chos
         plan=plan,
         mass_factors=[factor],
         critical=critical_by_role(comm, [pieces], sorted(set(comm.allreduce(sorted(set(pieces.roles.tolist())))))),
-        cut=critical,
+        interface=critical,
         smallest=critical,
         added_mass=comm.allreduce(float(mass @ (factor - 1.0))),
         model_mass=comm.allreduce(float(mass.sum())),

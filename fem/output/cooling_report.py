@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from reflowshock.fem.cell_shape import TENSOR_ORDER
 from reflowshock.fem.division.tables import JointTables
 from reflowshock.fem.division.whole import Whole
-from reflowshock.fem.dynamics.participant import uncut_motion
+from reflowshock.fem.dynamics.participant import explicit_motion
 from reflowshock.fem.elements.stress import von_mises
 from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.model.body import Body
@@ -85,7 +85,7 @@ def write_cooling(
 def joint_row(world: MPI.Comm, body: Body, tables: JointTables, yields: bool) -> dict[str, NDArray]:
     """Return names of joints, and the stresses [Pa] and plastic strain of each; collective."""
     watch = JointWatch(tables.watch, body, yields)
-    sums, maxima = watch.sample(uncut_motion(body, [], 1.0))
+    sums, maxima = watch.sample(explicit_motion(body, [], 1.0))
     total, most = np.empty_like(sums), np.empty_like(maxima)
     world.Allreduce(sums, total)
     world.Allreduce(maxima, most, MPI.MAX)

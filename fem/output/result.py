@@ -59,7 +59,7 @@ class Found:
     """What a run has found.
 
     Attributes:
-        history: Samples and ledger.
+        history: Samples and energy balance.
         peaks: Cell field -> part -> largest value of an element at the times of the fields.
     """
 
@@ -130,7 +130,7 @@ def model_summary(comms: Communicators, request: RunInput, models: dict[Role, Mo
         "tied_nodes": comms.world.allreduce(max(len(item.tie.slave) for item in tables), MPI.MAX),
         "largest_tie_move": comms.world.allreduce(max(item.moved for item in tables), MPI.MAX),
         "critical_steps": steps.critical,
-        "cut_critical_step": steps.cut,
+        "cut_critical_step": steps.interface,
         "window": plan.window,
         "step": plan.step,
         "substeps": plan.substeps,
@@ -166,12 +166,12 @@ def cost_metrics(summary: dict[str, Any], updates: int, timings: Timings) -> dic
 
 
 def health_metrics(history: History) -> dict[str, Any]:
-    """Return what the ledger found; the fraction is by how much both models' works across the cut differ."""
+    """Return the residuals; the energy fraction is by how much both models' works across the interface differ."""
     interface = float(np.abs(history.arrays()["interface"]).max())
     return {
-        "energy_balance_error": quantity(history.ledger.balance_error),
-        "interface_force_residual": quantity(history.ledger.force_residual),
-        "interface_energy_fraction": quantity(interface / history.ledger.largest if interface else 0.0),
+        "energy_balance_error": quantity(history.balance.balance_error),
+        "interface_force_residual": quantity(history.balance.force_residual),
+        "interface_energy_fraction": quantity(interface / history.balance.largest if interface else 0.0),
     }
 
 
@@ -217,8 +217,8 @@ def failure_metrics(verdicts: Verdicts) -> dict[str, Any]:
 def health(history: History, summary: dict[str, Any], request: RunInput) -> dict[str, Any]:
     """Return the checks of a finished run."""
     checks = {
-        "energy_balance_error": (history.ledger.balance_error, request.shock.numerics.energy_balance_limit),
-        "interface_force_residual": (history.ledger.force_residual, FORCE_RESIDUAL_LIMIT),
+        "energy_balance_error": (history.balance.balance_error, request.shock.numerics.energy_balance_limit),
+        "interface_force_residual": (history.balance.force_residual, FORCE_RESIDUAL_LIMIT),
         "added_mass_fraction": (summary["added_mass"] / summary["model_mass"], ADDED_MASS_LIMIT),
     }
     return checked(checks | hourglass_check(history, request.shock.numerics.formulation))
@@ -232,7 +232,7 @@ def hourglass_check(history: History, formulation: str) -> dict[str, tuple[float
     if formulation != HEXAHEDRON.name:
         return {}
     hourglass = float(np.abs(history.arrays()["hourglass"]).max())
-    return {"hourglass_energy_fraction": (hourglass / history.ledger.largest, HOURGLASS_LIMIT)} if hourglass else {}
+    return {"hourglass_energy_fraction": (hourglass / history.balance.largest, HOURGLASS_LIMIT)} if hourglass else {}
 
 
 def checked(checks: Mapping[str, tuple[float, float]]) -> dict[str, Any]:

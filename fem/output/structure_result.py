@@ -25,7 +25,7 @@ class Found:
     """What a run has found.
 
     Attributes:
-        history: Samples and ledger.
+        history: Samples and energy balance.
         modes: Natural modes, if this run was asked for them.
         peaks: Cell field -> layer -> largest value of an element at the times of the fields.
         factor: What the factorisation of an implicit solver took.
@@ -55,7 +55,7 @@ def write_result(
         result = {
             "metrics": cost_metrics(summary, timings)
             | factor_metrics(found.factor)
-            | {"energy_balance_error": quantity(history.ledger.balance_error)}
+            | {"energy_balance_error": quantity(history.balance.balance_error)}
             | energy_metrics(arrays)
             | point_metrics(arrays)
             | layer_metrics(found.peaks)
@@ -88,9 +88,9 @@ def model_summary(
         "ranks": comms.world.size,
         "placement": comms.placement.name,
         "elements": sum(elements.values()),
-        "nodes": sum(nodes.values()) - len(first.tables.cut),
+        "nodes": sum(nodes.values()) - len(first.tables.interface),
         "critical_steps": steps.critical,
-        "critical_step": steps.cut,
+        "critical_step": steps.interface,
         "window": steps.plan.window,
         "substeps": steps.plan.substeps,
         "step": steps.plan.step,
@@ -156,7 +156,7 @@ def strain_effect(watch: PointTable) -> dict[str, Any]:
 
 
 def energy_metrics(arrays: dict[str, NDArray]) -> dict[str, Any]:
-    """Return the largest value of each energy that the ledger keeps and that is not zero throughout."""
+    """Return the largest value of each energy that the energy balance keeps and that is not zero throughout."""
     names = ("kinetic", "internal", "plastic", "hourglass", "damping", "external")
     peaks = {name: float(np.abs(arrays[name]).max()) for name in names if name in arrays}
     return {f"peak_{name}_energy": quantity(peak, "J") for name, peak in peaks.items() if peak > 0.0}
@@ -203,7 +203,7 @@ def mode_metrics(modes: ModeTable | None) -> dict[str, Any]:
 def health(history: History, summary: dict[str, Any], request: StructureInput) -> dict[str, Any]:
     """Return the checks of a finished run."""
     checks = {
-        "energy_balance_error": (history.ledger.balance_error, request.dynamics.numerics.energy_balance_limit),
+        "energy_balance_error": (history.balance.balance_error, request.dynamics.numerics.energy_balance_limit),
         "added_mass_fraction": (summary["added_mass"] / summary["model_mass"], ADDED_MASS_LIMIT),
     }
     return checked(checks | hourglass_check(history, request.structure.formulation))

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from reflowshock.fem.dynamics.moving import Moving
+from reflowshock.fem.dynamics.motion import Motion
 from reflowshock.fem.elements.stress import principal_strain, von_mises
 from reflowshock.fem.mesh.watch_table import WatchTable
 from reflowshock.fem.model.body import Body
@@ -37,7 +37,7 @@ class JointWatch:
         self._facets = local.locate(facets.ravel()).reshape(-1, 4)
         self._corners = local.points[self._facets][:, :, :2]
 
-    def sample(self, motion: Moving) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def sample(self, motion: Motion) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return this rank's parts.
 
         Returns:

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from reflowshock.fem.dynamics.moving import Moving
+from reflowshock.fem.dynamics.motion import Motion
 from reflowshock.fem.mesh.point_table import COMPONENTS, PointTable
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.stress_recovery import StressRecovery
@@ -31,14 +31,14 @@ class PointWatch:
         supports = [(body.local.locate(nodes), held) for nodes, held in table.supports.values()]
         self._supports = [(nodes[(nodes >= 0) & body.shared.owned[nodes]], held) for nodes, held in supports]
 
-    def sample(self, motion: Moving) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def sample(self, motion: Motion) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return this rank's parts of the sums: the values of all points by quantity, then the reactions [N]."""
         parts = [self._value(quantity, motion).ravel() for quantity in self._table.quantities]
         reaction = motion.reaction()  # of all supports: their nodes are shared where facet sets meet
         sums = (held * reaction[nodes].sum(axis=0) for nodes, held in self._supports)
         return np.concatenate([*parts, *sums]), np.empty(0)
 
-    def _value(self, quantity: str, motion: Moving) -> NDArray[np.float64]:
+    def _value(self, quantity: str, motion: Motion) -> NDArray[np.float64]:
         """Return this rank's part of a quantity at all points."""
         result = np.zeros((len(self._table.names), COMPONENTS[quantity]))
         if quantity == "displacement":

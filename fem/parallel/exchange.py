@@ -1,4 +1,4 @@
-"""Messages between ranks: sums over nodes that several ranks hold, and the channel across the cut."""
+"""Messages between ranks: sums over nodes that several ranks hold, and the channel across the interface."""
 
 import time
 from dataclasses import dataclass
@@ -143,20 +143,20 @@ class Messages(Protocol):
         """Return the time spent on its messages."""
 
     def send(self, values: NDArray[np.float64]) -> None:
-        """Send the cut rows of ``values (n, 3)``."""
+        """Send the interface rows of ``values (n, 3)``."""
 
     def receive(self, values: NDArray[np.float64]) -> None:
-        """Receive the cut rows of ``values (n, 3)``."""
+        """Receive the interface rows of ``values (n, 3)``."""
 
     def free(self) -> None:
         """Give back what it needs."""
 
 
 class Channel:
-    """Messages of cut values ``(., 3)`` from the ranks of one model to those of another.
+    """Messages of interface values ``(., 3)`` from the ranks of one model to those of another.
 
     A rank may carry one model or both; what it can copy from itself is no message. Else the lowest rank that holds a
-    cut node of the source sends it to every rank that holds it of the target.
+    interface node of the source sends it to every rank that holds it of the target.
 
     Attributes:
         clock: Time spent on its messages.
@@ -169,7 +169,7 @@ class Channel:
 
         Args:
             comm: Communicator of all models.
-            source: ``(nc,)`` local node of each cut node in the sending model, -1 where this rank has none.
+            source: ``(nc,)`` local node of each interface node in the sending model, -1 where this rank has none.
             target: The same in the receiving model.
             receiver_waits: Whether receivers are already waiting when this rank sends: it carries one model only.
         """
@@ -188,11 +188,11 @@ class Channel:
         self._sends = [comm.Send_init(sent[k], k, CHANNEL_TAG) for k in others if len(sent[k])]
         self._receives = [comm.Recv_init(received[k], k, CHANNEL_TAG) for k in others if len(received[k])]
         takers, givers = ([k for k in others if len(rows[k])] for rows in (sent, received))
-        self._taken = f"values of the cut to be taken by {HERE.names(comm, takers)}"
-        self._given = f"values of the cut from {HERE.names(comm, givers)}"
+        self._taken = f"values of the interface to be taken by {HERE.names(comm, takers)}"
+        self._given = f"values of the interface from {HERE.names(comm, givers)}"
 
     def send(self, values: NDArray[np.float64]) -> None:
-        """Send the cut rows of ``values (n, 3)``.
+        """Send the interface rows of ``values (n, 3)``.
 
         A large message makes no progress while its sender computes, so this waits until it is taken, where receivers
         are waiting for it. Ranks that carry both models receive at a later turn: waiting for them would never end.
@@ -208,7 +208,7 @@ class Channel:
         self.clock.count(begin, packed, time.perf_counter())
 
     def receive(self, values: NDArray[np.float64]) -> None:
-        """Receive the cut rows of ``values (n, 3)``."""
+        """Receive the interface rows of ``values (n, 3)``."""
         begin = time.perf_counter()
         MPI.Prequest.Startall(self._receives)
         self._own[1][:] = self._own[0]
@@ -235,7 +235,7 @@ def split_rows(buffer: NDArray[np.float64], parts: list[NDArray[np.int64]]) -> l
 
 
 @dataclass(frozen=True, slots=True)
-class CutChannels:
+class InterfaceChannels:
     """The two channels of a window: velocities to the meso model, forces to the macro model."""
 
     velocities: Messages
@@ -244,12 +244,12 @@ class CutChannels:
     @classmethod
     def open(
         cls, comm: MPI.Comm, macro: NDArray[np.int32], meso: NDArray[np.int32], receiver_waits: bool
-    ) -> "CutChannels":
+    ) -> "InterfaceChannels":
         """Open both; collective over all models.
 
         Args:
             comm: Communicator of all models.
-            macro: ``(nc,)`` local node of each cut node in this rank's macro model, -1 where it has none.
+            macro: ``(nc,)`` local node of each interface node in this rank's macro model, -1 where it has none.
             meso: The same in its meso model.
             receiver_waits: See ``Channel``.
         """

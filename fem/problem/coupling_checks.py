@@ -3,42 +3,42 @@
 from collections.abc import Iterator
 
 from reflowshock.fem.problem.problem import Problem, unknown_name
-from reflowshock.fem.problem.structure import InputG, LayerCoupling, StructureScene
+from reflowshock.fem.problem.structure import InputG, LayerCoupling, StructureProblem
 
 KEY = "dynamics.coupling"
 
 
-def coupling_problems(scene: StructureScene) -> Iterator[Problem]:
+def coupling_problems(problem: StructureProblem) -> Iterator[Problem]:
     """Find what does not go with two models; nothing where there is one."""
-    coupling = scene.dynamics.coupling
+    coupling = problem.dynamics.coupling
     if coupling is None:
-        if scene.dynamics.solver == "dns":
+        if problem.dynamics.solver == "dns":
             message = "is one model instead of two that are coupled"
             yield Problem("dynamics.solver", "dns", message, f"explicit, implicit, both, or a table {KEY}")
         return
-    yield from _fine(coupling, scene)
-    yield from _scheme(coupling, scene)
-    yield from _ranks(coupling, scene.dynamics.ranks)
-    yield from _one_model(scene)
+    yield from _fine(coupling, problem)
+    yield from _scheme(coupling, problem)
+    yield from _ranks(coupling, problem.dynamics.ranks)
+    yield from _one_model(problem)
 
 
-def _fine(coupling: LayerCoupling, scene: StructureScene) -> Iterator[Problem]:
-    layers = scene.structure.layers
+def _fine(coupling: LayerCoupling, problem: StructureProblem) -> Iterator[Problem]:
+    layers = problem.structure.layers
     for name in coupling.fine:
         yield from unknown_name(f"{KEY}.fine", name, layers, "layer")
     if layers and set(coupling.fine) >= set(layers):
         yield Problem(f"{KEY}.fine", list(coupling.fine), "leaves no layer to the macro model", "fewer layers")
-    if scene.structure.element != "hexahedron":
-        yield Problem(f"{KEY}", None, f"couples hexahedra, the element is {scene.structure.element}", "hexahedron")
+    if problem.structure.element != "hexahedron":
+        yield Problem(f"{KEY}", None, f"couples hexahedra, the element is {problem.structure.element}", "hexahedron")
 
 
-def _scheme(coupling: LayerCoupling, scene: StructureScene) -> Iterator[Problem]:
+def _scheme(coupling: LayerCoupling, problem: StructureProblem) -> Iterator[Problem]:
     if coupling.direction == "one_way":
         message = "needs a coarse mesh of the fine part, too, which only a package has"
         yield Problem(f"{KEY}.direction", "one_way", message, "two_way")
-    materials = {name: scene.known_materials.get(layer.material) for name, layer in scene.structure.layers.items()}
+    materials = {name: problem.known_materials.get(layer.material) for name, layer in problem.structure.layers.items()}
     plastic = [name for name, material in materials.items() if material and material.plasticity is not None]
-    if coupling.scheme == "local_steps" and (plastic or scene.dynamics.kinematics == "finite"):
+    if coupling.scheme == "local_steps" and (plastic or problem.dynamics.kinematics == "finite"):
         why = f"layers that yield: {', '.join(plastic)}" if plastic else "dynamics.kinematics = finite"
         message = f"needs elastic layers at small strains, there are {why}"
         yield Problem(f"{KEY}.scheme", "local_steps", message, "held_velocity, impulse, gravouil_combescure, auto")
@@ -56,9 +56,9 @@ def _ranks(coupling: LayerCoupling, ranks: int) -> Iterator[Problem]:
         yield Problem(f"{KEY}.macro_ranks", coupling.macro_ranks, message, f"< {ranks}, dynamics.ranks")
 
 
-def _one_model(scene: StructureScene) -> Iterator[Problem]:
+def _one_model(problem: StructureProblem) -> Iterator[Problem]:
     """Yield what only one model can do."""
-    dynamics = scene.dynamics
+    dynamics = problem.dynamics
     if dynamics.solver == "implicit":
         yield Problem("dynamics.solver", "implicit", "couples nothing", "explicit or both, or no dynamics.coupling")
     if (
@@ -73,6 +73,6 @@ def _one_model(scene: StructureScene) -> Iterator[Problem]:
     if dynamics.numerics.critical_step != "element":
         message = "is for one model: windows rest on the steps of elements"
         yield Problem("dynamics.numerics.critical_step", dynamics.numerics.critical_step, message, "element")
-    for name, load in scene.loads.items():
+    for name, load in problem.loads.items():
         if isinstance(load, InputG) and load.method == "large_mass":
             yield Problem(f"loads.{name}.method", "large_mass", "moves one model", "direct")

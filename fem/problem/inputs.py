@@ -8,12 +8,12 @@ from pydantic import Field, TypeAdapter
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.parameters import Parameters
 from reflowshock.fem.problem.shock import Shock
-from reflowshock.fem.problem.structure import SolverName, StructureScene
+from reflowshock.fem.problem.structure import SolverName, StructureProblem
 
 UNRELATED = {"checkpoint_seconds", "watchdog_seconds"}  # numerics that results do not depend on
 
 
-class SceneInput(Parameters):
+class PackageInput(Parameters):
     """A package on a board; SI floats.
 
     ``meshes`` have all joints fine, ``coarse_joints`` has those that are not.
@@ -41,14 +41,14 @@ class SceneInput(Parameters):
         return False
 
 
-class CoolingInput(SceneInput):
+class CoolingInput(PackageInput):
     """Cooling of the whole model from where it is free of stress, ``change`` of temperature [K]."""
 
     mode: Literal["cooling"]
     change: float
 
 
-class RunInput(SceneInput):
+class RunInput(PackageInput):
     """A package on a board, dropped.
 
     ``checkpoints`` is a folder from which a run continues, ``cooling`` the file of the state in which it begins.
@@ -81,7 +81,7 @@ class RunInput(SceneInput):
         return self.mode == "dns" and self.shock.numerics.dns_solver == "implicit"
 
 
-class StructureInput(StructureScene):
+class StructureInput(StructureProblem):
     """A structure and one of its solvers; SI floats. ``checkpoints`` is a folder from which a run continues.
 
     The solver ``dns`` is the explicit one without coupling.
@@ -112,7 +112,7 @@ class StructureInput(StructureScene):
 
     @property
     def finds_modes(self) -> bool:
-        """Return whether this run is the one of the scene's solvers that finds the natural modes."""
+        """Return whether this run is the one of the problem's solvers that finds the natural modes."""
         alone = [solver for solver in self.dynamics.solvers if solver != "explicit" or not self.dynamics.coupling]
         return self.dynamics.modes > 0 and self.solver in alone[:1]
 

@@ -52,7 +52,7 @@ class Coupling(Parameters):
     Where no buffer fits, ``auto`` takes ``gravouil_combescure``, which needs none. ``impulse`` has the buffer of held
     velocity and keeps momentum exactly; its models wait for each other. ``one_way`` drives the meso model by the macro
     model, which takes nothing back. ``levels`` are those of the meso model's steps below the window. ``buffer_layers``
-    of board elements lie between joints and a cut of held velocity.
+    of board elements lie between joints and an interface of held velocity.
     """
 
     scheme: Literal["auto", "held_velocity", "local_steps", "impulse", "gravouil_combescure"] = "auto"

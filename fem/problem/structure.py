@@ -228,7 +228,7 @@ class Dynamics(Parameters):
         return (*chosen, "dns") if compared else chosen
 
 
-class StructureScene(Parameters):
+class StructureProblem(Parameters):
     """All that describes a structure and its motion; ``structure.checks.problems`` says what does not fit together."""
 
     structure: Structure
@@ -240,7 +240,7 @@ class StructureScene(Parameters):
 
     @property
     def known_materials(self) -> dict[str, Material]:
-        """Return the materials that layers may name: those of the scene, then those of the library."""
+        """Return the materials that layers may name: those of the problem, then those of the library."""
         return self.materials | {name: material for name, material in LIBRARY.items() if name not in self.materials}
 
     @property

@@ -12,150 +12,152 @@ from reflowshock.fem.problem.structure import (
     PrescribedMotion,
     Pressure,
     StructureLoad,
-    StructureScene,
+    StructureProblem,
 )
 
 ROUNDING = 1e-9  # of the box: a watch point on its surface is inside
 
 
-def problems(scene: StructureScene) -> list[Problem]:
+def problems(problem: StructureProblem) -> list[Problem]:
     """Find what cannot work before anything is meshed or computed."""
     return [
-        *_structure(scene),
-        *_supports(scene),
-        *(found for name, load in scene.loads.items() for found in _load(f"loads.{name}", load, scene)),
-        *_large_mass(scene),
-        *_symmetry(scene),
-        *_watch(scene),
-        *_dynamics(scene),
-        *coupling_problems(scene),
+        *_structure(problem),
+        *_supports(problem),
+        *(found for name, load in problem.loads.items() for found in _load(f"loads.{name}", load, problem)),
+        *_large_mass(problem),
+        *_symmetry(problem),
+        *_watch(problem),
+        *_dynamics(problem),
+        *coupling_problems(problem),
     ]
 
 
-def check(scene: StructureScene) -> None:
-    """Refuse a scene that cannot work.
+def check(problem: StructureProblem) -> None:
+    """Refuse a problem that cannot work.
 
     Raises:
         ValueError: With all problems, one a line.
     """
-    found = problems(scene)
+    found = problems(problem)
     if found:
         raise ValueError("\n".join(str(problem) for problem in found))
 
 
-def _structure(scene: StructureScene) -> Iterator[Problem]:
-    structure = scene.structure
+def _structure(problem: StructureProblem) -> Iterator[Problem]:
+    structure = problem.structure
     if not structure.layers:
         yield Problem("structure.layers", None, "the structure has no layer", "at least one table such as layers.board")
     for name, layer in structure.layers.items():
-        yield from unknown_name(f"structure.layers.{name}.material", layer.material, scene.known_materials, "material")
+        yield from unknown_name(
+            f"structure.layers.{name}.material", layer.material, problem.known_materials, "material"
+        )
     if structure.element != "hexahedron" and structure.formulation == "one_point":
         message = f"is a choice for hexahedra, the element is {structure.element}"
         yield Problem("structure.formulation", structure.formulation, message, "incompatible_modes (the default)")
 
 
-def _supports(scene: StructureScene) -> Iterator[Problem]:
-    for name, support in scene.supports.items():
-        yield from unknown_name(f"supports.{name}.on", support.on, scene.structure.facet_sets, "facet set")
+def _supports(problem: StructureProblem) -> Iterator[Problem]:
+    for name, support in problem.supports.items():
+        yield from unknown_name(f"supports.{name}.on", support.on, problem.structure.facet_sets, "facet set")
         if not support.hold:
             yield Problem(f"supports.{name}.hold", "[]", "holds nothing", "any of x, y, z")
 
 
-def _load(key: str, load: StructureLoad, scene: StructureScene) -> Iterator[Problem]:
+def _load(key: str, load: StructureLoad, problem: StructureProblem) -> Iterator[Problem]:
     if isinstance(load, Pressure | PrescribedMotion):
-        yield from unknown_name(f"{key}.on", load.on, scene.structure.facet_sets, "facet set")
+        yield from unknown_name(f"{key}.on", load.on, problem.structure.facet_sets, "facet set")
     if isinstance(load, InputG | Gravity) and not math.hypot(*load.direction) > 0.0:
         yield Problem(f"{key}.direction", list(load.direction), "has no length", "any vector but zero")
-    if isinstance(load, InputG) and load.method == "direct" and not _is_held(scene):
+    if isinstance(load, InputG) and load.method == "direct" and not _is_held(problem):
         yield Problem(
             f"{key}.method", "direct", "needs a support that the table shakes, there is none", "a [supports.NAME]"
         )
     if isinstance(load, PrescribedMotion):
-        yield from _conflicts(key, load, scene)
+        yield from _conflicts(key, load, problem)
     yield from _pulse(key, load)
 
 
-def _large_mass(scene: StructureScene) -> Iterator[Problem]:
+def _large_mass(problem: StructureProblem) -> Iterator[Problem]:
     """A large mass moves the supports that hold all components; nothing else may refer to a place in space."""
-    shaking = [name for name, load in scene.loads.items() if isinstance(load, InputG) and load.method == "large_mass"]
+    shaking = [name for name, load in problem.loads.items() if isinstance(load, InputG) and load.method == "large_mass"]
     if not shaking:
         return
     key = f"loads.{shaking[0]}.method"
-    if not any(set(support.hold) == set(AXES) for support in scene.supports.values()):
+    if not any(set(support.hold) == set(AXES) for support in problem.supports.values()):
         yield Problem(key, "large_mass", "needs a support that it can shake: one that holds x, y, z", "direct")
-    moved = {"initial_velocity": any(scene.dynamics.initial_velocity)}
-    moved |= {"mass-proportional damping": bool(scene.dynamics.damping.coefficients[0])}
-    moved |= {f"loads.{name}": isinstance(load, PrescribedMotion) for name, load in scene.loads.items()}
+    moved = {"initial_velocity": any(problem.dynamics.initial_velocity)}
+    moved |= {"mass-proportional damping": bool(problem.dynamics.damping.coefficients[0])}
+    moved |= {f"loads.{name}": isinstance(load, PrescribedMotion) for name, load in problem.loads.items()}
     for what in [name for name, is_there in moved.items() if is_there]:
         message = f"does not go with {what}, whose velocities would be those in space, not those seen from the supports"
         yield Problem(key, "large_mass", message, "direct")
     for name in shaking[1:]:
         yield Problem(f"loads.{name}.method", "large_mass", f"is already that of loads.{shaking[0]}", "direct")
     for name in shaking:
-        yield from _left_behind(name, scene)
-    yield from _not_shaken(key, scene)
+        yield from _left_behind(name, problem)
+    yield from _not_shaken(key, problem)
 
 
-def _not_shaken(key: str, scene: StructureScene) -> Iterator[Problem]:
+def _not_shaken(key: str, problem: StructureProblem) -> Iterator[Problem]:
     """Yield what holds in space some nodes of a support that a large mass moves."""
-    shaken = [name for name, support in scene.supports.items() if set(support.hold) == set(AXES)]
+    shaken = [name for name, support in problem.supports.items() if set(support.hold) == set(AXES)]
     for name in shaken:
-        support = scene.supports[name]
-        for what, on, _ in _held_sets(scene):
+        support = problem.supports[name]
+        for what, on, _ in _held_sets(problem):
             if what.removeprefix("supports.") not in shaken and _meet(on, support.on):
                 message = f"cannot move supports.{name}: {what} holds nodes of it in space {_where(on, support.on)}"
                 yield Problem(key, "large_mass", message, "direct")
 
 
-def _left_behind(shaking: str, scene: StructureScene) -> Iterator[Problem]:
+def _left_behind(shaking: str, problem: StructureProblem) -> Iterator[Problem]:
     """Yield the supports that would stay in place along the direction of a large mass."""
-    load = scene.loads[shaking]
-    for name, support in scene.supports.items():
+    load = problem.loads[shaking]
+    for name, support in problem.supports.items():
         along = [axis for axis in support.hold if isinstance(load, InputG) and load.direction[AXES.index(axis)]]
         if along and set(support.hold) != set(AXES):
             message = f"would stay in place along {' and '.join(along)} while the large mass of loads.{shaking} moves"
             yield Problem(f"supports.{name}.hold", list(support.hold), message, "x, y, z, or method = direct")
 
 
-def _symmetry(scene: StructureScene) -> Iterator[Problem]:
+def _symmetry(problem: StructureProblem) -> Iterator[Problem]:
     """What both halves of a body do must be mirror images."""
-    pushes = {f"loads.{name}.direction": load for name, load in scene.loads.items()}
+    pushes = {f"loads.{name}.direction": load for name, load in problem.loads.items()}
     vectors = {key: load.direction for key, load in pushes.items() if isinstance(load, InputG | Gravity)}
-    vectors["dynamics.initial_velocity"] = scene.dynamics.initial_velocity
-    for axis in scene.structure.symmetry:
+    vectors["dynamics.initial_velocity"] = problem.dynamics.initial_velocity
+    for axis in problem.structure.symmetry:
         for key, vector in vectors.items():
             if vector[AXES.index(axis)]:
                 message = (
                     f"crosses the plane of symmetry {axis} = 0, on both sides of which it would have to be mirrored"
                 )
                 yield Problem(key, list(vector), message, f"0 along {axis}, or no symmetry in {axis}")
-        for name, load in scene.loads.items():
+        for name, load in problem.loads.items():
             if isinstance(load, Pressure) and load.on == f"{axis}_min":
                 yield Problem(f"loads.{name}.on", load.on, "is a plane of symmetry inside the body", f"{axis}_max")
 
 
-def _is_held(scene: StructureScene) -> bool:
+def _is_held(problem: StructureProblem) -> bool:
     """Return whether something of the body keeps its place."""
-    return bool(scene.supports) or any(isinstance(load, PrescribedMotion) for load in scene.loads.values())
+    return bool(problem.supports) or any(isinstance(load, PrescribedMotion) for load in problem.loads.values())
 
 
-def _conflicts(key: str, load: PrescribedMotion, scene: StructureScene) -> Iterator[Problem]:
+def _conflicts(key: str, load: PrescribedMotion, problem: StructureProblem) -> Iterator[Problem]:
     """Yield what else decides on the component that a load moves."""
-    for what, on, components in _held_sets(scene):
+    for what, on, components in _held_sets(problem):
         if _meet(on, load.on) and load.component in components:
             yield Problem(f"{key}.component", load.component, f"is held by {what} {_where(on, load.on)}")
-    for name, other in scene.loads.items():
+    for name, other in problem.loads.items():
         if f"loads.{name}" == key:  # of two that clash, the later one is named
             return
         if isinstance(other, PrescribedMotion) and _meet(other.on, load.on) and other.component == load.component:
             yield Problem(f"{key}.component", load.component, f"is moved by loads.{name} {_where(other.on, load.on)}")
 
 
-def _held_sets(scene: StructureScene) -> Iterator[tuple[str, str, tuple[str, ...]]]:
+def _held_sets(problem: StructureProblem) -> Iterator[tuple[str, str, tuple[str, ...]]]:
     """Yield supports and planes of symmetry: what holds, on which facet set, which components."""
-    for name, support in scene.supports.items():
+    for name, support in problem.supports.items():
         yield f"supports.{name}", support.on, support.hold
-    for axis in scene.structure.symmetry:
+    for axis in problem.structure.symmetry:
         yield "a plane of symmetry", f"{axis}_min", (axis,)
 
 
@@ -188,10 +190,10 @@ def _pulse(key: str, load: StructureLoad) -> Iterator[Problem]:
         yield Problem(f"{key}.duration", f"{load.duration:g} s", f"is already given by {given[0]}")
 
 
-def _watch(scene: StructureScene) -> Iterator[Problem]:
-    low, high = scene.structure.corners
-    margin = ROUNDING * max(scene.structure.length, scene.structure.width, scene.structure.thickness)
-    for name, point in scene.watch.items():
+def _watch(problem: StructureProblem) -> Iterator[Problem]:
+    low, high = problem.structure.corners
+    margin = ROUNDING * max(problem.structure.length, problem.structure.width, problem.structure.thickness)
+    for name, point in problem.watch.items():
         nearest = [min(max(x, a), b) for x, a, b in zip(point.at, low, high, strict=True)]
         distance = math.dist(point.at, nearest)
         if distance > margin:
@@ -203,47 +205,47 @@ def _metres(point: Iterable[float]) -> str:
     return "(" + ", ".join(f"{value:.6g}" for value in point) + ") m"
 
 
-def _yielding(scene: StructureScene) -> Iterator[tuple[str, str]]:
+def _yielding(problem: StructureProblem) -> Iterator[tuple[str, str]]:
     """Yield key and material of the layers that yield."""
-    for name, layer in scene.structure.layers.items():
-        material = scene.known_materials.get(layer.material)
+    for name, layer in problem.structure.layers.items():
+        material = problem.known_materials.get(layer.material)
         if material is not None and material.plasticity is not None:
             yield f"structure.layers.{name}.material", layer.material
 
 
-def _nonlinear_damping(scene: StructureScene) -> Iterator[Problem]:
+def _nonlinear_damping(problem: StructureProblem) -> Iterator[Problem]:
     """Stiffness-proportional damping takes the elastic stiffness, which must not turn."""
-    key = "dynamics.damping.stiffness_" + ("ratio" if scene.dynamics.damping.stiffness_ratio else "coefficient")
-    if scene.dynamics.kinematics == "finite":
+    key = "dynamics.damping.stiffness_" + ("ratio" if problem.dynamics.damping.stiffness_ratio else "coefficient")
+    if problem.dynamics.kinematics == "finite":
         yield Problem(key, None, "needs a constant stiffness, dynamics.kinematics = finite has none", "mass_ratio")
 
 
-def _dynamics(scene: StructureScene) -> Iterator[Problem]:
-    dynamics = scene.dynamics
+def _dynamics(problem: StructureProblem) -> Iterator[Problem]:
+    dynamics = problem.dynamics
     damping = dynamics.damping
     if "implicit" in dynamics.solvers and dynamics.kinematics == "finite":
         yield Problem("dynamics.kinematics", "finite", "the implicit solver is linear", "small, or solver = explicit")
     if "implicit" in dynamics.solvers:
         yield from (
             Problem(key, material, f"yields, the solver {dynamics.solver} is linear", "dynamics.solver = explicit")
-            for key, material in _yielding(scene)
+            for key, material in _yielding(problem)
         )
     if (damping.mass_ratio or damping.stiffness_ratio) and damping.frequency is None:
         yield Problem("dynamics.damping.frequency", None, "is missing: at which the ratios hold", "> 0 Hz")
     if damping.stiffness_ratio or damping.stiffness_coefficient:
-        yield from _nonlinear_damping(scene)
+        yield from _nonlinear_damping(problem)
     for name in dynamics.numerics.mass_scaled:
-        yield from unknown_name("dynamics.numerics.mass_scaled", name, scene.structure.layers, "layer")
-    yield from _numerics(scene)
-    if not scene.loads and not any(dynamics.initial_velocity):
+        yield from unknown_name("dynamics.numerics.mass_scaled", name, problem.structure.layers, "layer")
+    yield from _numerics(problem)
+    if not problem.loads and not any(dynamics.initial_velocity):
         yield Problem(
             "loads", None, "nothing moves the structure", "a table such as loads.drop, or an initial_velocity"
         )
 
 
-def _numerics(scene: StructureScene) -> Iterator[Problem]:
-    dynamics, numerics = scene.dynamics, scene.dynamics.numerics
-    longest = min([dynamics.duration, *(load.duration / 2 for load in scene.loads.values() if load.duration)])
+def _numerics(problem: StructureProblem) -> Iterator[Problem]:
+    dynamics, numerics = problem.dynamics, problem.dynamics.numerics
+    longest = min([dynamics.duration, *(load.duration / 2 for load in problem.loads.values() if load.duration)])
     step = numerics.implicit_step
     if step is not None and step > longest:
         message = "is too long to see the motion: above the duration, or half a pulse"
@@ -251,6 +253,6 @@ def _numerics(scene: StructureScene) -> Iterator[Problem]:
     if numerics.mass_scaled and "implicit" in dynamics.solvers:
         message = f"serves explicit steps, the solver is {dynamics.solver}"
         yield Problem("dynamics.numerics.mass_scaled", list(numerics.mass_scaled), message, "none")
-    if scene.structure.layers and set(numerics.mass_scaled) >= set(scene.structure.layers):
+    if problem.structure.layers and set(numerics.mass_scaled) >= set(problem.structure.layers):
         message = "leaves no layer to take the step from"
         yield Problem("dynamics.numerics.mass_scaled", list(numerics.mass_scaled), message)

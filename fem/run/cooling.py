@@ -8,13 +8,13 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from reflowshock.fem import dolfinx_api
-from reflowshock.fem.division.fine_joints import read_scene
+from reflowshock.fem.division.fine_joints import read_package
 from reflowshock.fem.division.tables import JointTables, ModelInput, joined, model_inputs
 from reflowshock.fem.division.whole import Whole
-from reflowshock.fem.dynamics.participant import uncut_motion
+from reflowshock.fem.dynamics.participant import explicit_motion
 from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.mesh.supports import SYMMETRY
-from reflowshock.fem.model.assembly import Pieces, Response, make_body, make_pieces
+from reflowshock.fem.model.assembly import ForceOptions, Pieces, make_body, make_pieces
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.output.cooling_report import Unbalanced, write_cooling
 from reflowshock.fem.parallel.agreement import agreed
@@ -36,31 +36,31 @@ def run_cooling(world: MPI.Comm, request: CoolingInput) -> None:
         AgreedError: Input or mesh that does not fit, or no equilibrium; on every rank.
     """
     start = time.perf_counter()
-    scene = agreed(world, lambda: pinned_scene(request) if world.rank == 0 else None)
-    tables: JointTables = world.bcast(scene[1].tables if scene else None)
+    pinned = agreed(world, lambda: pinned_package(request) if world.rank == 0 else None)
+    tables: JointTables = world.bcast(pinned[1].tables if pinned else None)
     HERE.slow = "cools the model"
-    pieces = distributed(world, scene[1].mesh if scene else None, tables, request)
+    pieces = distributed(world, pinned[1].mesh if pinned else None, tables, request)
     ones = np.ones(len(pieces.steps))
-    body = make_body(world, pieces, tables, ones, Response())
+    body = make_body(world, pieces, tables, ones, ForceOptions())
     statics = Statics(world, body, pieces.materials, request.change)
     found, memory = statics.solve(), statics.memory
     statics.free()
     loaded = begun(body, pieces.materials, found.displacement, request.change, path=True)
     rest, seconds = unbalanced_force(world, loaded, statics.scale), time.perf_counter() - start
     unbalanced = Unbalanced(found.residuals, rest, found.products, memory, seconds)
-    whole = scene[0] if scene else None
-    displacement = whole_displacement(world, body, found, scene)
+    whole = pinned[0] if pinned else None
+    displacement = whole_displacement(world, body, found, pinned)
     cooling = Cooling(whole.mesh.points, displacement, request.change) if whole and displacement is not None else None
     write_cooling(world, request, (whole, cooling), (loaded, tables), unbalanced)
     agreed(world, lambda: None)
 
 
-Scene = tuple[Whole, ModelInput[JointTables]]
+Pinned = tuple[Whole, ModelInput[JointTables]]
 
 
-def pinned_scene(request: CoolingInput) -> Scene:
+def pinned_package(request: CoolingInput) -> Pinned:
     """Read all meshes as one model on its planes of symmetry, its other rigid motions pinned."""
-    whole = joined(read_scene(request))
+    whole = joined(read_package(request))
     return whole, pinned(model_inputs(whole, "dns", SYMMETRY)["dns"])
 
 
@@ -86,7 +86,7 @@ def distributed(world: MPI.Comm, mesh: MeshData | None, tables: JointTables, req
 
 def unbalanced_force(world: MPI.Comm, body: Body, scale: float) -> float:
     """Return what forces of the shock's own terms are out of balance at its beginning, over a scale [N]; collective."""
-    motion = uncut_motion(body, [], 1.0)
+    motion = explicit_motion(body, [], 1.0)
     motion.update_force()
     own = body.free & body.shared.owned[:, None]
     square = world.allreduce(float(np.sum(motion.force[own] ** 2)))
@@ -94,14 +94,14 @@ def unbalanced_force(world: MPI.Comm, body: Body, scale: float) -> float:
 
 
 def whole_displacement(
-    world: MPI.Comm, body: Body, found: Equilibrium, scene: Scene | None
+    world: MPI.Comm, body: Body, found: Equilibrium, pinned: Pinned | None
 ) -> NDArray[np.float64] | None:
     """Return the displacement ``(n, 3)`` [m] of all nodes of the whole mesh on rank 0, None elsewhere; collective."""
     owned = body.shared.owned
     parts = world.gather((body.local.nodes[owned], found.displacement[owned]))
-    if parts is None or scene is None:
+    if parts is None or pinned is None:
         return None
-    whole, item = scene
+    whole, item = pinned
     own, result = np.zeros((item.tables.nodes, 3)), np.zeros_like(whole.mesh.points)
     for nodes, values in parts:
         own[nodes] = values

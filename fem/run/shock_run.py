@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 from mpi4py import MPI
 
-from reflowshock.fem.coupling.crew import Crew, couple
+from reflowshock.fem.coupling.participants import CoupledRun, couple
 from reflowshock.fem.coupling.planner import Plan, loads_of, plan_ranks
 from reflowshock.fem.coupling.scheme import scheme_of
 from reflowshock.fem.coupling.self_check import recorded
@@ -14,10 +14,10 @@ from reflowshock.fem.coupling.stopwatch import Stopwatch
 from reflowshock.fem.division.checks import check_pulses
 from reflowshock.fem.division.division import SchemeName
 from reflowshock.fem.division.whole import Treatment
-from reflowshock.fem.dynamics.energy_balance import Ledger
+from reflowshock.fem.dynamics.energy_balance import EnergyBalance
 from reflowshock.fem.dynamics.history import History
 from reflowshock.fem.dynamics.implicit import ImplicitMotion
-from reflowshock.fem.dynamics.participant import Alone, uncut_motion
+from reflowshock.fem.dynamics.participant import Alone, explicit_motion
 from reflowshock.fem.estimates.estimate import WindowPlan, implicit_plan, largest_implicit_step, shortened
 from reflowshock.fem.estimates.placement import check_size
 from reflowshock.fem.loads.pulse import Pulse
@@ -27,7 +27,7 @@ from reflowshock.fem.loads.structure_pulses import pulse_durations
 from reflowshock.fem.materials.elasticity import materials_of_parts
 from reflowshock.fem.model.steps import Steps
 from reflowshock.fem.output.fields import Fields, element_peaks
-from reflowshock.fem.output.interface import InterfaceStress, picture_windows
+from reflowshock.fem.output.joint_interface import JointInterfaceStress, picture_windows
 from reflowshock.fem.output.result import Found, Timings, write_result
 from reflowshock.fem.output.watch_joints import JointWatch
 from reflowshock.fem.parallel.agreement import agreed
@@ -36,8 +36,8 @@ from reflowshock.fem.parallel.checkpoint_files import digest_of_files
 from reflowshock.fem.parallel.communicators import Communicators, Role
 from reflowshock.fem.problem.inputs import RunInput
 from reflowshock.fem.problem.shock import Shock
-from reflowshock.fem.run.time_loop import Outputs, march
-from reflowshock.fem.setup.shock_models import Divided, Model, build_models, divided_scene
+from reflowshock.fem.run.time_loop import Outputs, run_time_loop
+from reflowshock.fem.setup.shock_models import Divided, Model, build_models, divided_package
 
 SPEEDS = 201  # times at which the largest velocity of the table is looked for
 NON_TRIVIAL = 1e-4  # of the energy that the pulse gives a free body: from there on the balance is judged
@@ -54,13 +54,13 @@ def run(world: MPI.Comm, request: RunInput) -> None:
     start = time.perf_counter()
     if request.mode == "two_scale":
         check_size(request.shock.ranks, world.size)
-    divided = divided_scene(world, request)
+    divided = divided_package(world, request)
     pulse = agreed(world, lambda: pulse_of(request, divided.steps.plan.window))
     ranks = place(world, divided, request)
     with Communicators(world, ranks.placement) as comms:
         models, steps = build_models(comms, divided, request, ranks.cells)
         steps = planned(steps, request, pulse)
-        crew, channels, checked = make_crew(comms, models, (steps, divided.scheme), request.shock)
+        participants, channels, checked = make_participants(comms, models, (steps, divided.scheme), request.shock)
         stopwatch = Stopwatch({role: model.body.shared.clock for role, model in models.items()}, channels)
         history = make_history(comms, models, steps, pulse, request)
         numerics, fields = request.shock.numerics, make_fields(comms, models, request)
@@ -69,7 +69,7 @@ def run(world: MPI.Comm, request: RunInput) -> None:
         pictures = make_pictures(comms, models, steps.plan, request.shock)
         outputs = Outputs(history, fields, numerics.field_samples, checkpoints, pictures)
         ready = time.perf_counter()
-        output_seconds = march(comms.world, crew, outputs, stopwatch)
+        output_seconds = run_time_loop(comms.world, participants, outputs, stopwatch)
         seconds = time.perf_counter() - ready - output_seconds
         first = checkpoints.continued or 0
         balance = ranks.summary | stopwatch.summary(comms.world, steps.plan.windows - first)
@@ -108,7 +108,9 @@ def place(world: MPI.Comm, divided: Divided, request: RunInput) -> Plan:
     return plan_ranks(world, loads, request.shock.ranks, request.checkpoints, divided.scheme)
 
 
-def make_crew(comms: Communicators, models: dict[Role, Model], chosen: tuple[Steps, SchemeName], shock: Shock) -> Crew:
+def make_participants(
+    comms: Communicators, models: dict[Role, Model], chosen: tuple[Steps, SchemeName], shock: Shock
+) -> CoupledRun:
     """Return the participants of this rank, from the steps of the run and its scheme; collective."""
     steps, name = chosen
     plan, mass = steps.plan, steps.model_mass + steps.added_mass
@@ -120,8 +122,8 @@ def make_crew(comms: Communicators, models: dict[Role, Model], chosen: tuple[Ste
         return couple(comms, bodies, loads, plan, scheme_of(name, shock.coupling.direction))
     model = bodies["dns"], loads["dns"], plan.step
     implicit = shock.numerics.dns_solver == "implicit"
-    motion = ImplicitMotion(comms.models["dns"], *model) if implicit else uncut_motion(*model)
-    return Crew({"dns": Alone(motion, plan)}, [])
+    motion = ImplicitMotion(comms.models["dns"], *model) if implicit else explicit_motion(*model)
+    return CoupledRun({"dns": Alone(motion, plan)}, [])
 
 
 def make_history(
@@ -132,19 +134,19 @@ def make_history(
     speed = max(abs(pulse.integral(time)) for time in np.linspace(0.0, shock.duration, SPEEDS))
     mass, plan = steps.model_mass + steps.added_mass, steps.plan
     trivial = NON_TRIVIAL * 0.5 * mass * speed**2
-    ledger = Ledger(shock.numerics.energy_balance_limit, trivial, plan.step, steps.smallest)
+    balance = EnergyBalance(shock.numerics.energy_balance_limit, trivial, plan.step, steps.smallest)
     watches = {role: JointWatch(model.tables.watch, model.body, yields) for role, model in models.items()}
-    return History(comms.world, watches, ledger, {"base_acceleration": pulse.value})
+    return History(comms.world, watches, balance, {"base_acceleration": pulse.value})
 
 
 def make_pictures(
     comms: Communicators, models: dict[Role, Model], plan: WindowPlan, shock: Shock
-) -> list[InterfaceStress]:
+) -> list[JointInterfaceStress]:
     """Return what is taken at ``shock.picture_times``; nothing where none is given."""
     if not shock.picture_times:
         return []
-    tables = {role: (model.tables.interface, model.body) for role, model in models.items()}
-    return [InterfaceStress(comms.world, tables, picture_windows(shock.picture_times, plan))]
+    tables = {role: (model.tables.joint_interface, model.body) for role, model in models.items()}
+    return [JointInterfaceStress(comms.world, tables, picture_windows(shock.picture_times, plan))]
 
 
 def make_fields(comms: Communicators, models: dict[Role, Model], request: RunInput) -> dict[Role, Fields]:

@@ -5,12 +5,12 @@ from collections.abc import Mapping
 import numpy as np
 from mpi4py import MPI
 
-from reflowshock.fem.coupling.crew import Crew, couple
+from reflowshock.fem.coupling.participants import CoupledRun, couple
 from reflowshock.fem.coupling.scheme import scheme_of
 from reflowshock.fem.division.division import SchemeName
 from reflowshock.fem.dynamics.implicit import ImplicitMotion
-from reflowshock.fem.dynamics.moving import Moving
-from reflowshock.fem.dynamics.participant import Alone, uncut_motion
+from reflowshock.fem.dynamics.motion import Motion
+from reflowshock.fem.dynamics.participant import Alone, explicit_motion
 from reflowshock.fem.errors import AgreedError
 from reflowshock.fem.loads.load import Load
 from reflowshock.fem.loads.pulse import Pulse
@@ -35,15 +35,15 @@ def couple_models(
     request: StructureInput,
     pulses: Pulses,
     scheme: SchemeName,
-) -> Crew:
+) -> CoupledRun:
     """Return the coupled models of this rank, ready to move; collective."""
     bodies = {role: model.body for role, model in models.items()}
     loads = {role: loads_of(comms.models[role], model, request, pulses) for role, model in models.items()}
     plan = next(iter(models.values())).steps.plan
-    crew = couple(comms, bodies, loads, plan, scheme_of(scheme))
-    for participant in crew.participants.values():
+    participants = couple(comms, bodies, loads, plan, scheme_of(scheme))
+    for participant in participants.participants.values():
         launch(participant.motion, request)
-    return crew
+    return participants
 
 
 def loads_of(comm: MPI.Comm, model: StructureModel, request: StructureInput, pulses: Pulses) -> list[Load]:
@@ -52,13 +52,13 @@ def loads_of(comm: MPI.Comm, model: StructureModel, request: StructureInput, pul
     return loads + damping_loads(request.dynamics.damping, model.body)
 
 
-def launch(motion: Moving, request: StructureInput) -> None:
+def launch(motion: Motion, request: StructureInput) -> None:
     """Give a motion its initial velocity, if there is one."""
     if any(request.dynamics.initial_velocity):
         motion.launch(np.array(request.dynamics.initial_velocity))
 
 
-def make_motion(comm: MPI.Comm, model: StructureModel, request: StructureInput, loads: list[Load]) -> Moving:
+def make_motion(comm: MPI.Comm, model: StructureModel, request: StructureInput, loads: list[Load]) -> Motion:
     """Return the motion from rest by the run's solver; collective.
 
     Raises:
@@ -66,7 +66,7 @@ def make_motion(comm: MPI.Comm, model: StructureModel, request: StructureInput, 
     """
     step = model.steps.plan.step
     if request.solver != "implicit":
-        return uncut_motion(model.body, loads, step)
+        return explicit_motion(model.body, loads, step)
     try:
         return ImplicitMotion(comm, model.body, loads, step, request.dynamics.numerics.hht_alpha)
     except ValueError as error:  # of what all ranks know alike

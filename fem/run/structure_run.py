@@ -14,7 +14,7 @@ from reflowshock.fem.coupling.planner import Plan, loads_of, plan_ranks
 from reflowshock.fem.coupling.self_check import recorded
 from reflowshock.fem.coupling.stopwatch import Stopwatch
 from reflowshock.fem.division.whole import Treatment
-from reflowshock.fem.dynamics.energy_balance import Ledger
+from reflowshock.fem.dynamics.energy_balance import EnergyBalance
 from reflowshock.fem.dynamics.history import History
 from reflowshock.fem.dynamics.implicit import ImplicitMotion
 from reflowshock.fem.dynamics.participant import Participant
@@ -36,7 +36,7 @@ from reflowshock.fem.problem.inputs import StructureInput
 from reflowshock.fem.problem.shock import Ranks
 from reflowshock.fem.problem.structure import LayerCoupling
 from reflowshock.fem.run.structure_participants import couple_models, make_participant
-from reflowshock.fem.run.time_loop import Outputs, march
+from reflowshock.fem.run.time_loop import Outputs, run_time_loop
 from reflowshock.fem.setup.structure_divided import DividedStructure, divided_structure
 from reflowshock.fem.setup.structure_model import StructureModel, build_coupled, build_structure
 
@@ -49,14 +49,14 @@ class Started:
 
     Attributes:
         models: The models of this rank.
-        crew: Their participants, in the order of their turns.
+        participants: Their participants, in the order of their turns.
         modes: Natural modes, if the run is asked for them.
         channels: Clocks of the channels between two models.
         coupling: How they are coupled, for the result.
     """
 
     models: Models
-    crew: dict[Role, Participant]
+    participants: dict[Role, Participant]
     modes: ModeTable | None
     channels: Sequence[MessageClock] = ()
     coupling: dict[str, Any] | None = None
@@ -78,17 +78,17 @@ def run_structure(world: MPI.Comm, request: StructureInput) -> None:
             started = start_one(comms, request, pulses)
         else:
             started = start_two(comms, request, pulses, divided, ranks.cells)
-        models, crew = started.models, started.crew
+        models, participants = started.models, started.participants
         outputs = make_outputs(comms, models, request, pulses)
         stopwatch = Stopwatch({role: model.body.shared.clock for role, model in models.items()}, started.channels)
         ready = time.perf_counter()
-        output_seconds = march(comms.world, crew, outputs, stopwatch)
+        output_seconds = run_time_loop(comms.world, participants, outputs, stopwatch)
         seconds = time.perf_counter() - ready - output_seconds
         first = outputs.checkpoints.continued or 0
-        balance = ranks.summary | stopwatch.summary(comms.world, next(iter(crew.values())).plan.windows - first)
+        balance = ranks.summary | stopwatch.summary(comms.world, next(iter(participants.values())).plan.windows - first)
         timings = Timings(ready - start, seconds, output_seconds, balance, first)
         peaks = element_peaks(comms.world, outputs.fields.values(), next(iter(models.values())).tables.part_names)
-        motion = next(iter(crew.values())).motion
+        motion = next(iter(participants.values())).motion
         cost = motion.factor.cost if isinstance(motion, ImplicitMotion) else None
         found = Found(outputs.history, started.modes, peaks, cost, started.coupling)
         write_result(comms, request, models, found, timings)
@@ -122,8 +122,8 @@ def start_two(
 ) -> Started:
     """Return the coupled models of this rank; ``cells`` are those of ``planner.Plan``; collective."""
     models = build_coupled(comms, divided, request, cells)
-    crew, channels, checked = couple_models(comms, models, request, pulses, divided.scheme)
-    return Started(models, crew, None, channels, divided.coupling | recorded(checked))
+    participants, channels, checked = couple_models(comms, models, request, pulses, divided.scheme)
+    return Started(models, participants, None, channels, divided.coupling | recorded(checked))
 
 
 def make_outputs(comms: Communicators, models: Models, request: StructureInput, pulses: dict[str, Pulse]) -> Outputs:
@@ -145,7 +145,7 @@ def make_history(world: MPI.Comm, models: Models, request: StructureInput, pulse
     """Return the empty history of this run, with the value of each load as ``load@<name>``."""
     steps = next(iter(models.values())).steps
     # The balance is exact at any step, so that there is no energy too small to be judged.
-    ledger = Ledger(request.dynamics.numerics.energy_balance_limit, 0.0, steps.plan.step, steps.smallest)
+    balance = EnergyBalance(request.dynamics.numerics.energy_balance_limit, 0.0, steps.plan.step, steps.smallest)
     signals = {f"load@{name}": pulse.value for name, pulse in pulses.items()}
     watches = {role: PointWatch(model.tables.watch, model.body) for role, model in models.items()}
-    return History(world, watches, ledger, signals)
+    return History(world, watches, balance, signals)

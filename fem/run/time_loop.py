@@ -1,4 +1,4 @@
-"""The march of all models through their windows: samples, fields, checkpoints, progress."""
+"""The time loop: all models through their windows, with samples, fields, checkpoints, progress."""
 
 import json
 import time
@@ -23,7 +23,7 @@ PROGRESS_INTERVAL = 0.5  # [s] between two progress lines
 FLATTENED = "the step is that of the undeformed body: where elements are pressed flat, step_fraction must be smaller"
 GUARD = 500  # steps between two looks at the energies, whatever the samples
 
-Crew = Mapping[Role, Participant]
+Participants = Mapping[Role, Participant]
 
 
 class Pictures(Protocol):
@@ -35,7 +35,7 @@ class Pictures(Protocol):
 
     windows: frozenset[int]
 
-    def sample(self, crew: Crew) -> None:
+    def sample(self, participants: Participants) -> None:
         """Take it now; collective over all models."""
 
     def state(self) -> State:
@@ -50,7 +50,7 @@ class Outputs:
     """Where a run writes to.
 
     Attributes:
-        history: Samples and ledger.
+        history: Samples and energy balance.
         fields: A field file per model of this rank.
         field_samples: How many times each of them is written.
         checkpoints: From which the run continues, and to which it writes.
@@ -64,52 +64,54 @@ class Outputs:
     pictures: Sequence[Pictures] = ()
 
 
-def march(world: MPI.Comm, crew: Crew, outputs: Outputs, stopwatch: Stopwatch) -> float:
+def run_time_loop(world: MPI.Comm, participants: Participants, outputs: Outputs, stopwatch: Stopwatch) -> float:
     """Run all windows, from the latest checkpoint where there is one; return the seconds spent on fields. Collective.
 
     Raises:
-        EnergyError: On every rank, see ``Ledger.judge``.
+        EnergyError: On every rank, see ``EnergyBalance.judge``.
     """
-    plan = next(iter(crew.values())).plan
+    plan = next(iter(participants.values())).plan
     field_windows = set(np.linspace(0, plan.windows, outputs.field_samples).round().astype(int).tolist())
     told, output_seconds, first = time.perf_counter(), 0.0, 0
-    state = outputs.checkpoints.read(state_of(crew, outputs))
+    state = outputs.checkpoints.read(state_of(participants, outputs))
     if state is not None and outputs.checkpoints.continued is not None:
         first = outputs.checkpoints.continued + 1
-        output_seconds += resume(crew, outputs, state, [window for window in sorted(field_windows) if window < first])
+        output_seconds += resume(
+            participants, outputs, state, [window for window in sorted(field_windows) if window < first]
+        )
     for window in range(first, plan.windows + 1):
         HERE.window = window
         if window:
-            run_window(crew, stopwatch)
-        sampled = watch(crew, outputs, window)
+            run_window(participants, stopwatch)
+        sampled = watch(participants, outputs, window)
         if window in field_windows:
-            output_seconds += write_fields(crew, outputs, window)
+            output_seconds += write_fields(participants, outputs, window)
         if sampled and window < plan.windows and outputs.checkpoints.is_due():
-            save(crew, outputs, window)
+            save(participants, outputs, window)
         if world.rank == 0 and time.perf_counter() - told > PROGRESS_INTERVAL:
             told = time.perf_counter()
-            print(json.dumps({"progress": window / plan.windows, "time": time_of(crew)}), flush=True)
+            print(json.dumps({"progress": window / plan.windows, "time": time_of(participants)}), flush=True)
     HERE.slow = "writes the results"
     for file in outputs.fields.values():
         file.close()
     return output_seconds
 
 
-def watch(crew: Crew, outputs: Outputs, window: int) -> bool:
-    """Take what is due after a window; return whether there was a sample. Errors as ``march``."""
-    plan = next(iter(crew.values())).plan
+def watch(participants: Participants, outputs: Outputs, window: int) -> bool:
+    """Take what is due after a window; return whether there was a sample. Errors as ``run_time_loop``."""
+    plan = next(iter(participants.values())).plan
     sampled = window % plan.stride == 0 or window == plan.windows
     if sampled:
-        outputs.history.sample(crew)
+        outputs.history.sample(participants)
     elif window % max(1, GUARD // plan.substeps) == 0:
-        outputs.history.check(crew)
+        outputs.history.check(participants)
     for pictures in outputs.pictures:
         if window in pictures.windows:
-            pictures.sample(crew)
+            pictures.sample(participants)
     return sampled
 
 
-def run_window(crew: Crew, stopwatch: Stopwatch) -> None:
+def run_window(participants: Participants, stopwatch: Stopwatch) -> None:
     """Advance all models of this rank by one window, each at its turn.
 
     Raises:
@@ -117,27 +119,27 @@ def run_window(crew: Crew, stopwatch: Stopwatch) -> None:
     """
     stopwatch.start()
     try:
-        for role, participant in crew.items():
+        for role, participant in participants.items():
             participant.begin_window()
             stopwatch.lap(role)
-        for role, participant in crew.items():
+        for role, participant in participants.items():
             participant.finish_window()
             stopwatch.lap(role)
         HERE.slow = ""  # from here on all kernels are compiled
     except InvertedElementError as error:
-        raise InvertedElementError(f"time {time_of(crew):.6e} s: {error}; {FLATTENED}") from error
+        raise InvertedElementError(f"time {time_of(participants):.6e} s: {error}; {FLATTENED}") from error
 
 
-def time_of(crew: Crew) -> float:
+def time_of(participants: Participants) -> float:
     """Return the time [s] that the models have reached."""
-    return next(iter(crew.values())).motion.time
+    return next(iter(participants.values())).motion.time
 
 
-def write_fields(crew: Crew, outputs: Outputs, window: int) -> float:
+def write_fields(participants: Participants, outputs: Outputs, window: int) -> float:
     """Write the fields of all models of this rank, and keep them for a restart; return the seconds it took."""
     begin = time.perf_counter()
     with HERE.busy("writes fields"):
-        for role, participant in crew.items():
+        for role, participant in participants.items():
             fields = outputs.fields[role]
             sample = sample_fields(participant, fields)
             fields.write(sample)
@@ -151,33 +153,36 @@ def sample_fields(participant: Participant, fields: Fields) -> FieldSample:
     return fields.sample(motion.displacement - motion.base_displacement(), motion.time)
 
 
-def state_of(crew: Crew, outputs: Outputs) -> State:
+def state_of(participants: Participants, outputs: Outputs) -> State:
     """Return all that changes with time on this rank."""
-    models: dict[str, State] = {role: participant.state() for role, participant in crew.items()}
+    models: dict[str, State] = {role: participant.state() for role, participant in participants.items()}
     pictures = {f"pictures-{k}": some.state() for k, some in enumerate(outputs.pictures)}
     return models | {"history": outputs.history.state()} | pictures
 
 
-def save(crew: Crew, outputs: Outputs, window: int) -> None:
+def save(participants: Participants, outputs: Outputs, window: int) -> None:
     """Write a checkpoint at the end of a window."""
     with HERE.busy("writes a checkpoint"):
-        outputs.checkpoints.write(window, time_of(crew), state_of(crew, outputs))
+        outputs.checkpoints.write(window, time_of(participants), state_of(participants, outputs))
 
 
-def resume(crew: Crew, outputs: Outputs, state: dict[str, Any], field_windows: list[int]) -> float:
+def resume(participants: Participants, outputs: Outputs, state: dict[str, Any], field_windows: list[int]) -> float:
     """Continue from a checkpoint, and write its earlier fields anew; return the seconds that these took."""
     checkpoints = outputs.checkpoints
-    for role, participant in crew.items():
+    for role, participant in participants.items():
         participant.restore(state[role])
     outputs.history.restore(state["history"])
     for k, pictures in enumerate(outputs.pictures):
         pictures.restore(state[f"pictures-{k}"])
     begin = time.perf_counter()
-    like = {role: outputs.fields[role].state(sample_fields(crew[role], outputs.fields[role])) for role in crew}
+    like = {
+        role: outputs.fields[role].state(sample_fields(participants[role], outputs.fields[role]))
+        for role in participants
+    }
     for window in field_windows:
-        for role in crew:
+        for role in participants:
             kept = checkpoints.kept(f"{role}-{window}", {role: like[role]})
             outputs.fields[role].write(FieldSample(**kept[role]))
     if checkpoints.moved and checkpoints.continued is not None:
-        save(crew, outputs, checkpoints.continued)
+        save(participants, outputs, checkpoints.continued)
     return time.perf_counter() - begin

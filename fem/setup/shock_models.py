@@ -12,7 +12,7 @@ from reflowshock.fem import dolfinx_api
 from reflowshock.fem.division.checks import check_division
 from reflowshock.fem.division.divide import divide
 from reflowshock.fem.division.division import SchemeName
-from reflowshock.fem.division.fine_joints import copied_joints, read_scene
+from reflowshock.fem.division.fine_joints import copied_joints, read_package
 from reflowshock.fem.division.record import coupling_record
 from reflowshock.fem.division.rules import Rules
 from reflowshock.fem.division.tables import JointTables, Tables, TablesT_co, joined, model_inputs
@@ -24,7 +24,7 @@ from reflowshock.fem.materials.parameters import Material
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.mesh.supports import HELD, SYMMETRY
-from reflowshock.fem.model.assembly import Pieces, Response, make_body, make_pieces
+from reflowshock.fem.model.assembly import ForceOptions, Pieces, make_body, make_pieces
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.steps import Steps, agreed_minimum, assembled_step, steps_of_division, undivided
 from reflowshock.fem.parallel.agreement import agreed
@@ -69,7 +69,7 @@ class Divided(Generic[TablesT_co]):
     initial: InitialState | None = None
 
 
-def divided_scene(world: MPI.Comm, request: RunInput) -> Divided[JointTables]:
+def divided_package(world: MPI.Comm, request: RunInput) -> Divided[JointTables]:
     """Read, check and divide all meshes on rank 0, and tell the other ranks; collective.
 
     Raises:
@@ -86,9 +86,9 @@ def told_to_all(world: MPI.Comm, divided: Callable[[], Divided[TablesT_co]]) -> 
 
 
 def divided_on_one_rank(request: RunInput) -> Divided[JointTables]:
-    """Read, check and divide all meshes; errors as ``scene``, ``coupling.checks``, ``mesh_file``."""
+    """Read, check and divide all meshes; errors as ``read_package``, ``division.checks``."""
     shock, numerics = request.shock, request.shock.numerics
-    whole = joined(read_scene(request))
+    whole = joined(read_package(request))
     found = survey(
         whole.mesh,
         request.materials,
@@ -121,7 +121,8 @@ def divided_on_one_rank(request: RunInput) -> Divided[JointTables]:
         steps=steps,
         rules=rules,
         scheme=division.scheme,
-        coupling={"direction": shock.coupling.direction} | coupling_record(division, found, len(first.tables.cut)),
+        coupling={"direction": shock.coupling.direction}
+        | coupling_record(division, found, len(first.tables.interface)),
         initial=InitialState.of(Cooling.read(request.cooling), whole, inputs, not found.linear.all())
         if request.cooling
         else None,
@@ -179,7 +180,7 @@ def assembled(
     bodies = {}
     for role, own in pieces.items():
         factor = divided.mass_factors[role][own.local.cell_numbers]
-        response = Response(kinematics, divided.steps.step_of(role), divided.rules.stiffness)
+        response = ForceOptions(kinematics, divided.steps.step_of(role), divided.rules.stiffness)
         body = make_body(comms.models[role], own, divided.tables[role], factor, response)
         bodies[role] = divided.initial.begin(role, body, own.materials) if divided.initial else body
     return bodies

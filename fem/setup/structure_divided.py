@@ -11,11 +11,11 @@ from reflowshock.fem.division.divide import divide
 from reflowshock.fem.division.division import Division
 from reflowshock.fem.division.record import coupling_record
 from reflowshock.fem.division.rules import Rules
-from reflowshock.fem.division.split import Part, cut_between, part_of
+from reflowshock.fem.division.split import Part, interface_between, part_of
 from reflowshock.fem.division.structure_tables import StructureTables, structure_tables, tied
 from reflowshock.fem.division.tables import ModelInput
 from reflowshock.fem.division.whole import Survey, Treatment, Whole, survey
-from reflowshock.fem.errors import CutError, StepError
+from reflowshock.fem.errors import CouplingError, StepError
 from reflowshock.fem.estimates.placement import Role
 from reflowshock.fem.loads.structure_pulses import pulse_durations, pulses_of
 from reflowshock.fem.mesh.mesh_file import read_mesh
@@ -56,7 +56,7 @@ def divided_on_one_rank(request: StructureInput) -> DividedStructure:
     check_division(whole, found, division, rules)
     check_pulses(request, division.plan.window)
     inputs = structure_inputs(whole, division, structure_tables(whole, request))
-    check_motions_at_cut(division, inputs["macro"].tables, request)
+    check_motions_at_interface(division, inputs["macro"].tables, request)
     return Divided(
         meshes={role: item.mesh for role, item in inputs.items()},
         tables={role: item.tables for role, item in inputs.items()},
@@ -64,7 +64,7 @@ def divided_on_one_rank(request: StructureInput) -> DividedStructure:
         steps=steps_of_division(whole, found, division, rules),
         rules=rules,
         scheme=division.scheme,
-        coupling=coupling_record(division, found, len(inputs["macro"].tables.cut))
+        coupling=coupling_record(division, found, len(inputs["macro"].tables.interface))
         | {"fine_layers": fine, "direction": "two_way"},
     )
 
@@ -84,19 +84,19 @@ def check_pulses(request: StructureInput, window: float) -> None:
             )
 
 
-def check_motions_at_cut(division: Division, tables: StructureTables, request: StructureInput) -> None:
-    """Check that the model that moves the cut knows what prescribes its motion: what both models have is the macro's.
+def check_motions_at_interface(division: Division, tables: StructureTables, request: StructureInput) -> None:
+    """Check that the model that moves the interface knows what prescribes its motion: shared nodes are the macro's.
 
     Raises:
-        CutError: A motion of the cut where the meso model carries it.
+        CouplingError: A motion of the interface where the meso model carries it.
     """
     for name, load in request.loads.items():
         if division.scheme == "impulse" and isinstance(load, PrescribedMotion):
-            count = len(np.intersect1d(tables.nodes_of[load.on], tables.cut))
+            count = len(np.intersect1d(tables.nodes_of[load.on], tables.interface))
             if count:
-                raise CutError(
-                    f"loads.{name} moves {count} nodes of the cut, which the meso model carries with coupling.scheme ="
-                    " impulse: held_velocity, local_steps or gravouil_combescure let them be moved"
+                raise CouplingError(
+                    f"loads.{name} moves {count} nodes of the interface, which the meso model carries with"
+                    " coupling.scheme = impulse: held_velocity, local_steps or gravouil_combescure let them be moved"
                 )
 
 
@@ -104,13 +104,13 @@ def layers_that_are_fine(whole: Whole, found: Survey, coupling: LayerCoupling) -
     """Return the layers that are fine: those that are named or, where none is, those of small steps.
 
     Raises:
-        CutError: No layer is fine.
+        CouplingError: No layer is fine.
     """
     steps = {name: float(found.step[whole.mesh.in_parts(name.__eq__)].min()) for name in whole.mesh.part_names}
     fine = fine_layers(coupling, steps)
     if not fine:
         found_steps = ", ".join(f"{name} {step:.3g} s" for name, step in steps.items())
-        raise CutError(
+        raise CouplingError(
             f"no layer is fine: critical steps are {found_steps}, none less than half of the longest; name it in"
             " dynamics.coupling.fine, or leave dynamics.coupling out"
         )
@@ -125,7 +125,7 @@ def structure_inputs(
     What both models have counts in the macro model.
     """
     macro, meso = part_of(whole, division.macro), part_of(whole, division.meso)
-    cut = cut_between(whole, macro, meso)
+    interface = interface_between(whole, macro, meso)
     rest = np.where(macro.number < 0, meso.number, -1), np.where(macro.cell_number < 0, meso.cell_number, -1)
     level = division.level[division.meso]
     own = {
@@ -134,7 +134,9 @@ def structure_inputs(
     }
     parts: dict[Role, Part] = {"macro": macro, "meso": meso}
     return {
-        role: ModelInput(part.mesh, replace(own[role], cut=part.number[cut]), np.flatnonzero(part.cell_number >= 0))
+        role: ModelInput(
+            part.mesh, replace(own[role], interface=part.number[interface]), np.flatnonzero(part.cell_number >= 0)
+        )
         for role, part in parts.items()
     }
 

@@ -11,7 +11,7 @@ from reflowshock.fem.division.structure_tables import StructureTables, structure
 from reflowshock.fem.forces.force import Kinematics, linear_terms
 from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.mesh.mesh_file import read_mesh
-from reflowshock.fem.model.assembly import Pieces, Response, make_body, make_pieces
+from reflowshock.fem.model.assembly import ForceOptions, Pieces, make_body, make_pieces
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.power_iteration import highest_frequency
 from reflowshock.fem.model.steps import Steps
@@ -63,7 +63,7 @@ def assemble(
     comm: MPI.Comm, pieces: Pieces, tables: StructureTables, steps: Steps, kinematics: Kinematics
 ) -> StructureModel:
     """Return the model that moves by given steps; collective."""
-    body = make_body(comm, pieces, tables, steps.mass_factors[0], Response(kinematics, steps.plan.step))
+    body = make_body(comm, pieces, tables, steps.mass_factors[0], ForceOptions(kinematics, steps.plan.step))
     return StructureModel(tables, body, steps)
 
 

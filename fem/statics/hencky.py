@@ -12,7 +12,7 @@ from reflowshock.fem.elements.strain import strain_matrix
 from reflowshock.fem.errors import MeshError, ModesError
 from reflowshock.fem.forces.force_assembled import AssembledElements, upper_pattern
 from reflowshock.fem.kernels.force import assemble_upper_blocks
-from reflowshock.fem.kernels.hencky import Shape, State, hexahedra, hourglass_share, one_point
+from reflowshock.fem.kernels.hencky import ElementState, Shape, hexahedra, hourglass_share, one_point
 from reflowshock.fem.kernels.plasticity import plastic_constants
 from reflowshock.fem.materials.parameters import Material
 
@@ -35,7 +35,7 @@ class Points:
 
 
 @dataclass(frozen=True, slots=True)
-class Response:
+class ElementResponse:
     """Points of elements, forces ``(ne, 24)`` [N] of their nodes, tangents ``(ne, 24, 24)`` [N/m]."""
 
     points: Points
@@ -94,7 +94,7 @@ class HenckyElements:
         names = ("stress", "plastic_strain", "stretched", "hourglass_energy")
         return Points(*(np.concatenate([getattr(item, name) for item in found]) for name in names))
 
-    def respond(self, displacement: NDArray[np.float64]) -> Response:
+    def respond(self, displacement: NDArray[np.float64]) -> ElementResponse:
         """Return points, forces and tangents at a displacement ``(n, 3)`` [m].
 
         Raises:
@@ -107,15 +107,15 @@ class HenckyElements:
             chosen = np.arange(start, min(start + CHUNK, len(self.elements.cells)))
             yield HenckyElements(self.elements.subset(chosen), self.laws, self.expansion)
 
-    def _empty(self, points: int) -> State:
+    def _empty(self, points: int) -> ElementState:
         count = len(self.elements.cells)
-        return State(np.empty((count, points, 7)), np.empty((count, 24)), np.empty((count, 24, 24)))
+        return ElementState(np.empty((count, points, 7)), np.empty((count, 24)), np.empty((count, 24, 24)))
 
     @property
     def _materials(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int32]]:
         return self.elements.elasticity, self.laws, self.elements.material
 
-    def _fully(self, displacement: NDArray[np.float64]) -> Response:
+    def _fully(self, displacement: NDArray[np.float64]) -> ElementResponse:
         elements, found = self.elements, self._empty(8)
         corners, count = elements.points[elements.cells], len(elements.cells)
         failed = hexahedra(corners, self.straining(displacement), self._materials, found)
@@ -123,9 +123,9 @@ class HenckyElements:
             place = ", ".join(f"{value:.6g}" for value in corners[failed].mean(axis=0))
             raise ModesError(f"the incompatible modes of the element near ({place}) m found no equilibrium")
         state = Points(found.points[:, :, :6], found.points[:, :, 6], np.empty((count, 0)), np.zeros(count))
-        return Response(state, found.force, found.tangent)
+        return ElementResponse(state, found.force, found.tangent)
 
-    def _one_point(self, displacement: NDArray[np.float64]) -> Response:
+    def _one_point(self, displacement: NDArray[np.float64]) -> ElementResponse:
         elements, found, values = self.elements, self._empty(1), self.straining(displacement)
         corners, count = elements.points[elements.cells], len(elements.cells)
         geometry = elements.kind.geometry(corners)
@@ -141,7 +141,7 @@ class HenckyElements:
         stiffness = share[:, None, None] * stiffness - along * elastic[:, :, None] * elastic[:, None]
         state = Points(found.points[:, :, :6], found.points[:, :, 6], share[:, None] * amplitude, share**2 * energy)
         tangent = found.tangent + transformed(gamma, stiffness)
-        return Response(state, found.force + nodal.reshape(count, 24), tangent)
+        return ElementResponse(state, found.force + nodal.reshape(count, 24), tangent)
 
     def _share(self, points: NDArray[np.float64], density: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the share ``(ne,)`` of elastic hourglass forces of an energy density [J/m^3] that sections carry."""

@@ -2,7 +2,7 @@
 
 Where all is linear and small the motion does not know of it: stresses add. Elsewhere elements that yield or turn begin
 with the stress and plastic strain of their integration points, linear ones with a constant force (``pretension``). Each
-model leaves out what its forces at the cut add up to: the other model's are the opposite.
+model leaves out what its forces at the interface add up to: the other model's are the opposite.
 """
 
 from collections.abc import Mapping, Sequence
@@ -133,7 +133,7 @@ def mean_stress(
 
 
 def with_forces(body: Body, materials: Sequence[Material], displacement: NDArray[np.float64], change: float) -> Body:
-    """Return a body whose elements bear their stress, but for the sums of their forces at the cut; collective."""
+    """Return a body whose elements bear their stress, but for the sums of their forces at the interface; collective."""
     linear = [term for term in body.terms if not isinstance(term, NonlinearElements)]
     chosen = np.ones(len(body.elements.cells), dtype=bool)
     for term in body.terms:
@@ -142,7 +142,7 @@ def with_forces(body: Body, materials: Sequence[Material], displacement: NDArray
             begin_path(term, materials, displacement, change)
     pretension = pretension_of(body, chosen, linear, (materials, displacement, change))
     terms = [*body.terms, pretension]
-    leave_out_cut(body, terms, pretension)
+    leave_out_interface(body, terms, pretension)
     return replace(body, terms=terms)
 
 
@@ -186,13 +186,13 @@ def pretension_of(
     return Pretension(-force - expanding, stored)
 
 
-def leave_out_cut(body: Body, terms: Sequence[ForceTerm], pretension: Pretension) -> None:
-    """Let the forces of all terms on nodes of the cut add up to zero; collective."""
+def leave_out_interface(body: Body, terms: Sequence[ForceTerm], pretension: Pretension) -> None:
+    """Let the forces of all terms on nodes of the interface add up to zero; collective."""
     rest, force = np.zeros_like(pretension.force), np.zeros_like(pretension.force)
     for term in terms:
         term.add(rest, force)
     body.tie.gather(force)
     body.shared.add(force)
-    here = body.cut[body.cut >= 0]
+    here = body.interface[body.interface >= 0]
     here = here[body.shared.owned[here]]
     pretension.force[here] += force[here]

@@ -10,8 +10,8 @@ from reflowshock.fem.elements.mesh_elements import elements_of
 from reflowshock.fem.materials.elasticity import materials_of_parts
 from reflowshock.fem.mesh.mesh_file import read_mesh
 from reflowshock.fem.statics.pads import pad_matrix
-from reflowshock.fem.statics.scene import connected, die_corners, thermal_tables
-from reflowshock.fem.statics.state import Assembly, RigidModes, State, check_loads
+from reflowshock.fem.statics.state import Assembly, HeatedState, RigidModes, check_loads
+from reflowshock.fem.statics.thermal_tables import connected, die_corners, thermal_tables
 
 
 class RigidPlates:
@@ -60,14 +60,14 @@ class RigidPlates:
 
     def solve(
         self, temperature: float, corner: float, wrenches: NDArray[np.float64], rigid: NDArray[np.float64]
-    ) -> State:
+    ) -> HeatedState:
         """Return the state, see ``state.Structure``; the temperature changes nothing."""
         check_loads(self.rigid_modes, wrenches, rigid)
         displacement = np.tensordot(rigid, self._free, 1)
         if self._moved:
             displacement[self.package, 2] += corner
         load = self._held_weight + np.tensordot(self._held_motion, wrenches, 3)
-        return State(displacement, self._motion(displacement), -self._shares @ load)
+        return HeatedState(displacement, self._motion(displacement), -self._shares @ load)
 
     def _motion(self, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
         return (self._pads @ displacement.ravel()).reshape(-1, 2, 6)

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reflowshock.fem.parallel.own_job import end_with_parent, own_environment
-from reflowshock.fem.statics.state import Assembly, RigidModes, State
+from reflowshock.fem.statics.state import Assembly, HeatedState, RigidModes
 
 GRACE = 5.0  # seconds that the process has to end when it is told to
 
@@ -59,14 +59,14 @@ class StructureProcess:
 
     def solve(
         self, temperature: float, corner: float, wrenches: NDArray[np.float64], rigid: NDArray[np.float64]
-    ) -> State:
+    ) -> HeatedState:
         """Return the state at a temperature [K], see ``state.Structure``."""
         self._ready()
         try:
             self._pipe.send((temperature, corner, wrenches, rigid))
         except OSError as error:
             raise self._ended() from error
-        state: State = self._answer()
+        state: HeatedState = self._answer()
         return state
 
     def close(self) -> None:

@@ -51,7 +51,7 @@ class RigidModes:
 
 
 @dataclass(frozen=True, slots=True)
-class State:
+class HeatedState:
     """Board and package under given loads.
 
     Attributes:
@@ -65,7 +65,7 @@ class State:
     corner_force: NDArray[np.float64]
 
 
-class Structure(Protocol):
+class HeatedStructure(Protocol):
     """Board and package, elastic or rigid, in this process or another."""
 
     @property
@@ -82,7 +82,7 @@ class Structure(Protocol):
 
     def solve(
         self, temperature: float, corner: float, wrenches: NDArray[np.float64], rigid: NDArray[np.float64]
-    ) -> State:
+    ) -> HeatedState:
         """Return the state at a temperature [K].
 
         Args:

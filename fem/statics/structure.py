@@ -22,13 +22,13 @@ from reflowshock.fem.model.factorisation import FactorCost
 from reflowshock.fem.parallel.agreement import agreed
 from reflowshock.fem.statics.corners import Corners
 from reflowshock.fem.statics.pads import pad_matrix
-from reflowshock.fem.statics.scene import ThermalTables, connected, die_corners, thermal_tables
-from reflowshock.fem.statics.state import Assembly, RigidModes, State, check_loads
+from reflowshock.fem.statics.state import Assembly, HeatedState, RigidModes, check_loads
+from reflowshock.fem.statics.thermal_tables import ThermalTables, connected, die_corners, thermal_tables
 from reflowshock.fem.statics.thermoelastic import Thermoelastic
 
 
 @dataclass(frozen=True, slots=True)
-class Tabulated:
+class PlacedPads:
     """What rank 0 takes from the mesh, for all.
 
     Attributes:
@@ -53,7 +53,7 @@ class ThermalStructure:
         rigid_modes: What free rigid motions of the package do to its pads.
     """
 
-    def __init__(self, comm: MPI.Comm, found: Tabulated, mesh: MeshData | None, assembly: Assembly) -> None:
+    def __init__(self, comm: MPI.Comm, found: PlacedPads, mesh: MeshData | None, assembly: Assembly) -> None:
         """Factor, and find what all states have in common; collective. Use ``build``."""
         self._comm, self._thermal = comm, assembly.thermal
         self.points, self.package = found.points, found.tables.package
@@ -97,7 +97,7 @@ class ThermalStructure:
 
     def solve(
         self, temperature: float, corner: float, wrenches: NDArray[np.float64], rigid: NDArray[np.float64]
-    ) -> State:
+    ) -> HeatedState:
         """Return the state at a temperature [K], see ``state.Structure``; collective.
 
         Raises:
@@ -112,7 +112,7 @@ class ThermalStructure:
             load = load + self._load(force)
         displacement, corner_force = self._corners.move(displacement, corner, load)
         displacement += np.tensordot(rigid, self._free, 1)
-        return State(self._gathered(displacement), self._motion(displacement), corner_force)
+        return HeatedState(self._gathered(displacement), self._motion(displacement), corner_force)
 
     def _on_level(self, force: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the displacement under forces, heights from the mean height of the board's pads; collective."""
@@ -146,7 +146,7 @@ def borne(wrenches: NDArray[np.float64]) -> NDArray[np.float64]:
     return supported
 
 
-def tabulate(mesh: MeshData, assembly: Assembly) -> Tabulated:
+def tabulate(mesh: MeshData, assembly: Assembly) -> PlacedPads:
     """Read supports, pads and corners off a mesh.
 
     Raises:
@@ -154,4 +154,4 @@ def tabulate(mesh: MeshData, assembly: Assembly) -> Tabulated:
     """
     centre = assembly.pads.centres[:, 1].mean(axis=0)
     corners = die_corners(mesh) if assembly.thermal.package == "moved" else np.empty(0, np.intp)
-    return Tabulated(mesh.points, thermal_tables(mesh, centre), pad_matrix(mesh, assembly.pads), corners)
+    return PlacedPads(mesh.points, thermal_tables(mesh, centre), pad_matrix(mesh, assembly.pads), corners)

@@ -27,7 +27,7 @@ from reflowshock.fem.model.factorisation import FactorCost, Factorisation
 from reflowshock.fem.model.global_matrix import Equations
 from reflowshock.fem.parallel.agreement import agreed
 from reflowshock.fem.parallel.local_mesh import distribute
-from reflowshock.fem.statics.scene import ThermalTables
+from reflowshock.fem.statics.thermal_tables import ThermalTables
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,14 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from reflowshock.meshing.core.hexahedra import quad_areas, volumes
-from reflowshock.meshing.core.nearest import nearest_on_line, nearest_on_triangles
-from reflowshock.meshing.core.outlines import outlines, pieces
+from reflowshock.meshing.core.facets import nearest_on_line, nearest_on_triangles, outlines, pieces
+from reflowshock.meshing.core.hexahedra import Freedom, quad_areas, relax_hexahedra, volumes
 from reflowshock.meshing.core.quadratic_tetrahedra import curved_volume, quadratic_tetrahedra
-from reflowshock.meshing.core.relax_hexahedra import Freedom, relax_hexahedra
 from reflowshock.meshing.core.split_tetrahedra import split_tetrahedra
-from reflowshock.meshing.joint.levels import Placing, volume_keeping_scale
 from reflowshock.meshing.joint.solder import Side, Solder, WettedFace
+from reflowshock.meshing.joint.swept import Placing, volume_keeping_scale
 from reflowshock.meshing.joint.tetrahedra import Tetrahedra
 from reflowshock.meshing.surface.closed_surface import (
     BOARD_PAD,

@@ -1,17 +1,63 @@
-"""A joint's mesh in its place: solder and copper pads, named facets, quality; what misses its bars is an error."""
+"""A joint's mesh in its place: solder and copper pads, named facets, quality; what exceeds a limit is an error.
+
+Its place is that of its pad on the board, its head laid on the package's underside.
+"""
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
+from reflowshock.meshing.board.pad_planes import PadPlanes
 from reflowshock.meshing.board.pads import PadSite, has_rim
 from reflowshock.meshing.core.hexahedra import quad_areas, scaled_jacobian, shortest_lengths, volumes
 from reflowshock.meshing.core.quadratic_tetrahedra import QuadraticTetrahedra, tetrahedra_quality
-from reflowshock.meshing.joint.joint_place import JointPlace
 from reflowshock.meshing.joint.solder import Solder, WettedFace
+from reflowshock.meshing.surface.closed_surface import ClosedSurface, pad_planes
+
+
+class Underside(Protocol):
+    """The underside of a package."""
+
+    def height(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """Return the height (k,) over the board's top face at points (k,), (k,) [m]; ValueError beyond the package."""
+
+
+@dataclass(frozen=True, slots=True)
+class JointPlace:
+    """The way of a joint to its site.
+
+    Attributes:
+        site: where its pads are.
+        side: the package's underside.
+        copper: thickness of the copper between the solder and that underside, but for a plate's, which is part of
+            the package [m].
+        head: the solder's upper face in its own frame.
+    """
+
+    site: PadSite
+    side: Underside
+    copper: float
+    head: PadPlanes
+
+    @classmethod
+    def of(cls, surface: ClosedSurface, site: PadSite, side: Underside, copper: float) -> "JointPlace":
+        """Take the upper face from the joint's closed surface."""
+        return cls(site, side, copper, pad_planes(surface))
+
+    def __call__(self, points: np.ndarray) -> np.ndarray:
+        """Move points (n, 3) [m] to the site; shear them in z so that the upper face gets where the package is."""
+        share = np.clip(points[:, 2] / self.head.height(*points[:, :2].T), 0.0, 1.0)
+        x, y = points[:, 0] + self.site.x, points[:, 1] + self.site.y
+        return np.column_stack([x, y, self.site.z_board + points[:, 2] + share * self.rise(points)])
+
+    def rise(self, points: np.ndarray) -> np.ndarray:
+        """Return how far the upper face lies below its place at the x and y of points (n, 3) [m]: (n,)."""
+        height = self.side.height(points[:, 0] + self.site.x, points[:, 1] + self.site.y)
+        return height - self.copper - self.site.z_board - self.head.height(*points[:, :2].T)
+
 
 MINIMUM_SCALED_JACOBIAN = 0.2
 LARGEST_ERROR = 3.0e-3  # of volume, standoff and contact areas
@@ -58,7 +104,7 @@ class _Pad:
 
 
 @dataclass(slots=True)
-class _Stack:
+class _Parts:
     """A joint while its parts are put on each other."""
 
     points: np.ndarray
@@ -85,18 +131,18 @@ def build_joint(solder: Solder, sites: Sequence[PadSite], copper: float | None, 
         pads.append(replace(pad, rim=np.arange(len(own), len(own) + len(rim))))
         own = np.vstack([own, rim])
     name = place.site.name
-    stack = _Stack(place(own), {f"solder@{name}": solder.cells}, {})
+    parts = _Parts(place(own), {f"solder@{name}": solder.cells}, {})
     for face, pad in zip(solder.faces, pads, strict=True):
-        _add_pad(stack, face, pad, copper)
-    cells = {part: hexahedra.astype(np.int32) for part, hexahedra in stack.cells.items()}
-    facets = {part: quads.astype(np.int32) for part, quads in stack.facets.items()}
-    _check_quality(stack.points, cells)
+        _add_pad(parts, face, pad, copper)
+    cells = {part: hexahedra.astype(np.int32) for part, hexahedra in parts.cells.items()}
+    facets = {part: quads.astype(np.int32) for part, quads in parts.facets.items()}
+    _check_quality(parts.points, cells)
     heads = np.concatenate([np.unique(face.quads) for face in solder.faces if face.side == "package"])
-    volume = float(volumes(stack.points, cells[f"solder@{name}"]).sum())
+    volume = float(volumes(parts.points, cells[f"solder@{name}"]).sum())
     tetrahedra = solder.tetrahedra and replace(solder.tetrahedra, points=place(solder.tetrahedra.points))
     return JointMesh(
         name=name,
-        points=stack.points,
+        points=parts.points,
         cells=cells,
         facets=facets,
         volume_error=abs(volume / solder.volume - 1.0),
@@ -158,7 +204,7 @@ def _rim(solder: Solder, face: WettedFace, pad_radius: float) -> np.ndarray:
     return rim
 
 
-def _add_pad(stack: _Stack, face: WettedFace, pad: _Pad, copper: float | None) -> None:
+def _add_pad(parts: _Parts, face: WettedFace, pad: _Pad, copper: float | None) -> None:
     """Name a wetted face, and put copper on it as wide as its rim reaches."""
     board, quads = face.side == "board", face.quads
     end = "foot" if board else "head"
@@ -168,12 +214,12 @@ def _add_pad(stack: _Stack, face: WettedFace, pad: _Pad, copper: float | None) -
             around = np.column_stack([face.rim, pad.rim, np.roll(pad.rim, -1), np.roll(face.rim, -1)])
             quads = np.vstack([quads, around])
         nodes, local = np.unique(quads, return_inverse=True)
-        beyond = len(stack.points) + local.reshape(quads.shape)
+        beyond = len(parts.points) + local.reshape(quads.shape)
         step = [0.0, 0.0, -copper if board else copper]
-        stack.points = np.vstack([stack.points, stack.points[nodes] + step])
-        stack.cells[f"copper_{face.side}@{pad.name}"] = np.hstack([beyond, quads] if board else [quads, beyond])
+        parts.points = np.vstack([parts.points, parts.points[nodes] + step])
+        parts.cells[f"copper_{face.side}@{pad.name}"] = np.hstack([beyond, quads] if board else [quads, beyond])
         facets[f"{end}@{pad.name}"] = beyond
-    stack.facets |= {name: faces[:, ::-1] if board else faces for name, faces in facets.items()}
+    parts.facets |= {name: faces[:, ::-1] if board else faces for name, faces in facets.items()}
 
 
 def _check_quality(points: np.ndarray, cells: dict[str, np.ndarray]) -> None:

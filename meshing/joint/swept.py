@@ -1,10 +1,90 @@
-"""Swept solder: butterfly sections of a body, stacked from the board's pad to the package's."""
+"""Swept solder: butterfly (O-grid) sections of a body, stacked from the board's pad to the package's."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
 
 from reflowshock.meshing.board.parameters import JointNumerics
-from reflowshock.meshing.joint.butterfly import butterfly
-from reflowshock.meshing.joint.levels import Placing, layer_cells, solder_levels
+from reflowshock.meshing.core.facets import cut_segments, radius_by_angle, section_area, section_centroid
+from reflowshock.meshing.core.hexahedra import volumes
 from reflowshock.meshing.joint.solder import Solder, WettedFace
-from reflowshock.meshing.surface.closed_surface import ClosedSurface, pad_planes
+from reflowshock.meshing.surface.closed_surface import ClosedSurface, enclosed_volume, pad_planes
+
+# Half-diagonal and half-side of the core on the unit disc: between a circle (equal) and a square (ratio sqrt 2).
+CORE_DIAGONAL, CORE_SIDE = 0.60, 0.50
+END = 1.0e-9  # of the height: how far inside the end sections are cut, where the plane still crosses the triangles
+LARGEST_CORRECTION = 0.1
+VOLUME_TOLERANCE = 1.0e-12
+SECANT_STEPS = 20
+Placing = Callable[[np.ndarray], np.ndarray]
+
+
+@dataclass(frozen=True, slots=True)
+class Butterfly:
+    """A section of the unit disc: points (n, 2), quads (q, 4) counter-clockwise, rim (4 core,) nodes of the outline."""
+
+    points: np.ndarray
+    quads: np.ndarray
+    rim: np.ndarray
+
+
+def butterfly(core: int, rings: int) -> Butterfly:
+    """Build the section with core x core quads inside ``rings`` rings of 4 core quads each; without, it fills all."""
+    outline = _core_outline(core)
+    inner = _core_points(core, CORE_DIAGONAL, CORE_SIDE) if rings else _core_points(core, 1.0, 1.0)
+    if not rings:
+        inner[outline] /= np.linalg.norm(inner[outline], axis=1, keepdims=True)
+    angles = -0.75 * np.pi + 0.5 * np.pi * np.arange(4 * core) / core
+    circle = np.column_stack([np.cos(angles), np.sin(angles)])
+    layers = [inner[outline] + share * (circle - inner[outline]) for share in np.arange(1, rings + 1) / rings]
+    ids = [outline] + [len(inner) + ring * len(outline) + np.arange(len(outline)) for ring in range(rings)]
+    quads = [_core_quads(core)] + [
+        np.column_stack([low, high, np.roll(high, -1), np.roll(low, -1)]) for low, high in pairwise(ids)
+    ]
+    return Butterfly(np.vstack([inner, *layers]), np.vstack(quads), ids[-1])
+
+
+def circumradius(sides: int) -> float:
+    """Return the distance of the corners from the centre of a regular polygon that has the unit disc's area."""
+    angle = 2.0 * np.pi / sides
+    return float(np.sqrt(angle / np.sin(angle)))
+
+
+def _core_points(core: int, diagonal: float, side: float) -> np.ndarray:
+    """Square grid of given half-diagonal and half-side: its sides are bent outwards towards the circle."""
+    steps = np.linspace(-1.0, 1.0, core + 1)
+    x, y = np.meshgrid(steps, steps)
+    corner = diagonal / np.sqrt(2.0)
+    bend = side - corner
+    return np.column_stack([(x * (corner + bend * (1.0 - y**2))).ravel(), (y * (corner + bend * (1.0 - x**2))).ravel()])
+
+
+def _core_outline(core: int) -> np.ndarray:
+    """Outline nodes of the core, counter-clockwise from the corner at (-1, -1)."""
+    grid = np.arange((core + 1) ** 2).reshape(core + 1, core + 1)
+    return np.concatenate([grid[0, :-1], grid[:-1, -1], grid[-1, :0:-1], grid[:0:-1, 0]])
+
+
+def _core_quads(core: int) -> np.ndarray:
+    grid = np.arange((core + 1) ** 2).reshape(core + 1, core + 1)
+    return np.column_stack([grid[:-1, :-1].ravel(), grid[:-1, 1:].ravel(), grid[1:, 1:].ravel(), grid[1:, :-1].ravel()])
+
+
+@dataclass(frozen=True, slots=True)
+class Levels:
+    """Nodes of the solder, level by level.
+
+    Attributes:
+        points: (layers + 1, n, 3) [m].
+        scale: factor by which the inner outlines were scaled to keep the volume.
+        volume: the volume that they keep [m^3].
+    """
+
+    points: np.ndarray
+    scale: float
+    volume: float
 
 
 def swept_solder(surface: ClosedSurface, numerics: JointNumerics, place: Placing, overhang: float = 0.0) -> Solder:
@@ -19,3 +99,95 @@ def swept_solder(surface: ClosedSurface, numerics: JointNumerics, place: Placing
     )
     cells = layer_cells(section.quads, count, numerics.layers)
     return Solder(levels.points.reshape(-1, 3), cells, faces, levels.volume, levels.scale, pad_planes(surface))
+
+
+def solder_levels(
+    surface: ClosedSurface,
+    section: Butterfly,
+    layers: int,
+    place: Placing,
+    overhang: float = 0.0,
+) -> Levels:
+    """Cut a body into sections of equal distance and lay the butterfly into each.
+
+    The body is made straight between its pads first, and put back. A polygon of few sides encloses less than the
+    section that it follows, and straight layers less than a bulge: each outline is scaled to its section's area, then
+    those between the ends by one common factor to the body's volume.
+
+    Args:
+        surface: the body in its own frame.
+        section: the butterfly.
+        layers: number of layers.
+        place: moves points (n, 3) [m] to where the joint will be, where its volume is kept: a curved package makes a
+            joint higher here, lower there, and its mean gap another than that on its axis.
+        overhang: height [m] by which each end face is drawn out as a prism, which belongs to the body.
+
+    Raises:
+        ValueError: a section is not star-shaped, or the layers are too few to keep the volume.
+    """
+    planes = pad_planes(surface)
+    straight = planes.straighten(surface.points)
+    heights = np.linspace(-overhang, planes.gap + overhang, layers + 1)
+    cuts = np.clip(heights, END * planes.gap, (1.0 - END) * planes.gap)
+    points = np.empty((layers + 1, len(section.points), 3))
+    for level, cut in enumerate(cuts):
+        points[level, :, :2] = _section_nodes(cut_segments(straight, surface.triangles, cut), section)
+    points[:, :, 2] = heights[:, None]
+    cells = layer_cells(section.quads, len(section.points), layers)
+
+    def restored(scale: float) -> np.ndarray:
+        return planes.restore(_scaled(points, section, scale).reshape(-1, 3))
+
+    def swept_volume(scale: float) -> float:
+        return float(volumes(place(restored(scale)), cells).sum())
+
+    ends = sum(section_area(cut_segments(straight, surface.triangles, cut)) for cut in cuts[[0, -1]])
+    volume = enclosed_volume(surface) + overhang * ends
+    scale = volume_keeping_scale(swept_volume, volume)
+    return Levels(restored(scale).reshape(points.shape), scale, volume)
+
+
+def layer_cells(quads: np.ndarray, nodes: int, layers: int) -> np.ndarray:
+    """Sweep quads (q, 4) through ``layers`` layers of ``nodes`` nodes a level: hexahedra (layers q, 8)."""
+    return np.vstack([np.hstack([quads + k * nodes, quads + (k + 1) * nodes]) for k in range(layers)]).astype(np.int32)
+
+
+def _section_nodes(segments: np.ndarray, section: Butterfly) -> np.ndarray:
+    """Section nodes at one height, (n, 2) [m]: the unit disc stretched to the outline (s, 2, 2) along each angle."""
+    centre, area = section_centroid(segments), section_area(segments)
+    angles = _angles(section.points[section.rim])
+    radii = radius_by_angle(segments, centre, angles)
+    sector = np.sin(np.roll(angles, -1) - angles)
+    polygon = 0.5 * float(np.sum(radii * np.roll(radii, -1) * sector))
+    order = np.argsort(angles)
+    stretch = np.interp(_angles(section.points), angles[order], radii[order], period=2.0 * np.pi)
+    return centre + np.sqrt(area / polygon) * stretch[:, None] * section.points
+
+
+def volume_keeping_scale(swept_volume: Callable[[float], float], volume: float) -> float:
+    """Find the scale of the inner outlines at which the swept hexahedra have the volume (secant method)."""
+    before, scale = 1.0 - LARGEST_CORRECTION, 1.0
+    errors = [swept_volume(value) / volume - 1.0 for value in (before, scale)]
+    held, steps = 1.0 + errors[1], 0
+    while abs(errors[1]) > VOLUME_TOLERANCE and abs(scale - 1.0) <= LARGEST_CORRECTION and steps < SECANT_STEPS:
+        before, scale = scale, scale - errors[1] * (scale - before) / (errors[1] - errors[0])
+        errors, steps = [errors[1], swept_volume(scale) / volume - 1.0], steps + 1
+    if abs(errors[1]) > VOLUME_TOLERANCE or abs(scale - 1.0) > LARGEST_CORRECTION:
+        raise ValueError(
+            f"its layers hold {held:.3f} of its volume, allowed is what a scaling of the inner sections by"
+            f" 1 +- {LARGEST_CORRECTION:g} corrects; use more layers"
+        )
+    return scale
+
+
+def _scaled(points: np.ndarray, section: Butterfly, scale: float) -> np.ndarray:
+    """Scale all levels but the ends about their centres."""
+    result = points.copy()
+    inner = points[1:-1, :, :2]
+    centres = inner[:, section.rim].mean(axis=1, keepdims=True)
+    result[1:-1, :, :2] = centres + scale * (inner - centres)
+    return result
+
+
+def _angles(points: np.ndarray) -> np.ndarray:
+    return np.arctan2(points[:, 1], points[:, 0])

@@ -10,8 +10,7 @@ import numpy as np
 from numpy.polynomial import Legendre
 
 from reflowshock.meshing.board.pad_planes import PadPlanes
-from reflowshock.meshing.core.outlines import pieces
-from reflowshock.meshing.core.section import cut_segments, section_area
+from reflowshock.meshing.core.facets import cut_segments, pieces, section_area
 
 FREE, BOARD_PAD, PACKAGE_PAD = 0, 1, 2
 SMALLEST_TRIANGLE = 1.0e-8  # of the mean area

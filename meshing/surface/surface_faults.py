@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.spatial import cKDTree
 
-from reflowshock.meshing.core.outlines import pieces
+from reflowshock.meshing.core.facets import pieces
 from reflowshock.meshing.surface.closed_surface import SurfaceError, edge_numbers, volume_of
 
 STEP = 1.5  # between two sizes of triangles

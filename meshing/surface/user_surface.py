@@ -12,7 +12,7 @@ import numpy as np
 
 from reflowshock.meshing.board.pad_planes import PadPlanes
 from reflowshock.meshing.board.pads import PadSite
-from reflowshock.meshing.core.outlines import pieces
+from reflowshock.meshing.core.facets import pieces
 from reflowshock.meshing.surface.closed_surface import (
     BOARD_PAD,
     FREE,

@@ -3,15 +3,12 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from reflowshock.arrays import Floats, Indices
 from reflowshock.particles.core import symmetry
 from reflowshock.particles.core.cloud import Cloud
 from reflowshock.particles.core.plate import Plate
 from reflowshock.particles.core.surface_measure import volume_and_gradient
-
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int32]
 
 
 @dataclass(slots=True)

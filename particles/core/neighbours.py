@@ -7,8 +7,9 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
+from reflowshock.arrays import Indices
+
 Points = NDArray[np.float64]
-Indices = NDArray[np.int32]
 
 # Cells in a radius. Three of four visited pairs are too far apart to be neighbours; with one cell, five of six.
 REACH = 2

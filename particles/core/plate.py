@@ -7,9 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from reflowshock.arrays import Floats
 from reflowshock.particles.core.geometry import JointGeometry
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,13 +7,10 @@ from collections.abc import Sequence
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 from scipy import sparse
 
+from reflowshock.arrays import Floats, Indices
 from reflowshock.particles.core.plate import Plate
-
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int32]
 
 
 @njit(cache=True)

@@ -10,9 +10,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from reflowshock.arrays import Floats
 from reflowshock.particles.core.cloud import Cloud
 
-Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 

@@ -4,8 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import Delaunay
 
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int32]
+from reflowshock.arrays import Floats, Indices
 
 JITTER = 1e-5
 # Flat tetrahedra have no gradient worth the name.

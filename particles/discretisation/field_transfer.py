@@ -8,13 +8,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
+from reflowshock.arrays import Floats, Indices
 from reflowshock.particles.core.tetrahedra import cell_volumes, thick_cells, volume_gradients
-
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int32]
 
 
 def interpolation(points: Floats, cells: Indices, offset: Floats) -> sparse.csr_matrix:

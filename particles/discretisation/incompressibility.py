@@ -11,11 +11,10 @@ discrete energy stationary.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy import sparse
 
-Floats = NDArray[np.float64]
+from reflowshock.arrays import Floats
 
 RELATIVE_TOLERANCE = 1e-9
 RESIDUAL_LIMIT = 1e-6
@@ -89,7 +88,7 @@ def _cholesky(matrix: sparse.csr_matrix) -> PETSc.KSP:
     return solver
 
 
-class _Inverse:
+class _FactoredInverse:
     """x -> A^-1 x on NumPy vectors; only the rows that A couples are factored."""
 
     def __init__(self, matrix: sparse.csr_matrix) -> None:
@@ -114,7 +113,7 @@ class _Inverse:
 class _Schur:
     """PETSc shell of C A^-1 C^T + S."""
 
-    def __init__(self, problem: SaddlePoint, inverse: _Inverse) -> None:
+    def __init__(self, problem: SaddlePoint, inverse: _FactoredInverse) -> None:
         self._problem, self._transposed, self._inverse = problem, problem.constraint.T.tocsr(), inverse
 
     def mult(self, _matrix: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
@@ -135,7 +134,7 @@ def solve(problem: SaddlePoint) -> Solution:
         SolveFailed: the true residual of either equation stays above the limit.
     """
     operator, constraint = problem.operator, problem.constraint
-    inverse = _Inverse(operator)
+    inverse = _FactoredInverse(operator)
     lumped = constraint @ sparse.diags(1.0 / operator.diagonal()) @ constraint.T
     if problem.stabilisation is not None:
         lumped = lumped + problem.stabilisation

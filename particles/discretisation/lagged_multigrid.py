@@ -5,13 +5,11 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy import sparse
 
+from reflowshock.arrays import Floats
 from reflowshock.particles.discretisation.incompressibility import SolveFailed, petsc
-
-Floats = NDArray[np.float64]
 
 RELATIVE_TOLERANCE = 1e-6
 RESIDUAL_LIMIT = 1e-5

@@ -1,10 +1,10 @@
 """A symmetric positive definite system bordered by one constraint: the surface of a body that keeps its volume."""
 
 import numpy as np
-from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy import sparse
 
+from reflowshock.arrays import Floats
 from reflowshock.particles.discretisation.incompressibility import (
     SaddlePoint,
     Solution,
@@ -13,13 +13,11 @@ from reflowshock.particles.discretisation.incompressibility import (
     petsc,
 )
 
-Floats = NDArray[np.float64]
-
 RELATIVE_TOLERANCE = 1e-10
 MAX_ITERATIONS = 2000
 
 
-class _Inverse:
+class _IterativeInverse:
     """x -> A^-1 x by conjugate gradients and an incomplete factorisation."""
 
     def __init__(self, matrix: sparse.csr_matrix) -> None:
@@ -62,7 +60,7 @@ def solve_volume(problem: SaddlePoint) -> Solution:
     Raises:
         SolveFailed: the true residual of either equation stays above the limit.
     """
-    inverse, slope = _Inverse(problem.operator), problem.constraint.toarray().ravel()
+    inverse, slope = _IterativeInverse(problem.operator), problem.constraint.toarray().ravel()
     loaded = inverse(problem.load)
     reason = inverse.reason
     pressed = inverse(slope)

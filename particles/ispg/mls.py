@@ -6,12 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from reflowshock.arrays import Floats
 from reflowshock.particles.core.neighbours import NeighbourList
-from reflowshock.particles.ispg.mls_linear import linear_weights
-from reflowshock.particles.ispg.mls_quadratic import quadratic_weights
-from reflowshock.particles.ispg.mls_shape import shape_weights
-
-Floats = NDArray[np.float64]
+from reflowshock.particles.ispg.mls_weights import linear_weights, quadratic_weights, shape_weights
 
 # Support radius in spacings: the quadratic fit needs at least 9 well placed neighbours at a wall, too.
 SUPPORT = {"linear": 2.0, "quadratic": 2.4}

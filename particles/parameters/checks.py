@@ -74,11 +74,11 @@ def effect_problems(solder: Solder, effects: Mapping[str, Decision]) -> list[Pro
 
 def _wall_problems(solder: Solder) -> list[Problem]:
     if solder.numerics.scheme == "gripc" and solder.wall != "free-slip":
-        return [Problem("solder.wall", solder.wall, "free-slip", 'liquid slides freely in scheme "gripc"')]
+        return [Problem("solder.wall", solder.wall, "free-slip", 'the scheme "gripc" has walls with free slip only')]
     if (solder.wall == "slip") == (solder.slip_length is not None):
         return []
     value = "none" if solder.slip_length is None else mm(solder.slip_length)
-    message = 'the slip length belongs to wall = "slip", which needs it'
+    message = 'wall = "slip" needs a slip length, other walls have none'
     return [Problem("solder.slip_length", value, 'a length with wall = "slip", else none', message)]
 
 
@@ -122,7 +122,7 @@ def _too_much(solder: Solder, name: str, geometry: JointGeometry, pitch: float) 
     limit = pitch**2 * geometry.gap
     if solder.volume < limit:
         return []
-    message = f"cannot fit: joint {name} has a gap of {mm(geometry.gap)} at the pitch of {mm(pitch)}"
+    message = f"does not fit: joint {name} has a gap of {mm(geometry.gap)} at a pitch of {mm(pitch)}"
     return [Problem("solder.volume", mm3(solder.volume), f"< {mm3(limit)}", message)]
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from math import exp, pi, sqrt
-from typing import NotRequired, TypedDict
+from typing import Any, NotRequired, TypedDict
 
 from reflowshock.particles.core.geometry import JointGeometry
 from reflowshock.particles.parameters.solder import Solder
@@ -149,3 +149,61 @@ def decide(numbers: Numbers, solder: Solder) -> dict[str, Decision]:
     }
     switches = solder.effects.model_dump()
     return {name: _by_switch(switches[name], decision) for name, decision in auto.items()}
+
+
+ENTRIES: tuple[dict[str, Any], ...] = (
+    {
+        "name": "gravity",
+        "adds": "f = -rho g z dV/dx on the free surface",
+        "number": f"{SHAPE_CHANGE_BY_BOND:g} Bo, Bo = rho g L H / gamma",
+        "threshold": NEGLIGIBLE_SHAPE_CHANGE,
+        "influence": f"{SHAPE_CHANGE_BY_BOND:g} Bo of the shape, up to (large contact angles)",
+        "place": "reflowshock.particles.physics.forces.Gravity",
+        "switch": "solder.effects.gravity (of a scene: gravity) = auto, on, off",
+        "source": "Bashforth & Adams 1883, heights of sessile drops",
+    },
+    {
+        "name": "inertia",
+        "adds": "rho Dv/Dt",
+        "number": "T / max(sqrt(rho L^3 / gamma), rho L^2 / (5 mu)), process over slowest time",
+        "threshold": PROCESS_TIME_RATIO,
+        "acts": "below",
+        "influence": "exp(-T / slowest time): what is left of the motion",
+        "place": "reflowshock.particles.physics.operators.Inertia",
+        "switch": "solder.effects.inertia = auto, on, off",
+        "source": "Lamb 1932, art. 355, decay of mode 2",
+    },
+    {
+        "name": "viscosity",
+        "adds": "-div(2 mu D(v))",
+        "number": "as inertia; Oh = mu / sqrt(rho gamma L) is told",
+        "threshold": PROCESS_TIME_RATIO,
+        "acts": "below",
+        "influence": "exp(-T / slowest time): at rest it does nothing",
+        "place": "reflowshock.particles.physics.operators.Viscosity",
+        "switch": "solder.effects.viscosity = auto, on, off",
+        "source": "Lamb 1932, art. 355",
+    },
+    {
+        "name": "surface_tension",
+        "adds": "f = -gamma dA/dx, implicit: dt gamma K v",
+        "number": "Bo = rho g L H / gamma",
+        "threshold": LARGEST_BOND,
+        "acts": "below",
+        "influence": "1 / sqrt(1 + Bo) of the shape: the capillary length over the size",
+        "place": "reflowshock.particles.physics.forces.SurfaceTension",
+        "switch": "solder.effects.surface_tension = auto, on, off",
+        "source": "de Gennes, Brochard-Wyart & Quere 2004, 2.1",
+    },
+    {
+        "name": "wall_adhesion",
+        "adds": "f = gamma cos(theta) dA_wet/dx, contact lines that edges pin",
+        "number": "Bo = rho g L H / gamma",
+        "threshold": LARGEST_BOND,
+        "acts": "below",
+        "influence": "1 / sqrt(1 + Bo) of the shape, unless theta = 90 deg",
+        "place": "reflowshock.particles.physics.forces.Wetting",
+        "switch": "solder.effects.wall_adhesion = auto, on, off",
+        "source": "Young 1805; Brakke 1992",
+    },
+)

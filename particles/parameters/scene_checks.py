@@ -8,11 +8,9 @@ from reflowshock.particles.parameters import checks
 from reflowshock.particles.parameters.checks import Problem, mm, mm3
 from reflowshock.particles.parameters.effects import acting_weight, decide_drop, decide_effects
 from reflowshock.particles.parameters.estimate import particle_count
-from reflowshock.particles.parameters.scene_drops import Drops
-from reflowshock.particles.parameters.scene_oscillation import Oscillation
-from reflowshock.particles.parameters.scenes import Drop, Joint
+from reflowshock.particles.parameters.scenes import Drop, Drops, Joint, Oscillation
 from reflowshock.particles.parameters.solder import Solder
-from reflowshock.particles.reference.rayleigh import lamb_decay_rate, rayleigh_frequency
+from reflowshock.particles.reference.drop_oscillation import lamb_decay_rate, rayleigh_frequency
 from reflowshock.particles.reference.young_laplace import NoMeridian, joint_meridian, sessile_meridian
 
 FEWEST_PER_EDGE = 5
@@ -92,7 +90,7 @@ def oscillation_problems(scene: Oscillation, solder: Solder) -> list[Problem]:
     if decay < frequency:
         return []
     value, limit = f"{solder.viscosity:.4g} Pa*s", f"< {solder.viscosity * frequency / decay:.4g} Pa*s"
-    message = "a drop that is so small and viscous does not swing"
+    message = "a drop that is so small and viscous does not oscillate"
     return [Problem("solder.viscosity", value, limit, message)]
 
 
@@ -135,7 +133,7 @@ def _path_problems(joint: Joint) -> list[Problem]:
         message = "a package floats or is moved, not both"
         return [Problem("joint.path", "", "joint.package or joint.path", message)]
     if joint.places[-1] == joint.geometry:
-        message = "leads nowhere: it ends where it starts"
+        message = "the path ends where it starts"
         return [Problem("joint.path", "", "another standoff, offset or tilt", message)]
     end, lowest = joint.places[-1], checks.SPACINGS_IN_GAP * joint.spacing
     if end.gap < (1.0 - ROUNDING) * lowest:
@@ -150,7 +148,7 @@ def _path_problems(joint: Joint) -> list[Problem]:
 def _package_problems(joint: Joint) -> list[Problem]:
     if joint.package is None or not {"shift", "turn"} <= set(joint.package.free):
         return []
-    message = "free to shift and to turn, a package rolls off a single joint"
+    message = "a package that is free to shift and to turn rolls off a single joint"
     return [Problem("joint.package.free", ", ".join(joint.package.free), "lift with shift, or lift with turn", message)]
 
 
@@ -180,10 +178,10 @@ def _motion_problems(joint: Joint, solder: Solder) -> list[Problem]:
     if joint.package is None and joint.path is None:
         return []
     if solder.numerics.scheme == "gripc":
-        return [Problem("solder.numerics.scheme", "gripc", "energy", "the seed's scheme knows plates at rest only")]
+        return [Problem("solder.numerics.scheme", "gripc", "energy", "the scheme gripc needs plates at rest")]
     inertia = decide_effects(joint.geometry, solder)["inertia"]
     if joint.path is not None and inertia["on"]:
-        message = f"a package goes its path from rest to rest, its speed has no meaning; {inertia['why']}"
+        message = f"a package follows its path from rest to rest, at no particular speed; {inertia['why']}"
         return [Problem("solder.effects.inertia", solder.effects.inertia, "off", message)]
     return []
 
@@ -207,10 +205,10 @@ def _symmetry_problems(drop: Drop, solder: Solder) -> list[Problem]:
         return []
     key, effects = "drop.symmetry", decide_drop(solder, drop.is_free)
     if drop.count % 2 == 0:
-        message = f"no particles lie in a plane of symmetry of {drop.count} along an edge"
+        message = f"with {drop.count} particles along an edge none lie in the plane of symmetry"
         return [Problem(key, drop.symmetry, "an odd number of particles along an edge", message)]
     if solder.numerics.scheme == "gripc" or effects["inertia"]["on"] or effects["viscosity"]["on"]:
-        message = "only a drop on its way to rest can be cut, without inertia, viscosity and the seed's scheme"
+        message = "symmetry needs a drop that relaxes to rest, without inertia or viscosity, and not the scheme gripc"
         return [Problem(key, drop.symmetry, "none", message)]
     return []
 
@@ -229,7 +227,7 @@ def _wall_problems(drop: Drop) -> list[Problem]:
         allowed = f"< {deg(drop.hysteresis[1])}, the advancing angle"
         return [Problem(key, deg(value), allowed, "a line recedes at a smaller angle than it advances at")]
     if drop.pad_radius is not None and drop.contact_angle is None:
-        message = "a pad has no hysteresis here, and needs a contact angle"
+        message = "a pad needs a contact angle, and has no hysteresis here"
         return [Problem("drop.pad_radius", mm(drop.pad_radius), "only with drop.contact_angle", message)]
     return []
 
@@ -243,7 +241,7 @@ def _pad_problems(drop: Drop) -> list[Problem]:
         return [Problem("drop.contact_angle", f"{pad:.4g} deg", f"< {mask:.4g} deg", message)]
     limit = SPACINGS_IN_PAD * drop.resolution
     if drop.pad_radius < limit:
-        message = f"too small for a particle spacing of {mm(drop.resolution)}: volume {mm3(drop.volume)} cannot fit it"
+        message = f"too small for a particle spacing of {mm(drop.resolution)} with a volume of {mm3(drop.volume)}"
         return [Problem("drop.pad_radius", mm(drop.pad_radius), f">= {mm(limit)}", message)]
     return []
 
@@ -252,7 +250,7 @@ def _too_many(scene: str, spacing: float, count: int) -> list[Problem]:
     if count <= MOST_PARTICLES:
         return []
     limit = spacing * (count / MOST_PARTICLES) ** (1.0 / 3.0)
-    message = f"would take {count} particles, more than {MOST_PARTICLES}: a volume that cannot fit, or too fine"
+    message = f"needs {count} particles, more than {MOST_PARTICLES}: the volume does not fit, or spacing too fine"
     return [Problem(f"{scene}.spacing", mm(spacing), f">= {mm(limit)}", message)]
 
 

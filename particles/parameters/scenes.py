@@ -1,16 +1,15 @@
-"""Scenes of one body of solder: a drop on a wall or pad, a joint between two pads. Their parameters in SI floats.
+"""Scenes of solder alone, their parameters in SI floats: a drop, a joint, two drops, a free drop that oscillates.
 
 A scene is resolved into the `Solder` and the geometry that the solvers take.
 """
 
 import math
-from math import inf
+from math import inf, pi
 from typing import Annotated, Literal, Protocol
 
 from pydantic import Field
 
 from reflowshock.particles.core.geometry import JointGeometry
-from reflowshock.particles.parameters.scene_package import PI, FloatingPackage, PackagePath
 from reflowshock.particles.parameters.solder import (
     FlowEffects,
     FlowNumerics,
@@ -21,14 +20,39 @@ from reflowshock.particles.parameters.solder import (
     Switch,
     Walls,
 )
+from reflowshock.particles.reference.drop_oscillation import rayleigh_frequency
 
+PI = 3.14159265
+Direction = Literal["lift", "shift", "turn"]
 DEFAULT_PER_EDGE = 11
-
 # Hu et al. print 10 times the surface tension and 100 times the viscosity of molten SAC solder.
 PROPERTIES = {
     "physical": {"density": 8930.0, "surface_tension": 0.4985, "viscosity": 2.27e-3},
     "paper": {"density": 8930.0, "surface_tension": 4.985, "viscosity": 0.227},
 }
+
+
+class FloatingPackage(Parameters):
+    """A package that floats on the joint: free to lift, to shift (along x and y) or to turn (about x and y).
+
+    Free to shift and to turn it would roll off: a pad is in balance anywhere on a sphere. The load presses it down: its
+    weight over the number of its joints.
+    """
+
+    load: Annotated[float, "mN"] = Field(0.0, ge=0)
+    free: tuple[Direction, ...] = Field(("lift", "shift"), min_length=1)
+
+
+class PackagePath(Parameters):
+    """A package that is moved slowly from where the joint reflows to another place; the joint comes to rest each step.
+
+    What is not given stays as it was at the start.
+    """
+
+    standoff: Annotated[float | None, "mm"] = Field(None, gt=0)
+    offset: Annotated[float | None, "mm"] = Field(None, ge=0)
+    tilt: Annotated[float | None, "deg"] = Field(None, gt=-PI / 6.0, lt=PI / 6.0)
+    steps: int = Field(10, ge=1, le=200)
 
 
 class Drop(Parameters):
@@ -215,3 +239,84 @@ class Fluid(Liquid, Walls):
             **scene.contact_angles,
             **self.properties,
         )
+
+
+class Drops(Parameters):
+    """Two drops, their centres a distance apart, that are meant to become one or (with merge = false) to stay apart.
+
+    With a contact angle they start as cubes on a wall and spread; without, there is no wall and they start as balls.
+    """
+
+    volume_left: Annotated[float, "mm^3"] = Field(gt=0)
+    volume_right: Annotated[float, "mm^3"] = Field(gt=0)
+    distance: Annotated[float, "mm"] = Field(gt=0)
+    merge: bool = True
+    contact_angle: Annotated[float | None, "deg"] = Field(None, gt=0, lt=PI)
+    spacing: Annotated[float, "mm"] = Field(1.0e-4, gt=0)
+
+    @property
+    def volumes(self) -> tuple[float, float]:
+        """Both volumes [m^3]."""
+        return self.volume_left, self.volume_right
+
+    @property
+    def volume(self) -> float:
+        """Volume of both together [m^3]."""
+        return sum(self.volumes)
+
+    @property
+    def resolution(self) -> float:
+        """Spacing of the particles at the start [m]."""
+        return self.spacing
+
+    @property
+    def is_free(self) -> bool:
+        """Whether there is no wall."""
+        return self.contact_angle is None
+
+    @property
+    def contact_angles(self) -> dict[str, float]:
+        """Contact angle as the solder has it [rad]."""
+        return {} if self.contact_angle is None else {"pad_contact_angle": self.contact_angle}
+
+    def per_edge(self, volume: float) -> int:
+        """Particles along an edge of the cube of a volume [m^3]."""
+        return 1 + round(volume ** (1.0 / 3.0) / self.spacing)
+
+    @property
+    def particles(self) -> int:
+        """Particles of both cubes; balls have nearly as many."""
+        return sum(self.per_edge(volume) ** 3 for volume in self.volumes)
+
+
+class Oscillation(Parameters):
+    """A free drop that swings in its second mode: it starts as a ball, with the velocity of that mode.
+
+    The amplitude is in radii, the duration in Rayleigh's periods.
+    """
+
+    volume: Annotated[float, "mm^3"] = Field(gt=0)
+    amplitude: float = Field(0.1, gt=0, le=0.3)
+    periods: float = Field(2.0, ge=1, le=50)
+    particles_per_radius: int = Field(4, ge=2, le=20)
+    steps_per_period: int = Field(100, ge=16)
+
+    @property
+    def radius(self) -> float:
+        """Radius of the ball [m]."""
+        return (0.75 * self.volume / pi) ** (1.0 / 3.0)
+
+    @property
+    def particles(self) -> int:
+        """Number of particles: 10 k^2 + 2 on shell k, one at the centre."""
+        return 1 + sum(10 * shell**2 + 2 for shell in range(1, self.particles_per_radius + 1))
+
+    def resolve(self, liquid: Liquid) -> Solder:
+        """Return the drop's liquid."""
+        numerics = SolderNumerics(spacing=self.radius / self.particles_per_radius)
+        return Solder(volume=self.volume, numerics=numerics, **liquid.properties)
+
+
+def rayleigh_period(scene: Oscillation, solder: Solder) -> float:
+    """Period of the second mode at small amplitude and viscosity [s]."""
+    return 2.0 * pi / rayleigh_frequency(2, scene.radius, solder.density, solder.surface_tension)

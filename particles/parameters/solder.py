@@ -1,4 +1,4 @@
-"""Parameters of the molten solder and of the ISPG solver.
+"""Parameters of the molten solder and of how its flow is computed.
 
 All values are SI floats; see ``meshing.board.parameters`` for what the unit strings mean.
 """
@@ -21,7 +21,7 @@ class FlowNumerics(Parameters):
     """How a reflow is computed, apart from its resolution.
 
     The scheme energy moves to the least energy of the tracked surface at exactly the volume. The scheme gripc is the
-    pressure correction that Hu et al. print, kept for comparison: its time steps end at the capillary limit.
+    paper's ISPG (the pressure correction that Hu et al. print), for comparison: time steps end at the capillary limit.
     """
 
     scheme: Literal["energy", "gripc"] = "energy"

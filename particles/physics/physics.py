@@ -8,14 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from reflowshock.arrays import Floats
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.plate import slide
 from reflowshock.particles.core.symmetry import fold
 from reflowshock.particles.discretisation.discretisation import Discretisation
 from reflowshock.particles.physics.plate_motion import PlateMotion
 from reflowshock.particles.surface.contact_line import ContactLine
-
-Floats = NDArray[np.float64]
 
 
 class Force(Protocol):
@@ -103,3 +102,21 @@ class Physics:
         """The part of a displacement `(n, 3)` that resting plates, symmetry (free slip) and edges (none) allow."""
         along = fold(body.cloud, slide(body.plates, body.cloud.wall, field))
         return np.where(self.pinned(body)[:, None], 0.0, along)
+
+
+def plate_wrench(body: Body, others: Sequence[Force], wall: int) -> Floats:
+    """Force `(3,)` [N] and moment about the plate's origin `(3,)` [N m] of the solder on a plate, `(6,)`.
+
+    A plate that moves takes its contact line along, and the energy E - p V changes by the forces on the line: the
+    pull of the free surface, and the pressure on the wetted area and on the line's share of the free surface.
+
+    Args:
+        body: a body at rest.
+        others: forces on the surface but wetting (the wetted area does not change).
+        wall: index of the plate.
+    """
+    ring = body.cloud.rings[wall]
+    pressure = body.surface_pressure * body.volume()[1]
+    load = sum((force.force(body) for force in others), pressure)[ring]
+    lever = body.points[ring] - body.plates[wall].origin
+    return np.concatenate((load.sum(axis=0), np.cross(lever, load).sum(axis=0)))

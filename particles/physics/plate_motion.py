@@ -4,11 +4,9 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from reflowshock.arrays import Floats
 from reflowshock.particles.core.plate import Plate
-
-Floats = NDArray[np.float64]
 
 LIFT = np.eye(6)[2:3]
 SHIFT = np.eye(6)[:2]

@@ -9,11 +9,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import solve_bvp, solve_ivp
 from scipy.optimize import brentq
 
-Floats = NDArray[np.float64]
+from reflowshock.arrays import Floats
 
 TOLERANCE = 1e-8
 SAMPLES = 401

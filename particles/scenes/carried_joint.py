@@ -1,30 +1,34 @@
 """A joint between plates that a structure moves: carried from place to place, kept in a file in between.
 
 The flow at rest in one place is where the next one begins, so that a further exchange with the structure costs a
-fraction of a first reflow. What is in the file is all that there is: any process may carry the joint on.
+fraction of a first reflow. What is in the file is all that there is: any process may carry the joint on. The exchange
+starts from an estimate of the joint's stiffness.
 """
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from math import isfinite, pi
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from reflowshock.arrays import Floats
 from reflowshock.particles.core.checkpoint import Checkpoint
 from reflowshock.particles.core.cloud import TooLittleSolder
 from reflowshock.particles.core.geometry import JointGeometry
-from reflowshock.particles.parameters.effects import decide_effects, switched
+from reflowshock.particles.parameters.effects import acting_weight, decide_effects, switched
 from reflowshock.particles.parameters.solder import Solder
-from reflowshock.particles.physics.force_wetting import Wetting
-from reflowshock.particles.physics.plate_force import plate_wrench
+from reflowshock.particles.physics.forces import Wetting
+from reflowshock.particles.physics.physics import plate_wrench
+from reflowshock.particles.scenes.metrics import reference_meridian
 from reflowshock.particles.scenes.moving_joint import travel
 from reflowshock.particles.scenes.reflow import joint_flow, joint_shape, parted, solve_joint, start_joint, stop_rule
 from reflowshock.particles.steps.flow import LiquidFlow
 from reflowshock.particles.steps.rest import RECORDS, Run, StopRule, run_to_rest
 from reflowshock.particles.steps.shape import JointShape
 
-Floats = NDArray[np.float64]
+STEP = 0.01  # of the gap
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,3 +131,25 @@ def _joined(first: Run, last: Run) -> Run:
         ruptured=last.ruptured,
         calm=last.calm,
     )
+
+
+def stiffness_estimate(geometry: JointGeometry, solder: Solder) -> NDArray[np.float64]:
+    """Return the derivative `(6, 6)` of the solder's wrench on the package's pad by its motion, where it is level.
+
+    Along z it is that of the Young-Laplace joint. Sideways a cylinder of the pad's radius a and the gap h, whose
+    sections stay discs, resists with pi a gamma / h; a tilt as if each part of the pad bore what it does along z.
+    """
+    radius, gap = min(geometry.radius_board, geometry.radius_package), geometry.gap
+    lateral = pi * radius * solder.surface_tension / gap
+    upper, lower = (axial_force(geometry, solder, factor * gap) for factor in (1.0 + STEP, 1.0 - STEP))
+    axial = (lower - upper) / (2.0 * STEP * gap)
+    axial = axial if isfinite(axial) and axial > 0.0 else 4.0 * lateral  # what barrels of 1.2 to 1.7 radii have
+    tilt = axial * radius**2 / 4.0
+    return -np.diag([lateral, lateral, axial, tilt, tilt, 0.0])
+
+
+def axial_force(geometry: JointGeometry, solder: Solder, gap: float) -> float:
+    """Force on the package along z [N] of the coaxial Young-Laplace joint at a gap [m]; nan where there is none."""
+    weight = acting_weight(solder, decide_effects(geometry, solder))
+    meridian = reference_meridian(replace(geometry, gap=gap, offset=(0.0, 0.0), tilt=(0.0, 0.0)), solder, weight)
+    return float("nan") if meridian is None else meridian.axial_force

@@ -17,8 +17,7 @@ from reflowshock.particles.scenes.reflow import collect_shape, contact_line, sta
 from reflowshock.particles.steps.flow import LiquidFlow
 from reflowshock.particles.steps.rest import Run, run_to_rest
 from reflowshock.particles.steps.shape import JointShape
-from reflowshock.particles.surface.contact_line import ContactLine
-from reflowshock.particles.surface.contact_line_hysteresis import HystereticLine
+from reflowshock.particles.surface.contact_line import ContactLine, HystereticLine
 
 ANGLE_OF_CUBE = 0.5 * np.pi
 

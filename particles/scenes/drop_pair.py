@@ -8,14 +8,13 @@ from math import inf
 import numpy as np
 
 from reflowshock.particles.core.checkpoint import Checkpoint
-from reflowshock.particles.core.cloud import Cloud, box_cloud
-from reflowshock.particles.core.cloud_sphere import sphere_cloud
+from reflowshock.particles.core.cloud import Cloud, box_cloud, sphere_cloud
 from reflowshock.particles.core.surface_measure import centre_of_volume
 from reflowshock.particles.parameters.effects import Decision, acting_weight, decide_drop, switched
-from reflowshock.particles.parameters.scene_drops import Drops
+from reflowshock.particles.parameters.scenes import Drops
 from reflowshock.particles.parameters.solder import Solder
 from reflowshock.particles.reference.young_laplace import Meridian, sphere_meridian
-from reflowshock.particles.scenes.drops import Drop, run_drops
+from reflowshock.particles.scenes.drops import MovingDrop, run_drops
 from reflowshock.particles.scenes.metrics import Metrics, body_metrics, particle_pressure, reference_drop
 from reflowshock.particles.scenes.reflow import contact_line, start_flow, stop_rule
 from reflowshock.particles.steps.flow import LiquidFlow
@@ -91,12 +90,12 @@ def _start(solder: Solder, acting: Mapping[str, bool], cloud: Cloud) -> LiquidFl
     return start_flow(cloud, solder, dict(acting), lines)
 
 
-def _volume(scene: Drops, drop: Drop) -> float:
+def _volume(scene: Drops, drop: MovingDrop) -> float:
     """Volume that a drop is made of [m^3]."""
     return sum(scene.volumes[origin] for origin in drop.origins)
 
 
-def _reference(scene: Drops, solder: Solder, effects: Mapping[str, Decision], drop: Drop) -> Meridian:
+def _reference(scene: Drops, solder: Solder, effects: Mapping[str, Decision], drop: MovingDrop) -> Meridian:
     """Exact meridian of one of the drops that are left."""
     volume = _volume(scene, drop)
     if scene.is_free:
@@ -105,7 +104,7 @@ def _reference(scene: Drops, solder: Solder, effects: Mapping[str, Decision], dr
     return reference_drop(own, inf, acting_weight(solder, effects))
 
 
-def _drop_metrics(scene: Drops, solder: Solder, drop: Drop, reference: Meridian) -> Metrics:
+def _drop_metrics(scene: Drops, solder: Solder, drop: MovingDrop, reference: Meridian) -> Metrics:
     """Numbers of one of the drops that are left; of a sphere also the largest error of a radius."""
     body = drop.flow.body
     profile = fit_profile(body.points, body.triangles, body.span())
@@ -128,7 +127,7 @@ def _worst(results: Sequence[Metrics]) -> Metrics:
     return worst
 
 
-def _shape(drops: Sequence[Drop], metrics: Metrics, capillary: float) -> JointShape:
+def _shape(drops: Sequence[MovingDrop], metrics: Metrics, capillary: float) -> JointShape:
     """All drops that are left as one shape, the history that of the first; `capillary`: mu / gamma."""
     bodies = [drop.flow.body for drop in drops]
     counts = [body.cloud.surface_count for body in bodies]
@@ -147,7 +146,7 @@ def _shape(drops: Sequence[Drop], metrics: Metrics, capillary: float) -> JointSh
     )
 
 
-def _stages(drops: Sequence[Drop]) -> list[Snapshot]:
+def _stages(drops: Sequence[MovingDrop]) -> list[Snapshot]:
     """The start and, where the drops merged, the states before and after."""
     if not drops[0].parents:
         return [_side_by_side([drop.first for drop in drops])]
@@ -158,7 +157,7 @@ def _stages(drops: Sequence[Drop]) -> list[Snapshot]:
     return [*before, drops[0].first]
 
 
-def _now(drop: Drop) -> Snapshot:
+def _now(drop: MovingDrop) -> Snapshot:
     return Snapshot(drop.flow.time, drop.flow.body.points, drop.flow.body.triangles)
 
 

@@ -22,7 +22,7 @@ class OverlappingDrops(ValueError):
 
 
 @dataclass(slots=True, eq=False)
-class Drop:
+class MovingDrop:
     """A drop on its way to rest.
 
     Attributes:
@@ -38,13 +38,13 @@ class Drop:
     flow: LiquidFlow
     origins: tuple[int, ...]
     first: Snapshot
-    parents: tuple["Drop", ...] = ()
+    parents: tuple["MovingDrop", ...] = ()
     records: list[StepRecord] = field(default_factory=list)
     calm: int = 0
     seconds: float = 0.0
 
     @classmethod
-    def made(cls, flow: LiquidFlow, origins: tuple[int, ...], parents: tuple["Drop", ...] = ()) -> "Drop":
+    def made(cls, flow: LiquidFlow, origins: tuple[int, ...], parents: tuple["MovingDrop", ...] = ()) -> "MovingDrop":
         """Make a drop of a flow that has not moved yet."""
         first = Snapshot(flow.time, flow.body.points.copy(), flow.body.triangles.copy())
         return cls(flow, origins, first, parents)
@@ -58,7 +58,7 @@ class Drop:
         }
 
     @classmethod
-    def restored(cls, saved: Mapping[str, Any], start: Callable[[Body], LiquidFlow]) -> "Drop":
+    def restored(cls, saved: Mapping[str, Any], start: Callable[[Body], LiquidFlow]) -> "MovingDrop":
         """Make it again of what `saved` returned; `start` as for `run_drops`."""
         flow = start(Body.at_rest(saved["flow"]["body"].cloud))
         flow.restore(saved["flow"])
@@ -84,7 +84,7 @@ def run_drops(
     start: Callable[[Body], LiquidFlow],
     checkpoint: Checkpoint | None = None,
     progress: Callable[[float], None] | None = None,
-) -> list[Drop]:
+) -> list[MovingDrop]:
     """Let drops flow until all are at rest; the one that is behind in time goes first.
 
     Args:
@@ -103,7 +103,7 @@ def run_drops(
         CannotRebuild: drops touch, or one collapses, between walls.
     """
     saved = checkpoint.read(RECORDS) if checkpoint else None
-    drops = [Drop.restored(drop, start) for drop in saved or []] or _merge_touching(_apart(flows), start)
+    drops = [MovingDrop.restored(drop, start) for drop in saved or []] or _merge_touching(_apart(flows), start)
     while moving := [drop for drop in drops if drop.moves(rule)]:
         drop = min(moving, key=lambda candidate: candidate.flow.time)
         if len(drop.records) >= rule.max_steps:
@@ -119,7 +119,7 @@ def run_drops(
     return drops
 
 
-def _apart(flows: Sequence[LiquidFlow]) -> list[Drop]:
+def _apart(flows: Sequence[LiquidFlow]) -> list[MovingDrop]:
     """The drops at the start, which may touch, but not overlap by more than half a spacing."""
     for (i, first), (j, second) in combinations(enumerate(flows), 2):
         spacing = min(first.body.cloud.spacing, second.body.cloud.spacing)
@@ -128,10 +128,10 @@ def _apart(flows: Sequence[LiquidFlow]) -> list[Drop]:
             raise OverlappingDrops(
                 f"drops {i} and {j} overlap by {depth:.3g} m at the start, allowed <= {LARGEST_OVERLAP * spacing:.3g} m"
             )
-    return [Drop.made(flow, (number,)) for number, flow in enumerate(flows)]
+    return [MovingDrop.made(flow, (number,)) for number, flow in enumerate(flows)]
 
 
-def _restarted(start: Callable[[Body], LiquidFlow], *drops: Drop) -> LiquidFlow:
+def _restarted(start: Callable[[Body], LiquidFlow], *drops: MovingDrop) -> LiquidFlow:
     """Flow of the body that drops become, from the time of the latest, with their momentum; steps are counted on."""
     body = rebuild(*(drop.flow.body for drop in drops))
     flow = start(body)
@@ -141,16 +141,16 @@ def _restarted(start: Callable[[Body], LiquidFlow], *drops: Drop) -> LiquidFlow:
     return flow
 
 
-def _merge_touching(drops: list[Drop], start: Callable[[Body], LiquidFlow]) -> list[Drop]:
+def _merge_touching(drops: list[MovingDrop], start: Callable[[Body], LiquidFlow]) -> list[MovingDrop]:
     """Merge pairs of drops until none touch."""
     while (pair := _touching(drops)) is not None:
         rest = [drop for drop in drops if drop not in pair]
         origins = sorted(pair[0].origins + pair[1].origins)
-        drops = [*rest, Drop.made(_restarted(start, *pair), tuple(origins), pair)]
+        drops = [*rest, MovingDrop.made(_restarted(start, *pair), tuple(origins), pair)]
     return drops
 
 
-def _touching(drops: Sequence[Drop]) -> tuple[Drop, Drop] | None:
+def _touching(drops: Sequence[MovingDrop]) -> tuple[MovingDrop, MovingDrop] | None:
     for number, first in enumerate(drops):
         for second in drops[number + 1 :]:
             if touch(first.flow.body, second.flow.body):

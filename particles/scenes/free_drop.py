@@ -1,4 +1,4 @@
-"""A free drop with inertia: at rest (Laplace pressure) or swinging in its second mode (Rayleigh)."""
+"""A free drop with inertia: at rest (Laplace pressure) or oscillating in its second mode (Rayleigh)."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -8,22 +8,33 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import least_squares
 
+from reflowshock.arrays import Floats
 from reflowshock.data_file import fields_of
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.checkpoint import Checkpoint
-from reflowshock.particles.core.cloud_sphere import sphere_cloud
+from reflowshock.particles.core.cloud import sphere_cloud
+from reflowshock.particles.parameters.scenes import Oscillation, rayleigh_period
 from reflowshock.particles.parameters.solder import Solder
-from reflowshock.particles.reference.damped_oscillation import fit_oscillation
-from reflowshock.particles.reference.rayleigh import rayleigh_frequency, viscous_oscillation
+from reflowshock.particles.reference.drop_oscillation import rayleigh_frequency, viscous_oscillation
+from reflowshock.particles.scenes.metrics import Metrics
 from reflowshock.particles.scenes.reflow import build_physics
 from reflowshock.particles.steps.flow import FLOW_RECORDS
-from reflowshock.particles.steps.inertial_flow import InertialFlow
-from reflowshock.particles.steps.shape import Snapshot
+from reflowshock.particles.steps.inertial_step import InertialFlow
+from reflowshock.particles.steps.shape import JointShape, Snapshot
+from reflowshock.particles.steps.time_step import capillary_limit
 from reflowshock.particles.surface.surface_quality import vertex_normals
 
-Floats = NDArray[np.float64]
-
+METRICS = (
+    "period",
+    "period_error",
+    "decay_rate",
+    "decay_rate_error",
+    "volume_drift",
+    "particles",
+    "particle_steps_per_second",
+)
 EFFECTS = {"surface_tension": True, "gravity": False, "wall_adhesion": False, "inertia": True}
 COLUMNS = ("time", "amplitude", "energy", "kinetic_energy", "volume", "momentum")
 # Ways to the rest of the polyhedron, whose vertices are not quite on a sphere; the step in radians of the second mode.
@@ -219,3 +230,77 @@ def _swing_metrics(solder: Solder, history: dict[str, Floats]) -> dict[str, tupl
         "period_error": (exact_frequency / frequency - 1.0, ""),
         "decay_rate_error": (decay / exact_decay - 1.0, ""),
     }
+
+
+def solve_oscillation(
+    scene: Oscillation,
+    solder: Solder,
+    progress: Callable[[float], None] | None = None,
+    checkpoint: Checkpoint | None = None,
+) -> JointShape:
+    """Let a drop swing: its shape at the end, history and snapshots in time.
+
+    Args:
+        scene: volume, amplitude, duration and resolution.
+        solder: the same volume, and fluid.
+        progress: called with the fraction done.
+        checkpoint: where the run continues from, to the last bit, and leaves its state.
+
+    Raises:
+        SolveFailed: a linear solve failed.
+    """
+    drop = solve_free_drop(solder, scene.amplitude, scene.periods, scene.steps_per_period, progress, checkpoint)
+    steps = len(drop.history["time"]) - 1
+    limit = capillary_limit(solder.density, solder.numerics.spacing, solder.surface_tension)
+    largest = rayleigh_period(scene, solder) / scene.steps_per_period
+    metrics: Metrics = {name: drop.metrics[name] for name in METRICS}
+    metrics |= {
+        "amplitude": (float(np.abs(drop.history["amplitude"]).max()), ""),
+        "time_step_over_capillary_limit": (largest / limit, ""),
+        "steps": (float(steps), ""),
+        "seconds": (steps * len(drop.points) / drop.metrics["particle_steps_per_second"][0], "s"),
+    }
+    return JointShape(
+        points=drop.points,
+        velocity=drop.velocity,
+        pressure=drop.pressure,
+        surface_points=drop.surface_points,
+        triangles=drop.triangles,
+        rings=(),
+        history=drop.history,
+        snapshots=drop.snapshots,
+        metrics=metrics,
+        verdict="ok",
+    )
+
+
+def fit_oscillation(time: Floats, values: Floats, frequency: float) -> tuple[float, float]:
+    """Fit decay rate [1/s] and angular frequency [rad/s] of the fundamental.
+
+    Model: exp(-b t) cos(w t + ..), and of second order its harmonic exp(-2 b t) cos(2 w t + ..), its mean exp(-2 b t)
+    and a constant. The factors of these are linear and eliminated (variable projection).
+
+    Args:
+        time: `(k,)` [s], more than a period.
+        values: `(k,)`.
+        frequency: a guess within some 20 % [rad/s]; an octave too low is noticed: the harmonic is then the larger one.
+    """
+
+    def columns(unknowns: Floats) -> Floats:
+        decay, angle = np.exp(-unknowns[0] * scaled), unknowns[1] * scaled
+        first, second = decay * np.exp(1j * angle), decay**2 * np.exp(2j * angle)
+        return np.column_stack((first.real, first.imag, second.real, second.imag, decay**2, np.ones_like(decay)))
+
+    def factors(basis: Floats) -> Floats:
+        return np.linalg.lstsq(basis, values, rcond=None)[0]
+
+    def misfit(unknowns: Floats) -> Floats:
+        basis = columns(unknowns)
+        return basis @ factors(basis) - values
+
+    scaled = time * frequency
+    found = least_squares(misfit, (0.01, 1.0), x_scale=(0.01, 0.01), xtol=1e-12, ftol=1e-12).x
+    first, second = np.hypot(*factors(columns(found))[:4].reshape(2, 2).T)
+    if second > first:
+        return fit_oscillation(time, values, 2.0 * frequency)
+    return found[0] * frequency, found[1] * frequency

@@ -9,8 +9,7 @@ from scipy.optimize import brentq
 from reflowshock.particles.core.checkpoint import Checkpoint
 from reflowshock.particles.core.geometry import JointGeometry
 from reflowshock.particles.parameters.effects import Decision, acting_weight, decide_effects
-from reflowshock.particles.parameters.scene_package import FloatingPackage
-from reflowshock.particles.parameters.scenes import Joint
+from reflowshock.particles.parameters.scenes import FloatingPackage, Joint
 from reflowshock.particles.parameters.solder import Solder
 from reflowshock.particles.physics.plate_motion import LIFT, SHIFT, TURN, Floating
 from reflowshock.particles.reference.young_laplace import Meridian

@@ -8,13 +8,10 @@ from dataclasses import dataclass, replace
 from math import atan2, hypot
 
 import numpy as np
-from numpy.typing import NDArray
 
+from reflowshock.arrays import Floats, Indices
 from reflowshock.particles.core.geometry import JointGeometry
 from reflowshock.particles.steps.shape import JointShape, Snapshot
-
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int32]
 
 NOTHING = 1e-12  # lengths below a picometre have no direction [m]
 MIRROR = np.diag([1.0, -1.0, 1.0])

@@ -61,7 +61,7 @@ def write_body(folder: Path, shape: JointShape, reference: Meridian | None) -> N
     if reference is not None:
         with h5py.File(folder / "shape.h5", "a") as file:
             file[REFERENCE] = np.stack((reference.r, reference.z))
-    write_particles(folder / "reflowshock.particles.vtu", shape)
+    write_particles(folder / "particles.vtu", shape)
 
 
 def read_body(folder: Path) -> tuple[JointShape, np.ndarray | None]:

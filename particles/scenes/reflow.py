@@ -14,15 +14,11 @@ from reflowshock.particles.core.symmetry import whole_line
 from reflowshock.particles.ispg.gripc_step import GripcStep
 from reflowshock.particles.parameters.effects import decide_effects, switched
 from reflowshock.particles.parameters.solder import Solder
-from reflowshock.particles.physics.force_gravity import Gravity
-from reflowshock.particles.physics.force_surface_tension import SurfaceTension
-from reflowshock.particles.physics.force_wetting import Wetting
-from reflowshock.particles.physics.mass import Inertia, Mass
+from reflowshock.particles.physics.forces import Gravity, SurfaceTension, Wetting
+from reflowshock.particles.physics.operators import Inertia, Mass, NavierSlip, NoSlip, Viscosity
 from reflowshock.particles.physics.physics import Event, Force, Hold, Momentum, Operator, Physics
-from reflowshock.particles.physics.viscosity import Viscosity
-from reflowshock.particles.physics.wall_friction import NavierSlip, NoSlip
 from reflowshock.particles.scenes.metrics import Metrics, joint_metrics, open_metrics, particle_pressure, verdict
-from reflowshock.particles.scenes.split import parted_shape, split_to_rest
+from reflowshock.particles.scenes.rebuild import parted_shape, split_to_rest
 from reflowshock.particles.steps.flow import LiquidFlow
 from reflowshock.particles.steps.inertial_step import InertialStep
 from reflowshock.particles.steps.relaxation import Relaxation
@@ -144,7 +140,7 @@ def start_flow(cloud: Cloud, solder: Solder, effects: dict[str, bool], lines: tu
 
 
 def step_solver(solder: Solder, effects: dict[str, bool]) -> StepSolver:
-    """How steps are solved: by the seed's scheme, on tetrahedra where momentum is carried or shared, else to rest."""
+    """How steps are solved: as the paper does, on tetrahedra where momentum is carried or shared, else towards rest."""
     if solder.numerics.scheme == "gripc":
         return GripcStep(solder.numerics.basis)
     if effects["inertia"] or effects["viscosity"]:

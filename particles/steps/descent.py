@@ -12,15 +12,13 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from reflowshock.arrays import Floats, Indices
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.symmetry import surface_planes
 from reflowshock.particles.physics.physics import Physics
 from reflowshock.particles.steps.step_solver import StepSolver
 from reflowshock.particles.surface.contact_line import ContactLine
 from reflowshock.particles.surface.surface_quality import flip_to_delaunay, smoothing_offsets
-
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int32]
 
 VOLUME_PASSES = 2
 SAME_VOLUME = 1e-14

@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from reflowshock.arrays import Floats
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.cloud import Cloud
 from reflowshock.particles.core.neighbours import NeighbourList
@@ -21,8 +21,6 @@ from reflowshock.particles.steps.descent import Evening, Start, correct_volume, 
 from reflowshock.particles.steps.interior_shift import interior_shift
 from reflowshock.particles.steps.step_solver import Motion, PreparedStep, StepSolver
 from reflowshock.particles.steps.time_step import StepCollapsed, TimeStep
-
-Floats = NDArray[np.float64]
 
 SKIN = 0.2
 FLIP_INTERVAL = 2

@@ -2,15 +2,13 @@
 
 import numpy as np
 from numba import njit, prange
-from numpy.typing import NDArray
 
+from reflowshock.arrays import Floats
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.neighbours import NeighbourList
 from reflowshock.particles.core.plate import slide
 from reflowshock.particles.core.symmetry import fold, on_plane, unit
 from reflowshock.particles.surface.surface_quality import vertex_normals
-
-Floats = NDArray[np.float64]
 
 REPULSION_RANGE = 1.1
 REPULSION_STRENGTH = 0.15

@@ -11,14 +11,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit, prange
-from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
+from reflowshock.arrays import Floats
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.neighbours import NeighbourList
-
-Floats = NDArray[np.float64]
 
 # Share of its edges that each particle leaks: fixes the constant, also that of particles apart from the others.
 LEAK = 1e-6

@@ -14,9 +14,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
+from reflowshock.arrays import Floats
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.neighbours import NeighbourList
 from reflowshock.particles.core.plate import slide
@@ -29,8 +29,6 @@ from reflowshock.particles.physics.physics import Physics
 from reflowshock.particles.steps.potential_flow import PotentialFlow
 from reflowshock.particles.steps.step_equations import StepEquations
 from reflowshock.particles.steps.step_solver import Motion
-
-Floats = NDArray[np.float64]
 
 SUPPORT = 2.0
 # The surface moves along its normals and stretches its triangles unevenly, which biases the shape of least energy: one

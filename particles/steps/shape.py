@@ -6,8 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int32]
+from reflowshock.arrays import Floats, Indices
 
 
 def together(arrays: Sequence[NDArray], counts: Sequence[int]) -> NDArray:

@@ -3,16 +3,12 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from reflowshock.arrays import Floats, Indices
 from reflowshock.particles.core.cloud import Cloud, equal_area_radius
 from reflowshock.particles.core.plate import Plate
 from reflowshock.particles.core.surface_measure import volume_and_gradient
-from reflowshock.particles.surface.level_set import LevelSet
-from reflowshock.particles.surface.surface_nets import extract_surface, relax
-
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int32]
+from reflowshock.particles.surface.level_set import LevelSet, extract_surface, relax
 
 DEPTH = 0.75
 SNAP_SPACINGS = 0.5  # the net rounds the edge between a surface and its mirror image by less

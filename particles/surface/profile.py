@@ -8,10 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.polynomial import Legendre
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int32]
+from reflowshock.arrays import Floats, Indices
 
 SLICES = 64
 DEGREE = 6

@@ -4,12 +4,9 @@ from collections.abc import Sequence
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from reflowshock.arrays import Floats, Indices
 from reflowshock.particles.core.surface_measure import area_vector
-
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int32]
 
 SMOOTHING = 0.3
 FLIP_MARGIN = 1e-2

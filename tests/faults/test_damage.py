@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from reflowshock.workflow.jobs.batch import show_products
 from reflowshock.workflow.pipeline.reader import read_case
-from reflowshock.workflow.store.batch import show_products
 from reflowshock.workflow.store.point import Point
 from reflowshock.workflow.store.state import examine
 from reflowshock.workflow.store.store import Store
@@ -64,7 +64,7 @@ def undisturbed(tmp_path_factory):
     return folder
 
 
-@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("way", [way if way == "flip" else pytest.param(way, marks=pytest.mark.long) for way in WAYS])
 def test_damage_heals(undisturbed, tmp_path, way):
     folder = tmp_path / "run"
     shutil.copytree(undisturbed, folder)

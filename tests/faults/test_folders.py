@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from reflowshock.workflow.store.engine import SNAKEFILE
+from reflowshock.workflow.jobs.engine import SNAKEFILE
 from tests.support.faults import DROP, SMALL_DROP, run_drop
 from tests.support.workflow_command import wait_until
 
@@ -84,6 +84,7 @@ def test_names_do_not_lead_out_of_a_folder(tmp_path, name):
     assert [path.name for path in tmp_path.iterdir()] == ["case.toml"]
 
 
+@pytest.mark.long
 def test_plain_snakemake_holds_the_folder_and_shows_no_old_report(tmp_path):
     folder = tmp_path / "run"
     assert run_drop(folder).returncode == 0

@@ -3,7 +3,6 @@
 A success that is reported has happened: whatever was broken off, the command that is repeated computes what is missing.
 """
 
-import os
 import random
 import shutil
 import signal
@@ -16,8 +15,7 @@ import pytest
 from tests.support.faults import SEED, answers
 from tests.support.workflow_command import command_line, reflowshock
 
-LONG = bool(os.environ.get("REFLOWSHOCK_LONG"))  # make test-long
-COUNT = 50 if LONG else 4
+COUNT = 50
 CHANGED = ("shock.peak_acceleration=1000 G",)
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGKILL)
 ROUNDING = 1e-6
@@ -48,7 +46,7 @@ def whom(process: subprocess.Popen, choice: random.Random) -> list[psutil.Proces
     return [choice.choice([psutil.Process(process.pid), *children])]
 
 
-@pytest.mark.parametrize("number", range(COUNT))
+@pytest.mark.parametrize("number", [0, *(pytest.param(number, marks=pytest.mark.long) for number in range(1, COUNT))])
 def test_a_run_that_was_broken_off_goes_on_to_the_same_answer(undisturbed, tmp_path, number):
     choice = random.Random(f"{SEED} {number}")
     expected, seconds = undisturbed
@@ -68,7 +66,7 @@ def test_a_run_that_was_broken_off_goes_on_to_the_same_answer(undisturbed, tmp_p
     assert reflowshock("verify", tmp_path / "small").returncode == 0
 
 
-@pytest.mark.parametrize("end", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("end", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.long)])
 def test_an_old_result_is_never_reported_as_a_new_one(undisturbed, tmp_path, end):
     """A complete run, a changed one that is broken off in its shock, and the changed one again."""
     folder = tmp_path / "small"

@@ -8,9 +8,9 @@ SCRIPT = """
 import contextlib, json, sys
 import numpy as np
 from mpi4py import MPI
-from reflowshock.fem.model.assembly import Response, make_body, make_pieces
+from reflowshock.fem.model.assembly import ForceOptions, make_body, make_pieces
 from reflowshock.fem.parallel.communicators import Communicators
-from reflowshock.fem.coupling.crew import couple
+from reflowshock.fem.coupling.participants import couple
 from reflowshock.fem.estimates.placement import shared
 from reflowshock.fem.coupling.scheme import scheme_of
 from reflowshock.fem.parallel.local_mesh import distribute
@@ -33,7 +33,7 @@ def moved(scheme):
     whole, found, rules = surveyed(append([board(4), joint(0.25e-3, 0.25e-3)]), coupling=Coupling(scheme=scheme))
     division = checked(whole, found, rules)
     inputs, bodies = model_inputs(whole, division), {}
-    corner = inputs["macro"].mesh.points[inputs["macro"].tables.cut].max(axis=0)[:2]
+    corner = inputs["macro"].mesh.points[inputs["macro"].tables.interface].max(axis=0)[:2]
     comms = Communicators(world, shared(("macro", "meso"), world.size))
     for role, item in inputs.items():
         centre = item.mesh.points[item.mesh.cells].mean(axis=1)
@@ -42,20 +42,20 @@ def moved(scheme):
         pieces = make_pieces(distribute(comms.models[role], *mesh), item.tables, Materials())
         step = division.plan.window if role == "macro" else division.meso_step
         factor = np.ones(len(pieces.steps))
-        bodies[role] = make_body(comms.models[role], pieces, item.tables, factor, Response(step=step))
+        bodies[role] = make_body(comms.models[role], pieces, item.tables, factor, ForceOptions(step=step))
     at_corner = [(np.abs(body.local.points[:, :2] - corner).max(axis=1) < 1e-9).any() for body in bodies.values()]
-    crew, _, found = couple(comms, bodies, dict.fromkeys(bodies, []), division.plan, scheme_of(scheme))
-    for part in crew.values():
+    participants, _, found = couple(comms, bodies, dict.fromkeys(bodies, []), division.plan, scheme_of(scheme))
+    for part in participants.values():
         motion = part.motion
         wave = np.sin(1e3 * motion.body.local.points @ [1.0, 0.7, 0.4])
         motion.velocity[:] = np.where(motion.mobility > 0.0, wave[:, None] * [1.0, -0.5, 0.3], 0.0)
     for _ in range(40):
-        for part in crew.values():
+        for part in participants.values():
             part.begin_window()
-        for part in crew.values():
+        for part in participants.values():
             part.finish_window()
     sums = np.zeros(4)
-    for part in crew.values():
+    for part in participants.values():
         motion, owned = part.motion, part.motion.body.shared.owned
         pattern = np.cos(2e3 * motion.body.local.points[owned] @ [0.3, -0.8, 1.0])
         sums[:3] += pattern @ motion.displacement[owned]

@@ -35,7 +35,7 @@ def history(directory: Path, ranks: int, scheme: str, placement: str) -> dict[st
         return {name: array for name, array in arrays.items() if array.dtype.kind == "f"}
 
 
-@pytest.mark.parametrize("scheme", ["held_velocity", "local_steps"])
+@pytest.mark.parametrize("scheme", [pytest.param("held_velocity", marks=pytest.mark.long), "local_steps"])
 def test_placements_give_what_one_rank_gives(tmp_path, scheme):
     one = history(tmp_path / "one", 1, scheme, "shared")
     for placement, ranks in (("shared", 2), ("disjoint", 3)):

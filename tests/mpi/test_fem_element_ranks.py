@@ -18,7 +18,7 @@ from reflowshock.fem.loads.load import half_sine_drop
 from reflowshock.fem.parallel.local_mesh import distribute
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.mesh import MeshData
-from reflowshock.fem.dynamics.central_difference import Motion
+from reflowshock.fem.dynamics.central_difference import ExplicitMotion
 from reflowshock.fem.division.tables import prepare
 from reflowshock.cases.hard.trials.boxes import KINDS, box
 
@@ -31,7 +31,7 @@ for name, kind in KINDS.items():
     body = make_body(comm, pieces, item.tables, np.ones(len(pieces.steps)))
     body.free[body.local.points[:, 0] < 1e-9] = False
     step = 0.9 * comm.allreduce(float(pieces.steps.min(initial=np.inf)), MPI.MIN)
-    motion = Motion(body, [half_sine_drop(1e4, 5e-5)], step, np.empty(0, np.int32), np.zeros(len(body.mass)))
+    motion = ExplicitMotion(body, [half_sine_drop(1e4, 5e-5)], step, np.empty(0, np.int32), np.zeros(len(body.mass)))
     for _ in range(100):
         motion.advance()
         motion.update_force()

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from reflowshock.fem.dynamics.central_difference import Motion
+from reflowshock.fem.dynamics.central_difference import ExplicitMotion
 from reflowshock.fem.loads.load import NodalForces, half_sine_drop
 from reflowshock.fem.loads.pulse import HalfSine
 from reflowshock.fem.materials.roles import Materials
@@ -25,7 +25,7 @@ def march(comm: MPI.Comm) -> tuple[np.ndarray, np.ndarray]:
     body = model.body
     nodes = np.arange(0, comm.allreduce(int(body.local.nodes.max()), MPI.MAX), 5)
     push = NodalForces.build(body, nodes, np.sin(np.arange(3 * len(nodes))).reshape(-1, 3), HalfSine(1.0, 1e-6))
-    motion = Motion(
+    motion = ExplicitMotion(
         body, [push, half_sine_drop(1e4, 1e-6)], model.window, np.empty(0, np.int32), np.zeros(len(body.mass))
     )
     motion.launch(np.array([1.0, 0.5, -0.3]))

@@ -81,12 +81,14 @@ def reference(assembly) -> dict[str, np.ndarray]:
     return history(assembly, (1, 1), "two_scale")
 
 
-@pytest.mark.parametrize("ranks", [(1, 2), (2, 1), (2, 2)])
+@pytest.mark.parametrize(
+    "ranks", [(1, 2), pytest.param((2, 1), marks=pytest.mark.long), pytest.param((2, 2), marks=pytest.mark.long)]
+)
 def test_two_scale_is_the_same_on_more_ranks(assembly, reference, ranks):
     assert_same(reference, history(assembly, ranks, "two_scale"))
 
 
-@pytest.mark.parametrize("ranks", [(1, 0), (1, 1), (1, 2), (2, 2)])
+@pytest.mark.parametrize("ranks", [(1, 0), (1, 1), (1, 2), pytest.param((2, 2), marks=pytest.mark.long)])
 def test_two_scale_is_the_same_when_ranks_carry_both_models(assembly, reference, ranks):
     assert_same(reference, history(assembly, ranks, "two_scale", "shared"))
 

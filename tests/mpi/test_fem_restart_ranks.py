@@ -34,10 +34,10 @@ def go(changes, name, checkpoints=None, windows=10**9):
     if comm == MPI.COMM_NULL:
         return folder / name
     left = iter(range(windows))
-    def some_windows(*crew):
+    def some_windows(*participants):
         if next(left, None) is None:
             raise Killed
-        run_window(*crew)
+        run_window(*participants)
     time_loop.run_window = some_windows
     (folder / name).mkdir(exist_ok=True)
     request = json.loads((folder / "input.json").read_text()) | changes["input"]

@@ -49,7 +49,7 @@ def held_velocity(assembly) -> dict[str, np.ndarray]:
     return history(assembly, "held_velocity", {"total": 1, "placement": "shared"})
 
 
-@pytest.mark.parametrize("scheme", ["gravouil_combescure", "impulse"])
+@pytest.mark.parametrize("scheme", ["gravouil_combescure", pytest.param("impulse", marks=pytest.mark.long)])
 def test_a_scheme_is_the_same_on_more_ranks_and_close_to_held_velocity(assembly, held_velocity, scheme):
     one = history(assembly, scheme, {"total": 1, "placement": "shared"})
     three = history(assembly, scheme, {"total": 3, "placement": "disjoint", "macro": 1})

@@ -44,7 +44,10 @@ def history(directory: Path, ranks: int, solver: str, dynamics: dict) -> dict[st
         return {name: array for name, array in arrays.items() if array.dtype.kind == "f"}
 
 
-@pytest.mark.parametrize(("solver", "dynamics"), [("explicit", DYNAMICS), ("implicit", DYNAMICS), ("explicit", FINITE)])
+@pytest.mark.parametrize(
+    ("solver", "dynamics"),
+    [("explicit", DYNAMICS), ("implicit", DYNAMICS), pytest.param("explicit", FINITE, marks=pytest.mark.long)],
+)
 def test_two_ranks_give_what_one_gives(tmp_path, solver, dynamics):
     one, two = (history(tmp_path / f"{ranks}", ranks, solver, dynamics) for ranks in (1, 2))
     assert "reaction@clamp" in one

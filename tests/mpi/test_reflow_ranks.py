@@ -8,7 +8,7 @@ import pytest
 
 from reflowshock.particles.core.geometry import JointGeometry
 from reflowshock.particles.parameters.solder import Solder, SolderNumerics
-from reflowshock.workflow.board_drop.reflow_pool import Job
+from reflowshock.workflow.reflow.joints import Job
 from reflowshock.workflow.reflow.pool import ReflowError
 from reflowshock.workflow.reflow.processes import Processes
 from reflowshock.workflow.reflow.ranks import Ranks

@@ -11,8 +11,8 @@ from tests.support.workflow_command import reflowshock
 WRITE = """
 import sys
 from pathlib import Path
-from reflowshock.workflow.report.page import write_report
-from reflowshock.workflow.store.store import read_case_of_run
+from reflowshock.workflow.pipeline.report import write_report
+from reflowshock.workflow.pipeline.points import read_case_of_run
 folder = Path(sys.argv[1])
 write_report(folder, read_case_of_run(folder), folder)
 """

@@ -8,7 +8,7 @@ import pytest
 
 from tests.support.workflow_command import reflowshock
 
-CRITICAL = ("shock.coupling.fine_joints=critical", "shock.coupling.critical_joints=1")
+CRITICAL = ("shock.ranks.total=1", "shock.coupling.fine_joints=critical", "shock.coupling.critical_joints=1")
 
 
 @pytest.fixture(scope="module")

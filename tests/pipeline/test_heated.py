@@ -61,6 +61,7 @@ def test_pads_joints_and_structure_tell_the_same(folder):
     )
 
 
+@pytest.mark.long
 def test_a_kill_in_the_midst_of_an_exchange_changes_nothing(folder, tmp_path):
     """Killed in the third exchange, by kill -9 of the stage: shapes and products are the same to the last bit."""
     line = command_line("run", tmp_path, "--until", "reflow", settings=HEATED)

@@ -9,7 +9,7 @@ import meshio
 import numpy as np
 import pytest
 
-from reflowshock.meshing.board.displacement import read_computed
+from reflowshock.meshing.board.displaced_assembly import read_computed
 from reflowshock.meshing.board.package_side import PackageSide
 from reflowshock.meshing.board.pads import read_pads
 from tests.support.mesh_file import MeshFile

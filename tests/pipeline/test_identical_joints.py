@@ -13,7 +13,12 @@ from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.pipeline.reader import read_case
 from tests.support.workflow_command import SMALL_CASE, reflowshock
 
-SETTINGS = ("shock.identical_joints=true", "shock.coupling.fine_joints=['A4']", "shock.numerics.modes=['two_scale']")
+SETTINGS = (
+    "shock.ranks.total=1",
+    "shock.identical_joints=true",
+    "shock.coupling.fine_joints=['A4']",
+    "shock.numerics.modes=['two_scale']",
+)
 
 
 @pytest.fixture(scope="module")

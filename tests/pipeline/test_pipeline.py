@@ -13,7 +13,7 @@ import psutil
 import pytest
 
 from reflowshock.particles.scenes.products import read_shapes
-from reflowshock.workflow.case.stage_table import BOARD_DROP
+from reflowshock.workflow.package.case import BOARD_DROP
 from tests.support.workflow_command import SMALL_CASE, break_off, command_line, reflowshock, wait_until
 
 NAMES = BOARD_DROP.names
@@ -96,8 +96,8 @@ def test_only_what_depends_on_a_value_is_rerun(run_folder):
     "setting",
     [
         "shock.pulse_duration=0.01 ms",
-        "package.joint_numerics.layers=5",
-        "board.thickness=1.1 mm",
+        pytest.param("package.joint_numerics.layers=5", marks=pytest.mark.long),
+        pytest.param("board.thickness=1.1 mm", marks=pytest.mark.long),
         "solder.gravity=0 m/s^2",
     ],
 )
@@ -136,7 +136,9 @@ def test_a_stage_that_is_broken_off_leaves_nothing_and_is_redone(run_folder):
     assert "shock" not in after and not (run_folder / "report.html").exists()
 
 
-@pytest.mark.parametrize(("end", "whom"), [(signal.SIGTERM, "command"), (signal.SIGKILL, "stage")])
+@pytest.mark.parametrize(
+    ("end", "whom"), [pytest.param(signal.SIGTERM, "command", marks=pytest.mark.long), (signal.SIGKILL, "stage")]
+)
 def test_a_reflow_that_is_broken_off_continues_to_the_same_bits(first_run, tmp_path, end, whom):
     folder = tmp_path / "small"
     break_off(command_line("run", folder), folder, end, whom)

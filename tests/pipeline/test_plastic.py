@@ -10,6 +10,7 @@ from tests.support.workflow_command import reflowshock
 
 # A pulse as short as the small case's hardly bends the board: only an absurd peak lets its solder yield.
 SETTINGS = (
+    "shock.ranks.total=1",
     "materials.solder=SAC405",
     "shock.peak_acceleration=300000 G",
     "shock.failure.peel_stress=100 MPa",

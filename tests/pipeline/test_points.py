@@ -10,9 +10,10 @@ from pathlib import Path
 import psutil
 import pytest
 
-from reflowshock.workflow.pipeline.stage_runner import Run, run_stage
-from reflowshock.workflow.stages import STAGE_FUNCTIONS
-from reflowshock.workflow.store.batch import Machine, missing, run_points
+from reflowshock.workflow.case.run import Run
+from reflowshock.workflow.jobs.batch import Machine, missing, run_points
+from reflowshock.workflow.pipeline.stage_runner import run_stage
+from reflowshock.workflow.stages import stage_function
 from reflowshock.workflow.store.folders import locked
 from reflowshock.workflow.store.store import Store
 from reflowshock.workflow.study.command import read_points_of, run_study
@@ -54,7 +55,7 @@ def test_a_study_is_computed_once_and_survives_a_kill(tmp_path):
     assert [job.stage for job in missing(store, [good, bad], "report")] == ["reflow", "report"]
 
     summary = json.loads((store.run_folder(good) / "summary.json").read_text())
-    stage, run = STAGE_FUNCTIONS["drop"]["reflow"], Run(tmp_path / "run", good.case, cores=1)
+    stage, run = stage_function(good.case, "reflow"), Run(tmp_path / "run", good.case, cores=1)
     record = run_stage("reflow", stage, run, tmp_path / store.product(good, "reflow").name)
     assert untimed(summary) == untimed(record)
     found = store.record(good, "reflow")

@@ -8,13 +8,18 @@ import numpy as np
 import pytest
 
 from reflowshock.workflow.board_drop.shock_cooling import begun
+from reflowshock.workflow.board_drop.stages import shock
 from reflowshock.workflow.case.problems import CaseError
+from reflowshock.workflow.case.run import Findings, Run
 from reflowshock.workflow.pipeline.reader import read_case
-from reflowshock.workflow.pipeline.stage_runner import Findings, Run
-from reflowshock.workflow.stages import shock
 from tests.support.workflow_command import SMALL_CASE
 
-COOLED = ("thermal.effects.residual_stress=on", "thermal.effects.flexible=off", "materials.solder=SAC405")
+COOLED = (
+    "shock.ranks.total=1",
+    "thermal.effects.residual_stress=on",
+    "thermal.effects.flexible=off",
+    "materials.solder=SAC405",
+)
 
 
 def shock_of(run_folder: Path, *settings: str) -> tuple[Path, Findings]:

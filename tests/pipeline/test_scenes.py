@@ -41,7 +41,9 @@ def run(name: str, folder: Path, *settings: str) -> subprocess.CompletedProcess:
     ("name", "setting", "own"),
     [
         ("sessile_drop", COARSE_DROP, CONTACT | {"height_error"}),
-        ("bga_ball", COARSE_DROP, CONTACT | {"height_error", "contact_angle_error"}),
+        pytest.param(
+            "bga_ball", COARSE_DROP, CONTACT | {"height_error", "contact_angle_error"}, marks=pytest.mark.long
+        ),
         ("laplace_drop", COARSE_DROP, {"height_error", "mean_pressure_error"}),
         ("solder_joint", COARSE_JOINT, CONTACT | {"waist", "waist_error", "axial_force", "axial_force_error"}),
     ],
@@ -59,7 +61,11 @@ def test_from_case_file_to_report(tmp_path, name, setting, own):
     assert "nothing to do" in run(name, tmp_path, setting).stdout
 
 
-@pytest.mark.parametrize("place", [(), ("drops.contact_angle=60 deg", "drops.distance=1.3 mm")], ids=["free", "wall"])
+@pytest.mark.parametrize(
+    "place",
+    [pytest.param((), marks=pytest.mark.long), ("drops.contact_angle=60 deg", "drops.distance=1.3 mm")],
+    ids=["free", "wall"],
+)
 def test_two_drops_from_case_file_to_report(tmp_path, place):
     result = run("coalescence", tmp_path, "drops.spacing=0.11 mm", "gravity=off", *place)
     summary = json.loads((tmp_path / "summary.json").read_text())
@@ -129,7 +135,13 @@ def rest_of_joint(case: JointCase) -> np.ndarray:
 @pytest.mark.parametrize(
     ("name", "settings", "at_rest", "end"),
     [
-        ("sessile_drop", ("drop.particles_per_edge=8", *short_steps(5)), rest_of_drop, signal.SIGKILL),
+        pytest.param(
+            "sessile_drop",
+            ("drop.particles_per_edge=8", *short_steps(5)),
+            rest_of_drop,
+            signal.SIGKILL,
+            marks=pytest.mark.long,
+        ),
         ("solder_joint", (COARSE_JOINT, *short_steps(1)), rest_of_joint, signal.SIGTERM),
     ],
 )

@@ -10,7 +10,7 @@ from pathlib import Path
 import psutil
 import pytest
 
-from reflowshock.workflow.cluster.checks import PLUGIN
+from reflowshock.workflow.jobs.checks import PLUGIN
 from tests.support.one_node_slurm import NoSlurm, OneNode, one_node_slurm
 from tests.support.workflow_command import wait_until
 
@@ -63,10 +63,7 @@ def test_stages_are_jobs_with_ranks_and_products_those_of_a_local_run(slurm, tmp
     line = command(slurm, STRUCTURE, tmp_path / "jobs", SHORT)
     first = run(slurm, line)
     assert first.returncode == 0, first.stdout + first.stderr
-    jobs = {
-        comment.removeprefix("rule_").partition("_wildcards_")[0].partition("_on_ranks")[0]: (state, tasks)
-        for _, state, tasks, comment, _ in slurm.queue()
-    }
+    jobs = {stage_of(comment): (state, tasks) for _, state, tasks, comment, _ in slurm.queue()}
     assert jobs == {"geometry": ("COMPLETED", "1"), "shock": ("COMPLETED", "2")}
     said = first.stdout
     assert "shock, explicit solver on 2 ranks" in said
@@ -83,7 +80,7 @@ def test_stages_are_jobs_with_ranks_and_products_those_of_a_local_run(slurm, tmp
     assert len(slurm.queue()) == len(jobs)
 
 
-@pytest.mark.parametrize("end", [signal.SIGTERM, signal.SIGKILL])
+@pytest.mark.parametrize("end", [pytest.param(signal.SIGTERM, marks=pytest.mark.long), signal.SIGKILL])
 def test_killed_command_leaves_no_job(slurm, tmp_path, end):
     folder = tmp_path / "run"
     before = len(slurm.queue())

@@ -11,10 +11,10 @@ from reflowshock.fem.coupling.self_check import self_check
 from reflowshock.fem.division.buffer import touching
 from reflowshock.fem.division.checks import check_division
 from reflowshock.fem.division.divide import cut_nodes, divide, held
-from reflowshock.fem.errors import CutError
+from reflowshock.fem.errors import CouplingError
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.mesh import MeshData, append
-from reflowshock.fem.parallel.exchange import CutChannels
+from reflowshock.fem.parallel.exchange import InterfaceChannels
 from reflowshock.fem.problem.shock import Coupling
 
 
@@ -28,11 +28,13 @@ def test_cut_through_copper_and_board_is_stable_in_local_steps():
     mesh = copper_cut()
     scene = surveyed(mesh, coupling=Coupling(scheme="local_steps", levels=1))
     division = divide(*scene)
-    at_cut = touching(mesh.cells, cut_nodes(mesh.cells, division.meso, len(mesh.points)))
-    assert {"board", "copper"} <= set(scene[1].role[at_cut & division.macro])
-    assert "copper" in scene[1].role[at_cut & division.meso]
+    at_interface = touching(mesh.cells, cut_nodes(mesh.cells, division.meso, len(mesh.points)))
+    assert {"board", "copper"} <= set(scene[1].role[at_interface & division.macro])
+    assert "copper" in scene[1].role[at_interface & division.meso]
     assert radius(mesh, "local_steps") <= 1 + 1e-8
-    with pytest.raises(CutError, match=r"must belong to the board, found \d+ of copper.*local_steps may cut there"):
+    with pytest.raises(
+        CouplingError, match=r"must belong to the board, found \d+ of copper.*with scheme = local_steps"
+    ):
         check_division(*scene[:2], held(*scene, division.meso), scene[2])
 
 
@@ -46,8 +48,8 @@ def test_meso_model_in_a_corner_touches_two_faces_and_an_edge():
     division = divide(*scene)
     check_division(*scene[:2], division, scene[2])
     mesh = scene[0].mesh
-    cut = mesh.points[cut_nodes(mesh.cells, division.meso, len(mesh.points))]
-    on_faces = np.abs(cut[:, :2]) < 1e-12
+    interface = mesh.points[cut_nodes(mesh.cells, division.meso, len(mesh.points))]
+    on_faces = np.abs(interface[:, :2]) < 1e-12
     assert on_faces.any(axis=0).all()
     assert on_faces.all(axis=1).any()
     buffer = division.meso & scene[2].coarse
@@ -69,17 +71,21 @@ def test_points_a_little_outside_the_interface_are_tied_exactly(off):
     assert 0.0 < scene[0].moved < 2e-9
     models = models_of(append([board(), foot]), Materials(), Coupling(scheme="held_velocity"), 0.9)
     bodies = models.bodies()
-    channels = CutChannels.open(MPI.COMM_SELF, bodies["macro"].cut, bodies["meso"].cut, receiver_waits=False)
+    channels = InterfaceChannels.open(
+        MPI.COMM_SELF, bodies["macro"].interface, bodies["meso"].interface, receiver_waits=False
+    )
     checked = self_check(MPI.COMM_SELF, bodies, channels)
     checked.judge()
     assert max(checked.rigid, checked.linear, checked.tie, checked.cut) < 1e-12
-    assert checked.interface_mass > 0.0
+    assert checked.cut_mass > 0.0
 
 
 def test_self_check_sees_a_weight_that_is_wrong():
     models = models_of(append([board(), joint(0.5e-3, 0.5e-3)]), Materials(), Coupling(scheme="held_velocity"), 0.9)
     bodies = models.bodies()
-    channels = CutChannels.open(MPI.COMM_SELF, bodies["macro"].cut, bodies["meso"].cut, receiver_waits=False)
+    channels = InterfaceChannels.open(
+        MPI.COMM_SELF, bodies["macro"].interface, bodies["meso"].interface, receiver_waits=False
+    )
     bodies["meso"].tie.weight[0] += [1e-9, -1e-9, 0.0, 0.0]
     checked = self_check(MPI.COMM_SELF, bodies, channels)
     assert min(checked.linear, checked.tie) > 1e-12

@@ -28,16 +28,16 @@ def gap(coupled: Coupled) -> np.ndarray:
     """Return the gap at the cut (nc, 3) [m], each side's displacement plus (step / 2)^2 times its acceleration."""
     moved = []
     for part in coupled.parts:
-        motion, cut = part.motion, part.motion.body.cut
-        moved.append(motion.displacement[cut] + 0.25 * motion.step**2 * motion.acceleration(cut))
+        motion, interface = part.motion, part.motion.body.interface
+        moved.append(motion.displacement[interface] + 0.25 * motion.step**2 * motion.acceleration(interface))
     return moved[0] - moved[1]
 
 
 def link_momentum(coupled: Coupled) -> np.ndarray:
     """Return the momentum (6,) that the gap at the cut stands for."""
     body = coupled.macro.motion.body
-    impulse = 2.0 * body.mass[body.cut, None] / coupled.plan.window * gap(coupled)
-    return net_load(body.local.points[body.cut], impulse)
+    impulse = 2.0 * body.mass[body.interface, None] / coupled.plan.window * gap(coupled)
+    return net_load(body.local.points[body.interface], impulse)
 
 
 @pytest.mark.parametrize("pair", [Pair(5, 10.0, 2, free=True), Pair(40, 0.1, 8, free=True)], ids=["stiff", "soft"])

@@ -11,7 +11,7 @@ from mpi4py import MPI
 from reflowshock.fem.division import chebyshev
 from reflowshock.fem.division.chebyshev import Substeps
 from reflowshock.fem.division.choose_levels import Pace, governing_steps, least_steps
-from reflowshock.fem.dynamics.central_difference import Motion
+from reflowshock.fem.dynamics.central_difference import ExplicitMotion
 from reflowshock.fem.loads.damping import RayleighDamping
 from reflowshock.fem.materials.library import SAC405
 from reflowshock.fem.materials.parameters import Isotropic
@@ -130,7 +130,7 @@ def test_mesh_ratios_do_not_grow(edges):
 def test_energy_stays_over_many_windows():
     model = levelled(joint_on_board(solder=4), Materials(), (5, 3))
     body = model.body
-    motion = Motion(body, [], model.window, np.empty(0, np.int32), np.zeros(len(body.mass)))
+    motion = ExplicitMotion(body, [], model.window, np.empty(0, np.int32), np.zeros(len(body.mass)))
     motion.launch(np.array([1.0, 0.5, -0.3]))
     found = []
     for _ in range(50):
@@ -146,7 +146,7 @@ def test_damping_takes_the_energy_that_is_missing(damping):
     """As strong as levels bear: the highest modes, to which it does most, must fall as well."""
     model = levelled(joint_on_board(solder=4), Materials(), (5, 3), damping=damping)
     loads = [RayleighDamping.build(model.body, (0.0, damping * model.window))]
-    motion = Motion(model.body, loads, model.window, np.empty(0, np.int32), np.zeros(len(model.body.mass)))
+    motion = ExplicitMotion(model.body, loads, model.window, np.empty(0, np.int32), np.zeros(len(model.body.mass)))
     motion.launch(np.array([1.0, 0.5, -0.3]))
     held = []
     for _ in range(40):

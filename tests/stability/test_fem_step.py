@@ -6,9 +6,9 @@ from mpi4py import MPI
 
 from reflowshock.cases.hard.trials.bodies import dns_body
 from reflowshock.cases.hard.trials.grids import grid, mesh_of, on
-from reflowshock.fem.dynamics.central_difference import Motion
-from reflowshock.fem.dynamics.energy_balance import Ledger, ledger_sums
-from reflowshock.fem.dynamics.participant import Alone, uncut_motion
+from reflowshock.fem.dynamics.central_difference import ExplicitMotion
+from reflowshock.fem.dynamics.energy_balance import EnergyBalance, energy_sums
+from reflowshock.fem.dynamics.participant import Alone, explicit_motion
 from reflowshock.fem.errors import EnergyError
 from reflowshock.fem.estimates.estimate import WindowPlan, damped_critical_step
 from reflowshock.fem.loads.damping import RayleighDamping
@@ -48,13 +48,13 @@ def estimates(name: str) -> tuple[Body, dict[str, float]]:
     return body, {"element": element, "power_iteration": found.critical_step}
 
 
-def random_start(motion: Motion) -> None:
+def random_start(motion: ExplicitMotion) -> None:
     """Put energy into all modes alike."""
     noise = np.random.default_rng(3).normal(size=motion.velocity.shape)
     motion.velocity[:] = np.where(motion.mobility > 0.0, noise * np.sqrt(motion.mobility), 0.0)
 
 
-def energy_of(motion: Motion) -> float:
+def energy_of(motion: ExplicitMotion) -> float:
     return motion.kinetic_energy() + motion.internal_energy().total
 
 
@@ -62,7 +62,7 @@ def energy_of(motion: Motion) -> float:
 @pytest.mark.parametrize("estimate", ["element", "power_iteration"])
 def test_energy_stays_for_1e5_steps_at_99_percent(name, estimate):
     body, steps = estimates(name)
-    motion = uncut_motion(body, [], 0.99 * steps[estimate])
+    motion = explicit_motion(body, [], 0.99 * steps[estimate])
     random_start(motion)
     before, seen = energy_of(motion), []
     for _ in range(100):
@@ -76,13 +76,13 @@ def test_energy_stays_for_1e5_steps_at_99_percent(name, estimate):
 
 def steps_until_stopped(body: Body, step: float, loads: list[Load], critical: float) -> tuple[int, str]:
     """March as a run does, with a look at the ledger now and then; return when it was stopped, and why."""
-    participant = Alone(uncut_motion(body, loads, step), WindowPlan(50 * step, 50, 20, 1))
-    ledger = Ledger(limit=0.02, trivial=0.0, step=step, critical=critical)
-    ledger.judge(ledger_sums(participant, 0.0), 0.0)
+    participant = Alone(explicit_motion(body, loads, step), WindowPlan(50 * step, 50, 20, 1))
+    balance = EnergyBalance(limit=0.02, trivial=0.0, step=step, critical=critical)
+    balance.judge(energy_sums(participant, 0.0), 0.0)
     for window in range(1, 21):
         participant.begin_window()
         try:
-            ledger.judge(ledger_sums(participant, 0.0), participant.motion.time)
+            balance.judge(energy_sums(participant, 0.0), participant.motion.time)
         except EnergyError as error:
             return 50 * window, str(error)
     return 10**9, ""

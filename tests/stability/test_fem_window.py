@@ -10,7 +10,7 @@ import pytest
 from reflowshock.cases.hard.trials.coupled import surveyed
 from reflowshock.cases.hard.trials.grids import grid, joint_mesh, mesh_of, on
 from reflowshock.fem.division.checks import check_division
-from reflowshock.fem.errors import CutError
+from reflowshock.fem.errors import CouplingError
 from reflowshock.fem.materials.library import SAC405, SILICON
 from reflowshock.fem.materials.parameters import Isotropic
 from reflowshock.fem.materials.roles import Materials
@@ -62,7 +62,7 @@ def test_fine_elements_at_the_cut_do_grow_when_the_window_ignores_them():
 
 def test_joint_one_layer_above_the_cut_is_refused():
     scene = surveyed(with_joint(board(np.linspace(-1e-3, 0, 5), -0.25e-3)))
-    with pytest.raises(CutError, match="at least two layers"):
+    with pytest.raises(CouplingError, match="at least two layers"):
         check_division(*scene[:2], by_patch(*scene), scene[2])
 
 
@@ -74,5 +74,5 @@ def test_elements_of_other_parts_at_the_cut_are_refused():
     same, lower = np.nonzero((np.abs(lid.points[:, None] - base.points) < 1e-9).all(axis=2))
     mesh, _ = merge_nodes(mesh, (same + len(base.points)).astype(np.int32), lower.astype(np.int32))
     scene = surveyed(mesh)
-    with pytest.raises(CutError, match=r"must belong to the board, found \d+ of die"):
+    with pytest.raises(CouplingError, match=r"must belong to the board, found \d+ of die"):
         check_division(*scene[:2], by_patch(*scene), scene[2])

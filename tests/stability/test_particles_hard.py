@@ -27,7 +27,7 @@ def check(flow, run, exact, tolerance):
     assert run.profiles[-1].max_width == pytest.approx(exact.max_width, rel=tolerance)
 
 
-@pytest.mark.parametrize(("degrees", "count"), [(5.0, 6), (175.0, 7)])
+@pytest.mark.parametrize(("degrees", "count"), [pytest.param(5.0, 6, marks=pytest.mark.long), (175.0, 7)])
 def test_a_film_and_a_ball_that_hardly_touches(degrees, count):
     angle = np.radians(degrees)
     angles = {"pad_contact_angle": angle, "mask_contact_angle": np.radians(179.0)}

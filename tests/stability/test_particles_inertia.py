@@ -27,7 +27,7 @@ def spread(per_edge, degrees=60.0, end=0.1, **values):
     return metrics, np.array([record.energy for record in run.records])
 
 
-@pytest.mark.parametrize("degrees", [30, 120])
+@pytest.mark.parametrize("degrees", [pytest.param(30, marks=pytest.mark.long), 120])
 def test_a_drop_comes_to_rest_as_the_cap(degrees):
     """The values of Hu et al. at 100 times the capillary limit, 125 particles."""
     metrics, energy = spread(5, degrees)
@@ -45,7 +45,9 @@ def test_thin_and_thick_liquids(viscosity):
     assert energy.max() == energy[0]
 
 
-@pytest.mark.parametrize("wall", [{"wall": "no-slip"}, {"wall": "slip", "slip_length": 5e-5}])
+@pytest.mark.parametrize(
+    "wall", [pytest.param({"wall": "no-slip"}, marks=pytest.mark.long), {"wall": "slip", "slip_length": 5e-5}]
+)
 def test_walls_that_hold_the_liquid_do_not_change_the_rest(wall):
     metrics, _ = spread(5, **wall)
     assert abs(metrics["height_error"]) < 0.015

@@ -89,7 +89,7 @@ def test_too_little_solder_for_any_neck_stays_on_the_board_and_is_open():
     assert abs(shape.metrics["volume_drift"][0]) < 1e-6
 
 
-@pytest.mark.parametrize("properties", ["physical", "paper"])
+@pytest.mark.parametrize("properties", ["physical", pytest.param("paper", marks=pytest.mark.long)])
 def test_inertia_never_gains_energy(properties):
     """With inertia and no viscosity from a violent start: the energy falls, that of the motion included."""
     values = {"physical": {}, "paper": {"surface_tension": 4.985, "viscosity": 0.227}}[properties]

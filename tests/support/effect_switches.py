@@ -12,13 +12,13 @@ from mpi4py import MPI
 
 from reflowshock.cases.hard.trials.bodies import dns_body, motion_of, nonlinear_body
 from reflowshock.cases.hard.trials.grids import grid, mesh_of, on
-from reflowshock.fem.dynamics.central_difference import Motion
+from reflowshock.fem.dynamics.central_difference import ExplicitMotion
 from reflowshock.fem.loads.load import DOWN, BodyAcceleration, Load
 from reflowshock.fem.loads.pulse import HalfSine
 from reflowshock.fem.loads.shock_loads import shock_loads
 from reflowshock.fem.materials.library import FR4
 from reflowshock.fem.materials.parameters import Material
-from reflowshock.fem.model.assembly import Response
+from reflowshock.fem.model.assembly import ForceOptions
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.problem.shock import Shock
 from reflowshock.particles.core.cloud import box_cloud
@@ -82,7 +82,7 @@ def strip(kinematics: str = "small", material: Material = FR4) -> tuple[Body, fl
     if kinematics == "small" and material is FR4:
         body, critical = dns_body(mesh)
     else:
-        body, critical = nonlinear_body(mesh, material, Response(kinematics))
+        body, critical = nonlinear_body(mesh, material, ForceOptions(kinematics))
     return body, 0.5 * critical
 
 
@@ -92,7 +92,7 @@ def loads_of(body: Body, wanted: Shock) -> list[Load]:
     return shock_loads(MPI.COMM_SELF, float(body.mass.sum()), body, tables, wanted)
 
 
-def moved(body: Body, step: float, loads: list[Load], duration: float) -> tuple[Motion, float]:
+def moved(body: Body, step: float, loads: list[Load], duration: float) -> tuple[ExplicitMotion, float]:
     """Return the motion after a duration [s], and the largest deflection of its middle [m] until then."""
     motion, largest = motion_of(body, step, loads), 0.0
     middle = np.argmin(np.abs(body.local.points[:, 0] - 0.5 * LENGTH))
@@ -102,7 +102,7 @@ def moved(body: Body, step: float, loads: list[Load], duration: float) -> tuple[
     return motion, largest
 
 
-def step_of(motion: Motion) -> None:
+def step_of(motion: ExplicitMotion) -> None:
     """Take a step of a motion."""
     motion.advance()
     motion.update_force()

@@ -12,7 +12,7 @@ from reflowshock.fem.division.tables import prepare
 from reflowshock.fem.elements.element import element_stiffness
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.mesh import MeshData, append
-from reflowshock.fem.model.assembly import Response, make_body, make_pieces
+from reflowshock.fem.model.assembly import ForceOptions, make_body, make_pieces
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.parallel.local_mesh import distribute
 
@@ -61,7 +61,7 @@ def levelled(
     tables = replace(item.tables, level=level, ratios=ratios)
     pieces = make_pieces(distribute(comm, item.mesh if comm.rank == 0 else None), item.tables, materials)
     factor = np.ones(len(pieces.steps))
-    body = make_body(comm, pieces, tables, factor, Response("small", window, damping * window))
+    body = make_body(comm, pieces, tables, factor, ForceOptions("small", window, damping * window))
     plain = make_body(comm, pieces, item.tables, factor)
     return Levelled(body, plain, level[pieces.local.cell_numbers], ratios, window)
 

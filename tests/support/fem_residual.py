@@ -11,7 +11,7 @@ from reflowshock.fem.division.tables import joined, model_inputs
 from reflowshock.fem.materials.parameters import Material
 from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.mesh.supports import SYMMETRY
-from reflowshock.fem.model.assembly import Response, make_body, make_pieces
+from reflowshock.fem.model.assembly import ForceOptions, make_body, make_pieces
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.stress_recovery import StressRecovery
 from reflowshock.fem.parallel.local_mesh import distribute
@@ -19,7 +19,7 @@ from reflowshock.fem.run.cooling import pinned
 from reflowshock.fem.statics.equilibrium import Equilibrium, Statics, thermal_force
 from reflowshock.fem.statics.initial_state import begun
 
-SMALL = Response()
+SMALL = ForceOptions()
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ def cooled(
     materials: Mapping[str, Material],
     change: float,
     formulation: str = "incompatible_modes",
-    response: Response = SMALL,
+    response: ForceOptions = SMALL,
 ) -> Cooled:
     """Cool a mesh on its planes of symmetry, and let it begin with the stress."""
     item = pinned(model_inputs(joined(mesh), "dns", SYMMETRY)["dns"])

@@ -4,7 +4,8 @@ import shutil
 from collections.abc import Iterable
 from pathlib import Path
 
-from reflowshock.workflow.pipeline.stage_runner import Findings, Run, run_stage
+from reflowshock.workflow.case.run import Findings, Run
+from reflowshock.workflow.pipeline.stage_runner import run_stage
 from reflowshock.workflow.store.point import Point
 from reflowshock.workflow.store.product import seal
 from reflowshock.workflow.store.store import Store

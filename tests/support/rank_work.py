@@ -6,8 +6,8 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from reflowshock.workflow.board_drop import reflow_pool
-from reflowshock.workflow.board_drop.reflow_pool import Job, records
+from reflowshock.workflow.reflow import joints as reflow_pool
+from reflowshock.workflow.reflow.joints import Job, records
 
 __all__ = ["records"]
 

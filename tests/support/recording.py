@@ -1,4 +1,4 @@
-"""Messages across the cut written down, and given again: one side of a coupled run alone, to the same bits.
+"""Messages across the interface written down, and given again: one side of a coupled run alone, to the same bits.
 
 A participant of any scheme takes its channels at the start and knows nothing else of its partner, so that what it
 received is all that it needs. What it sends again is compared with what it sent.
@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reflowshock.fem.errors import RecordingError
-from reflowshock.fem.parallel.exchange import CutChannels, MessageClock, Messages
+from reflowshock.fem.parallel.exchange import InterfaceChannels, MessageClock, Messages
 
 CHANNELS, WAYS = ("velocities", "forces"), ("sent", "received")
 
@@ -22,7 +22,7 @@ class Recorded:
 
     Attributes:
         channel: The channel.
-        rows: Local cut nodes of the participant.
+        rows: Local interface nodes of the participant.
         sent: Values ``(k, 3)`` at them, message by message; ``received`` as well.
     """
 
@@ -56,7 +56,7 @@ class Replayed:
     """A channel that gives what was received once.
 
     Attributes:
-        rows: Local cut nodes of the participant.
+        rows: Local interface nodes of the participant.
         sent: Values ``(w, k, 3)`` of the recorded messages, and ``received``.
         deviation: Largest difference of what is sent now from what was sent then.
     """
@@ -90,12 +90,12 @@ class Replayed:
         return messages[number]
 
 
-def record(channels: CutChannels, rows: NDArray[np.int32]) -> CutChannels:
-    """Return channels for one participant that write down what goes through them; ``rows`` are its local cut nodes."""
-    return CutChannels(Recorded(channels.velocities, rows), Recorded(channels.forces, rows))
+def record(channels: InterfaceChannels, rows: NDArray[np.int32]) -> InterfaceChannels:
+    """Return channels of a participant that record what goes through them; ``rows`` are its local interface nodes."""
+    return InterfaceChannels(Recorded(channels.velocities, rows), Recorded(channels.forces, rows))
 
 
-def save_recording(channels: CutChannels, path: Path) -> None:
+def save_recording(channels: InterfaceChannels, path: Path) -> None:
     """Write what channels of ``record`` have written down (``.npz``)."""
     arrays = {}
     for name in CHANNELS:
@@ -105,16 +105,16 @@ def save_recording(channels: CutChannels, path: Path) -> None:
     np.savez(path, **arrays)
 
 
-def replay(path: Path, rows: NDArray[np.int32]) -> CutChannels:
-    """Return channels that give again what a participant with the same cut nodes received.
+def replay(path: Path, rows: NDArray[np.int32]) -> InterfaceChannels:
+    """Return channels that give again what a participant with the same interface nodes received.
 
     Raises:
-        RecordingError: The recording is of another cut.
+        RecordingError: The recording is of another interface.
     """
     with np.load(path) as arrays:
         sent, received = ({name: arrays[f"{name}_{way}"] for name in CHANNELS} for way in WAYS)
     count = sent["forces"].shape[1]
     if count != len(rows):
-        raise RecordingError(f"{path} is of a cut of {count} nodes, this one has {len(rows)}")
+        raise RecordingError(f"{path} is of an interface of {count} nodes, this one has {len(rows)}")
     velocities, forces = (Replayed(rows, sent[name], received[name]) for name in CHANNELS)
-    return CutChannels(velocities, forces)
+    return InterfaceChannels(velocities, forces)

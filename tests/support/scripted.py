@@ -1,7 +1,7 @@
 """Participants that are functions: in place of a macro or a meso model, for tests and for finding faults.
 
 They go through the windows of ``held_velocity`` (``local_steps`` too), or of ``one_way``, with a real partner. Their
-cut nodes are numbered as those of the partner's cut: its number k is their node k.
+interface nodes are numbered as those of the partner's interface: its number k is their node k.
 """
 
 from collections.abc import Callable
@@ -10,33 +10,33 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reflowshock.fem.estimates.estimate import WindowPlan
-from reflowshock.fem.parallel.exchange import CutChannels
+from reflowshock.fem.parallel.exchange import InterfaceChannels
 
-# Velocity of the cut [m/s] from time [s] and points (nc, 3) [m]; force on it [N] from time, displacement and velocity.
+# Velocity of the interface [m/s] from time [s] and points (nc, 3) [m]; force [N] from time, displacement, velocity.
 VelocityScript = Callable[[float, NDArray[np.float64]], NDArray[np.float64]]
 ForceScript = Callable[[float, NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]]
 
 
-def scripted_cut(count: int) -> NDArray[np.int32]:
-    """Return the numbers of the cut nodes of a scripted participant, for ``CutChannels.open``."""
+def scripted_interface(count: int) -> NDArray[np.int32]:
+    """Return the numbers of the interface nodes of a scripted participant, for ``InterfaceChannels.open``."""
     return np.arange(count, dtype=np.int32)
 
 
 class ScriptedDriver:
-    """A macro model that moves the cut and takes nothing back, as ``one_way.Driver``.
+    """A macro model that moves the interface and takes nothing back, as ``one_way.Driver``.
 
     Attributes:
         time: [s].
     """
 
     def __init__(
-        self, points: NDArray[np.float64], velocity: VelocityScript, plan: WindowPlan, channels: CutChannels
+        self, points: NDArray[np.float64], velocity: VelocityScript, plan: WindowPlan, channels: InterfaceChannels
     ) -> None:
         """Start at time zero.
 
         Args:
-            points: ``(nc, 3)`` [m] the cut nodes.
-            velocity: Of the cut; asked for at the middle of each window.
+            points: ``(nc, 3)`` [m] the interface nodes.
+            velocity: Of the interface; asked for at the middle of each window.
             plan: Windows.
             channels: To the meso model.
         """
@@ -44,7 +44,7 @@ class ScriptedDriver:
         self._plan, self._channels = plan, channels
 
     def begin_window(self) -> None:
-        """Send the cut's velocity."""
+        """Send the interface's velocity."""
         middle = self.time + 0.5 * self._plan.window
         self._channels.velocities.send(np.broadcast_to(self._velocity(middle, self._points), self._points.shape).copy())
         self.time += self._plan.window
@@ -54,15 +54,15 @@ class ScriptedDriver:
 
 
 class ScriptedMacro(ScriptedDriver):
-    """A macro model that moves the cut, as ``held_velocity.Macro``.
+    """A macro model that moves the interface, as ``held_velocity.Macro``.
 
     Attributes:
-        mass: ``(nc, 3)`` [kg] of the meso model at the cut.
+        mass: ``(nc, 3)`` [kg] of the meso model at the interface.
         force: ``(nc, 3)`` [N] that it has given back last.
     """
 
     def __init__(
-        self, points: NDArray[np.float64], velocity: VelocityScript, plan: WindowPlan, channels: CutChannels
+        self, points: NDArray[np.float64], velocity: VelocityScript, plan: WindowPlan, channels: InterfaceChannels
     ) -> None:
         """Receive the interface mass; a ``held_velocity.Meso`` must have sent it. Arguments as ``ScriptedDriver``."""
         super().__init__(points, velocity, plan, channels)
@@ -79,16 +79,18 @@ class ScriptedMeso:
 
     Attributes:
         time: [s].
-        displacement: ``(nc, 3)`` [m] of the cut, ``velocity`` [m/s] that over the window.
+        displacement: ``(nc, 3)`` [m] of the interface, ``velocity`` [m/s] that over the window.
         force: ``(nc, 3)`` [N] that was given back last.
     """
 
-    def __init__(self, mass: NDArray[np.float64], force: ForceScript, plan: WindowPlan, channels: CutChannels) -> None:
+    def __init__(
+        self, mass: NDArray[np.float64], force: ForceScript, plan: WindowPlan, channels: InterfaceChannels
+    ) -> None:
         """Send the interface mass and start at rest.
 
         Args:
-            mass: ``(nc,)`` [kg] at the cut.
-            force: On the cut; asked for at the end of each window.
+            mass: ``(nc,)`` [kg] at the interface.
+            force: On the interface; asked for at the end of each window.
             plan: Windows.
             channels: To the macro model.
         """
@@ -97,7 +99,7 @@ class ScriptedMeso:
         channels.forces.send(np.repeat(mass[:, None], 3, axis=1))
 
     def begin_window(self) -> None:
-        """Move with the received velocity of the cut, then send the force on it."""
+        """Move with the received velocity of the interface, then send the force on it."""
         self._channels.velocities.receive(self.velocity)
         self.displacement += self._plan.window * self.velocity
         self.time += self._plan.window

@@ -1,4 +1,4 @@
-"""Hourglass energy of one-point hexahedra: what the ledger shows is what the hourglass stiffness holds."""
+"""Hourglass energy of one-point hexahedra: what the energy balance shows is what the hourglass stiffness holds."""
 
 import numpy as np
 import pytest

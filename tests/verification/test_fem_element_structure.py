@@ -51,7 +51,7 @@ def test_linear_tetrahedra_are_too_stiff(runs):
     )
 
 
-def test_hourglass_energy_is_in_the_ledger_of_one_point_elements_only(runs):
+def test_hourglass_energy_is_in_the_energy_balance_of_one_point_elements_only(runs):
     for name, run in runs.items():
         assert (run["hourglass"].max() > 0.0) == (name == "one_point")
     ours, theirs = runs["one_point"], runs["incompatible_modes"]

@@ -5,7 +5,7 @@ import pytest
 
 from reflowshock.cases.hard.trials.bodies import dns_body, motion_of
 from reflowshock.cases.hard.trials.grids import grid, mesh_of, on
-from reflowshock.fem.dynamics.central_difference import Motion
+from reflowshock.fem.dynamics.central_difference import ExplicitMotion
 from reflowshock.fem.loads.follower_pressure import FollowerPressure
 from reflowshock.fem.loads.load import NodalForces
 from reflowshock.fem.loads.pulse import Constant
@@ -23,14 +23,14 @@ def cube() -> MeshData:
     return mesh_of(points, cells, "board", SIDES)
 
 
-def pressed(names) -> tuple[MeshData, Motion, list[FollowerPressure]]:
+def pressed(names) -> tuple[MeshData, ExplicitMotion, list[FollowerPressure]]:
     mesh = cube()
     body, critical = dns_body(mesh, STEEL)
     loads = [FollowerPressure.build(body, outward_facets(mesh, name), Constant(PRESSURE)) for name in names]
     return mesh, motion_of(body, 0.5 * critical, loads), loads
 
 
-def force_of(load, motion: Motion) -> np.ndarray:
+def force_of(load, motion: ExplicitMotion) -> np.ndarray:
     before = motion.force.copy()
     load.add(motion)
     return motion.force - before

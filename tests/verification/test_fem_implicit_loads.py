@@ -1,4 +1,4 @@
-"""All loads and damping in implicit steps: the ledger is exact to round-off, the motion that of explicit steps."""
+"""All loads and damping in implicit steps: energy balance exact to round-off, motion that of explicit steps."""
 
 import numpy as np
 import pytest
@@ -7,7 +7,7 @@ from mpi4py import MPI
 from reflowshock.cases.hard.trials.bodies import dns_body, motion_of
 from reflowshock.fem.dynamics.implicit import ImplicitMotion
 from reflowshock.fem.dynamics.modal import natural_modes
-from reflowshock.fem.dynamics.moving import Moving
+from reflowshock.fem.dynamics.motion import Motion
 from reflowshock.fem.loads.damping import RayleighDamping
 from reflowshock.fem.loads.load import Load
 from reflowshock.fem.mesh.mesh import MeshData
@@ -37,14 +37,14 @@ def test_energy_is_exact(kind, fraction, alpha):
     assert error < (1e-8 if kind == "large_mass" else 1e-10) * work
 
 
-def run(motion: Moving, end: float) -> Moving:
+def run(motion: Motion, end: float) -> Motion:
     while motion.time < end - 0.5 * motion.step:
         motion.advance()
         motion.update_force()
     return motion
 
 
-def shape_of(motion: Moving) -> np.ndarray:
+def shape_of(motion: Motion) -> np.ndarray:
     return motion.displacement - motion.base_displacement()
 
 
@@ -69,7 +69,7 @@ def test_motion_is_that_of_small_explicit_steps(kind):
         assert values == pytest.approx(reference, abs=0.01 * max(np.abs(reference).max(), least))
 
 
-def test_initial_velocity_starts_the_ledger():
+def test_initial_velocity_starts_the_energy_balance():
     body, _, critical = model("damped")
     motion = ImplicitMotion(MPI.COMM_SELF, body, [], 2 * critical)
     motion.launch(np.array([1.0, 0.0, 0.0]))

@@ -12,18 +12,18 @@ from reflowshock.cases.hard.trials.coupled import Coupled, Models, pieces_of
 from reflowshock.fem.coupling.scheme import scheme_of
 from reflowshock.fem.division.division import Division
 from reflowshock.fem.division.tables import joined, model_inputs
-from reflowshock.fem.dynamics.central_difference import Motion
+from reflowshock.fem.dynamics.central_difference import ExplicitMotion
 from reflowshock.fem.estimates.estimate import WindowPlan
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.tie import net_load
-from reflowshock.fem.model.step_levels import Levels, LocalSteps
+from reflowshock.fem.model.step_levels import Levels, SubsteppedElements
 from tests.support.fem_bodies import dense_stiffness
 from tests.support.fem_levels import Levelled, joint_on_board, levelled
 
 MESH = joint_on_board(solder=4)
 
 
-def released(model: Levelled, displacement: np.ndarray, step: float) -> Motion:
+def released(model: Levelled, displacement: np.ndarray, step: float) -> ExplicitMotion:
     """Return the motion of a body of a model, let go at rest at a displacement (n, 3)."""
     motion = motion_of(model.body, step)
     motion.displacement[:] = displacement
@@ -34,7 +34,7 @@ def released(model: Levelled, displacement: np.ndarray, step: float) -> Motion:
 
 def at_step(model: Levelled, step: float) -> Levelled:
     """Return a model with the same levels at another window."""
-    levels = LocalSteps.build(MPI.COMM_SELF, model.body, Levels(model.level, model.ratios, step))
+    levels = SubsteppedElements.build(MPI.COMM_SELF, model.body, Levels(model.level, model.ratios, step))
     return replace(model, body=replace(model.body, terms=[*model.body.terms[:-1], levels]), window=step)
 
 

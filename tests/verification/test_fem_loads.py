@@ -6,11 +6,11 @@ from mpi4py import MPI
 
 from reflowshock.cases.hard.trials.bodies import dns_body, motion_of
 from reflowshock.cases.hard.trials.grids import grid, mesh_of, on
-from reflowshock.fem.dynamics.central_difference import Motion
+from reflowshock.fem.dynamics.central_difference import ExplicitMotion
 from reflowshock.fem.estimates.estimate import damped_critical_step
 from reflowshock.fem.loads.damping import RayleighDamping
 from reflowshock.fem.loads.large_mass import LargeMass
-from reflowshock.fem.loads.load import BodyAcceleration, Load, NodalForces, PrescribedMotion
+from reflowshock.fem.loads.load import BodyAcceleration, Load, NodalForces, PrescribedVelocity
 from reflowshock.fem.loads.pulse import Constant, HalfSine
 from reflowshock.fem.materials.parameters import Isotropic
 from reflowshock.fem.mesh.facet_areas import outward_areas
@@ -31,13 +31,13 @@ def bar(held: bool, elements: int = 10) -> MeshData:
     return mesh_of(points, cells, "board", facets | {"low": on(0, 0.0), "high": on(0, LENGTH)})
 
 
-def total_energy(motion: Motion) -> float:
+def total_energy(motion: ExplicitMotion) -> float:
     """Return all energy that is there or was taken, minus the external work."""
     held = motion.internal_energy()
     return motion.kinetic_energy() + held.total + motion.damping_energy - motion.external_work
 
 
-def largest_imbalance(motion: Motion, steps: int) -> tuple[float, float]:
+def largest_imbalance(motion: ExplicitMotion, steps: int) -> tuple[float, float]:
     """Return the largest change of the total energy and the largest external work."""
     start, error, work = total_energy(motion), 0.0, 0.0
     for _ in range(steps):
@@ -62,7 +62,7 @@ def loads_of(kind: str, body: Body, mesh: MeshData, stiffness: float) -> list[Lo
     if kind == "pressure":
         return [pressure(body, mesh, Constant(1e6)), BodyAcceleration(ALONG, Constant(9.81))]
     if kind == "motion":
-        return [PrescribedMotion(low_nodes(body, mesh), 0, Constant(1.0)), BodyAcceleration(ALONG, pulse)]
+        return [PrescribedVelocity(low_nodes(body, mesh), 0, Constant(1.0)), BodyAcceleration(ALONG, pulse)]
     if kind == "large_mass":
         low = mesh.facet_nodes("low")
         return [LargeMass.build(MPI.COMM_SELF, body, low, (ALONG, pulse)), BodyAcceleration(ALONG, Constant(9.81))]
@@ -118,7 +118,7 @@ def test_prescribed_motion_sends_the_exact_wave():
     mesh, speed = bar(held=False, elements=60), 1.0
     body, critical = dns_body(mesh, STEEL)
     driven = low_nodes(body, mesh)
-    motion = motion_of(body, 0.9 * critical, [PrescribedMotion(driven, 0, Constant(speed))])
+    motion = motion_of(body, 0.9 * critical, [PrescribedVelocity(driven, 0, Constant(speed))])
     while motion.time < LENGTH / SPEED:
         motion.advance()
         motion.update_force()

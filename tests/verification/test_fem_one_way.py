@@ -10,7 +10,7 @@ from reflowshock.cases.hard.trials.pairs import FRACTION, Pair
 from reflowshock.fem.coupling.held_velocity import HeldVelocity
 from reflowshock.fem.coupling.one_way import OneWay
 from reflowshock.fem.division.tables import Tables, model_inputs
-from reflowshock.fem.dynamics.energy_balance import Ledger, ledger_sums
+from reflowshock.fem.dynamics.energy_balance import EnergyBalance, energy_sums
 from reflowshock.fem.loads.load import half_sine_drop
 from reflowshock.fem.materials.library import SAC405
 from reflowshock.fem.materials.roles import Materials
@@ -28,8 +28,8 @@ def driver_of(models: Models) -> tuple[Pieces, Tables]:
     whole, _, _ = surveyed(COARSE.mesh(), SOLDER)
     pieces, tables = pieces_of(model_inputs(whole, "dns")["dns"], SOLDER)
     fine, meso = models.parts["meso"]
-    cut = nearest(pieces.local.points, fine.local.points[fine.local.locate(meso.cut)])
-    return pieces, replace(tables, cut=pieces.local.nodes[cut].astype(np.int32))
+    interface = nearest(pieces.local.points, fine.local.points[fine.local.locate(meso.interface)])
+    return pieces, replace(tables, interface=pieces.local.nodes[interface].astype(np.int32))
 
 
 def nearest(points: np.ndarray, wanted: np.ndarray) -> np.ndarray:
@@ -53,11 +53,11 @@ def test_submodel_follows_and_the_driver_does_not_notice():
     submodel = Coupled(models._replace(parts=one_way).bodies(), plan, OneWay(), LOADS)
     two_way = Coupled(models.bodies(), plan, HeldVelocity(), LOADS)
     alone = motion_of(submodel.macro.motion.body, plan.window, LOADS)
-    ledgers = [Ledger(limit=1e-9, trivial=0.0) for _ in submodel.parts]
+    balances = [EnergyBalance(limit=1e-9, trivial=0.0) for _ in submodel.parts]
     ours, reference = [], []
     for window in range(WINDOWS):
-        for ledger, part in zip(ledgers, submodel.parts, strict=True):
-            energies = ledger.judge(ledger_sums(part, 0.0), window * plan.window)
+        for balance, part in zip(balances, submodel.parts, strict=True):
+            energies = balance.judge(energy_sums(part, 0.0), window * plan.window)
         submodel.run()
         two_way.run()
         alone.advance()

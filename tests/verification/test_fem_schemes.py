@@ -6,7 +6,7 @@ import pytest
 from reflowshock.cases.hard.trials.bodies import dns_body, motion_of
 from reflowshock.cases.hard.trials.coupled import Coupled
 from reflowshock.cases.hard.trials.pairs import SCHEMES, Pair
-from reflowshock.fem.dynamics.energy_balance import Ledger
+from reflowshock.fem.dynamics.energy_balance import EnergyBalance
 from reflowshock.fem.errors import EnergyError
 from reflowshock.fem.parallel.portable import values
 
@@ -98,9 +98,9 @@ def test_a_run_continues_from_its_state_to_the_same_bits(scheme):
 
 def test_energy_that_the_interface_has_is_told_as_such():
     coupled = pushed("held_velocity", Pair(4, 3.0, 2, layers=3))
-    ledger = Ledger(limit=1e-4, trivial=0.0)
-    ledger.judge(coupled.sums(), 0.0)
+    balance = EnergyBalance(limit=1e-4, trivial=0.0)
+    balance.judge(coupled.sums(), 0.0)
     with pytest.raises(EnergyError, match="the coupling of both models holds most of what is missing"):
         for window in range(1, 200):
             coupled.run()
-            ledger.judge(coupled.sums(), window * coupled.plan.window)
+            balance.judge(coupled.sums(), window * coupled.plan.window)

@@ -10,7 +10,7 @@ from reflowshock.fem.elements.stress import symmetric
 from reflowshock.fem.materials.elasticity import elasticity_matrix
 from reflowshock.fem.materials.library import FR4
 from reflowshock.fem.materials.parameters import Isotropic
-from reflowshock.fem.model.assembly import Response
+from reflowshock.fem.model.assembly import ForceOptions
 from reflowshock.fem.model.stress_recovery import StressRecovery
 
 ELASTIC = Isotropic(density=1.0, young_modulus=1e9, poisson_ratio=0.3)
@@ -20,7 +20,7 @@ both_formulations = pytest.mark.parametrize("formulation", ["one_point", "incomp
 def recovered(material, path, kinematics: str, formulation: str, steps: int = 100) -> tuple[StressRecovery, np.ndarray]:
     """Deform a block by path(s), s from 0 to 1; return the recovery of two elements and the displacement."""
     points, cells = grid([0, 1, 2], [0, 1], [0, 1, 1.5])
-    body, step = nonlinear_body(mesh_of(points, cells, "board", {}), material, Response(kinematics), formulation)
+    body, step = nonlinear_body(mesh_of(points, cells, "board", {}), material, ForceOptions(kinematics), formulation)
     motion = motion_of(body, step)
     for s in np.arange(1, steps + 1) / steps:
         motion.displacement[:] = body.local.points @ (path(s) - np.eye(3)).T

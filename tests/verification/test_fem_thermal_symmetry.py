@@ -10,16 +10,16 @@ from reflowshock.cases.hard.trials.packages import MM, PLATE, board, package
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.problem.thermal import Thermal
 from reflowshock.fem.statics.pads import Pads
-from reflowshock.fem.statics.state import Assembly, State
+from reflowshock.fem.statics.state import Assembly, HeatedState
 from reflowshock.fem.statics.structure import ThermalStructure
-from reflowshock.meshing.board.heated_assembly import write_heated_assembly
+from reflowshock.meshing.board.assembly import write_heated_assembly
 from reflowshock.meshing.board.pads import pad_table
 from reflowshock.meshing.board.parameters import Warpage
 
 MOVED = Thermal(package="moved", corner_displacement=-5e-5)
 
 
-def solved(folder: Path, symmetry: str, copper: dict, thermal: Thermal) -> tuple[Pads, State]:
+def solved(folder: Path, symmetry: str, copper: dict, thermal: Thermal) -> tuple[Pads, HeatedState]:
     """Return pads, and their motion under heat, weight and a pull of every joint towards the centre of the array."""
     parts = package(copper=copper)
     plate = board(symmetry=symmetry, numerics={"element_size": 0.5 * MM, "coarse_size": 4.0 * MM, "growth": 2.0})

@@ -10,7 +10,7 @@ from reflowshock.cases.hard.trials.bodies import dns_body, motion_of
 from reflowshock.cases.hard.trials.grids import grid, mesh_of, on
 from reflowshock.fem.loads.damping import RayleighDamping
 from reflowshock.fem.loads.large_mass import LargeMass
-from reflowshock.fem.loads.load import BodyAcceleration, Load, NodalForces, PrescribedMotion
+from reflowshock.fem.loads.load import BodyAcceleration, Load, NodalForces, PrescribedVelocity
 from reflowshock.fem.loads.pulse import HalfSine, Tabulated
 from reflowshock.fem.materials.parameters import Isotropic
 from reflowshock.fem.materials.roles import Materials
@@ -41,7 +41,7 @@ def test_wave_through_a_change_of_impedance(ratio):
     body, critical = dns_body(mesh, materials=Materials(board=STEEL, copper=other))
     unit = size / SPEED
     driven = body.local.locate(mesh.facet_nodes("low"))
-    motion = motion_of(body, 0.9 * critical, [PrescribedMotion(driven, 0, smooth_pulse(1.0, 60 * unit))])
+    motion = motion_of(body, 0.9 * critical, [PrescribedVelocity(driven, 0, smooth_pulse(1.0, 60 * unit))])
     before, behind = (int(np.argmin(np.abs(body.local.points[:, 0] - x[k]))) for k in (count // 2, count + 60))
     times, gauges = [], []
     while motion.time < 380 * unit:
@@ -79,7 +79,7 @@ def loads_of(kind: str, body, mesh: MeshData, duration: float) -> list[Load]:
         nodes, areas = outward_areas(mesh, "high")
         return [NodalForces.build(body, nodes, -areas, smooth_pulse(1e6, 0.6 * duration))]
     if kind == "motion":
-        return [PrescribedMotion(body.local.locate(low), 0, smooth_pulse(1.0, 0.6 * duration))]
+        return [PrescribedVelocity(body.local.locate(low), 0, smooth_pulse(1.0, 0.6 * duration))]
     return [BodyAcceleration(ALONG, pulse), RayleighDamping(2e5, 0.0, body.terms)]
 
 

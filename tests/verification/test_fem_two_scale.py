@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from reflowshock.cases.hard.trials.bodies import dns_body, motion_of
-from reflowshock.fem.dynamics.energy_balance import Ledger, ledger_sums
+from reflowshock.fem.dynamics.energy_balance import EnergyBalance, energy_sums
 from reflowshock.fem.loads.load import half_sine_drop
 from reflowshock.fem.materials.library import SAC405
 from reflowshock.fem.materials.roles import Materials
@@ -77,10 +77,10 @@ def test_two_scale_follows_the_dns_and_improves_with_the_window():
 
 def test_ledger_of_a_two_scale_run_balances():
     window, _ = die_history(0.9, 4e-5)
-    sums = ledger_sums(window.macro, 1.0) + ledger_sums(window.meso, -1.0)
-    ledger = Ledger(limit=0.02, trivial=0.0)
-    energies = ledger.judge(sums, 4e-5)
+    sums = energy_sums(window.macro, 1.0) + energy_sums(window.meso, -1.0)
+    balance = EnergyBalance(limit=0.02, trivial=0.0)
+    energies = balance.judge(sums, 4e-5)
     assert energies["external"] > 0
-    assert ledger.balance_error < 0.01
-    assert ledger.force_residual < 1e-12
+    assert balance.balance_error < 0.01
+    assert balance.force_residual < 1e-12
     assert abs(energies["interface"]) < 0.01 * energies["external"]

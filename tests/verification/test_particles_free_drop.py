@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from reflowshock.particles.parameters.solder import Solder, SolderNumerics
-from reflowshock.particles.reference.rayleigh import lamb_decay_rate, rayleigh_frequency, viscous_oscillation
+from reflowshock.particles.reference.drop_oscillation import lamb_decay_rate, rayleigh_frequency, viscous_oscillation
 from reflowshock.particles.scenes.free_drop import solve_free_drop
 
 RADIUS, DENSITY, GAMMA = 0.62e-3, 8930.0, 0.4985

@@ -1,4 +1,4 @@
-"""The seed's scheme (Hu et al., 2.2-2.6) against exact fields, and what it makes of a drop.
+"""The paper's ISPG scheme (Hu et al., 2.2-2.6) against exact fields, and what it makes of a drop.
 
 It is there to be compared with: what it cannot do is asserted as well as what it can.
 """
@@ -9,11 +9,9 @@ import pytest
 from reflowshock.particles.core.cloud import box_cloud
 from reflowshock.particles.core.plate import Plate
 from reflowshock.particles.ispg.collocation import collocate
-from reflowshock.particles.ispg.gripc_step import GripcStep
+from reflowshock.particles.ispg.gripc_step import GripcStep, force_pressure
 from reflowshock.particles.ispg.mls import DegenerateStencil
-from reflowshock.particles.ispg.pressure_poisson import Poisson
-from reflowshock.particles.ispg.surface_pressure import force_pressure
-from reflowshock.particles.ispg.velocity_prediction import predict_velocity
+from reflowshock.particles.ispg.projection import Poisson, predict_velocity
 from reflowshock.particles.parameters.effects import decide, drop_numbers, switched
 from reflowshock.particles.parameters.solder import Solder, SolderEffects, SolderNumerics
 from reflowshock.particles.reference.young_laplace import sessile_meridian
@@ -99,7 +97,7 @@ def rest():
 
 
 def continued(rest, basis):
-    """The drop at rest, continued with the seed's scheme, inertia and viscosity."""
+    """The drop at rest, continued with the paper's scheme, inertia and viscosity."""
     solder, flow = rest
     on = {"gravity": False, "inertia": True, "viscosity": True, "surface_tension": True, "wall_adhesion": True}
     physics = build_physics(solder, on, flow.physics.lines)

@@ -8,7 +8,7 @@ from reflowshock.particles.core.surface_measure import ring_area
 from reflowshock.particles.parameters.solder import Solder, SolderNumerics
 from reflowshock.particles.scenes.reflow import start_flow, stop_rule
 from reflowshock.particles.steps.rest import run_to_rest
-from reflowshock.particles.surface.contact_line_hysteresis import HystereticLine
+from reflowshock.particles.surface.contact_line import HystereticLine
 from tests.support.level_sets import cap_radius
 
 RECEDING, ADVANCING = np.radians(60.0), np.radians(110.0)

@@ -8,7 +8,7 @@ from reflowshock.particles.core.checkpoint import Checkpoint
 from reflowshock.particles.core.geometry import JointGeometry
 from reflowshock.particles.parameters.solder import Solder, SolderNumerics
 from reflowshock.particles.scenes.carried_joint import carried_shape, carry_joint
-from reflowshock.workflow.board_drop.case import LARGE_STEPS
+from reflowshock.workflow.package.case import LARGE_STEPS
 
 PAD = 0.24e-3
 PLACES = [

@@ -6,8 +6,8 @@ from scipy.optimize import brentq
 
 from reflowshock.particles.core.geometry import JointGeometry
 from reflowshock.particles.parameters.solder import Solder, SolderEffects, SolderNumerics
-from reflowshock.particles.physics.force_wetting import Wetting
-from reflowshock.particles.physics.plate_force import plate_wrench
+from reflowshock.particles.physics.forces import Wetting
+from reflowshock.particles.physics.physics import plate_wrench
 from reflowshock.particles.physics.plate_motion import LIFT, SHIFT, Floating
 from reflowshock.particles.reference.young_laplace import joint_meridian
 from reflowshock.particles.scenes.moving_joint import settle_joint

@@ -13,12 +13,9 @@ from scipy.optimize import brentq
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.cloud import joint_cloud
 from reflowshock.particles.core.geometry import JointGeometry
-from reflowshock.particles.physics.mass import Inertia, Mass
+from reflowshock.particles.physics.operators import Inertia, Mass, NavierSlip, NoSlip, Viscosity, wall_areas
 from reflowshock.particles.physics.physics import Physics
-from reflowshock.particles.physics.viscosity import Viscosity
-from reflowshock.particles.physics.wall_friction import NavierSlip, NoSlip, wall_areas
-from reflowshock.particles.steps.inertial_flow import InertialFlow
-from reflowshock.particles.steps.inertial_step import InertialStep
+from reflowshock.particles.steps.inertial_step import InertialFlow, InertialStep
 
 RADIUS, GAP, VISCOSITY, DENSITY, SPIN = 0.5, 1.0, 2.0, 3.0, 1e-7
 SLIP_LENGTH, LONG = 0.3, 1e6

@@ -9,7 +9,7 @@ from reflowshock.fem.problem.thermal import KELVIN, Thermal
 from reflowshock.particles.core.geometry import JointGeometry
 from reflowshock.particles.parameters.solder import Solder, SolderNumerics
 from reflowshock.particles.reference.young_laplace import joint_meridian
-from reflowshock.particles.scenes.joint_stiffness import stiffness_estimate
+from reflowshock.particles.scenes.carried_joint import stiffness_estimate
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.pipeline.reader import read_case
 from reflowshock.workflow.reflow.coupling import Coupling, NotInBalance, placed

@@ -9,7 +9,7 @@ import numpy as np
 from reflowshock.fem.estimates.effects import STIFFENING_OF_BOARD, called_for, effect, stiffened
 
 if TYPE_CHECKING:
-    from reflowshock.workflow.board_drop.case import BoardDropCase
+    from reflowshock.workflow.package.case import BoardDropCase
 
 SHARE = 4.0 / math.pi  # of the base's acceleration in the first mode of a pinned beam, at its middle
 SAMPLES, SAMPLES_A_PERIOD = 1000, 100
@@ -65,6 +65,18 @@ def decide_kinematics(case: "BoardDropCase") -> tuple[Literal["small", "finite"]
     return called_for(expected_deflection(case).largest / case.board.thickness)
 
 
+def decided(case: "BoardDropCase") -> "BoardDropCase":
+    """Return the case with kinematics that are small or finite, as its board's deflection calls for.
+
+    Raises:
+        PulseError: the table of the pulse cannot be read.
+    """
+    if case.shock.numerics.kinematics != "auto":
+        return case
+    numerics = case.shock.numerics.model_copy(update={"kinematics": decide_kinematics(case)[0]})
+    return case.model_copy(update={"shock": case.shock.model_copy(update={"numerics": numerics})})
+
+
 def kinematics_effect(case: "BoardDropCase") -> dict:
     """Return whether rotations are finite, why, and what small ones would leave out, as an effect of a plan."""
     from reflowshock.fem.materials.kinematics import finite_rotation
@@ -72,8 +84,8 @@ def kinematics_effect(case: "BoardDropCase") -> dict:
     expected, kinematics = expected_deflection(case), case.shock.numerics.kinematics
     ratio = expected.largest / case.board.thickness
     wanted, reason = called_for(ratio)
-    decided = wanted if kinematics == "auto" else kinematics
-    finite, why = finite_rotation("shock.numerics", decided, 0.5 * expected.slope**2)
+    taken = wanted if kinematics == "auto" else kinematics
+    finite, why = finite_rotation("shock.numerics", taken, 0.5 * expected.slope**2)
     if kinematics == "auto":
         why = f"shock.numerics.kinematics = auto: {reason}"
     elif not finite:

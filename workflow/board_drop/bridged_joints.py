@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from reflowshock.workflow.board_drop.case import PackageCase
+from reflowshock.workflow.package.case import PackageCase
 
 if TYPE_CHECKING:
     from reflowshock.meshing.board.package_side import PackageSide

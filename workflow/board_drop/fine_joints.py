@@ -12,7 +12,7 @@ from reflowshock.workflow.case.problems import Problem
 if TYPE_CHECKING:
     from reflowshock.fem.problem.shock import JointCoupling
     from reflowshock.meshing.board.pads import PadSite
-    from reflowshock.workflow.board_drop.case import BoardDropCase
+    from reflowshock.workflow.package.case import BoardDropCase
 
 FINE, CRITICAL = "shock.coupling.fine_joints", "shock.coupling.critical_joints"
 

@@ -7,8 +7,7 @@ from dataclasses import dataclass, replace
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.problem.thermal import Thermal
 from reflowshock.workflow.board_drop import shock_cooling
-from reflowshock.workflow.board_drop.case import BoardDropCase, PackageCase
-from reflowshock.workflow.board_drop.reflow_pool import distinct_joints, joint_geometries
+from reflowshock.workflow.board_drop.board_deflection import decided
 from reflowshock.workflow.board_drop.shock_effects import shock_effects
 from reflowshock.workflow.board_drop.shock_forecast import (
     PartForecast,
@@ -18,10 +17,12 @@ from reflowshock.workflow.board_drop.shock_forecast import (
     shorter_than_window,
     two_scale_parts,
 )
+from reflowshock.workflow.case.forecast import BYTES_OF_ELEMENT, BYTES_OF_PARTICLE, Size, too_many_steps
 from reflowshock.workflow.case.problems import Problem
-from reflowshock.workflow.case.step_limit import too_many_steps
-from reflowshock.workflow.pipeline.reader import available_cores
+from reflowshock.workflow.package.case import BoardDropCase, PackageCase
+from reflowshock.workflow.process.environment import available_cores
 from reflowshock.workflow.reflow.forecast import forecast_heated
+from reflowshock.workflow.reflow.joints import distinct_joints, joint_geometries
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,7 +89,7 @@ def _heated(of_reflow: Forecast, case: PackageCase, thermal: Thermal) -> Forecas
 
 
 def _with_shock(of_reflow: Forecast, case: BoardDropCase) -> Forecast:
-    told, case = shock_effects(case), case.decided
+    told, case = shock_effects(case), decided(case)
     parts = forecast_parts(case)
     shock = forecast_shock(case, parts)
     numerics = case.shock.numerics
@@ -112,7 +113,7 @@ def step_problems(case: BoardDropCase) -> Iterator[Problem]:
 
     from reflowshock.fem.estimates.estimate import damped_critical_step
 
-    case = case.decided
+    case = decided(case)
 
     with np.errstate(all="ignore"):
         steps = [part.critical_step for part in forecast_parts(case).values() if not part.mass_scaled]
@@ -133,3 +134,17 @@ def with_critical_step(quality: dict, materials: Materials) -> dict:
         for role, length in quality["smallest_length"].items()
     }
     return {**quality, "critical_time_step": min(steps.values()), "critical_time_steps": steps}
+
+
+def package_size(case: PackageCase) -> Size:
+    """Predict what the stages of a case take on one core: the forecast is that of this machine's cores."""
+    from reflowshock.fem.estimates.solver_cost import cooling_cost
+
+    outlook = forecast(case)
+    joints = max(1, outlook.distinct)
+    elements = sum(part.elements for part in outlook.parts.values())
+    memory = BYTES_OF_ELEMENT * elements + BYTES_OF_PARTICLE * outlook.particles[1]
+    if elements and outlook.effects.get("residual_stress", {}).get("on"):
+        memory += cooling_cost(elements, 0).memory
+    reflow = outlook.seconds["reflow"] * min(available_cores(), joints)
+    return Size({**outlook.seconds, "reflow": reflow}, joints, memory)

@@ -5,14 +5,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from reflowshock.workflow.board_drop.findings import metric
 from reflowshock.workflow.case.problems import Problem
-from reflowshock.workflow.pipeline.stage_runner import Findings, Run
+from reflowshock.workflow.case.run import Findings, Run, metric
 from reflowshock.workflow.process.products import read_json
 
 if TYPE_CHECKING:
     from reflowshock.meshing.surface.truncated_sphere import TruncatedSphere
-    from reflowshock.workflow.board_drop.case import BoardDropCase, PackageCase
+    from reflowshock.workflow.package.case import BoardDropCase, PackageCase
 
 KEY, FOLDER = "shock.identical_joints", "identical"
 PREFIX = "identical_"  # begins the names of meshes and metrics of identical joints

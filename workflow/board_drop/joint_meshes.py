@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from reflowshock.workflow.board_drop.bridged_joints import mesh_bridges
-from reflowshock.workflow.board_drop.case import BoardDropCase, PackageCase
 from reflowshock.workflow.board_drop.fine_joints import needs_coarse_joints
 from reflowshock.workflow.board_drop.identical_joints import PREFIX, identical_sphere
-from reflowshock.workflow.pipeline.stage_runner import Run
+from reflowshock.workflow.case.run import Run
+from reflowshock.workflow.package.case import BoardDropCase, PackageCase
 from reflowshock.workflow.process.products import write_json
 
 if TYPE_CHECKING:
@@ -21,8 +21,7 @@ if TYPE_CHECKING:
 
 def mesh_real_joints(run: Run[PackageCase], folder: Path) -> dict[str, dict]:
     """Put the package where the solder froze and mesh the joints there; return what ``mesh_array`` does."""
-    from reflowshock.meshing.board.displaced_assembly import write_displaced_assembly
-    from reflowshock.meshing.board.displacement import prescribed, read_computed
+    from reflowshock.meshing.board.displaced_assembly import prescribed, read_computed, write_displaced_assembly
     from reflowshock.meshing.board.pads import read_pads
     from reflowshock.meshing.surface.closed_surface import read_surface
 
@@ -40,8 +39,7 @@ def mesh_real_joints(run: Run[PackageCase], folder: Path) -> dict[str, dict]:
 
 def mesh_identical_joints(run: Run[PackageCase], folder: Path) -> dict[str, dict]:
     """Mesh truncated spheres of the solder's volume, on which nothing weighs, under a flat package at their height."""
-    from reflowshock.meshing.board.displaced_assembly import write_displaced_assembly
-    from reflowshock.meshing.board.displacement import raised
+    from reflowshock.meshing.board.displaced_assembly import raised, write_displaced_assembly
     from reflowshock.meshing.board.pads import read_pads
     from reflowshock.meshing.surface.sphere_surface import sphere_surface
 

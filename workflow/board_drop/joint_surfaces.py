@@ -4,10 +4,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from reflowshock.workflow.board_drop.bridged_joints import BETWEEN
-from reflowshock.workflow.board_drop.case import PackageCase
-from reflowshock.workflow.board_drop.reflow_pool import refuse_joints_without_mesh
-from reflowshock.workflow.pipeline.stage_runner import Run
+from reflowshock.workflow.case.run import Run
+from reflowshock.workflow.package.case import PackageCase
 from reflowshock.workflow.process.products import read_json
+from reflowshock.workflow.reflow.joints import refuse_joints_without_mesh
 
 if TYPE_CHECKING:
     from reflowshock.particles.steps.shape import JointShape

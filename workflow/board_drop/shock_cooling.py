@@ -8,13 +8,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from reflowshock.workflow.board_drop.case import BoardDropCase
 from reflowshock.workflow.board_drop.shock_forecast import PartForecast, role_of
 from reflowshock.workflow.case.problems import Problem
-from reflowshock.workflow.pipeline.stage_runner import Findings, Run
+from reflowshock.workflow.case.run import Findings, Run
+from reflowshock.workflow.case.text import duration
+from reflowshock.workflow.package.case import BoardDropCase
 from reflowshock.workflow.process.fem_launch import run_fem
 from reflowshock.workflow.process.kernel_cache import digest
-from reflowshock.workflow.process.plan_table import duration
 
 if TYPE_CHECKING:
     from reflowshock.fem.estimates.solver_cost import SolverCost

@@ -1,19 +1,18 @@
 """The effects of a board's shock, decided before it runs: what acts, why, and what it is expected to change."""
 
-from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from collections.abc import Iterator, Mapping
 
 from reflowshock.fem.estimates.effects import damping, effect
 from reflowshock.fem.estimates.material_effects import failure_effect, material_effects
+from reflowshock.fem.materials.library import SAC405
 from reflowshock.workflow.board_drop.board_deflection import expected_deflection, kinematics_effect, weight_effect
 from reflowshock.workflow.board_drop.fine_joints import coarse_joints_effect
 from reflowshock.workflow.board_drop.identical_joints import identical_joints_effect
+from reflowshock.workflow.case.forecast import Toggle, between, changed
+from reflowshock.workflow.package.case import BoardDropCase, PackageCase
 
-if TYPE_CHECKING:
-    from reflowshock.workflow.board_drop.case import BoardDropCase
 
-
-def shock_effects(case: "BoardDropCase") -> dict:
+def shock_effects(case: BoardDropCase) -> dict:
     """Return effect -> {"on", "why"} and, where it is foreseen, "influence"."""
     shock = case.shock
     omega = expected_deflection(case).omega
@@ -29,7 +28,7 @@ def shock_effects(case: "BoardDropCase") -> dict:
     )
 
 
-def _method(case: "BoardDropCase") -> Iterator[tuple[str, dict]]:
+def _method(case: BoardDropCase) -> Iterator[tuple[str, dict]]:
     """Yield what the models leave out or replace."""
     shock, symmetry = case.shock, case.board.symmetry
     coupled = "two_scale" in shock.numerics.modes
@@ -42,9 +41,38 @@ def _method(case: "BoardDropCase") -> Iterator[tuple[str, dict]]:
     yield "symmetry", effect(symmetry == "quarter", f"board.symmetry = {symmetry}", 0.0)
 
 
-def with_influence(found: dict, case: "BoardDropCase") -> dict:
+def with_influence(found: dict, case: BoardDropCase) -> dict:
     """Return the effects of a run with what was foreseen of their influence."""
     foreseen = shock_effects(case)
     told = {name: foreseen.get(f"{name}_in_the_shock", foreseen.get(name, {})) for name in found}
     expected = {name: {"influence": item["influence"]} if "influence" in item else {} for name, item in told.items()}
     return {name: record | expected[name] for name, record in found.items()}
+
+
+def _without_yielding(case: BoardDropCase, acts: bool) -> BoardDropCase:
+    """Return the case with elastic materials, or with solder that yields."""
+    if not acts:
+        return changed(case, "materials.solder", SAC405)
+    roles = {role: material for role, material in case.materials.by_role.items() if material.plasticity is not None}
+    elastic = {role: material.model_copy(update={"plasticity": None}) for role, material in roles.items()}
+    return case.model_copy(update={"materials": case.materials.model_copy(update=elastic)})
+
+
+HEATED: Mapping[str, Toggle] = {
+    "solder_force": between("thermal.effects.solder_force", "on", "off"),
+    "residual_stress": between("thermal.effects.residual_stress", "on", "off"),
+}
+DROPPED: Mapping[str, Toggle] = {
+    "finite_rotation": between("shock.numerics.kinematics", "finite", "small"),
+    "plasticity": _without_yielding,
+    "coarse_joints": between("shock.coupling.fine_joints", "critical", "all"),
+    "one_way": between("shock.coupling.direction", "one_way", "two_way"),
+    "identical_joints": between("shock.identical_joints", True, False),
+    "mass_scaling": between("shock.numerics.mass_scaled", ("copper",), ()),
+}
+
+
+def toggles(case: PackageCase) -> dict[str, Toggle]:
+    """Return the toggles of the effects whose cost the forecast knows."""
+    heated = HEATED if case.thermal is not None else {}
+    return {**heated, **(DROPPED if isinstance(case, BoardDropCase) else {})}

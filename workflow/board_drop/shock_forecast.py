@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING
 
 from reflowshock.fem.materials.parameters import Material
 from reflowshock.workflow.case.problems import CaseError, Problem
-from reflowshock.workflow.process.plan_table import short
+from reflowshock.workflow.case.text import short
 
 if TYPE_CHECKING:
     from reflowshock.meshing.board.estimate import PartEstimate
-    from reflowshock.workflow.board_drop.case import BoardDropCase
+    from reflowshock.workflow.package.case import BoardDropCase
 
 MACRO = "board"  # role of the parts whose elements the window follows
 

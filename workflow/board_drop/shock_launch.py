@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 
 from reflowshock.fem.problem.shock import JointCoupling
-from reflowshock.workflow.board_drop.case import BoardDropCase
+from reflowshock.workflow.board_drop.board_deflection import decided
 from reflowshock.workflow.board_drop.fine_joints import (
     FineJoints,
     most_stressed,
@@ -13,7 +13,8 @@ from reflowshock.workflow.board_drop.fine_joints import (
     write_fine_joints,
 )
 from reflowshock.workflow.board_drop.shock_cooling import begun
-from reflowshock.workflow.pipeline.stage_runner import Run
+from reflowshock.workflow.case.run import Run
+from reflowshock.workflow.package.case import BoardDropCase
 from reflowshock.workflow.process.fem_launch import run_fem
 
 MODES = {"two_scale": "two-scale", "dns": "DNS"}
@@ -66,7 +67,7 @@ def _mesh(run: Run[BoardDropCase], name: str) -> str:
 
 def _request(run: Run[BoardDropCase], mode: str, meshes: tuple[str, ...], coupling: JointCoupling) -> dict:
     """Return what the package fem reads as input of a run, but for its folders."""
-    shock = run.case.decided.shock.model_copy(update={"coupling": coupling})
+    shock = decided(run.case).shock.model_copy(update={"coupling": coupling})
     return {
         "mode": mode,
         "meshes": [_mesh(run, name) for name in meshes],

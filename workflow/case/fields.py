@@ -202,3 +202,8 @@ def _bare(annotation: object) -> object:
 
 def _is_union(annotation: object) -> bool:
     return typing.get_origin(annotation) in (typing.Union, types.UnionType)
+
+
+def display_values(case: BaseModel) -> dict[str, str]:
+    """Return every parameter that has a value as dotted key -> text in the user's unit."""
+    return {key: display(value, field) for key, value, field in leaves(case) if value is not None}

@@ -4,10 +4,15 @@ import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 from reflowshock.workflow.case.toml_places import Place
 
+if TYPE_CHECKING:
+    from reflowshock.particles.parameters.checks import Problem as ParticlesProblem
+
 LONGEST = 120  # characters of a value or key in a message
+MOST_SHOWN = 30  # problems of one file
 Places = Callable[[str], Place | None]
 
 
@@ -75,8 +80,10 @@ class CaseError(ValueError):
         super().__init__("\n".join(self.lines()))
 
     def lines(self) -> list[str]:
-        """One line a problem, each beginning with where the value was given."""
-        return [f"{self._place(problem)}: {problem}" for problem in self.problems]
+        """One line a problem, each beginning with where the value was given; the first of many, and how many more."""
+        lines = [f"{self._place(problem)}: {problem}" for problem in self.problems[:MOST_SHOWN]]
+        more = len(self.problems) - MOST_SHOWN
+        return [*lines, f"{one_line(self.source)}: {more} more problems"] if more > 0 else lines
 
     def _place(self, problem: Problem) -> str:
         origin = self._origin(problem)
@@ -130,3 +137,8 @@ def shortened(text: str) -> str:
 def one_line(text: str) -> str:
     """Write characters that move the cursor, or that no terminal shows, as their escapes."""
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+
+
+def of_particles(found: "Sequence[ParticlesProblem]") -> list[Problem]:
+    """Say what the checks of the particles found, in the words of a case file."""
+    return [Problem(problem.key, problem.message, problem.value or None, problem.allowed) for problem in found]

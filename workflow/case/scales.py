@@ -5,10 +5,11 @@ scale = "full"                                   # or --set scale="quick"
 "board.numerics.coarse_size" = "2 mm"
 """
 
+import tomllib
 from collections.abc import Iterator
 
 from reflowshock.fem.names import nearest
-from reflowshock.workflow.case.kind import FULL
+from reflowshock.workflow.case.case import FULL
 from reflowshock.workflow.case.names import is_name, wrong_name
 from reflowshock.workflow.case.problems import Problem, as_toml
 from reflowshock.workflow.case.toml_file import DEEPEST
@@ -78,3 +79,11 @@ def dotted(values: dict, prefix: str = "") -> Iterator[tuple[str, object]]:
             yield from dotted(value, f"{prefix}{key}.")
         else:
             yield prefix + key, value
+
+
+def override_value(text: str) -> object:
+    """Return the value that a setting's text stands for: TOML, quotes may be left out."""
+    try:
+        return tomllib.loads(f"value = {text}")["value"]
+    except (ValueError, RecursionError):
+        return text

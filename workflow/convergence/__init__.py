@@ -1,1 +1,1 @@
-"""What accuracy costs: a convergence study of a case, and what to choose."""
+"""Convergence studies: the runs of each kind of case, their errors and costs, and how both are shown."""

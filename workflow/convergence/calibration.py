@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from math import log
 from pathlib import Path
 
-from reflowshock.workflow.case.kind import Case
+from reflowshock.workflow.case.case import Case
 from reflowshock.workflow.convergence.machine import this_machine
 from reflowshock.workflow.convergence.measured import FILE, StageCost, read_accuracy
 

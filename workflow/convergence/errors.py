@@ -3,37 +3,14 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-if TYPE_CHECKING:
-    from reflowshock.workflow.convergence.series import Rung
-
-Values = float | NDArray[np.float64]
+from reflowshock.workflow.convergence.series import Quantity, Rung, Values
 
 LARGEST_ORDER = 2.5  # that is believed: no method here is of more than second order
 ORDER_MARGIN = 0.5  # of an observed order from theory, beyond which runs are not yet fine enough to extrapolate from
-
-
-@dataclass(frozen=True, slots=True)
-class Quantity:
-    """An answer of a run.
-
-    Attributes:
-        value: a number or samples, at the same places in all runs.
-        exact: the exact answer at these places; None where it is not known. Of an error that the run has found
-            itself, zero.
-        scale: what a difference is divided by; None: the norm of the answer that it is compared with.
-        source: what the exact answer is, for readers: "spherical cap".
-    """
-
-    value: Values
-    exact: Values | None = None
-    scale: float | None = None
-    source: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +25,7 @@ Answers = Mapping[str, Quantity]
 
 
 def errors_of(
-    answers: Mapping[str, Answers], rungs: Sequence["Rung"], main: Sequence["Rung"], order: float | None
+    answers: Mapping[str, Answers], rungs: Sequence[Rung], main: Sequence[Rung], order: float | None
 ) -> dict[str, dict[str, Error]]:
     """Find the errors of all runs.
 
@@ -86,9 +63,9 @@ class _Reference:
     def of(
         cls,
         quantity: str,
-        rung: "Rung",
+        rung: Rung,
         answers: Mapping[str, Answers],
-        main: Sequence["Rung"],
+        main: Sequence[Rung],
         order: float | None,
     ) -> "_Reference | None":
         """Take the rung that is named, else an extrapolation of the three finest of the first knob, else the finest."""
@@ -110,9 +87,7 @@ def _exact(answer: Quantity, exact: Values) -> Error:
     return Error(_difference(answer, exact), f"exact: {answer.source}" if answer.source else "exact")
 
 
-def _compared(
-    quantity: str, rung: "Rung", answers: Mapping[str, Answers], reference: _Reference | None
-) -> Error | None:
+def _compared(quantity: str, rung: Rung, answers: Mapping[str, Answers], reference: _Reference | None) -> Error | None:
     if reference is None or reference.rung == rung.name:
         return None
     return Error(_difference(answers[rung.name][quantity], reference.value), reference.words)

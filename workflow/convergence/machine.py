@@ -4,7 +4,7 @@ import platform
 from dataclasses import dataclass
 from pathlib import Path
 
-from reflowshock.workflow.pipeline.reader import available_cores
+from reflowshock.workflow.process.environment import available_cores
 
 CPU_INFO = Path("/proc/cpuinfo")
 

@@ -6,14 +6,12 @@ from pathlib import Path
 from typing import Any
 
 from reflowshock.meshing.board.pads import pad_table
-from reflowshock.workflow.board_drop.case import BoardDropCase, PackageCase
 from reflowshock.workflow.board_drop.shock_forecast import implicit_seconds
 from reflowshock.workflow.board_drop.shock_launch import MODES
 from reflowshock.workflow.case.units import from_si
-from reflowshock.workflow.convergence.apart import apart
-from reflowshock.workflow.convergence.errors import Quantity
 from reflowshock.workflow.convergence.histories import at_same_times
-from reflowshock.workflow.convergence.series import Knob, Ladder, Rung
+from reflowshock.workflow.convergence.series import Knob, Ladder, Quantity, Rung
+from reflowshock.workflow.package.case import BoardDropCase, PackageCase
 from reflowshock.workflow.process.products import read_json
 from reflowshock.workflow.store.product import read_record
 
@@ -53,9 +51,9 @@ def _dropped(case: BoardDropCase) -> Ladder:
     """Meshes by one model, in implicit steps where all is linear; then what two models on the case's mesh lose."""
     whole = _one_model(case)
     parts = [
-        apart(_board(case, whole), FINEST),
-        apart(_joints(case, whole), FINEST),
-        apart(_particles(case, whole, SPACINGS), FINEST_SPACING),
+        _board(case, whole).apart(FINEST),
+        _joints(case, whole).apart(FINEST),
+        _particles(case, whole, SPACINGS).apart(FINEST_SPACING),
     ]
     knobs = (_mesh(case, whole), _critical(case), *(knob for knob, _ in parts))
     choices = (*(finest for _, finest in parts), *_couplings(case))

@@ -3,14 +3,13 @@
 from pathlib import Path
 
 from reflowshock.workflow import __version__
-from reflowshock.workflow.case.kind import Case
+from reflowshock.workflow.case.case import CASES, Case
 from reflowshock.workflow.convergence import tables
 from reflowshock.workflow.convergence.calibration import folder_name
 from reflowshock.workflow.convergence.measured import FILE, Accuracy, read_accuracy
 from reflowshock.workflow.convergence.plot import figure, save_picture
-from reflowshock.workflow.pipeline.template import CASES
 from reflowshock.workflow.report.curves import svg
-from reflowshock.workflow.report.page import write_page
+from reflowshock.workflow.report.template import write_page
 
 PAGE, PICTURE, TEXT = "accuracy.html", "accuracy.png", "accuracy.md"
 

@@ -1,11 +1,33 @@
 """Ladders: the settings of a case whose errors and costs are measured. Each kind of case has its own."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from reflowshock.workflow.case.kind import Case
-from reflowshock.workflow.convergence.errors import Quantity
+import numpy as np
+from numpy.typing import NDArray
+
+from reflowshock.workflow.case.case import Case
+
+Values = float | NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """An answer of a run.
+
+    Attributes:
+        value: a number or samples, at the same places in all runs.
+        exact: the exact answer at these places; None where it is not known. Of an error that the run has found
+            itself, zero.
+        scale: what a difference is divided by; None: the norm of the answer that it is compared with.
+        source: what the exact answer is, for readers: "spherical cap".
+    """
+
+    value: Values
+    exact: Values | None = None
+    scale: float | None = None
+    source: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +72,19 @@ class Knob:
     def rungs(self) -> tuple[Rung, ...]:
         """What is measured of it."""
         return tuple(self.at(value) for value in self.values)
+
+    def apart(self, finest: float) -> tuple["Knob", Rung]:
+        """Return it by itself, and its finest rung: the others are compared with that, so no other error is in theirs.
+
+        Args:
+            finest: value finer than all of its values.
+        """
+        reference = replace(self.at(finest), value=None)
+
+        def at(value: float) -> Rung:
+            return replace(self.at(value), against=reference.name)
+
+        return replace(self, at=at), reference
 
 
 @dataclass(frozen=True, slots=True)

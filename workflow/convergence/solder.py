@@ -1,14 +1,14 @@
 """Ladders of solder alone: particles and time steps, against exact shapes and periods."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import partial
 from math import ceil
 from pathlib import Path
+from typing import Any
 
-from reflowshock.workflow.case.kind import Case
+from reflowshock.workflow.case.case import Case
 from reflowshock.workflow.case.units import from_si
-from reflowshock.workflow.convergence.errors import Quantity
-from reflowshock.workflow.convergence.series import Knob, Ladder, Rung
+from reflowshock.workflow.convergence.series import Knob, Ladder, Quantity, Rung
 from reflowshock.workflow.solder.case import DropCase, DropsCase, JointCase, OscillationCase
 from reflowshock.workflow.store.product import read_record
 
@@ -163,3 +163,11 @@ def oscillation_ladder(_case: OscillationCase) -> Ladder:
         Knob("time step", tuple(1.0 / count for count in STEPS_PER_PERIOD), step),
     )
     return Ladder("reflow", ("reflow",), errors, partial(of_metrics, "Reid, small swings", errors, "reflow"), knobs)
+
+
+LADDERS: dict[str, Callable[[Any], Ladder]] = {
+    DropCase.kind: drop_ladder,
+    JointCase.kind: joint_ladder,
+    DropsCase.kind: drops_ladder,
+    OscillationCase.kind: oscillation_ladder,
+}

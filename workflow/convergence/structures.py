@@ -8,11 +8,9 @@ from typing import Any
 
 from reflowshock.workflow.case.problems import CaseError, Problem
 from reflowshock.workflow.case.units import from_si
-from reflowshock.workflow.convergence.apart import apart
-from reflowshock.workflow.convergence.errors import Quantity
 from reflowshock.workflow.convergence.histories import at_same_times, common_times
-from reflowshock.workflow.convergence.series import Knob, Ladder, Rung
-from reflowshock.workflow.pipeline.reader import available_cores
+from reflowshock.workflow.convergence.series import Knob, Ladder, Quantity, Rung
+from reflowshock.workflow.process.environment import available_cores
 from reflowshock.workflow.store.product import read_record
 from reflowshock.workflow.structure.case import StructureCase
 from reflowshock.workflow.structure.findings import exact_velocities, read_history, read_places, wave_points
@@ -160,7 +158,7 @@ def _steps(case: StructureCase, own: Settings) -> tuple[Knob, Rung]:
         told, settings = setting(value)
         return Rung(f"step {told}", TIME_STEP, base | settings, value)
 
-    return apart(Knob(TIME_STEP, values, at, SECOND), smallest)
+    return Knob(TIME_STEP, values, at, SECOND).apart(smallest)
 
 
 def _step_fraction(value: float) -> tuple[str, Settings]:

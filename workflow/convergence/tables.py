@@ -5,10 +5,10 @@ from collections import Counter
 from collections.abc import Mapping
 
 from reflowshock.workflow.case.problems import as_toml
+from reflowshock.workflow.case.scales import override_value
+from reflowshock.workflow.case.text import number, percent
 from reflowshock.workflow.convergence.measured import Accuracy, Fit, Measurement
 from reflowshock.workflow.convergence.pareto import front
-from reflowshock.workflow.pipeline.reader import override_value
-from reflowshock.workflow.report.tables import number, percent
 
 LONGEST_MESSAGE = 90
 ON_FRONT = "*"

@@ -7,11 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from reflowshock.fem.errors import PulseError
-from reflowshock.workflow.case.kind import Case
+from reflowshock.workflow.case.case import Case
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.effects.registry import effect_of
-from reflowshock.workflow.effects.switches import switches
-from reflowshock.workflow.pipeline.stage_forecast import stage_seconds
+from reflowshock.workflow.kinds import kind_of, stage_seconds
 
 MEASURED = Path(__file__).with_name("costs.json")  # written by benchmarks/effects.py
 
@@ -43,7 +42,7 @@ def cost_shares(case: Case, effects: Mapping[str, Any]) -> dict[str, float]:
 
 def _other_way(case: Case, name: str, seconds: Mapping[str, float], acts: bool) -> float | None:
     """Return the predicted cost [s] of the case with an effect the other way; None where nothing tells it."""
-    toggles, total = switches(case), sum(seconds.values())
+    toggles, total = kind_of(case).toggles(case), sum(seconds.values())
     if name in toggles:
         try:
             return sum(stage_seconds(toggles[name](case, acts)).values())

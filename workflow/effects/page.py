@@ -6,12 +6,12 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from reflowshock.workflow.case.kind import Case
+from reflowshock.workflow.case.case import Case
 from reflowshock.workflow.effects.costs import MEASURED, measured
 from reflowshock.workflow.effects.effect import Effect
 from reflowshock.workflow.effects.registry import registry
 from reflowshock.workflow.effects.table import CAPTION, HEAD, per_cent, rows
-from reflowshock.workflow.pipeline.stage_forecast import scene_effects
+from reflowshock.workflow.kinds import kind_of
 from reflowshock.workflow.process.plan_table import new_table
 from reflowshock.workflow.process.terminal import styled
 
@@ -56,4 +56,4 @@ def effects_table(case: Case, effects: Mapping[str, Any], of_what: str) -> Table
 
 def show_effects(case: Case, console: Console) -> None:
     """Print the effects of a case."""
-    console.print(effects_table(case, scene_effects(case), case.case.name))
+    console.print(effects_table(case, dict(kind_of(case).forecast(case).effects), case.case.name))

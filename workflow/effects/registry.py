@@ -12,7 +12,7 @@ APART = "_in_the_shock"
 def registry() -> dict[str, Effect]:
     """Return the effects by name."""
     from reflowshock.fem.estimates.effect_entries import ENTRIES as OF_STAGES
-    from reflowshock.particles.parameters.effect_entries import ENTRIES as OF_LIQUID
+    from reflowshock.particles.parameters.effects import ENTRIES as OF_LIQUID
 
     entries = {"reflow": (*OF_LIQUID, *OF_STAGES["reflow"]), "shock": OF_STAGES["shock"]}
     found = [Effect(stage=stage, **entry) for stage, members in entries.items() for entry in members]

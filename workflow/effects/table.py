@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from reflowshock.workflow.case.kind import Case
+from reflowshock.workflow.case.case import Case
 from reflowshock.workflow.effects.costs import cost_shares
 
 HEAD = ("effect", "", "influence", "cost", "why")
@@ -36,3 +36,12 @@ def per_cent(share: float) -> str:
         return "0.0001 %" if share < 0.0 else "< 0.0001 %"
     digits = f"{100.0 * share:.2g}"
     return f"{float(digits):.0f} %" if abs(share) >= 0.1 else f"{digits} %"
+
+
+def report_table(case: Case, effects: Mapping[str, Any]) -> dict:
+    """Which effects were simulated, their expected influence and predicted cost, and why: in prose."""
+    told = [
+        [name, "on" if acts else "off", influence, cost, why]
+        for name, acts, influence, cost, why in rows(case, effects)
+    ]
+    return {"head": ["effect", "state", *HEAD[2:]], "rows": told, "prose": True, "caption": CAPTION}

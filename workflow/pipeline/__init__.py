@@ -1,1 +1,1 @@
-"""Running a case: reading it, its gate, its stages one by one, what a run folder holds."""
+"""Reading a case and running its stages: the gate, one stage after the other, the report."""

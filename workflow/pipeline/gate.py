@@ -9,11 +9,14 @@ from pathlib import Path
 import numpy as np
 from rich.console import Console
 
-from reflowshock.workflow.case.kind import Case
+from reflowshock.workflow.case.case import Case
 from reflowshock.workflow.case.plausible import FORCE, implausible, implausible_tables
 from reflowshock.workflow.case.problems import CaseError, Problem
+from reflowshock.workflow.case.text import duration
 from reflowshock.workflow.case.toml_file import fault_of
-from reflowshock.workflow.process.plan_table import duration
+from reflowshock.workflow.kinds import kind_of
+from reflowshock.workflow.pipeline.resources import stage_resources
+from reflowshock.workflow.process.environment import available_cores
 
 LONG = 3600.0  # seconds of a run before which its user is asked
 LARGEST_FILE = 100_000_000  # bytes of a file that a case names
@@ -34,7 +37,7 @@ def problems_of(case: Case, leave: Leave) -> list[Problem]:
     """Find why a case whose values are valid, each for itself, cannot be run; the cheapest checks first."""
     with np.errstate(all="ignore"):
         try:
-            return _values(case, leave) or case.problems() or list(too_large(case, leave))
+            return _values(case, leave) or kind_of(case).problems(case) or list(too_large(case, leave))
         except CaseError as error:
             return error.problems
         except (ArithmeticError, ValueError, MemoryError) as error:  # beyond what floats can tell
@@ -59,8 +62,6 @@ def unreadable_files(case: Case) -> Iterator[Problem]:
 
 def too_many_ranks(case: Case) -> Iterator[Problem]:
     """Find out whether a case asks for more MPI ranks than there are cores."""
-    from reflowshock.workflow.pipeline.reader import available_cores
-
     cores = available_cores()
     for key, ranks in case.ranks_by_key.items():
         if ranks > cores:
@@ -83,9 +84,6 @@ def too_large(case: Case, leave: Leave | None = None) -> Iterator[Problem]:
 
 def needed_memory(case: Case) -> float:
     """Predict the memory [B] of the largest stage of a case on this machine."""
-    from reflowshock.workflow.cluster.resources import stage_resources
-    from reflowshock.workflow.pipeline.reader import available_cores
-
     stages = stage_resources(case, cores=available_cores()).values()
     return 1e6 * max((stage.mem_mb for stage in stages), default=0)
 

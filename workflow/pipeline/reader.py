@@ -1,51 +1,22 @@
 """Reading a case file: its kind, by the table that only this kind has, every value converted and checked."""
 
-import os
-import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 from pydantic import ValidationError
 
-from reflowshock.fem.names import nearest
-from reflowshock.workflow.board_drop.case import BoardDropCase, PackageCase
 from reflowshock.workflow.case import fields
-from reflowshock.workflow.case.kind import FULL, Case
+from reflowshock.workflow.case.case import FULL, Case
 from reflowshock.workflow.case.problems import CaseError, Origin, Problem
-from reflowshock.workflow.case.scales import choose, is_key, take_scales
+from reflowshock.workflow.case.scales import choose, is_key, override_value, take_scales
 from reflowshock.workflow.case.toml_file import is_too_deep, parse_toml, read_text
 from reflowshock.workflow.case.toml_places import Places
 from reflowshock.workflow.case.validation import translate
+from reflowshock.workflow.kinds import kind_named_in
 from reflowshock.workflow.pipeline import gate
 from reflowshock.workflow.pipeline.gate import Leave
-from reflowshock.workflow.solder.case import DropCase, DropsCase, JointCase, OscillationCase
-from reflowshock.workflow.structure.case import StructureCase
 
 SETTING = "--set"  # where a value is from that an option gives
-KINDS: dict[str, type[Case]] = {
-    model.kind: model for model in (BoardDropCase, DropCase, JointCase, DropsCase, OscillationCase, StructureCase)
-}
-
-
-def kind_of(table: Mapping) -> type[Case]:
-    """Return the model of a case file.
-
-    Raises:
-        CaseError: the file has the tables of no kind, or of several.
-    """
-    found = [kind for kind in KINDS if kind in table]
-    if found == [PackageCase.kind] and not any(nearest(name, ("shock",)) for name in table):
-        return PackageCase
-    if len(found) == 1:
-        return KINDS[found[0]]
-    choice = "exactly one of " + ", ".join(f"[{kind}]" for kind in KINDS)
-    if found:
-        message = "is of several kinds at once: it has " + " and ".join(f"[{kind}]" for kind in found)
-        raise CaseError("case", [Problem("", message, None, choice)])
-    if isinstance(table.get("study"), dict):
-        raise CaseError("case", [Problem("", "is a study, not a case; use: reflowshock study")])
-    hint = next((f"[{near}]" for name in table if (near := nearest(name, KINDS))), "")
-    raise CaseError("case", [Problem("", "does not say what kind of case it is", None, choice, hint)])
 
 
 def read_case(path: Path, overrides: Sequence[str] = (), oversubscribe: bool = False, force: bool = False) -> Case:
@@ -80,7 +51,7 @@ def _checked_case(path: Path, table: dict, overrides: Sequence[str], origins: di
     problems: list[Problem] = []
     origins |= _override(table, overrides, problems)
     try:
-        kind = kind_of(table)
+        kind = kind_named_in(table).case
     except CaseError as error:
         raise CaseError(str(path), error.problems + problems) from None
     values = kind.located(fields.to_si_table(kind, kind.completed(table), "", problems), path.parent)
@@ -94,16 +65,6 @@ def _checked_case(path: Path, table: dict, overrides: Sequence[str], origins: di
     if case is None or problems:
         raise CaseError(str(path), problems)
     return case
-
-
-def display_values(case: Case) -> dict[str, str]:
-    """Return every parameter that has a value as dotted key -> text in the user's unit."""
-    return {key: fields.display(value, field) for key, value, field in fields.leaves(case) if value is not None}
-
-
-def available_cores() -> int:
-    """Return the number of cores that this process may use."""
-    return len(os.sched_getaffinity(0))
 
 
 def _override(table: dict, overrides: Sequence[str], problems: list[Problem]) -> dict[str, Origin]:
@@ -129,14 +90,6 @@ def _setting(override: str, problems: list[Problem]) -> tuple[str, object]:
     elif is_too_deep(value):
         problems.append(Problem(key, "has lists or tables nested too deeply", None, "a value, or a list of values"))
     return key or override, value
-
-
-def override_value(text: str) -> object:
-    """Return the value that a setting's text stands for: TOML, quotes may be left out."""
-    try:
-        return tomllib.loads(f"value = {text}")["value"]
-    except (ValueError, RecursionError):
-        return text
 
 
 def set_value(table: dict, path: list[str], value: object) -> bool:

@@ -8,12 +8,11 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
-from reflowshock.workflow.board_drop.case import PackageCase
+from reflowshock.workflow.case.case import Case
 from reflowshock.workflow.case.fields import allowed, display, holds_named_tables, models_of, unit_of
-from reflowshock.workflow.case.kind import Case
 from reflowshock.workflow.case.names import NAME
 from reflowshock.workflow.case.units import QUANTITY, dimension
-from reflowshock.workflow.pipeline.reader import KINDS
+from reflowshock.workflow.kinds import KINDS
 
 SCALES = {
     "description": "values, by dotted keys, that replace those of the file where its scale is chosen",
@@ -28,8 +27,7 @@ def case_schema() -> dict:
     """Return the JSON schema (draft 2020-12) of a case file: that of any kind."""
     kinds: list[dict] = []
     definitions: dict = {}
-    models: list[type[Case]] = [*KINDS.values(), PackageCase]
-    for kind in models:
+    for kind in (one.case for one in KINDS):
         schema = _with_own_names(_kind_schema(kind), kind.kind, definitions)
         definitions |= schema.pop("$defs")
         schema["properties"]["scales"] = SCALES

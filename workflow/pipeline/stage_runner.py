@@ -3,65 +3,15 @@
 import resource
 import time
 import traceback
-from collections.abc import Callable
-from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Generic, TypeVar
 
-from reflowshock.workflow.case.kind import Case
-from reflowshock.workflow.case.stage_table import Stage
+from reflowshock.workflow.case.run import Run, StageError, StageFunction
+from reflowshock.workflow.case.stage import Stage
 from reflowshock.workflow.process.last_word import in_words, is_interrupt
 from reflowshock.workflow.process.terminal import console, health_line
 from reflowshock.workflow.store.keys import compare, product_key, stage_inputs
 from reflowshock.workflow.store.product import discard, publish, read_record, seal
 from reflowshock.workflow.store.store import MESSAGE, TRACEBACK, reads
-
-AnyCase = TypeVar("AnyCase", bound=Case)
-
-
-@dataclass(frozen=True, slots=True)
-class Run(Generic[AnyCase]):
-    """What a stage works with.
-
-    Attributes:
-        folder: the run folder, with the products of earlier stages.
-        case: the resolved case.
-        cores: number of cores that a stage may use.
-        oversubscribe: whether MPI may have more ranks than cores.
-    """
-
-    folder: Path
-    case: AnyCase
-    cores: int
-    oversubscribe: bool = False
-
-    def checkpoints(self, stage: str) -> Path:
-        """Folder in which a stage keeps what it needs to continue after a kill; removed when it is complete."""
-        return self.folder / f".{stage}.checkpoints"
-
-
-@dataclass(frozen=True, slots=True)
-class Findings:
-    """What a stage found, in the form of ``summary.json``.
-
-    Attributes:
-        metrics: name -> {"value", "unit"}.
-        health: check -> {"value", "limit", "ok"}.
-        effects: effect -> {"on", "why"}.
-        continued: what continued from checkpoints, in words.
-    """
-
-    metrics: dict = field(default_factory=dict)
-    health: dict = field(default_factory=dict)
-    effects: dict = field(default_factory=dict)
-    continued: str = ""
-
-
-class StageError(RuntimeError):
-    """A stage cannot use what it was given, or has not made what it is to make."""
-
-
-StageFunction = Callable[[Run[Any], Path], Findings]
 
 
 def run_stage(name: str, function: StageFunction, run: Run, product: Path) -> dict:

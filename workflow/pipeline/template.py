@@ -8,6 +8,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
 from reflowshock.fem.names import nearest
+from reflowshock.workflow.case.case import CASES, Case, Title
 from reflowshock.workflow.case.fields import (
     allowed,
     alternatives,
@@ -17,14 +18,12 @@ from reflowshock.workflow.case.fields import (
     models_of,
     unit_of,
 )
-from reflowshock.workflow.case.kind import Case, Title
 from reflowshock.workflow.case.names import is_name, wrong_name
 from reflowshock.workflow.case.problems import CaseError, Problem, as_toml
 from reflowshock.workflow.case.scales import scales_text, take_scales
 from reflowshock.workflow.case.toml_file import read_toml
 from reflowshock.workflow.pipeline.reader import read_case
 
-CASES = Path(__file__).resolve().parents[2] / "cases"
 COMMENT_COLUMN = 44
 HEADER = """\
 # Case "{name}", from the template "{template}".

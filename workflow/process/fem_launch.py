@@ -6,7 +6,7 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from reflowshock.workflow.pipeline.stage_runner import Run
+from reflowshock.workflow.case.run import Run
 from reflowshock.workflow.process.launch import launch, mpi_command
 from reflowshock.workflow.process.progress import progress_bar
 from reflowshock.workflow.process.stopped_processes import PATIENCE

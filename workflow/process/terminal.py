@@ -12,7 +12,7 @@ from rich.console import Console, ConsoleOptions, RenderableType
 from rich.segment import Segment
 from rich.text import Span, Text
 
-from reflowshock.workflow.case.check_text import against_limit
+from reflowshock.workflow.case.text import against_limit
 
 # All that a terminal obeys (but for line end and tab), that turns the direction of text, or that no encoding has.
 CONTROL = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")

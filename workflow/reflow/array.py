@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reflowshock.particles.parameters.solder import Solder
-from reflowshock.workflow.board_drop.reflow_pool import Alike, distinct_joints
+from reflowshock.workflow.reflow.joints import Alike, distinct_joints
 from reflowshock.workflow.reflow.pool import JointPool, Shares
 
 if TYPE_CHECKING:

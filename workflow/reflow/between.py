@@ -10,9 +10,9 @@ import numpy as np
 from reflowshock.fem.problem.thermal import Thermal
 
 if TYPE_CHECKING:
-    from reflowshock.fem.statics.state import Structure
+    from reflowshock.fem.statics.state import HeatedStructure
     from reflowshock.meshing.board.pads import PadSite
-    from reflowshock.workflow.board_drop.case import PackageCase
+    from reflowshock.workflow.package.case import PackageCase
 
 
 def thermal_effects(case: "PackageCase", thermal: Thermal) -> dict:
@@ -37,7 +37,7 @@ def thermal_effects(case: "PackageCase", thermal: Thermal) -> dict:
 
 def open_structure(
     case: "PackageCase", thermal: Thermal, mesh: Path, pads: "list[PadSite]", flexible: bool
-) -> "AbstractContextManager[Structure]":
+) -> "AbstractContextManager[HeatedStructure]":
     """Return board and package as a structure, in a process of its own where it bends; a context that ends it.
 
     Args:
@@ -60,7 +60,7 @@ def open_structure(
     return StructureProcess(assembly) if flexible else nullcontext(RigidPlates(assembly))
 
 
-def frozen_displacement(case: "PackageCase", structure: "Structure", displacement: np.ndarray) -> np.ndarray:
+def frozen_displacement(case: "PackageCase", structure: "HeatedStructure", displacement: np.ndarray) -> np.ndarray:
     """Return the displacement `(n, 3)` with the lift of a prescribed warpage: rigid plates have it from the start."""
     from reflowshock.meshing.board.pads import lift
 

@@ -20,7 +20,7 @@ from reflowshock.workflow.reflow.load_steps import LoadStep
 from reflowshock.workflow.reflow.rigid_balance import RigidBalance
 
 if TYPE_CHECKING:
-    from reflowshock.fem.statics.state import State, Structure
+    from reflowshock.fem.statics.state import HeatedState, HeatedStructure
     from reflowshock.particles.core.geometry import JointGeometry
 
 Floats = NDArray[np.float64]
@@ -98,7 +98,7 @@ class Coupled:
     rigid: Floats
     balance: RigidBalance
     load_step: int = 0
-    state: "State | None" = None
+    state: "HeatedState | None" = None
     pending: bool = False
     exchanges: list[Exchange] = field(default_factory=list)
     pad_motion: list[Floats] = field(default_factory=list)
@@ -118,7 +118,7 @@ class Coupling:
         tell: called with each exchange that is done.
     """
 
-    structure: "Structure"
+    structure: "HeatedStructure"
     joints: Joints
     drawn: "Mapping[str, JointGeometry]"
     scale: Scale

@@ -12,7 +12,7 @@ from reflowshock.workflow.reflow.load_steps import LoadStep, load_steps
 
 if TYPE_CHECKING:
     from reflowshock.particles.core.geometry import JointGeometry
-    from reflowshock.workflow.board_drop.case import PackageCase
+    from reflowshock.workflow.package.case import PackageCase
 
 # Measured with the structures of tests/verification/test_workflow_coupling.py: a package that floats is sought by
 # three or four exchanges a load step, forces that bend need two, and one way none beyond the first.

@@ -10,15 +10,14 @@ import numpy as np
 from reflowshock.fem import statics
 from reflowshock.fem.parallel.checkpoint_files import digest_of_files
 from reflowshock.fem.problem.thermal import KELVIN, Thermal
-from reflowshock.workflow.board_drop.case import PackageCase
-from reflowshock.workflow.board_drop.findings import at_most, metric
-from reflowshock.workflow.board_drop.reflow_pool import Alike, joint_geometries
-from reflowshock.workflow.pipeline.stage_runner import Run
+from reflowshock.workflow.case.run import Run, at_most, metric
+from reflowshock.workflow.package.case import PackageCase
 from reflowshock.workflow.process.progress import ProgressBar, progress_bar
 from reflowshock.workflow.reflow.array import JointArray, Left, Source
 from reflowshock.workflow.reflow.between import frozen_displacement, open_structure, thermal_effects
 from reflowshock.workflow.reflow.coupling import Coupled, Coupling, Exchange, placed
 from reflowshock.workflow.reflow.forecast import thermal_effect
+from reflowshock.workflow.reflow.joints import Alike, joint_geometries
 from reflowshock.workflow.reflow.load_steps import LoadStep, load_steps
 from reflowshock.workflow.reflow.open_pool import open_pool
 from reflowshock.workflow.reflow.pool import Shares
@@ -26,7 +25,7 @@ from reflowshock.workflow.reflow.rigid_balance import RigidBalance
 from reflowshock.workflow.reflow.start import scale_of, start
 
 if TYPE_CHECKING:
-    from reflowshock.fem.statics.state import Structure
+    from reflowshock.fem.statics.state import HeatedStructure
     from reflowshock.meshing.board.pads import PadSite
     from reflowshock.particles.core.geometry import JointGeometry
     from reflowshock.particles.steps.shape import JointShape
@@ -110,14 +109,16 @@ def reflow_heated(run: Run[PackageCase], thermal: Thermal, pads: "list[PadSite]"
         )
 
 
-def _start(structure: "Structure", drawn: "dict[str, JointGeometry]", case: PackageCase, first: LoadStep) -> Coupled:
+def _start(
+    structure: "HeatedStructure", drawn: "dict[str, JointGeometry]", case: PackageCase, first: LoadStep
+) -> Coupled:
     """Begin with pads where the structure has them without solder."""
     modes = structure.rigid_modes
     alone = structure.solve(first.temperature, first.corner, *_nothing(structure))
     return start(list(placed(drawn, alone.pad_motion).values()), case.solder, modes)
 
 
-def _nothing(structure: "Structure") -> tuple[np.ndarray, np.ndarray]:
+def _nothing(structure: "HeatedStructure") -> tuple[np.ndarray, np.ndarray]:
     """No wrenches, no rigid motions."""
     motion = structure.rigid_modes.pad_motion
     return np.zeros(motion.shape[1:]), np.zeros(len(motion))
@@ -132,11 +133,11 @@ def all_inputs(case: PackageCase, pads: "list[PadSite]") -> tuple:
 
 def _records() -> tuple[type, ...]:
     """What the file of a coupling consists of."""
-    from reflowshock.fem.statics.state import State
+    from reflowshock.fem.statics.state import HeatedState
     from reflowshock.particles.core.geometry import JointGeometry
     from reflowshock.particles.scenes.orientation import Orientation
 
-    return Coupled, RigidBalance, State, Exchange, Left, Source, Alike, JointGeometry, Orientation
+    return Coupled, RigidBalance, HeatedState, Exchange, Left, Source, Alike, JointGeometry, Orientation
 
 
 class Saved:

@@ -1,7 +1,7 @@
 """Who brings the joints of a case to rest."""
 
-from reflowshock.workflow.board_drop.case import PackageCase
-from reflowshock.workflow.pipeline.stage_runner import Run
+from reflowshock.workflow.case.run import Run
+from reflowshock.workflow.package.case import PackageCase
 from reflowshock.workflow.reflow.pool import JointPool
 from reflowshock.workflow.reflow.processes import Processes
 from reflowshock.workflow.reflow.ranks import Ranks

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from reflowshock.workflow.board_drop import findings
-from reflowshock.workflow.board_drop import reflow_pool as pool
-from reflowshock.workflow.board_drop.case import PackageCase
-from reflowshock.workflow.board_drop.given_surfaces import given_records
-from reflowshock.workflow.pipeline.stage_runner import Findings, Run
+from reflowshock.workflow.case.run import Findings, Run
+from reflowshock.workflow.package import findings
+from reflowshock.workflow.package.case import PackageCase
+from reflowshock.workflow.package.given_surfaces import given_records
 from reflowshock.workflow.process.products import write_json
 from reflowshock.workflow.process.progress import progress_bar
+from reflowshock.workflow.reflow import joints as pool
 from reflowshock.workflow.reflow.heated import reflow_heated
 from reflowshock.workflow.reflow.open_pool import open_pool
 
@@ -90,7 +90,7 @@ def _between_plates(run: Run[PackageCase], pads: "list[PadSite]") -> Reflowed:
 
 def _heated(run: Run[PackageCase], pads: "list[PadSite]", mesh: Path) -> Reflowed:
     """All joints through the load steps of temperature, with board and package, which are meshed for it."""
-    from reflowshock.meshing.board.heated_assembly import write_heated_assembly
+    from reflowshock.meshing.board.assembly import write_heated_assembly
 
     assert run.case.thermal is not None
     write_heated_assembly(run.case.package, run.case.board, mesh)

@@ -35,7 +35,7 @@ def start(geometries: "Sequence[JointGeometry]", solder: Solder, modes: "RigidMo
         solder: of one joint.
         modes: free rigid motions of the package.
     """
-    from reflowshock.particles.scenes.joint_stiffness import stiffness_estimate
+    from reflowshock.particles.scenes.carried_joint import stiffness_estimate
 
     gaps = np.array([geometry.gap for geometry in geometries])
     middle = geometries[int(np.argsort(gaps)[len(gaps) // 2])]
@@ -56,7 +56,7 @@ def floating_height(geometry: "JointGeometry", solder: Solder, load: float) -> f
     """
     from scipy.optimize import brentq
 
-    from reflowshock.particles.scenes.joint_stiffness import axial_force
+    from reflowshock.particles.scenes.carried_joint import axial_force
 
     def excess(gap: float) -> float:
         return axial_force(geometry, solder, gap) - load

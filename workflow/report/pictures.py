@@ -2,19 +2,24 @@
 
 import base64
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 import pyvista
 from matplotlib import pyplot
+
+if TYPE_CHECKING:
+    from reflowshock.particles.steps.shape import JointShape, Snapshot
 
 Told = TypeVar("Told")
 
 MILLI = 1.0e-3
 MEGA = 1.0e6
 WINDOW = (1600, 800)
+SMALLEST_RANGE = 0.01  # of colours, about the mean
+ROW_SHARE = 0.86  # of the width, which a row of bodies fills
 SCALAR_BAR = {"vertical": True, "position_x": 0.88, "position_y": 0.3, "height": 0.5, "color": "black", "n_labels": 4}
 
 
@@ -191,3 +196,51 @@ def embedded(draw: Callable[[Path], Told]) -> tuple[str, Told]:
         picture = Path(folder) / "picture.png"
         told = draw(picture)
         return base64.b64encode(picture.read_bytes()).decode(), told
+
+
+def render_stages(stages: "Sequence[Snapshot]", shape: "JointShape", picture: Path) -> None:
+    """Render particles and free surface at some times side by side, then at the end, coloured by pressure."""
+    plotter = new_plotter((1800, 800))
+    states = [*((stage.points, stage.triangles) for stage in stages), (shape.points, shape.triangles)]
+    place, size = 0.0, {"point_size": 11, "render_points_as_spheres": True}
+    for index, (points, triangles) in enumerate(states):
+        points = points / MILLI
+        points = points + np.array([place - points[:, 0].min(), 0.0, 0.0])
+        place = points[:, 0].max() + 0.2 * np.ptp(points[:, 0])
+        faces = np.column_stack((np.full(len(triangles), 3), triangles))
+        surface = pyvista.PolyData(points, faces.ravel())
+        plotter.add_mesh(surface, color="#b9c4cf", opacity=0.35, show_edges=True, edge_color="#5f6c7b", line_width=0.6)
+        if index < len(stages):
+            plotter.add_mesh(pyvista.PolyData(points), color="#8a949e", **size)
+        else:
+            _add_coloured(plotter, points, shape.pressure, size)
+    _look_at_row(plotter)
+    save(plotter, picture)
+
+
+def _look_at_row(plotter: pyvista.Plotter) -> None:
+    """Look at a row along x from slightly above, so that it fills the picture but for the bar on the right."""
+    left, right, front, back, low, high = plotter.bounds
+    aspect = plotter.window_size[0] / plotter.window_size[1]
+    width = max((right - left) / ROW_SHARE, 1.05 * aspect * (high - low + 0.4 * (back - front)))
+    centre = np.array([left + 0.5 * width - 0.02 * width, 0.0, 0.5 * (low + high)])
+    plotter.camera_position = [centre + width * np.array([0.0, -10.0, 4.0]), centre, (0.0, 0.0, 1.0)]
+    plotter.enable_parallel_projection()
+    plotter.camera.parallel_scale = 0.5 * width / aspect
+    plotter.camera.clipping_range = (width, 20.0 * width)
+
+
+def _add_coloured(plotter: pyvista.Plotter, points: np.ndarray, pressure: np.ndarray, size: dict) -> None:
+    """Add particles at points `(n, 3)` [mm] coloured by their pressure `(n,)` [Pa], and the bar of the colours."""
+    cloud = pyvista.PolyData(points)
+    cloud["pressure [Pa]"] = pressure
+    bar = {"vertical": True, "position_x": 0.92, "position_y": 0.25, "height": 0.5, "color": "black", "n_labels": 3}
+    bar, limits = bar | {"fmt": "%.4g"}, _colour_limits(pressure)
+    plotter.add_mesh(cloud, scalars="pressure [Pa]", cmap="viridis", clim=limits, scalar_bar_args=bar, **size)
+
+
+def _colour_limits(pressure: np.ndarray) -> tuple[float, float]:
+    """Range of the colours: that of the values, at least one per cent about the mean, so that equal ones look equal."""
+    mean = float(pressure.mean())
+    low, high = float(pressure.min()), float(pressure.max())
+    return min(low, mean - SMALLEST_RANGE * abs(mean)), max(high, mean + SMALLEST_RANGE * abs(mean))

@@ -4,7 +4,7 @@ from importlib import metadata
 
 import numpy as np
 
-from reflowshock.workflow.case.check_text import against_limit
+from reflowshock.workflow.case.text import against_limit, nano, number, percent, quantity
 
 SHAPE_EFFECT = "shape_effect_on_peak_stress"
 HEADLINE = (
@@ -71,24 +71,6 @@ def health_rows(health: dict) -> list[dict]:
         {"name": name.replace("_", " "), "value": value, "limit": limit, "ok": health[name]["ok"]}
         for name, (value, limit) in texts.items()
     ]
-
-
-def parameters(case) -> dict:
-    """All resolved parameters of the case, as dotted keys with values in the user's units."""
-    from reflowshock.workflow.pipeline.reader import display_values
-
-    return {"head": ["key", "value"], "rows": [[key, value] for key, value in display_values(case).items()]}
-
-
-def effects(case, records: dict) -> dict:
-    """Which effects were simulated, their expected influence and predicted cost, and why: in prose."""
-    from reflowshock.workflow.effects.table import CAPTION, rows
-
-    told = [
-        [name, "on" if acts else "off", influence, cost, why]
-        for name, acts, influence, cost, why in rows(case, records)
-    ]
-    return {"head": ["effect", "state", "influence", "cost", "why"], "rows": told, "prose": True, "caption": CAPTION}
 
 
 def versions() -> dict:
@@ -181,52 +163,3 @@ def named_quantity(metrics: dict, name: str) -> str:
     if name.endswith("_strain"):
         return f"{1e6 * metrics[name]['value']:.0f} µm/m"
     return quantity(metrics[name])
-
-
-LONGEST_IN_MS = 0.1
-SHOWN = {
-    "Pa": (1e-6, "MPa"), "m": (1e3, "mm"), "m^3": (1e9, "mm^3"), "J": (1e3, "mJ"), "J/m^3": (1e-3, "kJ/m^3"),
-    "N": (1e3, "mN"), "kg": (1e6, "mg"), "B": (1e-9, "GB"),
-}  # fmt: skip
-
-
-def quantity(metric: dict) -> str:
-    """Text of a metric record: fractions as per cent, stresses in MPa, lengths in mm, short times in ms."""
-    value, unit = metric["value"], metric["unit"]
-    if isinstance(value, str):
-        return value
-    if unit == "s" and 0.0 < value < LONGEST_IN_MS:
-        return f"{number(1e3 * value)} ms"
-    factor, shown = SHOWN.get(unit, (1.0, unit))
-    return f"{number(factor * value)} {shown}".strip()
-
-
-def number(value) -> str:
-    """Four significant digits, without a needless exponent."""
-    if isinstance(value, bool | str) or value is None:
-        return str(value)
-    if isinstance(value, int):
-        return f"{value:,}".replace(",", " ")
-    return f"{value:.4g}"
-
-
-def nano(seconds: float | None) -> str:
-    """Seconds as nanoseconds."""
-    return "–" if seconds is None else f"{1e9 * seconds:.3g} ns"
-
-
-def micro(value: float) -> str:
-    """Metres as micrometres."""
-    return f"{1e6 * value:.1f}"
-
-
-def mega(value: float) -> str:
-    """Pascals as megapascals."""
-    return f"{1e-6 * value:.1f}" if abs(value) >= 1e6 or value == 0.0 else f"{1e-6 * value:.2g}"
-
-
-def percent(value: float) -> str:
-    """A fraction as per cent, two digits."""
-    if abs(value) < 1.0e-6:
-        return "< 0.0001 %"
-    return f"{100.0 * value:.2g} %" if abs(value) < 1.0 else f"{100.0 * value:.0f} %"

@@ -3,8 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from reflowshock.workflow.board_drop.fine_joints import FineJoints
-from reflowshock.workflow.report.tables import nano, number, quantity
+from reflowshock.workflow.case.text import nano, number, quantity
 
 Record = Mapping[str, Any]
 
@@ -27,13 +26,13 @@ SELF_CHECK = {
 }
 
 
-def two_scales(coupling: Record, model: Record, fine: FineJoints | None) -> dict:
+def two_scales(coupling: Record, model: Record, found_by: str = "") -> dict:
     """Return how the models are coupled: what of it the run has told.
 
     Args:
         coupling: ``coupling`` of the result of a two-scale run.
         model: its ``model``.
-        fine: its fine joints, where they were found by a coarse run.
+        found_by: how its fine joints were found, where a coarse run did; else empty.
     """
     scheme, joints = coupling.get("scheme"), coupling.get("fine_joints")
     rows = [
@@ -42,7 +41,7 @@ def two_scales(coupling: Record, model: Record, fine: FineJoints | None) -> dict
         ("direction", DIRECTIONS.get(coupling.get("direction", ""))),
         ("fine joints", " ".join(joints) if joints is not None and not isinstance(joints, str) else joints),
         ("fine layers", " ".join(coupling.get("fine_layers", ()))),
-        ("how they were found", fine and fine.why),
+        ("how they were found", found_by),
         ("window", nano(model["window"])),
         ("step ratio m", number(model["substeps"])),
         ("meso share f of the elements", _share(coupling.get("meso_share"))),

@@ -2,13 +2,16 @@
 
 from pydantic import Field
 
-from reflowshock.particles.parameters.scene_drops import Drops
-from reflowshock.particles.parameters.scene_oscillation import Oscillation
-from reflowshock.particles.parameters.scenes import Drop, Fluid, Joint, Liquid
+from reflowshock.particles.parameters.scenes import Drop, Drops, Fluid, Joint, Liquid, Oscillation
 from reflowshock.particles.parameters.solder import Solder, Switch
-from reflowshock.workflow.case.kind import Case, of_particles
-from reflowshock.workflow.case.problems import Problem
-from reflowshock.workflow.case.stage_table import DROP, DROPS, JOINT, OSCILLATION
+from reflowshock.workflow.case.case import Case
+from reflowshock.workflow.case.stage import Pipeline, Stage, report_of
+
+
+def _one_body(scene: str) -> Pipeline:
+    """Reflow of one scene, and its report."""
+    reflow = Stage("reflow", (scene, "solder", "gravity"), (), ("reflow/shape.h5", "reflow/particles.vtu"))
+    return Pipeline((reflow, report_of("reflow")))
 
 
 class SceneCase(Case):
@@ -27,52 +30,34 @@ class DropCase(SceneCase):
     """A drop of solder on a wall or pad."""
 
     kind = "drop"
-    stages = DROP
+    stages = _one_body("drop")
 
     drop: Drop
-
-    def problems(self) -> list[Problem]:
-        """Find parameters that make no possible drop together."""
-        from reflowshock.particles.parameters.scene_checks import drop_problems
-
-        return of_particles(drop_problems(self.drop, self.molten))
 
 
 class JointCase(SceneCase):
     """A joint of solder between two pads."""
 
     kind = "joint"
-    stages = JOINT
+    stages = _one_body("joint")
 
     joint: Joint
-
-    def problems(self) -> list[Problem]:
-        """Find parameters that make no possible joint together."""
-        from reflowshock.particles.parameters.scene_checks import joint_problems
-
-        return of_particles(joint_problems(self.joint, self.molten))
 
 
 class DropsCase(SceneCase):
     """Two drops that become one, or stay apart."""
 
     kind = "drops"
-    stages = DROPS
+    stages = _one_body("drops")
 
     drops: Drops
-
-    def problems(self) -> list[Problem]:
-        """Find parameters that make no possible pair together."""
-        from reflowshock.particles.parameters.scene_checks import pair_problems
-
-        return of_particles(pair_problems(self.drops, self.molten))
 
 
 class OscillationCase(Case):
     """A free drop that swings."""
 
     kind = "oscillation"
-    stages = OSCILLATION
+    stages = _one_body("oscillation")
 
     oscillation: Oscillation
     solder: Liquid = Liquid()
@@ -81,9 +66,3 @@ class OscillationCase(Case):
     def molten(self) -> Solder:
         """The liquid as the solver takes it."""
         return self.oscillation.resolve(self.solder)
-
-    def problems(self) -> list[Problem]:
-        """Find a drop that does not swing."""
-        from reflowshock.particles.parameters.scene_checks import oscillation_problems
-
-        return of_particles(oscillation_problems(self.oscillation, self.molten))

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 from math import ceil
 from typing import Any
 
-from reflowshock.workflow.case.kind import Case
+from reflowshock.workflow.case.case import Case
+from reflowshock.workflow.case.forecast import BYTES_OF_PARTICLE, Size
 from reflowshock.workflow.solder.case import DropCase, DropsCase, JointCase, OscillationCase, SceneCase
 
 SECONDS_TO_START = 2.0  # until a stage has loaded its libraries and kernels
@@ -87,7 +88,7 @@ def _towards_rest(case: SceneCase, effects: Mapping[str, Any], particles: int, s
 def _of_oscillation(case: OscillationCase) -> SceneForecast:
     from reflowshock.particles.parameters.effects import decide_oscillation
     from reflowshock.particles.parameters.estimate import inertial_seconds
-    from reflowshock.particles.parameters.scene_oscillation import rayleigh_period
+    from reflowshock.particles.parameters.scenes import rayleigh_period
     from reflowshock.particles.steps.time_step import capillary_limit
 
     scene, solder = case.oscillation, case.molten
@@ -110,3 +111,9 @@ FORECASTS: dict[str, Callable[[Any], SceneForecast]] = {
     DropsCase.kind: _of_drops,
     OscillationCase.kind: _of_oscillation,
 }
+
+
+def scene_size(case: Case) -> Size:
+    """Predict what the stages of a case take."""
+    outlook = forecast_scene(case)
+    return Size(outlook.seconds, 1, BYTES_OF_PARTICLE * outlook.particles)

@@ -3,10 +3,10 @@
 from dataclasses import replace
 from pathlib import Path
 
-from reflowshock.workflow.board_drop import findings
-from reflowshock.workflow.pipeline.stage_runner import Findings, Run, StageFunction
+from reflowshock.workflow.case.run import Findings, Run
 from reflowshock.workflow.process.products import write_json
 from reflowshock.workflow.process.progress import progress_bar
+from reflowshock.workflow.solder import findings
 from reflowshock.workflow.solder.case import DropCase, DropsCase, JointCase, OscillationCase
 
 
@@ -66,7 +66,7 @@ def reflow_oscillation(run: Run[OscillationCase], folder: Path) -> Findings:
     """Let a free drop swing."""
     from reflowshock.particles.core.checkpoint import Checkpoint
     from reflowshock.particles.parameters.effects import decide_oscillation
-    from reflowshock.particles.scenes.oscillation import solve_oscillation
+    from reflowshock.particles.scenes.free_drop import solve_oscillation
     from reflowshock.particles.scenes.products import write_body
 
     scene, solder = run.case.oscillation, run.case.molten
@@ -76,11 +76,3 @@ def reflow_oscillation(run: Run[OscillationCase], folder: Path) -> Findings:
     write_body(folder, shape, None)
     found = findings.of_oscillation(shape.metrics, decide_oscillation(solder))
     return replace(found, continued="the drop" if checkpoint.continued else "")
-
-
-REFLOW_SCENES: dict[str, StageFunction] = {
-    DropCase.kind: reflow_drop,
-    JointCase.kind: reflow_joint,
-    DropsCase.kind: reflow_drops,
-    OscillationCase.kind: reflow_oscillation,
-}

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from reflowshock.workflow import __version__
-from reflowshock.workflow.case.kind import Case
-from reflowshock.workflow.case.stage_table import Stage
+from reflowshock.workflow.case.case import Case
+from reflowshock.workflow.case.stage import Stage
 
 DIGITS = 12  # hexadecimal: two of a million products are alike with a probability of 0.2 %
 

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from reflowshock.workflow.case.check_text import against_limit
+from reflowshock.workflow.case.text import against_limit
 from reflowshock.workflow.store.keys import Change, compare, stage_inputs
 from reflowshock.workflow.store.point import Point
 from reflowshock.workflow.store.product import damage

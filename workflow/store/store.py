@@ -6,10 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from reflowshock.workflow.case.kind import Case
-from reflowshock.workflow.case.problems import CaseError, Problem
-from reflowshock.workflow.case.stage_table import Stage
-from reflowshock.workflow.pipeline.reader import kind_of
+from reflowshock.workflow.case.case import Case
+from reflowshock.workflow.case.stage import Stage
 from reflowshock.workflow.store.keys import digest_of
 from reflowshock.workflow.store.point import Point
 from reflowshock.workflow.store.product import RECORD, SEAL, content_digest, discard, read_record
@@ -126,22 +124,3 @@ def write_case(folder: Path, case: Case) -> None:
     partial = path.with_suffix(".partial")
     partial.write_text(text, encoding="utf-8")
     partial.replace(path)
-
-
-def read_case_of_run(folder: Path) -> Case:
-    """Return the case of a run folder.
-
-    Raises:
-        CaseError: there is none, or it is damaged.
-    """
-    path = folder / CASE
-    try:
-        table = json.loads(path.read_text(encoding="utf-8"))
-        if table.pop(SEAL) != digest_of(table):
-            raise ValueError(SEAL)
-        return kind_of(table).model_validate(table)
-    except FileNotFoundError as error:
-        raise CaseError(str(folder), [Problem("", "is not a run folder: nothing was run in it")]) from error
-    except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
-        message = "is not as it was written; `reflowshock run` with the case file writes it again"
-        raise CaseError(str(path), [Problem("", message)]) from error

@@ -11,7 +11,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from reflowshock.workflow.case.stage_table import PAGE
+from reflowshock.workflow.case.stage import PAGE
 from reflowshock.workflow.store.point import Point
 from reflowshock.workflow.store.product import RECORD, discard, file_digest, read_record
 from reflowshock.workflow.store.store import CASE, Store, write_case

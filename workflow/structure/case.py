@@ -4,17 +4,30 @@ from pathlib import Path
 
 from pydantic import Field
 
-from reflowshock.fem.problem.structure import StructureScene
+from reflowshock.fem.problem.structure import StructureProblem
 from reflowshock.meshing.board.box_plan import Box, BoxHoles, BoxLayer
-from reflowshock.workflow.case.kind import Case
-from reflowshock.workflow.case.problems import Problem
-from reflowshock.workflow.case.pulse_files import unreadable_pulses
-from reflowshock.workflow.case.stage_table import STRUCTURE
+from reflowshock.workflow.case.case import Case
+from reflowshock.workflow.case.stage import Pipeline, Stage, report_of
 from reflowshock.workflow.case.toml_file import beside
-from reflowshock.workflow.structure.references import AnyReference, reference_problems
+from reflowshock.workflow.structure.references import AnyReference
+
+MESHED = ("length", "width", "cells", "refine", "symmetry", "element", "layers", "holes")
+STRUCTURE = Pipeline(
+    (
+        Stage(
+            "geometry",
+            tuple(f"structure.{name}" for name in MESHED),
+            (),
+            ("geometry/structure.msh", "geometry/preview.png"),
+        ),
+        Stage("shock", ("structure", "materials", "supports", "loads", "watch", "dynamics"), ("geometry",), ()),
+        Stage("comparison", ("references",), ("shock",), ("comparison/comparison.json",)),
+        report_of("geometry", "shock", "comparison"),
+    )
+)
 
 
-class StructureCase(StructureScene, Case):
+class StructureCase(StructureProblem, Case):
     """A box of layers under supports and loads."""
 
     kind = "structure"
@@ -49,9 +62,9 @@ class StructureCase(StructureScene, Case):
         return {key: path for key, (path, _) in self.pulse_tables.items()}
 
     @property
-    def scene(self) -> StructureScene:
+    def scene(self) -> StructureProblem:
         """All of it as the solver takes it."""
-        return StructureScene(**{name: getattr(self, name) for name in StructureScene.model_fields})
+        return StructureProblem(**{name: getattr(self, name) for name in StructureProblem.model_fields})
 
     @property
     def box(self) -> Box:
@@ -62,26 +75,6 @@ class StructureCase(StructureScene, Case):
         )
         holes = BoxHoles(body.holes.spacing, body.holes.diameter) if body.holes else None
         return Box((body.length, body.width), body.cells, layers, body.symmetry, body.element, holes)
-
-    def problems(self) -> list[Problem]:
-        """Find what does not fit together: materials, places, facet sets, loads, references."""
-        from reflowshock.fem.problem import structure_checks
-        from reflowshock.meshing.board.box_checks import box_problems
-
-        boxes = [Problem(found.key, found.message, found.value, found.allowed) for found in box_problems(self.box)]
-        scenes = [
-            Problem(found.key, found.message, found.value, found.allowed, found.hint)
-            for found in structure_checks.problems(self.scene)
-        ]
-        found = [*boxes, *scenes, *unreadable_pulses(self.pulse_tables)]
-        found += reference_problems(self.references, self.scene)
-        return found or self._impossible_steps()
-
-    def _impossible_steps(self) -> list[Problem]:
-        from reflowshock.workflow.structure.findings import waves_that_do_not_pass
-        from reflowshock.workflow.structure.forecast import step_problems
-
-        return [*step_problems(self), *waves_that_do_not_pass(self)]
 
     @property
     def ranks(self) -> int:

@@ -8,10 +8,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from reflowshock.workflow.board_drop.findings import at_least, at_most, in_words_continued, metric
 from reflowshock.workflow.case.problems import Problem
-from reflowshock.workflow.pipeline.stage_runner import Findings
-from reflowshock.workflow.process.plan_table import short
+from reflowshock.workflow.case.run import Findings, at_least, at_most, in_words_continued, metric
+from reflowshock.workflow.case.text import short
 from reflowshock.workflow.structure import exact_bar, exact_cantilever, exact_layers
 from reflowshock.workflow.structure.case import StructureCase
 from reflowshock.workflow.structure.references import BarWave, Cantilever, FrequencyRange, LayeredBar

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from math import ceil
 from typing import TYPE_CHECKING, Any
 
+from reflowshock.workflow.case.forecast import BYTES_OF_ELEMENT, Size, Toggle, between, too_many_steps
 from reflowshock.workflow.case.problems import Problem
-from reflowshock.workflow.case.step_limit import too_many_steps
-from reflowshock.workflow.process.plan_table import short
+from reflowshock.workflow.case.text import short
 from reflowshock.workflow.structure.case import StructureCase
 
 if TYPE_CHECKING:
@@ -181,3 +181,16 @@ def added_mass(case: StructureCase, layers: Mapping[str, LayerForecast]) -> floa
         for name, layer in layers.items()
         if layer.mass_scaled
     )
+
+
+def structure_size(case: StructureCase) -> Size:
+    """Predict what the stages of a case take."""
+    outlook = forecast_structure(case)
+    elements = sum(layer.elements for layer in outlook.layers.values())
+    implicit = outlook.solvers.implicit.memory if "implicit" in case.dynamics.solvers else 0.0
+    return Size(outlook.seconds, 1, BYTES_OF_ELEMENT * elements + outlook.solvers.explicit.memory + implicit)
+
+
+def toggles(case: StructureCase) -> dict[str, Toggle]:
+    """Return the toggles of the effects whose cost the forecast knows."""
+    return {"finite_rotation": between("dynamics.kinematics", "finite", "small")}

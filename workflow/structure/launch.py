@@ -3,7 +3,7 @@
 import json
 from pathlib import Path
 
-from reflowshock.workflow.pipeline.stage_runner import Run
+from reflowshock.workflow.case.run import Run
 from reflowshock.workflow.process.fem_launch import run_fem
 from reflowshock.workflow.structure.case import StructureCase
 

@@ -1,10 +1,13 @@
 """Tables of the plan of a structure: its layers, and what either solver would cost."""
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+from rich.console import RenderableType
 from rich.table import Table
 
-from reflowshock.workflow.process.plan_table import duration, new_table, short
+from reflowshock.workflow.case.text import duration, short
+from reflowshock.workflow.process.plan_table import new_table
 from reflowshock.workflow.structure.case import StructureCase
 from reflowshock.workflow.structure.forecast import CoupledForecast, StructureForecast
 
@@ -12,6 +15,12 @@ if TYPE_CHECKING:
     from reflowshock.fem.estimates.solver_cost import SolverCost
 
 MEGA = 1.0e6
+
+
+def structure_tables(case: StructureCase, outlook: StructureForecast) -> Iterator[RenderableType]:
+    """Yield layers and solvers."""
+    yield layers(outlook)
+    yield solvers(case, outlook)
 
 
 def layers(outlook: StructureForecast) -> Table:

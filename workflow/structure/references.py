@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from reflowshock.fem.names import nearest
-from reflowshock.fem.problem.structure import Pressure, StructureScene
+from reflowshock.fem.problem.structure import Pressure, StructureProblem
 from reflowshock.workflow.case.problems import Problem
 
 
@@ -76,7 +76,7 @@ class Published(Reference):
 AnyReference = Annotated[BarWave | LayeredBar | Cantilever | FrequencyRange | Published, Field(discriminator="kind")]
 
 
-def reference_problems(references: dict[str, AnyReference], scene: StructureScene) -> Iterator[Problem]:
+def reference_problems(references: dict[str, AnyReference], scene: StructureProblem) -> Iterator[Problem]:
     """Find references to loads, points or modes that are not there, or to what has no exact solution."""
     for name, reference in references.items():
         key = f"references.{name}"
@@ -96,7 +96,7 @@ def reference_problems(references: dict[str, AnyReference], scene: StructureScen
             yield Problem(f"{key}.mode", "is not computed", reference.mode, allowed)
 
 
-def _heights(key: str, reference: BarWave | LayeredBar, scene: StructureScene) -> Iterator[Problem]:
+def _heights(key: str, reference: BarWave | LayeredBar, scene: StructureProblem) -> Iterator[Problem]:
     points = [*(("incident", name) for name in reference.incident), ("transmitted", reference.transmitted)]
     for item, name in points:
         yield from _known(f"{key}.{item}", name, scene.watch, "watch point")
@@ -110,7 +110,7 @@ def _heights(key: str, reference: BarWave | LayeredBar, scene: StructureScene) -
         yield Problem(key, "the watch points are not in their layers", None, allowed)
 
 
-def _pressure(key: str, name: str, scene: StructureScene, pulse: str) -> Iterator[Problem]:
+def _pressure(key: str, name: str, scene: StructureProblem, pulse: str) -> Iterator[Problem]:
     yield from _known(key, name, scene.loads, "load")
     load = scene.loads.get(name)
     if load is not None and not (isinstance(load, Pressure) and load.peak is not None and load.pulse == pulse):
@@ -119,7 +119,7 @@ def _pressure(key: str, name: str, scene: StructureScene, pulse: str) -> Iterato
         )
 
 
-def _pulse(key: str, name: str, scene: StructureScene) -> Iterator[Problem]:
+def _pulse(key: str, name: str, scene: StructureProblem) -> Iterator[Problem]:
     yield from _known(key, name, scene.loads, "load")
     load = scene.loads.get(name)
     if load is not None and not (isinstance(load, Pressure) and load.on == "z_min" and _ends(load)):
@@ -137,7 +137,7 @@ def _known(key: str, name: str, names: dict, what: str) -> Iterator[Problem]:
         yield Problem(key, f"no such {what}", name, "one of " + ", ".join(names), nearest(name, names))
 
 
-def _layers(key: str, count: int, scene: StructureScene) -> Iterator[Problem]:
+def _layers(key: str, count: int, scene: StructureProblem) -> Iterator[Problem]:
     found = len(scene.structure.layers)
     if found != count:
         yield Problem(f"{key}.kind", f"has no exact solution for {found} layers", None, f"{count} in structure.layers")

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
-from reflowshock.workflow.process.plan_table import short
+from reflowshock.workflow.case.text import number, percent, quantity, short
 from reflowshock.workflow.report import two_scales
-from reflowshock.workflow.report.tables import costs, number, percent, quantity
+from reflowshock.workflow.report.tables import costs
 from reflowshock.workflow.structure import curves as structure_curves
 from reflowshock.workflow.structure.case import StructureCase
 from reflowshock.workflow.structure.findings import read_history, read_modes
@@ -67,7 +67,7 @@ def add_two_scales(result: Mapping, context: dict) -> None:
     if coupling is None:
         return
     context["tables"] |= {
-        "two_scales": two_scales.two_scales(coupling, result["model"], None),
+        "two_scales": two_scales.two_scales(coupling, result["model"]),
         "levels": two_scales.levels(coupling),
         "placement": two_scales.placement(coupling),
     }

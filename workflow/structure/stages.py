@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from reflowshock.workflow.pipeline.stage_runner import Findings, Run, StageFunction
+from reflowshock.workflow.case.run import Findings, Run
 from reflowshock.workflow.process.products import write_json
 from reflowshock.workflow.structure import findings as structure_findings
 from reflowshock.workflow.structure.case import StructureCase
@@ -31,6 +31,3 @@ def comparison(run: Run[StructureCase], folder: Path) -> Findings:
     found = structure_findings.of_comparison(run.case, solver_folders(run.folder / "shock"))
     write_json(folder / "comparison.json", found.metrics)
     return found
-
-
-STRUCTURE_STAGES: dict[str, StageFunction] = {"geometry": geometry, "shock": shock, "comparison": comparison}

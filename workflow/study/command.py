@@ -9,12 +9,14 @@ from rich.table import Table
 
 from reflowshock.fem.names import nearest
 from reflowshock.workflow.case.problems import CaseError
-from reflowshock.workflow.process.plan_table import duration, new_table
+from reflowshock.workflow.case.text import duration
+from reflowshock.workflow.jobs.batch import Machine, missing, run_points, show_products
+from reflowshock.workflow.pipeline.points import PointsError, read_possible_points
+from reflowshock.workflow.process.plan_table import new_table
 from reflowshock.workflow.process.progress import progress_bar
 from reflowshock.workflow.process.terminal import console, print_error
-from reflowshock.workflow.store.batch import Machine, missing, run_points, show_products
 from reflowshock.workflow.store.folders import locked
-from reflowshock.workflow.store.point import Point, PointsError, read_possible_points
+from reflowshock.workflow.store.point import Point
 from reflowshock.workflow.store.product import discard
 from reflowshock.workflow.store.store import Store
 from reflowshock.workflow.store.view import adopt

@@ -6,8 +6,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from reflowshock.workflow.case.text import SHOWN
 from reflowshock.workflow.report.curves import STYLE, pyplot
-from reflowshock.workflow.report.tables import SHOWN
 from reflowshock.workflow.study.main_effects import Effect
 
 BLUE, RED, GREY = "#0b5fa5", "#d1495b", "#9aa5b1"

@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from reflowshock.workflow.pipeline.stage_forecast import stage_seconds
-from reflowshock.workflow.store.batch import Job
+from reflowshock.workflow.jobs.batch import Job
+from reflowshock.workflow.kinds import stage_seconds
 from reflowshock.workflow.store.point import Point
 
 

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from reflowshock.workflow import __version__
-from reflowshock.workflow.report.page import write_page
+from reflowshock.workflow.report.template import write_page
 from reflowshock.workflow.study import tables
 from reflowshock.workflow.study.results import HEALTHY, Row, columns, write_csv, write_parquet
 from reflowshock.workflow.study.study_file import Study

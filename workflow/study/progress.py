@@ -3,10 +3,10 @@
 import time
 from collections.abc import Callable, Sequence
 
-from reflowshock.workflow.process.plan_table import duration
+from reflowshock.workflow.case.text import duration
+from reflowshock.workflow.jobs.batch import Job
 from reflowshock.workflow.process.progress import ProgressBar
 from reflowshock.workflow.process.terminal import console
-from reflowshock.workflow.store.batch import Job
 from reflowshock.workflow.store.point import Point
 from reflowshock.workflow.store.store import Store
 

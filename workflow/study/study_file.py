@@ -14,7 +14,7 @@ from reflowshock.workflow.case.scales import dotted, is_key
 from reflowshock.workflow.case.toml_file import parse_toml, read_text
 from reflowshock.workflow.case.toml_places import Places
 from reflowshock.workflow.case.validation import translate
-from reflowshock.workflow.pipeline.reader import KINDS
+from reflowshock.workflow.kinds import NAMES
 from reflowshock.workflow.study.designs import MOST_POINTS, Design, TooManyPoints, grid_axes, list_axis, sampled
 from reflowshock.workflow.study.hypercube import Hypercube
 from reflowshock.workflow.study.setting_text import as_text
@@ -101,7 +101,7 @@ def read_study(path: Path) -> Study:
 
 def _study(path: Path, table: dict) -> Study:
     """Return the study of a table; errors as ``read_study``, without their places."""
-    if "study" not in table and any(kind in table for kind in KINDS):
+    if "study" not in table and any(kind in table for kind in NAMES):
         raise CaseError(str(path), [Problem("", "is a case, not a study; use: reflowshock plan, or run")])
     values = table | ({"list": tuple(table["list"])} if isinstance(table.get("list"), list) else {})
     if isinstance(given := table.get("study"), dict) and isinstance(given.get("metrics"), list):

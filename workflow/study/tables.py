@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 
-from reflowshock.workflow.report.tables import quantity
+from reflowshock.workflow.case.text import quantity
 from reflowshock.workflow.study.main_effects import Effect, effect_of, measured, ranked
 from reflowshock.workflow.study.results import HEALTHY, UNHEALTHY, Row
 from reflowshock.workflow.study.study_file import Study

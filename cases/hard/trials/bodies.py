@@ -4,7 +4,7 @@ import numpy as np
 from mpi4py import MPI
 
 from reflowshock.fem.division.tables import Tables, prepare
-from reflowshock.fem.dynamics.central_difference import Motion
+from reflowshock.fem.dynamics.central_difference import ExplicitMotion
 from reflowshock.fem.elements.element import Elements
 from reflowshock.fem.forces.force_nonlinear import NonlinearElements
 from reflowshock.fem.kernels.nonlinear import Path
@@ -13,7 +13,7 @@ from reflowshock.fem.materials.library import FR4
 from reflowshock.fem.materials.parameters import Isotropic, JohnsonCook, Material
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.mesh import MeshData
-from reflowshock.fem.model.assembly import Pieces, Response, make_body, make_pieces
+from reflowshock.fem.model.assembly import ForceOptions, Pieces, make_body, make_pieces
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.parallel.local_mesh import distribute
 
@@ -38,9 +38,9 @@ def dns_body(mesh: MeshData, board=FR4, materials: Materials | None = None) -> t
     return make_body(MPI.COMM_SELF, pieces, tables, np.ones(len(pieces.steps))), float(pieces.steps.min())
 
 
-def motion_of(body: Body, step: float, loads=(), held=()) -> Motion:
+def motion_of(body: Body, step: float, loads=(), held=()) -> ExplicitMotion:
     """Return the motion of a body from rest."""
-    return Motion(body, loads, step, np.array(held, np.int32), np.zeros(len(body.mass)))
+    return ExplicitMotion(body, loads, step, np.array(held, np.int32), np.zeros(len(body.mass)))
 
 
 def nonlinear(elements: Elements, material: Material, finite: bool, step: float = np.inf) -> NonlinearElements:
@@ -57,7 +57,7 @@ def force_of(term: NonlinearElements, displacement: np.ndarray) -> np.ndarray:
 
 
 def nonlinear_body(
-    mesh: MeshData, material: Material, response: Response, formulation: str = "one_point"
+    mesh: MeshData, material: Material, response: ForceOptions, formulation: str = "one_point"
 ) -> tuple[Body, float]:
     """Return a body of one material, and its smallest element critical step [s]."""
     item = prepare(mesh, "dns")["dns"]

@@ -17,8 +17,8 @@ from reflowshock.fem.division.division import Division
 from reflowshock.fem.division.rules import Rules
 from reflowshock.fem.division.tables import ModelInput, Tables, joined, model_inputs
 from reflowshock.fem.division.whole import Survey, Treatment, Whole, survey
-from reflowshock.fem.dynamics.central_difference import Motion
-from reflowshock.fem.dynamics.energy_balance import ENERGIES, ledger_sums
+from reflowshock.fem.dynamics.central_difference import ExplicitMotion
+from reflowshock.fem.dynamics.energy_balance import ENERGIES, energy_sums
 from reflowshock.fem.dynamics.participant import Participant
 from reflowshock.fem.estimates.estimate import WindowPlan
 from reflowshock.fem.loads.load import Load
@@ -27,10 +27,10 @@ from reflowshock.fem.materials.parameters import Material
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.mesh.tie import net_load
-from reflowshock.fem.model.assembly import Pieces, Response, make_body, make_pieces
+from reflowshock.fem.model.assembly import ForceOptions, Pieces, make_body, make_pieces
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.parallel.communicators import Role
-from reflowshock.fem.parallel.exchange import CutChannels
+from reflowshock.fem.parallel.exchange import InterfaceChannels
 from reflowshock.fem.parallel.local_mesh import distribute
 from reflowshock.fem.problem.shock import Coupling
 
@@ -71,7 +71,7 @@ class Models(NamedTuple):
         """Return both models on this rank, new each time: terms may have a path."""
         step = self.division.meso_step
         return {
-            role: make_body(MPI.COMM_SELF, *part, np.ones(len(part[0].steps)), Response(step=step))
+            role: make_body(MPI.COMM_SELF, *part, np.ones(len(part[0].steps)), ForceOptions(step=step))
             for role, part in self.parts.items()
         }
 
@@ -95,7 +95,7 @@ class Turn(Participant, Protocol):
     """A participant that moves by central differences."""
 
     @property
-    def motion(self) -> Motion:
+    def motion(self) -> ExplicitMotion:
         """Return its state."""
 
 
@@ -107,7 +107,9 @@ class Coupled:
     ) -> None:
         """Make both participants of a scheme, as a rank that carries both models does."""
         self.plan, self._scheme = plan, scheme
-        channels = CutChannels.open(MPI.COMM_SELF, bodies["macro"].cut, bodies["meso"].cut, receiver_waits=False)
+        channels = InterfaceChannels.open(
+            MPI.COMM_SELF, bodies["macro"].interface, bodies["meso"].interface, receiver_waits=False
+        )
         self._channels = channels
         make = {"macro": scheme.macro, "meso": scheme.meso}
         made = {role: make[role](bodies[role], list(loads), plan, channels) for role in scheme.order}
@@ -159,7 +161,7 @@ class Coupled:
 
     def sums(self) -> np.ndarray:
         """Return the ledger's sums of both models."""
-        return ledger_sums(self.macro, 1.0) + ledger_sums(self.meso, -1.0)
+        return energy_sums(self.macro, 1.0) + energy_sums(self.meso, -1.0)
 
     def momentum(self) -> np.ndarray:
         """Return linear and angular momentum (6,)."""
@@ -167,14 +169,14 @@ class Coupled:
         for part in self.parts:
             motion = part.motion
             velocity = np.where(motion.mobility > 0.0, motion.present_velocity(), 0.0)
-            total += net_load(motion.body.local.points, motion.ledger_mass[:, None] * velocity)
+            total += net_load(motion.body.local.points, motion.counted_mass[:, None] * velocity)
         return total
 
     @property
     def size(self) -> int:
         """Return the number of values of a state."""
-        cut = 3 * len(self.macro.motion.body.cut) if self._linked else 0
-        return 2 * sum(int(free.sum()) for free in self._free) + cut
+        interface = 3 * len(self.macro.motion.body.interface) if self._linked else 0
+        return 2 * sum(int(free.sum()) for free in self._free) + interface
 
     def apply(self, state: np.ndarray) -> np.ndarray:
         """Return the state one window later: displacements, velocities times DT, link over a unit."""
@@ -191,31 +193,31 @@ class Coupled:
             self.plan.window * part.motion.velocity[free] for part, free in zip(self.parts, self._free, strict=True)
         ]
         if self._linked:
-            link = self.meso.foreign_force()[self.meso.motion.body.cut]
+            link = self.meso.foreign_force()[self.meso.motion.body.interface]
             moved.append(link.ravel() * self.plan.window / self._impedance)
         return np.concatenate(moved)
 
     def complete(self) -> None:
         """Let all follow from displacements and velocities that were given to both models, with no link."""
-        self._complete(np.zeros((len(self.meso.motion.body.cut), 3)))
+        self._complete(np.zeros((len(self.meso.motion.body.interface), 3)))
 
     def _complete(self, link: np.ndarray) -> None:
         """Let all that follows from displacements and link follow: slaves, the held cut, forces."""
         macro, meso = self.macro.motion, self.meso.motion
         pushed = isinstance(self._scheme, Impulse)
         if pushed:
-            macro.displacement[macro.body.cut] = meso.displacement[meso.body.cut]
+            macro.displacement[macro.body.interface] = meso.displacement[meso.body.interface]
         elif not self._linked:
-            meso.displacement[meso.body.cut] = macro.displacement[macro.body.cut]
+            meso.displacement[meso.body.interface] = macro.displacement[macro.body.interface]
         for part in self.parts:
             part.motion.body.tie.spread(part.motion.displacement)
             part.motion.update_force()
         if self._linked:
-            self.meso.foreign_force()[meso.body.cut] = link
+            self.meso.foreign_force()[meso.body.interface] = link
             meso.force += self.meso.foreign_force()
-            self.macro.foreign_force()[macro.body.cut] = -link
+            self.macro.foreign_force()[macro.body.interface] = -link
         elif pushed:
-            self.meso.cut_force()[meso.body.cut] = macro.force[macro.body.cut]
+            self.meso.interface_force()[meso.body.interface] = macro.force[macro.body.interface]
             meso.force += self.meso.foreign_force()
         elif isinstance(self.macro, Answered):
             self._channels.forces.send(meso.force)

@@ -15,7 +15,7 @@ from reflowshock.meshing.board.pads import PadSite, lift, pad_table
 from reflowshock.meshing.board.parameters import JointNumerics, Warpage
 from reflowshock.meshing.core.hexahedra import scaled_jacobian, volumes
 from reflowshock.meshing.joint.joint_mesh import JointMesh, joint_quality
-from reflowshock.meshing.joint.joint_place import Underside as Placed
+from reflowshock.meshing.joint.joint_mesh import Underside as Placed
 from reflowshock.meshing.joint.solder_mesh import mesh_bridge, mesh_joint
 from reflowshock.meshing.surface.closed_surface import ClosedSurface, enclosed_volume, pad_planes
 from reflowshock.meshing.surface.user_surface import load_surface

@@ -19,7 +19,7 @@ def layout(given: Layout) -> dict[str, float]:
     """Return the growth of a window, and what tie and cut do to fields, forces and masses.
 
     Raises:
-        CutError: The layout cannot be divided in this way.
+        CouplingError: The layout cannot be divided in this way.
     """
     models = models_of(LAYOUTS[given.layout](), Materials(), Coupling(scheme=given.scheme), FRACTION)
     coupled = Coupled(models.bodies(), models.division.plan, scheme_of(models.division.scheme))

@@ -11,9 +11,9 @@ from reflowshock.cases.hard.trials.elements import Flight, Impact, PulseTrial
 from reflowshock.cases.hard.trials.grids import grid, mesh_of, on
 from reflowshock.fem.division.checks import check_pulses
 from reflowshock.fem.division.tables import Tables, prepare
-from reflowshock.fem.dynamics.central_difference import Motion
-from reflowshock.fem.dynamics.energy_balance import Ledger, ledger_sums
-from reflowshock.fem.dynamics.participant import Alone, uncut_motion
+from reflowshock.fem.dynamics.central_difference import ExplicitMotion
+from reflowshock.fem.dynamics.energy_balance import EnergyBalance, energy_sums
+from reflowshock.fem.dynamics.participant import Alone, explicit_motion
 from reflowshock.fem.estimates.estimate import WindowPlan, damped_critical_step
 from reflowshock.fem.forces.force import Kinematics
 from reflowshock.fem.loads.damping import RayleighDamping
@@ -24,7 +24,7 @@ from reflowshock.fem.materials.parameters import Material
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.mesh.tie import net_load
-from reflowshock.fem.model.assembly import Pieces, Response, make_body, make_pieces
+from reflowshock.fem.model.assembly import ForceOptions, Pieces, make_body, make_pieces
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.power_iteration import highest_frequency
 from reflowshock.fem.model.steps import mass_factor
@@ -54,13 +54,13 @@ def flight(given: Flight) -> dict[str, float]:
     stiffness = given.stiffness_damping * plain
     critical = float(damped_critical_step(plain, stiffness))
     step = given.step_fraction * critical
-    body = make_body(MPI.COMM_SELF, pieces, tables, factor, Response(given.kinematics, step))
+    body = make_body(MPI.COMM_SELF, pieces, tables, factor, ForceOptions(given.kinematics, step))
     loads: list[Load] = []
     if given.mass_damping or stiffness:
         loads.append(RayleighDamping.build(body, (given.mass_damping / step, stiffness)))
-    motion = uncut_motion(body, loads, step)
+    motion = explicit_motion(body, loads, step)
     random_start(motion, given.seed)
-    found = watched(motion, given, Ledger(limit=BALANCE, trivial=0.0, step=step, critical=critical))
+    found = watched(motion, given, EnergyBalance(limit=BALANCE, trivial=0.0, step=step, critical=critical))
     return found | {"step_gain": assembled / element}
 
 
@@ -87,7 +87,7 @@ def mesh_of_flight(given: Flight) -> MeshData:
     return mesh_of(points, cells, np.repeat(names, given.cells**2 * of_box), {})
 
 
-def random_start(motion: Motion, seed: int) -> None:
+def random_start(motion: ExplicitMotion, seed: int) -> None:
     """Put energy into all modes alike, on top of a common speed."""
     noise = np.random.default_rng(seed).normal(size=motion.velocity.shape) * np.sqrt(motion.mobility)
     mass = motion.body.mass[:, None]
@@ -95,34 +95,34 @@ def random_start(motion: Motion, seed: int) -> None:
     motion.velocity[:] = np.where(motion.mobility > 0.0, SPEED + scale * noise, 0.0)
 
 
-def watched(motion: Motion, given: Flight, ledger: Ledger) -> dict[str, float]:
+def watched(motion: ExplicitMotion, given: Flight, balance: EnergyBalance) -> dict[str, float]:
     """Take the steps with looks at the ledger; return errors; errors as ``flight``."""
     steps = min(LOOK, given.steps)
     looks = given.steps // steps
     participant = Alone(motion, WindowPlan(steps * motion.step, steps, looks, 1))
-    ledger.judge(ledger_sums(participant, 0.0), 0.0)
+    balance.judge(energy_sums(participant, 0.0), 0.0)
     first, error = momentum(motion, given.kinematics == "finite"), np.zeros(2)
     scale = momentum_scale(motion)
     for _ in range(looks):
         participant.begin_window()
-        ledger.judge(ledger_sums(participant, 0.0), motion.time)
+        balance.judge(energy_sums(participant, 0.0), motion.time)
         change = np.abs(momentum(motion, given.kinematics == "finite") - first).reshape(2, 3).max(axis=1)
         error = np.maximum(error, change / scale)
     return {
-        "energy_error": ledger.balance_error,
+        "energy_error": balance.balance_error,
         "momentum_error": float(error[0]),
         "angular_momentum_error": float(error[1]),
-        "energy_left": ledger.latest["kinetic"] / ledger.initial,
+        "energy_left": balance.latest["kinetic"] / balance.initial,
     }
 
 
-def momentum(motion: Motion, moved: bool) -> np.ndarray:
+def momentum(motion: ExplicitMotion, moved: bool) -> np.ndarray:
     """Return linear and angular momentum (6,), about the moved places of nodes where strains are finite."""
     places = motion.body.local.points + (motion.displacement if moved else 0.0)
     return net_load(places, motion.body.mass[:, None] * motion.present_velocity())
 
 
-def momentum_scale(motion: Motion) -> np.ndarray:
+def momentum_scale(motion: ExplicitMotion) -> np.ndarray:
     """Return the sums of magnitudes of linear and angular momenta (2,)."""
     points, amount = motion.body.local.points, motion.body.mass[:, None] * motion.present_velocity()
     return np.array([np.linalg.norm(amount, axis=1).sum(), np.linalg.norm(np.cross(points, amount), axis=1).sum()])
@@ -209,14 +209,14 @@ def rod(
 
 def explicit(
     mesh: MeshData, material: Material, kinematics: Kinematics, formulation: str, fraction: float
-) -> tuple[Body, Motion]:
+) -> tuple[Body, ExplicitMotion]:
     """Return a body of one material and its motion at a fraction of the critical step of its elements."""
-    _, critical = nonlinear_body(mesh, material, Response(kinematics, np.inf), formulation)
-    body, _ = nonlinear_body(mesh, material, Response(kinematics, fraction * critical), formulation)
+    _, critical = nonlinear_body(mesh, material, ForceOptions(kinematics, np.inf), formulation)
+    body, _ = nonlinear_body(mesh, material, ForceOptions(kinematics, fraction * critical), formulation)
     return body, motion_of(body, fraction * critical)
 
 
-def march(motion: Motion, steps: int) -> np.ndarray:
+def march(motion: ExplicitMotion, steps: int) -> np.ndarray:
     """Take steps; return kinetic, strain, plastic and hourglass energy at each: (steps + 1, 4)."""
     energies = []
     for _ in range(steps + 1):

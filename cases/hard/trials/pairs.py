@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from reflowshock.cases.hard.trials.coupled import Coupled, Models, models_of, surveyed
 from reflowshock.cases.hard.trials.grids import grid, mesh_of, on
-from reflowshock.fem.coupling.held_velocity import Answered, HeldVelocity, Macro
+from reflowshock.fem.coupling.held_velocity import Answered, HeldVelocity, HeldVelocityMacro
 from reflowshock.fem.coupling.scheme import scheme_of
-from reflowshock.fem.dynamics.central_difference import Motion
+from reflowshock.fem.dynamics.central_difference import ExplicitMotion
 from reflowshock.fem.estimates.estimate import WindowPlan
 from reflowshock.fem.loads.load import Load
 from reflowshock.fem.materials.library import FR4
@@ -19,7 +19,7 @@ from reflowshock.fem.materials.parameters import Isotropic, Orthotropic
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.mesh import MeshData, append
 from reflowshock.fem.model.body import Body
-from reflowshock.fem.parallel.exchange import CutChannels
+from reflowshock.fem.parallel.exchange import InterfaceChannels
 from reflowshock.fem.problem.shock import Coupling
 
 SIZE, THICKNESS = 0.5e-3, 0.25e-3  # of a board element [m]
@@ -130,16 +130,16 @@ def shaped(mesh: MeshData, shape: str) -> MeshData:
 class Printed(HeldVelocity):
     """The paper's scheme as printed: the block alone is meso, only its internal force goes to the board, no mass."""
 
-    def macro(self, body: Body, loads: list[Load], plan: WindowPlan, channels: CutChannels) -> Macro:
+    def macro(self, body: Body, loads: list[Load], plan: WindowPlan, channels: InterfaceChannels) -> HeldVelocityMacro:
         """Return the macro model's participant, which is told the interface mass and leaves it out."""
         return PrintedMacro(body, loads, plan, channels)
 
 
-class PrintedMacro(Macro):
+class PrintedMacro(HeldVelocityMacro):
     """A board that answers for no mass of the block at its interface."""
 
-    def __init__(self, body: Body, loads: list[Load], plan: WindowPlan, channels: CutChannels) -> None:
+    def __init__(self, body: Body, loads: list[Load], plan: WindowPlan, channels: InterfaceChannels) -> None:
         """Start at rest; a ``Meso`` must have sent the interface mass."""
         channels.forces.receive(np.zeros((len(body.mass), 3)))
-        motion = Motion(body, loads, plan.window, np.empty(0, np.int32), np.zeros(len(body.mass)))
+        motion = ExplicitMotion(body, loads, plan.window, np.empty(0, np.int32), np.zeros(len(body.mass)))
         Answered.__init__(self, motion, plan, channels)

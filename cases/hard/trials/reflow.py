@@ -6,11 +6,9 @@ import numpy as np
 from pydantic import Field
 
 from reflowshock.cases.hard.trial import Measured, Refused, Trial
-from reflowshock.particles.parameters.scene_drops import Drops
-from reflowshock.particles.parameters.scene_oscillation import Oscillation
-from reflowshock.particles.parameters.scenes import Drop, Fluid, Joint, Liquid
+from reflowshock.particles.parameters.scenes import Drop, Drops, Fluid, Joint, Liquid, Oscillation
 from reflowshock.particles.parameters.solder import Parameters, Solder, Switch
-from reflowshock.workflow.case.kind import of_particles
+from reflowshock.workflow.case.problems import of_particles
 
 if TYPE_CHECKING:
     from reflowshock.particles.steps.shape import JointShape

@@ -7,7 +7,7 @@ import numpy as np
 from skimage.measure import marching_cubes
 
 from reflowshock.meshing.board.pad_planes import PadPlanes
-from reflowshock.meshing.core.outlines import outlines
+from reflowshock.meshing.core.facets import outlines
 from reflowshock.meshing.surface.closed_surface import FREE, ClosedSurface, close_rings, close_surface
 
 

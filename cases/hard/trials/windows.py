@@ -16,7 +16,7 @@ from reflowshock.fem.materials.library import FR4, SAC405
 from reflowshock.fem.materials.parameters import Isotropic
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.mesh import MeshData, append
-from reflowshock.fem.parallel.exchange import CutChannels
+from reflowshock.fem.parallel.exchange import InterfaceChannels
 from reflowshock.fem.parallel.portable import values
 from reflowshock.fem.problem.shock import Coupling
 
@@ -59,7 +59,7 @@ def all_energy(coupled: Coupled) -> float:
 
 def momentum_change(coupled: Coupled, start: np.ndarray) -> float:
     """Return the largest change of linear and angular momentum over that of all nodes at the speed of the push."""
-    mass = sum(part.motion.ledger_mass.sum() for part in coupled.parts)
+    mass = sum(part.motion.counted_mass.sum() for part in coupled.parts)
     scale = mass * np.linalg.norm(PUSH) * np.array([1.0] * 3 + [3 * SIZE] * 3)
     return float(np.abs((coupled.momentum() - start) / scale).max())
 
@@ -85,9 +85,11 @@ def transfer(given: PairTransfer) -> dict[str, float]:
 
 
 def through(models: Models) -> dict[str, float]:
-    """Try fields, forces and masses through tie and cut of two models."""
+    """Try fields, forces and masses through tie and interface of two models."""
     bodies = models.bodies()
-    channels = CutChannels.open(MPI.COMM_SELF, bodies["macro"].cut, bodies["meso"].cut, receiver_waits=False)
+    channels = InterfaceChannels.open(
+        MPI.COMM_SELF, bodies["macro"].interface, bodies["meso"].interface, receiver_waits=False
+    )
     found = self_check(MPI.COMM_SELF, bodies, channels)
     masses = found.macro_mass + found.interface_mass + found.meso_mass
     return {

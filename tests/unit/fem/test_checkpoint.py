@@ -94,10 +94,10 @@ def test_a_shock_beside_forged_checkpoints_starts_anew(tmp_path, capsys, monkeyp
     request = request.model_copy(update={"checkpoints": tmp_path / "checkpoints"})
     windows, real = iter(range(11)), time_loop.run_window
 
-    def run_window(crew, stopwatch) -> None:
+    def run_window(participants, stopwatch) -> None:
         if next(windows, None) is None:
             raise Killed
-        real(crew, stopwatch)
+        real(participants, stopwatch)
 
     with monkeypatch.context() as patch:
         patch.setattr(time_loop, "run_window", run_window)

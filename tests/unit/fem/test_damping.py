@@ -7,7 +7,7 @@ import pytest
 
 from reflowshock.cases.hard.trials.bodies import dns_body, motion_of
 from reflowshock.cases.hard.trials.grids import grid, mesh_of, on
-from reflowshock.fem.dynamics.central_difference import Motion
+from reflowshock.fem.dynamics.central_difference import ExplicitMotion
 from reflowshock.fem.kernels.damping import add_damping, power
 from reflowshock.fem.kernels.motion import STRIP
 from reflowshock.fem.loads.damping import RayleighDamping
@@ -57,7 +57,7 @@ def test_a_node_is_damped_alike_wherever_it_stands():
 
 def moving_bar(
     coefficients: tuple[float, float], owned: slice = slice(None), elements: int = 5
-) -> tuple[RayleighDamping, Motion]:
+) -> tuple[RayleighDamping, ExplicitMotion]:
     """Return the damping and the motion of a bar that moves at random, with weight; a rank that counts some nodes."""
     points, cells = grid(np.linspace(0, elements * 1e-3, elements + 1), [0, 1e-3], [0, 1e-3, 2e-3])
     body, critical = dns_body(mesh_of(points, cells, "board", {"symmetry_x": on(0, 0.0)}), STEEL)

@@ -9,9 +9,9 @@ from reflowshock.cases.hard.trials.coupled import surveyed
 from reflowshock.fem.division.buffer import grown
 from reflowshock.fem.division.checks import check_division
 from reflowshock.fem.division.divide import divide, scheme_for
-from reflowshock.fem.division.split import cut_between, part_of
+from reflowshock.fem.division.split import interface_between, part_of
 from reflowshock.fem.division.tables import model_inputs
-from reflowshock.fem.errors import CutError
+from reflowshock.fem.errors import CouplingError
 from reflowshock.fem.materials.library import SAC305
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.mesh import append
@@ -32,7 +32,7 @@ def scene(mesh, materials=ELASTIC, **coupling):
 
 
 def refused(parts, division, words):
-    with pytest.raises(CutError, match=words):
+    with pytest.raises(CouplingError, match=words):
         check_division(parts[0], parts[1], division, parts[2])
 
 
@@ -45,18 +45,18 @@ def test_every_cell_is_in_one_model_and_ties_are_complete(mesh, scheme):
     macro, meso = (part_of(parts[0], cells) for cells in (division.macro, division.meso))
     assert len(macro.tie.slave) + len(meso.tie.slave) >= len(parts[0].tie.slave)
     assert (meso.tie.master >= 0).all()
-    cut = cut_between(parts[0], macro, meso)
-    assert not np.isin(cut, parts[0].tie.slave).any()
+    interface = interface_between(parts[0], macro, meso)
+    assert not np.isin(interface, parts[0].tie.slave).any()
     tables = {role: item.tables for role, item in model_inputs(parts[0], division).items()}
-    assert len(tables["macro"].cut) == len(tables["meso"].cut) == len(cut)
+    assert len(tables["macro"].interface) == len(tables["meso"].interface) == len(interface)
 
 
 def test_cut_of_gravouil_combescure_are_the_masters(mesh):
     parts = scene(mesh, scheme="gravouil_combescure")
     division = divide(*parts)
-    cut = cut_between(parts[0], part_of(parts[0], division.macro), part_of(parts[0], division.meso))
+    interface = interface_between(parts[0], part_of(parts[0], division.macro), part_of(parts[0], division.meso))
     on_board = parts[0].tie.master[parts[0].mesh.points[parts[0].tie.slave][:, 2] < 1e-9]
-    assert np.array_equal(cut, np.unique(on_board))
+    assert np.array_equal(interface, np.unique(on_board))
 
 
 def test_more_buffer_layers_are_more_cells(mesh):
@@ -116,5 +116,5 @@ def test_window_above_the_elements_step_is_refused(mesh):
 def test_board_that_is_all_buffer_is_refused(mesh):
     parts = scene(mesh, scheme="held_velocity", buffer_layers=20)
     division = divide(*parts)
-    assert steps_of_division(*parts[:2], division, parts[2]).cut > 0.0
+    assert steps_of_division(*parts[:2], division, parts[2]).interface > 0.0
     refused(parts, division, r"nothing is left for the macro model: .*20 layers")

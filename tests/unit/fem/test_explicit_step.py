@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from reflowshock.fem.dynamics.energy_balance import Ledger
+from reflowshock.fem.dynamics.energy_balance import EnergyBalance
 from reflowshock.fem.errors import StepError
 from reflowshock.fem.run.structure_run import run_structure
 from reflowshock.fem.run.time_loop import GUARD
@@ -34,8 +34,10 @@ def test_energies_are_looked_at_between_samples_that_are_far_apart(tmp_path, mon
     numerics = {"history_samples": 2, "field_samples": 2}
     request = structure_input(tmp_path, dynamics={"duration": 8e-5, "numerics": numerics})
     steps, looked = build_structure(MPI.COMM_SELF, request, []).steps.plan, []
-    judge = Ledger.judge
-    monkeypatch.setattr(Ledger, "judge", lambda self, sums, time: (looked.append(time), judge(self, sums, time))[1])
+    judge = EnergyBalance.judge
+    monkeypatch.setattr(
+        EnergyBalance, "judge", lambda self, sums, time: (looked.append(time), judge(self, sums, time))[1]
+    )
     run_structure(MPI.COMM_SELF, request)
     with np.load(request.output / "history.npz") as arrays:
         assert len(arrays["time"]) == 3

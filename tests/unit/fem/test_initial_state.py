@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from reflowshock.cases.hard.trials.bodies import motion_of
-from reflowshock.fem.dynamics.central_difference import Motion
-from reflowshock.fem.dynamics.energy_balance import Ledger
+from reflowshock.fem.dynamics.central_difference import ExplicitMotion
+from reflowshock.fem.dynamics.energy_balance import EnergyBalance
 from reflowshock.fem.loads.damping import RayleighDamping
 from reflowshock.fem.loads.pretension import Pretension
 from reflowshock.fem.materials.library import FR4, SAC405, SILICON
-from reflowshock.fem.model.assembly import Response
+from reflowshock.fem.model.assembly import ForceOptions
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.stress_recovery import StressRecovery
 from reflowshock.fem.parallel import portable
@@ -25,7 +25,7 @@ LAYERS = {"board": [1.5e-4, 1.5e-4], "solder": [1e-4, 1e-4], "die": [2e-4]}
 
 def package(formulation: str = "one_point", kinematics: str = "small", materials: dict | None = None) -> Cooled:
     mesh = layered(np.linspace(0, 1e-3, 4), np.linspace(0, 7e-4, 3), LAYERS, distorted=0.15)
-    return cooled(mesh, materials or MATERIALS, CHANGE, formulation, Response(kinematics, 1e-9))
+    return cooled(mesh, materials or MATERIALS, CHANGE, formulation, ForceOptions(kinematics, 1e-9))
 
 
 def force_at_rest(body: Body) -> np.ndarray:
@@ -50,7 +50,7 @@ def test_nothing_moves_without_a_shock(formulation, kinematics):
     assert StressRecovery(body, np.arange(len(body.elements.cells))).plastic_strain().max() > 1e-3
 
 
-def launched(body: Body, step: float) -> Motion:
+def launched(body: Body, step: float) -> ExplicitMotion:
     motion = motion_of(body, step, [RayleighDamping.build(body, (0.0, 0.01 * step))])
     motion.launch(np.array([0.0, 0.1, 1.0]))
     return motion
@@ -82,14 +82,14 @@ def test_stresses_add_where_all_is_linear():
 
 
 def test_energy_at_the_beginning_is_a_reference():
-    ledger = Ledger(limit=0.1, trivial=0.0)
+    balance = EnergyBalance(limit=0.1, trivial=0.0)
     sums = np.zeros(24)
     sums[1] = 5.0
-    assert ledger.judge(sums, 0.0)["balance"] == 0.0
-    assert ledger.largest == 0.0
+    assert balance.judge(sums, 0.0)["balance"] == 0.0
+    assert balance.largest == 0.0
     sums[1], sums[0] = 4.0, 1.0
-    assert ledger.judge(sums, 1.0)["balance"] == 0.0
-    assert ledger.largest == 1.0
+    assert balance.judge(sums, 1.0)["balance"] == 0.0
+    assert balance.largest == 1.0
 
 
 def test_state_continues_from_a_checkpoint():

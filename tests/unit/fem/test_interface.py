@@ -13,7 +13,7 @@ from reflowshock.fem.estimates.estimate import WindowPlan, shortened
 from reflowshock.fem.mesh.mesh import append
 from reflowshock.fem.mesh.watch_table import whole_watch
 from reflowshock.fem.output.compare import compare_histories
-from reflowshock.fem.output.interface import picture_windows
+from reflowshock.fem.output.joint_interface import picture_windows
 from reflowshock.fem.problem.inputs import RunInput
 from reflowshock.fem.problem.shock import Shock
 from reflowshock.fem.problem.shock_checks import problems
@@ -112,10 +112,10 @@ class Killed(Exception):
 def test_broken_run_has_the_same_pictures(files, two_scale, monkeypatch):
     real, left = time_loop.run_window, iter(range(80))
 
-    def run_window(crew, stopwatch) -> None:
+    def run_window(participants, stopwatch) -> None:
         if next(left, None) is None:
             raise Killed
-        real(crew, stopwatch)
+        real(participants, stopwatch)
 
     kept = {"checkpoints": files / "checkpoints", "numerics": {"checkpoint_seconds": 1e-9}}
     with monkeypatch.context() as patch:

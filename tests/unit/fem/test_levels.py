@@ -10,17 +10,17 @@ from mpi4py import MPI
 
 from reflowshock.fem.division.chebyshev import Substeps
 from reflowshock.fem.division.choose_levels import Pace, choose_levels, governing_steps
-from reflowshock.fem.dynamics.central_difference import Motion
+from reflowshock.fem.dynamics.central_difference import ExplicitMotion
 from reflowshock.fem.elements.one_point import ONE_POINT
 from reflowshock.fem.errors import LevelError
 from reflowshock.fem.forces.energy import Energy
 from reflowshock.fem.forces.force import linear_terms
-from reflowshock.fem.loads.load import PrescribedMotion
+from reflowshock.fem.loads.load import PrescribedVelocity
 from reflowshock.fem.loads.pulse import HalfSine
 from reflowshock.fem.materials.library import FR4, SAC405
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.tie import Tie, net_load
-from reflowshock.fem.model.step_levels import Levels, LocalSteps, check_elastic, levels_of
+from reflowshock.fem.model.step_levels import Levels, SubsteppedElements, check_elastic, levels_of
 from tests.support.fem_bodies import dense_stiffness
 from tests.support.fem_levels import Levelled, dense_effective_stiffness, joint_on_board, levelled
 
@@ -103,9 +103,9 @@ def test_what_a_motion_prescribes_does_not_move_in_substeps():
     body = model.body
     top = np.flatnonzero(body.local.points[:, 2] == body.local.points[:, 2].max())
     held.body.free[top, 0] = False
-    levels = LocalSteps.build(MPI.COMM_SELF, held.body, Levels(held.level, ratios, held.window))
-    motion = Motion(
-        body, [PrescribedMotion(top, 0, HalfSine(1.0, 1e-6))], model.window, np.empty(0, int), 0.0 * body.mass
+    levels = SubsteppedElements.build(MPI.COMM_SELF, held.body, Levels(held.level, ratios, held.window))
+    motion = ExplicitMotion(
+        body, [PrescribedVelocity(top, 0, HalfSine(1.0, 1e-6))], model.window, np.empty(0, int), 0.0 * body.mass
     )
     motion.displacement[:] = 1e-6 * np.sin(np.arange(motion.displacement.size)).reshape(-1, 3)
     body.tie.spread(motion.displacement)
@@ -117,7 +117,7 @@ def test_what_a_motion_prescribes_does_not_move_in_substeps():
 
 def test_one_substep_is_the_plain_force():
     model = levelled(joint_on_board(), Materials(), (12,))
-    once = LocalSteps.build(MPI.COMM_SELF, model.body, Levels(model.level, (1,), model.window))
+    once = SubsteppedElements.build(MPI.COMM_SELF, model.body, Levels(model.level, (1,), model.window))
     body = replace(model.body, terms=[*model.body.terms[:-1], once])
     plain = dense_stiffness(model.plain)
     assert np.abs(dense_stiffness(body) - plain).max() <= 1e-13 * np.abs(plain).max()
@@ -138,7 +138,7 @@ def test_hourglass_energy_is_told_apart():
     body.tie.spread(displacement)
     elements = body.elements.subset(model.level > 0)
     exact = sum((term.energy(displacement) for term in linear_terms(elements)), Energy())
-    found = LocalSteps.build(MPI.COMM_SELF, body, Levels(model.level, model.ratios, 1e-6 * model.window))
+    found = SubsteppedElements.build(MPI.COMM_SELF, body, Levels(model.level, model.ratios, 1e-6 * model.window))
     assert exact.hourglass > 0.01 * exact.strain
     assert found.energy(displacement).strain == pytest.approx(exact.strain, rel=1e-9)
     assert found.energy(displacement).hourglass == pytest.approx(exact.hourglass, rel=1e-9)

@@ -7,7 +7,7 @@ import pytest
 
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.mesh import MeshData
-from reflowshock.fem.model.step_levels import LocalSteps, levels_of
+from reflowshock.fem.model.step_levels import SubsteppedElements, levels_of
 from tests.support.fem_levels import joint_on_board, levelled
 
 
@@ -21,13 +21,13 @@ def barrel() -> MeshData:
     return mesh
 
 
-def one_by_one(level: LocalSteps) -> LocalSteps:
+def one_by_one(level: SubsteppedElements) -> SubsteppedElements:
     """Return a level whose substeps, and those of the levels inside it, are calls of their own."""
-    terms = [one_by_one(term) if isinstance(term, LocalSteps) else term for term in level.terms]
+    terms = [one_by_one(term) if isinstance(term, SubsteppedElements) else term for term in level.terms]
     return replace(level, terms=terms, at_once=())
 
 
-def nested(level: LocalSteps) -> list[LocalSteps]:
+def nested(level: SubsteppedElements) -> list[SubsteppedElements]:
     """Return a level and those inside it."""
     return [level, *(inner for term in levels_of(level.terms) for inner in nested(term))]
 

@@ -8,8 +8,8 @@ from reflowshock.cases.hard.trials.grids import grid, mesh_of
 from reflowshock.fem.division.checks import check_division
 from reflowshock.fem.division.divide import divide
 from reflowshock.fem.division.tables import prepare
-from reflowshock.fem.errors import CutError, MeshError
-from reflowshock.fem.mesh.coupling_interface import find_cut
+from reflowshock.fem.errors import CouplingError, MeshError
+from reflowshock.fem.mesh.coupling_interface import find_interface
 from reflowshock.fem.mesh.mesh import MeshData, append, boundary_facets, cells_of_facets, merge_nodes, select
 from reflowshock.fem.mesh.mesh_file import read_mesh
 from tests.support.fem_models import board_mesh, small_assembly, write_msh
@@ -64,7 +64,7 @@ def apart(mesh: MeshData) -> MeshData:
 
 
 def test_cut_is_found_whether_nodes_are_shared_or_not():
-    shared, twice = find_cut(board_mesh()), find_cut(apart(board_mesh()))
+    shared, twice = find_interface(board_mesh()), find_interface(apart(board_mesh()))
     assert np.array_equal(*shared)
     assert len(shared[0]) == len(twice[0]) > 0
     assert not np.array_equal(*twice)
@@ -88,12 +88,14 @@ def test_patch_that_does_not_match_is_an_error_with_a_place():
     patch = np.unique(mesh.cells[mesh.in_parts("board_patch".__eq__)])
     inner = patch[np.argmin(mesh.points[patch, 2])]
     mesh.points[inner, 2] -= 1e-6
-    with pytest.raises(CutError, match=r"1 of \d+ nodes of board_patch on the cut have no partner"):
-        find_cut(mesh)
+    with pytest.raises(CouplingError, match=r"1 of \d+ nodes of board_patch on the interface have no partner"):
+        find_interface(mesh)
 
 
 def test_two_scale_of_what_has_nothing_fine_is_an_error():
     points, cells = grid([0, 1], [0, 1], [0, 1])
     scene = surveyed(mesh_of(points, cells, "board", {}))
-    with pytest.raises(CutError, match="something finer than the rest: the mesh has the parts board and 0 tied nodes"):
+    with pytest.raises(
+        CouplingError, match="something finer than the rest: the mesh has the parts board and 0 tied nodes"
+    ):
         check_division(*scene[:2], divide(*scene), scene[2])

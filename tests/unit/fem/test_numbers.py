@@ -1,4 +1,4 @@
-"""Materials, steps, comparison, ledger, watch points: the small arithmetic of a run."""
+"""Materials, steps, comparison, energy balance, watch points: the small arithmetic of a run."""
 
 from pathlib import Path
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import trapezoid
 
-from reflowshock.fem.dynamics.energy_balance import SUMS, Ledger
+from reflowshock.fem.dynamics.energy_balance import SUMS, EnergyBalance
 from reflowshock.fem.elements.stress import principal_strain, von_mises
 from reflowshock.fem.errors import EnergyError
 from reflowshock.fem.estimates.estimate import (
@@ -124,16 +124,16 @@ def test_half_sine_changes_the_velocity_by_two_a_tau_over_pi():
     assert load.acceleration(2.5e-4).tolist() == [0.0, 0.0, 14709.975]
 
 
-def test_ledger_stops_a_run_that_does_not_balance():
+def test_energy_balance_stops_a_run_that_does_not_balance():
     sums = np.zeros(SUMS)
     sums[[0, 1, 5]] = 1.0, 1.0, 2.1
-    ledger = Ledger(limit=0.02, trivial=0.1)
+    balance = EnergyBalance(limit=0.02, trivial=0.1)
     with pytest.raises(EnergyError, match=r"energy balance -1\.000e-01 J at time 1\.000000e-03 s"):
-        ledger.judge(sums, 1e-3)
-    Ledger(limit=0.02, trivial=10.0).judge(sums, 1e-3)
+        balance.judge(sums, 1e-3)
+    EnergyBalance(limit=0.02, trivial=10.0).judge(sums, 1e-3)
     sums[0] = np.nan
     with pytest.raises(EnergyError, match="not numbers"):
-        ledger.judge(sums, 1e-3)
+        balance.judge(sums, 1e-3)
 
 
 def test_von_mises_of_simple_states():

@@ -9,7 +9,7 @@ from mpi4py import MPI
 from pydantic import ValidationError
 
 from reflowshock.cases.hard.trials.grids import grid, joint_mesh, mesh_of
-from reflowshock.fem.coupling.planner import Load, Measured, keep, kept, plan_from, plan_ranks, words
+from reflowshock.fem.coupling.planner import Measured, ModelWork, keep, kept, plan_from, plan_ranks, words
 from reflowshock.fem.coupling.speeds import (
     Kind,
     StepCost,
@@ -125,12 +125,12 @@ def test_line_through_two_samples():
     assert line_through((64, 1e-4), (64, 1e-4)) == pytest.approx((5e-5, 0.5e-4 / 64))
 
 
-def model(count: int, steps: int, level: int = 0, ratios: tuple[int, ...] = ()) -> Load:
+def model(count: int, steps: int, level: int = 0, ratios: tuple[int, ...] = ()) -> ModelWork:
     """A strip of boxes of FR4, a quarter of them of copper and at a level; nothing is a box at its end."""
     points, cells = grid(np.arange(count + 1) * 1e-3, [0, 1e-3], [0, 1e-3])
     points[-1, 0] += 1e-4
     mesh = mesh_of(points, cells, np.where(np.arange(count) < count // 4, "copper", "board"), {})
-    return Load(mesh, np.where(np.arange(count) < count // 4, level, 0).astype(np.int32), ratios, steps, KIND)
+    return ModelWork(mesh, np.where(np.arange(count) < count // 4, level, 0).astype(np.int32), ratios, steps, KIND)
 
 
 def measured(ranks: int, box: float = 1e-7, assembled: float = 4e-7, slow: float = 1.0) -> Measured:
@@ -138,7 +138,7 @@ def measured(ranks: int, box: float = 1e-7, assembled: float = 4e-7, slow: float
     return Measured(StepCost(np.zeros((ranks, 3)), element), 1e-6)
 
 
-def planned(ranks: Ranks, measurement: Measured, **loads: Load):
+def planned(ranks: Ranks, measurement: Measured, **loads: ModelWork):
     family = {role: families(load.mesh, load.kind) for role, load in loads.items()}
     return plan_from(loads, family, ranks, (measurement, True))
 

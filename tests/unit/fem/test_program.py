@@ -21,10 +21,10 @@ def test_error_of_all_ranks_names_the_latest_checkpoint(tmp_path, monkeypatch, c
     path.write_text(json.dumps(json.loads(path.read_text()) | {"checkpoints": str(checkpoints)}))
     left, run_window = iter(range(3 if begun else 0)), time_loop.run_window
 
-    def some_windows(*crew) -> None:
+    def some_windows(*participants) -> None:
         if next(left, None) is None:
             raise error("wrong")
-        run_window(*crew)
+        run_window(*participants)
 
     monkeypatch.setattr(time_loop, "run_window", some_windows)
     monkeypatch.setattr(time_loop.Checkpoints, "is_due", lambda self: begun)

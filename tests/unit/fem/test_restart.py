@@ -62,9 +62,9 @@ def run_some_windows(count: int):
     left = iter(range(count))
     real = time_loop.run_window
 
-    def run_window(crew, stopwatch) -> None:
+    def run_window(participants, stopwatch) -> None:
         if next(left, None) is None:
             raise Killed
-        real(crew, stopwatch)
+        real(participants, stopwatch)
 
     return run_window

@@ -6,14 +6,14 @@ from mpi4py import MPI
 
 from reflowshock.cases.hard.trials.pairs import SCHEMES, Pair
 from reflowshock.fem.coupling.gravouil_combescure import GravouilCombescure
-from reflowshock.fem.coupling.held_velocity import HeldVelocity, local_cut
+from reflowshock.fem.coupling.held_velocity import HeldVelocity, local_interface
 from reflowshock.fem.coupling.one_way import OneWay
-from reflowshock.fem.dynamics.participant import uncut_motion
+from reflowshock.fem.dynamics.participant import explicit_motion
 from reflowshock.fem.errors import RecordingError
 from reflowshock.fem.loads.load import half_sine_drop
-from reflowshock.fem.parallel.exchange import CutChannels
+from reflowshock.fem.parallel.exchange import InterfaceChannels
 from tests.support.recording import record, replay, save_recording
-from tests.support.scripted import ScriptedDriver, ScriptedMacro, ScriptedMeso, scripted_cut
+from tests.support.scripted import ScriptedDriver, ScriptedMacro, ScriptedMeso, scripted_interface
 
 WINDOWS = 20
 
@@ -45,11 +45,13 @@ def driven(bodies, scheme, script, partner):
     """Return the meso model and the largest internal force in it after some windows of a script."""
     made, plan = bodies
     body = made["meso"]
-    channels = CutChannels.open(MPI.COMM_SELF, scripted_cut(len(body.cut)), body.cut, receiver_waits=False)
+    channels = InterfaceChannels.open(
+        MPI.COMM_SELF, scripted_interface(len(body.interface)), body.interface, receiver_waits=False
+    )
     meso = scheme.meso(body, [], plan, channels)
     meso.motion.velocity[:] = script(0.0, body.local.points)
     meso.motion.velocity[body.tie.slave] = 0.0
-    macro = partner(body.local.points[body.cut], script, plan, channels)
+    macro = partner(body.local.points[body.interface], script, plan, channels)
     run(macro, meso)
     assert macro.time == pytest.approx(WINDOWS * plan.window)
     return meso, macro
@@ -67,9 +69,9 @@ def test_meso_model_in_rigid_motion_stays_stress_free(bodies, scheme, partner):
 
 def test_scripted_macro_gets_mass_and_force(bodies):
     meso, macro = driven(bodies, HeldVelocity(), stretched, ScriptedMacro)
-    cut = meso.motion.body.cut
-    assert np.array_equal(macro.mass[:, 0], meso.motion.body.mass[cut])
-    assert np.array_equal(macro.force, meso.motion.force[cut])
+    interface = meso.motion.body.interface
+    assert np.array_equal(macro.mass[:, 0], meso.motion.body.mass[interface])
+    assert np.array_equal(macro.force, meso.motion.force[interface])
     assert np.abs(macro.force).max() > 0.0
 
 
@@ -77,7 +79,9 @@ def answered(bodies, mass: np.ndarray, script):
     """Return macro model and scripted meso model after some windows of a drop."""
     made, plan = bodies
     body = made["macro"]
-    channels = CutChannels.open(MPI.COMM_SELF, body.cut, scripted_cut(len(body.cut)), receiver_waits=False)
+    channels = InterfaceChannels.open(
+        MPI.COMM_SELF, body.interface, scripted_interface(len(body.interface)), receiver_waits=False
+    )
     meso = ScriptedMeso(mass, script, plan, channels)
     macro = HeldVelocity().macro(body, [half_sine_drop(1e6, 1e-5)], plan, channels)
     run(macro, meso)
@@ -86,10 +90,10 @@ def answered(bodies, mass: np.ndarray, script):
 
 def test_macro_model_on_springs_stores_their_energy(bodies):
     """Springs of k N/m hold the cut: the work across it is k u^2 / 2, exactly, whatever the step."""
-    stiffness, count = 1e4, len(bodies[0]["macro"].cut)
+    stiffness, count = 1e4, len(bodies[0]["macro"].interface)
     macro, meso = answered(bodies, np.full(count, 1e-9), lambda time, u, v: -stiffness * u)
-    assert np.array_equal(meso.force, macro.cut_force()[macro.motion.body.cut])
-    stored = 0.5 * stiffness * float(np.sum(macro.motion.displacement[macro.motion.body.cut] ** 2))
+    assert np.array_equal(meso.force, macro.interface_force()[macro.motion.body.interface])
+    stored = 0.5 * stiffness * float(np.sum(macro.motion.displacement[macro.motion.body.interface] ** 2))
     assert stored > 0.0
     assert macro.interface_work == pytest.approx(stored, rel=1e-10)
 
@@ -97,8 +101,8 @@ def test_macro_model_on_springs_stores_their_energy(bodies):
 def test_macro_model_with_nothing_at_its_cut_is_alone(bodies):
     made, plan = bodies
     body = made["macro"]
-    macro, _ = answered(bodies, np.zeros(len(body.cut)), lambda time, u, v: np.zeros_like(u))
-    alone = uncut_motion(body, [half_sine_drop(1e6, 1e-5)], plan.window)
+    macro, _ = answered(bodies, np.zeros(len(body.interface)), lambda time, u, v: np.zeros_like(u))
+    alone = explicit_motion(body, [half_sine_drop(1e6, 1e-5)], plan.window)
     for _ in range(WINDOWS):
         alone.advance()
         alone.update_force()
@@ -111,15 +115,17 @@ def test_macro_model_with_nothing_at_its_cut_is_alone(bodies):
 def test_replay_of_one_side_is_the_same_to_the_last_bit(tmp_path, name, scheme):
     models = Pair(free=True).divided(SCHEMES[name])
     plan, made, loads = models.division.plan, models.bodies(), [half_sine_drop(1e6, 1e-5)]
-    cut = {role: local_cut(body) for role, body in made.items()}
-    channels = CutChannels.open(MPI.COMM_SELF, made["macro"].cut, made["meso"].cut, receiver_waits=False)
-    recorded = {role: record(channels, cut[role]) for role in made}
+    interface = {role: local_interface(body) for role, body in made.items()}
+    channels = InterfaceChannels.open(
+        MPI.COMM_SELF, made["macro"].interface, made["meso"].interface, receiver_waits=False
+    )
+    recorded = {role: record(channels, interface[role]) for role in made}
     make = {"macro": scheme.macro, "meso": scheme.meso}
     parts = {role: make[role](made[role], loads, plan, recorded[role]) for role in scheme.order}
     run(parts["macro"], parts["meso"])
     for role in made:
         save_recording(recorded[role], tmp_path / f"{role}.npz")
-        replayed = replay(tmp_path / f"{role}.npz", cut[role])
+        replayed = replay(tmp_path / f"{role}.npz", interface[role])
         again = make[role](models.bodies()[role], loads, plan, replayed)
         run(again)
         assert np.abs(again.motion.displacement).max() > 0.0
@@ -129,4 +135,4 @@ def test_replay_of_one_side_is_the_same_to_the_last_bit(tmp_path, name, scheme):
         with pytest.raises(RecordingError, match="another one is wanted"):
             run(again)
     with pytest.raises(RecordingError, match="nodes, this one has 1"):
-        replay(tmp_path / "meso.npz", scripted_cut(1))
+        replay(tmp_path / "meso.npz", scripted_interface(1))

@@ -7,10 +7,10 @@ from pydantic import ValidationError
 
 from reflowshock.cases.hard.trials.bodies import dns_body, motion_of
 from reflowshock.cases.hard.trials.grids import grid, mesh_of, on
-from reflowshock.fem.dynamics.energy_balance import SUMS, Ledger
+from reflowshock.fem.dynamics.energy_balance import SUMS, EnergyBalance
 from reflowshock.fem.errors import EnergyError, LoadError
 from reflowshock.fem.loads.large_mass import LargeMass
-from reflowshock.fem.loads.load import BodyAcceleration, PrescribedMotion
+from reflowshock.fem.loads.load import BodyAcceleration, PrescribedVelocity
 from reflowshock.fem.loads.pulse import Constant
 from reflowshock.fem.loads.shock_pulse import shock_pulse
 from reflowshock.fem.mesh.mesh import MeshData
@@ -96,7 +96,7 @@ def test_large_mass_needs_nodes_that_are_free():
 def test_motion_of_a_held_component_is_refused():
     mesh, body = box(held=True)
     with pytest.raises(LoadError, match="prescribed motion along x acts on nodes that are held"):
-        motion_of(body, 1e-8, [PrescribedMotion(body.local.locate(mesh.facet_nodes("low")), 0, Constant(1.0))])
+        motion_of(body, 1e-8, [PrescribedVelocity(body.local.locate(mesh.facet_nodes("low")), 0, Constant(1.0))])
 
 
 def test_weight_of_the_large_mass_does_not_move_the_base():
@@ -117,13 +117,13 @@ def test_weight_of_the_large_mass_does_not_move_the_base():
 
 
 def test_ledger_says_what_grew_and_which_step_it_was():
-    ledger = Ledger(limit=0.02, trivial=0.0, step=1e-9, critical=9e-10)
+    balance = EnergyBalance(limit=0.02, trivial=0.0, step=1e-9, critical=9e-10)
     sums = np.zeros(SUMS)
-    ledger.judge(sums, 0.0)
+    balance.judge(sums, 0.0)
     sums[1] = np.inf
     expected = (
         r"energies are not numbers at time 1\.0+e-06 s \(step 1000\): the internal energy went from 0\.000e\+00 J to"
         r" inf J since the sample before; step 1\.000e-09 s, estimated critical step 9\.000e-10 s; most likely the time"
     )
     with pytest.raises(EnergyError, match=expected):
-        ledger.judge(sums, 1e-6)
+        balance.judge(sums, 1e-6)

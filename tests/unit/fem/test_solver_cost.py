@@ -4,16 +4,16 @@ import pytest
 
 from reflowshock.fem.estimates.factor_cost import box_factor
 from reflowshock.fem.estimates.solver_cost import forecast_solvers, plate_nodes
-from reflowshock.fem.problem.structure import StructureScene
+from reflowshock.fem.problem.structure import StructureProblem
 from tests.support.fem_structures import structure_tables_of
 
 # Unknowns of three MUMPS factorisations by benchmarks/jedec_oracle.py: operations, entries.
 MEASURED = {(80, 61, 5): (2.27e10, 3.14e7), (40, 41, 5): (4.42e9, 8.42e6), (20, 21, 21): (1.61e10, 1.60e7)}
 
 
-def scene(**changes) -> StructureScene:
-    names = StructureScene.model_fields
-    return StructureScene.model_validate({k: v for k, v in structure_tables_of(**changes).items() if k in names})
+def scene(**changes) -> StructureProblem:
+    names = StructureProblem.model_fields
+    return StructureProblem.model_validate({k: v for k, v in structure_tables_of(**changes).items() if k in names})
 
 
 def test_factor_of_a_chain_is_that_of_a_band():

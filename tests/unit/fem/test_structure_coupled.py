@@ -5,7 +5,7 @@ import pytest
 
 from reflowshock.fem.division.division import Division
 from reflowshock.fem.division.structure_tables import structure_tables, tied
-from reflowshock.fem.errors import CutError, StepError
+from reflowshock.fem.errors import CouplingError, StepError
 from reflowshock.fem.estimates.estimate import WindowPlan
 from reflowshock.fem.mesh.mesh_file import read_mesh
 from reflowshock.fem.output.compare import relative_error
@@ -66,7 +66,7 @@ def test_the_finest_layer_and_its_buffer_are_the_meso_model(tmp_path):
 def test_layers_that_are_alike_have_none_that_is_fine(tmp_path):
     layers = LAYERS | {"layer_1": LAYERS["layer_1"] | {"cells": 1, "in_plane": (2, 2)}}
     request = write_bar(tmp_path, WIDTH, layers, 1e-5, **TABLES, dynamics=dynamics())
-    with pytest.raises(CutError, match=r"less than half of the longest.*name it in dynamics\.coupling\.fine"):
+    with pytest.raises(CouplingError, match=r"less than half of the longest.*name it in dynamics\.coupling\.fine"):
         divided_on_one_rank(request)
 
 
@@ -139,7 +139,7 @@ def test_impulses_refuse_a_prescribed_motion_of_the_cut(tmp_path):
     """The macro model alone would know of it, and the meso model's cut run away: strains were 1.3 times wrong."""
     side = {"loads": {"side": LOADS["pull"] | {"on": "x_max", "component": "x"}}, "supports": {}}
     changes = dynamics(coupling={"scheme": "impulse", "fine": ["layer_1"]})
-    with pytest.raises(CutError, match=r"loads\.side moves 6 nodes of the cut.*impulse"):
+    with pytest.raises(CouplingError, match=r"loads\.side moves 6 nodes of the interface.*impulse"):
         divided_on_one_rank(write_bar(tmp_path, WIDTH, LAYERS, 1e-5, **(TABLES | side), dynamics=changes))
 
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from reflowshock.fem.problem.structure import StructureScene
+from reflowshock.fem.problem.structure import StructureProblem
 from reflowshock.fem.problem.structure_checks import check, problems
 
 TIN = {"kind": "isotropic", "density": 7400.0, "young_modulus": 50e9, "poisson_ratio": 0.36}
@@ -11,7 +11,7 @@ SHAKEN = {"kind": "input_g", "service_condition": "B", "method": "large_mass"}
 YIELDING = TIN | {"plasticity": {"A": 40e6}}
 
 
-def scene(**changes) -> StructureScene:
+def scene(**changes) -> StructureProblem:
     """Return a board on its holes, dropped; ``changes`` are tables that replace those of it."""
     board = {"material": "FR4", "thickness": 1e-3, "cells": 2}
     tables = {
@@ -28,7 +28,7 @@ def scene(**changes) -> StructureScene:
         "watch": {"centre": {"at": [0.0, 0.0, 0.0]}},
         "dynamics": {"duration": 2e-3},
     }
-    return StructureScene.model_validate(tables | changes)
+    return StructureProblem.model_validate(tables | changes)
 
 
 def layered(material: str, **more) -> dict:
@@ -39,7 +39,7 @@ def layered(material: str, **more) -> dict:
 def test_a_good_scene_has_no_problem_and_survives_its_json():
     good = scene()
     assert not problems(good)
-    assert StructureScene.model_validate_json(good.model_dump_json()) == good
+    assert StructureProblem.model_validate_json(good.model_dump_json()) == good
     assert good.structure.corners == ((0.0, -0.0385, 0.0), (0.066, 0.0385, 1e-3))
 
 

@@ -62,11 +62,11 @@ def test_interrupted_run_continues_to_the_same_bits(whole, tmp_path, monkeypatch
     reference, _, history = whole
     sample, calls = History.sample, []
 
-    def broken(self, crew):
+    def broken(self, participants):
         calls.append(1)
         if len(calls) > 7:
             raise KeyboardInterrupt
-        sample(self, crew)
+        sample(self, participants)
 
     monkeypatch.setattr(History, "sample", broken)
     with pytest.raises(KeyboardInterrupt):

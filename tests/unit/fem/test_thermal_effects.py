@@ -23,7 +23,7 @@ from reflowshock.fem.statics.pads import Pads
 from reflowshock.fem.statics.plates import RigidPlates
 from reflowshock.fem.statics.state import Assembly
 from reflowshock.fem.statics.structure import ThermalStructure
-from reflowshock.meshing.board.heated_assembly import write_heated_assembly
+from reflowshock.meshing.board.assembly import write_heated_assembly
 from reflowshock.meshing.board.pads import pad_table
 from reflowshock.meshing.board.parameters import Warpage
 from tests.support.thermal_models import REFERENCE, Layers, pads_at, small_structure, structure_of

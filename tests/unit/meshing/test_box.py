@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from reflowshock.meshing.board.box import write_box
-from reflowshock.meshing.board.box_checks import box_problems
-from reflowshock.meshing.board.box_plan import Box, BoxHoles, BoxLayer, box_plan, count_box
+from reflowshock.meshing.board.box_plan import Box, BoxHoles, BoxLayer, box_plan, box_problems, count_box
 
 SIZE, THICKNESS = (40e-3, 20e-3), (1e-3, 0.5e-3)
 LAYERS = (BoxLayer("board", THICKNESS[0], 2), BoxLayer("cover", THICKNESS[1], 1))

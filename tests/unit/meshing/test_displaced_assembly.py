@@ -5,12 +5,16 @@ import pytest
 
 from reflowshock.cases.hard.trials.packages import MM, PLATE, board, package
 from reflowshock.meshing.board.assembly import write_assembly
-from reflowshock.meshing.board.displaced_assembly import ContactError, write_displaced_assembly
-from reflowshock.meshing.board.displacement import DisplacementError, computed, prescribed
-from reflowshock.meshing.board.package_side import PackageSide, underside
+from reflowshock.meshing.board.displaced_assembly import (
+    ContactError,
+    DisplacementError,
+    computed,
+    prescribed,
+    write_displaced_assembly,
+)
+from reflowshock.meshing.board.package_side import NotStructuredError, PackageSide, StructuredFace, underside
 from reflowshock.meshing.board.pads import lift
 from reflowshock.meshing.board.parameters import Warpage
-from reflowshock.meshing.core.structured_face import NotStructuredError, StructuredFace
 from tests.support.mesh_file import MeshFile
 
 PACKAGE = ("substrate", "die")

@@ -5,8 +5,7 @@ import numpy as np
 import pytest
 
 from reflowshock.cases.hard.trials.packages import MM, PLATE, board, package
-from reflowshock.meshing.board.assembly import write_assembly
-from reflowshock.meshing.board.heated_assembly import write_heated_assembly
+from reflowshock.meshing.board.assembly import write_assembly, write_heated_assembly
 
 
 @pytest.mark.parametrize("copper", [{}, PLATE])

@@ -9,7 +9,7 @@ from reflowshock.cases.hard.trials.surfaces import barrel, revolve
 from reflowshock.meshing.board.pads import lift, pad_table
 from reflowshock.meshing.board.parameters import Warpage
 from reflowshock.meshing.core.hexahedra import quad_areas, volumes
-from reflowshock.meshing.joint.joint_place import JointPlace
+from reflowshock.meshing.joint.joint_mesh import JointPlace
 from reflowshock.meshing.joint.solder_mesh import JointMeshError, joint_quality, mesh_joint
 from reflowshock.meshing.surface.closed_surface import close_surface
 

@@ -6,7 +6,7 @@ from reflowshock.particles.core.cloud import joint_cloud
 from reflowshock.particles.core.geometry import JointGeometry
 from reflowshock.particles.core.plate import Plate
 from reflowshock.particles.physics.plate_motion import LIFT, SHIFT, TURN, Floating, Travel
-from reflowshock.particles.steps.admissible import Admissible
+from reflowshock.particles.steps.step_equations import Admissible
 
 SPEED = 0.5
 

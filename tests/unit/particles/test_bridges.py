@@ -1,6 +1,6 @@
 import pytest
 
-from reflowshock.particles.scenes.bridges import contacts, neighbours
+from reflowshock.particles.scenes.bridge import contacts, neighbours
 
 PITCH = 1e-3
 ROW = {f"A{k}": ((k - 0.5) * PITCH, 2.5 * PITCH) for k in (1, 2, 3)}

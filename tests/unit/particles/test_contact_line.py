@@ -8,7 +8,7 @@ from reflowshock.particles.core.cloud import box_cloud, equal_area_radius, joint
 from reflowshock.particles.core.geometry import JointGeometry
 from reflowshock.particles.core.plate import Pad, Plate
 from reflowshock.particles.core.surface_measure import ring_area
-from reflowshock.particles.physics.force_wetting import Wetting
+from reflowshock.particles.physics.forces import Wetting
 from reflowshock.particles.scenes.metrics import verdict
 from reflowshock.particles.steps.descent import Start
 from reflowshock.particles.surface.contact_line import ON_MASK, ON_PAD, PINNED, ContactLine

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from reflowshock.particles.reference.damped_oscillation import fit_oscillation
+from reflowshock.particles.scenes.free_drop import fit_oscillation
 
 TIME = np.linspace(0.0, 3.0, 200)
 

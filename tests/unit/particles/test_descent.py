@@ -10,16 +10,15 @@ from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.cloud import free_box_cloud, joint_cloud
 from reflowshock.particles.core.geometry import JointGeometry
 from reflowshock.particles.core.plate import Pad, Plate
-from reflowshock.particles.physics.force_surface_tension import SurfaceTension
-from reflowshock.particles.physics.mass import Inertia, Mass
+from reflowshock.particles.physics.forces import SurfaceTension
+from reflowshock.particles.physics.operators import Inertia, Mass
 from reflowshock.particles.physics.physics import Physics
 from reflowshock.particles.physics.plate_motion import Travel
 from reflowshock.particles.steps.descent import Evening, Start, correct_volume, even_out, highest_energy
 from reflowshock.particles.steps.flow import LiquidFlow
 from reflowshock.particles.steps.relaxation import Relaxation
 from reflowshock.particles.steps.time_step import TimeStep
-from reflowshock.particles.surface.contact_line import ON_PAD, PINNED, ContactLine
-from reflowshock.particles.surface.contact_line_hysteresis import HystereticLine
+from reflowshock.particles.surface.contact_line import ON_PAD, PINNED, ContactLine, HystereticLine
 
 RADII, GAP = (0.75, 1.46), 1.0
 TENSION = (SurfaceTension(2.0),)

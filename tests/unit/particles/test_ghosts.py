@@ -3,7 +3,7 @@ import pytest
 
 from reflowshock.particles.core.neighbours import NeighbourList
 from reflowshock.particles.core.plate import Plate
-from reflowshock.particles.ispg.ghosts import mirror
+from reflowshock.particles.ispg.collocation import mirror
 from reflowshock.particles.ispg.mls import derivatives
 
 REACH = 0.3

@@ -1,4 +1,4 @@
-"""Parts of the seed's scheme against exact fields and printed sums."""
+"""Parts of the paper's scheme against exact fields and printed sums."""
 
 import numpy as np
 import pytest
@@ -9,14 +9,11 @@ from reflowshock.particles.core.cloud import box_cloud
 from reflowshock.particles.core.neighbours import NeighbourList
 from reflowshock.particles.core.plate import Plate
 from reflowshock.particles.discretisation.incompressibility import SolveFailed
-from reflowshock.particles.discretisation.krylov import solve_gmres
 from reflowshock.particles.ispg.collocation import collocate
-from reflowshock.particles.ispg.gripc_step import GripcStep
-from reflowshock.particles.ispg.pressure_poisson import Poisson, correct_pressure
-from reflowshock.particles.ispg.surface_pressure import force_pressure, viscous_pressure
-from reflowshock.particles.ispg.velocity_smoothing import Velocities, smooth
-from reflowshock.particles.physics.force_surface_tension import SurfaceTension
-from reflowshock.particles.physics.mass import Mass
+from reflowshock.particles.ispg.gripc_step import GripcStep, force_pressure, viscous_pressure
+from reflowshock.particles.ispg.projection import Poisson, Velocities, correct_pressure, smooth, solve_gmres
+from reflowshock.particles.physics.forces import SurfaceTension
+from reflowshock.particles.physics.operators import Mass
 from reflowshock.particles.physics.physics import Physics
 from reflowshock.particles.physics.plate_motion import PlateMotion
 from reflowshock.particles.surface.contact_line import ContactLine

@@ -7,10 +7,10 @@ from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.cloud import joint_cloud
 from reflowshock.particles.core.geometry import JointGeometry
 from reflowshock.particles.core.plate import Plate
-from reflowshock.particles.physics.mass import Inertia, Mass
+from reflowshock.particles.physics.operators import Inertia, Mass
 from reflowshock.particles.physics.physics import Physics
 from reflowshock.particles.physics.plate_motion import Travel
-from reflowshock.particles.steps.inertial_flow import InertialFlow
+from reflowshock.particles.steps.inertial_step import InertialFlow
 
 
 def test_a_plate_arrives_exactly_and_rests():

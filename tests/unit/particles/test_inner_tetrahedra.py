@@ -4,15 +4,13 @@ import numpy as np
 import pytest
 
 from reflowshock.particles.core.body import Body
-from reflowshock.particles.core.cloud import box_cloud, joint_cloud
-from reflowshock.particles.core.cloud_sphere import sphere_cloud
+from reflowshock.particles.core.cloud import box_cloud, joint_cloud, sphere_cloud
 from reflowshock.particles.core.geometry import JointGeometry
 from reflowshock.particles.core.surface_measure import wall_corners
 from reflowshock.particles.core.tetrahedra import cell_volumes, volume_gradients
-from reflowshock.particles.core.winding_number import winding_numbers
-from reflowshock.particles.discretisation.discretisation_tetrahedra import LinearTetrahedra
+from reflowshock.particles.discretisation.discretisation import LinearTetrahedra
 from reflowshock.particles.discretisation.field_transfer import Transfer, interpolation
-from reflowshock.particles.discretisation.inner_tetrahedra import fill
+from reflowshock.particles.discretisation.inner_tetrahedra import fill, winding_numbers
 
 CLOUDS = {
     "ball": lambda: sphere_cloud(1.0, 3),

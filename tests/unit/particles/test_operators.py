@@ -6,11 +6,10 @@ import pytest
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.cloud import box_cloud
 from reflowshock.particles.core.neighbours import NeighbourList
-from reflowshock.particles.discretisation.discretisation_tetrahedra import LinearTetrahedra
+from reflowshock.particles.discretisation.discretisation import LinearTetrahedra
 from reflowshock.particles.discretisation.inner_tetrahedra import fill
-from reflowshock.particles.physics.force_surface_tension import SurfaceTension
-from reflowshock.particles.physics.mass import Inertia, Mass
-from reflowshock.particles.physics.viscosity import Viscosity
+from reflowshock.particles.physics.forces import SurfaceTension
+from reflowshock.particles.physics.operators import Inertia, Mass, Viscosity
 from reflowshock.particles.steps.interior_shift import SMALLEST_DEPTH, interior_shift
 from reflowshock.particles.steps.time_step import TimeStep, capillary_limit
 

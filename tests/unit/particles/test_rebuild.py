@@ -7,8 +7,7 @@ from reflowshock.particles.core.geometry import JointGeometry
 from reflowshock.particles.core.plate import Plate
 from reflowshock.particles.scenes.rebuild import CannotRebuild, closed_surface, collapsing, rebuild, touch
 from reflowshock.particles.surface.cloud_level_set import boundary_loops, cloud_from_level_set
-from reflowshock.particles.surface.level_set import Grid, signed_distance, smooth_union
-from reflowshock.particles.surface.surface_nets import extract_surface, relax
+from reflowshock.particles.surface.level_set import Grid, extract_surface, relax, signed_distance, smooth_union
 from tests.support.level_sets import ball, cap_radius, grid_around_ball
 
 R = 0.5e-3

@@ -9,8 +9,7 @@ import pytest
 from scipy import sparse
 
 from reflowshock.particles.core.checkpoint import Checkpoint
-from reflowshock.particles.core.cloud import box_cloud
-from reflowshock.particles.core.cloud_sphere import sphere_cloud
+from reflowshock.particles.core.cloud import box_cloud, sphere_cloud
 from reflowshock.particles.core.geometry import JointGeometry
 from reflowshock.particles.parameters.scenes import Drop
 from reflowshock.particles.parameters.solder import Solder, SolderEffects, SolderNumerics

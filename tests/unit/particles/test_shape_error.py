@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from reflowshock.particles.reference.young_laplace import sphere_meridian
-from reflowshock.particles.surface.shape_error import distance, shape_error
+from reflowshock.particles.scenes.metrics import distance, shape_error
 
 VOLUME = 4.0 / 3.0 * np.pi * 1e-9  # of a sphere of 1 mm
 OCTAHEDRON = np.vstack((np.eye(3), -np.eye(3)))

@@ -12,7 +12,7 @@ from reflowshock.particles.core.surface_measure import (
     surface_area,
     volume_and_gradient,
 )
-from reflowshock.particles.physics.force_gravity import Gravity
+from reflowshock.particles.physics.forces import Gravity
 
 CLOUDS = [box_cloud(1.0, 5), joint_cloud(JointGeometry(1.0, 0.8, 0.6), 1.9, 0.25)]
 

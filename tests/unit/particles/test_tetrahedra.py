@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from reflowshock.particles.core.body import Body
-from reflowshock.particles.core.cloud_sphere import geodesic_sphere, sphere_cloud
+from reflowshock.particles.core.cloud import geodesic_sphere, sphere_cloud
 from reflowshock.particles.core.surface_measure import enclosed_volume
 from reflowshock.particles.core.tetrahedra import boundary_triangles, cell_volumes, tetrahedralise, volume_gradients
-from reflowshock.particles.discretisation.backward_difference import BackwardDifference
-from reflowshock.particles.discretisation.discretisation_tetrahedra import LinearTetrahedra
-from reflowshock.particles.physics.viscosity import Viscosity
+from reflowshock.particles.discretisation.discretisation import LinearTetrahedra
+from reflowshock.particles.physics.operators import Viscosity
+from reflowshock.particles.steps.backward_difference import BackwardDifference
 
 
 @pytest.fixture

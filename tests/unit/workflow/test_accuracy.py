@@ -5,16 +5,16 @@ from pathlib import Path
 
 import pytest
 
+from reflowshock.workflow.accuracy import command
+from reflowshock.workflow.accuracy.command import Wish, keeps_promise, measure, read_wish, unproved
+from reflowshock.workflow.accuracy.runs import AGAIN
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.cli import main
-from reflowshock.workflow.convergence import command
 from reflowshock.workflow.convergence.calibration import calibration, calibration_of, default_folder
-from reflowshock.workflow.convergence.command import Wish, keeps_promise, measure, read_wish, unproved
-from reflowshock.workflow.convergence.kinds import ladder_of
 from reflowshock.workflow.convergence.measured import StageCost, read_accuracy
 from reflowshock.workflow.convergence.page import section, section_for, write_pages
-from reflowshock.workflow.convergence.runs import AGAIN
 from reflowshock.workflow.convergence.tables import as_lines, as_options, legend, on_front, runs
+from reflowshock.workflow.kinds import kind_of
 from reflowshock.workflow.pipeline.reader import read_case
 from reflowshock.workflow.plan import foreseen_costs
 from reflowshock.workflow.store.store import MESSAGE
@@ -258,7 +258,8 @@ def test_a_wish_is_read():
 )
 def test_every_rung_of_solder_alone_is_a_case(name):
     path = CASE.parents[1] / name / "case.toml"
-    ladder = ladder_of(read_case(path))
+    case = read_case(path)
+    ladder = kind_of(case).ladder(case)
     for rung in ladder.rungs:
         read_case(path, [f"{key}={value}" for key, value in rung.settings.items()])
     for knob in ladder.knobs:

@@ -5,7 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from reflowshock.workflow.convergence.errors import Error, Quantity, errors_of, richardson
+from reflowshock.workflow.accuracy.recommend import Goal, recommend
+from reflowshock.workflow.case.case import CASES
+from reflowshock.workflow.convergence.errors import Error, errors_of, richardson
 from reflowshock.workflow.convergence.machine import this_machine
 from reflowshock.workflow.convergence.measured import (
     Accuracy,
@@ -18,9 +20,7 @@ from reflowshock.workflow.convergence.measured import (
 )
 from reflowshock.workflow.convergence.orders import fit_cost, fit_error
 from reflowshock.workflow.convergence.pareto import front
-from reflowshock.workflow.convergence.recommend import Goal, recommend
-from reflowshock.workflow.convergence.series import Knob, Ladder, Rung
-from reflowshock.workflow.pipeline.template import CASES
+from reflowshock.workflow.convergence.series import Knob, Ladder, Quantity, Rung
 
 SIZES = (0.4, 0.2, 0.1, 0.05)
 

@@ -5,16 +5,16 @@ import json
 import numpy as np
 import pytest
 
+from reflowshock.workflow.accuracy.recommend import Goal, recommend
+from reflowshock.workflow.case.case import CASES
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.convergence.errors import Error, errors_of
 from reflowshock.workflow.convergence.histories import at_same_times
 from reflowshock.workflow.convergence.measured import Measurement, StageCost, fits_of
 from reflowshock.workflow.convergence.packages import SAME_MESH, package_ladder
-from reflowshock.workflow.convergence.recommend import Goal, recommend
 from reflowshock.workflow.convergence.series import Knob, Ladder, Rung
 from reflowshock.workflow.convergence.structures import structure_ladder
 from reflowshock.workflow.pipeline.reader import read_case
-from reflowshock.workflow.pipeline.template import CASES
 from reflowshock.workflow.structure.findings import exact_velocities, wave_points
 from tests.support.workflow_command import SMALL_CASE
 

@@ -6,8 +6,10 @@ from pathlib import Path
 import pytest
 
 from reflowshock.fem.materials.library import SAC305
+from reflowshock.workflow.case.fields import display_values
 from reflowshock.workflow.case.problems import CaseError
-from reflowshock.workflow.pipeline.reader import available_cores, display_values, read_case
+from reflowshock.workflow.pipeline.reader import read_case
+from reflowshock.workflow.process.environment import available_cores
 from tests.support.workflow_command import SMALL_CASE
 
 BAD_VALUES = {
@@ -77,7 +79,7 @@ BAD_VALUES = {
     ),
     "volume that cannot fit its gap": (
         "solder.volume=5 mm^3",
-        ["solder.volume", '"5 mm^3"', "cannot fit", "< 0.31"],
+        ["solder.volume", '"5 mm^3"', "does not fit", "< 0.31"],
     ),
     "package larger than the board": (
         "package.substrate.length=250 mm",
@@ -181,3 +183,13 @@ def test_values_are_shown_in_the_units_of_users():
 
 def test_cores_are_those_of_this_process():
     assert available_cores() == len(os.sched_getaffinity(0))
+
+
+def test_of_many_problems_the_first_are_shown(tmp_path):
+    case = tmp_path / "case.toml"
+    case.write_text("".join(f"wrong{number} = 1\n" for number in range(1000)) + SMALL_CASE.read_text())
+    with pytest.raises(CaseError) as caught:
+        read_case(case)
+    lines = str(caught.value).splitlines()
+    assert len(lines) == 31
+    assert "wrong0" in lines[0] and lines[-1].endswith(": 970 more problems")

@@ -9,7 +9,8 @@ import jsonschema
 import pytest
 
 from reflowshock.workflow import cli
-from reflowshock.workflow.pipeline.reader import display_values, read_case
+from reflowshock.workflow.case.fields import display_values
+from reflowshock.workflow.pipeline.reader import read_case
 from reflowshock.workflow.pipeline.schema import case_schema
 from reflowshock.workflow.store.folders import locked
 from tests.support.workflow_command import command_line

@@ -6,13 +6,13 @@ from pathlib import Path
 import pytest
 
 from reflowshock.workflow.case.problems import CaseError
-from reflowshock.workflow.cluster import checks, queue
-from reflowshock.workflow.cluster.executor import ExecutorName, Local, Slurm, executor_for
-from reflowshock.workflow.cluster.job_output import JobOutput, failures_of
-from reflowshock.workflow.cluster.profile import FILE, SHIPPED, Profile, read_profile
-from reflowshock.workflow.cluster.queue import Partition, jobs_in, partitions
-from reflowshock.workflow.cluster.resources import stage_resources
+from reflowshock.workflow.jobs import checks, queue
+from reflowshock.workflow.jobs.executor import ExecutorName, Local, Slurm, executor_for
+from reflowshock.workflow.jobs.job_output import JobOutput, failures_of
+from reflowshock.workflow.jobs.profile import FILE, SHIPPED, Profile, read_profile
+from reflowshock.workflow.jobs.queue import Partition, jobs_in, partitions
 from reflowshock.workflow.pipeline.reader import read_case
+from reflowshock.workflow.pipeline.resources import stage_resources
 from reflowshock.workflow.process.launch import LAUNCHER, mpi_command
 
 CASES = Path(__file__).resolve().parents[3] / "cases"

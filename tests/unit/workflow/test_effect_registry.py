@@ -14,14 +14,15 @@ from reflowshock.fem.estimates.effects import (
     called_for,
     stiffened,
 )
+from reflowshock.workflow.board_drop.board_deflection import decided
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.cli import app
 from reflowshock.workflow.effects.costs import cost_shares, measured
 from reflowshock.workflow.effects.page import effects_table
 from reflowshock.workflow.effects.registry import effect_of, registry
 from reflowshock.workflow.effects.table import per_cent
+from reflowshock.workflow.kinds import kind_of
 from reflowshock.workflow.pipeline.reader import read_case
-from reflowshock.workflow.pipeline.stage_forecast import scene_effects
 from tests.support.workflow_command import SMALL_CASE
 
 CASES = Path(__file__).parents[3] / "cases"
@@ -45,7 +46,7 @@ SCENES = {
 
 def printed(case) -> list[str]:
     console = Console(width=100, record=True, file=StringIO())
-    console.print(effects_table(case, scene_effects(case), "scene"))
+    console.print(effects_table(case, kind_of(case).forecast(case).effects, "scene"))
     return console.export_text().splitlines()
 
 
@@ -67,7 +68,7 @@ def test_a_plan_tells_scenes_apart(name):
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.parent.name)
 def test_every_effect_of_a_plan_is_in_the_registry(path):
     case = read_case(path, (), True)
-    effects = scene_effects(case)
+    effects = kind_of(case).forecast(case).effects
     unknown = {name for name in effects if effect_of(name, "reflow" in case.pipeline.names) is None}
     assert unknown <= METHOD
     assert all(decision.get("influence", 0.0) >= 0.0 for decision in effects.values())
@@ -75,7 +76,7 @@ def test_every_effect_of_a_plan_is_in_the_registry(path):
 
 def test_what_yields_turns_or_is_fine_costs_and_what_is_coarse_saves():
     case = read_case(CASES / "bga_drop/case.toml", (), True)
-    shares = cost_shares(case, scene_effects(case))
+    shares = cost_shares(case, kind_of(case).forecast(case).effects)
     assert shares["finite_rotation"] > 1.0 and shares["plasticity"] > 1.0
     assert shares["mass_scaling"] < 0.0 < shares["identical_joints"]
     assert 0.0 < shares["gravity_in_the_shock"] < 0.1
@@ -85,7 +86,7 @@ def test_what_yields_turns_or_is_fine_costs_and_what_is_coarse_saves():
 def test_shares_of_what_is_on_are_of_the_whole():
     """On, an effect that costs r times the rest is the share 1 - 1 / r of the stage; off, it would add r - 1."""
     acting, left_out = (read_case(DROP, [f"gravity={switch}"], True) for switch in ("on", "off"))
-    on, off = (cost_shares(case, scene_effects(case))["gravity"] for case in (acting, left_out))
+    on, off = (cost_shares(case, kind_of(case).forecast(case).effects)["gravity"] for case in (acting, left_out))
     assert off == pytest.approx(measured()["gravity"] - 1.0)
     assert on == pytest.approx(1.0 - 1.0 / measured()["gravity"])
 
@@ -113,11 +114,11 @@ def test_stretching_is_bounded_and_grows_with_the_deflection():
 def test_auto_kinematics_follow_the_deflection():
     auto = "shock.numerics.kinematics=auto"
     hard, soft = (read_case(SMALL_CASE, [auto, *more], True) for more in ([], [SLOW]))
-    assert hard.decided.shock.numerics.kinematics == ("finite" if _ratio(hard) > 0.12 else "small")
-    assert soft.decided.shock.numerics.kinematics == "small"
+    assert decided(hard).shock.numerics.kinematics == ("finite" if _ratio(hard) > 0.12 else "small")
+    assert decided(soft).shock.numerics.kinematics == "small"
     far = read_case(CASES / "bga_drop/case.toml", [auto], True)
-    assert far.decided.shock.numerics.kinematics == "finite"
-    told = scene_effects(far)["finite_rotation"]
+    assert decided(far).shock.numerics.kinematics == "finite"
+    told = kind_of(far).forecast(far).effects["finite_rotation"]
     assert told["on"] and "auto" in told["why"] and told["influence"] > 0.3
     with pytest.raises(ValueError, match="decided by the case"):
         _ = far.shock.numerics.decided_kinematics

@@ -7,15 +7,15 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-from reflowshock.workflow.board_drop.case import PackageCase
 from reflowshock.workflow.case.fields import display, leaves, unit_of
 from reflowshock.workflow.case.names import is_name
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.case.toml_places import Place, Places
 from reflowshock.workflow.case.units import to_si
+from reflowshock.workflow.kinds import KINDS
 from reflowshock.workflow.pipeline import gate
 from reflowshock.workflow.pipeline.gate import Leave, ask_if_long, bytes_text, machine_memory, needed_memory, too_large
-from reflowshock.workflow.pipeline.reader import KINDS, read_case
+from reflowshock.workflow.pipeline.reader import read_case
 from reflowshock.workflow.pipeline.schema import _reachable
 from reflowshock.workflow.pipeline.template import templates
 from tests.support.workflow_command import SMALL_CASE
@@ -200,7 +200,7 @@ def test_a_message_is_one_line_of_what_can_be_seen(tmp_path):
     assert len(caught.value.lines()[0]) < 400
 
 
-@pytest.mark.parametrize("kind", [*KINDS.values(), PackageCase], ids=lambda kind: kind.__name__)
+@pytest.mark.parametrize("kind", [kind.case for kind in KINDS], ids=lambda kind: kind.__name__)
 def test_defaults_are_what_their_text_says(kind):
     """A line of a case file that repeats a default changes nothing."""
     for model in _reachable(kind):

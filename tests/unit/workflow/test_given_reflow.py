@@ -10,13 +10,13 @@ from reflowshock.cases.hard.trials.packages import MM
 from reflowshock.cases.hard.trials.surfaces import barrel
 from reflowshock.meshing.board.pads import pad_table, write_pads
 from reflowshock.meshing.board.parameters import Warpage
-from reflowshock.workflow.board_drop import findings
 from reflowshock.workflow.board_drop.forecast import forecast
+from reflowshock.workflow.case.run import Run
+from reflowshock.workflow.package import findings
+from reflowshock.workflow.package_report import joint_tables
+from reflowshock.workflow.package_report.joint_records import joint_records
 from reflowshock.workflow.pipeline.reader import read_case
-from reflowshock.workflow.pipeline.stage_runner import Run
 from reflowshock.workflow.reflow.stage import reflow
-from reflowshock.workflow.report import joint_tables
-from reflowshock.workflow.report.joint_records import joint_records
 from reflowshock.workflow.store.keys import stage_inputs
 from tests.support.workflow_command import SMALL_CASE
 

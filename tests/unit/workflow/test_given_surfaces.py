@@ -15,16 +15,17 @@ from reflowshock.cases.hard.trials.surfaces import barrel, bridged_pair, revolve
 from reflowshock.meshing.board.assembly import write_assembly
 from reflowshock.meshing.board.pads import pad_table, write_pads
 from reflowshock.meshing.board.parameters import Warpage
-from reflowshock.meshing.core.outlines import outlines
+from reflowshock.meshing.core.facets import outlines
 from reflowshock.meshing.surface.closed_surface import enclosed_volume, read_surface
 from reflowshock.particles.scenes.products import write_shapes
 from reflowshock.particles.steps.shape import JointShape, Snapshot
-from reflowshock.workflow.board_drop import findings
 from reflowshock.workflow.board_drop.joint_meshes import mesh_real_joints
 from reflowshock.workflow.board_drop.joint_surfaces import write_surfaces
+from reflowshock.workflow.case.fields import display_values
 from reflowshock.workflow.case.problems import CaseError
-from reflowshock.workflow.pipeline.reader import display_values, read_case
-from reflowshock.workflow.pipeline.stage_runner import Run
+from reflowshock.workflow.case.run import Run
+from reflowshock.workflow.package import findings
+from reflowshock.workflow.pipeline.reader import read_case
 from reflowshock.workflow.pipeline.template import case_text
 from reflowshock.workflow.process.products import write_json
 from reflowshock.workflow.store.keys import stage_inputs

@@ -3,7 +3,7 @@
 import pytest
 
 from reflowshock.particles.parameters.solder import SolderNumerics
-from reflowshock.workflow.board_drop.case import LARGE_STEPS
+from reflowshock.workflow.package.case import LARGE_STEPS
 from reflowshock.workflow.pipeline.reader import read_case
 from tests.support.workflow_command import SMALL_CASE
 

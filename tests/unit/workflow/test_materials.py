@@ -4,8 +4,9 @@ from pathlib import Path
 
 import pytest
 
+from reflowshock.workflow.case.fields import display_values
 from reflowshock.workflow.case.problems import CaseError
-from reflowshock.workflow.pipeline.reader import display_values, read_case
+from reflowshock.workflow.pipeline.reader import read_case
 
 STRUCTURE = Path(__file__).resolve().parents[2] / "pipeline" / "structure.toml"
 LAMINATE = (

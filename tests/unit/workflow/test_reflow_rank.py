@@ -10,8 +10,8 @@ from reflowshock.particles.core.geometry import JointGeometry
 from reflowshock.particles.parameters.solder import Solder
 from reflowshock.particles.scenes.carried_joint import Carried
 from reflowshock.particles.steps.shape import JointShape, Snapshot
-from reflowshock.workflow.board_drop import reflow_pool
 from reflowshock.workflow.reflow import array, rank
+from reflowshock.workflow.reflow import joints as reflow_pool
 from reflowshock.workflow.reflow.pool import ReflowError
 from reflowshock.workflow.reflow.rank import JOB, RESULT, Done, find, name_of, records_of
 from reflowshock.workflow.reflow.ranks import Ranks

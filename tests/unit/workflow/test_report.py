@@ -7,15 +7,16 @@ import pytest
 
 from reflowshock.fem.output.failure import failure_criteria, judge
 from reflowshock.fem.problem.shock import Failure
+from reflowshock.workflow.package_report import joint_tables
+from reflowshock.workflow.package_report.array_map import array_map
+from reflowshock.workflow.package_report.shock import ranking_mode
 from reflowshock.workflow.pipeline.reader import read_case
-from reflowshock.workflow.report import body as report_body
-from reflowshock.workflow.report import joint_tables, tables
-from reflowshock.workflow.report.array_map import array_map
+from reflowshock.workflow.pipeline.summary import collect_summary, write_summary
+from reflowshock.workflow.report import tables
 from reflowshock.workflow.report.curves import energy_curves, history_curves
 from reflowshock.workflow.report.histories import late_peak
 from reflowshock.workflow.report.pictures import exaggeration
-from reflowshock.workflow.report.shock import ranking_mode
-from reflowshock.workflow.report.summary import collect_summary, write_summary
+from reflowshock.workflow.solder import report as report_body
 from reflowshock.workflow.store.keys import inputs_digest
 from tests.support.products import record_of
 from tests.support.workflow_command import SMALL_CASE

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 import pyvista
 
-from reflowshock.workflow.report import cost, gallery, mesh_tables, residual, shape_effect, shock, warpage
-from reflowshock.workflow.report import interface as section
-from reflowshock.workflow.report.array_map import array_map
-from reflowshock.workflow.report.joint_records import joint_records
-from reflowshock.workflow.report.joints import headline
+from reflowshock.workflow.package_report import cost, gallery, mesh_tables, residual, shape_effect, shock, warpage
+from reflowshock.workflow.package_report import interface as section
+from reflowshock.workflow.package_report.array_map import array_map
+from reflowshock.workflow.package_report.joint_records import joint_records
+from reflowshock.workflow.package_report.joints import headline
 from tests.support.chain_products import BOW, MICRO, MILLI, bowed_structure, interface
 
 NAMES = ["A3", "A4", "B3", "B4"]

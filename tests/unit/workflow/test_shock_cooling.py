@@ -3,8 +3,8 @@
 import json
 
 from reflowshock.workflow.board_drop.shock_cooling import with_cooling
+from reflowshock.workflow.case.run import Findings
 from reflowshock.workflow.pipeline.reader import read_case
-from reflowshock.workflow.pipeline.stage_runner import Findings
 from tests.support.workflow_command import SMALL_CASE
 
 COOLED = ["thermal.effects.residual_stress=on", "thermal.effects.flexible=off", "materials.solder=SAC405"]

@@ -8,9 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from reflowshock.workflow.case.check_text import against_limit
+from reflowshock.workflow.case.run import Findings, Run, StageError
+from reflowshock.workflow.case.text import against_limit
 from reflowshock.workflow.pipeline.reader import read_case
-from reflowshock.workflow.pipeline.stage_runner import Findings, Run, StageError, execute, run_stage
+from reflowshock.workflow.pipeline.stage_runner import execute, run_stage
 from reflowshock.workflow.store.point import Point
 from reflowshock.workflow.store.store import MESSAGE, TRACEBACK, Store
 from tests.support.products import make, record_of

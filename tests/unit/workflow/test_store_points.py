@@ -2,8 +2,8 @@
 
 import pytest
 
-from reflowshock.workflow.store.batch import log_of, missing, show_products, why
-from reflowshock.workflow.store.point import PointsError, read_possible_points
+from reflowshock.workflow.jobs.batch import log_of, missing, show_products, why
+from reflowshock.workflow.pipeline.points import PointsError, read_possible_points
 from reflowshock.workflow.store.state import examine
 from reflowshock.workflow.store.store import MESSAGE, Store
 from tests.support.products import make

@@ -4,14 +4,15 @@ import pytest
 
 from reflowshock.workflow.case.fields import leaves
 from reflowshock.workflow.case.problems import CaseError
-from reflowshock.workflow.case.stage_table import BOARD_DROP
+from reflowshock.workflow.case.run import Findings
+from reflowshock.workflow.jobs.batch import missing, show_products
+from reflowshock.workflow.package.case import BOARD_DROP
+from reflowshock.workflow.pipeline.points import read_case_of_run
 from reflowshock.workflow.pipeline.reader import read_case
-from reflowshock.workflow.pipeline.stage_runner import Findings
-from reflowshock.workflow.store.batch import missing, show_products
 from reflowshock.workflow.store.keys import compare, stage_inputs
 from reflowshock.workflow.store.point import Point
 from reflowshock.workflow.store.state import examine, failed_checks
-from reflowshock.workflow.store.store import CASE, Store, read_case_of_run
+from reflowshock.workflow.store.store import CASE, Store
 from tests.support.products import make
 from tests.support.workflow_command import SMALL_CASE, WHO_COMPUTES
 

@@ -7,9 +7,9 @@ import shutil
 import pytest
 
 from reflowshock.workflow.case.problems import CaseError
+from reflowshock.workflow.jobs.batch import show_products
 from reflowshock.workflow.pipeline.reader import read_case
 from reflowshock.workflow.store import view
-from reflowshock.workflow.store.batch import show_products
 from reflowshock.workflow.store.folders import RunFolderBusy, locked, remove_own
 from reflowshock.workflow.store.point import Point
 from reflowshock.workflow.store.product import discard

@@ -6,8 +6,9 @@ from pathlib import Path
 import jsonschema
 import pytest
 
+from reflowshock.workflow.case.fields import display_values
 from reflowshock.workflow.case.problems import CaseError
-from reflowshock.workflow.pipeline.reader import display_values, read_case
+from reflowshock.workflow.pipeline.reader import read_case
 from reflowshock.workflow.pipeline.schema import case_schema
 from reflowshock.workflow.pipeline.template import case_text, templates
 from reflowshock.workflow.store.keys import compare, stage_inputs

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from reflowshock.workflow.case.case import CASES
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.pipeline.reader import read_case
-from reflowshock.workflow.pipeline.template import CASES
 from reflowshock.workflow.structure.findings import Motion, compared_with_references, layers_of
 from reflowshock.workflow.structure.forecast import forecast_structure
 

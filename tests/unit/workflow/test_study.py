@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from reflowshock.workflow.case.problems import CaseError
-from reflowshock.workflow.pipeline.stage_forecast import stage_seconds
-from reflowshock.workflow.store.batch import Machine, missing
-from reflowshock.workflow.store.point import PointsError
+from reflowshock.workflow.jobs.batch import Machine, missing
+from reflowshock.workflow.kinds import stage_seconds
+from reflowshock.workflow.pipeline.points import PointsError
 from reflowshock.workflow.store.store import Store
 from reflowshock.workflow.study import tables
 from reflowshock.workflow.study.command import read_points_of, results, run_study

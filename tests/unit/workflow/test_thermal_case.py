@@ -5,8 +5,9 @@ import tomllib
 import pytest
 
 from reflowshock.fem.materials.library import FR4, LIBRARY
+from reflowshock.workflow.case.fields import display_values
 from reflowshock.workflow.case.problems import CaseError
-from reflowshock.workflow.pipeline.reader import display_values, read_case
+from reflowshock.workflow.pipeline.reader import read_case
 from reflowshock.workflow.pipeline.template import case_text
 from tests.support.workflow_command import SMALL_CASE
 

@@ -5,8 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from reflowshock.workflow.board_drop.findings import fine_joints_of, ideal_ratio, of_shock
-from reflowshock.workflow.board_drop.fine_joints import FineJoints
+from reflowshock.workflow.package.findings import fine_joints_of, ideal_ratio, of_shock
 from reflowshock.workflow.report import two_scales as section
 
 MODEL = {"window": 80e-9, "step": 10e-9, "substeps": 8, "ranks": 2, "elements": {"dns": 1000}}
@@ -38,7 +37,7 @@ def rows_of(table: dict) -> dict[str, str]:
 
 
 def test_the_section_tells_scheme_joints_and_checks():
-    rows = rows_of(section.two_scales(COUPLING, MODEL, FineJoints(("A4", "B4"), "the most stressed")))
+    rows = rows_of(section.two_scales(COUPLING, MODEL, "the most stressed"))
     assert rows["scheme"].startswith("local time steps")
     assert rows["why"] == "all is linear"
     assert rows["fine joints"] == "A4 B4"
@@ -49,13 +48,13 @@ def test_the_section_tells_scheme_joints_and_checks():
 
 
 def test_a_structure_tells_its_fine_layers_and_its_direction():
-    rows = rows_of(section.two_scales({"fine_layers": ["solder", "copper"], "direction": "two_way"}, MODEL, None))
+    rows = rows_of(section.two_scales({"fine_layers": ["solder", "copper"], "direction": "two_way"}, MODEL))
     assert rows["fine layers"] == "solder copper"
     assert rows["direction"] == "two-way"
 
 
 def test_what_a_run_does_not_tell_is_left_out():
-    rows = rows_of(section.two_scales({}, MODEL, None))
+    rows = rows_of(section.two_scales({}, MODEL))
     assert set(rows) == {"window", "step ratio m"}
     assert section.levels({}) is None
     assert section.placement({}) is None

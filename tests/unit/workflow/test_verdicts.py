@@ -5,9 +5,10 @@ from types import SimpleNamespace
 
 import pytest
 
-from reflowshock.workflow.board_drop import findings
-from reflowshock.workflow.board_drop.reflow_pool import ReflowError, mark_bridges, refuse_joints_without_mesh
-from reflowshock.workflow.report import joint_tables
+from reflowshock.workflow.package import findings
+from reflowshock.workflow.package_report import joint_tables
+from reflowshock.workflow.reflow.joints import ReflowError, mark_bridges, refuse_joints_without_mesh
+from reflowshock.workflow.solder.findings import of_drop, of_joint
 
 PADS = [SimpleNamespace(name=f"A{k}", x=k * 1e-3, y=2.5e-3) for k in (1, 2, 3, 4)]
 
@@ -50,14 +51,21 @@ def test_widths_are_judged_to_one_per_cent_and_counted(records):
 
 
 def test_a_joint_that_failed_says_how():
-    assert findings.of_joint({}, "overflow", {}).health["joint_overflow"] == {"value": 1, "limit": 0, "ok": False}
-    assert findings.of_joint({}, "ok", {}).health["joints_not_ok"]["ok"]
+    assert of_joint({}, "overflow", {}).health["joint_overflow"] == {
+        "value": 1,
+        "limit": 0,
+        "ok": False,
+    }
+    assert of_joint({}, "ok", {}).health["joints_not_ok"]["ok"]
 
 
 def test_a_drop_that_still_moves_is_not_judged_by_the_shape_at_rest():
     metrics = {"volume_drift": (0.0, ""), "height_error": (0.5, ""), "at_rest": (0.0, "")}
-    assert set(findings.of_drop(metrics, "ok", {}).health) == {"volume_drift"}
-    assert set(findings.of_drop(metrics | {"at_rest": (1.0, "")}, "ok", {}).health) == {"volume_drift", "height_error"}
+    assert set(of_drop(metrics, "ok", {}).health) == {"volume_drift"}
+    assert set(of_drop(metrics | {"at_rest": (1.0, "")}, "ok", {}).health) == {
+        "volume_drift",
+        "height_error",
+    }
 
 
 def test_they_have_no_mesh(records):

@@ -1,0 +1,78 @@
+"""Stress at the upper interface of all joints at chosen times: ``interface.npz`` (H Fig 16)."""
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from reflowshock.data_file import columns, rows
+from reflowshock.fem.dynamics.participant import Participant
+from reflowshock.fem.elements.stress import von_mises
+from reflowshock.fem.estimates.estimate import WindowPlan
+from reflowshock.fem.mesh.joint_interface import JointInterfaceTable
+from reflowshock.fem.model.body import Body
+from reflowshock.fem.model.stress_recovery import StressRecovery
+from reflowshock.fem.parallel.communicators import Role
+from reflowshock.fem.parallel.portable import Log, State
+from reflowshock.fem.parallel.whereabouts import HERE
+
+
+def picture_windows(times: Iterable[float], plan: WindowPlan) -> frozenset[int]:
+    """Return the windows at whose ends it is closest to some times [s]; times after the last window have none."""
+    windows = (round(time / plan.window) for time in times)
+    return frozenset(window for window in windows if window <= plan.windows)
+
+
+class JointInterfaceStress:
+    """Von Mises stress of the solder elements at the package's pads; a ``time_loop.Pictures``.
+
+    Attributes:
+        windows: At whose ends it is taken.
+    """
+
+    def __init__(
+        self, world: MPI.Comm, tables: Mapping[Role, tuple[JointInterfaceTable, Body]], windows: frozenset[int]
+    ) -> None:
+        """Find this rank's elements in the tables of its models."""
+        self.windows, self._world = windows, world
+        self._table = next(iter(tables.values()))[0]
+        self._shares: dict[Role, tuple[NDArray[np.intp], StressRecovery]] = {}
+        for role, (table, body) in tables.items():
+            cells = body.local.locate_cells(table.cells)
+            here = np.flatnonzero(cells >= 0)
+            self._shares[role] = here, StressRecovery(body, cells[here])
+        self._rows: list[dict[str, Any]] = []
+
+    def sample(self, participants: Mapping[Role, Participant]) -> None:
+        """Take the stress as it is now; collective over all models."""
+        stress = np.zeros(len(self._table.cells))
+        for role, participant in participants.items():
+            motion, (rows, recovery) = participant.motion, self._shares[role]
+            stress[rows] = von_mises(recovery.stress(motion.displacement - motion.base_displacement()))
+            time = motion.time
+        HERE.wait_for("the stress at the interface of joints, with all ranks")
+        self._world.Allreduce(MPI.IN_PLACE, stress)
+        HERE.go_on()
+        if self._world.rank == 0:
+            self._rows.append({"time": time, "stress": stress})
+
+    def state(self) -> State:
+        """Return what was taken so far, for a checkpoint."""
+        return {"rows": Log(columns(self._rows))}
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Continue from the values of what ``state`` returned."""
+        self._rows = rows(state["rows"])
+
+    def write(self, directory: Path) -> None:
+        """Write ``times (k,)`` [s], the joints' ``surfaces`` and ``von_mises@<joint> (k, m)`` [Pa], on rank 0."""
+        if self._world.rank:
+            return
+        table, count = self._table, len(self._rows)
+        stress = np.array([row["stress"] for row in self._rows]).reshape(count, len(table.cells))
+        by_joint = {f"von_mises@{name}": stress[:, table.joint == k] for k, name in enumerate(table.joints)}
+        times = np.array([row["time"] for row in self._rows])
+        np.savez(directory / "interface.npz", times=times, **table.surfaces(), **by_joint)

@@ -1,0 +1,110 @@
+"""Board and package before they are distributed: one mesh, what is held, which rigid motions are free."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reflowshock.fem.division.tables import Tables
+from reflowshock.fem.division.whole import Whole
+from reflowshock.fem.errors import MeshError
+from reflowshock.fem.materials.elasticity import role_of_part
+from reflowshock.fem.mesh.coupling_interface import find_interface
+from reflowshock.fem.mesh.mesh import MeshData, merge_nodes
+from reflowshock.fem.mesh.supports import SYMMETRY, held_components
+from reflowshock.fem.mesh.tie import Tie
+from reflowshock.fem.statics.rigid import RigidMotions
+
+BOARD_PARTS = ("board", "board_patch", "copper_board")
+
+
+@dataclass(frozen=True, slots=True)
+class ThermalTables(Tables):
+    """Tables of board and package, which nothing connects while the solder is liquid.
+
+    Attributes:
+        package: ``(n,)`` whether a node belongs to the package.
+        motions: Free rigid motions of board and package.
+    """
+
+    package: NDArray[np.bool_]
+    motions: tuple[RigidMotions, RigidMotions]
+
+
+def connected(mesh: MeshData) -> MeshData:
+    """Let board and patch share their nodes."""
+    macro, meso = find_interface(mesh)
+    return merge_nodes(mesh, meso, macro)[0]
+
+
+def thermal_tables(mesh: MeshData, centre: NDArray[np.float64]) -> ThermalTables:
+    """Hold planes of symmetry, let the board rest on one point at each hole, and pin what is free after that.
+
+    Pins bear nothing, since loads on free motions are balanced by inertia; the points at the holes bear the weight of
+    the board and let it expand.
+
+    Args:
+        mesh: Board and package.
+        centre: ``(3,)`` [m] that turns of the package are about.
+
+    Raises:
+        MeshError: Board or package is missing, or they share nodes.
+    """
+    package = package_nodes(mesh)
+    held = held_components(mesh, SYMMETRY)
+    held[resting_nodes(mesh), 2] = True
+    motions = []
+    for nodes in (np.flatnonzero(~package), np.flatnonzero(package)):
+        points = mesh.points[nodes]
+        free = RigidMotions.free(points, held[nodes], centre if package[nodes[0]] else np.zeros(3))
+        node, component = free.pins(points)
+        held[nodes[node], component] = True
+        motions.append(free)
+    whole = Whole(mesh, Tie.none(), moved=0.0)
+    return ThermalTables.undivided(whole, held, package=package, motions=(motions[0], motions[1]))
+
+
+def package_nodes(mesh: MeshData) -> NDArray[np.bool_]:
+    """Return ``(n,)``: whether a node belongs to the package; errors as ``thermal_tables``."""
+    of_board = mesh.in_parts(BOARD_PARTS.__contains__)
+    if of_board.all() or not of_board.any():
+        raise MeshError(f"board and package are needed, the mesh has {', '.join(mesh.part_names)}")
+    package = np.zeros(len(mesh.points), dtype=bool)
+    package[mesh.cells[~of_board]] = True
+    both = np.intersect1d(mesh.cells[of_board], mesh.cells[~of_board])
+    if len(both):
+        raise MeshError(f"board and package share {len(both)} nodes: nothing may join them while the solder is liquid")
+    return package
+
+
+def resting_nodes(mesh: MeshData) -> NDArray[np.intp]:
+    """Return one node at the lower end of each mounting hole, the one nearest to the centre of the board."""
+    nodes = mesh.facet_nodes("mounting_holes")
+    if not len(nodes):
+        return nodes.astype(np.intp)
+    points = mesh.points[nodes]
+    low = nodes[points[:, 2] <= points[:, 2].min() + 1e-6 * np.ptp(points[:, 2])]
+    distance = np.hypot(*mesh.points[low, :2].T)
+    quadrant = 2 * (mesh.points[low, 0] > 0.0) + (mesh.points[low, 1] > 0.0)
+    return np.array([low[quadrant == q][np.argmin(distance[quadrant == q])] for q in np.unique(quadrant)])
+
+
+def die_corners(mesh: MeshData) -> NDArray[np.intp]:
+    """Return the nodes at the upper corners of the die that no plane of symmetry cuts off: one in a quarter model.
+
+    Raises:
+        MeshError: There is no die.
+    """
+    cells = mesh.cells[mesh.in_parts(lambda name: role_of_part(name) == "die")]
+    if not len(cells):
+        raise MeshError(f"no die whose corner could be moved; the mesh has {', '.join(mesh.part_names)}")
+    nodes = np.unique(cells)
+    points = mesh.points[nodes]
+    top = nodes[points[:, 2] >= points[:, 2].max() - 1e-6 * np.ptp(points[:, 2])]
+    return np.array([top[np.argmax(mesh.points[top, :2] @ sign)] for sign in _outward(mesh)])
+
+
+def _outward(mesh: MeshData) -> Sequence[tuple[float, float]]:
+    signs = [(1.0,) if len(mesh.facets_of(name)) else (1.0, -1.0) for name in ("symmetry_x", "symmetry_y")]
+    return [(x, y) for x in signs[0] for y in signs[1]]

@@ -1,0 +1,123 @@
+"""Sets of facets: connected pieces, outlines, horizontal sections, nearest points."""
+
+import numpy as np
+
+
+def pieces(facets: np.ndarray) -> list[np.ndarray]:
+    """Return the pieces of facets (f, m) that hang together by edges: row numbers of each, largest piece first."""
+    ends = np.sort(np.stack([facets, np.roll(facets, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
+    edges = np.unique(ends, axis=0, return_inverse=True)[1].reshape(facets.shape)
+    label = np.arange(int(edges.max()) + 1)
+    while True:
+        previous = label.copy()
+        np.minimum.at(label, edges, label[edges].min(axis=1)[:, None])
+        label = label[label]
+        if np.array_equal(label, previous):
+            break
+    own = label[edges[:, 0]]
+    found = [np.flatnonzero(own == value) for value in np.unique(own)]
+    return sorted(found, key=len, reverse=True)
+
+
+def outlines(facets: np.ndarray) -> list[np.ndarray]:
+    """Return the closed lines along the edges that one facet (f, m) has, in its direction; longest first."""
+    first, second = facets.ravel(), np.roll(facets, -1, axis=1).ravel()
+    count = int(facets.max()) + 1
+    forward, backward = first * np.int64(count) + second, second * np.int64(count) + first
+    alone = ~np.isin(forward, backward)
+    following = dict(zip(first[alone].tolist(), second[alone].tolist(), strict=True))
+    lines = []
+    while following:
+        line = [next(iter(following))]
+        while line[-1] in following:
+            line.append(following.pop(line[-1]))
+        lines.append(np.array(line[:-1]))
+    return sorted(lines, key=len, reverse=True)
+
+
+def cut_segments(points: np.ndarray, triangles: np.ndarray, height: float) -> np.ndarray:
+    """Cut triangles with the plane z = height.
+
+    Args:
+        points: (n, 3) [m].
+        triangles: (t, 3), outward oriented.
+        height: [m]; vertices exactly on the plane count as above it.
+
+    Returns:
+        (s, 2, 2) segments [m]; the body lies to the left of each, so a section is traced counter-clockwise.
+    """
+    above = points[:, 2] >= height
+    count = above[triangles].sum(axis=1)
+    segments = []
+    for lone_above, selected in ((True, count == 1), (False, count == 2)):
+        chosen = triangles[selected]
+        lone = np.argmax(above[chosen] == lone_above, axis=1)
+        apex, following, preceding = (chosen[np.arange(len(chosen)), (lone + k) % 3] for k in range(3))
+        first, second = _crossing(points, apex, following, height), _crossing(points, apex, preceding, height)
+        segments.append(np.stack((first, second) if lone_above else (second, first), axis=1))
+    return np.concatenate(segments)
+
+
+def section_area(segments: np.ndarray) -> float:
+    """Area enclosed by oriented segments [m^2] (Green)."""
+    start, end = segments[:, 0], segments[:, 1]
+    return 0.5 * float(np.sum(start[:, 0] * end[:, 1] - end[:, 0] * start[:, 1]))
+
+
+def section_centroid(segments: np.ndarray) -> np.ndarray:
+    """Centroid (2,) of the enclosed area [m]."""
+    start, end = segments[:, 0], segments[:, 1]
+    cross = start[:, 0] * end[:, 1] - end[:, 0] * start[:, 1]
+    return ((start + end) * cross[:, None]).sum(axis=0) / (3.0 * cross.sum())
+
+
+def radius_by_angle(segments: np.ndarray, centre: np.ndarray, angles: np.ndarray) -> np.ndarray:
+    """Distance from ``centre`` to the section's outline along each angle.
+
+    Args:
+        segments: (s, 2, 2) [m].
+        centre: (2,) [m].
+        angles: (a,) [rad].
+
+    Returns:
+        (a,) [m].
+
+    Raises:
+        ValueError: a ray meets the outline not exactly once; the section is not star-shaped about its centre.
+    """
+    start, along = segments[:, 0] - centre, segments[:, 1] - segments[:, 0]
+    rays = np.column_stack([np.cos(angles), np.sin(angles)])
+    determinant = rays[:, :1] * along[:, 1] - rays[:, 1:] * along[:, 0]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        distance = (start[:, 0] * along[:, 1] - start[:, 1] * along[:, 0]) / determinant
+        position = (start[:, 0] * rays[:, 1:] - start[:, 1] * rays[:, :1]) / determinant
+    hit = (distance > 0.0) & (position >= -1e-9) & (position <= 1.0 + 1e-9)
+    nearest = np.where(hit, distance, np.inf).min(axis=1)
+    farthest = np.where(hit, distance, -np.inf).max(axis=1)
+    if not hit.any(axis=1).all() or np.any(farthest - nearest > 1e-6 * farthest):
+        raise ValueError("section is not star-shaped about its centroid: a ray meets its outline not exactly once")
+    return nearest
+
+
+def _crossing(points: np.ndarray, first: np.ndarray, second: np.ndarray, height: float) -> np.ndarray:
+    """Where the edges first-second cross the plane, (e, 2) [m]; independent of the edge's direction."""
+    low, high = np.minimum(first, second), np.maximum(first, second)
+    share = (height - points[low, 2]) / (points[high, 2] - points[low, 2])
+    return points[low, :2] + share[:, None] * (points[high, :2] - points[low, :2])
+
+
+def nearest_on_triangles(points: np.ndarray, triangles: np.ndarray, queries: np.ndarray) -> np.ndarray:
+    """Return the point nearest to each query (q, 3) on triangles (t, 3): (q, 3) [m]."""
+    import pyvista
+
+    surface = pyvista.PolyData.from_regular_faces(points, triangles)
+    return np.asarray(surface.find_closest_cell(queries, return_closest_point=True)[1])
+
+
+def nearest_on_line(line: np.ndarray, queries: np.ndarray) -> np.ndarray:
+    """Return the point nearest to each query (q, 3) on a closed polygon (k, 3): (q, 3) [m]."""
+    along = np.roll(line, -1, axis=0) - line
+    share = np.einsum("qki,ki->qk", queries[:, None] - line, along) / np.einsum("ki,ki->k", along, along)
+    found = line + np.clip(share, 0.0, 1.0)[..., None] * along
+    nearest = np.linalg.norm(found - queries[:, None], axis=2).argmin(axis=1)
+    return found[np.arange(len(queries)), nearest]

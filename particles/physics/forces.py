@@ -1,0 +1,176 @@
+"""Conservative forces on the free surface, gradients of their energies: surface tension, gravity, wall adhesion.
+
+The weight of an incompressible body is a hydrostatic load on its boundary; wetting a wall gains gamma cos(theta) a unit
+area.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from scipy import sparse
+
+from reflowshock.arrays import Floats
+from reflowshock.particles.core.body import Body
+from reflowshock.particles.core.surface_measure import area_vector, cotangent_laplacian, surface_area, wall_corners
+from reflowshock.particles.core.symmetry import fold
+from reflowshock.particles.discretisation.discretisation import Discretisation
+from reflowshock.particles.physics.physics import Force
+from reflowshock.particles.surface.contact_line import ContactLine
+
+
+@dataclass(frozen=True, slots=True)
+class SurfaceTension:
+    """Energy E = gamma A of the free surface.
+
+    Attributes:
+        coefficient: surface tension gamma [N/m].
+    """
+
+    coefficient: float
+
+    def energy(self, body: Body) -> float:
+        """Surface energy [J]."""
+        return self.coefficient * surface_area(body.points, body.triangles)
+
+    def _stiffness(self, body: Body) -> sparse.csr_matrix:
+        return self.coefficient * cotangent_laplacian(body.points, body.triangles, len(body.points))
+
+    def force(self, body: Body) -> Floats:
+        """Force -dE/dx = -gamma K x, `(n, 3)` [N]."""
+        return -(self._stiffness(body) @ body.points)
+
+    def matrix(self, body: Body, _space: Discretisation, time_step: float) -> sparse.csr_matrix:
+        """Semi-implicit part dt gamma K, `(3 n, 3 n)` [kg/s]: the force at the end of the step is f - dt gamma K v."""
+        return sparse.kron(sparse.identity(3), time_step * self._stiffness(body), format="csr")
+
+
+@dataclass(frozen=True, slots=True)
+class Gravity:
+    """Potential energy of the weight in the tracked surface.
+
+    The weight m g of each particle would leave the statics to the interior operator (1 % in height).
+
+    Attributes:
+        weight: rho g, weight of the unit volume [N/m^3].
+    """
+
+    weight: float
+
+    def energy(self, body: Body) -> float:
+        """Potential energy rho g times the integral of z over the body [J], by the divergence theorem.
+
+        The integral of z^2 / 2 n_z over the free surface and over the walls, exact for flat triangles.
+        """
+        return self.weight * self._potential(body)[0]
+
+    def force(self, body: Body) -> Floats:
+        """Force -dE/dx, `(n, 3)` [N], of this very energy.
+
+        The hydrostatic load -rho g z dV/dx is the same to second order in the spacing; but where it differs, a step
+        along it may raise the energy, and a flat film never rests.
+        """
+        return -self.weight * self._potential(body)[1]
+
+    def _potential(self, body: Body) -> tuple[float, Floats]:
+        """Integral of z over the body [m^4] and its gradient `(n, 3)` [m^3]."""
+        total, gradient = _potential_and_gradient(body.points, body.triangles)
+        for ring, plate in zip(body.cloud.rings, body.plates, strict=True):
+            corners = wall_corners(body.points, ring, plate)
+            fan = np.arange(corners.shape[0] * 3, dtype=np.int32).reshape(-1, 3)
+            on_wall, by_corner = _potential_and_gradient(corners.reshape(-1, 3), fan)
+            total += on_wall
+            gradient[ring] += _by_vertex(by_corner.reshape(-1, 3, 3), plate.side)
+        return total, gradient
+
+
+def _by_vertex(by_corner: Floats, side: float) -> Floats:
+    """Gradient by the vertices of a contact line `(k, 3)` of that by the corners of `wall_corners` `(k, 3, 3)`."""
+    own, after = (1, 2) if side > 0.0 else (2, 1)
+    centre = by_corner[:, 0].sum(axis=0) / len(by_corner)
+    return by_corner[:, own] + np.roll(by_corner[:, after], 1, axis=0) + centre
+
+
+@njit(cache=True)
+def _potential_and_gradient(points, triangles):
+    """Integral of z^2 / 2 n_z over flat triangles [m^4], and its gradient `(n, 3)` [m^3]."""
+    total, gradient = 0.0, np.zeros(points.shape)
+    for t in range(triangles.shape[0]):
+        i, j, m = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+        doubled_area_z = area_vector(points, i, j, m)[2]
+        first = points[i, 2] + points[j, 2] + points[m, 2]
+        second = points[i, 2] ** 2 + points[j, 2] ** 2 + points[m, 2] ** 2
+        quarter_mean = (first * first + second) / 48.0
+        total += quarter_mean * doubled_area_z
+        for k in range(3):
+            a, b, c = triangles[t, k], triangles[t, (k + 1) % 3], triangles[t, (k + 2) % 3]
+            gradient[a, 0] += quarter_mean * (points[b, 1] - points[c, 1])
+            gradient[a, 1] += quarter_mean * (points[c, 0] - points[b, 0])
+            gradient[a, 2] += (first + points[a, 2]) / 24.0 * doubled_area_z
+    return total, gradient
+
+
+@dataclass(frozen=True, slots=True)
+class Wetting:
+    """Energy E = -gamma cos(theta) A_wet of the wetted walls (the functional of Brakke's Surface Evolver).
+
+    Attributes:
+        coefficient: surface tension gamma [N/m].
+        lines: contact lines with the angle that acts on each vertex.
+        others: all other forces on the surface; with them a pinned vertex knows its contact angle.
+    """
+
+    coefficient: float
+    lines: Sequence[ContactLine]
+    others: Sequence[Force]
+
+    def energy(self, body: Body) -> float:
+        """Energy of the walls [J], that of a line at the edges of the pads being zero."""
+        return -self.coefficient * sum(line.cosine_area(body) for line in self.lines)
+
+    def force(self, body: Body) -> Floats:
+        """Force -dE/dx on the contact lines, gamma cos(theta) dA_wet/dx where one angle acts, `(n, 3)` [N]."""
+        force = np.zeros_like(body.points)
+        for line in self.lines:
+            ring = body.cloud.rings[line.wall]
+            force[ring] += self.coefficient * line.cosine_area_gradient(body)
+        return force
+
+    def contact_cosines(self, body: Body) -> list[Floats]:
+        """Cosines of the contact angles at the vertices of each contact line, from the balance of forces."""
+        load = self._load(body)
+        return [line.contact_cosine(body, load, self.coefficient) for line in self.lines]
+
+    def update(self, body: Body) -> None:
+        """Release vertices at the edges of the wetted discs, hold those that have crossed one."""
+        load = self._load(body)
+        for line in self.lines:
+            line.update(body, load, self.coefficient)
+
+    def attempt(self, body: Body) -> bool:
+        """Put vertices close to an edge that would hold them onto it; return whether there were any.
+
+        Alone this dents the surface: it pays where the step that follows gains more than it takes.
+        """
+        load, found = self._load(body), False
+        for line in self.lines:
+            near = line.near_edges(body, load, self.coefficient)
+            if near.any():
+                line.catch(body, near)
+                found = True
+        return found
+
+    def _load(self, body: Body) -> Floats:
+        """All forces but the walls', `(n, 3)` [N], with the mean capillary pressure of the surface.
+
+        The pressure p is the least-squares solution of f + p a = 0 over the vertices off the contact lines; the
+        pressure of the solve would bring the accelerations of a violent start into the contact angle.
+        """
+        force = sum((other.force(body) for other in self.others), np.zeros_like(body.points))
+        force, gradient = fold(body.cloud, force), fold(body.cloud, body.volume()[1])
+        off_lines = np.arange(len(body.points)) < body.cloud.surface_count
+        off_lines[body.cloud.wall >= 0] = False
+        a = gradient[off_lines]
+        pressure = -float((force[off_lines] * a).sum() / (a**2).sum())
+        return force + pressure * gradient

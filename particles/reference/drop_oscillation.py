@@ -1,0 +1,41 @@
+"""Small oscillations of a free drop: Rayleigh's frequency, Lamb's damping, and both exactly for any viscosity."""
+
+from cmath import sqrt as complex_sqrt
+from math import sqrt
+
+
+def rayleigh_frequency(mode: int, radius: float, density: float, surface_tension: float) -> float:
+    """Angular frequency without viscosity, omega^2 = n (n - 1)(n + 2) gamma / (rho R^3) [rad/s]."""
+    return sqrt(mode * (mode - 1) * (mode + 2) * surface_tension / (density * radius**3))
+
+
+def lamb_decay_rate(mode: int, radius: float, density: float, viscosity: float) -> float:
+    """Decay rate of the amplitude at small viscosity, (n - 1)(2 n + 1) mu / (rho R^2) [1/s]."""
+    return (mode - 1) * (2 * mode + 1) * viscosity / (density * radius**2)
+
+
+def viscous_oscillation(mode: int, frequency: float, diffusion_rate: float) -> tuple[float, float]:
+    """Decay rate [1/s] and angular frequency [rad/s] of a mode at any viscosity that lets it oscillate.
+
+    Amplitude exp(-s t) with s = decay + i frequency solves, with q^2 = s / nu* and Q = J_{n+3/2}(q) / J_{n+1/2}(q),
+    omega^2 / nu*^2 = 2 q^2 (n - 1) (n + (n + 1)(q - 2 n Q) / (q - 2 Q)) - q^4 (Chandrasekhar 1959; Reid 1960).
+
+    Args:
+        mode: n.
+        frequency: Rayleigh's omega [rad/s].
+        diffusion_rate: nu* = mu / (rho R^2) [1/s].
+    """
+    from scipy.optimize import newton  # plans and stages that need no root start without them
+    from scipy.special import jve
+
+    ratio = (frequency / diffusion_rate) ** 2
+
+    def residual(s: complex) -> complex:
+        q = complex_sqrt(s)
+        quotient = jve(mode + 1.5, q) / jve(mode + 0.5, q)
+        inner = mode + (mode + 1) * (q - 2 * mode * quotient) / (q - 2 * quotient)
+        return (2 * s * (mode - 1) * inner - s**2) / ratio - 1.0
+
+    first = (mode - 1) * (2 * mode + 1) + 1j * sqrt(ratio)
+    root = newton(residual, first, x1=first * (0.99 + 0.01j)) * diffusion_rate
+    return root.real, root.imag

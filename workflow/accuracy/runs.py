@@ -1,0 +1,185 @@
+"""Climbing a ladder: its points are computed where they are missing, timed, compared; cheap ones several times."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from time import perf_counter
+
+from reflowshock.workflow.convergence.calibration import calibration
+from reflowshock.workflow.convergence.errors import Error, errors_of
+from reflowshock.workflow.convergence.measured import Measurement, StageCost
+from reflowshock.workflow.convergence.series import Ladder, Quantity, Rung
+from reflowshock.workflow.kinds import stage_seconds
+from reflowshock.workflow.pipeline.points import read_possible_points
+from reflowshock.workflow.store.point import Point
+from reflowshock.workflow.store.store import Store
+
+AGAIN = 2  # times that a cheap point is run once more: load of the machine and first compilation are then not counted
+CHEAP = 8.0  # up to these core-seconds [s]
+LEAST = 4  # coarsest rungs of a knob that are run, however long they take
+SECONDS_TO_SCHEDULE = 4.0  # of a call that computes points, until the first stage runs
+
+Compute = Callable[[Store, Sequence[Point]], Mapping[str, str]]
+
+
+@dataclass(slots=True)
+class Climb:
+    """Points of a ladder, and what is known of them.
+
+    Attributes:
+        ladder: its rungs.
+        case: the case file.
+        settings: dotted key -> value that hold for all rungs.
+        folder: of the store.
+        compute: computes points in a store up to the ladder's last stage; returns the key of each that failed and why.
+        budget: wall time that may be spent [s]; infinite without a limit.
+        longest: that a rung of the ladder may be foreseen to take [s], but for the coarsest ones of the knobs.
+        oversubscribe: whether MPI may have more ranks than cores.
+        force: whether values that are not plausible are welcome.
+        failed: key of a point -> why it failed, also of earlier calls.
+        points: name of rung -> its point.
+        impossible: name of rung -> what is wrong with its settings.
+        left_out: name of rung -> wall time [s] that was foreseen and did not fit.
+    """
+
+    ladder: Ladder
+    case: Path
+    settings: Mapping[str, str]
+    folder: Path
+    compute: Compute
+    budget: float = float("inf")
+    longest: float = float("inf")
+    oversubscribe: bool = False
+    force: bool = False
+    failed: dict[str, str] = field(default_factory=dict)
+    points: dict[str, Point] = field(default_factory=dict)
+    impossible: dict[str, str] = field(default_factory=dict)
+    left_out: dict[str, float] = field(default_factory=dict)
+    _start: float = field(default_factory=perf_counter)
+    _forecasts: dict[str, dict[str, float]] = field(default_factory=dict)
+
+    @property
+    def left(self) -> float:
+        """Wall time that is left of the budget [s]."""
+        return self.budget - (perf_counter() - self._start)
+
+    @property
+    def stores(self) -> list[Store]:
+        """The store, and those of runs that are only for their times."""
+        return [Store(self.folder), *(Store(self.folder / f"again-{number}") for number in range(1, AGAIN + 1))]
+
+    def climb(self, rungs: Sequence[Rung]) -> None:
+        """Compute the points of rungs that are missing, the cheapest first; then cheap ones again.
+
+        Those of the first knob go before all others, which may have to be compared with them.
+        """
+        self._read(rungs)
+        main, known = self.ladder.knobs[0].name, [rung for rung in rungs if rung.name in self.points]
+        ready = sorted(known, key=lambda rung: (rung.knob != main, self.foreseen(rung)))
+        for batch in [ready] if self.budget == float("inf") else [[rung] for rung in ready]:
+            self._run(self.stores[0], batch)
+        for store in self.stores[1:]:
+            again = [rung for rung in ready if self._is_done(rung) and self._wants_repetition(rung)]
+            self._run(store, again)
+
+    def measured(self, rungs: Sequence[Rung]) -> dict[str, Measurement]:
+        """Return what is known of rungs: their costs, their errors against each other; failures."""
+        done = [rung for rung in rungs if rung.name in self.points and self._is_done(rung)]
+        answers = {rung.name: self._answers(rung) for rung in done}
+        main = self.ladder.knobs[0]
+        errors = errors_of(answers, rungs, main.rungs, main.order)
+        found = {rung.name: self._measurement(rung, errors.get(rung.name, {})) for rung in rungs}
+        return {name: one for name, one in found.items() if one.stages or one.failed}
+
+    def foreseen(self, rung: Rung, store: Store | None = None) -> float:
+        """Wall time of the stages of a rung that a store does not have [s]: the forecast, corrected by measurements."""
+        point, store = self.points[rung.name], store or self.stores[0]
+        known, seconds = calibration(self._costs(self.points[one]) for one in self._known()), self._forecast(point)
+        stages = [stage.name for stage in point.case.pipeline.upstream(self.ladder.until)]
+        return sum(
+            known.seconds(name, seconds[name]) for name in stages if name in seconds and not store.has(point, name)
+        )
+
+    def _known(self) -> list[str]:
+        return [name for name, point in self.points.items() if self.stores[0].is_complete(point, self.ladder.until)]
+
+    def _forecast(self, point: Point) -> dict[str, float]:
+        if point.key not in self._forecasts:
+            self._forecasts[point.key] = stage_seconds(point.case)
+        return self._forecasts[point.key]
+
+    def _read(self, rungs: Sequence[Rung]) -> None:
+        """Read the cases of rungs; one that cannot be is noted, and one that failed before, as it would again."""
+        for rung in rungs:
+            points, wrong = read_possible_points(
+                self.case, [dict(self.settings) | dict(rung.settings)], self.oversubscribe, self.force
+            )
+            if wrong:
+                self.impossible[rung.name] = "; ".join(str(problem) for problem in wrong[0].problems)
+            else:
+                self.points[rung.name] = points[0]
+                self.failed |= _failed_before(self.stores[0], points[0], self.ladder.until)
+
+    def _run(self, store: Store, rungs: Sequence[Rung]) -> None:
+        """Compute what is missing and fits into the budget."""
+        until, wanted = self.ladder.until, []
+        for rung in rungs:
+            point = self.points[rung.name]
+            if store.is_complete(point, until) or point.key in self.failed:
+                continue
+            expected = self.foreseen(rung, store) + SECONDS_TO_SCHEDULE
+            if expected <= self.left and (expected <= self.longest or self._is_wanted(rung)):
+                wanted.append(point)
+            elif store == self.stores[0]:
+                self.left_out[rung.name] = expected
+        if wanted:
+            self.failed |= self.compute(store, wanted)
+
+    def _is_wanted(self, rung: Rung) -> bool:
+        """Whether a rung is run however long it takes: one of the coarsest of a knob, or chosen off the ladder."""
+        coarsest = {one.name for knob in self.ladder.knobs for one in knob.rungs[:LEAST]}
+        return rung.name in coarsest or all(rung.name != one.name for one in self.ladder.rungs)
+
+    def _is_done(self, rung: Rung) -> bool:
+        return self.stores[0].is_complete(self.points[rung.name], self.ladder.until)
+
+    def _wants_repetition(self, rung: Rung) -> bool:
+        """Whether a point is cheap, by measurement or forecast, or its time is not that of the whole run."""
+        point, store = self.points[rung.name], self.stores[0]
+        stages = [stage.name for stage in point.case.pipeline.upstream(self.ladder.until)]
+        records = [record for stage in stages if (record := store.record(point, stage)) is not None]
+        taken = sum(record["core_seconds"] for record in records)
+        foreseen = sum(seconds for stage, seconds in self._forecast(point).items() if stage in stages)
+        return min(taken, foreseen or taken) < CHEAP or any(record["continued"] for record in records)
+
+    def _answers(self, rung: Rung) -> Mapping[str, Quantity]:
+        point = self.points[rung.name]
+        return self.ladder.measure(point.case, self.stores[0].run_folder(point))
+
+    def _measurement(self, rung: Rung, errors: Mapping[str, Error]) -> Measurement:
+        """Return what is known of a rung; neither costs nor a failure where it was not run."""
+        point = self.points.get(rung.name)
+        costs = self._costs(point) if point is not None and self._is_done(rung) else {}
+        why = self.impossible.get(rung.name, "") if point is None else self.failed.get(point.key, "")
+        key = "" if point is None else point.key
+        failed = "" if costs else why
+        return Measurement(
+            rung.name, rung.knob, rung.value, rung.settings, key, costs, errors, failed, against=rung.against
+        )
+
+    def _costs(self, point: Point) -> dict[str, StageCost]:
+        """Return the smallest times of the stages that count, of all runs that were not broken off."""
+        foreseen, costs = self._forecast(point), {}
+        for stage in self.ladder.timed:
+            records = [record for store in self.stores if (record := store.record(point, stage)) is not None]
+            whole = [record for record in records if not record["continued"]] or records
+            times = {name: min(record[name] for record in whole) for name in ("seconds", "core_seconds")}
+            costs[stage] = StageCost(**times, forecast=foreseen.get(stage))
+        return costs
+
+
+def _failed_before(store: Store, point: Point, until: str) -> dict[str, str]:
+    """Return key and message of a point of which a stage was tried and failed."""
+    missing = [stage.name for stage in point.case.pipeline.upstream(until) if not store.has(point, stage.name)]
+    told = [f"stage {stage}: {message}" for stage in missing if (message := store.message(point, stage)) is not None]
+    return {point.key: told[0]} if told else {}

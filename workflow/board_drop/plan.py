@@ -1,0 +1,115 @@
+"""Tables of the plan of a package: sizes, time steps, schemes, cost and rank placement."""
+
+from collections.abc import Iterator
+
+from rich.console import RenderableType
+from rich.table import Table
+
+from reflowshock.workflow.board_drop.forecast import Forecast
+from reflowshock.workflow.board_drop.shock_forecast import ShockForecast
+from reflowshock.workflow.case.text import duration, short
+from reflowshock.workflow.package.case import BoardDropCase, PackageCase
+from reflowshock.workflow.process.environment import available_cores
+from reflowshock.workflow.process.plan_table import REFLOW_SPEED, new_table
+from reflowshock.workflow.process.terminal import styled
+
+
+def package_tables(case: PackageCase, outlook: Forecast) -> Iterator[RenderableType]:
+    """Yield sizes and, where the board is dropped, the shock; then what the costs assume."""
+    yield _sizes(case, outlook) if outlook.parts else f"\n{_joints(case, outlook)}"
+    if not isinstance(case, BoardDropCase) or outlook.shock is None:
+        yield styled("\n[dim]{}", REFLOW_SPEED)
+        return
+    yield _shock(case, outlook.shock)
+    rate = f"{outlook.shock.updates_per_second:.1e} element updates per second and rank (fem/estimates/estimate.py)"
+    yield styled("\n[dim]Costs assume {}", rate)
+    yield styled("[dim]and the reflow speed in particles/parameters/estimate.py, both as benchmarks/ measured them.")
+
+
+def _sizes(case: PackageCase, outlook: Forecast) -> Table:
+    table = new_table("\nSizes and critical time steps", "part", "hexahedra", "critical step", "time step")
+    step = {name: level for level in (outlook.shock.levels if outlook.shock else ()) for name in level.parts}
+    for name, part in outlook.parts.items():
+        remark = f"{short(step[name].step)}, {step[name].count} in a window" if name in step else ""
+        if part.mass_scaled:
+            remark += "; mass scaled to the smallest step of the others"
+        table.add_row(name, f"{part.elements}", short(part.critical_step), remark)
+    total = sum(part.elements for part in outlook.parts.values())
+    table.add_row("all", f"{total}", "", "", style="bold")
+    table.caption = _joints(case, outlook)
+    table.caption_justify = "left"
+    return table
+
+
+def _joints(case: PackageCase, outlook: Forecast) -> str:
+    smallest, largest = outlook.particles
+    particles = f"{smallest}" if smallest == largest else f"{smallest} to {largest}"
+    distinct = f"up to {outlook.distinct}" if outlook.load_steps else f"{outlook.distinct}"
+    heated = f", {outlook.load_steps} load steps with liquid solder" if outlook.load_steps else ""
+    ranks = f", on {case.reflow.ranks} MPI ranks" if case.reflow.ranks is not None else ""
+    return f"{outlook.joints} joints, {distinct} of them distinct, {particles} particles each{heated}{ranks}"
+
+
+def _shock(case: BoardDropCase, shock: ShockForecast) -> Table:
+    every = case.shock.ranks.total
+    table = new_table("\nShock", "what", "value", "remark")
+    scheme, why = shock.scheme
+    table.add_row("scheme", scheme.replace("_", " "), why)
+    table.add_row("fine joints", *_fine_joints(case))
+    table.add_row("window", short(shock.window), f"step of the macro model, {shock.windows} windows")
+    table.add_row("steps in a window", *_levels(shock))
+    table.add_row("step ratio m", f"{shock.substeps}", f"step of the DNS {short(shock.window / shock.substeps)}")
+    if shock.search:
+        table.add_row("coarse run", f"about {duration(shock.search)}", "all joints coarse: it finds the critical ones")
+    table.add_row("two-scale", f"about {duration(shock.two_scale)}", _placement(case) + _absent("two_scale", case))
+    if case.shock.identical_joints:
+        again = shock.two_scale if "two_scale" in case.shock.numerics.modes else shock.dns
+        table.add_row("identical joints", f"about {duration(again)}", "the first mode again: what shapes change")
+    part = f"; the first {short(shock.dns_share * case.shock.duration)}" if shock.dns_share < 1.0 else ""
+    dns = f"all {every} ranks on one model{part}" + _absent("dns", case)
+    table.add_row("DNS", f"about {duration(shock.dns)}", dns)
+    table.add_row(
+        "DNS, implicit steps", f"about {duration(shock.implicit)}", "one rank; elastic only (shock.numerics.dns_solver)"
+    )
+    per_time = " for as much simulated time" if part else ""
+    table.add_row("two-scale / DNS", f"{shock.ratio:.2f}", f"predicted ratio of wall times{per_time}")
+    return table
+
+
+def _levels(shock: ShockForecast) -> tuple[str, str]:
+    """Say how many steps the levels take in a window, and what share of the elements is not at the window's."""
+    elements = [level.elements for level in shock.levels]
+    counts = ", ".join(str(level.count) for level in shock.levels)
+    share = 1.0 - elements[0] / sum(elements)
+    return (
+        counts,
+        f"of {' + '.join(map(str, elements))} hexahedra; meso share f = {share:.2f}, elements beside them left out",
+    )
+
+
+def _fine_joints(case: BoardDropCase) -> tuple[str, str]:
+    """Say how many joints are fine, and which."""
+    coupling = case.shock.coupling
+    if coupling.fine_joints == "critical":
+        return f"{coupling.critical_joints}", "the most stressed ones of a run with coarse joints before"
+    if coupling.fine_joints == "all":
+        return "all", "one-way: coarse in the macro model" if coupling.direction == "one_way" else ""
+    return f"{len(set(coupling.fine_joints))}", ", ".join(coupling.fine_joints)
+
+
+def _placement(case: BoardDropCase) -> str:
+    """Say which MPI rank works on which model."""
+    ranks, cores = case.shock.ranks, f"on {available_cores()} cores"
+    if ranks.total == 1:
+        return f"one rank, {cores}"
+    if ranks.placement == "shared":
+        return f"all {ranks.total} ranks on both models in turn, {cores}"
+    macro = f"{ranks.macro} of {ranks.total}" if ranks.macro else f"some of {ranks.total}"
+    own = f"{macro} ranks on the macro model, the others on the meso model, at the same time"
+    if ranks.placement == "disjoint":
+        return f"{own}, {cores}"
+    return f"all {ranks.total} ranks on both models in turn, or each on one, as speeds measured by the run say, {cores}"
+
+
+def _absent(mode: str, case: BoardDropCase) -> str:
+    return "" if mode in case.shock.numerics.modes else "; not in shock.numerics.modes"

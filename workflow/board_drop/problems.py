@@ -1,0 +1,98 @@
+"""What does not fit together in the case of a package: its geometry, its solder, its shock."""
+
+from collections.abc import Iterable, Iterator
+from typing import Any
+
+from reflowshock.workflow.board_drop import fine_joints, identical_joints, shock_cooling
+from reflowshock.workflow.board_drop.board_deflection import decided
+from reflowshock.workflow.board_drop.forecast import step_problems
+from reflowshock.workflow.case import fields
+from reflowshock.workflow.case.problems import Problem, of_particles
+from reflowshock.workflow.case.pulse_files import unreadable_pulses
+from reflowshock.workflow.package import given_surfaces
+from reflowshock.workflow.package.case import BoardDropCase, PackageCase
+from reflowshock.workflow.reflow import forecast as reflow_forecast
+from reflowshock.workflow.reflow.joints import joint_geometries
+
+
+def package_problems(case: PackageCase) -> list[Problem]:
+    """Find parameters that make no possible package, joint or board together."""
+    return _of_geometry(case) or _of_joints(case)
+
+
+def board_drop_problems(case: BoardDropCase) -> list[Problem]:
+    """Find parameters that make no possible package, joint, board or shock together."""
+    from reflowshock.fem.problem import shock_checks
+
+    if found := _of_geometry(case):
+        return found
+    found = _of_joints(case) + _in_words(case, shock_checks.problems(case.shock)) + list(fine_joints.problems(case))
+    found += unreadable_pulses(case.pulse_tables)
+    if case.shock.numerics.kinematics == "auto" and not found:
+        found += _in_words(case, shock_checks.problems(decided(case).shock))
+    if found:
+        return found
+    found = [*identical_joints.problems(case), *shock_cooling.problems(case), *_of_flow(case), *_of_coupling(case)]
+    return found or list(step_problems(case))
+
+
+def _of_geometry(case: PackageCase) -> list[Problem]:
+    from reflowshock.meshing.board.checks import problems
+
+    return _in_words(case, problems(case.package, case.board, case.warpage))
+
+
+def _of_joints(case: PackageCase) -> list[Problem]:
+    """Find temperatures, solder and given surfaces that do not go with the joints of a possible package."""
+    from reflowshock.fem.problem import thermal_checks
+    from reflowshock.meshing.board.pads import pad_table
+    from reflowshock.particles.parameters import checks as particles_checks
+
+    package, thermal = case.package, case.thermal
+    pads = pad_table(package, case.board, case.warpage)
+    geometries = joint_geometries(pads)
+    heated = thermal_checks.problems(thermal, case.materials.by_role, case.warpage.corner) if thermal else []
+    of_solder = of_particles(particles_checks.problems(case.solder, geometries, package.pitch))
+    if thermal:
+        of_solder += reflow_forecast.problems(case.solder, geometries, thermal, package.pitch)
+    return _in_words(case, heated) + of_solder + list(given_surfaces.problems(package, pads, thermal is not None))
+
+
+def _in_words(case: PackageCase, found: Iterable[Any]) -> list[Problem]:
+    """Say what checks of meshing or fem found in the words of a case file, values in the user's units."""
+    known = {key: field for key, _, field in fields.leaves(case)}
+    return [
+        Problem(problem.key, problem.message, fields.shown(problem.value, known.get(problem.key)), problem.allowed)
+        for problem in found
+    ]
+
+
+def _yielding(case: BoardDropCase) -> list[str]:
+    """Return the parts whose material yields."""
+    return [role for role, material in case.materials.by_role.items() if material.plasticity is not None]
+
+
+def _of_flow(case: BoardDropCase) -> Iterator[Problem]:
+    """Find a limit of plastic work where nothing yields, and linear steps where something does."""
+    failure, yielding = case.shock.failure, _yielding(case)
+    if failure.plastic_work_density is not None and "solder" not in yielding:
+        message = "limits the plastic work of solder that does not yield"
+        allowed = 'materials.solder of the library, such as "SAC405", or with a table plasticity'
+        limit = fields.shown(failure.plastic_work_density, type(failure).model_fields["plastic_work_density"])
+        yield Problem("shock.failure.plastic_work_density", message, limit, allowed)
+    if case.shock.numerics.dns_solver == "implicit" and yielding:
+        message = f"is linear, {' and '.join(yielding)} yields"
+        yield Problem("shock.numerics.dns_solver", message, "implicit", "explicit, or elastic materials")
+
+
+def _of_coupling(case: BoardDropCase) -> Iterator[Problem]:
+    """Find local steps of what has a path."""
+    if case.shock.coupling.scheme != "local_steps" or "two_scale" not in case.shock.numerics.modes:
+        return
+    yielding = _yielding(case)
+    if not yielding and decided(case).shock.numerics.kinematics == "small":
+        return
+    why = f"{' and '.join(yielding)} yields" if yielding else "shock.numerics.kinematics is finite"
+    message = f"needs elastic materials at small strains, {why}"
+    allowed = "held_velocity, impulse, gravouil_combescure, auto"
+    yield Problem("shock.coupling.scheme", message, "local_steps", allowed)

@@ -1,0 +1,82 @@
+"""What all kinds of case have in common."""
+
+from pathlib import Path
+from typing import ClassVar
+
+from pydantic import BaseModel, ConfigDict
+
+from reflowshock.workflow.case.names import Name
+from reflowshock.workflow.case.stage import Pipeline
+
+CASES = Path(__file__).resolve().parents[2] / "cases"  # those that the program ships
+FULL = "full"  # the scale of a case as its file says it
+
+
+class Title(BaseModel):
+    """Name and title of a case; the name is also that of its run folder."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    name: Name
+    title: str = ""
+
+
+class Case(BaseModel):
+    """Everything that a run depends on, in SI floats.
+
+    Attributes:
+        kind: the table that makes a file a case of this kind.
+        stages: of all cases of this kind.
+        ranks_key: key of `ranks`.
+        case: its name.
+        scale: "full", or the name of the table of ``[scales]`` whose values replace those of the file.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    kind: ClassVar[str]
+    stages: ClassVar[Pipeline]
+    ranks_key: ClassVar[str] = ""
+
+    case: Title
+    scale: Name = FULL
+
+    @property
+    def run_name(self) -> str:
+        """Name of its run folder, where none is given."""
+        return self.case.name if self.scale == FULL else f"{self.case.name}-{self.scale}"
+
+    @property
+    def pipeline(self) -> Pipeline:
+        """The stages of this case."""
+        return self.stages
+
+    @property
+    def ranks(self) -> int:
+        """MPI ranks of the package fem."""
+        return 1
+
+    @property
+    def ranks_by_key(self) -> dict[str, int]:
+        """MPI ranks that it asks for, one stage after the other, by the key that does."""
+        return {self.ranks_key: self.ranks} if self.ranks_key else {}
+
+    @classmethod
+    def completed(cls, table: dict) -> dict:
+        """Return the table of a case file with the defaults that depend on which tables it has."""
+        return table
+
+    @classmethod
+    def located(cls, table: dict, folder: Path) -> dict:
+        """Take names of files in a table of SI values as relative to the folder of the case file."""
+        return table
+
+    @property
+    def pulse_tables(self) -> dict[str, tuple[Path, str]]:
+        """Those of its files that are tables of a pulse, by key, and which quantity each has."""
+        return {}
+
+    @property
+    def files(self) -> dict[str, Path]:
+        """Files that its parameters name, by key: what they hold counts as a parameter, too."""
+        return {}

@@ -1,0 +1,53 @@
+"""What forecasts of all kinds of case share: sizes, the limit of time steps, and effects switched the other way."""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from pydantic import BaseModel
+
+from reflowshock.workflow.case.problems import Problem
+from reflowshock.workflow.case.text import short
+
+BYTES_OF_ELEMENT, BYTES_OF_PARTICLE = 5.0e3, 5.0e4
+STEPS_MOST = 1e10  # those of the smallest meshes take hours
+
+# From a case, and whether the effect acts in it, to the case in which it does not, or does.
+Toggle = Callable[[Any, bool], Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Size:
+    """Seconds of the stages on one core or on the ranks of the case, joints at a time, memory of the model [B]."""
+
+    seconds: Mapping[str, float]
+    joints: int
+    memory: float
+
+
+def changed(model: BaseModel, key: str, value: object) -> Any:
+    """Return a model with another value at a dotted key; nothing is checked."""
+    name, _, rest = key.partition(".")
+    return model.model_copy(update={name: changed(getattr(model, name), rest, value) if rest else value})
+
+
+def between(key: str, on: object, off: object) -> Toggle:
+    """Return the toggle of an effect that a key switches."""
+    return lambda case, acts: changed(case, key, off if acts else on)
+
+
+def too_many_steps(key: str, duration: float, step: float, solver: str) -> Iterator[Problem]:
+    """Yield a problem where a motion takes more steps than any run.
+
+    Args:
+        key: Of the duration.
+        duration: Of the motion [s].
+        step: Predicted time step [s].
+        solver: Its name.
+    """
+    if not step > 0.0:
+        message = f"has no {solver} step: sizes, densities, moduli or damping are beyond all numbers"
+        yield Problem(key, message, short(duration))
+    elif duration > STEPS_MOST * step:
+        message = f"takes more than {STEPS_MOST:g} {solver} steps of {step:.3g} s"
+        yield Problem(key, message, short(duration), f"<= {STEPS_MOST * step:.3g} s")

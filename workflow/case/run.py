@@ -1,0 +1,82 @@
+"""What a stage works with, and what it finds: metrics and health checks in the form of ``summary.json``."""
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Generic, TypeVar
+
+from reflowshock.workflow.case.case import Case
+
+AnyCase = TypeVar("AnyCase", bound=Case)
+
+
+@dataclass(frozen=True, slots=True)
+class Run(Generic[AnyCase]):
+    """What a stage works with.
+
+    Attributes:
+        folder: the run folder, with the products of earlier stages.
+        case: the resolved case.
+        cores: number of cores that a stage may use.
+        oversubscribe: whether MPI may have more ranks than cores.
+    """
+
+    folder: Path
+    case: AnyCase
+    cores: int
+    oversubscribe: bool = False
+
+    def checkpoints(self, stage: str) -> Path:
+        """Folder in which a stage keeps what it needs to continue after a kill; removed when it is complete."""
+        return self.folder / f".{stage}.checkpoints"
+
+
+@dataclass(frozen=True, slots=True)
+class Findings:
+    """What a stage found, in the form of ``summary.json``.
+
+    Attributes:
+        metrics: name -> {"value", "unit"}.
+        health: check -> {"value", "limit", "ok"}.
+        effects: effect -> {"on", "why"}.
+        continued: what continued from checkpoints, in words.
+    """
+
+    metrics: dict = field(default_factory=dict)
+    health: dict = field(default_factory=dict)
+    effects: dict = field(default_factory=dict)
+    continued: str = ""
+
+
+class StageError(RuntimeError):
+    """A stage cannot use what it was given, or has not made what it is to make."""
+
+
+StageFunction = Callable[[Run[Any], Path], Findings]
+
+
+def metric(value: float | str, unit: str = "") -> dict:
+    """Return a metric; its unit is SI."""
+    return {"value": value, "unit": unit}
+
+
+def at_most(value: float, limit: float) -> dict:
+    """Return a health check that holds where the value is within its limit; nan never is."""
+    return {"value": value, "limit": limit, "ok": bool(value <= limit)}
+
+
+def at_least(value: float, limit: float) -> dict:
+    """Return a health check that holds where the value reaches its limit; nan never does."""
+    return {"value": value, "limit": limit, "ok": bool(value >= limit)}
+
+
+def worst(values: Iterable[float]) -> float:
+    """Return the largest magnitude; nan if any value is, zero if there is none."""
+    magnitudes = [abs(value) for value in values]
+    return float("nan") if any(value != value for value in magnitudes) else max(magnitudes, default=0.0)
+
+
+def in_words_continued(results: Mapping[str, dict]) -> str:
+    """Say which runs continued from a checkpoint; empty where none did."""
+    windows = {name: result.get("continued_from", 0) for name, result in results.items()}
+    return ", ".join(f"{name} from window {window}" for name, window in windows.items() if window)

@@ -1,0 +1,75 @@
+"""Numbers as text: three or four digits and a unit that makes them readable."""
+
+import re
+
+CHECK_UNITS = {
+    r".*peel_stress": "Pa", r".*plastic_work_density": "J/m^3", r"(\w+_)?frequency_\d+_(low|high)": "Hz",
+    r"standoff_spread_.*": "m",
+}  # fmt: skip
+LONGEST_IN_MS = 0.1
+SHOWN = {
+    "Pa": (1e-6, "MPa"), "m": (1e3, "mm"), "m^3": (1e9, "mm^3"), "J": (1e3, "mJ"), "J/m^3": (1e-3, "kJ/m^3"),
+    "N": (1e3, "mN"), "kg": (1e6, "mg"), "B": (1e-9, "GB"),
+}  # fmt: skip
+
+
+def quantity(metric: dict) -> str:
+    """Text of a metric record: fractions as per cent, stresses in MPa, lengths in mm, short times in ms."""
+    value, unit = metric["value"], metric["unit"]
+    if isinstance(value, str):
+        return value
+    if unit == "s" and 0.0 < value < LONGEST_IN_MS:
+        return f"{number(1e3 * value)} ms"
+    factor, shown = SHOWN.get(unit, (1.0, unit))
+    return f"{number(factor * value)} {shown}".strip()
+
+
+def number(value) -> str:
+    """Four significant digits, without a needless exponent."""
+    if isinstance(value, bool | str) or value is None:
+        return str(value)
+    if isinstance(value, int):
+        return f"{value:,}".replace(",", " ")
+    return f"{value:.4g}"
+
+
+def nano(seconds: float | None) -> str:
+    """Seconds as nanoseconds."""
+    return "–" if seconds is None else f"{1e9 * seconds:.3g} ns"
+
+
+def micro(value: float) -> str:
+    """Metres as micrometres."""
+    return f"{1e6 * value:.1f}"
+
+
+def mega(value: float) -> str:
+    """Pascals as megapascals."""
+    return f"{1e-6 * value:.1f}" if abs(value) >= 1e6 or value == 0.0 else f"{1e-6 * value:.2g}"
+
+
+def percent(value: float) -> str:
+    """A fraction as per cent, two digits."""
+    if abs(value) < 1.0e-6:
+        return "< 0.0001 %"
+    return f"{100.0 * value:.2g} %" if abs(value) < 1.0 else f"{100.0 * value:.0f} %"
+
+
+def against_limit(name: str, check: dict) -> tuple[str, str]:
+    """Return value and limit of a check."""
+    unit = next((unit for pattern, unit in CHECK_UNITS.items() if re.fullmatch(pattern, name)), "")
+    value, limit = (quantity({"value": check[key], "unit": unit}) for key in ("value", "limit"))
+    return value, limit
+
+
+def duration(seconds: float) -> str:
+    """Write a wall time with two digits, in the unit that makes its figure readable."""
+    units = ((1.0, "s"), (60.0, "min"), (3600.0, "h"))
+    size, unit = next(((s, u) for s, u in units if seconds < 100.0 * s), (86400.0, "days"))
+    return f"{seconds / size:.2g} {unit}" if seconds < 100.0 * size else f"{seconds / size:.0f} {unit}"
+
+
+def short(seconds: float) -> str:
+    """Write a time step in the unit that makes its figure readable."""
+    factor, unit = next(((f, u) for f, u in ((1e9, "ns"), (1e6, "us")) if f * seconds < 1e3), (1e3, "ms"))
+    return f"{factor * seconds:.3g} {unit}"

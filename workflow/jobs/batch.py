@@ -1,0 +1,243 @@
+"""Making products: one Snakemake job for each that is missing; those that fail leave the others finished."""
+
+import json
+import shutil
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from reflowshock.workflow.jobs.engine import SAID, last_words, snakemake
+from reflowshock.workflow.jobs.executor import Executor, Jobs, Local, Slurm
+from reflowshock.workflow.jobs.job_output import JobOutput, failures_of
+from reflowshock.workflow.store.point import Point
+from reflowshock.workflow.store.product import discard
+from reflowshock.workflow.store.state import Verdict, examine, why_stale
+from reflowshock.workflow.store.store import Store
+from reflowshock.workflow.store.view import show
+
+BATCH = "batch"  # below the store: jobs, logs and marks of the last call
+JOBS = f"{BATCH}/jobs.json"
+UNTRIED = "was not reached"
+LEAST_FREE = 2**20  # bytes of a device on which a stage could still have said why it ended
+
+
+@dataclass(frozen=True, slots=True)
+class Machine:
+    """What points are computed with.
+
+    Attributes:
+        cores: number of cores that may be used.
+        exclusive: one stage at a time, with all cores, for measurements that must not disturb each other.
+        oversubscribe: whether MPI may have more ranks than cores.
+        slurm: where stages are jobs of a cluster.
+        live: whether stages show on the terminal how far they are.
+        each_second: called while points are computed, and once more in the end.
+    """
+
+    cores: int
+    exclusive: bool = False
+    oversubscribe: bool = False
+    slurm: Slurm | None = None
+    live: bool = False
+    each_second: Callable[[], None] | None = None
+
+    @property
+    def executor(self) -> Executor:
+        """Where stages run."""
+        return self.slurm or Local(self.cores, self.oversubscribe)
+
+
+def machine_of(executor: Local | Slurm, *, one_run: bool = False) -> Machine:
+    """Return what points are computed with where the user chose where stages run."""
+    if isinstance(executor, Slurm):
+        return Machine(executor.largest, oversubscribe=executor.oversubscribe, slurm=executor, live=one_run)
+    return Machine(executor.cores, one_run, executor.oversubscribe, live=one_run)
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """A product that has to be made.
+
+    Attributes:
+        stage: whose product it is.
+        point: the first of the points that want it.
+        needs: names of the jobs whose products its stage reads.
+    """
+
+    stage: str
+    point: Point
+    needs: tuple[str, ...]
+
+    @property
+    def name(self) -> str:
+        """``<stage>-<key>``."""
+        return job_name(self.point, self.stage)
+
+
+@dataclass(frozen=True, slots=True)
+class _Task:
+    """A job as the Snakefile reads it, paths relative to the store's home.
+
+    ``live``: whether it shows on the terminal how far it is; ``resources``: what it asks a cluster for, if it is a job
+    there.
+    """
+
+    stage: str
+    needs: tuple[str, ...]
+    threads: int
+    priority: int
+    live: bool
+    resources: dict[str, Any]
+
+
+def job_name(point: Point, stage: str) -> str:
+    """Return the name of the job that makes a product."""
+    return f"{stage}-{point.digests[stage]}"
+
+
+def missing(store: Store, points: Sequence[Point], until: str) -> list[Job]:
+    """List the products, up to those of one stage, that have to be made for points; each once."""
+    jobs: dict[str, Job] = {}
+    for point in points:
+        before: list[str] = []
+        verdicts = examine(store, point)
+        for stage in point.case.pipeline.upstream(until):
+            if verdicts[stage.name].stale:
+                name = job_name(point, stage.name)
+                jobs.setdefault(name, Job(stage.name, point, tuple(before)))
+                before.append(name)
+    return list(jobs.values())
+
+
+def show_products(store: Store, point: Point) -> list[str]:
+    """Show in a point's run folder what is there, intact, and made from what is there; return files put back."""
+    verdicts = examine(store, point)
+    return show(store, point, [name for name, one in verdicts.items() if not (one.stale or one.because_of)])
+
+
+def run_points(
+    store: Store,
+    points: Sequence[Point],
+    until: str,
+    machine: Machine,
+    lock: int,
+) -> dict[str, str]:
+    """Make what is missing or damaged of points; what is there and intact is never computed again.
+
+    Should this process be killed, all that is complete stays, and checkpoints of stages that were at work. A product
+    that a damaged one was read for is made again if that comes out otherwise than it was.
+
+    Args:
+        store: where products are.
+        points: what is wanted.
+        until: the last stage.
+        machine: what they are computed with.
+        lock: what ``locked`` yields for the store's folder.
+
+    Returns:
+        Key of each point that is not complete -> why.
+
+    Raises:
+        RunFolderBusy: jobs of an earlier command are still at work in the store.
+    """
+    tried: set[str] = set()
+    try:
+        while True:
+            jobs = missing(store, points, until)
+            if not jobs or any(job.name in tried for job in jobs):
+                break
+            tried |= {job.name for job in jobs}
+            for point in points:
+                show_products(store, point)
+            done = _run(store, jobs, machine, lock)
+            if not done:
+                break
+    finally:
+        for point in points:
+            show_products(store, point)
+    return {point.key: reason for point in points if (reason := why(store, point, until))}
+
+
+def why(store: Store, point: Point, until: str) -> str:
+    """Say why a point is not complete: its first stage that is not there, and what it said; nothing where it is."""
+    failure = failure_of(store, point, until)
+    return f"stage {failure[0]}: {failure[1]}" if failure else ""
+
+
+def failure_of(store: Store, point: Point, until: str) -> tuple[str, str] | None:
+    """Return the first stage of a point that is not there, and why; None where all are."""
+    verdicts = examine(store, point)
+    stale = [stage.name for stage in point.case.pipeline.upstream(until) if verdicts[stage.name].stale]
+    if not stale:
+        return None
+    return stale[0], store.message(point, stale[0]) or _untold(store, point, stale[0], verdicts[stale[0]])
+
+
+def log_of(store: Store, point: Point, stage: str) -> Path:
+    """Return the file that takes what a job says beside the terminal, as the Snakefile names it."""
+    return store.home / BATCH / "logs" / f"{job_name(point, stage)}.txt"
+
+
+def _untold(store: Store, point: Point, stage: str, verdict: Verdict) -> str:
+    """Say what is known of a stage that said nothing when it ended."""
+    name, said, log = job_name(point, stage), store.home / SAID, log_of(store, point, stage)
+    if by_cluster := failures_of(said).get(name):
+        return f"{by_cluster}; see {said}"
+    if not log.exists():
+        told = UNTRIED if verdict.missing else f"{UNTRIED}: {why_stale(verdict)}"
+        return f"{told}; see {said}\n{last_words(store.home)}" if said.is_file() else told
+    words = log.read_text(encoding="utf-8", errors="replace").strip().splitlines()
+    last = f'; its last words: "{words[-1].strip()}"' if words else ""
+    if shutil.disk_usage(store.home).free < LEAST_FREE:
+        return f"no space left on the device of {store.home}"
+    return f"ended without an error of its own, as when it is killed{last}; see {log}"
+
+
+def _run(store: Store, jobs: Sequence[Job], machine: Machine, lock: int) -> bool:
+    """Run Snakemake once for some jobs; what jobs of a cluster say is shown as it comes."""
+    discard(store.home / BATCH)
+    (store.home / BATCH / "logs").mkdir(parents=True)
+    for job in jobs:
+        store.prepare_work(job.point, job.stage)
+    write_jobs(store, jobs, machine)
+    follow = machine.each_second
+    if machine.live and machine.slurm:
+        follow = JobOutput([log_of(store, job.point, job.stage) for job in jobs]).show
+    config = ("--config", f"oversubscribe={int(machine.oversubscribe)}", f"cluster={int(bool(machine.slurm))}")
+    try:
+        return snakemake(store.home.resolve(), machine.executor, ["--scheduler", "greedy", *config], lock, follow)
+    finally:
+        for job in jobs:
+            store.drop_work(job.point, job.stage)
+
+
+def write_jobs(store: Store, jobs: Sequence[Job], machine: Machine) -> None:
+    """Write the jobs for the Snakefile; later stages first, so that points are complete one after the other."""
+    tasks = {}
+    wanted = {job.point.key: machine.executor.jobs(job.point.case) for job in jobs}
+    for job in jobs:
+        tasks[job.name] = _Task(
+            stage=job.stage,
+            needs=job.needs,
+            threads=_threads(job, jobs, machine, wanted[job.point.key]),
+            priority=job.point.case.pipeline.names.index(job.stage),
+            live=machine.live and not machine.slurm,
+            resources=wanted[job.point.key].get(job.stage, {}),
+        )
+    path = store.home / JOBS
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(json.dumps({name: asdict(task) for name, task in tasks.items()}, indent=1) + "\n", encoding="utf-8")
+
+
+def _threads(job: Job, jobs: Sequence[Job], machine: Machine, wanted: Jobs) -> int:
+    """Return the cores of a job: a shock's are its ranks, a reflow has its share, other stages are serial."""
+    if machine.slurm:
+        return wanted[job.stage]["cpus_per_task"] if job.stage in wanted else 1
+    if machine.exclusive:
+        return machine.cores
+    if job.stage == "shock":
+        return min(machine.cores, job.point.case.ranks)
+    if job.stage == "reflow":
+        return max(1, machine.cores // sum(other.stage == job.stage for other in jobs))
+    return 1

@@ -1,0 +1,39 @@
+"""What Snakemake needs to run a case without the command line: the jobs of a run, written into its store."""
+
+from collections.abc import Mapping
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+from reflowshock.workflow.jobs.batch import BATCH, Machine, missing, write_jobs
+from reflowshock.workflow.pipeline.reader import read_case
+from reflowshock.workflow.store.folders import locked
+from reflowshock.workflow.store.point import Point
+from reflowshock.workflow.store.product import discard
+from reflowshock.workflow.store.store import Store
+
+_held = ExitStack()  # the lock of the run folder, until Snakemake ends: its jobs are at work in it
+
+
+def prepare_run(config: Mapping[str, Any], cores: int) -> tuple[Store, Point]:
+    """Read a case and write the jobs that make what is missing of its run.
+
+    Args:
+        config: ``case``, and perhaps ``set``, ``out``, ``oversubscribe``.
+        cores: that Snakemake may use.
+
+    Raises:
+        CaseError: the case, or the folder of the run, is not possible.
+        RunFolderBusy: a run is at work in the folder.
+    """
+    oversubscribe = bool(int(config.get("oversubscribe", 0)))
+    case = read_case(Path(config["case"]), config.get("set", []), oversubscribe)
+    folder = Path(config.get("out", f"runs/{case.run_name}")).resolve()
+    store, point = Store(folder, one_run=True), Point({}, case)
+    _held.enter_context(locked(folder, "run", case.case.name))
+    jobs = missing(store, [point], case.pipeline.names[-1])
+    discard(store.home / BATCH)
+    for job in jobs:
+        store.prepare_work(point, job.stage)
+    write_jobs(store, jobs, Machine(cores, exclusive=True, oversubscribe=oversubscribe, live=True))
+    return store, point

@@ -1,0 +1,222 @@
+"""All kinds of case: one record each, with all that the program does with a case of that kind."""
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Protocol
+
+from rich.console import RenderableType
+
+from reflowshock.fem.names import nearest
+from reflowshock.workflow.board_drop import problems as package_checks
+from reflowshock.workflow.board_drop import shock_effects
+from reflowshock.workflow.board_drop import stages as package_stages
+from reflowshock.workflow.board_drop.forecast import forecast, package_size
+from reflowshock.workflow.board_drop.plan import package_tables
+from reflowshock.workflow.case.case import Case
+from reflowshock.workflow.case.forecast import Size, Toggle
+from reflowshock.workflow.case.problems import CaseError, Problem
+from reflowshock.workflow.case.run import StageFunction
+from reflowshock.workflow.convergence.series import Ladder
+from reflowshock.workflow.package.case import BoardDropCase, PackageCase
+from reflowshock.workflow.reflow.stage import reflow
+from reflowshock.workflow.solder import problems as solder_checks
+from reflowshock.workflow.solder import stages as solder_stages
+from reflowshock.workflow.solder.case import DropCase, DropsCase, JointCase, OscillationCase
+from reflowshock.workflow.solder.forecast import forecast_scene, scene_size
+from reflowshock.workflow.solder.plan import scene_tables
+from reflowshock.workflow.structure import forecast as structure_forecast
+from reflowshock.workflow.structure import stages as structure_stages
+from reflowshock.workflow.structure.case import StructureCase
+from reflowshock.workflow.structure.plan import structure_tables
+from reflowshock.workflow.structure.problems import structure_problems
+
+
+class Forecast(Protocol):
+    """What the forecasts of all kinds say."""
+
+    @property
+    def effects(self) -> Mapping[str, Any]:
+        """Effect -> "on", "why" and, where it is predicted, "influence"."""
+
+    @property
+    def seconds(self) -> Mapping[str, float]:
+        """Stage -> predicted wall time [s], where there is a prediction."""
+
+
+@dataclass(frozen=True, slots=True)
+class Kind:
+    """A kind of case.
+
+    Attributes:
+        case: the model of its case files.
+        problems: finds parameters that are each allowed, but impossible together.
+        stages: name -> function of each stage but the report, in order.
+        forecast: predicts effects and cost from the parameters alone.
+        size: predicts what its stages take on one core.
+        plan: what the plan shows below stages and effects, of a case and its forecast.
+        acts: what its effects belong to, for readers.
+        report: adds its sections to the context of a report: run folder, case, context, summary.
+        ladder: its convergence study.
+        toggles: effect -> the case with that effect the other way, where the forecast knows what it costs.
+    """
+
+    case: type[Case]
+    problems: Callable[[Any], list[Problem]]
+    stages: Mapping[str, StageFunction]
+    forecast: Callable[[Any], Forecast]
+    size: Callable[[Any], Size]
+    plan: Callable[[Any, Any], Iterable[RenderableType]]
+    acts: str
+    report: Callable[[Path, Any, dict, dict], None]
+    ladder: Callable[[Any], Ladder]
+    toggles: Callable[[Any], Mapping[str, Toggle]] = lambda case: {}
+
+    @property
+    def name(self) -> str:
+        """The table that makes a file a case of this kind."""
+        return self.case.kind
+
+
+def _package_report(run_folder: Path, case: PackageCase, context: dict, summary: dict) -> None:
+    from reflowshock.workflow.package_report.joints import add_joints
+
+    add_joints(run_folder, context)
+
+
+def _board_drop_report(run_folder: Path, case: BoardDropCase, context: dict, summary: dict) -> None:
+    from reflowshock.workflow.package_report.shock import add_shock
+
+    _package_report(run_folder, case, context, summary)
+    add_shock(run_folder, case, context, summary)
+
+
+def _structure_report(run_folder: Path, case: StructureCase, context: dict, summary: dict) -> None:
+    from reflowshock.workflow.structure.report import add_structure
+
+    context["preview_caption"] = "Mesh, coloured by layer."
+    add_structure(run_folder, case, context, summary["metrics"])
+
+
+def _scene_report(run_folder: Path, case: Case, context: dict, summary: dict) -> None:
+    if (run_folder / "reflow/shape.h5").exists():
+        from reflowshock.workflow.solder.report import add_scene
+
+        add_scene(run_folder, case.kind, context, summary)
+
+
+def _package_ladder(case: PackageCase) -> Ladder:
+    from reflowshock.workflow.convergence.packages import package_ladder
+
+    return package_ladder(case)
+
+
+def _structure_ladder(case: StructureCase) -> Ladder:
+    from reflowshock.workflow.convergence.structures import structure_ladder
+
+    return structure_ladder(case)
+
+
+def _scene_ladder(case: Case) -> Ladder:
+    from reflowshock.workflow.convergence.solder import LADDERS
+
+    return LADDERS[case.kind](case)
+
+
+def _scene(case: type[Case], problems: Callable[[Any], list[Problem]], reflow_scene: StageFunction) -> Kind:
+    """Return a kind of case of solder alone."""
+    return Kind(
+        case,
+        problems,
+        {"reflow": reflow_scene},
+        forecast_scene,
+        scene_size,
+        scene_tables,
+        "reflow",
+        _scene_report,
+        _scene_ladder,
+    )
+
+
+PACKAGE = Kind(
+    case=PackageCase,
+    problems=package_checks.package_problems,
+    stages={
+        "geometry": package_stages.geometry,
+        "reflow": reflow,
+        "surface": package_stages.surface,
+        "solder_mesh": package_stages.solder_mesh,
+    },
+    forecast=forecast,
+    size=package_size,
+    plan=package_tables,
+    acts="reflow",
+    report=_package_report,
+    ladder=_package_ladder,
+    toggles=shock_effects.toggles,
+)
+BOARD_DROP = replace(
+    PACKAGE,
+    case=BoardDropCase,
+    problems=package_checks.board_drop_problems,
+    stages={**PACKAGE.stages, "shock": package_stages.shock},
+    acts="reflow and shock",
+    report=_board_drop_report,
+)
+STRUCTURE = Kind(
+    case=StructureCase,
+    problems=structure_problems,
+    stages={
+        "geometry": structure_stages.geometry,
+        "shock": structure_stages.shock,
+        "comparison": structure_stages.comparison,
+    },
+    forecast=structure_forecast.forecast_structure,
+    size=structure_forecast.structure_size,
+    plan=structure_tables,
+    acts="motion",
+    report=_structure_report,
+    ladder=_structure_ladder,
+    toggles=structure_forecast.toggles,
+)
+KINDS = (
+    BOARD_DROP,
+    _scene(DropCase, solder_checks.of_drop, solder_stages.reflow_drop),
+    _scene(JointCase, solder_checks.of_joint, solder_stages.reflow_joint),
+    _scene(DropsCase, solder_checks.of_drops, solder_stages.reflow_drops),
+    _scene(OscillationCase, solder_checks.of_oscillation, solder_stages.reflow_oscillation),
+    STRUCTURE,
+    PACKAGE,
+)
+NAMES = tuple(dict.fromkeys(kind.name for kind in KINDS))
+
+
+def kind_of(case: Case) -> Kind:
+    """Return the kind of a case."""
+    return next(kind for kind in KINDS if kind.case is type(case))
+
+
+def kind_named_in(table: Mapping) -> Kind:
+    """Return the kind of a case file.
+
+    Raises:
+        CaseError: the file has the tables of no kind, or of several.
+    """
+    found = [name for name in NAMES if name in table]
+    if found == [PACKAGE.name] and not any(nearest(name, ("shock",)) for name in table):
+        return PACKAGE
+    if len(found) == 1:
+        return next(kind for kind in KINDS if kind.name == found[0])
+    choice = "exactly one of " + ", ".join(f"[{name}]" for name in NAMES)
+    if found:
+        message = "is of several kinds at once: it has " + " and ".join(f"[{name}]" for name in found)
+        raise CaseError("case", [Problem("", message, None, choice)])
+    if isinstance(table.get("study"), dict):
+        raise CaseError("case", [Problem("", "is a study, not a case; use: reflowshock study")])
+    hint = next((f"[{near}]" for name in table if (near := nearest(name, NAMES))), "")
+    raise CaseError("case", [Problem("", "does not say what kind of case it is", None, choice, hint)])
+
+
+def stage_seconds(case: Case) -> dict[str, float]:
+    """Predict the wall time [s] of each stage of which there is a prediction."""
+    return dict(kind_of(case).forecast(case).seconds)

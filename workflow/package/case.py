@@ -1,0 +1,162 @@
+"""The cases of a package on a board: its joints reflowed; then the board dropped, where a shock is given."""
+
+from pathlib import Path
+
+from reflowshock.fem.materials.roles import Materials
+from reflowshock.fem.problem.shock import Shock
+from reflowshock.fem.problem.thermal import Thermal
+from reflowshock.meshing.board.parameters import Board, Package, Warpage
+from reflowshock.particles.parameters.solder import Reflow, Solder
+from reflowshock.workflow.case.case import Case
+from reflowshock.workflow.case.stage import Pipeline, Stage, report_of
+from reflowshock.workflow.case.toml_file import beside
+from reflowshock.workflow.package import given_surfaces
+
+# Where solder overflows a sixth of the steps: tests/verification/test_particles_large_steps.py
+LARGE_STEPS = 100.0
+
+
+DRAWN = (
+    "package.rows",
+    "package.columns",
+    "package.depopulated",
+    "package.pitch",
+    "package.standoff",
+    "package.board_pad",
+    "package.package_pad",
+    "board.symmetry",
+)
+PADS = (*DRAWN, "warpage")
+GIVEN = ("package.surfaces", "package.surface_unit")
+JOINT_MESHES = (
+    "package.joint_numerics",
+    "package.coarse_joint_numerics",
+    "shock.coupling.fine_joints",
+    "shock.coupling.direction",
+    "shock.identical_joints",
+)
+DRAWN_MESH = (*DRAWN, "package.copper", "package.substrate", "package.die", "package.numerics", "board")
+HEATED = tuple(
+    f"thermal.{name}"
+    for name in (
+        "reference", "peak", "melting", "solidification", "steps", "package", "corner_displacement", "tolerance",
+        "effects.flexible", "effects.solder_force",
+    )
+)  # fmt: skip
+STRUCTURE_ROLES = tuple(f"materials.{role}" for role in ("board", "substrate", "die", "copper"))
+COOLED = ("thermal.solidification", "thermal.final", "thermal.effects.residual_stress")
+
+
+def package_pipeline(heated: bool, dropped: bool) -> Pipeline:
+    """Return the stages of a package on a board.
+
+    Args:
+        heated: whether the reflow has temperatures: it then needs the mesh of board and package.
+        dropped: whether there is a shock.
+    """
+    geometry = Stage(
+        "geometry", DRAWN_MESH, (), ("geometry/assembly.msh", "geometry/pads.json", "geometry/preview.png")
+    )
+    solid = ("reflow/shapes.h5", "reflow/joints.json", "reflow/pads.json")
+    if heated:
+        last = () if dropped else COOLED  # what is told of cooling, where no shock begins with it
+        parameters = (*PADS, *HEATED, *STRUCTURE_ROLES, "solder", *last)
+        reflow = Stage("reflow", parameters, ("geometry",), (*solid, "reflow/structure.npz"))
+    else:
+        reflow = Stage("reflow", (*PADS, "thermal", "solder", *GIVEN), (), solid, pads=True)
+    solder_mesh = Stage(
+        "solder_mesh",
+        ("warpage", "solder.volume", *JOINT_MESHES, "materials.copper", "materials.solder"),
+        ("geometry", "surface"),
+        ("solder_mesh/assembly.msh", "solder_mesh/joints.msh", "solder_mesh/quality.json"),
+    )
+    surface = Stage("surface", GIVEN, ("reflow",), ("surface/surfaces.json",))
+    shock = Stage("shock", ("shock", "materials", *COOLED), ("solder_mesh",), ())
+    stages = (geometry, reflow, surface, solder_mesh, *((shock,) if dropped else ()))
+    follows = tuple(stage.name for stage in stages)
+    return Pipeline((*stages, report_of(*follows)))
+
+
+BOARD_DROP = package_pipeline(heated=False, dropped=True)
+
+
+class PackageCase(Case):
+    """A package on a board, whose joints are reflowed and meshed."""
+
+    kind = "package"
+
+    package: Package
+    board: Board
+    warpage: Warpage = Warpage()
+    thermal: Thermal | None = None
+    solder: Solder
+    reflow: Reflow = Reflow()
+    materials: Materials = Materials()
+
+    @property
+    def pipeline(self) -> Pipeline:
+        """The stages: with temperatures, the reflow needs the mesh of board and package."""
+        return package_pipeline(heated=self.thermal is not None, dropped=False)
+
+    @classmethod
+    def completed(cls, table: dict) -> dict:
+        """With temperatures take large time steps: load steps are at rest, only the shape there counts."""
+        solder = table.get("solder")
+        if "thermal" not in table or not isinstance(solder, dict):
+            return table
+        numerics = solder.get("numerics", {})
+        if isinstance(numerics, dict):
+            numerics = {"time_step_limit": LARGE_STEPS} | numerics
+        return table | {"solder": solder | {"numerics": numerics}}
+
+    @classmethod
+    def located(cls, table: dict, folder: Path) -> dict:
+        """Take files of surfaces as relative to the folder of the case file."""
+        return given_surfaces.located(table, folder)
+
+    @property
+    def ranks_by_key(self) -> dict[str, int]:
+        """MPI ranks of the reflow, too, if it has any."""
+        of_reflow = {"reflow.ranks": self.reflow.ranks} if self.reflow.ranks is not None else {}
+        return super().ranks_by_key | of_reflow
+
+    @property
+    def files(self) -> dict[str, Path]:
+        """Surfaces of joints."""
+        return given_surfaces.files(self.package)
+
+
+class BoardDropCase(PackageCase):
+    """A package on a board: its joints reflowed, then the board dropped."""
+
+    ranks_key = "shock.ranks.total"
+
+    shock: Shock
+
+    @property
+    def pipeline(self) -> Pipeline:
+        """The stages: those of the package, then the shock."""
+        return package_pipeline(heated=self.thermal is not None, dropped=True)
+
+    @classmethod
+    def located(cls, table: dict, folder: Path) -> dict:
+        """Take surfaces and the shock's table as relative to the folder of the case file."""
+        shock = table.get("shock")
+        if isinstance(shock, dict) and isinstance(shock.get("table"), str):
+            shock["table"] = beside(folder, shock["table"])
+        return super().located(table, folder)
+
+    @property
+    def files(self) -> dict[str, Path]:
+        """Surfaces of joints, and the shock's table."""
+        return super().files | {key: path for key, (path, _) in self.pulse_tables.items()}
+
+    @property
+    def pulse_tables(self) -> dict[str, tuple[Path, str]]:
+        """The shock's table, if it has one."""
+        return {} if self.shock.table is None else {"shock.table": (Path(self.shock.table), "acceleration")}
+
+    @property
+    def ranks(self) -> int:
+        """MPI ranks of the shock."""
+        return self.shock.ranks.total

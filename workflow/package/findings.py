@@ -1,0 +1,173 @@
+"""What stages found: metrics and health checks in the form of ``summary.json``, with the limits of health."""
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from reflowshock.particles.core.geometry import LARGEST_WIDTH_CHANGE
+from reflowshock.workflow.case.run import Findings, at_least, at_most, in_words_continued, metric, worst
+
+WIDTH_ERROR = 0.01  # of a joint's width, against the Young-Laplace shape of its volume, pads and gap
+VOLUME_DRIFT = 1.0e-3  # of a joint's volume during its reflow
+SURFACE_VOLUME_ERROR = 1.0e-3  # of a closed surface, against the particles' own volume
+VOLUME_ERROR = 0.003  # of a joint's hexahedra, against its closed surface
+SCALED_JACOBIAN = 0.2
+STRESS_ERROR = 0.10  # of the critical joint's von Mises history, two-scale against DNS, relative L2
+COMPARED = "compared_duration"  # of a DNS that ends before the shock
+
+Records = Mapping[str, Mapping[str, Any]]
+
+
+def of_geometry(joints: int, elements: Mapping[str, int]) -> Findings:
+    """Judge the assembly: how many joints, how many hexahedra in each part."""
+    counts = {f"elements_{part}": metric(count) for part, count in elements.items()}
+    return Findings(metrics={"joint_count": metric(joints), **counts})
+
+
+def of_reflow(joints: Records, effects: Mapping[str, Any]) -> Findings:
+    """Judge the joints' shapes by volume, by the Young-Laplace shape and by their verdicts.
+
+    An open joint has no shape to compare with, nor has one that leans too much for a coaxial reference. Of joints whose
+    surface is given only widths count, and that they touch others.
+    """
+    flowed = [joint for joint in joints.values() if "given" not in joint]
+
+    def values(name: str) -> list[float]:
+        return [joint["metrics"][name]["value"] for joint in joints.values()]
+
+    def count(verdict: str) -> int:
+        return sum(joint["verdict"] == verdict for joint in joints.values())
+
+    closed = [joint for joint in flowed if joint["verdict"] != "open" and _has_reference(joint["metrics"])]
+    width_error = worst(joint["metrics"]["width_error"]["value"] for joint in closed)
+    drift = worst(joint["metrics"]["volume_drift"]["value"] for joint in flowed)
+    return Findings(
+        metrics={
+            "distinct_shapes": metric(len({joint["shape"] for joint in flowed})),
+            "joint_width_min": metric(min(values("max_width")), "m"),
+            "joint_width_max": metric(max(values("max_width")), "m"),
+            "joint_width_error_max": metric(width_error),
+            "joints_compared_in_width": metric(len(closed)),
+            "joint_volume_drift_max": metric(drift),
+        },
+        health={
+            "joint_width_error_max": at_most(width_error, WIDTH_ERROR),
+            "joint_volume_drift_max": at_most(drift, VOLUME_DRIFT),
+            "joints_bridged": at_most(count("bridged"), 0),
+            "joints_open": at_most(count("open"), 0),
+            "joints_not_ok": at_most(len(joints) - count("ok") - count("given"), 0),
+        },
+        effects=dict(effects),
+    )
+
+
+def _has_reference(metrics: Mapping[str, dict]) -> bool:
+    """Whether a joint leans so little that the coaxial joint of its gap is a reference for its width."""
+    return metrics.get("width_reference_error", {"value": 0.0})["value"] <= LARGEST_WIDTH_CHANGE
+
+
+def of_surface(surfaces: Records) -> Findings:
+    """Judge the closed surfaces by the volume that the reflow ended with; tell how those given were stretched."""
+    error = worst(surface["volume_error"] for surface in surfaces.values() if "given" not in surface)
+    given = [surface["volume_change"] for surface in surfaces.values() if "given" in surface]
+    stretched = {"given_surface_volume_change_max": metric(worst(given))} if given else {}
+    return Findings(
+        metrics={"surface_volume_error_max": metric(error)} | stretched,
+        health={"surface_volume_error_max": at_most(error, SURFACE_VOLUME_ERROR)},
+    )
+
+
+def of_solder_mesh(qualities: Mapping[str, Records], effects: Mapping[str, Any]) -> Findings:
+    """Judge the joints' hexahedra; ``qualities`` by kind of joint mesh: prefix of its metrics -> joint -> quality."""
+    metrics: dict[str, dict] = {}
+    health: dict[str, dict] = {}
+    for kind, quality in qualities.items():
+        volume_error = worst(joint["volume_error"] for joint in quality.values())
+        jacobian = min(joint["minimum_scaled_jacobian"] for joint in quality.values())
+        step = min(joint["critical_time_step"] for joint in quality.values())
+        metrics |= {
+            f"{kind}joint_volume_error_max": metric(volume_error),
+            f"{kind}joint_scaled_jacobian_min": metric(jacobian),
+            f"{kind}joint_critical_time_step": metric(step, "s"),
+        }
+        health |= {
+            f"{kind}joint_volume_error_max": at_most(volume_error, VOLUME_ERROR),
+            f"{kind}joint_scaled_jacobian_min": at_least(jacobian, SCALED_JACOBIAN),
+        }
+    return Findings(metrics, health, dict(effects))
+
+
+def of_shock(results: Mapping[str, dict], folder: Path, thickness: float) -> Findings:
+    """Judge the shock: the two-scale run by itself, and by the DNS where both were run.
+
+    Args:
+        results: ``result.json`` of each mode, the one whose figures count first.
+        folder: where each mode's history is.
+        thickness: of the board [m]; small kinematics hold for deflections well below it.
+    """
+    first = next(iter(results))
+    metrics, health = dict(results[first]["metrics"]), dict(results[first]["health"])
+    metrics["deflection_over_thickness"] = metric(metrics["peak_board_displacement"]["value"] / thickness)
+    metrics |= _coupling_metrics(results[first])
+    for mode, result in results.items():
+        if mode != first:
+            health |= {f"{mode}_{name}": value for name, value in result["health"].items()}
+    if len(results) == 2:
+        metrics |= _comparison(results, folder)
+        health["critical_joint_stress_error"] = at_most(metrics["critical_joint_stress_error"]["value"], STRESS_ERROR)
+        if "critical_joint_coarse" in metrics:
+            health["critical_joint_coarse"] = at_most(metrics["critical_joint_coarse"]["value"], 0)
+    return Findings(metrics, health, dict(results[first]["effects"]), in_words_continued(results))
+
+
+def fine_joints_of(result: Mapping[str, Any]) -> list[str] | None:
+    """Return the fine joints of a run in which some are coarse, else None."""
+    fine = result.get("coupling", {}).get("fine_joints", "all")
+    return None if isinstance(fine, str) else list(fine)
+
+
+def _coupling_metrics(result: Mapping[str, Any]) -> dict:
+    """Return what a two-scale run says of its coupling: shares of elements, and of its ranks' time."""
+    coupling = result.get("coupling", {})
+    balance = coupling.get("placement", {})
+    found = {
+        "meso_share": coupling.get("meso_share"),
+        "coupling_overhead": balance.get("coupling_overhead"),
+        "busy_share": balance.get("busy_share"),
+    }
+    return {name: metric(value) for name, value in found.items() if value is not None}
+
+
+def ideal_ratio(coupling: Mapping[str, Any], dns: Mapping[str, Any]) -> float | None:
+    """Return the time of a two-scale run over that of a DNS if all element updates cost the same and all else nothing.
+
+    Args:
+        coupling: of the two-scale run; None is returned where it does not tell its levels.
+        dns: model of the DNS, which takes the smallest step everywhere.
+    """
+    rates = [record["elements"] / record["step"] for record in coupling.get("levels", ())]
+    return sum(rates) * dns["step"] / sum(dns["elements"].values()) if rates else None
+
+
+def _comparison(results: Mapping[str, dict], folder: Path) -> dict:
+    """Compare both modes: errors of histories, and the ratio of the wall times of their windows."""
+    from reflowshock.fem.output.compare import compare_histories
+
+    files = [folder / mode / "history.npz" for mode in ("two_scale", "dns")]
+    errors = compare_histories(files[0], files[1], fine_joints_of(results["two_scale"]))
+    seconds = {mode: _wall_time(result) for mode, result in results.items()}
+    ratios = {"two_scale_dns_time_ratio": seconds["two_scale"] / seconds["dns"]}
+    ideal = ideal_ratio(results["two_scale"].get("coupling", {}), results["dns"]["model"])
+    ratios |= {} if ideal is None else {"two_scale_ideal_ratio": ideal}
+    search = folder / "coarse/result.json"
+    if search.exists():
+        ratios["coarse_run_dns_time_ratio"] = (
+            _wall_time(json.loads(search.read_text(encoding="utf-8"))) / seconds["dns"]
+        )
+    return {name: metric(value, "s" if name == COMPARED else "") for name, value in (errors | ratios).items()}
+
+
+def _wall_time(result: Mapping[str, Any]) -> float:
+    """Wall time of a run's windows over the time that they simulate: windows of two runs may differ."""
+    return result["metrics"]["window_seconds"]["value"] / result["model"]["window"]

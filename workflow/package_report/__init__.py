@@ -1,0 +1,1 @@
+"""Sections of the report on a package: its joints, their meshes, the shock."""

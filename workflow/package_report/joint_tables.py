@@ -1,0 +1,106 @@
+"""Tables of joints: what the reflow made of each, how it was meshed, how the shock stressed it."""
+
+from collections.abc import Collection, Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from reflowshock.workflow.case.text import mega, micro, number, percent
+from reflowshock.workflow.package_report.joint_records import Column, Record, by_shape, record_table
+from reflowshock.workflow.process.products import read_json
+from reflowshock.workflow.report.histories import at_pads
+
+SHAPE_COLUMNS: tuple[Column, ...] = (
+    ("standoff [µm]", "standoff", micro),
+    ("max. width [µm]", "max_width", micro),
+    ("angle board / package [deg]", "angles", str),
+    ("tilt [mrad]", "tilted", lambda value: f"{1e3 * value:.2f}"),
+    ("width error", "width_error", percent),
+    ("axial force [mN]", "axial_force", lambda value: f"{1e3 * value:+.3f}"),
+    ("volume drift", "volume_drift", percent),
+)
+
+
+def shapes(joints: Sequence[Record]) -> dict:
+    """One row a distinct shape, by increasing standoff."""
+    return record_table(SHAPE_COLUMNS, by_shape(joints), lambda key, values: values[0])
+
+
+def verdicts(run_folder: Path) -> dict:
+    """Verdict of the reflow on every joint, those that are not ok first."""
+    joints = read_json(run_folder / "reflow/joints.json")
+    rows = [
+        [
+            name,
+            joint["verdict"],
+            " ".join(joint.get("touches", ())) or "–",
+            micro(joint["metrics"]["standoff"]["value"]),
+            micro(joint["metrics"]["max_width"]["value"]),
+        ]
+        for name, joint in sorted(joints.items(), key=lambda item: item[1]["verdict"] == "ok")
+    ]
+    return {"head": ["joint", "verdict", "touches", "standoff [µm]", "max. width alone [µm]"], "rows": rows}
+
+
+def ranked_joints(
+    history: Mapping[str, np.ndarray],
+    joints: Sequence[Record],
+    failure: Mapping[str, dict],
+    fine: Collection[str] | None = None,
+) -> dict:
+    """Joints ranked by peak von Mises stress at their pads.
+
+    Args:
+        history: of one mode.
+        joints: ``joint_records``.
+        failure: criterion -> joint -> value, limit, ok; of the same mode.
+        fine: names of the fine joints, where some are coarse.
+    """
+    shape = {joint["name"]: joint for joint in joints}
+    stress = at_pads(history)
+    peel = np.maximum(history["peel_board"], history["peel_package"])
+    rows = []
+    for column in np.argsort(-stress.max(axis=0)):
+        name, row = str(history["joints"][column]), int(np.argmax(stress[:, column]))
+        side = "board" if history["von_mises_board"][row, column] == stress[row, column] else "package"
+        rows.append(
+            [
+                name,
+                mega(stress[row, column]),
+                side,
+                f"{1e3 * history['time'][row]:.3f}",
+                mega(peel[:, column].max()),
+                mega(history["von_mises_max"][:, column].max()),
+                micro(shape[name]["standoff"]),
+                micro(shape[name]["max_width"]),
+                *failure_cells(history, column, failure),
+                *([] if fine is None else ["fine" if name in fine else "coarse"]),
+            ]
+        )
+    head = [
+        "joint",
+        "von Mises at pad [MPa]",
+        "pad",
+        "time [ms]",
+        "peel stress [MPa]",
+        "largest in an element [MPa]",
+        "standoff [µm]",
+        "width [µm]",
+        *(["plastic work at pad [kJ/m³]"] if "plastic_work_board" in history else []),
+        *(["fails by"] if failure else []),
+        *([] if fine is None else ["mesh"]),
+    ]
+    return {"head": head, "rows": rows}
+
+
+def failure_cells(history: Mapping[str, np.ndarray], column: int, failure: Mapping[str, dict]) -> list[str]:
+    """Plastic work and failed criteria of the joint in a column of the history: only what the run has."""
+    cells = []
+    if "plastic_work_board" in history:
+        work = max(history[f"plastic_work_{end}"][:, column].max() for end in ("board", "package"))
+        cells.append(number(1e-3 * work))
+    if failure:
+        joint = str(history["joints"][column])
+        failed = [name.replace("_", " ") for name, verdicts in failure.items() if not verdicts[joint]["ok"]]
+        cells.append(", ".join(failed) or "–")
+    return cells

@@ -1,0 +1,77 @@
+"""Section "Joints" of the report: what the reflow made of them, and how they were meshed."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from reflowshock.workflow.package_report import joint_tables, mesh_tables
+from reflowshock.workflow.package_report.joint_records import bridge_records, joint_records
+from reflowshock.workflow.process.products import read_json
+
+BRIDGE_CAPTION = "as one body: particles and free surface, right by pressure above ambient."
+
+
+def add_joints(run_folder: Path, context: dict) -> None:
+    """Add shapes, maps, verdicts and meshes of the joints of an array, as far as the run has gone."""
+    if not (run_folder / "reflow/joints.json").exists():
+        return
+    from reflowshock.workflow.package_report.array_map import array_map
+    from reflowshock.workflow.package_report.gallery import render_gallery
+    from reflowshock.workflow.report.pictures import embedded
+
+    joints = joint_records(run_folder)
+    meshed = joints + bridge_records(run_folder)
+    context["headline"] += headline(joints)
+    context["tables"] |= {
+        "verdicts": joint_tables.verdicts(run_folder),
+        "shapes": joint_tables.shapes(joints),
+        "meshes": mesh_tables.meshes(meshed),
+        "missed_tries": mesh_tables.missed_tries(meshed),
+        "fine_instead": mesh_tables.fine_instead(run_folder),
+    }
+    context["curves"]["map"] = array_map(joints)
+    drawn = [joint for joint in joints if "given" not in joint or (run_folder / "surface").exists()]
+    if drawn:
+        context["pictures"]["gallery"], _ = embedded(lambda path: render_gallery(run_folder, drawn, path))
+    _add_bridge(run_folder, context)
+    _add_warpage(run_folder, joints, context)
+
+
+def headline(joints: Sequence[Mapping[str, Any]]) -> list[dict]:
+    """The figures of the joints at the top of the page."""
+    standoffs = [1e6 * joint["standoff"] for joint in joints]
+    shapes = len({joint["shape"] for joint in joints})
+    return [
+        {"value": f"{min(standoffs):.0f}–{max(standoffs):.0f} µm", "label": "standoff over the array"},
+        {"value": f"{len(joints)} / {shapes}", "label": "joints / distinct shapes"},
+    ]
+
+
+def _add_bridge(run_folder: Path, context: dict) -> None:
+    """Add the picture of two joints that became one, the only shape under two names."""
+    if not any(joint["verdict"] == "bridged" for joint in read_json(run_folder / "reflow/joints.json").values()):
+        return
+    from reflowshock.particles.scenes.products import read_shapes
+    from reflowshock.workflow.report.pictures import embedded, render_stages
+
+    for name, shape in read_shapes(run_folder / "reflow/shapes.h5").items():
+        if "+" in name:
+            first = shape.snapshots[:1]
+            context["bridge_caption"] = f"{name} {BRIDGE_CAPTION}"
+            context["pictures"]["bridge"], _ = embedded(lambda path: render_stages(first, shape, path))  # noqa: B023
+            return
+
+
+def _add_warpage(run_folder: Path, joints: Sequence[Mapping[str, Any]], context: dict) -> None:
+    """Add how package and board have warped, where they did."""
+    from reflowshock.workflow.package_report import warpage
+
+    structure = warpage.read_structure(run_folder)
+    if structure is None:
+        return
+    context["warpage"] = warpage.in_words(structure)
+    context["curves"] |= {
+        "warpage": warpage.warpage_maps(structure, joints),
+        "profiles": warpage.profiles(structure),
+    }
+    context["tables"]["load_steps"] = warpage.load_steps(structure)

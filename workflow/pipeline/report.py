@@ -1,0 +1,62 @@
+"""report.html: one self-contained page from the products of a run. Nothing is computed here that a product holds."""
+
+import base64
+from pathlib import Path
+
+from reflowshock.workflow.case.case import Case
+from reflowshock.workflow.case.fields import display_values
+from reflowshock.workflow.convergence.page import section_for
+from reflowshock.workflow.effects.table import report_table
+from reflowshock.workflow.kinds import kind_of
+from reflowshock.workflow.pipeline.summary import collect_summary, write_summary
+from reflowshock.workflow.report import tables
+from reflowshock.workflow.report.template import write_page
+
+
+def write_report(run_folder: Path, case: Case, folder: Path) -> dict:
+    """Write ``report.html`` and ``summary.json``.
+
+    Args:
+        run_folder: folder of the run; stages that have not run are left out of the page.
+        case: the resolved case.
+        folder: where they are written.
+
+    Returns:
+        The summary.
+    """
+    summary = collect_summary(run_folder, case)
+    write_summary(folder, summary)
+    write_page(folder / "report.html", "report.html.j2", _context(run_folder, case, summary))
+    return summary
+
+
+def _context(run_folder: Path, case: Case, summary: dict) -> dict:
+    context = {
+        "case": case.case,
+        "version": summary["version"],
+        "inputs_sha256": summary["inputs_sha256"],
+        "healthy": all(check["ok"] for check in summary["health"].values()),
+        "headline": [],
+        "health": tables.health_rows(summary["health"]),
+        "tables": {
+            "parameters": {
+                "head": ["key", "value"],
+                "rows": [[key, value] for key, value in display_values(case).items()],
+            },
+            "effects": report_table(case, summary["effects"]),
+            "versions": tables.versions(),
+        },
+        "preview_caption": "Mesh of board and package, coloured by part. Joints are meshed after reflow.",
+        "curves": {},
+        "pictures": {},
+    }
+    if summary["timings"]:
+        from reflowshock.workflow.report.curves import timing_bars
+
+        context["curves"]["timings"] = timing_bars(summary["timings"])
+    preview = run_folder / "geometry/preview.png"
+    if preview.exists():
+        context["pictures"]["preview"] = base64.b64encode(preview.read_bytes()).decode()
+    kind_of(case).report(run_folder, case, context, summary)
+    context["accuracy"] = section_for(run_folder, case)
+    return context

@@ -1,0 +1,188 @@
+"""The commands run, report, verify and clean: what they do with a run folder, and what the user is told."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+from reflowshock.workflow.case.case import Case
+from reflowshock.workflow.case.run import Run
+from reflowshock.workflow.jobs.batch import Machine, failure_of, run_points, show_products
+from reflowshock.workflow.pipeline.points import read_case_of_run
+from reflowshock.workflow.pipeline.stage_runner import execute
+from reflowshock.workflow.process.terminal import console, print_error
+from reflowshock.workflow.store.folders import locked, read_mark, remove_own
+from reflowshock.workflow.store.point import Point
+from reflowshock.workflow.store.product import discard
+from reflowshock.workflow.store.state import Verdict, examine, failed_checks, why_stale
+from reflowshock.workflow.store.store import TRACEBACK, Store
+from reflowshock.workflow.store.view import adopt, not_as_put, remove_unused, withdraw_all
+
+WHAT = "run"  # a run folder holds
+REPORT = "report"
+
+
+def run_case(store: Store, point: Point, until: str, machine: Machine, *, force: bool = False) -> bool:
+    """Make what is missing, stale or damaged of a run, and tell how it ended.
+
+    Args:
+        store: of the run folder.
+        point: the case.
+        until: the last stage.
+        machine: what it is computed with.
+        force: whether the folder may hold another case.
+
+    Returns:
+        Whether every product up to that stage is there and intact, and every health check holds.
+
+    Raises:
+        CaseError: the folder must not, or cannot be written into.
+        RunFolderBusy: another process is at work in it.
+    """
+    with locked(store.folder, WHAT, point.case.case.name, force) as lock:
+        verdicts = examine(store, point)
+        wanted = {stage.name: verdicts[stage.name] for stage in point.case.pipeline.upstream(until)}
+        _tell_damage(wanted)
+        for name in show_products(store, point):
+            console.print(f"put back {store.folder / name}")
+        if any(verdict.stale for verdict in wanted.values()):
+            watched = replace(machine, each_second=machine.each_second or _shower(store, point))
+            run_points(store, [point], until, watched, lock)
+        else:
+            console.print(f"nothing to do: {store.folder} is up to date")
+        failure = failure_of(store, point, until)
+    if failure:
+        _tell_failure(store, point, *failure)
+        return False
+    failures = failed_checks(store, point, until)
+    for failed in failures:
+        print_error(failed)
+    if until == REPORT:
+        console.print(f"report: {store.folder / 'report.html'}")
+    return not failures
+
+
+def report_again(folder: Path, name: str, write: Callable[[Path, Case, Path], object], stage: Callable) -> bool:
+    """Write the report of a run folder again, from the products that are there and the case that they were made of.
+
+    Where products are missing the report says what is there, and is no product: the next run replaces it.
+
+    Args:
+        folder: the run folder.
+        name: of its case.
+        write: writes a report of a run folder and a case into a folder.
+        stage: function of the stage that does so.
+
+    Returns:
+        Whether it was written; not where a product is damaged.
+
+    Raises:
+        CaseError: nothing was run in the folder.
+    """
+    case = read_case_of_run(folder)
+    store, point = Store(folder, one_run=True), Point({}, case)
+    with locked(folder, WHAT, name):
+        verdicts = examine(store, point)
+        upstream = {one: verdicts[one] for one in point.case.pipeline.names[:-1]}
+        if _tell_damage(upstream, "run makes it again"):
+            return False
+        if any(verdict.stale for verdict in upstream.values()):
+            show_products(store, point)
+            _adopt_report(store, folder, case, write)
+            return True
+        store.prepare_work(point, REPORT)
+        work = store.work_folder(point, REPORT)
+        done = execute(REPORT, stage, Run(work, case, 1), store.product(point, REPORT))
+        show_products(store, point)
+        store.drop_work(point, REPORT)
+    if not done and (failure := failure_of(store, point, REPORT)):
+        _tell_failure(store, point, *failure)
+    return done
+
+
+def _adopt_report(store: Store, folder: Path, case: Case, write: Callable[[Path, Case, Path], object]) -> None:
+    """Write a report that is no product, and put it into the run folder when it is complete."""
+    made = store.home / "work" / REPORT
+    discard(made)
+    made.mkdir(parents=True)
+    write(folder, case, made)
+    adopt(store, folder, made)
+    discard(made)
+
+
+def verify(store: Store, point: Point) -> bool:
+    """Look at every file of a run, in its store and in its folder, and tell what is damaged or missing.
+
+    Returns:
+        Whether every product is there and as it was written, and so is what the run folder shows.
+    """
+    verdicts = examine(store, point)
+    for name, verdict in verdicts.items():
+        if verdict.damaged:
+            print_error(f"{name}: {why_stale(verdict)}")
+        elif verdict.stale:
+            print_error(
+                f"{name}: {why_stale(verdict)}" if verdict.missing else f"{name}: is not of this case as it is now"
+            )
+        else:
+            record = store.record(point, name) or {"files": {}}
+            console.print(f"ok     {name:<11} {len(record['files']) + 1} files")
+    lost = not_as_put(store, store.folder)
+    for told in lost:
+        print_error(f"{told}; `reflowshock run` puts it back")
+    return not lost and not any(verdict.stale for verdict in verdicts.values())
+
+
+def clean(folder: Path, name: str, *, unused: bool = False, force: bool = False) -> None:
+    """Remove what the program has written into a run folder; what a user has put there stays.
+
+    Args:
+        folder: the run folder.
+        name: of the case.
+        unused: remove only products that the run folder does not show, and work that was broken off.
+        force: whether the folder may hold another case.
+
+    Raises:
+        CaseError: the folder holds another case.
+        RunFolderBusy: a run is at work in it.
+    """
+    if read_mark(folder) is None:
+        console.print(f"nothing to remove: {folder} is not a run folder")
+        return
+    with locked(folder, WHAT, name, force):
+        store = Store(folder, one_run=True)
+        if unused:
+            count = remove_unused(store)
+            console.print(f"removed {count} unused products from {folder}")
+            return
+        withdraw_all(store, folder)
+        left = remove_own(folder)
+    console.print(f"removed {folder}" if not folder.exists() else f"removed all products from {folder}")
+    if left:
+        console.print(f"kept what is not the program's: {', '.join(left)}")
+
+
+def _shower(store: Store, point: Point) -> Callable[[], None]:
+    """Return what shows a product in the run folder soon after it was made, when it is called now and then."""
+    there = [0]
+
+    def show_new() -> None:
+        count = sum(store.has(point, stage) for stage in point.digests)
+        if count != there[0]:
+            there[0] = count
+            show_products(store, point)
+
+    return show_new
+
+
+def _tell_damage(verdicts: dict[str, Verdict], what: str = "it is made again") -> bool:
+    """Tell which products are damaged; return whether any is."""
+    damaged = {name: verdict for name, verdict in verdicts.items() if verdict.damaged}
+    for name, verdict in damaged.items():
+        print_error(f"product {name} is damaged ({', '.join(verdict.damaged)}): {what}")
+    return bool(damaged)
+
+
+def _tell_failure(store: Store, point: Point, stage: str, message: str) -> None:
+    traceback = store.work_folder(point, stage) / f".{stage}.partial" / TRACEBACK
+    place = f"\ntraceback: {traceback}" if traceback.is_file() else ""
+    print_error(f"stage {stage} failed: {message}{place}")
