@@ -1,6 +1,7 @@
 """A session of pytest that tries hard cases in several processes; one that hangs or dies is replaced."""
 
 import os
+import signal
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -39,7 +40,10 @@ class Report:
 
 
 class Reports:
-    """A plugin that takes what tests report in the place of pytest's terminal."""
+    """A plugin that takes what tests report in the place of pytest's terminal.
+
+    While a process starts, an interrupt waits: the process inherits that, and is never interrupted itself.
+    """
 
     def __init__(self, take: Callable[[str, Report], None]) -> None:
         """Keep to whom a test's name and report go."""
@@ -63,10 +67,21 @@ class Reports:
         self._since[nodeid] = time.monotonic()
 
     @pytest.hookimpl(optionalhook=True)
+    def pytest_xdist_setupnodes(self) -> None:
+        """Processes are about to start."""
+        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+
+    @pytest.hookimpl(optionalhook=True)
+    def pytest_testnodeready(self) -> None:
+        """They have started."""
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+
+    @pytest.hookimpl(optionalhook=True)
     def pytest_testnodedown(self, node: Any, error: object) -> None:
-        """Take note how a process broke off, which is known before the report of its test."""
+        """Take note how a process broke off, which is known before the report of its test; another will start."""
         if error:
             self._code = node.gateway._io.wait()
+            self.pytest_xdist_setupnodes()
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         """Hand over what has ended: a call, or a process, of which xdist has a report without a phase."""
@@ -130,13 +145,14 @@ class Session:
             KeyboardInterrupt: it was interrupted.
             RuntimeError: a process could not read the cases.
         """
-        arguments = [f"--config-file={os.devnull}", "--rootdir=/", "--noconftest", "-p", "no:cacheprovider"]
+        arguments = ["-c", os.devnull, "--rootdir=/", "--noconftest", "-p", "no:cacheprovider"]
         arguments += [part for plugin in PLUGINS for part in ("-p", plugin)]
         arguments += [f"--numprocesses={self.cores}", "--max-worker-restart=1000000", f"--random-seed={self.seed}"]
         arguments += [f"--random-cases={name}={count}" for name, count in self.counts.items()]
         reports = Reports(take)
         with _environment():
             code = pytest.main([*arguments, *options, *(str(path.resolve()) for path in files)], plugins=[reports])
+            reports.pytest_testnodeready()
         if reports.broken:
             raise RuntimeError(reports.broken)
         if code == pytest.ExitCode.INTERRUPTED:
