@@ -29,15 +29,14 @@ from reflowshock.cases.hard.trials.grids import grid, mesh_of
 from reflowshock.fem.dynamics.implicit import ImplicitMotion
 from reflowshock.fem.estimates.factor_cost import box_factor
 from reflowshock.fem.estimates.solver_cost import forecast_solvers
-from reflowshock.fem.loads.structure_pulses import pulse_durations, pulses_of
 from reflowshock.fem.materials.library import FR4
 from reflowshock.fem.model.factorisation import Factorisation
 from reflowshock.fem.model.global_matrix import Equations
 from reflowshock.fem.output.compare_structures import solver_differences
+from reflowshock.fem.parallel.communicators import Communicators
 from reflowshock.fem.problem.inputs import INPUT, StructureInput
-from reflowshock.fem.run.structure_participants import make_participant
-from reflowshock.fem.run.structure_run import make_history
-from reflowshock.fem.setup.structure_model import build_structure
+from reflowshock.fem.run.dynamics import make_history, make_participants
+from reflowshock.fem.run.structure import StructureDynamics
 from reflowshock.meshing.board.box import write_box
 from reflowshock.meshing.board.box_plan import Box, BoxHoles, BoxLayer
 
@@ -105,12 +104,13 @@ def run(setting: Setting) -> tuple[dict, dict[str, np.ndarray]]:
     """Run a setting; return its costs, forecast and measured, and its history."""
     with tempfile.TemporaryDirectory() as directory:
         request = input_of(setting, Path(directory))
-        pulses = pulses_of(request.loads)
-        model = build_structure(MPI.COMM_SELF, request, pulse_durations(pulses))
+        problem = StructureDynamics.read(MPI.COMM_SELF, request)
+        comms = Communicators(MPI.COMM_SELF, problem.place(MPI.COMM_SELF).placement)
+        models, model_steps = problem.build(comms, {})
     begin = process_time()
-    participant = make_participant(MPI.COMM_SELF, model, request, pulses)
+    participant = make_participants(comms, problem, models, model_steps).participants["structure"]
     setup = process_time() - begin
-    history, plan, seconds = make_history(MPI.COMM_SELF, {"structure": model}, request, pulses), participant.plan, 0.0
+    history, plan, seconds = make_history(MPI.COMM_SELF, problem, models, model_steps), participant.plan, 0.0
     history.sample({"structure": participant})
     for _ in range(plan.windows):
         begin = process_time()
@@ -118,14 +118,14 @@ def run(setting: Setting) -> tuple[dict, dict[str, np.ndarray]]:
         participant.finish_window()
         seconds += process_time() - begin
         history.sample({"structure": participant})
-    steps, elements = plan.windows * plan.substeps, len(model.body.local.cells)
+    steps, elements = plan.windows * plan.substeps, len(models["structure"].body.local.cells)
     forecast = getattr(forecast_solvers(request, elements, steps, steps), setting.solver)
     costs = {
         "kind": setting.kind,
         "cells": setting.cells,
         "solver": setting.solver,
         "elements": elements,
-        "equations": int(model.body.free.sum()),
+        "equations": int(models["structure"].body.free.sum()),
         "step_us": 1e6 * plan.step,
         "steps": steps,
         "setup_seconds": setup,

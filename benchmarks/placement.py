@@ -26,9 +26,9 @@ from reflowshock.fem.parallel.communicators import Communicators
 from reflowshock.fem.parallel.own_job import own_environment
 from reflowshock.fem.problem.inputs import RunInput
 from reflowshock.fem.problem.shock import Ranks
-from reflowshock.fem.run.shock_run import make_participants, place
+from reflowshock.fem.run.dynamics import make_participants
+from reflowshock.fem.run.package import PackageDrop
 from reflowshock.fem.run.time_loop import run_window
-from reflowshock.fem.setup.shock_models import build_models, divided_package
 from reflowshock.workflow.process.launch import mpi_command
 
 SCHEMES = ("held_velocity", "local_steps")
@@ -38,11 +38,11 @@ PREDICTION, OVERHEAD, BUSY = 0.3, 0.03, 0.9
 
 def measure(world: MPI.Comm, request: RunInput) -> dict:
     """Return the prediction, and the time of windows on all ranks."""
-    divided = divided_package(world, request)
-    plan = place(world, divided, request)
+    problem = PackageDrop.read(world, request)
+    plan = problem.place(world)
     comms = Communicators(world, plan.placement)
-    models, steps = build_models(comms, divided, request, plan.cells)
-    participants, channels, _ = make_participants(comms, models, (steps, divided.scheme), request.shock)
+    models, steps = problem.build(comms, plan.cells)
+    participants, channels, _ = make_participants(comms, problem, models, steps)
     sums = {role: model.body.shared.clock for role, model in models.items()}
     records = np.empty((WINDOWS, 4))
     for record in records:

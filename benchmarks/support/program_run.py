@@ -6,11 +6,10 @@ import numpy as np
 from mpi4py import MPI
 
 from reflowshock.fem.estimates.placement import shared
-from reflowshock.fem.loads.shock_pulse import shock_pulse
 from reflowshock.fem.parallel.communicators import Communicators
 from reflowshock.fem.problem.inputs import RunInput
-from reflowshock.fem.run.shock_run import make_history, make_participants, planned
-from reflowshock.fem.setup.shock_models import build_models, divided_package
+from reflowshock.fem.run.dynamics import make_history, make_participants
+from reflowshock.fem.run.package import PackageDrop
 
 
 class ProgramRun:
@@ -27,16 +26,14 @@ class ProgramRun:
     def __init__(self, request: RunInput) -> None:
         """Build the models."""
         begin = process_time()
-        divided = divided_package(MPI.COMM_SELF, request)
-        comms = Communicators(MPI.COMM_SELF, shared(tuple(divided.tables), 1))
-        models, steps = build_models(comms, divided, request, {})
-        pulse = shock_pulse(request.shock).pulse
-        steps = planned(steps, request, pulse)
+        problem = PackageDrop.read(MPI.COMM_SELF, request)
+        comms = Communicators(MPI.COMM_SELF, shared(tuple(problem.divided.tables), 1))
+        models, steps = problem.build(comms, {})
         self.plan = steps.plan
-        self.participants = make_participants(comms, models, (steps, divided.scheme), request.shock).participants
+        self.participants = make_participants(comms, problem, models, steps).participants
         self.elements = {role: len(model.body.local.cells) for role, model in models.items()}
         self.setup = process_time() - begin
-        self.history = make_history(comms, models, steps, pulse, request)
+        self.history = make_history(comms.world, problem, models, steps)
 
     def window(self) -> None:
         """Go on by one window."""

@@ -4,7 +4,7 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
@@ -23,7 +23,6 @@ from reflowshock.fem.coupling.speeds import (
 )
 from reflowshock.fem.division.division import SchemeName
 from reflowshock.fem.division.tables import Tables
-from reflowshock.fem.division.whole import Treatment
 from reflowshock.fem.estimates.placement import (
     Alternative,
     ModelCost,
@@ -35,15 +34,12 @@ from reflowshock.fem.estimates.placement import (
     shared,
 )
 from reflowshock.fem.materials.elasticity import materials_of_parts
-from reflowshock.fem.materials.parameters import Material
-from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.parallel.checkpoint_files import warn
 from reflowshock.fem.parallel.partition import partition
+from reflowshock.fem.problem.inputs import RunInput, StructureInput
 from reflowshock.fem.problem.shock import Ranks
-
-if TYPE_CHECKING:
-    from reflowshock.fem.setup.shock_models import Divided
+from reflowshock.fem.setup.models import Divided
 
 CALLS = 2.5e-5  # [s] of the interpreter in a step of a motion
 KEPT = "speeds.json"
@@ -97,18 +93,16 @@ class Measured:
     latency: float
 
 
-def loads_of(
-    divided: "Divided[Tables]", materials: Materials | Mapping[str, Material], treatment: Treatment
-) -> dict[Role, ModelWork]:
+def works_of(divided: Divided[Tables], request: RunInput | StructureInput) -> dict[Role, ModelWork]:
     """Return the models of a divided mesh as what is to be distributed."""
-    loads: dict[Role, ModelWork] = {}
+    works: dict[Role, ModelWork] = {}
     for role, tables in divided.tables.items():
-        _, assigned = materials_of_parts(tables.part_names, materials)
+        _, assigned = materials_of_parts(tables.part_names, request.part_materials)
         step = divided.steps.step_of(role)
-        kind = Kind(assigned, treatment.formulation, treatment.kinematics, step)
+        kind = Kind(assigned, request.formulation, request.kinematics, step)
         steps = round(divided.steps.plan.window / step)
-        loads[role] = ModelWork(divided.meshes.get(role), tables.level, tables.ratios, steps, kind)
-    return loads
+        works[role] = ModelWork(divided.meshes.get(role), tables.level, tables.ratios, steps, kind)
+    return works
 
 
 def plan_ranks(

@@ -28,7 +28,7 @@ class Steps:
         plan: Window, substeps.
         critical: Role -> smallest element critical step before mass scaling [s].
         smallest: Smallest critical step that the substeps follow, mass scaling and damping included [s].
-        interface: Smallest element critical step among those that touch the interface or belong to the macro model [s].
+        macro_critical: Smallest element critical step in the macro model and at the interface [s].
         added_mass: Mass that scaling adds [kg].
         model_mass: Mass without scaling [kg].
         meso_step: Step of the meso model's motion [s], the window where its own steps are inside its force.
@@ -37,12 +37,17 @@ class Steps:
 
     plan: WindowPlan
     critical: dict[str, float]
-    interface: float
+    macro_critical: float
     smallest: float
     added_mass: float
     model_mass: float
     meso_step: float = math.nan
     mass_factors: list[NDArray[np.float64]] = field(default_factory=list)
+
+    @property
+    def moved_mass(self) -> float:
+        """Return the mass of all models, scaling included [kg]."""
+        return self.model_mass + self.added_mass
 
     def step_of(self, role: Role) -> float:
         """Return the time step of a model [s]."""
@@ -58,7 +63,7 @@ def steps_of_division(whole: Whole, survey: Survey, division: Division, rules: R
     return Steps(
         plan=division.plan,
         critical={role: float(survey.plain_step[survey.role == role].min()) for role in roles},
-        interface=float(critical[slow if slow.any() else ...].min()),  # of all where no macro model is left
+        macro_critical=float(critical[slow if slow.any() else ...].min()),  # of all where no macro model is left
         smallest=float(critical.min()),
         added_mass=float(survey.added_mass[counted].sum()),
         model_mass=float(survey.mass[counted].sum()),

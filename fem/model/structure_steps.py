@@ -57,7 +57,7 @@ def check_step(dynamics: Dynamics, critical: float) -> None:
 def with_critical(steps: Steps, undamped: float, dynamics: Dynamics) -> Steps:
     """Return explicit steps with another critical step without damping [s]."""
     plan, critical = explicit_plan(dynamics, undamped)
-    return replace(steps, plan=plan, interface=critical, smallest=critical)
+    return replace(steps, plan=plan, macro_critical=critical, smallest=critical)
 
 
 def implicit_steps(comm: MPI.Comm, pieces: Pieces, dynamics: Dynamics, pulses: Iterable[float]) -> Steps:
@@ -99,7 +99,7 @@ def make_steps(comm: MPI.Comm, pieces: Pieces, factor: NDArray[np.float64], chos
         plan=plan,
         mass_factors=[factor],
         critical=critical_by_role(comm, [pieces], sorted(set(comm.allreduce(sorted(set(pieces.roles.tolist())))))),
-        interface=critical,
+        macro_critical=critical,
         smallest=critical,
         added_mass=comm.allreduce(float(mass @ (factor - 1.0))),
         model_mass=comm.allreduce(float(mass.sum())),

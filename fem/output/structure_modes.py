@@ -16,7 +16,7 @@ from reflowshock.fem.model.global_matrix import Equations
 from reflowshock.fem.output.fields import Fields
 from reflowshock.fem.problem.inputs import StructureInput
 from reflowshock.fem.problem.structure import AXES, PrescribedMotion
-from reflowshock.fem.setup.structure_model import StructureModel
+from reflowshock.fem.setup.structure_models import StructureModel
 
 SHOWN = 0.05  # largest displacement of a shape in a field file, in lengths of the structure
 
@@ -34,20 +34,24 @@ class ModeTable:
     mass_fraction: NDArray[np.float64]
 
 
-def find_modes(comm: MPI.Comm, model: StructureModel, request: StructureInput) -> ModeTable | None:
-    """Find and write the natural modes that a run is asked for, None where it is not; collective.
+def find_modes(comm: MPI.Comm, model: StructureModel, mass: float, request: StructureInput) -> ModeTable:
+    """Find and write the natural modes of a structure; collective.
+
+    Args:
+        comm: All ranks of the run.
+        model: The structure.
+        mass: Its mass [kg].
+        request: The input.
 
     Raises:
         AgreedError: More modes are wanted than there are; on every rank.
     """
-    if not request.finds_modes:
-        return None
     body = at_rest_supports(model, request)
     try:
         modes = natural_modes(Equations.of(comm, body), request.dynamics.modes)
     except ValueError as error:  # every rank counts the same equations
         raise AgreedError(f"dynamics.modes: {error}") from error
-    table = ModeTable(modes.frequency, modes.effective_mass / (model.steps.model_mass + model.steps.added_mass))
+    table = ModeTable(modes.frequency, modes.effective_mass / mass)
     if comm.rank == 0:
         (request.output / "modes.json").write_text(json.dumps(mode_rows(table), indent=1), encoding="utf-8")
     write_shapes(comm, replace(model, body=body), request, modes)

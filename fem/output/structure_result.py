@@ -1,6 +1,5 @@
-"""``history.npz`` and ``result.json`` of a structure."""
+"""What ``result.json`` tells of a structure."""
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -8,111 +7,70 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from reflowshock.fem.dynamics.history import History
+from reflowshock.fem.division.structure_tables import StructureTables
 from reflowshock.fem.elements.stress import principal_strains, von_mises
 from reflowshock.fem.estimates.structure_effects import effects
 from reflowshock.fem.mesh.point_table import PointTable
 from reflowshock.fem.model.factorisation import FactorCost
-from reflowshock.fem.output.result import ADDED_MASS_LIMIT, Timings, checked, hourglass_check, quantity
+from reflowshock.fem.output.result import Outcome, Timings, health, model_summary, quantity, sizes
 from reflowshock.fem.output.structure_modes import ModeTable
-from reflowshock.fem.parallel.communicators import Communicators, Role
+from reflowshock.fem.parallel.communicators import Communicators
 from reflowshock.fem.problem.inputs import StructureInput
-from reflowshock.fem.setup.structure_model import StructureModel
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
-    """What a run has found.
+class StructureReport:
+    """The result of a structure; a ``result.Report``."""
 
-    Attributes:
-        history: Samples and energy balance.
-        modes: Natural modes, if this run was asked for them.
-        peaks: Cell field -> layer -> largest value of an element at the times of the fields.
-        factor: What the factorisation of an implicit solver took.
-        coupling: How two models are coupled, if there are two.
-    """
+    request: StructureInput
 
-    history: History
-    modes: ModeTable | None
-    peaks: dict[str, dict[str, float]]
-    factor: FactorCost | None
-    coupling: dict[str, Any] | None
+    def summary(self, comms: Communicators, outcome: Outcome[StructureTables]) -> dict[str, Any]:
+        """Return sizes, steps, masses and where the watch points are; collective, complete on all ranks."""
+        structure, steps = self.request.structure, outcome.steps
+        tables = next(iter(outcome.models.values())).tables
+        elements, nodes = sizes(comms, outcome.models)
+        return model_summary(comms, steps, self.request.mode) | {
+            "solver": self.request.solver,
+            "element": structure.element,
+            "formulation": structure.formulation if structure.element == "hexahedron" else "",
+            "elements": sum(elements.values()),
+            "nodes": sum(nodes.values()) - len(tables.interface),
+            "critical_step": steps.macro_critical,
+            "steps": steps.plan.windows * steps.plan.substeps,
+            "samples": steps.plan.windows // steps.plan.stride,
+            "watch": {
+                name: {"node_at": node.tolist(), "strain_at": strain.tolist()}
+                for name, node, strain in zip(
+                    tables.watch.names, tables.watch.points, tables.watch.strain_points, strict=True
+                )
+            },
+            "models": elements,
+        }
 
-
-def write_result(
-    comms: Communicators,
-    request: StructureInput,
-    models: Mapping[Role, StructureModel],
-    found: Found,
-    timings: Timings,
-) -> None:
-    """Write both files on rank 0; collective."""
-    summary, history = model_summary(comms, request, models), found.history
-    model = next(iter(models.values()))
-    if comms.world.rank == 0:
-        history.write(request.output)
-        arrays = history.arrays()
-        result = {
+    def sections(
+        self,
+        outcome: Outcome[StructureTables],
+        arrays: Mapping[str, NDArray],
+        summary: dict[str, Any],
+        timings: Timings,
+    ) -> dict[str, Any]:
+        """Return metrics, health, effects, the time of windows, and the coupling of two models."""
+        tables = next(iter(outcome.models.values())).tables
+        coupling = {"coupling": outcome.coupling | {"placement": timings.balance}} if outcome.coupling else {}
+        return {
             "metrics": cost_metrics(summary, timings)
-            | factor_metrics(found.factor)
-            | {"energy_balance_error": quantity(history.balance.balance_error)}
+            | factor_metrics(outcome.factor)
+            | {"energy_balance_error": quantity(outcome.history.balance.balance_error)}
             | energy_metrics(arrays)
             | point_metrics(arrays)
-            | layer_metrics(found.peaks)
-            | mode_metrics(found.modes),
-            "health": health(history, summary, request),
-            "effects": effects(request, summary["added_mass"], max(found.peaks["neglected_strain"].values()))
-            | strain_effect(model.tables.watch),
-            **coupling_of(found, timings),
-            "timings": timings.seconds,
+            | layer_metrics(outcome.peaks)
+            | mode_metrics(outcome.modes),
+            "health": health(self.request, outcome),
+            "effects": effects(self.request, summary["added_mass"], outcome.neglected_strain)
+            | strain_effect(tables.watch),
             "balance": timings.balance,
-            "continued_from": timings.first,
-            "model": summary,
-            "parts": list(model.tables.part_names),
+            **coupling,
         }
-        (request.output / "result.json").write_text(json.dumps(result, indent=1), encoding="utf-8")
-
-
-def model_summary(
-    comms: Communicators, request: StructureInput, models: Mapping[Role, StructureModel]
-) -> dict[str, Any]:
-    """Return sizes, steps, masses and where the watch points are; collective, complete on all ranks."""
-    first = next(iter(models.values()))
-    steps, watch = first.steps, first.tables.watch
-    elements, nodes = sizes(comms, models)
-    return {
-        "mode": "structure",
-        "solver": request.solver,
-        "element": request.structure.element,
-        "formulation": request.structure.formulation if request.structure.element == "hexahedron" else "",
-        "ranks": comms.world.size,
-        "placement": comms.placement.name,
-        "elements": sum(elements.values()),
-        "nodes": sum(nodes.values()) - len(first.tables.interface),
-        "critical_steps": steps.critical,
-        "critical_step": steps.interface,
-        "window": steps.plan.window,
-        "substeps": steps.plan.substeps,
-        "step": steps.plan.step,
-        "steps": steps.plan.windows * steps.plan.substeps,
-        "windows": steps.plan.windows,
-        "samples": steps.plan.windows // steps.plan.stride,
-        "added_mass": steps.added_mass,
-        "model_mass": steps.model_mass,
-        "watch": {
-            name: {"node_at": watch.points[k].tolist(), "strain_at": watch.strain_points[k].tolist()}
-            for k, name in enumerate(watch.names)
-        },
-        "models": elements,
-    }
-
-
-def sizes(comms: Communicators, models: Mapping[Role, StructureModel]) -> tuple[dict[Role, int], dict[Role, int]]:
-    """Return the numbers of elements and of nodes of every model; collective, complete on all ranks."""
-    mine = {role: (len(model.body.local.cells), model.tables.nodes) for role, model in models.items()}
-    everyone = comms.world.allgather(mine)
-    elements = {role: sum(rank[role][0] for rank in everyone if role in rank) for role in comms.first}
-    return elements, {role: next(rank[role][1] for rank in everyone if role in rank) for role in comms.first}
 
 
 def cost_metrics(summary: dict[str, Any], timings: Timings) -> dict[str, Any]:
@@ -133,13 +91,6 @@ def cost_metrics(summary: dict[str, Any], timings: Timings) -> dict[str, Any]:
     }
 
 
-def coupling_of(found: Found, timings: Timings) -> dict[str, Any]:
-    """Return how two models are coupled and placed; nothing where there is one."""
-    if found.coupling is None:
-        return {}
-    return {"coupling": found.coupling | {"placement": timings.balance}}
-
-
 def factor_metrics(cost: FactorCost | None) -> dict[str, Any]:
     """Return the size of a factored matrix, if there is one."""
     if cost is None:
@@ -155,14 +106,14 @@ def strain_effect(watch: PointTable) -> dict[str, Any]:
     return {"strain_at_surface": {"on": not away, "why": why if away else "a linear fit to the means of elements"}}
 
 
-def energy_metrics(arrays: dict[str, NDArray]) -> dict[str, Any]:
+def energy_metrics(arrays: Mapping[str, NDArray]) -> dict[str, Any]:
     """Return the largest value of each energy that the energy balance keeps and that is not zero throughout."""
     names = ("kinetic", "internal", "plastic", "hourglass", "damping", "external")
     peaks = {name: float(np.abs(arrays[name]).max()) for name in names if name in arrays}
     return {f"peak_{name}_energy": quantity(peak, "J") for name, peak in peaks.items() if peak > 0.0}
 
 
-def point_metrics(arrays: dict[str, NDArray]) -> dict[str, Any]:
+def point_metrics(arrays: Mapping[str, NDArray]) -> dict[str, Any]:
     """Return peaks at watch points and supports: ``<metric>@<name>``."""
     metrics: dict[str, Any] = {}
     for name in arrays["watch"]:
@@ -198,12 +149,3 @@ def layer_metrics(peaks: dict[str, dict[str, float]]) -> dict[str, Any]:
 def mode_metrics(modes: ModeTable | None) -> dict[str, Any]:
     """Return the first natural frequency, if modes were found."""
     return {} if modes is None else {"first_frequency": quantity(float(modes.frequency[0]), "Hz")}
-
-
-def health(history: History, summary: dict[str, Any], request: StructureInput) -> dict[str, Any]:
-    """Return the checks of a finished run."""
-    checks = {
-        "energy_balance_error": (history.balance.balance_error, request.dynamics.numerics.energy_balance_limit),
-        "added_mass_fraction": (summary["added_mass"] / summary["model_mass"], ADDED_MASS_LIMIT),
-    }
-    return checked(checks | hourglass_check(history, request.structure.formulation))

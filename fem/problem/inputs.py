@@ -5,10 +5,11 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, TypeAdapter
 
+from reflowshock.fem.materials.parameters import Material
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.parameters import Parameters
-from reflowshock.fem.problem.shock import Shock
-from reflowshock.fem.problem.structure import SolverName, StructureProblem
+from reflowshock.fem.problem.shock import Ranks, Shock, ShockNumerics
+from reflowshock.fem.problem.structure import DynamicsNumerics, LayerCoupling, SolverName, StructureProblem
 
 UNRELATED = {"checkpoint_seconds", "watchdog_seconds"}  # numerics that results do not depend on
 
@@ -59,6 +60,35 @@ class RunInput(PackageInput):
     cooling: Path | None = None
 
     @property
+    def numerics(self) -> ShockNumerics:
+        """Return how the motion is computed."""
+        return self.shock.numerics
+
+    @property
+    def part_materials(self) -> Materials:
+        """Return the material of each role that a part can have."""
+        return self.materials
+
+    @property
+    def formulation(self) -> str:
+        """Return the formulation of hexahedra."""
+        return self.shock.numerics.formulation
+
+    @property
+    def kinematics(self) -> Literal["small", "finite"]:
+        """Return whether rotations and strains are small."""
+        return self.shock.numerics.decided_kinematics
+
+    @property
+    def coupled(self) -> bool:
+        """Return whether the run has two models."""
+        return self.mode == "two_scale"
+
+    def ranks(self, started: int) -> Ranks:
+        """Return which of so many ranks work on which model."""
+        return self.shock.ranks
+
+    @property
     def computed(self) -> str:
         """Return all that results depend on: not where they go, nor which ranks compute them."""
         shock: Any = {"ranks": True, "numerics": UNRELATED}
@@ -74,6 +104,16 @@ class RunInput(PackageInput):
     def one_way(self) -> bool:
         """Whether a coarse model of all drives a finer one of some joints."""
         return self.mode == "two_scale" and self.shock.coupling.direction == "one_way"
+
+    @property
+    def initial_velocity(self) -> tuple[float, float, float]:
+        """Return the velocity of all that is free at time zero [m/s]: none."""
+        return 0.0, 0.0, 0.0
+
+    @property
+    def hht_alpha(self) -> float:
+        """Return the alpha of the HHT method."""
+        return 0.0
 
     @property
     def implicit(self) -> bool:
@@ -106,9 +146,54 @@ class StructureInput(StructureProblem):
         return self.model_dump_json(exclude={"output": True, "checkpoints": True, "dynamics": dynamics})
 
     @property
+    def files(self) -> tuple[Path, ...]:
+        """Return all files that results depend on."""
+        return (self.mesh, *(Path(load.table) for load in self.loads.values() if load.table is not None))
+
+    @property
+    def numerics(self) -> DynamicsNumerics:
+        """Return how the motion is computed."""
+        return self.dynamics.numerics
+
+    @property
+    def part_materials(self) -> dict[str, Material]:
+        """Return the material of each part: of each layer."""
+        return self.layer_materials
+
+    @property
+    def formulation(self) -> str:
+        """Return the formulation of hexahedra."""
+        return self.structure.formulation
+
+    @property
+    def kinematics(self) -> Literal["small", "finite"]:
+        """Return whether rotations and strains are small."""
+        return self.dynamics.kinematics
+
+    @property
+    def initial_velocity(self) -> tuple[float, float, float]:
+        """Return the velocity of all that is free at time zero [m/s]."""
+        return self.dynamics.initial_velocity
+
+    @property
+    def hht_alpha(self) -> float:
+        """Return the alpha of the HHT method."""
+        return self.dynamics.numerics.hht_alpha
+
+    @property
+    def implicit(self) -> bool:
+        """Whether the run takes implicit steps."""
+        return self.solver == "implicit"
+
+    @property
     def coupled(self) -> bool:
         """Return whether the run has two models."""
         return self.solver == "explicit" and self.dynamics.coupling is not None
+
+    def ranks(self, started: int) -> Ranks:
+        """Return which of so many ranks work on which model."""
+        coupling = self.dynamics.coupling or LayerCoupling()
+        return Ranks(total=started, placement=coupling.placement, macro=coupling.macro_ranks)
 
     @property
     def finds_modes(self) -> bool:

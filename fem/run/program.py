@@ -13,8 +13,8 @@ from reflowshock.fem.parallel.watchdog import Watchdog
 from reflowshock.fem.problem.inputs import INPUT, CoolingInput, RunInput, StructureInput
 from reflowshock.fem.problem.structure_checks import check
 from reflowshock.fem.run.cooling import run_cooling
-from reflowshock.fem.run.shock_run import run
-from reflowshock.fem.run.structure_run import run_structure
+from reflowshock.fem.run.package import run
+from reflowshock.fem.run.structure import run_structure
 
 
 def main(world: MPI.Comm, arguments: list[str]) -> int:

@@ -4,6 +4,7 @@ import json
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
@@ -37,6 +38,9 @@ class Pictures(Protocol):
 
     def sample(self, participants: Participants) -> None:
         """Take it now; collective over all models."""
+
+    def write(self, directory: Path) -> None:
+        """Write all that was taken; on rank 0."""
 
     def state(self) -> State:
         """Return what was taken so far, for a checkpoint."""

@@ -1,4 +1,4 @@
-"""Four ranks, three of which meet at one corner of the cut: what they add up there is exact."""
+"""Four ranks, three of which meet at one corner of the interface: what they add up there is exact."""
 
 import pytest
 

@@ -23,7 +23,7 @@ from pathlib import Path
 from mpi4py import MPI
 from reflowshock.fem.run import time_loop
 from reflowshock.fem.run import program
-from reflowshock.fem.run import shock_run
+from reflowshock.fem.run import dynamics
 from reflowshock.fem.errors import InvertedElementError
 
 world, what, where = MPI.COMM_WORLD, sys.argv[2], sys.argv[3]
@@ -47,7 +47,7 @@ def broken(real):
     return call
 
 if where == "set-up":
-    shock_run.make_history = broken(shock_run.make_history)
+    dynamics.make_history = broken(dynamics.make_history)
 else:
     time_loop.run_window = broken(time_loop.run_window)
 sys.exit(program.main(world, sys.argv[1:2]))
@@ -99,7 +99,7 @@ def errors_of(directory: Path, checkpoints: Path, what: str, where: str) -> str:
         ("SIGKILL", r"error: rank 1 \((macro|meso)\) has died, all ranks are ended in window 2"),
         (
             "SIGSTOP",
-            r"rank 0 \((macro|meso)\): in window 21 it has waited [2-9] s for values of the cut .* rank 1",
+            r"rank 0 \((macro|meso)\): in window 21 it has waited [2-9] s for values of the interface .* rank 1",
         ),
     ],
 )

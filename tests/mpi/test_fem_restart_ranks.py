@@ -20,8 +20,8 @@ import numpy as np
 from mpi4py import MPI
 from reflowshock.fem.run import time_loop
 from reflowshock.fem.problem.inputs import INPUT, RunInput
-from reflowshock.fem.run.shock_run import run
-from reflowshock.fem.run.structure_run import run_structure
+from reflowshock.fem.run.package import run
+from reflowshock.fem.run.structure import run_structure
 
 ENERGIES = {"kinetic", "internal", "plastic", "hourglass", "damping", "external", "interface", "balance"}
 world, run_window = MPI.COMM_WORLD, time_loop.run_window

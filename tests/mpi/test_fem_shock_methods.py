@@ -9,7 +9,7 @@ import pytest
 from mpi4py import MPI
 
 from reflowshock.fem.problem.inputs import RunInput
-from reflowshock.fem.run import shock_run
+from reflowshock.fem.run import package
 from tests.support.fem_models import write_small_assembly
 from tests.support.fem_program import run_program
 
@@ -33,7 +33,7 @@ def run(directory: Path, mode: Literal["two_scale", "dns"], **changes) -> tuple[
     request = {"mode": mode, "meshes": meshes, "shock": SHOCK | changes, "output": str(output)}
     if mode == "dns":
         output.mkdir()
-        shock_run.run(MPI.COMM_SELF, RunInput.model_validate(request))
+        package.run(MPI.COMM_SELF, RunInput.model_validate(request))
     else:
         path = directory / "input.json"
         path.write_text(json.dumps(request))

@@ -8,7 +8,7 @@ import pytest
 from mpi4py import MPI
 
 from reflowshock.fem.errors import InvertedElementError
-from reflowshock.fem.run.structure_run import run_structure
+from reflowshock.fem.run.structure import run_structure
 from tests.support.fem_structures import LENGTH, STEEL, structure_input, structure_tables_of
 
 DURATION = 4e-4

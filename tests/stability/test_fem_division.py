@@ -1,4 +1,4 @@
-"""Divisions of hard shapes: what the program chooses is stable, exact at tie and cut; what is neither is refused."""
+"""Divisions of hard shapes: the program's choice is stable, exact at tie and interface; what is neither is refused."""
 
 import numpy as np
 import pytest

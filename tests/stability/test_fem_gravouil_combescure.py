@@ -25,7 +25,7 @@ def kicked(pair: Pair) -> Coupled:
 
 
 def gap(coupled: Coupled) -> np.ndarray:
-    """Return the gap at the cut (nc, 3) [m], each side's displacement plus (step / 2)^2 times its acceleration."""
+    """Return the gap at the interface (nc, 3) [m], displacements plus (step / 2)^2 times its acceleration."""
     moved = []
     for part in coupled.parts:
         motion, interface = part.motion, part.motion.body.interface
@@ -34,7 +34,7 @@ def gap(coupled: Coupled) -> np.ndarray:
 
 
 def link_momentum(coupled: Coupled) -> np.ndarray:
-    """Return the momentum (6,) that the gap at the cut stands for."""
+    """Return the momentum (6,) that the gap at the interface stands for."""
     body = coupled.macro.motion.body
     impulse = 2.0 * body.mass[body.interface, None] / coupled.plan.window * gap(coupled)
     return net_load(body.local.points[body.interface], impulse)

@@ -1,7 +1,7 @@
 """The window of the two-scale scheme must not grow: spectral radii of the program's own operator, not movies.
 
-At 0.9 of the element step, with two layers of board between cut and joint, the radius is at most 1 + 1e-8; the naive
-scheme, fine elements at the cut, must be seen to fail by the same measure.
+At 0.9 of the element step, with two layers of board between interface and joint, the radius is at most 1 + 1e-8; the
+naive scheme, fine elements at the interface, must be seen to fail by the same measure.
 """
 
 import numpy as np

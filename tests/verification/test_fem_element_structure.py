@@ -9,7 +9,7 @@ from mpi4py import MPI
 
 from reflowshock.cases.hard.trials.boxes import KINDS, box
 from reflowshock.cases.hard.trials.grids import mesh_of, on
-from reflowshock.fem.run.structure_run import run_structure
+from reflowshock.fem.run.structure import run_structure
 from tests.support.fem_structures import LENGTH, THICKNESS, WIDTH, structure_input, structure_tables_of
 
 CELLS = (16, 4, 2)

@@ -7,7 +7,7 @@ from mpi4py import MPI
 from reflowshock.fem.output.compare import compare_histories
 from reflowshock.fem.problem.inputs import RunInput
 from reflowshock.fem.problem.shock import Shock
-from reflowshock.fem.run.shock_run import run
+from reflowshock.fem.run.package import run
 from tests.support.fem_models import write_small_assembly
 
 

@@ -84,7 +84,7 @@ def test_momentum_of_a_free_body_stays():
 
 @pytest.mark.parametrize("ratios", [(14,), (5, 3)], ids=str)
 def test_two_models_that_share_the_levels_move_as_one(ratios):
-    """The meso model has the elements of all levels below the window; its cut is the ring of the first level."""
+    """The meso model has the elements of all levels below the window; its interface is the ring of the first level."""
     whole = levelled(MESH, Materials(), ratios)
     level = np.empty_like(whole.level)
     level[whole.body.local.cell_numbers] = whole.level

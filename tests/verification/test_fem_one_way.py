@@ -24,7 +24,7 @@ FINE, COARSE = Pair(ratio=2, height=4), Pair(ratio=1, height=2)  # the same bloc
 
 
 def driver_of(models: Models) -> tuple[Pieces, Tables]:
-    """Return a board of its own with the coarse block, which knows the cut of the fine block's model."""
+    """Return a board of its own with the coarse block, which knows the interface of the fine block's model."""
     whole, _, _ = surveyed(COARSE.mesh(), SOLDER)
     pieces, tables = pieces_of(model_inputs(whole, "dns")["dns"], SOLDER)
     fine, meso = models.parts["meso"]

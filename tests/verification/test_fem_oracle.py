@@ -10,7 +10,7 @@ from mpi4py import MPI
 from reflowshock.cases.hard.trials.grids import grid, mesh_of, on
 from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.output.compare_structures import solver_differences
-from reflowshock.fem.run.structure_run import run_structure
+from reflowshock.fem.run.structure import run_structure
 from tests.support.fem_structures import structure_input
 
 X, Y, Z = 66e-3, 38.5e-3, 1e-3

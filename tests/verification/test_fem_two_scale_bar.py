@@ -1,4 +1,4 @@
-"""Waves through tie and cut of two coupled models: what comes back, the error against exact waves and its order."""
+"""Waves through tie and interface of coupled models: what comes back, the error against exact waves and its order."""
 
 from pathlib import Path
 

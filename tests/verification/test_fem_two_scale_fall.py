@@ -21,7 +21,7 @@ PULSE = half_sine_drop(peak=1.5e4, duration=2e-5)
     [("held_velocity", 1e-10), ("impulse", 1e-10), ("local_steps", 1e-10), ("gravouil_combescure", 1e-3)],
 )
 def test_a_body_acceleration_moves_both_models_alike(scheme, limit):
-    """With held velocity, a meso model that falls by itself in every substep runs ahead of its cut by 1 % of the way.
+    """With held velocity, a meso model that falls by itself in each substep runs ahead of its interface by 1 %.
 
     The models of Gravouil-Combescure each integrate the load in their own steps: they differ by its second order.
     """

@@ -11,7 +11,7 @@ from reflowshock.fem.coupling.planner import KEPT, kept
 from reflowshock.fem.parallel.checkpoint import Checkpoints
 from reflowshock.fem.parallel.portable import Log, Rows, Same, Shares, Sum
 from reflowshock.fem.run import time_loop
-from reflowshock.fem.run.structure_run import run_structure
+from reflowshock.fem.run.structure import run_structure
 from tests.support.fem_structures import structure_input
 from tests.support.forged_files import DAMAGES
 

@@ -116,5 +116,5 @@ def test_window_above_the_elements_step_is_refused(mesh):
 def test_board_that_is_all_buffer_is_refused(mesh):
     parts = scene(mesh, scheme="held_velocity", buffer_layers=20)
     division = divide(*parts)
-    assert steps_of_division(*parts[:2], division, parts[2]).interface > 0.0
+    assert steps_of_division(*parts[:2], division, parts[2]).macro_critical > 0.0
     refused(parts, division, r"nothing is left for the macro model: .*20 layers")

@@ -6,15 +6,15 @@ from mpi4py import MPI
 
 from reflowshock.fem.dynamics.energy_balance import EnergyBalance
 from reflowshock.fem.errors import StepError
-from reflowshock.fem.run.structure_run import run_structure
+from reflowshock.fem.run.structure import run_structure
 from reflowshock.fem.run.time_loop import GUARD
-from reflowshock.fem.setup.structure_model import build_structure
+from reflowshock.fem.setup.structure_models import build_structure
 from tests.support.fem_structures import structure_input
 
 
 def steps_of(directory, **numerics):
     request = structure_input(directory, dynamics={"duration": 8e-5, "numerics": {"history_samples": 40} | numerics})
-    return build_structure(MPI.COMM_SELF, request, []).steps
+    return build_structure(MPI.COMM_SELF, request, [])[1]
 
 
 def test_given_step_is_taken_or_refused(tmp_path):
@@ -33,7 +33,7 @@ def test_given_step_is_taken_or_refused(tmp_path):
 def test_energies_are_looked_at_between_samples_that_are_far_apart(tmp_path, monkeypatch):
     numerics = {"history_samples": 2, "field_samples": 2}
     request = structure_input(tmp_path, dynamics={"duration": 8e-5, "numerics": numerics})
-    steps, looked = build_structure(MPI.COMM_SELF, request, []).steps.plan, []
+    steps, looked = build_structure(MPI.COMM_SELF, request, [])[1].plan, []
     judge = EnergyBalance.judge
     monkeypatch.setattr(
         EnergyBalance, "judge", lambda self, sums, time: (looked.append(time), judge(self, sums, time))[1]

@@ -18,7 +18,7 @@ from reflowshock.fem.problem.inputs import RunInput
 from reflowshock.fem.problem.shock import Shock
 from reflowshock.fem.problem.shock_checks import problems
 from reflowshock.fem.run import time_loop
-from reflowshock.fem.run.shock_run import run
+from reflowshock.fem.run.package import run
 from tests.support.fem_models import SITES, small_assembly, write_small_assembly
 
 TIMES = 4e-6, 1e-5

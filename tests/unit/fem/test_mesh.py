@@ -1,4 +1,4 @@
-"""Reading, selecting, merging meshes; finding the cut."""
+"""Reading, selecting, merging meshes; finding the interface."""
 
 import numpy as np
 import pytest

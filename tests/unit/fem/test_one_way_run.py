@@ -13,7 +13,7 @@ from reflowshock.fem.errors import AgreedError
 from reflowshock.fem.mesh.mesh import append
 from reflowshock.fem.problem.inputs import RunInput
 from reflowshock.fem.problem.shock_checks import problems
-from reflowshock.fem.run.shock_run import run
+from reflowshock.fem.run.package import run
 from tests.support.fem_models import SITES, write_msh, write_small_assembly
 
 SHOCK = {

@@ -5,7 +5,7 @@ import pytest
 from mpi4py import MPI
 
 from reflowshock.fem.run import time_loop
-from reflowshock.fem.run.structure_run import run_structure
+from reflowshock.fem.run.structure import run_structure
 from tests.support.fem_structures import STEEL, structure_input
 
 NUMERICS = {"history_samples": 20, "field_samples": 3, "checkpoint_seconds": 1e-9}

@@ -89,7 +89,7 @@ def answered(bodies, mass: np.ndarray, script):
 
 
 def test_macro_model_on_springs_stores_their_energy(bodies):
-    """Springs of k N/m hold the cut: the work across it is k u^2 / 2, exactly, whatever the step."""
+    """Springs of k N/m hold the interface: the work across it is k u^2 / 2, exactly, whatever the step."""
     stiffness, count = 1e4, len(bodies[0]["macro"].interface)
     macro, meso = answered(bodies, np.full(count, 1e-9), lambda time, u, v: -stiffness * u)
     assert np.array_equal(meso.force, macro.interface_force()[macro.motion.body.interface])

@@ -14,8 +14,8 @@ from reflowshock.fem.loads.structure_loads import structure_loads
 from reflowshock.fem.loads.structure_pulses import pulses_of
 from reflowshock.fem.output.compare_structures import solver_differences
 from reflowshock.fem.run.program import main
-from reflowshock.fem.run.structure_run import run_structure
-from reflowshock.fem.setup.structure_model import build_structure
+from reflowshock.fem.run.structure import run_structure
+from reflowshock.fem.setup.structure_models import build_structure
 from tests.support.fem_structures import (
     LENGTH,
     STEEL,
@@ -171,7 +171,7 @@ def test_both_solvers_agree_under_all_loads(tmp_path):
 def test_pressure_follows_the_surface_where_it_may_turn(tmp_path, kinematics, kind):
     loads = {"push": {"kind": "pressure", "on": "z_max", "peak": 1e5, "pulse": "constant"}}
     request = structure_input(tmp_path, loads=loads, dynamics={"duration": 1e-5, "kinematics": kinematics})
-    model = build_structure(MPI.COMM_SELF, request, [])
+    model, _ = build_structure(MPI.COMM_SELF, request, [])
     (load,) = structure_loads(MPI.COMM_SELF, model.body, model.tables, request, pulses_of(request.loads))
     assert isinstance(load, kind)
 

@@ -11,7 +11,7 @@ from reflowshock.fem.mesh.mesh_file import read_mesh
 from reflowshock.fem.output.compare import relative_error
 from reflowshock.fem.output.compare_structures import solver_differences
 from reflowshock.fem.problem.structure_checks import problems
-from reflowshock.fem.setup.structure_divided import divided_on_one_rank, structure_inputs
+from reflowshock.fem.setup.structure_models import divided_on_one_rank, structure_inputs
 from tests.support.fem_bars import bar_layers, run_bar, write_bar
 
 WIDTH = 2e-3
@@ -78,7 +78,7 @@ def test_a_pulse_shorter_than_a_window_is_refused_with_both_durations(tmp_path):
 
 @pytest.mark.parametrize("scheme", ["held_velocity", "gravouil_combescure", "local_steps"])
 def test_two_models_move_as_one(tmp_path, scheme):
-    """Within the error of their steps: loads across tie and cut, reactions, watch points of both models."""
+    """Within the error of their steps: loads across tie and interface, reactions, watch points of both models."""
     changes = {"coupling": {"scheme": scheme, "fine": ["layer_1"]}}
     result, two = run_bar(write_bar(tmp_path / "two", WIDTH, LAYERS, 1e-5, **TABLES, dynamics=dynamics(**changes)))
     assert all(check["ok"] for check in result["health"].values())
@@ -120,7 +120,7 @@ def test_what_acts_on_fine_elements_strains_them_as_in_one_model(tmp_path, load,
 
 @pytest.mark.parametrize("scheme", ["held_velocity", "impulse"])
 def test_a_support_in_the_meso_model_bears_a_body_force_as_in_one_model(tmp_path, scheme):
-    """Nine steps a window; pushed once a window, elements at support and cut were strained 3.5 and 8 % wrong."""
+    """Nine steps a window; pushed once a window, elements at support and interface were strained 3.5 and 8 % wrong."""
     layers = bar_layers(("FR4", 1e-3, 16, (2, 2)), ("FR4", 6e-3, 6, (2, 2)))
     scene = {
         "loads": {"drop": {"kind": "input_g", "peak": 1e4, "duration": 3e-5}},
@@ -136,7 +136,7 @@ def test_a_support_in_the_meso_model_bears_a_body_force_as_in_one_model(tmp_path
 
 
 def test_impulses_refuse_a_prescribed_motion_of_the_cut(tmp_path):
-    """The macro model alone would know of it, and the meso model's cut run away: strains were 1.3 times wrong."""
+    """The macro model alone would know of it, and the meso model's interface run away: strains were 1.3 times wrong."""
     side = {"loads": {"side": LOADS["pull"] | {"on": "x_max", "component": "x"}}, "supports": {}}
     changes = dynamics(coupling={"scheme": "impulse", "fine": ["layer_1"]})
     with pytest.raises(CouplingError, match=r"loads\.side moves 6 nodes of the interface.*impulse"):

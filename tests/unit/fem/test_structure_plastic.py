@@ -8,7 +8,7 @@ import pytest
 from mpi4py import MPI
 
 from reflowshock.fem.dynamics.history import History
-from reflowshock.fem.run.structure_run import run_structure
+from reflowshock.fem.run.structure import run_structure
 from tests.support.fem_structures import LENGTH, STEEL, THICKNESS, WIDTH, structure_input
 
 YIELD, SLOPE = 2e8, 2e9

@@ -1,5 +1,6 @@
-"""A structure as two models: which layers are fine, how they are divided, the tables of each."""
+"""From the mesh of a structure to its models on each rank: one, or fine layers apart from the others."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -14,35 +15,108 @@ from reflowshock.fem.division.rules import Rules
 from reflowshock.fem.division.split import Part, interface_between, part_of
 from reflowshock.fem.division.structure_tables import StructureTables, structure_tables, tied
 from reflowshock.fem.division.tables import ModelInput
-from reflowshock.fem.division.whole import Survey, Treatment, Whole, survey
+from reflowshock.fem.division.whole import Survey, Whole, survey
 from reflowshock.fem.errors import CouplingError, StepError
 from reflowshock.fem.estimates.placement import Role
+from reflowshock.fem.forces.force import linear_terms
 from reflowshock.fem.loads.structure_pulses import pulse_durations, pulses_of
+from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.mesh.mesh_file import read_mesh
-from reflowshock.fem.model.steps import steps_of_division
+from reflowshock.fem.model.assembly import ForceOptions, Pieces, make_body, make_pieces
+from reflowshock.fem.model.power_iteration import highest_frequency
+from reflowshock.fem.model.steps import Steps, steps_of_division
+from reflowshock.fem.model.structure_steps import check_step, explicit_steps, implicit_steps, with_critical
+from reflowshock.fem.parallel.agreement import agreed
+from reflowshock.fem.parallel.communicators import Communicators
+from reflowshock.fem.parallel.local_mesh import distribute
 from reflowshock.fem.problem.inputs import StructureInput
 from reflowshock.fem.problem.structure import LayerCoupling, PrescribedMotion, fine_layers
-from reflowshock.fem.setup.shock_models import Divided, told_to_all
+from reflowshock.fem.setup.models import Divided, Model, assembled, distributed, divided_on_root, treatment_of
 
-DividedStructure = Divided[StructureTables]
+StructureModel = Model[StructureTables]
 
 
-def divided_structure(world: MPI.Comm, request: StructureInput) -> DividedStructure:
+def build_structure(comm: MPI.Comm, request: StructureInput, pulses: list[float]) -> tuple[StructureModel, Steps]:
+    """Read and distribute a structure, choose its steps and assemble it as one model; collective.
+
+    Args:
+        comm: All ranks of the run.
+        request: The input.
+        pulses: Durations of its loads [s].
+
+    Raises:
+        AgreedError: The mesh does not fit the input; on every rank.
+    """
+    mesh, tables = read_structure(comm, request)
+    local = distribute(comm, mesh)
+    pieces = agreed(comm, lambda: make_pieces(local, tables, request.part_materials, request.formulation))
+    steps = choose_steps(comm, pieces, request, pulses)
+    model = assemble(comm, pieces, tables, steps, request)
+    if request.implicit:
+        return model, steps
+    if request.numerics.critical_step == "power_iteration":
+        found = highest_frequency(comm, model.body, linear_terms(model.body.elements), model.body.mass)
+        steps = with_critical(steps, found.critical_step, request.dynamics)
+        model = assemble(comm, pieces, tables, steps, request)  # made anew: a law that depends on the rate has the step
+    check_step(request.dynamics, steps.smallest)
+    return model, steps
+
+
+def assemble(
+    comm: MPI.Comm, pieces: Pieces, tables: StructureTables, steps: Steps, request: StructureInput
+) -> StructureModel:
+    """Return the model that moves by given steps; collective."""
+    options = ForceOptions(request.kinematics, steps.plan.step)
+    return Model(tables, make_body(comm, pieces, tables, steps.mass_factors[0], options))
+
+
+def read_structure(comm: MPI.Comm, request: StructureInput) -> tuple[MeshData | None, StructureTables]:
+    """Read the mesh on rank 0 and build its tables; the mesh is None on the other ranks."""
+
+    def read() -> tuple[MeshData, StructureTables] | None:
+        if comm.rank:
+            return None
+        whole = tied(read_mesh(request.mesh), request)
+        return whole.mesh, structure_tables(whole, request)
+
+    found = agreed(comm, read)
+    return (found[0] if found else None), comm.bcast(found[1] if found else None)
+
+
+def choose_steps(comm: MPI.Comm, pieces: Pieces, request: StructureInput, pulses: list[float]) -> Steps:
+    """Choose the steps of the run's solver."""
+    if request.implicit:
+        return implicit_steps(comm, pieces, request.dynamics, pulses)
+    return explicit_steps(comm, pieces, request.dynamics)
+
+
+def divided_structure(world: MPI.Comm, request: StructureInput) -> Divided[StructureTables]:
     """Read, check and divide the mesh of a structure on rank 0, and tell the other ranks; collective.
 
     Raises:
         AgreedError: A mesh that does not fit, or cannot be divided; on every rank.
     """
-    return told_to_all(world, lambda: divided_on_one_rank(request))
+    return divided_on_root(world, lambda: divided_on_one_rank(request))
 
 
-def divided_on_one_rank(request: StructureInput) -> DividedStructure:
+def build_coupled(
+    comms: Communicators,
+    divided: Divided[StructureTables],
+    request: StructureInput,
+    ranks: Mapping[Role, NDArray[np.int32]],
+) -> dict[Role, StructureModel]:
+    """Distribute and assemble the coupled models of this rank; ``ranks`` as ``distributed``; collective."""
+    pieces = distributed(comms, divided, ranks, request)
+    bodies = assembled(comms, divided, pieces, request.kinematics)
+    return {role: Model(divided.tables[role], body) for role, body in bodies.items()}
+
+
+def divided_on_one_rank(request: StructureInput) -> Divided[StructureTables]:
     """Read, check and divide the mesh of a structure; errors as ``tables``, ``coupling.checks``."""
     coupling, dynamics = request.dynamics.coupling, request.dynamics
     assert coupling is not None
     whole = tied(read_mesh(request.mesh), request)
-    treatment = Treatment(request.structure.formulation, dynamics.kinematics, dynamics.numerics.mass_scaled)
-    found = survey(whole.mesh, request.layer_materials, treatment)
+    found = survey(whole.mesh, request.part_materials, treatment_of(request))
     fine = layers_that_are_fine(whole, found, coupling)
     rules = Rules(
         coupling=coupling,

@@ -1,0 +1,115 @@
+"""A package on a board under input-G: what a run of it has of its own."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from reflowshock.fem.coupling.planner import Plan
+from reflowshock.fem.division.checks import check_pulses
+from reflowshock.fem.division.tables import JointTables
+from reflowshock.fem.dynamics.history import Signal
+from reflowshock.fem.estimates.estimate import implicit_plan, largest_implicit_step, shortened
+from reflowshock.fem.estimates.placement import check_size
+from reflowshock.fem.loads.load import Load
+from reflowshock.fem.loads.pulse import Pulse
+from reflowshock.fem.loads.shock_loads import shock_loads
+from reflowshock.fem.loads.shock_pulse import shock_pulse
+from reflowshock.fem.loads.structure_pulses import pulse_durations
+from reflowshock.fem.model.steps import Steps
+from reflowshock.fem.output.joint_interface import JointInterfaceStress, picture_windows
+from reflowshock.fem.output.package_result import PackageReport
+from reflowshock.fem.output.watch_joints import JointWatch
+from reflowshock.fem.parallel.agreement import agreed
+from reflowshock.fem.parallel.communicators import Communicators, Role
+from reflowshock.fem.problem.inputs import RunInput
+from reflowshock.fem.run.dynamics import place, run_dynamics
+from reflowshock.fem.setup.models import Divided, Model
+from reflowshock.fem.setup.package_models import build_package, divided_package
+
+SPEEDS = 201  # times at which the largest velocity of the table is looked for
+NON_TRIVIAL = 1e-4  # of the energy that the pulse gives a free body: from there on the balance is judged
+
+
+@dataclass(frozen=True, slots=True)
+class PackageDrop:
+    """A package on a board; a ``dynamics.DynamicProblem``."""
+
+    request: RunInput
+    divided: Divided[JointTables]
+    pulse: Pulse
+
+    @classmethod
+    def read(cls, world: MPI.Comm, request: RunInput) -> "PackageDrop":
+        """Read and divide the meshes; collective. Errors as ``run_dynamics``."""
+        if request.coupled:
+            check_size(request.shock.ranks, world.size)
+        divided = divided_package(world, request)
+        return cls(request, divided, agreed(world, lambda: pulse_of(request, divided.steps.plan.window)))
+
+    @property
+    def signals(self) -> Mapping[str, Signal]:
+        """Return the acceleration of the table."""
+        return {"base_acceleration": self.pulse.value}
+
+    @property
+    def report(self) -> PackageReport:
+        """Return what the result tells of it."""
+        return PackageReport(self.request)
+
+    def place(self, world: MPI.Comm) -> Plan:
+        """Choose which ranks carry which model and which cells."""
+        return place(world, self.divided, self.request)
+
+    def build(
+        self, comms: Communicators, cells: Mapping[Role, NDArray[np.int32]]
+    ) -> tuple[dict[Role, Model[JointTables]], Steps]:
+        """Return the models, and steps that may be implicit or end early."""
+        models, steps = build_package(comms, self.divided, self.request, cells)
+        numerics = self.request.numerics
+        if self.request.mode == "dns" and numerics.dns_duration is not None:
+            steps = replace(steps, plan=shortened(steps.plan, numerics.dns_duration))
+        if self.request.implicit:
+            largest = largest_implicit_step(self.request.shock.duration, pulse_durations({"drop": self.pulse}))
+            steps = replace(steps, plan=implicit_plan(steps.plan, largest))
+        return models, steps
+
+    def loads(self, comm: MPI.Comm, model: Model[JointTables], steps: Steps) -> list[Load]:
+        """Return the loads and the damping of a model."""
+        return shock_loads(comm, steps.moved_mass, model.body, model.tables, self.request.shock)
+
+    def watch(self, model: Model[JointTables]) -> JointWatch:
+        """Return the watch points of a model."""
+        return JointWatch(model.tables.watch, model.body, self.request.materials.solder.plasticity is not None)
+
+    def trivial_energy(self, steps: Steps) -> float:
+        """Return a small part of the energy [J] that the pulse gives a free body."""
+        times = np.linspace(0.0, self.request.shock.duration, SPEEDS)
+        speed = max(abs(self.pulse.integral(time)) for time in times)
+        return NON_TRIVIAL * 0.5 * steps.moved_mass * speed**2
+
+    def pictures(
+        self, world: MPI.Comm, models: Mapping[Role, Model[JointTables]], steps: Steps
+    ) -> Sequence[JointInterfaceStress]:
+        """Return what is taken at ``shock.picture_times``."""
+        times = self.request.shock.picture_times
+        tables = {role: (model.tables.joint_interface, model.body) for role, model in models.items()}
+        return [JointInterfaceStress(world, tables, picture_windows(times, steps.plan))] if times else []
+
+    def find_modes(self, comms: Communicators, models: Mapping[Role, Model[JointTables]], steps: Steps) -> None:
+        """Find none."""
+
+
+def run(world: MPI.Comm, request: RunInput) -> None:
+    """Run one shock and write its results; collective over ``world``, errors as ``run_dynamics``."""
+    run_dynamics(world, PackageDrop.read(world, request))
+
+
+def pulse_of(request: RunInput, window: float) -> Pulse:
+    """Return the pulse of a run whose window is given [s]; errors as ``shock_pulse`` and ``check_pulses``."""
+    pulse = shock_pulse(request.shock).pulse
+    if request.coupled:
+        check_pulses(pulse_durations({"drop": pulse}), window, request.numerics.step_fraction)
+    return pulse
