@@ -11,7 +11,7 @@ from pydantic import BaseModel
 
 FAMILIES = ("reflow", "elements", "coupling", "remesh")
 # Each has a table TRIALS: name -> Trial; names are unique among all.
-TABLES = (*FAMILIES, "run")
+TABLES = (*(f"trials.{family}" for family in FAMILIES), "run_trial")
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,5 +72,5 @@ def pure_trial(parameters: type[BaseModel], place: str, measures: str) -> Trial:
 @cache
 def trials() -> dict[str, Trial]:
     """Return the trials of all families by name; loads no solver."""
-    tables = [import_module(f"{__package__}.trials.{name}").TRIALS for name in TABLES]
+    tables = [import_module(f"{__package__}.{name}").TRIALS for name in TABLES]
     return {name: trial for table in tables for name, trial in table.items()}
