@@ -1,12 +1,17 @@
 """The only place that knows versions of DOLFINx: 0.5 (Debian 12) and 0.9 (Debian 13)."""
 
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
+import basix
 import dolfinx
 import dolfinx.fem
+import dolfinx.fem.petsc
 import dolfinx.io
 import dolfinx.mesh
 import numpy as np
+import scipy.sparse
 import ufl
 from mpi4py import MPI
 from numpy.typing import NDArray
@@ -88,6 +93,37 @@ def cell_dofs(space: dolfinx.fem.FunctionSpace) -> NDArray[np.int32]:
     cells = space.mesh.topology.index_map(3)
     array = np.asarray(dofs.array if OLD else dofs, np.int32)
     return array.reshape(cells.size_local + cells.num_ghosts, -1)
+
+
+def quadrature_space(mesh: dolfinx.mesh.Mesh, degree: int, shape: tuple[int, ...]) -> dolfinx.fem.FunctionSpace:
+    """Return the space of values of a shape at the integration points of a rule of some degree."""
+    if OLD:
+        element = ufl.FiniteElement("Quadrature", mesh.ufl_cell(), degree=degree, quad_scheme="default")
+        return dolfinx.fem.FunctionSpace(mesh, ufl.TensorElement(element, shape=shape) if shape else element)
+    import basix.ufl
+
+    element = basix.ufl.quadrature_element(mesh.basix_cell(), value_shape=shape, degree=degree)
+    return dolfinx.fem.functionspace(mesh, element)
+
+
+def at_quadrature_points(
+    mesh: dolfinx.mesh.Mesh, expression: ufl.core.expr.Expr, degree: int
+) -> Callable[[], NDArray[np.float64]]:
+    """Return what evaluates an expression of UFL at the integration points of all cells, ``(ne, points * size)``."""
+    points, _ = basix.make_quadrature(getattr(basix.CellType, shape_of(cell_nodes(mesh)).cell), degree)
+    compiled = dolfinx.fem.Expression(expression, points)
+    cells = np.arange(mesh.topology.index_map(3).size_local, dtype=np.int32)
+    return partial(compiled.eval, cells) if OLD else partial(compiled.eval, mesh, cells)
+
+
+def assembled_csr(form) -> scipy.sparse.csr_matrix:  # its type has another name in each version
+    """Return the matrix of a bilinear form."""
+    matrix = dolfinx.fem.petsc.assemble_matrix(form)
+    matrix.assemble()
+    pointers, columns, values = matrix.getValuesCSR()
+    result = scipy.sparse.csr_matrix((values, columns, pointers), shape=matrix.getSize())
+    matrix.destroy()
+    return result
 
 
 def compiled_form(form: ufl.Form, flags: list[str]):  # its type has another name in each version

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from reflowshock.fem.forces.force_nonlinear import NonlinearElements
+from reflowshock.fem.forces.force import TermWithPath
 from reflowshock.fem.kernels.motion import advance
 from reflowshock.fem.loads.load import FineSupports, Load, Loaded
 from reflowshock.fem.model.body import Body
@@ -194,6 +194,6 @@ class ExplicitMotion(Loaded):
         for k, load in enumerate(self._loads):
             load.restore(state["loads"][str(k)])
 
-    def _terms_with_path(self) -> list[NonlinearElements]:
+    def _terms_with_path(self) -> list[TermWithPath]:
         """Return the force terms whose history must be kept; the same ones in the same order on all ranks with any."""
-        return [term for term in self.body.terms if isinstance(term, NonlinearElements)]
+        return [term for term in self.body.terms if isinstance(term, TermWithPath)]

@@ -1,5 +1,6 @@
 """Elements of one kind with materials: stiffness, lumped mass, critical time steps."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -76,18 +77,27 @@ def lumped_mass(elements: Elements, nodal_volume: NDArray[np.float64]) -> NDArra
     return mass
 
 
-def critical_steps(elements: Elements, nodal_volume: NDArray[np.float64]) -> NDArray[np.float64]:
+def critical_steps(
+    elements: Elements,
+    nodal_volume: NDArray[np.float64],
+    stiffness: Callable[[Elements], NDArray[np.float64]] = element_stiffness,
+) -> NDArray[np.float64]:
     """Return the critical time step of each element on its own: ``(ne,)`` [s], 2 / omega_max of M_e^-1 K_e.
 
     No assembled model has a smaller one (Irons' bound); this holds for tied nodes too, whose weights are not negative.
     Elements of equal shape and material are computed once.
+
+    Args:
+        elements: The elements.
+        nodal_volume: ``(ne, k)`` [m^3] shares of the nodes.
+        stiffness: Returns the stiffness ``(ne, 3k, 3k)`` [N/m] of elements.
     """
     first, shape = classes(elements)
     frequency = np.empty(len(first))
     for start in range(0, len(first), CHUNK):
         chosen = first[start : start + CHUNK]
         scale = np.repeat(1.0 / np.sqrt(elements.density[chosen][:, None] * nodal_volume[chosen]), 3, axis=1)
-        scaled = scale[:, :, None] * element_stiffness(elements.subset(chosen)) * scale[:, None, :]
+        scaled = scale[:, :, None] * stiffness(elements.subset(chosen)) * scale[:, None, :]
         frequency[start : start + CHUNK] = np.sqrt(np.linalg.eigvalsh(scaled)[:, -1])
     return (2.0 / frequency)[shape]
 

@@ -15,7 +15,7 @@ class Energy:
 
     Attributes:
         strain: Elastic strain energy, recoverable.
-        plastic: Work dissipated by plastic flow so far.
+        plastic: Work dissipated by plastic or viscous flow so far.
         hourglass: Energy of the hourglass stiffness of elements with one integration point; in fully integrated ones
             that yield the work of incompatible modes that are not yet in equilibrium.
     """

@@ -1,7 +1,8 @@
 """Internal force terms: the contract, and the choice of one for the elements of a mesh."""
 
-from collections.abc import Sequence
-from typing import Literal, Protocol
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Literal, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,10 @@ from reflowshock.fem.forces.force_nonlinear import NonlinearElements
 from reflowshock.fem.kernels.nonlinear import Path
 from reflowshock.fem.kernels.plasticity import FIRST_YIELD, plastic_constants
 from reflowshock.fem.materials.parameters import Material
+from reflowshock.fem.parallel.portable import Rows
+
+if TYPE_CHECKING:
+    from reflowshock.fem.forces.force_ufl import Law
 
 Kinematics = Literal["small", "finite"]
 
@@ -35,8 +40,23 @@ class ForceTerm(Protocol):
         """Return the energies [J] of this rank's elements at the displacement of the latest ``add``."""
 
 
+@runtime_checkable
+class TermWithPath(ForceTerm, Protocol):
+    """A force term that remembers."""
+
+    def state(self, cells: NDArray[np.int64]) -> dict[str, Rows]:
+        """Return the history by element, for a checkpoint; ``cells`` are the input numbers of the rank's elements."""
+
+    def restore(self, state: Mapping[str, NDArray[np.float64]]) -> None:
+        """Continue from the values of what ``state`` returned."""
+
+
 def force_terms(
-    elements: Elements, materials: Sequence[Material], kinematics: Kinematics = "small", step: float = np.inf
+    elements: Elements,
+    materials: Sequence[Material],
+    kinematics: Kinematics = "small",
+    step: float = np.inf,
+    laws: "Mapping[int, Law]" = MappingProxyType({}),
 ) -> list[ForceTerm]:
     """Return the force terms of elements: linear ones, and one with a path where the problem calls for it.
 
@@ -45,14 +65,26 @@ def force_terms(
         materials: Material of each index of ``elements.elasticity``.
         kinematics: Whether rotations and strains are small.
         step: dt [s], of laws that depend on the rate; infinity stands for slow.
+        laws: Index of ``elements.elasticity`` -> law in UFL that stands in the place of this material.
     """
+    own = ~np.isin(elements.material, list(laws))
     plastic = np.array([plastic_constants(material) for material in materials])
     finite = kinematics == "finite"
-    nonlinear = np.isfinite(plastic[elements.material, FIRST_YIELD]) | finite
-    terms = linear_terms(elements.subset(~nonlinear))
+    nonlinear = own & (np.isfinite(plastic[elements.material, FIRST_YIELD]) | finite)
+    terms = linear_terms(elements.subset(own & ~nonlinear))
     if nonlinear.any():
         terms.append(NonlinearElements.build(elements, np.flatnonzero(nonlinear), plastic, Path(finite, step)))
-    return terms
+    return terms + ufl_terms(elements, laws)
+
+
+def ufl_terms(elements: Elements, laws: "Mapping[int, Law]") -> list[ForceTerm]:
+    """Return a force term for each law in UFL that elements of this rank have; arguments as ``force_terms``."""
+    here = {index: np.flatnonzero(elements.material == index) for index in laws}
+    if not any(map(len, here.values())):
+        return []
+    from reflowshock.fem.forces.force_ufl import UflElements  # which loads the compiler of forms
+
+    return [UflElements(elements, chosen, laws[index]) for index, chosen in here.items() if len(chosen)]
 
 
 def linear_terms(elements: Elements) -> list[ForceTerm]:

@@ -1,7 +1,8 @@
 """From the mesh of a rank and the tables of its model to a body: materials, masses, force terms, tie."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 from mpi4py import MPI
@@ -12,8 +13,9 @@ from reflowshock.fem.elements.element import Elements, critical_steps, element_g
 from reflowshock.fem.elements.hexahedron import HEXAHEDRON
 from reflowshock.fem.elements.kind import Geometry
 from reflowshock.fem.elements.mesh_elements import elements_of
-from reflowshock.fem.errors import MassError, RankError
+from reflowshock.fem.errors import LevelError, MassError, RankError
 from reflowshock.fem.forces.force import ForceTerm, Kinematics, force_terms, linear_terms
+from reflowshock.fem.forces.force_ufl import Law, tangent_at_rest
 from reflowshock.fem.materials.elasticity import materials_of_parts
 from reflowshock.fem.materials.parameters import Material
 from reflowshock.fem.materials.roles import Materials
@@ -38,6 +40,7 @@ class Pieces:
         roles: ``(ne,)`` material role of each element.
         parts: ``(ne,)`` part of each element.
         materials: Material of each part.
+        laws: Part -> law in UFL in the place of its material.
     """
 
     local: LocalMesh
@@ -47,6 +50,28 @@ class Pieces:
     roles: NDArray[np.str_]
     parts: NDArray[np.int32]
     materials: tuple[Material, ...]
+    laws: Mapping[int, Law] = field(default_factory=dict)
+
+    def with_laws(self, part_names: Sequence[str], laws: Mapping[str, Law]) -> "Pieces":
+        """Give parts laws in UFL: they take the place of their material, whose density remains.
+
+        Args:
+            part_names: Of the model's tables.
+            laws: Name of a part -> law.
+
+        Raises:
+            ValueError: There is no such part.
+        """
+        missing = [name for name in laws if name not in part_names]
+        if missing:
+            raise ValueError(f"part {missing[0]!r} does not exist; parts: {', '.join(part_names)}")
+        steps, numbered = self.steps.copy(), {list(part_names).index(name): law for name, law in laws.items()}
+        for part, law in numbered.items():
+            chosen = np.flatnonzero(self.parts == part)
+            if len(chosen):
+                volume, tangent = self.geometry.nodal_volume[chosen], partial(tangent_at_rest, law=law)
+                steps[chosen] = critical_steps(self.elements.subset(chosen), volume, tangent)
+        return replace(self, steps=steps, laws=numbered)
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,13 +161,13 @@ def make_body(
     free[tie.slave] = False
     interface = local.locate(tables.interface).astype(np.int32)
     body = Body(local, elements, pieces.geometry, [], tie, shared, interface, mass, free)
-    terms = response_terms(comm, body, pieces.materials, tables, response) if response else linear_terms(elements)
+    terms = response_terms(comm, body, pieces, tables, response) if response else linear_terms(elements)
     warm_up(terms, len(mass))
     return replace(body, terms=terms)
 
 
 def response_terms(
-    comm: MPI.Comm, body: Body, materials: Sequence[Material], tables: Tables, response: ForceOptions
+    comm: MPI.Comm, body: Body, pieces: Pieces, tables: Tables, response: ForceOptions
 ) -> list[ForceTerm]:
     """Return the force terms of a body, one of them with all elements that take smaller steps; collective.
 
@@ -150,8 +175,10 @@ def response_terms(
         LevelError: Not all elements of a body with levels are linear elastic; on every rank.
     """
     if not tables.level.any():
-        return force_terms(body.elements, materials, response.kinematics, response.step)
-    check_elastic(materials, response.kinematics, tables.ratios)
+        return force_terms(body.elements, pieces.materials, response.kinematics, response.step, pieces.laws)
+    if pieces.laws:
+        raise LevelError("parts with a law in UFL take no smaller steps: choose a coupling scheme without local steps")
+    check_elastic(pieces.materials, response.kinematics, tables.ratios)
     level = tables.level[body.local.cell_numbers]
     levels = SubsteppedElements.build(
         comm, body, Levels(level, tables.ratios, response.step, response.stiffness / response.step)

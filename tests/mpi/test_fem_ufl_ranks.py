@@ -1,0 +1,25 @@
+"""A user's own material moves alike on one rank and on two: the shipped example, shortened."""
+
+from pathlib import Path
+
+import numpy as np
+
+from tests.support.fem_program import run_python
+
+
+def own_material(path: Path, ranks: int) -> dict[str, np.ndarray]:
+    """Return the histories of the example's first 0.05 ms on some ranks."""
+    done = run_python(["-m", "reflowshock.cases.own_material.own_material", str(path), "0.05"], ranks)
+    assert done.returncode == 0, done.stderr
+    assert "viscoelastic" in done.stdout
+    with np.load(path) as arrays:
+        return dict(arrays)
+
+
+def test_two_ranks_equal_one(tmp_path):
+    expected, found = (own_material(tmp_path / f"{ranks}.npz", ranks) for ranks in (1, 2))
+    assert len(expected["time"]) > 10
+    for name, values in expected.items():
+        scale = np.abs(expected[name if name in ("time", "part") else "given"]).max()
+        assert np.abs(values).max() > 0.0
+        assert np.abs(found[name] - values).max() <= 1e-9 * scale, name
