@@ -5,17 +5,15 @@ from collections.abc import Sequence
 from rich.table import Table
 from rich.text import Text
 
+from reflowshock.cases.hard.trial import FAMILIES
+from reflowshock.cases.hard.verdict import Verdict
 from reflowshock.workflow.process.terminal import console, styled
-from reflowshock.workflow.stress_test.families import FAMILIES
-from reflowshock.workflow.stress_test.sample import Sample
-from reflowshock.workflow.stress_test.verdict import Check, Verdict
-
-LARGEST_SHOWN = 1000.0
+from reflowshock.workflow.stress_test.sample import MOST_REFUSED, Sample
 
 
 def show_verdict(verdict: Verdict) -> None:
     """Print one verdict: what was tried, the closest bound, what was measured, the margin."""
-    told = styled(" {}  {}  {} s", named(verdict), said(verdict), f"{verdict.seconds:.1f}")
+    told = styled(" {}  {}  {} s", named(verdict), str(verdict), f"{verdict.seconds:.1f}")
     console.print(_mark(verdict.ok) + told, soft_wrap=True)
 
 
@@ -28,36 +26,21 @@ def named(verdict: Verdict) -> str:
     return verdict.case.name + (f" ({verdict.case.tried})" if verdict.case.tried else "")
 
 
-def said(verdict: Verdict) -> str:
-    """Say how a case ended: the closest of its checks, or why there is none; where it missed, all that it missed."""
-    if verdict.message:
-        return ("refused: " if verdict.is_refused else "") + verdict.message
-    missed = [check for check in verdict.checks if not check.holds]
-    closest = verdict.closest
-    assert closest is not None
-    return "; ".join(f"{check}, margin {margin_text(check)}" for check in missed or [closest])
-
-
-def margin_text(check: Check) -> str:
-    """Write a margin: by what factor a bound is kept."""
-    return f"> {LARGEST_SHOWN:g}" if check.margin > LARGEST_SHOWN else f"{check.margin:.3g}"
-
-
 def show_sample(sample: Sample) -> None:
     """Print how the random cases of a trial ended, and what was missed."""
     seconds = f"{sum(verdict.seconds for verdict in sample.verdicts):.1f}"
-    told = styled(" {}  {}  {} s", sample.trial.name, sample_said(sample), seconds)
+    told = styled(" {}  {}  {} s", sample.name, sample_said(sample), seconds)
     console.print(_mark(sample.ok) + told, soft_wrap=True)
     for verdict in sample.missed:
-        console.print(f"     {named(verdict)}  {said(verdict)}", soft_wrap=True)
+        console.print(f"     {named(verdict)}  {verdict!s}", soft_wrap=True)
 
 
 def sample_said(sample: Sample) -> str:
     """Say how the random cases of a trial ended."""
     counts = f"{len(sample.verdicts)} tried, {sample.refused} refused, {len(sample.missed)} missed"
     if sample.too_many_refused:
-        counts += f"; allowed to be refused: {sample.trial.most_refused:.0%}"
-    return counts + (f"; closest: {sample.closest}, margin {margin_text(sample.closest)}" if sample.closest else "")
+        counts += f"; allowed to be refused: {MOST_REFUSED:.0%}"
+    return counts + (f"; closest: {sample.closest}, margin {sample.closest.margin_text}" if sample.closest else "")
 
 
 def show_table(verdicts: Sequence[Verdict], samples: Sequence[Sample]) -> None:
@@ -83,4 +66,4 @@ def _least(verdicts: Sequence[Verdict]) -> tuple[str, str]:
     if not found:
         return "", ""
     check, verdict = min(found, key=lambda pair: pair[0].rank)
-    return margin_text(check), named(verdict)
+    return check.margin_text, named(verdict)

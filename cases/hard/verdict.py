@@ -3,12 +3,15 @@
 import math
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from typing import Any
 
+from reflowshock.cases.hard.bound import Bound
+from reflowshock.cases.hard.hard_case import HardCase
+from reflowshock.cases.hard.trial import Measured, Refused
 from reflowshock.workflow.case.units import UnitError
-from reflowshock.workflow.stress_test.bound import Bound
-from reflowshock.workflow.stress_test.hard_case import HardCase
-from reflowshock.workflow.stress_test.trial import Measured, Refused
+
+LARGEST_SHOWN = 1000.0  # margin
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,6 +32,11 @@ class Check:
     def rank(self) -> float:
         """The margin, but -1 where it is no number: the worst of all."""
         return -1.0 if math.isnan(self.margin) else self.margin
+
+    @property
+    def margin_text(self) -> str:
+        """The margin in words."""
+        return f"> {LARGEST_SHOWN:g}" if self.margin > LARGEST_SHOWN else f"{self.margin:.3g}"
 
     def __str__(self) -> str:
         return f"{self.measure.replace('_', ' ')} {self.found} {self.bound}"
@@ -62,12 +70,29 @@ class Verdict:
         """The check that was kept by the smallest factor, or missed by the largest."""
         return min(self.checks, key=lambda check: check.rank, default=None)
 
+    def __str__(self) -> str:
+        """Say how it ended: the closest of its checks, or why there is none; where it missed, all that it missed."""
+        if self.message:
+            return ("refused: " if self.is_refused else "") + self.message
+        told: list[Check | None] = [check for check in self.checks if not check.holds] or [self.closest]
+        return "; ".join(f"{check}, margin {check.margin_text}" for check in told if check is not None)
+
+    def record(self) -> dict[str, Any]:
+        """Return all but the case, to be sent from one process to another."""
+        checks = [asdict(check) for check in self.checks]
+        return {"checks": checks, "message": self.message, "is_refused": self.is_refused, "seconds": self.seconds}
+
+    @classmethod
+    def of(cls, case: HardCase, record: dict[str, Any]) -> "Verdict":
+        """Return the verdict on a case from its record."""
+        return cls(case, **record | {"checks": tuple(Check(**check) for check in record["checks"])})
+
 
 def attempt(case: HardCase) -> Verdict:
     """Try a case in this process; any error of it becomes part of the verdict."""
     start, is_refused = time.perf_counter(), False
     try:
-        found = case.trial.run(case.parameters)
+        found = case.trial.measure(case.parameters)
         checks, message = tuple(_check(bound, found) for bound in case.bounds), ""
     except Exception as error:  # whatever breaks a solver is what is looked for
         checks, message = (), f"{type(error).__name__}: {error}"

@@ -9,17 +9,16 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from reflowshock.cases.hard.bound import Bound, read_bound
+from reflowshock.cases.hard.trial import FAMILIES, Trial, trials
 from reflowshock.fem.names import nearest
 from reflowshock.workflow.case import fields
-from reflowshock.workflow.case.problems import CaseError, Problem
+from reflowshock.workflow.case.problems import CaseError, Problem, as_toml
 from reflowshock.workflow.case.scales import dotted
 from reflowshock.workflow.case.toml_file import read_toml
 from reflowshock.workflow.case.units import UnitError
 from reflowshock.workflow.case.validation import translate
 from reflowshock.workflow.pipeline.reader import set_value
-from reflowshock.workflow.stress_test.bound import Bound, read_bound
-from reflowshock.workflow.stress_test.families import FAMILIES, trials
-from reflowshock.workflow.stress_test.trial import Trial
 
 DEADLINE = 300.0
 FREE_TABLES = ("parameters", "vary", "bounds")
@@ -57,7 +56,8 @@ class HardCase:
         title: what is tried.
         why: what breaks others here.
         trial: what is done.
-        parameters: of the trial, in SI values.
+        given: parameters of the trial as a file has them.
+        parameters: the same in SI values.
         bounds: that its measures must keep.
         expect: part of the error with which it must be refused, or "".
         deadline: after which it is taken to hang [s].
@@ -70,6 +70,7 @@ class HardCase:
     title: str
     why: str
     trial: Trial
+    given: dict[str, Any]
     parameters: BaseModel
     bounds: tuple[Bound, ...]
     expect: str
@@ -106,6 +107,7 @@ def hard_cases(name: str, table: Mapping[str, Any], source: str, folder: Path) -
             name=name,
             tried=tried,
             trial=trial,
+            given=values,
             parameters=parameters,
             bounds=bounds,
             **head.model_dump(include={"family", "title", "why", "expect", "deadline"}),
@@ -164,6 +166,13 @@ def _bounds(head: HardCaseFile, trial: Trial, problems: list[Problem]) -> Iterat
                 yield read_bound(measure, text, None if names is None else names[measure])
             except UnitError as error:
                 problems.append(Problem(key, str(error), text))
+
+
+def hard_case_text(table: Mapping[str, Any], prefix: str = "") -> str:
+    """Write the table of a hard case as TOML: its values, then its tables."""
+    values = [f"{name} = {as_toml(value)}\n" for name, value in table.items() if not isinstance(value, Mapping)]
+    tables = [(f"{prefix}{name}", value) for name, value in table.items() if isinstance(value, Mapping)]
+    return "".join(values) + "".join(f"\n[{name}]\n{hard_case_text(value, f'{name}.')}" for name, value in tables)
 
 
 def _combinations(head: HardCaseFile, problems: list[Problem]) -> Iterator[tuple[str, dict]]:

@@ -10,11 +10,11 @@ from pathlib import Path
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 from pydantic_core import PydanticCustomError
 
+from reflowshock.cases.hard.trial import Measured, Trial
 from reflowshock.fem.parallel.own_job import own_environment
 from reflowshock.workflow.case.problems import CaseError, as_toml
 from reflowshock.workflow.case.scales import dotted
 from reflowshock.workflow.pipeline.reader import read_case
-from reflowshock.workflow.stress_test.trial import Measured, Trial
 
 LAST_LINES = 3
 
