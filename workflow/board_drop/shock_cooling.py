@@ -32,7 +32,7 @@ def is_wanted(case: BoardDropCase) -> bool:
 def problems(case: BoardDropCase) -> Iterator[Problem]:
     """Find shocks that cannot begin with the stress of cooling."""
     if is_wanted(case) and case.shock.coupling.direction == "one_way" and "two_scale" in case.shock.numerics.modes:
-        message = "does not go with thermal.effects.residual_stress = on: the model that drives has its joints twice"
+        message = "cannot be combined with thermal.effects.residual_stress = on: the macro model has its joints twice"
         yield Problem("shock.coupling.direction", message, "one_way", "two_way")
 
 
@@ -103,7 +103,7 @@ def effect(case: BoardDropCase) -> dict:
     why = f"thermal.effects.residual_stress = {thermal.effects.residual_stress}"
     if is_wanted(case):
         why += (
-            f": cooling by {thermal.solidification - thermal.final:.4g} K; an upper bound, solder relaxes at room"
+            f": cooling by {thermal.solidification - thermal.final:.4g} K; an upper bound: solder relaxes at room"
             " temperature"
         )
     return {"residual_stress": {"on": is_wanted(case), "why": why}}

@@ -67,7 +67,7 @@ def implausible_tables(case: Case) -> Iterator[Problem]:
     for key, unit, number in largest_values(case.pulse_tables):
         found = BY_DIMENSION[dimension(unit)]
         if number > to_si(found.high, unit):
-            message = f"has {from_si(number, unit, 6)} in it, which is not plausible"
+            message = f"has {from_si(number, unit, 6)}, which is not plausible"
             yield Problem(key, message, None, f"up to {found.high}, or {FORCE}")
 
 

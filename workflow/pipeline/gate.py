@@ -41,7 +41,7 @@ def problems_of(case: Case, leave: Leave) -> list[Problem]:
         except CaseError as error:
             return error.problems
         except (ArithmeticError, ValueError, MemoryError) as error:  # beyond what floats can tell
-            return [Problem("", f"has values with which nothing can be computed: {error or type(error).__name__}")]
+            return [Problem("", f"has values that cannot be computed with: {error or type(error).__name__}")]
 
 
 def _values(case: Case, leave: Leave) -> list[Problem]:
@@ -65,8 +65,8 @@ def too_many_ranks(case: Case) -> Iterator[Problem]:
     cores = available_cores()
     for key, ranks in case.ranks_by_key.items():
         if ranks > cores:
-            message = f"asks for {ranks} MPI ranks, this machine offers {cores} cores"
-            yield Problem(key, message, ranks, f"<= {cores} in all, or more with --oversubscribe")
+            message = f"asks for {ranks} MPI ranks, but this machine has {cores} cores"
+            yield Problem(key, message, ranks, f"<= {cores} in total, or more with --oversubscribe")
 
 
 def too_large(case: Case, leave: Leave | None = None) -> Iterator[Problem]:
@@ -76,9 +76,9 @@ def too_large(case: Case, leave: Leave | None = None) -> Iterator[Problem]:
         return
     allowed = f"larger particles or elements, fewer MPI ranks, or {FORCE}"
     if not needed <= LARGEST_MEMORY:
-        yield Problem("", f"needs about {bytes_text(needed)} of memory, no machine has as much", None, allowed)
+        yield Problem("", f"needs about {bytes_text(needed)} of memory, more than any machine has", None, allowed)
     elif not leave.oversubscribe and needed > machine_memory():
-        message = f"needs about {bytes_text(needed)} of memory, this machine has {bytes_text(machine_memory())}"
+        message = f"needs about {bytes_text(needed)} of memory, but this machine has {bytes_text(machine_memory())}"
         yield Problem("", message, None, allowed)
 
 

@@ -61,7 +61,7 @@ def _check_key(run: Run, stage: Stage, inputs: dict, key: str) -> None:
     """See to it that what a stage finds is what its product is named after, when the command began."""
     follows = [(read_record(run.folder / name) or {}).get("key") for name in stage.follows]
     if None not in follows and product_key(run.case, stage, inputs, follows) != key:
-        raise StageError("a file of the case, or the program, has changed since the command began; run it again")
+        raise StageError("a file of the case or the program itself has changed since the command started; run it again")
 
 
 def _check(run: Run, stage: Stage, before: dict, partial: Path) -> None:
@@ -69,12 +69,12 @@ def _check(run: Run, stage: Stage, before: dict, partial: Path) -> None:
     changed = compare(before["inputs"], stage_inputs(run.case, stage))
     if changed:
         names = ", ".join(change.key.removesuffix(".sha256") for change in changed)
-        raise StageError(f"{names}: the file has changed while the stage was at work; run it again")
+        raise StageError(f"{names}: the file changed while the stage was running; run it again")
     if None in before["reads"].values() or before["reads"] != _reads(run, stage):
-        raise StageError("a product that it reads has changed, or is damaged; run it again")
+        raise StageError("a product that the stage reads has changed or is damaged; run it again")
     missing = [name for name in stage.products if not (partial / name.removeprefix(f"{stage.name}/")).exists()]
     if missing:
-        raise StageError(f"it has not written {', '.join(missing)}")
+        raise StageError(f"the stage has not written {', '.join(missing)}")
 
 
 def core_seconds() -> float:

@@ -24,7 +24,7 @@ LAST_LINES = 5
 ENDING = ("SIGTERM", "SIGHUP")  # signals that end a command as Ctrl-C does
 
 OWN_PACKAGE = "reflowshock"  # the text of errors that it defines is for the user
-NO_MEMORY = "the memory is not sufficient (also limited by: ulimit -v)"
+NO_MEMORY = "out of memory (also limited by ulimit -v)"
 SYSTEM = {
     errno.ENOSPC: "no space left on the device",
     errno.EDQUOT: "the disk quota is used up",
@@ -32,7 +32,7 @@ SYSTEM = {
     errno.EROFS: "the file system is read-only",
     errno.EACCES: "permission denied",
     errno.EPERM: "permission denied",
-    errno.ENOENT: "the file or folder does not exist, or was removed meanwhile",
+    errno.ENOENT: "the file or folder does not exist or was removed",
     errno.EMFILE: "too many files are open (ulimit -n)",
     errno.ENFILE: "too many files are open on this machine",
     errno.ENOMEM: NO_MEMORY,
@@ -52,7 +52,7 @@ LIBRARIES = (
     (re.compile(r"failed to map segment|insufficient memory", re.IGNORECASE), NO_MEMORY),
     (re.compile(r"can't start new thread|resource temporarily unavailable", re.IGNORECASE), SYSTEM[errno.EAGAIN]),
     (re.compile(r"terminated abruptly|process pool", re.IGNORECASE),
-     "a process was killed, as the system does when memory is short"),
+     "a process was killed, probably because memory ran out"),
 )  # fmt: skip
 PETSC = {55: NO_MEMORY, 56: "not supported by this PETSc", 71: "zero pivot: the matrix is singular", 76: "MUMPS failed"}
 
@@ -81,7 +81,7 @@ def in_words(error: BaseException, where: Path | None = None) -> str:
         behind = behind.__cause__ or (None if behind.__suppress_context__ else behind.__context__)
     lines = [line.strip() for line in str(error).splitlines() if line.strip()]
     kind = "" if type(error) is RuntimeError else type(error).__name__
-    text = ": ".join(part for part in (kind, lines[0] if lines else "") if part) or "an error without a message"
+    text = ": ".join(part for part in (kind, lines[0] if lines else "") if part) or "unknown error"
     return text if len(text) <= LONGEST else f"{text[:LONGEST]} …"
 
 

@@ -14,10 +14,10 @@ def structure_problems(case: StructureCase) -> list[Problem]:
     from reflowshock.workflow.structure.findings import waves_that_do_not_pass
 
     boxes = [Problem(found.key, found.message, found.value, found.allowed) for found in box_problems(case.box)]
-    scenes = [
+    bodies = [
         Problem(found.key, found.message, found.value, found.allowed, found.hint)
-        for found in structure_checks.problems(case.scene)
+        for found in structure_checks.problems(case.problem)
     ]
-    found = [*boxes, *scenes, *unreadable_pulses(case.pulse_tables)]
-    found += reference_problems(case.references, case.scene)
+    found = [*boxes, *bodies, *unreadable_pulses(case.pulse_tables)]
+    found += reference_problems(case.references, case.problem)
     return found or [*step_problems(case), *waves_that_do_not_pass(case)]

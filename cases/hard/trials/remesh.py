@@ -4,8 +4,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field
 
+from reflowshock.cases.hard.trial import Measured, Refused, Trial
 from reflowshock.meshing.board.parameters import JointNumerics, Parameters
-from reflowshock.workflow.stress_test.trial import Measured, Refused, Trial
 
 if TYPE_CHECKING:
     from reflowshock.cases.hard.trials.joints import Meshed
