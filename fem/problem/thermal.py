@@ -9,7 +9,7 @@ from pydantic import Field, ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
 
 from reflowshock.fem.materials.parameters import Temperature
-from reflowshock.fem.parameters import Parameters
+from reflowshock.parameters import Parameters
 
 KELVIN = 273.15
 Switch = Literal["auto", "on", "off"]

@@ -3,8 +3,8 @@
 from collections.abc import Iterator, Mapping
 
 from reflowshock.fem.materials.parameters import Material
-from reflowshock.fem.problem.problem import Problem
 from reflowshock.fem.problem.thermal import Thermal
+from reflowshock.problem import Problem
 
 
 def problems(thermal: Thermal, materials: Mapping[str, Material], warpage: float) -> list[Problem]:
@@ -24,10 +24,10 @@ def _expansion(thermal: Thermal, materials: Mapping[str, Material]) -> Iterator[
         if role == "solder" and thermal.effects.residual_stress == "off":
             continue
         for name in material.unknown_expansion:
-            yield Problem(f"materials.{role}.{name}", None, "is missing, which [thermal] needs", "e.g. 16 ppm/K")
+            yield Problem(f"materials.{role}.{name}", "is missing, which [thermal] needs", None, "e.g. 16 ppm/K")
 
 
 def _warpage(thermal: Thermal, warpage: float) -> Iterator[Problem]:
     if warpage and thermal.effects.flexible != "off":
         message = "does not go with [thermal], which computes the warpage"
-        yield Problem("warpage.corner", warpage, message, "0 mm, or thermal.effects.flexible = off")
+        yield Problem("warpage.corner", message, warpage, "0 mm, or thermal.effects.flexible = off")

@@ -4,9 +4,10 @@ import shutil
 from collections.abc import Iterator, Sequence
 from importlib.util import find_spec
 
-from reflowshock.fem.names import nearest
+from reflowshock.names import nearest
+from reflowshock.problem import Problem
 from reflowshock.workflow.case.case import Case
-from reflowshock.workflow.case.problems import CaseError, Problem
+from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.jobs.profile import FILE, Profile
 from reflowshock.workflow.jobs.queue import NoAnswer, Partition, partitions
 

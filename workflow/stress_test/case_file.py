@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from reflowshock.workflow.case.problems import as_toml
+from reflowshock.problem import as_toml
 
 
 def hard_case_text(table: Mapping[str, Any]) -> str:

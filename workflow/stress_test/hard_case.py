@@ -7,11 +7,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, Field, ValidationError
 
-from reflowshock.fem.names import nearest
+from reflowshock.names import nearest
+from reflowshock.parameters import Parameters
+from reflowshock.problem import Problem
 from reflowshock.workflow.case import fields
-from reflowshock.workflow.case.problems import CaseError, Problem
+from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.case.scales import dotted
 from reflowshock.workflow.case.toml_file import read_toml
 from reflowshock.workflow.case.units import UnitError
@@ -25,7 +27,7 @@ DEADLINE = 300.0
 FREE_TABLES = ("parameters", "vary", "bounds")
 
 
-class HardCaseFile(BaseModel):
+class HardCaseFile(Parameters):
     """A hard case as its file has it.
 
     ``parameters`` are those of the trial; ``vary`` gives lists of values for some of them; ``bounds`` are upper ones of
@@ -33,17 +35,15 @@ class HardCaseFile(BaseModel):
     refused. After the deadline a case is taken to hang.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
     family: str
     title: str
     why: str
     trial: str
     expect: str = ""
     deadline: Annotated[float, "s"] = Field(DEADLINE, gt=0)
-    parameters: dict = {}
-    vary: dict = {}
-    bounds: dict = {}
+    parameters: dict = Field(default_factory=dict)
+    vary: dict = Field(default_factory=dict)
+    bounds: dict = Field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,9 +5,9 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from pydantic import Field
 
+from reflowshock.parameters import Parameters
 from reflowshock.particles.parameters.scenes import Drop, Drops, Fluid, Joint, Liquid, Oscillation
-from reflowshock.particles.parameters.solder import Parameters, Solder, Switch
-from reflowshock.workflow.case.problems import of_particles
+from reflowshock.particles.parameters.solder import Solder, Switch
 from reflowshock.workflow.stress_test.trial import Measured, Refused, Trial
 
 if TYPE_CHECKING:
@@ -155,7 +155,7 @@ def _swings(amplitude: np.ndarray) -> float:
 
 def _refuse(problems: list) -> None:
     if problems:
-        raise Refused("; ".join(str(problem) for problem in of_particles(problems)))
+        raise Refused("; ".join(str(problem) for problem in problems))
 
 
 def _energy(energy: np.ndarray) -> dict[str, Measured]:

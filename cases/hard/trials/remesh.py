@@ -4,7 +4,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field
 
-from reflowshock.meshing.board.parameters import JointNumerics, Parameters
+from reflowshock.meshing.board.parameters import JointNumerics
+from reflowshock.parameters import Parameters
 from reflowshock.workflow.stress_test.trial import Measured, Refused, Trial
 
 if TYPE_CHECKING:

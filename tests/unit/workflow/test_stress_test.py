@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 from pydantic import Field
 
 from reflowshock.cases.hard.trials.elements import Impact, PairRun, Turns
-from reflowshock.particles.parameters.solder import Parameters
+from reflowshock.parameters import Parameters
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.case.units import UnitError
 from reflowshock.workflow.stress_test import families, hard_case, sample
