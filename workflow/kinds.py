@@ -31,7 +31,7 @@ from reflowshock.workflow.structure.forecast import structure_tables
 from reflowshock.workflow.structure.problems import structure_problems
 
 
-class PackageForecast(Protocol):
+class Forecast(Protocol):
     """What the forecasts of all kinds say."""
 
     @property
@@ -63,7 +63,7 @@ class Kind:
     case: type[Case]
     problems: Callable[[Any], list[Problem]]
     stages: Mapping[str, StageFunction]
-    forecast: Callable[[Any], PackageForecast]
+    forecast: Callable[[Any], Forecast]
     size: Callable[[Any], Size]
     plan: Callable[[Any, Any], Iterable[RenderableType]]
     acts: str

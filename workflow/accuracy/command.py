@@ -171,7 +171,7 @@ def show(request: AccuracyRequest, out: Path | None, console: Console) -> bool:
     Args:
         request: what is asked for.
         out: folder; None: the default one.
-        console: where it is told.
+        console: where it is shown.
 
     Returns:
         Whether the recommendation was run and keeps its promise: the tolerance, where there is one.

@@ -89,7 +89,7 @@ def _heated(of_reflow: PackageForecast, case: PackageCase, thermal: Thermal) -> 
 
 
 def _with_shock(of_reflow: PackageForecast, case: BoardDropCase) -> PackageForecast:
-    told, case = shock_effects(case), decided(case)
+    of_shock, case = shock_effects(case), decided(case)
     parts = forecast_parts(case)
     shock = forecast_shock(case, parts)
     numerics = case.shock.numerics
@@ -100,7 +100,7 @@ def _with_shock(of_reflow: PackageForecast, case: BoardDropCase) -> PackageForec
     identical = again if case.shock.identical_joints else 0.0
     return replace(
         of_reflow,
-        effects=of_reflow.effects | told | cooling,
+        effects=of_reflow.effects | of_shock | cooling,
         parts=two_scale_parts(case) if "two_scale" in numerics.modes else parts,
         shock=shock,
         seconds=of_reflow.seconds | {"shock": identical + sum(modes[mode] for mode in numerics.modes) + seconds},

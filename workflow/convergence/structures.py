@@ -161,8 +161,8 @@ def _steps(case: StructureCase, own: Settings) -> tuple[Parameter, StudyRun]:
     base = own | _refine(case, COARSE)
 
     def at(value: float) -> StudyRun:
-        told, settings = setting(value)
-        return StudyRun(f"step {told}", TIME_STEP, base | settings, value)
+        size, settings = setting(value)
+        return StudyRun(f"step {size}", TIME_STEP, base | settings, value)
 
     return Parameter(TIME_STEP, values, at, SECOND).apart(smallest)
 

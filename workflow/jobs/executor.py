@@ -1,4 +1,4 @@
-"""Where stages run: on this machine, or as jobs of a cluster; how Snakemake is told so, and ended."""
+"""Where stages run: on this machine, or as jobs of a cluster; options of Snakemake for that, and how it is ended."""
 
 import signal
 import subprocess
