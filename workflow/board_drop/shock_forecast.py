@@ -253,7 +253,7 @@ def _coupled(case: "BoardDropCase", parts: Parts) -> tuple[tuple[str, str], tupl
 
 def forecast_scheme(case: "BoardDropCase", parts: Parts) -> tuple[str, str]:
     """Return the scheme of the coupling, and why; layers of board around the joints are taken to be there."""
-    from reflowshock.fem.division.choice import choose_scheme
+    from reflowshock.fem.division.division import choose_scheme
 
     wanted = case.shock.coupling.scheme
     if case.shock.coupling.direction == "one_way":
