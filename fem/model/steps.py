@@ -9,8 +9,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from reflowshock.fem.division.checks import steps_of
-from reflowshock.fem.division.division import Division
-from reflowshock.fem.division.rules import Rules
+from reflowshock.fem.division.division import Division, Rules
 from reflowshock.fem.division.tables import Tables
 from reflowshock.fem.division.whole import Survey, Whole
 from reflowshock.fem.estimates.estimate import WindowPlan, damped_critical_step

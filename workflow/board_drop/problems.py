@@ -73,12 +73,12 @@ def _of_flow(case: BoardDropCase) -> Iterator[Problem]:
     """Find a limit of plastic work where nothing yields, and linear steps where something does."""
     failure, yielding = case.shock.failure, _yielding(case)
     if failure.plastic_work_density is not None and "solder" not in yielding:
-        message = "limits the plastic work of solder that does not yield"
+        message = "limits plastic work, but the solder does not yield"
         allowed = 'materials.solder of the library, such as "SAC405", or with a table plasticity'
         limit = fields.shown(failure.plastic_work_density, type(failure).model_fields["plastic_work_density"])
         yield Problem("shock.failure.plastic_work_density", message, limit, allowed)
     if case.shock.numerics.dns_solver == "implicit" and yielding:
-        message = f"is linear, {' and '.join(yielding)} yields"
+        message = f"is linear, but {' and '.join(yielding)} yields"
         yield Problem("shock.numerics.dns_solver", message, "implicit", "explicit, or elastic materials")
 
 
@@ -90,6 +90,6 @@ def _of_coupling(case: BoardDropCase) -> Iterator[Problem]:
     if not yielding and decided(case).shock.numerics.kinematics == "small":
         return
     why = f"{' and '.join(yielding)} yields" if yielding else "shock.numerics.kinematics is finite"
-    message = f"needs elastic materials at small strains, {why}"
+    message = f"needs elastic materials and small strains, but {why}"
     allowed = "held_velocity, impulse, gravouil_combescure, auto"
     yield Problem("shock.coupling.scheme", message, "local_steps", allowed)

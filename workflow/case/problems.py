@@ -16,11 +16,11 @@ class Origin:
     """Where a value is from that stands elsewhere than under its key.
 
     Attributes:
-        told: in words: an option, or a table of the file.
+        label: in words: an option, or a table of the file.
         key: under which the file has it; empty where it is not from the file.
     """
 
-    told: str
+    label: str
     key: str = ""
 
 
@@ -45,7 +45,7 @@ class CaseError(ValueError):
     def _place(self, problem: Problem) -> str:
         origin = self._origin(problem)
         file = f"{self.source}{problem.position}"
-        place = file if origin is None else f"{file} {origin.told}" if origin.key else origin.told
+        place = file if origin is None else f"{file} {origin.label}" if origin.key else origin.label
         return one_line(place)
 
     def _origin(self, problem: Problem) -> Origin | None:

@@ -22,8 +22,8 @@ def unreadable_pulses(tables: Tables) -> Iterator[Problem]:
         try:
             read_pulse(path, quantity)
         except PulseError as error:
-            told = str(error).removeprefix(str(path)).lstrip(":, ")
-            yield Problem(key, told, str(path))
+            message = str(error).removeprefix(str(path)).lstrip(":, ")
+            yield Problem(key, message, str(path))
 
 
 def largest_values(tables: Tables) -> Iterator[tuple[str, str, float]]:

@@ -57,7 +57,7 @@ def _problem(root: type[BaseModel], names: list[str], record: ErrorDetails, tabl
     if fields.models_of(field):
         return Problem(key, "must be a table", value)
     if kind == "literal_error":
-        message = "unknown name" if len(fields.alternatives(field)) == 1 else "is not among what is allowed"
+        message = "unknown name" if len(fields.alternatives(field)) == 1 else "is not allowed"
         return Problem(key, message, value, fields.allowed(field), _nearest_name(value, field))
     if kind in RANGES:
         return Problem(key, "is out of range", value, fields.allowed(field))

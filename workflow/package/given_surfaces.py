@@ -50,7 +50,7 @@ def problems(package: "Package", pads: "Sequence[PadSite]", heated: bool) -> Ite
             hint = nearest(name, names)
             yield Problem(key, "is not a joint of the model", None, f"{names[0]} to {names[-1]}", hint)
         if path.suffix.lower() not in SUFFIXES:
-            yield Problem(key, "is not in a format that is read", text, ", ".join(SUFFIXES))
+            yield Problem(key, "has an unknown file format", text, ", ".join(SUFFIXES))
         elif name in sites:
             try:
                 if heated:

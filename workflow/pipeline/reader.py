@@ -77,7 +77,7 @@ def _override(table: dict, overrides: Sequence[str], problems: list[Problem]) ->
     wrong = {problem.key for problem in problems}
     for key, value in [*of_scale.items(), *settings]:
         if key not in wrong and not set_value(table, key.split("."), value):
-            problems.append(Problem(key, "is below a key that has a value, not a table", value))
+            problems.append(Problem(key, "cannot be set: the key above it has a value, not a table", value))
     of_file = {key: Origin(f"[scales.{chosen}]", f"scales.{chosen}.{key}") for key in of_scale}
     return of_file | {key: Origin(SETTING) for key, _ in settings}
 

@@ -28,8 +28,8 @@ from reflowshock.workflow.pipeline.reader import read_case
 COMMENT_COLUMN = 44
 HEADER = """\
 # Case "{name}", from the template "{template}".
-# Every parameter is here. A quantity is a string with a unit, which may be any of its dimension ("0.48 mm", "480 um").
-# Tables named "numerics" say how something is computed, all others what. A line that only repeats the default can go.
+# Every parameter is here. A quantity is a string with a unit, any unit of its dimension ("0.48 mm", "480 um").
+# Tables named "numerics" say how something is computed, all others what. Lines that repeat a default can be removed.
 """
 
 

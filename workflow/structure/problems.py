@@ -14,5 +14,5 @@ def structure_problems(case: StructureCase) -> list[Problem]:
     from reflowshock.workflow.structure.findings import waves_that_do_not_pass
 
     found = [*box_problems(case.box), *structure_checks.problems(case.scene), *unreadable_pulses(case.pulse_tables)]
-    found += reference_problems(case.references, case.scene)
+    found += reference_problems(case.references, case.problem)
     return found or [*step_problems(case), *waves_that_do_not_pass(case)]

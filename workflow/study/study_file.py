@@ -17,9 +17,16 @@ from reflowshock.workflow.case.toml_file import parse_toml, read_text
 from reflowshock.workflow.case.toml_places import Places
 from reflowshock.workflow.case.validation import translate
 from reflowshock.workflow.kinds import NAMES
-from reflowshock.workflow.study.designs import MOST_POINTS, Design, TooManyPoints, grid_axes, list_axis, sampled
-from reflowshock.workflow.study.hypercube import Hypercube
-from reflowshock.workflow.study.setting_text import as_text
+from reflowshock.workflow.study.designs import (
+    MOST_POINTS,
+    Design,
+    Hypercube,
+    TooManyPoints,
+    as_text,
+    grid_axes,
+    list_axis,
+    sampled,
+)
 
 DESIGNS = "at least one of [grid], [[list]], [latin_hypercube]"
 
@@ -98,7 +105,7 @@ def read_study(path: Path) -> Study:
 def _study(path: Path, table: dict) -> Study:
     """Return the study of a table; errors as ``read_study``, without their places."""
     if "study" not in table and any(kind in table for kind in NAMES):
-        raise CaseError(str(path), [Problem("", "is a case, not a study; use: reflowshock plan, or run")])
+        raise CaseError(str(path), [Problem("", "is a case, not a study; use reflowshock plan or run")])
     values = table | ({"list": tuple(table["list"])} if isinstance(table.get("list"), list) else {})
     if isinstance(given := table.get("study"), dict) and isinstance(given.get("metrics"), list):
         values["study"] = given | {"metrics": tuple(given["metrics"])}
@@ -112,7 +119,7 @@ def _study(path: Path, table: dict) -> Study:
     settings |= {"scale": file.study.scale} if file.study.scale else {}
     varied = {key for point in design.points for key in point}
     problems += [
-        Problem(key, "is fixed and varied at once", settings[key], "either [settings] or a design")
+        Problem(key, "is both fixed and varied", settings[key], "either [settings] or a design")
         for key in sorted(settings.keys() & varied)
     ]
     problems += [
@@ -139,7 +146,7 @@ def _design(file: StudyFile, problems: list[Problem]) -> Design:
         problems.append(Problem("", str(error), None, f"up to {MOST_POINTS}"))
         return Design()
     problems += [
-        Problem(key, "is given twice, of which one would be lost", None, "one place in [grid], [[list]] or ranges")
+        Problem(key, "is given twice", None, "one place in [grid], [[list]] or ranges")
         for key, count in Counter(key for axis in axes for key in axis.given).items()
         if count > 1
     ]

@@ -5,10 +5,10 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from pydantic import Field
 
+from reflowshock.cases.hard.trial import Measured, Refused, Trial
 from reflowshock.parameters import Parameters
 from reflowshock.particles.parameters.scenes import Drop, Drops, Fluid, Joint, Liquid, Oscillation
 from reflowshock.particles.parameters.solder import Solder, Switch
-from reflowshock.workflow.stress_test.trial import Measured, Refused, Trial
 
 if TYPE_CHECKING:
     from reflowshock.particles.steps.shape import JointShape
