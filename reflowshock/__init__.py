@@ -5,7 +5,7 @@
     case = reflowshock.Case.load("cases/bga_drop/case.toml", {"shock.peak_acceleration": "1000 G"})
     print(case.plan())
     run = case.run("runs/first")  # or, later: reflowshock.Run.open("runs/first")
-    run.metrics["corner_von_mises"], run.joints, run.history["two_scale"]["time"], run.surface("A10")
+    run.metrics["peak_von_mises"], run.joints, run.history["two_scale"]["time"], run.surface("A10")
 
 Importing it loads no numerical library; each of these loads what it needs.
 """

@@ -1,4 +1,4 @@
-"""The commands run, report, verify and clean: what they do with a run folder, and what the user is told."""
+"""The commands run, report, verify and clean: what they do with a run folder, and what the user sees."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -127,8 +127,8 @@ def verify(store: Store, point: Point) -> bool:
             record = store.record(point, name) or {"files": {}}
             console.print(f"ok     {name:<11} {len(record['files']) + 1} files")
     lost = not_as_put(store, store.folder)
-    for told in lost:
-        print_error(f"{told}; `reflowshock run` restores it")
+    for fault in lost:
+        print_error(f"{fault}; `reflowshock run` restores it")
     return not lost and not any(state.stale for state in states.values())
 
 

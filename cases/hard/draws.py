@@ -8,8 +8,9 @@ Table = st.SearchStrategy[dict[str, Any]]
 
 
 def numbers(low: float, high: float) -> st.SearchStrategy[float]:
-    """Draw plain numbers, to four digits."""
-    return st.floats(low, high).map(lambda value: float(f"{value:.4g}"))
+    """Draw plain numbers, to four digits and to a millionth of the range: smaller ones are zero."""
+    least = 1e-6 * (high - low)
+    return st.floats(low, high).map(lambda value: float(f"{value:.4g}") if abs(value) > least or low > 0.0 else 0.0)
 
 
 def powers(low: float, high: float) -> st.SearchStrategy[float]:
@@ -19,7 +20,7 @@ def powers(low: float, high: float) -> st.SearchStrategy[float]:
 
 def quantities(low: float, high: float, unit: str) -> st.SearchStrategy[str]:
     """Draw quantities as a file has them, to four digits."""
-    return st.floats(low, high).map(lambda value: f"{value:.4g} {unit}".strip())
+    return numbers(low, high).map(lambda value: f"{value:.4g} {unit}".strip())
 
 
 def tables(*parts: Table, **values: Any) -> Table:

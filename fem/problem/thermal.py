@@ -10,8 +10,8 @@ from pydantic import Field, ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
 
 from reflowshock.fem.materials.parameters import Material, Temperature
-from reflowshock.fem.parameters import Parameters
-from reflowshock.fem.problem.problem import Problem
+from reflowshock.parameters import Parameters
+from reflowshock.problem import Problem
 
 KELVIN = 273.15
 Switch = Literal["auto", "on", "off"]
@@ -118,10 +118,10 @@ def _expansion(thermal: Thermal, materials: Mapping[str, Material]) -> Iterator[
         if role == "solder" and thermal.effects.residual_stress == "off":
             continue
         for name in material.unknown_expansion:
-            yield Problem(f"materials.{role}.{name}", None, "is missing, which [thermal] needs", "e.g. 16 ppm/K")
+            yield Problem(f"materials.{role}.{name}", "is missing, which [thermal] needs", None, "e.g. 16 ppm/K")
 
 
 def _warpage(thermal: Thermal, warpage: float) -> Iterator[Problem]:
     if warpage and thermal.effects.flexible != "off":
         message = "does not go with [thermal], which computes the warpage"
-        yield Problem("warpage.corner", warpage, message, "0 mm, or thermal.effects.flexible = off")
+        yield Problem("warpage.corner", message, warpage, "0 mm, or thermal.effects.flexible = off")

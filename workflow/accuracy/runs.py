@@ -181,5 +181,5 @@ class StudyRunner:
 def _failed_before(store: Store, point: Point, until: str) -> dict[str, str]:
     """Return key and message of a point of which a stage was tried and failed."""
     missing = [stage.name for stage in point.case.pipeline.upstream(until) if not store.has(point, stage.name)]
-    told = [f"stage {stage}: {message}" for stage in missing if (message := store.message(point, stage)) is not None]
-    return {point.key: told[0]} if told else {}
+    found = [f"stage {stage}: {said}" for stage in missing if (said := store.message(point, stage)) is not None]
+    return {point.key: found[0]} if found else {}

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.problem.thermal import Thermal
+from reflowshock.problem import Problem
 from reflowshock.workflow.board_drop import shock_cooling
 from reflowshock.workflow.board_drop.board_deflection import decided
 from reflowshock.workflow.board_drop.shock_effects import shock_effects
@@ -18,7 +19,6 @@ from reflowshock.workflow.board_drop.shock_forecast import (
     two_scale_parts,
 )
 from reflowshock.workflow.case.forecast import BYTES_OF_ELEMENT, BYTES_OF_PARTICLE, Size, too_many_steps
-from reflowshock.workflow.case.problems import Problem
 from reflowshock.workflow.package.case import BoardDropCase, PackageCase
 from reflowshock.workflow.process.environment import available_cores
 from reflowshock.workflow.reflow.forecast import forecast_heated
@@ -89,7 +89,7 @@ def _heated(of_reflow: PackageForecast, case: PackageCase, thermal: Thermal) -> 
 
 
 def _with_shock(of_reflow: PackageForecast, case: BoardDropCase) -> PackageForecast:
-    told, case = shock_effects(case), decided(case)
+    of_shock, case = shock_effects(case), decided(case)
     parts = forecast_parts(case)
     shock = forecast_shock(case, parts)
     numerics = case.shock.numerics
@@ -100,7 +100,7 @@ def _with_shock(of_reflow: PackageForecast, case: BoardDropCase) -> PackageForec
     identical = again if case.shock.identical_joints else 0.0
     return replace(
         of_reflow,
-        effects=of_reflow.effects | told | cooling,
+        effects=of_reflow.effects | of_shock | cooling,
         parts=two_scale_parts(case) if "two_scale" in numerics.modes else parts,
         shock=shock,
         seconds=of_reflow.seconds | {"shock": identical + sum(modes[mode] for mode in numerics.modes) + seconds},

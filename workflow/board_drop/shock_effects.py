@@ -44,8 +44,8 @@ def _method(case: BoardDropCase) -> Iterator[tuple[str, dict]]:
 def with_influence(found: dict, case: BoardDropCase) -> dict:
     """Return the effects of a run with their predicted influence."""
     predicted = shock_effects(case)
-    told = {name: predicted.get(f"{name}_in_the_shock", predicted.get(name, {})) for name in found}
-    expected = {name: {"influence": item["influence"]} if "influence" in item else {} for name, item in told.items()}
+    known = {name: predicted.get(f"{name}_in_the_shock", predicted.get(name, {})) for name in found}
+    expected = {name: {"influence": item["influence"]} if "influence" in item else {} for name, item in known.items()}
     return {name: record | expected[name] for name, record in found.items()}
 
 

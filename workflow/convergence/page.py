@@ -29,7 +29,7 @@ def write_pages(folder: Path, accuracy: Accuracy, remarks: tuple[str, ...] = ())
     Args:
         folder: where they go.
         accuracy: what was measured.
-        remarks: what else is told.
+        remarks: further notes.
     """
     write_page(folder / PAGE, "accuracy.html.j2", {"version": __version__, "accuracy": section(accuracy, remarks)})
     save_picture(accuracy, folder / PICTURE)
@@ -41,7 +41,7 @@ def section(accuracy: Accuracy, remarks: tuple[str, ...] = (), elsewhere: bool =
 
     Args:
         accuracy: what was measured.
-        remarks: what else is told.
+        remarks: further notes.
         elsewhere: whether it was measured of another case than the page is on.
     """
     chosen = accuracy.recommended
@@ -91,10 +91,10 @@ def markdown(accuracy: Accuracy) -> str:
     """Return tables of runs, orders and the recommendation in Markdown."""
     legend = tables.legend(accuracy).replace(tables.ON_FRONT, f"\\{tables.ON_FRONT}")
     blocks = [_markdown(tables.runs(accuracy)), f"{legend}.", _markdown(tables.orders(accuracy))]
-    told = tables.prediction(accuracy)
-    if told is not None and accuracy.recommended is not None:
+    predicted = tables.prediction(accuracy)
+    if predicted is not None and accuracy.recommended is not None:
         options = tables.as_options(accuracy.recommended.run.settings)
-        blocks += [f"Recommended: `{options}`, {accuracy.recommended.why}.", _markdown(told)]
+        blocks += [f"Recommended: `{options}`, {accuracy.recommended.why}.", _markdown(predicted)]
     return "\n\n".join([*blocks, f"Measured by `{accuracy.command}` on {accuracy.machine}."]) + "\n"
 
 

@@ -99,7 +99,7 @@ class ConvergenceStudy:
         until: the last stage that is computed.
         timed: stages whose time is the cost of a run.
         errors: quantity -> what its error is called in tables, with what it is relative to. The first one is judged by
-            the tolerance, and by it costs and orders are told.
+            the tolerance, and by it costs and orders are shown.
         measure: what the products of a run, in its run folder, say of each of these quantities; a quantity may be
             missing where it has no meaning.
         parameters: the first one has the runs that others are compared with where nothing is exact.

@@ -6,7 +6,8 @@ from math import ceil
 from pathlib import Path
 from typing import Any
 
-from reflowshock.workflow.case.problems import CaseError, Problem
+from reflowshock.problem import Problem
+from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.case.units import from_si
 from reflowshock.workflow.convergence.series import (
     ConvergenceStudy,
@@ -161,8 +162,8 @@ def _steps(case: StructureCase, own: Settings) -> tuple[Parameter, StudyRun]:
     base = own | _refine(case, COARSE)
 
     def at(value: float) -> StudyRun:
-        told, settings = setting(value)
-        return StudyRun(f"step {told}", TIME_STEP, base | settings, value)
+        size, settings = setting(value)
+        return StudyRun(f"step {size}", TIME_STEP, base | settings, value)
 
     return Parameter(TIME_STEP, values, at, SECOND).apart(smallest)
 

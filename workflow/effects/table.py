@@ -89,8 +89,8 @@ def per_cent(share: float) -> str:
 
 def report_table(case: Case, effects: Mapping[str, Any]) -> dict:
     """Which effects were simulated, their expected influence and predicted cost, and why: in prose."""
-    told = [
+    shown = [
         [name, "on" if acts else "off", influence, cost, why]
         for name, acts, influence, cost, why in rows(case, effects)
     ]
-    return {"head": ["effect", "state", *HEAD[2:]], "rows": told, "prose": True, "caption": CAPTION}
+    return {"head": ["effect", "state", *HEAD[2:]], "rows": shown, "prose": True, "caption": CAPTION}

@@ -184,8 +184,8 @@ def _untold(store: Store, point: Point, stage: str, state: StageState) -> str:
     if by_cluster := failures_of(said).get(name):
         return f"{by_cluster}; see {said}"
     if not log.exists():
-        told = UNTRIED if state.missing else f"{UNTRIED}: {why_stale(state)}"
-        return f"{told}; see {said}\n{last_words(store.home)}" if said.is_file() else told
+        reason = UNTRIED if state.missing else f"{UNTRIED}: {why_stale(state)}"
+        return f"{reason}; see {said}\n{last_words(store.home)}" if said.is_file() else reason
     words = log.read_text(encoding="utf-8", errors="replace").strip().splitlines()
     last = f'; last output: "{words[-1].strip()}"' if words else ""
     if shutil.disk_usage(store.home).free < LEAST_FREE:

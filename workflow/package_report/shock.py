@@ -20,7 +20,7 @@ SIDES = ("von_mises_board", "von_mises_package")
 
 
 def add_shock(run_folder: Path, case: BoardDropCase, context: dict, summary: dict) -> None:
-    """Add what is told of the shock, where it was run."""
+    """Add the sections on the shock, where it was run."""
     shock = run_folder / "shock"
     histories, results = read_modes(shock)
     if not histories:
@@ -106,14 +106,14 @@ def _add_ranks(histories: dict, results: dict, joints: list[dict], context: dict
     )
 
 
-def _add_shape_effect(shock: Path, history: dict, told: tuple[list[dict], dict], context: dict) -> None:
-    """Add the shock of identical joints, where it was run; ``told`` of the real ones: records, and metrics of all."""
+def _add_shape_effect(shock: Path, history: dict, text: tuple[list[dict], dict], context: dict) -> None:
+    """Add the shock of identical joints, where it was run; ``text`` of the real ones: records, and metrics of all."""
     from reflowshock.workflow.package_report import shape_effect
 
     histories, _ = read_modes(shock, ("identical",))
     if not histories:
         return
-    (joints, metrics), identical = told, histories["identical"]
+    (joints, metrics), identical = text, histories["identical"]
     context["shape_effect"] = shape_effect.in_words(history, identical)
     if "identical_joint_standoff" in metrics:
         real, flat = (micro(metrics[f"{name}_joint_standoff"]["value"]) for name in ("critical", "identical"))
@@ -189,11 +189,11 @@ def in_words(metrics: Mapping[str, Any]) -> str:
     """Say what stress cooling leaves in the joints, and how the package's warpage changes."""
     lifts = (metrics[name]["value"] for name in ("solidified_warpage", "room_temperature_warpage"))
     warped, cold = (f"{micro(lift)} µm" for lift in lifts)
-    told = f"Cooling from solidification changes the warpage of the package from {warped} to {cold}"
+    text = f"Cooling from solidification changes the warpage of the package from {warped} to {cold}"
     if "residual_stress_joint" in metrics:
         joint, stress = metrics["residual_stress_joint"]["value"], quantity(metrics["residual_stress_largest"])
-        told += f" and leaves {stress} at the pads of {joint}, the largest of all joints"
-    return f"{told}. The shock begins with it: an upper bound, since solder that relaxes afterwards is not modelled."
+        text += f" and leaves {stress} at the pads of {joint}, the largest of all joints"
+    return f"{text}. The shock begins with it: an upper bound, since solder that relaxes afterwards is not modelled."
 
 
 def table(joints: Mapping[str, list]) -> dict:

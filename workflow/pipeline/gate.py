@@ -9,9 +9,10 @@ from pathlib import Path
 import numpy as np
 from rich.console import Console
 
+from reflowshock.problem import Problem
 from reflowshock.workflow.case.case import Case
 from reflowshock.workflow.case.plausible import FORCE, implausible, implausible_tables
-from reflowshock.workflow.case.problems import CaseError, Problem
+from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.case.text import duration
 from reflowshock.workflow.case.toml_file import fault_of
 from reflowshock.workflow.kinds import kind_of
@@ -114,10 +115,10 @@ def ask_if_long(name: str, seconds: float, yes: bool, console: Console) -> bool:
     """
     if yes or seconds <= LONG:
         return True
-    told = f"{name} is predicted to take about {duration(seconds)}"
+    prediction = f"{name} is predicted to take about {duration(seconds)}"
     if not (console.is_terminal and sys.stdin is not None and sys.stdin.isatty()):
-        raise CaseError("run", [Problem("", f"{told}; start it with --yes")])
-    return console.input(f"{told}; run it? \\[y/N] ").strip().lower() in ("y", "yes")
+        raise CaseError("run", [Problem("", f"{prediction}; start it with --yes")])
+    return console.input(f"{prediction}; run it? \\[y/N] ").strip().lower() in ("y", "yes")
 
 
 def bytes_text(number: float) -> str:

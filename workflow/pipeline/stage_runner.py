@@ -94,7 +94,7 @@ def execute(name: str, function: StageFunction, run: Run, product: Path) -> bool
     """
     try:
         record = run_stage(name, function, run, product)
-    except Exception as error:  # the boundary of a stage: whatever went wrong is told with the stage's name
+    except Exception as error:  # the boundary of a stage: whatever went wrong is reported with the stage's name
         if is_interrupt(error):
             raise KeyboardInterrupt from error
         _write_message(name, run.folder / f".{name}.partial", error)
@@ -105,10 +105,10 @@ def execute(name: str, function: StageFunction, run: Run, product: Path) -> bool
 
 def _write_message(name: str, folder: Path, error: Exception) -> None:
     """Leave traceback and message for the command, which tells the user; say it at once where they cannot be."""
-    told = in_words(error, folder)
+    message = in_words(error, folder)
     try:
         folder.mkdir(parents=True, exist_ok=True)
         (folder / TRACEBACK).write_text(traceback.format_exc(), encoding="utf-8")
-        (folder / MESSAGE).write_text(told, encoding="utf-8")
+        (folder / MESSAGE).write_text(message, encoding="utf-8")
     except OSError:
-        console.print(f"stage {name} failed: {told}", soft_wrap=True)
+        console.print(f"stage {name} failed: {message}", soft_wrap=True)

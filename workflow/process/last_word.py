@@ -1,7 +1,7 @@
 """What is said last: whatever ends the program becomes one plain line and an exit code, never a traceback.
 
 Nothing but the standard library is loaded before something is to be said, so that an interrupt while the program loads
-is told, too.
+is reported, too.
 """
 
 import errno
@@ -75,9 +75,9 @@ def in_words(error: BaseException, where: Path | None = None) -> str:
         return str(error)
     behind: BaseException | None = error
     while behind is not None:
-        told = _known_words(behind, where)
-        if told:
-            return told
+        words = _known_words(behind, where)
+        if words:
+            return words
         behind = behind.__cause__ or (None if behind.__suppress_context__ else behind.__context__)
     lines = [line.strip() for line in str(error).splitlines() if line.strip()]
     kind = "" if type(error) is RuntimeError else type(error).__name__
@@ -100,8 +100,8 @@ def _known_words(error: BaseException, where: Path | None) -> str:
     if isinstance(error, OSError) and error.errno in SYSTEM:
         does = " while writing" if error.errno in WRITING else ":" if place else ""
         return f"{SYSTEM[error.errno]}{does} {place}".rstrip() if place else SYSTEM[error.errno]
-    told = words_of(str(error))
-    return f"{told} while writing {place}" if told in (SYSTEM[one] for one in WRITING) and place else told
+    words = words_of(str(error))
+    return f"{words} while writing {place}" if words in (SYSTEM[one] for one in WRITING) and place else words
 
 
 def words_of(text: str) -> str:
@@ -167,7 +167,7 @@ def say(error: BaseException) -> int:
         _print_error("interrupted")
         return FAILED
     if isinstance(error, BrokenPipeError):
-        return FAILED  # whoever read has gone: nobody is there to be told
+        return FAILED  # whoever read has gone: nobody reads it
     if getattr(error, "silent", False):
         return int(getattr(error, "exit_code", FAILED))
     if _is_own(error):

@@ -42,8 +42,8 @@ def styled(template: str, *values: object) -> Text:
     ends = [end for found in re.finditer(re.escape(PLACE), words.plain) for end in found.span()]
     pieces = list(words.divide(ends))
     for place, value in zip(range(1, len(pieces), 2), values, strict=True):
-        told = visible(str(value))
-        pieces[place] = Text(told, spans=[Span(0, len(told), span.style) for span in pieces[place].spans])
+        line = visible(str(value))
+        pieces[place] = Text(line, spans=[Span(0, len(line), span.style) for span in pieces[place].spans])
     return Text("").join(pieces)
 
 
@@ -111,8 +111,8 @@ def health_line(stage: str, seconds: float, health: dict, continued: str = "") -
         text = "done"
     if continued:
         text += f"; {continued} continued from checkpoints"
-    told = styled(" [bold]{}[/] {} s  {}", f"{stage:<11}", f"{seconds:6.1f}", text)
-    console.print(mark + told, soft_wrap=True)
+    line = styled(" [bold]{}[/] {} s  {}", f"{stage:<11}", f"{seconds:6.1f}", text)
+    console.print(mark + line, soft_wrap=True)
 
 
 def _against_limit(name: str, result: dict) -> str:
@@ -127,7 +127,7 @@ def _closeness(result: dict) -> float:
 
 
 class ProgressBar(Protocol):
-    """What is told how far something is."""
+    """Is called with how far something is."""
 
     def __call__(self, share: float, text: str = "") -> None:
         """Take the share that is done, 0 to 1, and what is going on, which stands in place of the description."""
@@ -140,7 +140,7 @@ def progress_bar(description: str) -> Iterator[ProgressBar]:
     Where there is no terminal, only the description is printed.
 
     Yields:
-        What is to be told.
+        What is called with the progress.
     """
     columns = (
         TextColumn("  {task.description}", markup=False),

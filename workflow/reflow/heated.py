@@ -161,7 +161,7 @@ class Saved:
 
 
 class Telling:
-    """What the terminal is told: load step, temperature, exchange, residual, and which joints are under way."""
+    """What the terminal shows: load step, temperature, exchange, residual, and which joints are under way."""
 
     def __init__(self, bar: ProgressBar, steps: list[LoadStep]) -> None:
         """Begin at the first load step."""

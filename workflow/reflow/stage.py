@@ -32,7 +32,7 @@ class Reflowed:
         geometries: joint name -> geometry.
         groups: joints that are alike.
         shapes: name of the first of them -> its shape.
-        found: what is to be told of them besides their shapes.
+        found: what is reported of them besides their shapes.
         structure: what `structure.npz` holds; nothing between rigid plates at rest.
     """
 

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from reflowshock.workflow.case.text import nano, number, quantity
+from reflowshock.workflow.case.text import nano, number, quantity, short
 
 Record = Mapping[str, Any]
 
@@ -27,7 +27,7 @@ SELF_CHECK = {
 
 
 def two_scales(coupling: Record, model: Record, found_by: str = "") -> dict:
-    """Return how the models are coupled: what of it the run has told.
+    """Return how the models are coupled: what the run recorded of it.
 
     Args:
         coupling: ``coupling`` of the result of a two-scale run.
@@ -64,10 +64,10 @@ def placement(coupling: Record) -> dict | None:
     """Return the predicted window of every placement, what was measured, and how busy the ranks were."""
     record = coupling.get("placement", {})
     rows = [
-        (f"window, predicted, {name}{' (chosen)' if name == record.get('chosen') else ''}", _micro(seconds))
+        (f"window, predicted, {name}{' (chosen)' if name == record.get('chosen') else ''}", short(seconds))
         for name, seconds in _numbers(record, "alternatives")
     ]
-    rows += [("window, measured", _micro(record["window_seconds"]))] if "window_seconds" in record else []
+    rows += [("window, measured", short(record["window_seconds"]))] if "window_seconds" in record else []
     rows += [(f"rank {rank} computes", _share(share)) for rank, share in enumerate(record.get("busy_shares", ()))]
     rows += (
         [("coupling, share of a window", _share(record["coupling_overhead"]))] if "coupling_overhead" in record else []
@@ -83,21 +83,17 @@ def oracle(seconds: float, results: Sequence[Record]) -> str:
         results: of the two-scale run, and of the preceding coarse run.
     """
     core_seconds = sum(result["timings"]["windows"] * result["model"]["ranks"] for result in results)
-    told = "the two-scale run" if len(results) == 1 else "the two-scale run and the preceding coarse run"
+    runs = "the two-scale run" if len(results) == 1 else "the two-scale run and the preceding coarse run"
     winner = "implicit steps are cheaper" if seconds < core_seconds else "two scales are cheaper"
     return (
         f"All is linear elastic here, so {winner}: one model in implicit steps (MUMPS, factored once) is predicted to"
-        f" take {seconds:.0f} core seconds, {told} took {core_seconds:.0f}. Solder that yields, finite"
+        f" take {seconds:.0f} core seconds, {runs} took {core_seconds:.0f}. Solder that yields, finite"
         " rotations and failure need explicit steps."
     )
 
 
 def _numbers(record: Record, name: str) -> list[tuple[str, float]]:
     return [(key, value) for key, value in record.get(name, {}).items() if isinstance(value, int | float)]
-
-
-def _micro(seconds: float) -> str:
-    return f"{1e6 * seconds:.1f} µs"
 
 
 def _share(value: float | None) -> str:

@@ -24,7 +24,7 @@ HEADLINE = (
 
 
 def add_solder(run_folder: Path, kind: str, context: dict, summary: dict) -> None:
-    """Add what is told of a scene of solder alone."""
+    """Add the section on solder alone."""
     if not (run_folder / "reflow" / "shape.h5").exists():
         return
     from reflowshock.particles.scenes.products import read_body

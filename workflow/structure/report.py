@@ -53,7 +53,7 @@ MODEL_ROWS = (
 
 
 def add_structure(run_folder: Path, case: StructureCase, context: dict, metrics: dict) -> None:
-    """Add what is told of a structure that has moved."""
+    """Add the sections on a structure."""
     folder = run_folder / "shock"
     if not folder.is_dir():
         return

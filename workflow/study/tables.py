@@ -60,8 +60,8 @@ def effect_table(found: Sequence[tuple[str, str, Sequence[MainEffect]]]) -> dict
 def imbalance(rows: Sequence[Row]) -> str:
     """Say that means at a factor's values are not of equal points where some have no result, or a bad one."""
     missing, unsound = sum(not row.metrics for row in rows), sum(row.verdict == UNHEALTHY for row in rows)
-    told = [text.format(count, len(rows)) for text, count in ((MIXED, missing), (UNSOUND, unsound)) if count]
-    return " ".join(told)
+    remarks = [text.format(count, len(rows)) for text, count in ((MIXED, missing), (UNSOUND, unsound)) if count]
+    return " ".join(remarks)
 
 
 def troubles(rows: Sequence[Row]) -> dict:

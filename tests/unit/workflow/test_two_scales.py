@@ -70,9 +70,9 @@ def test_levels_begin_with_the_window():
 
 def test_predictions_stand_beside_what_was_measured():
     rows = rows_of(section.placement(COUPLING))
-    assert rows["window, predicted, shared by 2 (chosen)"] == "300.0 µs"
-    assert rows["window, predicted, macro on rank 0, meso on rank 1"] == "400.0 µs"
-    assert rows["window, measured"] == "330.0 µs"
+    assert rows["window, predicted, shared by 2 (chosen)"] == "300 µs"
+    assert rows["window, predicted, macro on rank 0, meso on rank 1"] == "400 µs"
+    assert rows["window, measured"] == "330 µs"
     assert rows["rank 1 computes"] == "92 %"
     assert rows["coupling, share of a window"] == "2 %"
 
