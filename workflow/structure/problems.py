@@ -13,6 +13,6 @@ def structure_problems(case: StructureCase) -> list[Problem]:
     from reflowshock.meshing.board.box_plan import box_problems
     from reflowshock.workflow.structure.findings import waves_that_do_not_pass
 
-    found = [*box_problems(case.box), *structure_checks.problems(case.scene), *unreadable_pulses(case.pulse_tables)]
+    found = [*box_problems(case.box), *structure_checks.problems(case.problem), *unreadable_pulses(case.pulse_tables)]
     found += reference_problems(case.references, case.problem)
     return found or [*step_problems(case), *waves_that_do_not_pass(case)]
