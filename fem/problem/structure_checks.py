@@ -3,11 +3,11 @@
 import math
 from collections.abc import Iterable, Iterator
 
-from reflowshock.fem.problem.coupling_checks import coupling_problems
 from reflowshock.fem.problem.structure import (
     AXES,
     Gravity,
     InputG,
+    LayerCoupling,
     PrescribedMotion,
     Pressure,
     StructureLoad,
@@ -15,6 +15,7 @@ from reflowshock.fem.problem.structure import (
 )
 from reflowshock.problem import Problem, unknown_name
 
+COUPLING = "dynamics.coupling"
 ROUNDING = 1e-9  # of the box: a watch point on its surface is inside
 
 
@@ -256,3 +257,73 @@ def _numerics(problem: StructureProblem) -> Iterator[Problem]:
     if problem.structure.layers and set(numerics.mass_scaled) >= set(problem.structure.layers):
         message = "leaves no layer to take the step from"
         yield Problem("dynamics.numerics.mass_scaled", message, list(numerics.mass_scaled))
+
+
+def coupling_problems(problem: StructureProblem) -> Iterator[Problem]:
+    """Find what does not go with two models; nothing where there is one."""
+    coupling = problem.dynamics.coupling
+    if coupling is None:
+        if problem.dynamics.solver == "dns":
+            message = "is one model instead of two that are coupled"
+            yield Problem("dynamics.solver", message, "dns", f"explicit, implicit, both, or a table {COUPLING}")
+        return
+    yield from _fine(coupling, problem)
+    yield from _scheme(coupling, problem)
+    yield from _ranks(coupling, problem.dynamics.ranks)
+    yield from _one_model(problem)
+
+
+def _fine(coupling: LayerCoupling, problem: StructureProblem) -> Iterator[Problem]:
+    layers = problem.structure.layers
+    for name in coupling.fine:
+        yield from unknown_name(f"{COUPLING}.fine", name, layers, "layer")
+    if layers and set(coupling.fine) >= set(layers):
+        yield Problem(f"{COUPLING}.fine", "leaves no layer to the macro model", list(coupling.fine), "fewer layers")
+    if problem.structure.element != "hexahedron":
+        yield Problem(COUPLING, f"couples hexahedra, the element is {problem.structure.element}", None, "hexahedron")
+
+
+def _scheme(coupling: LayerCoupling, problem: StructureProblem) -> Iterator[Problem]:
+    if coupling.direction == "one_way":
+        message = "needs a coarse mesh of the fine part, too, which only a package has"
+        yield Problem(f"{COUPLING}.direction", message, "one_way", "two_way")
+    materials = {name: problem.known_materials.get(layer.material) for name, layer in problem.structure.layers.items()}
+    plastic = [name for name, material in materials.items() if material and material.plasticity is not None]
+    if coupling.scheme == "local_steps" and (plastic or problem.dynamics.kinematics == "finite"):
+        why = f"layers that yield: {', '.join(plastic)}" if plastic else "dynamics.kinematics = finite"
+        message = f"needs elastic layers at small strains, there are {why}"
+        yield Problem(f"{COUPLING}.scheme", message, "local_steps", "held_velocity, impulse, gravouil_combescure, auto")
+
+
+def _ranks(coupling: LayerCoupling, ranks: int) -> Iterator[Problem]:
+    if coupling.placement == "disjoint" and ranks < 2:
+        yield Problem(
+            f"{COUPLING}.placement", "needs a rank for each model", "disjoint", "auto, shared; dynamics.ranks >= 2"
+        )
+    if coupling.macro_ranks is not None and coupling.placement != "disjoint":
+        yield Problem(f"{COUPLING}.macro_ranks", "is for placement = disjoint", coupling.macro_ranks, "none")
+    elif coupling.macro_ranks is not None and coupling.macro_ranks >= ranks:
+        message = "leaves no rank for the meso model"
+        yield Problem(f"{COUPLING}.macro_ranks", message, coupling.macro_ranks, f"< {ranks}, dynamics.ranks")
+
+
+def _one_model(problem: StructureProblem) -> Iterator[Problem]:
+    """Yield what only one model can do."""
+    dynamics = problem.dynamics
+    if dynamics.solver == "implicit":
+        yield Problem("dynamics.solver", "couples nothing", "implicit", "explicit or both, or no dynamics.coupling")
+    if (
+        dynamics.modes
+        and dynamics.solver not in ("both", "dns")
+        and not (dynamics.coupling and dynamics.coupling.compare)
+    ):
+        yield Problem("dynamics.modes", "are those of one model", dynamics.modes, f"0, or {COUPLING}.compare = true")
+    if dynamics.numerics.explicit_step is not None:
+        message = "is the step of one model, two have a window and smaller steps"
+        yield Problem("dynamics.numerics.explicit_step", message, f"{dynamics.numerics.explicit_step:g} s", "none")
+    if dynamics.numerics.critical_step != "element":
+        message = "is for one model: windows rest on the steps of elements"
+        yield Problem("dynamics.numerics.critical_step", message, dynamics.numerics.critical_step, "element")
+    for name, load in problem.loads.items():
+        if isinstance(load, InputG) and load.method == "large_mass":
+            yield Problem(f"loads.{name}.method", "moves one model", "large_mass", "direct")

@@ -44,7 +44,7 @@ def _of_geometry(case: PackageCase) -> list[Problem]:
 
 def _of_joints(case: PackageCase) -> list[Problem]:
     """Find temperatures, solder and given surfaces that do not go with the joints of a possible package."""
-    from reflowshock.fem.problem import thermal_checks
+    from reflowshock.fem.problem import thermal as thermal_checks
     from reflowshock.meshing.board.pads import pad_table
     from reflowshock.particles.parameters import checks as particles_checks
 
