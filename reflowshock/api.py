@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rich.console import Console
 
-from reflowshock.fem.names import nearest
+from reflowshock.names import nearest
+from reflowshock.problem import as_toml
 from reflowshock.workflow import plan
 from reflowshock.workflow.case.case import Case as ResolvedCase
-from reflowshock.workflow.case.problems import CaseError, as_toml
+from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.kinds import kind_of, stage_seconds
 from reflowshock.workflow.pipeline.points import read_case_of_run
 from reflowshock.workflow.pipeline.reader import read_case

@@ -7,7 +7,8 @@ from typing import Any, Protocol
 
 from rich.console import RenderableType
 
-from reflowshock.fem.names import nearest
+from reflowshock.names import nearest
+from reflowshock.problem import Problem
 from reflowshock.workflow.board_drop import problems as package_checks
 from reflowshock.workflow.board_drop import shock_effects
 from reflowshock.workflow.board_drop import stages as package_stages
@@ -15,7 +16,7 @@ from reflowshock.workflow.board_drop.forecast import forecast, package_size
 from reflowshock.workflow.board_drop.plan import package_tables
 from reflowshock.workflow.case.case import Case
 from reflowshock.workflow.case.forecast import Size, Toggle
-from reflowshock.workflow.case.problems import CaseError, Problem
+from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.case.run import StageFunction
 from reflowshock.workflow.convergence.series import ConvergenceStudy
 from reflowshock.workflow.package.case import BoardDropCase, PackageCase

@@ -11,9 +11,10 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from reflowshock.cases.hard.bound import Bound, read_bound
 from reflowshock.cases.hard.trial import FAMILIES, Trial, trials
-from reflowshock.fem.names import nearest
+from reflowshock.names import nearest
+from reflowshock.problem import Problem, as_toml
 from reflowshock.workflow.case import fields
-from reflowshock.workflow.case.problems import CaseError, Problem, as_toml
+from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.case.scales import dotted
 from reflowshock.workflow.case.toml_file import read_toml
 from reflowshock.workflow.case.units import UnitError

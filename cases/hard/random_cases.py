@@ -13,8 +13,9 @@ from hypothesis import HealthCheck, Phase, Verbosity
 from reflowshock.cases.hard.draws import DRAWS
 from reflowshock.cases.hard.hard_case import HardCase, hard_cases
 from reflowshock.cases.hard.verdict import attempt
-from reflowshock.fem.names import nearest
-from reflowshock.workflow.case.problems import CaseError, Problem
+from reflowshock.names import nearest
+from reflowshock.problem import Problem
+from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.case.toml_file import read_toml
 
 LONGEST_SEARCH = 120.0  # for a simpler case that misses, too [s]

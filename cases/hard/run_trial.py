@@ -7,25 +7,25 @@ import sys
 import tempfile
 from pathlib import Path
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from reflowshock.cases.hard.trial import Measured, Trial
 from reflowshock.fem.parallel.own_job import own_environment
-from reflowshock.workflow.case.problems import CaseError, as_toml
+from reflowshock.parameters import Parameters
+from reflowshock.problem import as_toml
+from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.case.scales import dotted
 from reflowshock.workflow.pipeline.reader import read_case
 
 LAST_LINES = 3
 
 
-class RunParameters(BaseModel):
+class RunParameters(Parameters):
     """A case file, its name relative to the hard case's own, and settings: dotted keys with values as for --set."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
     case: str = Field(min_length=1)
-    settings: dict = {}
+    settings: dict = Field(default_factory=dict)
 
     @property
     def overrides(self) -> list[str]:

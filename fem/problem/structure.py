@@ -12,8 +12,8 @@ from pydantic import Field
 
 from reflowshock.fem.materials.library import LIBRARY
 from reflowshock.fem.materials.parameters import Material
-from reflowshock.fem.parameters import Parameters
 from reflowshock.fem.problem.shock import MOST_RANKS, Coupling, Damping, ServiceCondition
+from reflowshock.parameters import Parameters
 
 AXES = "xyz"
 SMALLER = 0.5  # of the longest step of a layer: below it a layer is fine, unless the user names those that are

@@ -21,8 +21,14 @@ from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.mesh.mesh_file import read_mesh
 from reflowshock.fem.model.assembly import ForceOptions, Pieces, make_body, make_pieces
 from reflowshock.fem.model.power_iteration import highest_frequency
-from reflowshock.fem.model.steps import Steps, steps_of_division
-from reflowshock.fem.model.structure_steps import check_step, explicit_steps, implicit_steps, with_critical
+from reflowshock.fem.model.steps import (
+    Steps,
+    check_step,
+    explicit_steps,
+    implicit_steps,
+    steps_of_division,
+    with_critical,
+)
 from reflowshock.fem.parallel.agreement import agreed
 from reflowshock.fem.parallel.communicators import Communicators
 from reflowshock.fem.parallel.local_mesh import distribute

@@ -9,7 +9,7 @@ from pydantic import Field
 
 from reflowshock.cases.hard.draws import DRAWS, quantities, tables
 from reflowshock.cases.hard.trial import Measured, Refused, Trial, trials
-from reflowshock.particles.parameters.solder import Parameters
+from reflowshock.parameters import Parameters
 
 
 class Rod(Parameters):

@@ -9,10 +9,11 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
+from reflowshock.problem import Problem
 from reflowshock.workflow.accuracy.recommend import Goal, recommend
 from reflowshock.workflow.accuracy.runs import Compute, StudyRunner
 from reflowshock.workflow.case.case import Case
-from reflowshock.workflow.case.problems import CaseError, Problem
+from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.case.text import duration, percent
 from reflowshock.workflow.case.units import UnitError, to_si
 from reflowshock.workflow.convergence import tables

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from reflowshock.fem.names import nearest
-from reflowshock.workflow.case.problems import Problem
+from reflowshock.names import nearest
+from reflowshock.problem import Problem
 
 if TYPE_CHECKING:
     from reflowshock.fem.problem.shock import JointCoupling

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.problem.thermal import Thermal
+from reflowshock.problem import Problem
 from reflowshock.workflow.board_drop import shock_cooling
 from reflowshock.workflow.board_drop.board_deflection import decided
 from reflowshock.workflow.board_drop.shock_effects import shock_effects
@@ -18,7 +19,6 @@ from reflowshock.workflow.board_drop.shock_forecast import (
     two_scale_parts,
 )
 from reflowshock.workflow.case.forecast import BYTES_OF_ELEMENT, BYTES_OF_PARTICLE, Size, too_many_steps
-from reflowshock.workflow.case.problems import Problem
 from reflowshock.workflow.package.case import BoardDropCase, PackageCase
 from reflowshock.workflow.process.environment import available_cores
 from reflowshock.workflow.reflow.forecast import forecast_heated

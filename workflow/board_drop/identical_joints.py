@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from reflowshock.workflow.case.problems import Problem
+from reflowshock.problem import Problem
 from reflowshock.workflow.case.run import Findings, Run, metric
 from reflowshock.workflow.process.products import read_json
 

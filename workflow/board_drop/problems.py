@@ -1,13 +1,13 @@
 """What does not fit together in the case of a package: its geometry, its solder, its shock."""
 
 from collections.abc import Iterable, Iterator
-from typing import Any
+from dataclasses import replace
 
+from reflowshock.problem import Problem
 from reflowshock.workflow.board_drop import fine_joints, identical_joints, shock_cooling
 from reflowshock.workflow.board_drop.board_deflection import decided
 from reflowshock.workflow.board_drop.forecast import step_problems
 from reflowshock.workflow.case import fields
-from reflowshock.workflow.case.problems import Problem, of_particles
 from reflowshock.workflow.case.pulse_files import unreadable_pulses
 from reflowshock.workflow.package import given_surfaces
 from reflowshock.workflow.package.case import BoardDropCase, PackageCase
@@ -44,7 +44,7 @@ def _of_geometry(case: PackageCase) -> list[Problem]:
 
 def _of_joints(case: PackageCase) -> list[Problem]:
     """Find temperatures, solder and given surfaces that do not go with the joints of a possible package."""
-    from reflowshock.fem.problem import thermal_checks
+    from reflowshock.fem.problem import thermal as thermal_checks
     from reflowshock.meshing.board.pads import pad_table
     from reflowshock.particles.parameters import checks as particles_checks
 
@@ -52,19 +52,16 @@ def _of_joints(case: PackageCase) -> list[Problem]:
     pads = pad_table(package, case.board, case.warpage)
     geometries = joint_geometries(pads)
     heated = thermal_checks.problems(thermal, case.materials.by_role, case.warpage.corner) if thermal else []
-    of_solder = of_particles(particles_checks.problems(case.solder, geometries, package.pitch))
+    of_solder = particles_checks.problems(case.solder, geometries, package.pitch)
     if thermal:
         of_solder += reflow_forecast.problems(case.solder, geometries, thermal, package.pitch)
     return _in_words(case, heated) + of_solder + list(given_surfaces.problems(package, pads, thermal is not None))
 
 
-def _in_words(case: PackageCase, found: Iterable[Any]) -> list[Problem]:
+def _in_words(case: PackageCase, found: Iterable[Problem]) -> list[Problem]:
     """Say what checks of meshing or fem found in the words of a case file, values in the user's units."""
     known = {key: field for key, _, field in fields.leaves(case)}
-    return [
-        Problem(problem.key, problem.message, fields.shown(problem.value, known.get(problem.key)), problem.allowed)
-        for problem in found
-    ]
+    return [replace(problem, value=fields.shown(problem.value, known.get(problem.key))) for problem in found]
 
 
 def _yielding(case: BoardDropCase) -> list[str]:

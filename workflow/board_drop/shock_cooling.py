@@ -8,8 +8,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from reflowshock.problem import Problem
 from reflowshock.workflow.board_drop.shock_forecast import PartForecast, role_of
-from reflowshock.workflow.case.problems import Problem
 from reflowshock.workflow.case.run import Findings, Run
 from reflowshock.workflow.case.text import duration
 from reflowshock.workflow.package.case import BoardDropCase

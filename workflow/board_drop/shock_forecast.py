@@ -5,7 +5,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from reflowshock.fem.materials.parameters import Material
-from reflowshock.workflow.case.problems import CaseError, Problem
+from reflowshock.problem import Problem
+from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.case.text import short
 
 if TYPE_CHECKING:

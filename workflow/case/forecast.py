@@ -6,7 +6,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from reflowshock.workflow.case.problems import Problem
+from reflowshock.problem import Problem
 from reflowshock.workflow.case.text import short
 
 BYTES_OF_ELEMENT, BYTES_OF_PARTICLE = 5.0e3, 5.0e4

@@ -5,7 +5,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from reflowshock.workflow.case.problems import Problem
+from reflowshock.problem import Problem
 
 NAME = r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,63}$"
 NAMES = "letters, digits, _ . -, starting with a letter or digit, at most 64 characters"

@@ -7,9 +7,9 @@ from functools import cache
 
 from pydantic.fields import FieldInfo
 
+from reflowshock.problem import Problem
 from reflowshock.workflow.case import fields
 from reflowshock.workflow.case.case import Case
-from reflowshock.workflow.case.problems import Problem
 from reflowshock.workflow.case.pulse_files import largest_values
 from reflowshock.workflow.case.units import dimension, from_si, to_si
 

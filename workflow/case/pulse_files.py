@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-from reflowshock.workflow.case.problems import Problem
+from reflowshock.problem import Problem
 
 UNITS = {"acceleration": "m/s^2", "pressure": "Pa", "velocity": "m/s"}
 Tables = Mapping[str, tuple[Path, str]]

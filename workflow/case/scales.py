@@ -8,10 +8,10 @@ scale = "full"                                   # or --set scale="quick"
 import tomllib
 from collections.abc import Iterator
 
-from reflowshock.fem.names import nearest
+from reflowshock.names import nearest
+from reflowshock.problem import Problem, as_toml
 from reflowshock.workflow.case.case import FULL
 from reflowshock.workflow.case.names import is_name, wrong_name
-from reflowshock.workflow.case.problems import Problem, as_toml
 from reflowshock.workflow.case.toml_file import DEEPEST
 
 KEYS = 'a table of dotted keys, e.g. "board.numerics.coarse_size" = "2 mm"'

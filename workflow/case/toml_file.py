@@ -5,7 +5,8 @@ import stat
 import tomllib
 from pathlib import Path
 
-from reflowshock.workflow.case.problems import CaseError, Problem
+from reflowshock.problem import Problem
+from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.case.toml_places import Place, message_of, place_of_error
 
 MOST_BYTES = 4_000_000

@@ -7,10 +7,10 @@ from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
-from reflowshock.fem.names import nearest
+from reflowshock.names import nearest
+from reflowshock.problem import Problem
 from reflowshock.workflow.case import fields
 from reflowshock.workflow.case.names import wrong_name
-from reflowshock.workflow.case.problems import Problem
 
 RANGES = ("greater_than", "greater_than_equal", "less_than", "less_than_equal", "finite_number")
 

@@ -6,7 +6,8 @@ from math import ceil
 from pathlib import Path
 from typing import Any
 
-from reflowshock.workflow.case.problems import CaseError, Problem
+from reflowshock.problem import Problem
+from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.case.units import from_si
 from reflowshock.workflow.convergence.series import (
     ConvergenceStudy,

@@ -4,7 +4,7 @@ import shlex
 from collections import Counter
 from collections.abc import Mapping, Sequence
 
-from reflowshock.workflow.case.problems import as_toml
+from reflowshock.problem import as_toml
 from reflowshock.workflow.case.scales import override_value
 from reflowshock.workflow.case.text import number, percent
 from reflowshock.workflow.convergence.measured import Accuracy, Fit, Measurement

@@ -8,9 +8,10 @@ from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 
-from reflowshock.fem.names import nearest
+from reflowshock.names import nearest
+from reflowshock.problem import Problem
 from reflowshock.workflow.case.case import Case
-from reflowshock.workflow.case.problems import CaseError, Problem
+from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.jobs.profile import FILE, Profile
 
 WAIT = 60  # seconds for an answer

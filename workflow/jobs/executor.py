@@ -10,8 +10,9 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Any, Protocol
 
+from reflowshock.problem import Problem
 from reflowshock.workflow.case.case import Case
-from reflowshock.workflow.case.problems import CaseError, Problem
+from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.jobs.checks import NoAnswer, cancel, check_slurm, jobs_in
 from reflowshock.workflow.jobs.profile import Profile, read_profile
 from reflowshock.workflow.pipeline.resources import MOST_CORES, stage_resources

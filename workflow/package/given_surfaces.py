@@ -5,8 +5,8 @@ from collections.abc import Container, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from reflowshock.fem.names import nearest
-from reflowshock.workflow.case.problems import Problem
+from reflowshock.names import nearest
+from reflowshock.problem import Problem
 from reflowshock.workflow.case.toml_file import beside
 
 if TYPE_CHECKING:

@@ -9,9 +9,10 @@ from pathlib import Path
 import numpy as np
 from rich.console import Console
 
+from reflowshock.problem import Problem
 from reflowshock.workflow.case.case import Case
 from reflowshock.workflow.case.plausible import FORCE, implausible, implausible_tables
-from reflowshock.workflow.case.problems import CaseError, Problem
+from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.case.text import duration
 from reflowshock.workflow.case.toml_file import fault_of
 from reflowshock.workflow.kinds import kind_of

@@ -4,8 +4,9 @@ import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from reflowshock.problem import Problem
 from reflowshock.workflow.case.case import Case
-from reflowshock.workflow.case.problems import CaseError, Problem
+from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.kinds import kind_named_in
 from reflowshock.workflow.pipeline.reader import SETTING, read_case
 from reflowshock.workflow.store.keys import digest_of

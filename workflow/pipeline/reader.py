@@ -5,9 +5,10 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
+from reflowshock.problem import Problem
 from reflowshock.workflow.case import fields
 from reflowshock.workflow.case.case import FULL, Case
-from reflowshock.workflow.case.problems import CaseError, Origin, Problem
+from reflowshock.workflow.case.problems import CaseError, Origin
 from reflowshock.workflow.case.scales import choose, is_key, override_value, take_scales
 from reflowshock.workflow.case.toml_file import is_too_deep, parse_toml, read_text
 from reflowshock.workflow.case.toml_places import Places

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from reflowshock.fem.problem.thermal import KELVIN, Thermal
 from reflowshock.particles.parameters.solder import Solder
-from reflowshock.workflow.case.problems import Problem
+from reflowshock.problem import Problem
 from reflowshock.workflow.reflow.between import thermal_effects
 
 if TYPE_CHECKING:

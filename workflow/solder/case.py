@@ -4,8 +4,8 @@ from pydantic import Field
 
 from reflowshock.particles.parameters.scenes import Drop, Drops, Fluid, Joint, Liquid, Oscillation
 from reflowshock.particles.parameters.solder import Solder, Switch
+from reflowshock.problem import Problem
 from reflowshock.workflow.case.case import Case
-from reflowshock.workflow.case.problems import Problem, of_particles
 from reflowshock.workflow.case.stage import Pipeline, Stage, report_of
 
 
@@ -73,25 +73,25 @@ def of_drop(case: DropCase) -> list[Problem]:
     """Find parameters that make no possible drop together."""
     from reflowshock.particles.parameters.scene_checks import drop_problems
 
-    return of_particles(drop_problems(case.drop, case.molten))
+    return drop_problems(case.drop, case.molten)
 
 
 def of_joint(case: JointCase) -> list[Problem]:
     """Find parameters that make no possible joint together."""
     from reflowshock.particles.parameters.scene_checks import joint_problems
 
-    return of_particles(joint_problems(case.joint, case.molten))
+    return joint_problems(case.joint, case.molten)
 
 
 def of_drops(case: DropsCase) -> list[Problem]:
     """Find parameters that make no possible pair together."""
     from reflowshock.particles.parameters.scene_checks import pair_problems
 
-    return of_particles(pair_problems(case.drops, case.molten))
+    return pair_problems(case.drops, case.molten)
 
 
 def of_oscillation(case: OscillationCase) -> list[Problem]:
     """Find a drop that does not oscillate."""
     from reflowshock.particles.parameters.scene_checks import oscillation_problems
 
-    return of_particles(oscillation_problems(case.oscillation, case.molten))
+    return oscillation_problems(case.oscillation, case.molten)

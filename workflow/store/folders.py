@@ -7,8 +7,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from reflowshock.problem import Problem
 from reflowshock.workflow import __version__
-from reflowshock.workflow.case.problems import CaseError, Problem
+from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.store.product import discard
 from reflowshock.workflow.store.store import HOME
 

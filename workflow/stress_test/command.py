@@ -9,8 +9,9 @@ from reflowshock.cases.hard.hard_case import HardCase, read_hard_cases
 from reflowshock.cases.hard.random_cases import read_random_file, shares
 from reflowshock.cases.hard.trial import FAMILIES
 from reflowshock.cases.hard.verdict import Verdict
-from reflowshock.fem.names import nearest
-from reflowshock.workflow.case.problems import CaseError, Problem
+from reflowshock.names import nearest
+from reflowshock.problem import Problem
+from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.process.terminal import console
 from reflowshock.workflow.store.folders import locked
 from reflowshock.workflow.stress_test.page import write_results

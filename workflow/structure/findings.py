@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from reflowshock.workflow.case.problems import Problem
+from reflowshock.problem import Problem
 from reflowshock.workflow.case.run import Findings, at_least, at_most, in_words_continued, metric
 from reflowshock.workflow.case.text import short
 from reflowshock.workflow.structure import exact_bar, exact_cantilever, exact_layers

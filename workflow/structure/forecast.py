@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from math import ceil
 from typing import TYPE_CHECKING, Any
 
+from reflowshock.problem import Problem
 from reflowshock.workflow.case.forecast import BYTES_OF_ELEMENT, Size, Toggle, between, too_many_steps
-from reflowshock.workflow.case.problems import Problem
 from reflowshock.workflow.case.text import short
 from reflowshock.workflow.structure.case import StructureCase
 

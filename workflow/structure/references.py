@@ -3,17 +3,16 @@
 from collections.abc import Iterator
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
-from reflowshock.fem.names import nearest
 from reflowshock.fem.problem.structure import Pressure, StructureProblem
-from reflowshock.workflow.case.problems import Problem
+from reflowshock.names import nearest
+from reflowshock.parameters import Parameters
+from reflowshock.problem import Problem
 
 
-class Reference(BaseModel):
+class Reference(Parameters):
     """Base of all references: immutable, unknown keys are errors."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
 
 class BarWave(Reference):

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from rich.table import Table
 
-from reflowshock.fem.names import nearest
+from reflowshock.names import nearest
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.case.text import duration
 from reflowshock.workflow.jobs.batch import Machine, missing, run_points, show_products

@@ -9,7 +9,7 @@ from itertools import product
 
 import numpy as np
 
-from reflowshock.workflow.case.problems import Problem
+from reflowshock.problem import Problem
 from reflowshock.workflow.case.units import QUANTITY
 
 

@@ -6,10 +6,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field, ValidationError
 
+from reflowshock.parameters import Parameters
+from reflowshock.problem import Problem
 from reflowshock.workflow.case.names import Name
-from reflowshock.workflow.case.problems import CaseError, Problem
+from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.case.scales import dotted, is_key
 from reflowshock.workflow.case.toml_file import parse_toml, read_text
 from reflowshock.workflow.case.toml_places import Places
@@ -29,10 +31,8 @@ from reflowshock.workflow.study.designs import (
 DESIGNS = "at least one of [grid], [[list]], [latin_hypercube]"
 
 
-class StudyTable(BaseModel):
+class StudyTable(Parameters):
     """What the table ``[study]`` says: the case, relative to the file, and what is made of the results."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     name: Name
     title: str = ""
@@ -44,24 +44,20 @@ class StudyTable(BaseModel):
     skip_impossible: bool = False
 
 
-class LatinHypercubeTable(BaseModel):
+class LatinHypercubeTable(Parameters):
     """A Latin hypercube: each parameter once in each of ``samples`` equal parts of its range."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     samples: int = Field(ge=1, le=10000)
     seed: int = Field(0, ge=0)
     ranges: dict[str, Any]
 
 
-class StudyFile(BaseModel):
+class StudyFile(Parameters):
     """The tables of a study file."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
     study: StudyTable
-    settings: dict[str, Any] = {}
-    grid: dict[str, Any] = {}
+    settings: dict[str, Any] = Field(default_factory=dict)
+    grid: dict[str, Any] = Field(default_factory=dict)
     list: tuple[dict[str, Any], ...] = ()
     latin_hypercube: LatinHypercubeTable | None = None
 

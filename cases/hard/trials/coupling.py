@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from reflowshock.cases.hard.trial import pure_trial
-from reflowshock.fem.parameters import Parameters
+from reflowshock.parameters import Parameters
 
 SchemeOfTrial = Literal[
     "held_velocity", "impulse", "gravouil_combescure", "local_steps", "local_steps, levels auto", "as_printed"

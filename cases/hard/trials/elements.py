@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from reflowshock.cases.hard.trial import pure_trial
-from reflowshock.fem.parameters import Parameters
+from reflowshock.parameters import Parameters
 
 Element = Literal["incompatible_modes", "one_point", "tetrahedron", "tetrahedron_quadratic"]
 Hexahedron = Literal["incompatible_modes", "one_point"]

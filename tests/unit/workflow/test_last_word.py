@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from reflowshock.workflow.case.problems import CaseError, Problem
+from reflowshock.problem import Problem
+from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.process import last_word
 from reflowshock.workflow.process.last_word import in_words, say
 from reflowshock.workflow.process.launch import LaunchError

@@ -1,9 +1,9 @@
-"""The base of all parameter models of fem."""
+"""The base of all models of parameters."""
 
 from pydantic import BaseModel, ConfigDict
 
 
 class Parameters(BaseModel):
-    """Base of all parameter models: immutable, unknown keys are errors."""
+    """Immutable; unknown keys are errors."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
