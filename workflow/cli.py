@@ -2,6 +2,8 @@
 
 import json
 import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
@@ -65,6 +67,16 @@ ProfileOption = Annotated[
 ]
 
 
+@contextmanager
+def interruptible(what: str) -> Iterator[None]:
+    """End with exit code 1 on Ctrl-C, and say what is kept."""
+    try:
+        yield
+    except KeyboardInterrupt as error:
+        print_error(f"interrupted; {what}")
+        raise typer.Exit(1) from error
+
+
 @app.command()
 def new(
     name: Annotated[str, typer.Argument(help="name of the case; the file is NAME.toml")],
@@ -123,11 +135,8 @@ def run(
         seconds = predicted_seconds(store, point, until)
         if not ask_if_long(point.case.run_name, seconds, yes, console):
             raise typer.Exit(1)
-    try:
+    with interruptible("complete stages and checkpoints are kept; repeat the command to continue"):
         healthy = run_case(store, point, until, machine, force=force)
-    except KeyboardInterrupt as error:
-        print_error("interrupted; complete stages and checkpoints are kept; repeat the command to continue")
-        raise typer.Exit(1) from error
     raise typer.Exit(0 if healthy else 1)
 
 
@@ -153,11 +162,8 @@ def accuracy(
     from reflowshock.workflow.accuracy.command import read_request, show
 
     request = replace(read_request(case, settings or [], tolerance, budget), oversubscribe=oversubscribe, force=force)
-    try:
+    with interruptible("complete points and checkpoints are kept; repeat the command to continue"):
         kept = show(request, out, console)
-    except KeyboardInterrupt as error:
-        print_error("interrupted; complete points and checkpoints are kept; repeat the command to continue")
-        raise typer.Exit(1) from error
     raise typer.Exit(0 if kept else 1)
 
 
@@ -231,11 +237,8 @@ def stress_test(
 
     count = random if random is not None else 0 if cases else RANDOM_COUNT
     request = Request(cases or [], family or [], count, seed, cores or available_cores(), out)
-    try:
+    with interruptible("no results are written"):
         survived = try_cases(request)
-    except KeyboardInterrupt as error:
-        print_error("interrupted; no results are written")
-        raise typer.Exit(1) from error
     raise typer.Exit(0 if survived else 1)
 
 
@@ -285,11 +288,8 @@ def study(
         seconds = predicted_study_seconds(points, store) / machine.cores
         if not ask_if_long(f"study {points.study.about.name}", seconds, yes, console):
             raise typer.Exit(1)
-    try:
+    with interruptible("complete products and checkpoints are kept; repeat the command to continue"):
         healthy = run_study(points, store, machine, force=force)
-    except KeyboardInterrupt as error:
-        print_error("interrupted; complete products and checkpoints are kept; repeat the command to continue")
-        raise typer.Exit(1) from error
     raise typer.Exit(0 if healthy else 1)
 
 

@@ -12,9 +12,11 @@ from pathlib import Path
 import numpy as np
 import psutil
 import pytest
+from hypothesis import given
 
 from reflowshock.cases.hard.bound import read_bound
 from reflowshock.cases.hard.collector import HARD
+from reflowshock.cases.hard.draws import quantities
 from reflowshock.cases.hard.hard_case import hard_case_text, hard_cases, read_hard_cases
 from reflowshock.cases.hard.random_cases import read_random_file
 from reflowshock.cases.hard.trial import Measured
@@ -220,3 +222,9 @@ def test_all_cases_of_the_program_can_be_read():
     files = [(path, read_random_file(path)) for path in sorted(HARD.glob("*.toml"))]
     found = [case for path, random in files for case in (random.cases(2, 1) if random else read_hard_cases(path))]
     assert all(case.name.split("_")[0] == case.family for case in found)
+
+
+@given(quantities(-30.0, 30.0, "deg"))
+def test_what_is_drawn_is_zero_or_can_be_told_from_it(quantity):
+    value = float(quantity.removesuffix(" deg"))
+    assert value == 0.0 or abs(value) > 1e-5
