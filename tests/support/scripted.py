@@ -64,7 +64,7 @@ class ScriptedMacro(ScriptedDriver):
     def __init__(
         self, points: NDArray[np.float64], velocity: VelocityScript, plan: WindowPlan, channels: InterfaceChannels
     ) -> None:
-        """Receive the interface mass; a ``held_velocity.HeldVelocityMeso`` must have sent it. Arguments as ``ScriptedDriver``."""
+        """Receive the interface mass; a ``HeldVelocityMeso`` must have sent it. Arguments as ``ScriptedDriver``."""
         super().__init__(points, velocity, plan, channels)
         self.mass, self.force = np.zeros_like(points), np.zeros_like(points)
         channels.forces.receive(self.mass)
