@@ -27,8 +27,7 @@ from mpi4py import MPI
 from reflowshock.cases.hard.trials.bodies import dns_body
 from reflowshock.cases.hard.trials.grids import grid, mesh_of
 from reflowshock.fem.dynamics.implicit import ImplicitMotion
-from reflowshock.fem.estimates.factor_cost import box_factor
-from reflowshock.fem.estimates.solver_cost import forecast_solvers
+from reflowshock.fem.estimates.solver_cost import box_factor, forecast_solvers
 from reflowshock.fem.materials.library import FR4
 from reflowshock.fem.model.factorisation import Factorisation
 from reflowshock.fem.model.global_matrix import Equations

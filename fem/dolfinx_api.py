@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from functools import partial
+from operator import methodcaller
 from pathlib import Path
 
 import basix
@@ -113,7 +114,8 @@ def at_quadrature_points(
     points, _ = basix.make_quadrature(getattr(basix.CellType, shape_of(cell_nodes(mesh)).cell), degree)
     compiled = dolfinx.fem.Expression(expression, points)
     cells = np.arange(mesh.topology.index_map(3).size_local, dtype=np.int32)
-    return partial(compiled.eval, cells) if OLD else partial(compiled.eval, mesh, cells)
+    evaluate = methodcaller("eval", cells) if OLD else methodcaller("eval", mesh, cells)  # compiled code, no text
+    return partial(evaluate, compiled)
 
 
 def assembled_csr(form) -> scipy.sparse.csr_matrix:  # its type has another name in each version

@@ -1,5 +1,28 @@
-"""From a case file to a drop-shock report; the rooms beside this file are links to those at the top of the checkout."""
+"""From a case file to a drop-shock report; the rooms beside this file are links to those at the top of the checkout.
+
+    import reflowshock
+
+    case = reflowshock.Case.load("cases/bga_drop/case.toml", {"shock.peak_acceleration": "1000 G"})
+    print(case.plan())
+    run = case.run("runs/first")  # or, later: reflowshock.Run.open("runs/first")
+    run.metrics["peak_von_mises"], run.joints, run.history["two_scale"]["time"], run.surface("A10")
+
+Importing it loads no numerical library; each of these loads what it needs.
+"""
+
+from typing import TYPE_CHECKING, Any
 
 from reflowshock.workflow import __version__
 
-__all__ = ["__version__"]
+if TYPE_CHECKING:
+    from reflowshock.api import Case, CaseError, Run, RunFailed, UnknownName
+
+__all__ = ["Case", "CaseError", "Run", "RunFailed", "UnknownName", "__version__"]
+
+
+def __getattr__(name: str) -> Any:
+    if name in __all__:
+        from reflowshock import api
+
+        return getattr(api, name)
+    raise AttributeError(f"module 'reflowshock' has no attribute {name!r}")

@@ -2,6 +2,8 @@
 
 import json
 import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
@@ -21,7 +23,7 @@ from reflowshock.workflow.store.store import Store
 
 app = typer.Typer(
     name="reflowshock",
-    help="From a case file to a report: solder reflow by particles, two-scale explicit drop shock.",
+    help="Solder reflow with particles and two-scale explicit drop shock, from a case file to a report.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     add_completion=False,
@@ -29,17 +31,18 @@ app = typer.Typer(
 
 CasePath = Annotated[Path, typer.Argument(metavar="CASE", help="case file (TOML)")]
 Settings = Annotated[
-    list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help='override, e.g. "shock.peak_acceleration=1000 G"')
+    list[str] | None,
+    typer.Option("--set", metavar="KEY=VALUE", help='override a value, e.g. "shock.peak_acceleration=1000 G"'),
 ]
 Out = Annotated[
-    Path | None, typer.Option("--out", metavar="DIR", help="run folder [default: runs/<case name>, with its scale]")
+    Path | None, typer.Option("--out", metavar="DIR", help="run folder [default: runs/<case name>-<scale>]")
 ]
 Oversubscribe = Annotated[bool, typer.Option("--oversubscribe", help="allow more MPI ranks than cores")]
 Force = Annotated[
     bool,
-    typer.Option("--force", help="also where the folder holds another case, and with implausible values"),
+    typer.Option("--force", help="use the folder even if it holds another case; accept implausible values"),
 ]
-Yes = Annotated[bool, typer.Option("--yes", "-y", help="do not ask, also where it takes more than an hour")]
+Yes = Annotated[bool, typer.Option("--yes", "-y", help="do not ask before runs of more than an hour")]
 MOST_AT_ONCE = 10_000  # cores, or jobs of a cluster
 AtOnce = Annotated[
     int | None,
@@ -48,16 +51,30 @@ AtOnce = Annotated[
         "--cores",
         min=1,
         max=MOST_AT_ONCE,
-        help=f"cores to use [default: all]; of a cluster: jobs at a time [{JOBS}]",
+        help=f"cores to use [default: all]; on a cluster: jobs at a time [default: {JOBS}]",
     ),
 ]
 ExecutorOption = Annotated[
-    ExecutorName, typer.Option("--executor", help="where stages run; slurm: as jobs of a cluster")
+    ExecutorName, typer.Option("--executor", help="where stages run: on this machine or as Slurm jobs")
 ]
 ProfileOption = Annotated[
     Path | None,
-    typer.Option("--profile", metavar="DIR", help="of the cluster [default: profiles/slurm, if there; else built in]"),
+    typer.Option(
+        "--profile",
+        metavar="DIR",
+        help="profile of the cluster [default: profiles/slurm if it exists, else the built-in one]",
+    ),
 ]
+
+
+@contextmanager
+def interruptible(what: str) -> Iterator[None]:
+    """End with exit code 1 on Ctrl-C, and say what is kept."""
+    try:
+        yield
+    except KeyboardInterrupt as error:
+        print_error(f"interrupted; {what}")
+        raise typer.Exit(1) from error
 
 
 @app.command()
@@ -80,7 +97,7 @@ def plan(
     oversubscribe: Oversubscribe = False,
     force: Force = False,
 ) -> None:
-    """Show what a run would do and cost; runs nothing."""
+    """Show what a run would do and what it would cost; nothing is run."""
     from reflowshock.workflow.plan import show_plan
     from reflowshock.workflow.run import WHAT
 
@@ -93,7 +110,7 @@ def plan(
 def run(
     case: CasePath,
     settings: Settings = None,
-    until: Annotated[str, typer.Option(metavar="STAGE", help="last stage, of those that plan lists")] = "report",
+    until: Annotated[str, typer.Option(metavar="STAGE", help="last stage to run (see plan)")] = "report",
     cores: AtOnce = None,
     out: Out = None,
     oversubscribe: Oversubscribe = False,
@@ -102,7 +119,7 @@ def run(
     force: Force = False,
     yes: Yes = False,
 ) -> None:
-    """Run what is missing, stale or damaged."""
+    """Run all stages that are missing, stale or damaged."""
     from reflowshock.workflow.jobs.batch import machine_of
     from reflowshock.workflow.pipeline.gate import ask_if_long
     from reflowshock.workflow.plan import predicted_seconds
@@ -111,18 +128,15 @@ def run(
     store, point = _load(case, settings, out, oversubscribe or executor != ExecutorName.LOCAL, force)
     if until not in point.case.pipeline.names:
         allowed = ", ".join(point.case.pipeline.names)
-        raise typer.BadParameter(f"'{until}' is no stage of this case; allowed: {allowed}", param_hint="--until")
+        raise typer.BadParameter(f"'{until}' is not a stage of this case; allowed: {allowed}", param_hint="--until")
     check_folder(store.folder, WHAT, point.case.case.name, force)
     machine = machine_of(executor_for(executor, profile, cores, oversubscribe, [point.case]), one_run=True)
     if executor == ExecutorName.LOCAL:
         seconds = predicted_seconds(store, point, until)
         if not ask_if_long(point.case.run_name, seconds, yes, console):
             raise typer.Exit(1)
-    try:
+    with interruptible("complete stages and checkpoints are kept; repeat the command to continue"):
         healthy = run_case(store, point, until, machine, force=force)
-    except KeyboardInterrupt as error:
-        print_error("interrupted; complete stages and checkpoints are kept: the same command continues")
-        raise typer.Exit(1) from error
     raise typer.Exit(0 if healthy else 1)
 
 
@@ -131,11 +145,11 @@ def accuracy(
     case: CasePath,
     tolerance: Annotated[
         str | None,
-        typer.Option(metavar="SHARE", help='error that is allowed, e.g. "2%" [default: 2% without a budget]'),
+        typer.Option(metavar="SHARE", help='allowed error, e.g. "2%" [default: 2% if no budget is given]'),
     ] = None,
     budget: Annotated[
         str | None,
-        typer.Option(metavar="TIME", help='wall time of all runs together, e.g. "10min" [default: no limit]'),
+        typer.Option(metavar="TIME", help='total wall time of all runs, e.g. "10min" [default: no limit]'),
     ] = None,
     settings: Settings = None,
     out: Annotated[
@@ -144,21 +158,18 @@ def accuracy(
     oversubscribe: Oversubscribe = False,
     force: Force = False,
 ) -> None:
-    """Measure what accuracy costs: a ladder of settings, their errors and times; recommend some and run them."""
-    from reflowshock.workflow.accuracy.command import read_wish, show
+    """Run a convergence study: errors and costs of settings; recommend settings and run them."""
+    from reflowshock.workflow.accuracy.command import read_request, show
 
-    wish = replace(read_wish(case, settings or [], tolerance, budget), oversubscribe=oversubscribe, force=force)
-    try:
-        kept = show(wish, out, console)
-    except KeyboardInterrupt as error:
-        print_error("interrupted; complete points and checkpoints are kept: the same command continues")
-        raise typer.Exit(1) from error
+    request = replace(read_request(case, settings or [], tolerance, budget), oversubscribe=oversubscribe, force=force)
+    with interruptible("complete points and checkpoints are kept; repeat the command to continue"):
+        kept = show(request, out, console)
     raise typer.Exit(0 if kept else 1)
 
 
 @app.command()
 def status(case: CasePath, settings: Settings = None, out: Out = None) -> None:
-    """Show what a run folder holds: stages done, stale, damaged or missing, their times and main figures."""
+    """Show the state of a run folder: stages done, stale, damaged or missing, with times and key results."""
     from reflowshock.workflow.status import show_status
 
     show_status(*_load(case, settings, out, True, True), console)
@@ -166,14 +177,14 @@ def status(case: CasePath, settings: Settings = None, out: Out = None) -> None:
 
 @app.command()
 def report(case: CasePath, settings: Settings = None, out: Out = None) -> None:
-    """Write the report again, from the products that are there and the values that they were made with."""
+    """Write the report again from the existing products."""
     from reflowshock.workflow.pipeline.report import write_report
     from reflowshock.workflow.run import report_again
     from reflowshock.workflow.stages import report as stage_function
 
     store, point = _load(case, settings, out, True, True)
     if read_mark(store.folder) is None:
-        print_error(f"{store.folder} is not a run folder: nothing was run")
+        print_error(f"{store.folder} is not a run folder")
         raise typer.Exit(1)
     if not report_again(store.folder, point.case.case.name, write_report, stage_function):
         raise typer.Exit(1)
@@ -182,7 +193,7 @@ def report(case: CasePath, settings: Settings = None, out: Out = None) -> None:
 
 @app.command()
 def verify(case: CasePath, settings: Settings = None, out: Out = None) -> None:
-    """Look at every file of a run folder: are all products there, and as they were written?"""
+    """Verify that all products of a run folder exist and are unchanged."""
     from reflowshock.workflow.run import verify as verify_run
 
     raise typer.Exit(0 if verify_run(*_load(case, settings, out, True, True)) else 1)
@@ -194,11 +205,11 @@ def clean(
     settings: Settings = None,
     out: Out = None,
     unused: Annotated[
-        bool, typer.Option("--unused", help="only products of other settings, and work that was broken off")
+        bool, typer.Option("--unused", help="remove only products of other settings and unfinished work")
     ] = False,
     force: Force = False,
 ) -> None:
-    """Remove what the program has written into a case's run folder."""
+    """Remove the program's own files from a run folder."""
     from reflowshock.workflow.run import clean as clean_run
 
     store, point = _load(case, settings, out, True, True)
@@ -220,26 +231,25 @@ def stress_test(
     ] = None,
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="results")] = Path("runs/stress-test"),
 ) -> None:
-    """Try the hard cases, and random ones: does each survive within its bounds?"""
+    """Run hard and random cases and check that each stays within its bounds."""
     from reflowshock.workflow.stress_test.command import RANDOM_COUNT, Request
     from reflowshock.workflow.stress_test.command import stress_test as try_cases
 
     count = random if random is not None else 0 if cases else RANDOM_COUNT
     request = Request(cases or [], family or [], count, seed, cores or available_cores(), out)
-    try:
+    with interruptible("no results are written"):
         survived = try_cases(request)
-    except KeyboardInterrupt as error:
-        print_error("interrupted; no results are written, the same command begins anew")
-        raise typer.Exit(1) from error
     raise typer.Exit(0 if survived else 1)
 
 
 @app.command()
 def effects(
-    case: Annotated[Path | None, typer.Argument(metavar="[CASE]", help="case file: its effects only")] = None,
+    case: Annotated[
+        Path | None, typer.Argument(metavar="[CASE]", help="case file; without it, all effects of the program")
+    ] = None,
     settings: Settings = None,
 ) -> None:
-    """Show the effects of the program, or those of a case: on or off and why, expected influence, share of the cost."""
+    """Show all effects, or those of a case: on or off and why, expected influence, share of the cost."""
     from reflowshock.workflow.effects.page import show_effects, show_registry
 
     if case is None:
@@ -252,7 +262,7 @@ def effects(
 def study(
     study: Annotated[Path, typer.Argument(metavar="STUDY", help="study file (TOML)")],
     cores: AtOnce = None,
-    dry_run: Annotated[bool, typer.Option("--dry-run", "-n", help="say what would be computed, and its cost")] = False,
+    dry_run: Annotated[bool, typer.Option("--dry-run", "-n", help="show what would be computed and its cost")] = False,
     out: Annotated[
         Path | None, typer.Option("--out", metavar="DIR", help="folder of the study [default: runs/<study name>]")
     ] = None,
@@ -262,7 +272,7 @@ def study(
     force: Force = False,
     yes: Yes = False,
 ) -> None:
-    """Run a case at many settings; only what is missing. Results as tables, plots and a page."""
+    """Run a parametric study; only what is missing is computed. Writes tables, plots and a page."""
     from reflowshock.workflow.jobs.batch import machine_of
     from reflowshock.workflow.pipeline.gate import ask_if_long
     from reflowshock.workflow.study.command import predicted_study_seconds, read_points_of, run_study, show_outlook
@@ -278,11 +288,8 @@ def study(
         seconds = predicted_study_seconds(points, store) / machine.cores
         if not ask_if_long(f"study {points.study.about.name}", seconds, yes, console):
             raise typer.Exit(1)
-    try:
+    with interruptible("complete products and checkpoints are kept; repeat the command to continue"):
         healthy = run_study(points, store, machine, force=force)
-    except KeyboardInterrupt as error:
-        print_error("interrupted; complete products and checkpoints are kept: the same command continues")
-        raise typer.Exit(1) from error
     raise typer.Exit(0 if healthy else 1)
 
 
@@ -300,9 +307,9 @@ def stage(
     key: str,
     cores: Annotated[int, typer.Option("--cores")] = 1,
     oversubscribe: Oversubscribe = False,
-    mark: Annotated[Path | None, typer.Option(help="file that says to Snakemake that it is done")] = None,
+    mark: Annotated[Path | None, typer.Option(help="file that tells Snakemake that the job is done")] = None,
 ) -> None:
-    """Make one product, in the store that is the working directory; Snakemake calls this."""
+    """Make one product in the store in the working directory (called by Snakemake)."""
     from reflowshock.workflow.case.run import Run
     from reflowshock.workflow.pipeline.stage_runner import execute
     from reflowshock.workflow.stages import stage_function

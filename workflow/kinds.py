@@ -7,7 +7,8 @@ from typing import Any, Protocol
 
 from rich.console import RenderableType
 
-from reflowshock.fem.names import nearest
+from reflowshock.names import nearest
+from reflowshock.problem import Problem
 from reflowshock.workflow.board_drop import problems as package_checks
 from reflowshock.workflow.board_drop import shock_effects
 from reflowshock.workflow.board_drop import stages as package_stages
@@ -15,20 +16,19 @@ from reflowshock.workflow.board_drop.forecast import forecast, package_size
 from reflowshock.workflow.board_drop.plan import package_tables
 from reflowshock.workflow.case.case import Case
 from reflowshock.workflow.case.forecast import Size, Toggle
-from reflowshock.workflow.case.problems import CaseError, Problem
+from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.case.run import StageFunction
-from reflowshock.workflow.convergence.series import Ladder
+from reflowshock.workflow.convergence.series import ConvergenceStudy
 from reflowshock.workflow.package.case import BoardDropCase, PackageCase
 from reflowshock.workflow.reflow.stage import reflow
-from reflowshock.workflow.solder import problems as solder_checks
+from reflowshock.workflow.solder import case as solder_case
 from reflowshock.workflow.solder import stages as solder_stages
 from reflowshock.workflow.solder.case import DropCase, DropsCase, JointCase, OscillationCase
-from reflowshock.workflow.solder.forecast import forecast_scene, scene_size
-from reflowshock.workflow.solder.plan import scene_tables
+from reflowshock.workflow.solder.forecast import forecast_solder, solder_size, solder_tables
 from reflowshock.workflow.structure import forecast as structure_forecast
 from reflowshock.workflow.structure import stages as structure_stages
 from reflowshock.workflow.structure.case import StructureCase
-from reflowshock.workflow.structure.plan import structure_tables
+from reflowshock.workflow.structure.forecast import structure_tables
 from reflowshock.workflow.structure.problems import structure_problems
 
 
@@ -57,7 +57,7 @@ class Kind:
         plan: what the plan shows below stages and effects, of a case and its forecast.
         acts: what its effects belong to, for readers.
         report: adds its sections to the context of a report: run folder, case, context, summary.
-        ladder: its convergence study.
+        study: its convergence study.
         toggles: effect -> the case with that effect the other way, where the forecast knows what it costs.
     """
 
@@ -69,7 +69,7 @@ class Kind:
     plan: Callable[[Any, Any], Iterable[RenderableType]]
     acts: str
     report: Callable[[Path, Any, dict, dict], None]
-    ladder: Callable[[Any], Ladder]
+    study: Callable[[Any], ConvergenceStudy]
     toggles: Callable[[Any], Mapping[str, Toggle]] = lambda case: {}
 
     @property
@@ -98,43 +98,43 @@ def _structure_report(run_folder: Path, case: StructureCase, context: dict, summ
     add_structure(run_folder, case, context, summary["metrics"])
 
 
-def _scene_report(run_folder: Path, case: Case, context: dict, summary: dict) -> None:
+def _solder_report(run_folder: Path, case: Case, context: dict, summary: dict) -> None:
     if (run_folder / "reflow/shape.h5").exists():
-        from reflowshock.workflow.solder.report import add_scene
+        from reflowshock.workflow.solder.report import add_solder
 
-        add_scene(run_folder, case.kind, context, summary)
-
-
-def _package_ladder(case: PackageCase) -> Ladder:
-    from reflowshock.workflow.convergence.packages import package_ladder
-
-    return package_ladder(case)
+        add_solder(run_folder, case.kind, context, summary)
 
 
-def _structure_ladder(case: StructureCase) -> Ladder:
-    from reflowshock.workflow.convergence.structures import structure_ladder
+def _package_study(case: PackageCase) -> ConvergenceStudy:
+    from reflowshock.workflow.convergence.packages import package_study
 
-    return structure_ladder(case)
-
-
-def _scene_ladder(case: Case) -> Ladder:
-    from reflowshock.workflow.convergence.solder import LADDERS
-
-    return LADDERS[case.kind](case)
+    return package_study(case)
 
 
-def _scene(case: type[Case], problems: Callable[[Any], list[Problem]], reflow_scene: StageFunction) -> Kind:
+def _structure_study(case: StructureCase) -> ConvergenceStudy:
+    from reflowshock.workflow.convergence.structures import structure_study
+
+    return structure_study(case)
+
+
+def _solder_study(case: Case) -> ConvergenceStudy:
+    from reflowshock.workflow.convergence.solder import STUDIES
+
+    return STUDIES[case.kind](case)
+
+
+def _solder_kind(case: type[Case], problems: Callable[[Any], list[Problem]], reflow_solder: StageFunction) -> Kind:
     """Return a kind of case of solder alone."""
     return Kind(
         case,
         problems,
-        {"reflow": reflow_scene},
-        forecast_scene,
-        scene_size,
-        scene_tables,
+        {"reflow": reflow_solder},
+        forecast_solder,
+        solder_size,
+        solder_tables,
         "reflow",
-        _scene_report,
-        _scene_ladder,
+        _solder_report,
+        _solder_study,
     )
 
 
@@ -152,7 +152,7 @@ PACKAGE = Kind(
     plan=package_tables,
     acts="reflow",
     report=_package_report,
-    ladder=_package_ladder,
+    study=_package_study,
     toggles=shock_effects.toggles,
 )
 BOARD_DROP = replace(
@@ -176,15 +176,15 @@ STRUCTURE = Kind(
     plan=structure_tables,
     acts="motion",
     report=_structure_report,
-    ladder=_structure_ladder,
+    study=_structure_study,
     toggles=structure_forecast.toggles,
 )
 KINDS = (
     BOARD_DROP,
-    _scene(DropCase, solder_checks.of_drop, solder_stages.reflow_drop),
-    _scene(JointCase, solder_checks.of_joint, solder_stages.reflow_joint),
-    _scene(DropsCase, solder_checks.of_drops, solder_stages.reflow_drops),
-    _scene(OscillationCase, solder_checks.of_oscillation, solder_stages.reflow_oscillation),
+    _solder_kind(DropCase, solder_case.of_drop, solder_stages.reflow_drop),
+    _solder_kind(JointCase, solder_case.of_joint, solder_stages.reflow_joint),
+    _solder_kind(DropsCase, solder_case.of_drops, solder_stages.reflow_drops),
+    _solder_kind(OscillationCase, solder_case.of_oscillation, solder_stages.reflow_oscillation),
     STRUCTURE,
     PACKAGE,
 )
@@ -209,10 +209,10 @@ def kind_named_in(table: Mapping) -> Kind:
         return next(kind for kind in KINDS if kind.name == found[0])
     choice = "exactly one of " + ", ".join(f"[{name}]" for name in NAMES)
     if found:
-        message = "is of several kinds at once: it has " + " and ".join(f"[{name}]" for name in found)
+        message = "has the tables of several kinds: " + " and ".join(f"[{name}]" for name in found)
         raise CaseError("case", [Problem("", message, None, choice)])
     if isinstance(table.get("study"), dict):
-        raise CaseError("case", [Problem("", "is a study, not a case; use: reflowshock study")])
+        raise CaseError("case", [Problem("", "is a study, not a case; use reflowshock study")])
     hint = next((f"[{near}]" for name in table if (near := nearest(name, NAMES))), "")
     raise CaseError("case", [Problem("", "does not say what kind of case it is", None, choice, hint)])
 

@@ -1,4 +1,4 @@
-"""The commands run, report, verify and clean: what they do with a run folder, and what the user is told."""
+"""The commands run, report, verify and clean: what they do with a run folder, and what the user sees."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -13,7 +13,7 @@ from reflowshock.workflow.process.terminal import console, print_error
 from reflowshock.workflow.store.folders import locked, read_mark, remove_own
 from reflowshock.workflow.store.point import Point
 from reflowshock.workflow.store.product import discard
-from reflowshock.workflow.store.state import Verdict, examine, failed_checks, why_stale
+from reflowshock.workflow.store.state import StageState, examine, failed_checks, why_stale
 from reflowshock.workflow.store.store import TRACEBACK, Store
 from reflowshock.workflow.store.view import adopt, not_as_put, remove_unused, withdraw_all
 
@@ -39,12 +39,12 @@ def run_case(store: Store, point: Point, until: str, machine: Machine, *, force:
         RunFolderBusy: another process is at work in it.
     """
     with locked(store.folder, WHAT, point.case.case.name, force) as lock:
-        verdicts = examine(store, point)
-        wanted = {stage.name: verdicts[stage.name] for stage in point.case.pipeline.upstream(until)}
+        states = examine(store, point)
+        wanted = {stage.name: states[stage.name] for stage in point.case.pipeline.upstream(until)}
         _tell_damage(wanted)
         for name in show_products(store, point):
-            console.print(f"put back {store.folder / name}")
-        if any(verdict.stale for verdict in wanted.values()):
+            console.print(f"restored {store.folder / name}")
+        if any(state.stale for state in wanted.values()):
             watched = replace(machine, each_second=machine.each_second or _shower(store, point))
             run_points(store, [point], until, watched, lock)
         else:
@@ -81,11 +81,11 @@ def report_again(folder: Path, name: str, write: Callable[[Path, Case, Path], ob
     case = read_case_of_run(folder)
     store, point = Store(folder, one_run=True), Point({}, case)
     with locked(folder, WHAT, name):
-        verdicts = examine(store, point)
-        upstream = {one: verdicts[one] for one in point.case.pipeline.names[:-1]}
+        states = examine(store, point)
+        upstream = {one: states[one] for one in point.case.pipeline.names[:-1]}
         if _tell_damage(upstream, "run makes it again"):
             return False
-        if any(verdict.stale for verdict in upstream.values()):
+        if any(state.stale for state in upstream.values()):
             show_products(store, point)
             _adopt_report(store, folder, case, write)
             return True
@@ -115,21 +115,21 @@ def verify(store: Store, point: Point) -> bool:
     Returns:
         Whether every product is there and as it was written, and so is what the run folder shows.
     """
-    verdicts = examine(store, point)
-    for name, verdict in verdicts.items():
-        if verdict.damaged:
-            print_error(f"{name}: {why_stale(verdict)}")
-        elif verdict.stale:
+    states = examine(store, point)
+    for name, state in states.items():
+        if state.damaged:
+            print_error(f"{name}: {why_stale(state)}")
+        elif state.stale:
             print_error(
-                f"{name}: {why_stale(verdict)}" if verdict.missing else f"{name}: is not of this case as it is now"
+                f"{name}: {why_stale(state)}" if state.missing else f"{name}: belongs to other settings of this case"
             )
         else:
             record = store.record(point, name) or {"files": {}}
             console.print(f"ok     {name:<11} {len(record['files']) + 1} files")
     lost = not_as_put(store, store.folder)
-    for told in lost:
-        print_error(f"{told}; `reflowshock run` puts it back")
-    return not lost and not any(verdict.stale for verdict in verdicts.values())
+    for fault in lost:
+        print_error(f"{fault}; `reflowshock run` restores it")
+    return not lost and not any(state.stale for state in states.values())
 
 
 def clean(folder: Path, name: str, *, unused: bool = False, force: bool = False) -> None:
@@ -158,7 +158,7 @@ def clean(folder: Path, name: str, *, unused: bool = False, force: bool = False)
         left = remove_own(folder)
     console.print(f"removed {folder}" if not folder.exists() else f"removed all products from {folder}")
     if left:
-        console.print(f"kept what is not the program's: {', '.join(left)}")
+        console.print(f"kept files that the program did not write: {', '.join(left)}")
 
 
 def _shower(store: Store, point: Point) -> Callable[[], None]:
@@ -174,11 +174,11 @@ def _shower(store: Store, point: Point) -> Callable[[], None]:
     return show_new
 
 
-def _tell_damage(verdicts: dict[str, Verdict], what: str = "it is made again") -> bool:
+def _tell_damage(states: dict[str, StageState], what: str = "it is made again") -> bool:
     """Tell which products are damaged; return whether any is."""
-    damaged = {name: verdict for name, verdict in verdicts.items() if verdict.damaged}
-    for name, verdict in damaged.items():
-        print_error(f"product {name} is damaged ({', '.join(verdict.damaged)}): {what}")
+    damaged = {name: state for name, state in states.items() if state.damaged}
+    for name, state in damaged.items():
+        print_error(f"product {name} is damaged ({', '.join(state.damaged)}): {what}")
     return bool(damaged)
 
 

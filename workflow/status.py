@@ -7,7 +7,7 @@ from rich.text import Text
 from reflowshock.workflow.case.units import from_si
 from reflowshock.workflow.process.terminal import styled
 from reflowshock.workflow.store.point import Point
-from reflowshock.workflow.store.state import Verdict, examine
+from reflowshock.workflow.store.state import StageState, examine
 from reflowshock.workflow.store.store import Store
 
 SHOWN_UNITS = {"m": "mm", "m^3": "mm^3", "Pa": "MPa", "J": "mJ", "kg": "mg", "s": "ns"}
@@ -40,11 +40,11 @@ def show_status(store: Store, point: Point, console: Console) -> None:
     table.add_column("state", no_wrap=True)
     table.add_column("time", justify="right", no_wrap=True)
     table.add_column("figures", ratio=1)
-    for name, verdict in examine(store, point).items():
+    for name, state in examine(store, point).items():
         record = store.record(point, name) or {"metrics": {}, "health": {}}
         seconds = f"{record['seconds']:.1f} s" if "seconds" in record else ""
-        figures = ", ".join(verdict.damaged) or _figures(name, record["metrics"])
-        table.add_row(name, _state(verdict, record["health"]), seconds, figures)
+        figures = ", ".join(state.damaged) or _figures(name, record["metrics"])
+        table.add_row(name, _state(state, record["health"]), seconds, figures)
     console.print(table)
 
 
@@ -56,12 +56,12 @@ def metric_text(metric: dict) -> str:
     return from_si(value, SHOWN_UNITS[unit], 4) if unit in SHOWN_UNITS else f"{value:.4g} {unit}".strip()
 
 
-def _state(verdict: Verdict, health: dict) -> Text:
-    if verdict.missing:
+def _state(state: StageState, health: dict) -> Text:
+    if state.missing:
         return styled("[dim]missing[/]")
-    if verdict.damaged:
+    if state.damaged:
         return styled("[bold red]damaged[/]")
-    if verdict.stale:
+    if state.stale:
         return styled("[yellow]stale[/]")
     if not all(check["ok"] for check in health.values()):
         return styled("[bold red]unhealthy[/]")

@@ -1,4 +1,4 @@
-"""What accuracy costs, into the README of a case: its ladder is climbed, plot, table and `accuracy.json` are put there.
+"""What accuracy costs, into the README of a case: its study is run; plot, table and `accuracy.json` go there.
 
 Run: .venv/bin/python benchmarks/support/publish_accuracy.py sessile_drop -- --tolerance 0.03%   (on an idle machine)
      .venv/bin/python benchmarks/support/publish_accuracy.py sessile_drop --stored                    (measured last)

@@ -1,1 +1,1 @@
-"""Two models of one run: how they are divided, placed and coupled."""
+"""Coupling of two models of one run: schemes, placement on ranks, self-check; start with `scheme.py`."""

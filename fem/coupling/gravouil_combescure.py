@@ -26,7 +26,7 @@ from reflowshock.fem.coupling.held_velocity import Answered, local_interface
 from reflowshock.fem.dynamics.central_difference import ExplicitMotion
 from reflowshock.fem.dynamics.participant import Continued, explicit_motion
 from reflowshock.fem.estimates.estimate import WindowPlan
-from reflowshock.fem.kernels.coupling import link_velocities
+from reflowshock.fem.kernels.motion import link_velocities
 from reflowshock.fem.loads.load import Load
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.parallel.communicators import Role

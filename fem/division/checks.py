@@ -5,12 +5,10 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from reflowshock.fem.division.buffer import grown, touching
 from reflowshock.fem.division.chebyshev import LARGEST_DAMPING
 from reflowshock.fem.division.choose_levels import Pace, least_steps
-from reflowshock.fem.division.divide import cut_nodes, seeds_of
-from reflowshock.fem.division.division import BUFFERED, Division
-from reflowshock.fem.division.rules import Rules
+from reflowshock.fem.division.divide import cut_nodes, grown, seeds_of, touching
+from reflowshock.fem.division.division import BUFFERED, Division, Rules
 from reflowshock.fem.division.whole import Survey, Whole
 from reflowshock.fem.errors import CouplingError, PulseError
 from reflowshock.fem.estimates.estimate import damped_critical_step

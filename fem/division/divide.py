@@ -1,18 +1,28 @@
 """The choice of models, levels and window from the cells of a whole mesh and their critical steps."""
 
+import math
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from reflowshock.fem.division.buffer import grown, nodes_of, touching
 from reflowshock.fem.division.chebyshev import LARGEST_DAMPING
-from reflowshock.fem.division.choice import Choice, choose_scheme
-from reflowshock.fem.division.divide_levels import by_levels
-from reflowshock.fem.division.division import Division, SchemeName
-from reflowshock.fem.division.rules import Rules
+from reflowshock.fem.division.choose_levels import SUBSTEP_COST, Pace, choose_levels
+from reflowshock.fem.division.division import Choice, Division, Rules, SchemeName, choose_scheme
 from reflowshock.fem.division.whole import Survey, Whole
-from reflowshock.fem.estimates.estimate import damped_critical_step
+from reflowshock.fem.errors import LevelError
+from reflowshock.fem.estimates.estimate import (
+    BOARD_ADVANTAGE,
+    UPDATES_PER_SECOND,
+    WINDOW_OVERHEAD,
+    damped_critical_step,
+)
+
+# Of the coarse cells, those that may need less than the window: none, a few at the walls of holes, the finer half.
+EXCEPTIONS = (0.0, 0.02, 0.5)
+SHARES = (1.0, 1.0 / 1.5, 0.5)  # of these windows: on packages the largest is within 5 % of the best there is
+WINDOW_COST = WINDOW_OVERHEAD * UPDATES_PER_SECOND * BOARD_ADVANTAGE  # in updates of a box
 
 
 def divide(whole: Whole, survey: Survey, rules: Rules) -> Division:
@@ -121,3 +131,74 @@ def two_steps(
     damped = damped_critical_step(critical, rules.stiffness)
     plan = rules.plan(float(damped[slow if slow.any() else ...].min()), float(damped.min()))
     return Division(scheme, *models, np.zeros(len(critical), np.int32), (), plan)
+
+
+def by_levels(whole: Whole, survey: Survey, rules: Rules) -> Division:
+    """Choose window and levels of least predicted cost: local steps.
+
+    Raises:
+        LevelError: No window allows levels.
+    """
+    critical = damped_critical_step(survey.step, rules.stiffness)
+    found, failure = [], LevelError("no window was tried")
+    for step in window_steps(critical[rules.coarse if rules.coarse.any() else ...]):
+        try:
+            found.append(levels_below(whole, survey, step, rules))
+        except LevelError as error:
+            failure = error
+    if not found:
+        raise failure
+    useful = [division for division in found if division.meso.any() and division.macro.any()]
+    return min(useful or found, key=lambda division: predicted_cost(division, survey.cost))
+
+
+def window_steps(coarse: NDArray[np.float64]) -> Iterator[float]:
+    """Yield critical steps [s] of which the window may be the allowed fraction, from those of coarse cells."""
+    natural = np.quantile(coarse, EXCEPTIONS, method="lower")
+    yield from np.unique(np.outer(natural, SHARES)).tolist()
+
+
+def levels_below(whole: Whole, survey: Survey, step: float, rules: Rules) -> Division:
+    """Return the division of the window that follows a critical step [s]; errors as ``choose_levels``."""
+    plan, most = rules.plan(step, step), rules.coupling.most_levels
+    pace = Pace(survey.step, survey.cost, plan.window, rules.fraction, rules.stiffness)
+    level, ratios = choose_levels(whole.mesh.cells, whole.tie, pace, most)
+    plan = replace(plan, substeps=math.prod(ratios))
+    return Division("local_steps", level == 0, level > 0, level, ratios, plan)
+
+
+def predicted_cost(division: Division, cost: NDArray[np.float64]) -> float:
+    """Return the cost of a second of simulated time in updates of a box, ``cost (ne,)`` that of an update."""
+    counts = np.cumprod([1, *division.ratios])
+    updates = float(cost @ counts[division.level]) + SUBSTEP_COST * float(counts[1:].sum())
+    return (updates + WINDOW_COST) / division.plan.window
+
+
+def touching(cells: NDArray[np.int32], nodes: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return which cells ``(ne,)`` have one of the nodes ``(n,)``."""
+    return nodes[cells].any(axis=1)
+
+
+def nodes_of(cells: NDArray[np.int32], chosen: NDArray[np.bool_], count: int) -> NDArray[np.bool_]:
+    """Return which of ``count`` nodes belong to one of the chosen cells ``(ne,)``."""
+    found = np.zeros(count, dtype=bool)
+    found[cells[chosen]] = True
+    return found
+
+
+def grown(
+    cells: NDArray[np.int32], seeds: NDArray[np.bool_], through: NDArray[np.bool_], layers: int
+) -> NDArray[np.bool_]:
+    """Return the cells ``(ne,)`` of some layers around seeds, each of which touches a node of the layer before.
+
+    Args:
+        cells: ``(ne, k)`` nodes.
+        seeds: ``(n,)`` nodes that the first layer touches.
+        through: ``(ne,)`` cells that a layer may have.
+        layers: Number of layers.
+    """
+    taken = np.zeros(len(cells), dtype=bool)
+    for _ in range(layers):
+        taken |= through & touching(cells, seeds)
+        seeds = seeds | nodes_of(cells, taken, len(seeds))
+    return taken

@@ -1,4 +1,4 @@
-"""How the cells of a whole mesh are divided: which model has them, at which level of step they are."""
+"""How the cells of a whole mesh are divided: by which rules and scheme, into which models and levels of steps."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -6,10 +6,40 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from reflowshock.fem.estimates.estimate import WindowPlan
+from reflowshock.fem.estimates.estimate import WindowPlan, window_plan
+from reflowshock.fem.problem.shock import Coupling
 
 SchemeName = Literal["held_velocity", "local_steps", "impulse", "gravouil_combescure"]
 BUFFERED: tuple[SchemeName, ...] = ("held_velocity", "impulse")  # schemes whose interface lies below layers of board
+
+
+@dataclass(frozen=True, slots=True)
+class Rules:
+    """What a division follows.
+
+    Attributes:
+        coupling: What the user wants.
+        coarse: ``(ne,)`` cells that are the macro model's where velocities or forces are coupled: a board's.
+        fraction: Of the critical step that is used.
+        stiffness: beta of damping [s].
+        duration: Simulated time [s].
+        samples: History samples wanted.
+        copied: One way, ``(ne,)`` fine cells of which the driving model has a coarse copy.
+        copy: These copies.
+    """
+
+    coupling: Coupling
+    coarse: NDArray[np.bool_]
+    fraction: float
+    stiffness: float
+    duration: float
+    samples: int
+    copied: NDArray[np.bool_] | None = None
+    copy: NDArray[np.bool_] | None = None
+
+    def plan(self, macro_step: float, meso_step: float) -> WindowPlan:
+        """Return the windows that follow from two critical steps [s]."""
+        return window_plan(macro_step, meso_step, self.fraction, self.duration, self.samples)
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,3 +81,32 @@ class Division:
     def meso_step(self) -> float:
         """Return the step of the meso model's motion [s]: with local steps these are inside its force."""
         return self.plan.window if self.scheme == "local_steps" else self.plan.step
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """A scheme, and the reason in words."""
+
+    scheme: SchemeName
+    why: str
+
+
+def choose_scheme(elastic: bool, buffer_possible: bool) -> Choice:
+    """Choose the scheme of a two-way run whose user leaves it open.
+
+    All are stable at the steps that a run chooses (benchmarks/coupling_stability.py). Local steps keep energy and
+    momentum but know no path: plastic strains would be those of a mean motion, half as large or twice (PHYSICS 4). Held
+    velocity lets both models work at the same time; impulses, which keep momentum exactly along a path, do not, and are
+    taken where the user asks for them. Gravouil-Combescure's link takes energy from what moves, and waits, too.
+
+    Args:
+        elastic: Whether all of the meso model is linear elastic at small strains.
+        buffer_possible: Whether two layers of board fit between what is fine and the macro model.
+    """
+    if elastic:
+        return Choice("local_steps", "all that takes small steps is linear elastic at small strains")
+    if buffer_possible:
+        return Choice("held_velocity", "what takes small steps depends on its path; layers of board fit around it")
+    return Choice(
+        "gravouil_combescure", "what takes small steps depends on its path; no two layers of board fit around it"
+    )

@@ -1,18 +1,20 @@
 """From the mesh of a structure to its tables: the work of one rank before anything is distributed."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from reflowshock.fem.division.tables import Tables
+from reflowshock.fem.division.split import Part
+from reflowshock.fem.division.tables import Tables, present
 from reflowshock.fem.division.whole import Whole
 from reflowshock.fem.errors import LoadError, MeshError
 from reflowshock.fem.estimates.material_effects import plastic_laws
 from reflowshock.fem.mesh.facet_areas import OutwardFacets, facet_set, outward_areas, outward_facets
 from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.mesh.point_shares import point_shares
-from reflowshock.fem.mesh.point_table import PointTable, point_table
+from reflowshock.fem.mesh.point_table import PointTable, Support, point_table
 from reflowshock.fem.mesh.tie import tie_joints
 from reflowshock.fem.problem.structure import AXES, InputG, PointForce, PrescribedMotion, Pressure, StructureProblem
 
@@ -38,6 +40,26 @@ class StructureTables(Tables):
     pressed: dict[str, OutwardFacets]
     pushed: dict[str, Shares]
     watch: PointTable
+
+    def counted(self, part: Part, node: NDArray[np.int32], cell: NDArray[np.int32]) -> dict[str, Any]:
+        """Return facet sets, watch points and supports."""
+        supports: dict[str, Support] = {
+            name: (present(node[nodes]), held) for name, (nodes, held) in self.watch.supports.items()
+        }
+        return {
+            "nodes_of": {name: present(node[nodes]) for name, nodes in self.nodes_of.items()},
+            "areas": {
+                name: (present(node[nodes]), area[node[nodes] >= 0]) for name, (nodes, area) in self.areas.items()
+            },
+            "pressed": {
+                name: replace(item, facets=part.number[item.facets], cells=cell[item.cells])
+                for name, item in self.pressed.items()
+            },
+            "pushed": {
+                name: (present(node[nodes]), share[node[nodes] >= 0]) for name, (nodes, share) in self.pushed.items()
+            },
+            "watch": replace(self.watch, nodes=node[self.watch.nodes], cells=cell[self.watch.cells], supports=supports),
+        }
 
 
 def tied(mesh: MeshData, problem: StructureProblem) -> Whole:

@@ -74,6 +74,16 @@ class Tables:
             **own,
         )
 
+    def counted(self, part: Part, node: NDArray[np.int32], cell: NDArray[np.int32]) -> dict[str, Any]:
+        """Return the fields of a subclass with what counts in a model.
+
+        Args:
+            part: Of the mesh.
+            node: ``(n,)`` its number of each node, -1 where the node counts in another model.
+            cell: ``(ne,)`` the same of each cell.
+        """
+        return {}
+
 
 @dataclass(frozen=True, slots=True)
 class JointTables(Tables):
@@ -89,7 +99,28 @@ class JointTables(Tables):
     shaken: NDArray[np.int32]
     joint_interface: JointInterfaceTable
 
+    @classmethod
+    def of(cls, whole: Whole, rules: Mapping[str, Sequence[int]]) -> Self:
+        """Find out what is held, as ``rules`` say, and watched."""
+        mesh = whole.mesh
+        return cls.undivided(
+            whole,
+            held_components(mesh, rules),
+            watch=whole_watch(mesh),
+            shaken=mesh.facet_nodes("mounting_holes"),
+            joint_interface=whole_joint_interface(mesh),
+        )
 
+    def counted(self, part: Part, node: NDArray[np.int32], cell: NDArray[np.int32]) -> dict[str, Any]:
+        """Return watch points, shaken nodes and interfaces of joints."""
+        return {
+            "watch": self.watch.within(node, cell),
+            "shaken": present(node[self.shaken]),
+            "joint_interface": self.joint_interface.within(cell),
+        }
+
+
+TablesT = TypeVar("TablesT", bound=Tables)
 TablesT_co = TypeVar("TablesT_co", bound=Tables, covariant=True)
 
 
@@ -122,7 +153,7 @@ def prepare(
 def model_inputs(
     whole: Whole, division: Division | Literal["dns"], rules: Mapping[str, Sequence[int]] = HELD
 ) -> dict[Role, ModelInput[JointTables]]:
-    """Split a mesh into its models; ``rules`` say what is held, as ``supports.HELD``.
+    """Split a package on a board into its models; ``rules`` say what is held, as ``supports.HELD``.
 
     Returns:
         ``macro`` and ``meso``, or ``dns``: all of it.
@@ -130,65 +161,56 @@ def model_inputs(
     Raises:
         MeshError: A pad has no solder.
     """
-    package = WholePackage.of(whole, rules)
-    if division == "dns":
-        part = part_of(whole, np.ones(len(whole.mesh.cells), dtype=bool))
-        return {"dns": package.model_input(part, np.empty(0, np.int32), (part.number, part.cell_number))}
+    tables = JointTables.of(whole, rules)
+    if division != "dns":
+        return split(whole, tables, division)
+    part = part_of(whole, np.ones(len(whole.mesh.cells), dtype=bool))
+    return {"dns": part_input(whole, tables, part, (part.number, part.cell_number))}
+
+
+def split(whole: Whole, tables: TablesT, division: Division) -> dict[Role, ModelInput[TablesT]]:
+    """Split a mesh with its tables into the models ``macro`` and ``meso``; what both have counts in the macro model."""
     macro, meso = part_of(whole, division.macro), part_of(whole, division.meso)
     interface = interface_between(whole, part_of(whole, division.around), meso)
     rest = np.where(macro.number < 0, meso.number, -1), np.where(macro.cell_number < 0, meso.cell_number, -1)
-    inputs: dict[Role, ModelInput[JointTables]] = {
-        "macro": package.model_input(macro, interface, (macro.number, macro.cell_number)),
-        "meso": package.model_input(meso, interface, rest),
-    }
-    tables = replace(inputs["meso"].tables, level=division.level[division.meso], ratios=division.ratios)
-    return inputs | {"meso": replace(inputs["meso"], tables=tables)}
+    coarse = part_input(whole, tables, macro, (macro.number, macro.cell_number))
+    fine = part_input(whole, tables, meso, rest)
+    coarse_tables = replace(coarse.tables, interface=macro.number[interface])
+    level = division.level[division.meso]
+    fine_tables = replace(fine.tables, interface=meso.number[interface], level=level, ratios=division.ratios)
+    return {"macro": replace(coarse, tables=coarse_tables), "meso": replace(fine, tables=fine_tables)}
 
 
-@dataclass(frozen=True, slots=True)
-class WholePackage:
-    """What is known of a package on a board before it is split: mesh and ties, held components ``(n, 3)``, watches."""
+def part_input(
+    whole: Whole, tables: TablesT, part: Part, counted: tuple[NDArray[np.int32], NDArray[np.int32]]
+) -> ModelInput[TablesT]:
+    """Return a part of a mesh as a model without an interface.
 
-    whole: Whole
-    held: NDArray[np.bool_]
-    watch: WatchTable
-    joint_interface: JointInterfaceTable
+    Args:
+        whole: The mesh.
+        tables: Its tables.
+        part: The part.
+        counted: Own numbers of the nodes ``(n,)`` and cells ``(ne,)`` that are loaded and watched in this model, -1 for
+            those of another one.
+    """
+    mine = np.flatnonzero(part.number >= 0)
+    order = mine[np.argsort(part.number[mine])]
+    held = part.number[tables.held_nodes].astype(np.int64)
+    restricted = replace(
+        tables,
+        part=part.mesh.part,
+        part_names=part.mesh.part_names,
+        tie=part.tie,
+        master_points=whole.mesh.points[order][part.tie.master],
+        held_nodes=held[held >= 0],
+        held=tables.held[held >= 0],
+        nodes=part.nodes,
+        level=np.zeros(len(part.mesh.cells), np.int32),
+        **tables.counted(part, *counted),
+    )
+    return ModelInput(part.mesh, restricted, np.flatnonzero(part.cell_number >= 0))
 
-    @classmethod
-    def of(cls, whole: Whole, rules: Mapping[str, Sequence[int]]) -> "WholePackage":
-        """Find out what is held and watched."""
-        mesh = whole.mesh
-        return cls(whole, held_components(mesh, rules), whole_watch(mesh), whole_joint_interface(mesh))
 
-    def model_input(
-        self, part: Part, interface: NDArray[np.integer], counted: tuple[NDArray[np.int32], NDArray[np.int32]]
-    ) -> ModelInput[JointTables]:
-        """Return a model with its tables.
-
-        Args:
-            part: Its part of the mesh.
-            interface: ``(nc,)`` nodes of the whole mesh that couple.
-            counted: Own numbers of the nodes ``(n,)`` and cells ``(ne,)`` that are watched and shaken in this model, -1
-                for those of another one.
-        """
-        mine = np.flatnonzero(part.number >= 0)
-        order = mine[np.argsort(part.number[mine])]
-        held_nodes = np.flatnonzero(self.held[order].any(axis=1))
-        shaken = counted[0][self.whole.mesh.facet_nodes("mounting_holes")]
-        tables = JointTables(
-            part=part.mesh.part,
-            part_names=part.mesh.part_names,
-            tie=part.tie,
-            master_points=self.whole.mesh.points[order][part.tie.master],
-            moved=self.whole.moved,
-            held_nodes=held_nodes,
-            held=self.held[order][held_nodes],
-            interface=part.number[interface],
-            nodes=part.nodes,
-            level=np.zeros(len(part.mesh.cells), np.int32),
-            ratios=(),
-            watch=self.watch.within(*counted),
-            shaken=shaken[shaken >= 0],
-            joint_interface=self.joint_interface.within(counted[1]),
-        )
-        return ModelInput(part.mesh, tables, np.flatnonzero(part.cell_number >= 0))
+def present(numbers: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Return the numbers that are none of another model's."""
+    return numbers[numbers >= 0]

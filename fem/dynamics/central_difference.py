@@ -6,28 +6,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from reflowshock.fem.dynamics.motion import Motion
 from reflowshock.fem.forces.force import TermWithPath
 from reflowshock.fem.kernels.motion import advance
-from reflowshock.fem.loads.load import FineSupports, Load, Loaded
+from reflowshock.fem.loads.load import FineSupports, Load
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.step_levels import levels_of
 from reflowshock.fem.parallel.portable import Rows, Same, Shares, State, Sum
 
 
-class ExplicitMotion(Loaded):
+class ExplicitMotion(Motion):
     """The state of one model on one rank, and its step.
 
     Half-kick, drift, force, half-kick, written with the velocity half a step back: v += dt (f / m + g), u += dt v.
     Nodes that several ranks hold are updated by each of them, from equal sums of forces.
 
-    Attributes:
-        displacement: ``(n, 3)`` [m] at ``time``.
-        velocity: ``(n, 3)`` [m/s] at ``time - dt / 2``.
-        force: ``(n, 3)`` [N] at ``time``, summed over ranks, slaves' moved to their masters; without body force.
-        slave_force: ``(ns, 3)`` [N] of this rank's elements on the slaves, before it is moved.
-        gravity: ``(3,)`` [m/s^2], sum of the loads' accelerations at ``time``.
-        mobility: ``(n, 3)`` [1/kg] inverse masses, zero where the velocity is prescribed.
-        counted_mass: ``(n,)`` [kg] that counts in the energy balance of this rank.
+    Attributes as ``Motion``; ``velocity`` is that at ``time - dt / 2``.
     """
 
     def __init__(

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from mpi4py import MPI
@@ -10,11 +10,28 @@ from numpy.typing import NDArray
 
 from reflowshock.data_file import columns, fields_of, rows
 from reflowshock.fem.dynamics.energy_balance import EnergyBalance, energy_sums
+from reflowshock.fem.dynamics.motion import Motion
 from reflowshock.fem.dynamics.participant import Participant
-from reflowshock.fem.dynamics.watch import Watch
 from reflowshock.fem.parallel.communicators import Role
 from reflowshock.fem.parallel.portable import Log, Same, State
 from reflowshock.fem.parallel.whereabouts import HERE
+
+
+class Watch(Protocol):
+    """Watch points of one rank: parts of sums and maxima that the ranks of all models combine.
+
+    Attributes:
+        labels: Name -> what belongs to a history but does not change with time.
+    """
+
+    labels: dict[str, NDArray]
+
+    def sample(self, motion: Motion) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return this rank's parts of the sums and of the maxima, of equal lengths in all models of a run."""
+
+    def row(self, sums: NDArray[np.float64], maxima: NDArray[np.float64]) -> dict[str, NDArray[np.float64] | float]:
+        """Return the values of a sample by name, from the combined parts."""
+
 
 SIDE: dict[Role, float] = {"macro": 1.0, "meso": -1.0, "dns": 0.0, "structure": 0.0}
 Signal = Callable[[float], float]

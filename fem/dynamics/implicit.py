@@ -17,10 +17,11 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from reflowshock.fem.dynamics.motion import Motion
 from reflowshock.fem.forces.force_assembled import AssembledElements
 from reflowshock.fem.forces.force_congruent import CongruentElements
 from reflowshock.fem.loads.damping import RayleighDamping
-from reflowshock.fem.loads.load import Load, Loaded
+from reflowshock.fem.loads.load import Load
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.factorisation import Factorisation
 from reflowshock.fem.model.global_matrix import Equations
@@ -53,20 +54,11 @@ class HHTScheme:
         return 0.5 - self.alpha
 
 
-class ImplicitMotion(Loaded):
-    """The state of one model on one rank, and its step; the surface of ``central_difference.ExplicitMotion``.
+class ImplicitMotion(Motion):
+    """The state of one model on one rank, and its step.
 
     Attributes:
-        body: The model.
-        step: h [s].
-        time: [s].
-        displacement: ``(n, 3)`` [m] at ``time``.
-        velocity: ``(n, 3)`` [m/s] at ``time``.
-        force: ``(n, 3)`` [N] at ``time`` after ``update_force``, summed over ranks, without body force.
-        slave_force: ``(ns, 3)`` [N] of this rank's elements on the slaves, before it is moved.
-        gravity: ``(3,)`` [m/s^2], sum of the loads' accelerations at ``time``.
-        counted_mass: ``(n,)`` [kg] that counts in the energy balance of this rank.
-        factor: The factored matrix of a step.
+        factor: The factored matrix of a step. Others as ``Motion``; ``velocity`` is that at ``time``.
     """
 
     def __init__(self, comm: MPI.Comm, body: Body, loads: Sequence[Load], step: float, alpha: float = 0.0) -> None:

@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reflowshock.fem.elements.hexahedron import HEXAHEDRON
-from reflowshock.fem.elements.kind import Geometry
-from reflowshock.fem.elements.strain import strain_matrix
+from reflowshock.fem.elements.kind import Geometry, strain_matrix
 from reflowshock.fem.kernels.hexahedron import SIDES
 
 HOURGLASS = np.column_stack([SIDES[:, 1] * SIDES[:, 2], SIDES[:, 2] * SIDES[:, 0], SIDES[:, 0] * SIDES[:, 1]])

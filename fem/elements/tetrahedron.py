@@ -5,8 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from reflowshock.fem.elements.kind import Geometry
-from reflowshock.fem.elements.strain import strain_matrix
+from reflowshock.fem.elements.kind import Geometry, strain_matrix
 
 EDGES = np.array([[2, 3], [1, 3], [1, 2], [0, 3], [0, 2], [0, 1]])  # of the middle nodes 4 to 9
 # Vertices and face centroids in barycentric coordinates, weights of volume 1/6: exact for cubics (Stroud 1971, T3:3-3),

@@ -21,7 +21,7 @@ HEATED: Entries = (
         "adds": "temperature of board and package in load steps, T(t)",
         "number": GIVEN,
         "influence": "that of flexible",
-        "place": "reflowshock.workflow.reflow.load_steps.LoadStep",
+        "place": "reflowshock.workflow.reflow.forecast.LoadStep",
         "switch": "[thermal], there or not",
         "source": "J-STD-020",
     },

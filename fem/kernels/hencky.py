@@ -26,7 +26,7 @@ OVERSHOOT = 0.9  # of the slope at its start is where a step along a direction e
 LINE_SEARCHES = 12
 
 
-class Law(NamedTuple):
+class PointLaw(NamedTuple):
     """Material of an element: elasticity ``(6, 6)`` [Pa], isotropic where it yields, and its plastic constants."""
 
     elasticity: NDArray[np.float64]
@@ -171,7 +171,7 @@ def hexahedra(corners, displacement, materials, states):
     for e in range(len(corners)):
         write_strains(corners[e], bench, shape.strain, shape.weight)
         unknowns[:NODAL], unknowns[NODAL:] = displacement[e], 0.0
-        law = Law(elasticity[material[e]], plastic[material[e]])
+        law = PointLaw(elasticity[material[e]], plastic[material[e]])
         if not relax_modes(shape, unknowns, law, ElementState(states.points[e], force, tangent)):
             return e
         states.force[e] = force[:NODAL]
@@ -192,7 +192,7 @@ def one_point(shape, displacement, materials, states):
     """
     elasticity, plastic, material = materials
     for e in range(len(displacement)):
-        law = Law(elasticity[material[e]], plastic[material[e]])
+        law = PointLaw(elasticity[material[e]], plastic[material[e]])
         own = ElementState(states.points[e], states.force[e], states.tangent[e])
         add_points(Shape(shape.strain[e], shape.weight[e]), displacement[e], law, own)
 

@@ -1,1 +1,1 @@
-"""Loads and damping: objects in a list, each with its force and its work; start with `load.py`."""
+"""Loads, their pulses, and damping: objects in a list, each with its force and work; start with `load.py`."""

@@ -1,1 +1,1 @@
-"""Materials: parameters, library, laws, failure."""
+"""Materials: parameters, library with sources, elasticity, material of each role."""

@@ -9,7 +9,7 @@ from typing import Annotated, ClassVar, Literal, NamedTuple, Self
 from pydantic import Field, ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
 
-from reflowshock.fem.parameters import Parameters
+from reflowshock.parameters import Parameters
 
 Pressure = Annotated[float, "GPa"]
 Stress = Annotated[float, "MPa"]

@@ -9,7 +9,7 @@ from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from reflowshock.fem.materials.library import COPPER, FR4, LIBRARY, SAC405, SILICON
 from reflowshock.fem.materials.parameters import Material
-from reflowshock.fem.parameters import Parameters
+from reflowshock.parameters import Parameters
 
 
 @dataclass(frozen=True, slots=True)

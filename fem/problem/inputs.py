@@ -7,9 +7,9 @@ from pydantic import Field, TypeAdapter
 
 from reflowshock.fem.materials.parameters import Material
 from reflowshock.fem.materials.roles import Materials
-from reflowshock.fem.parameters import Parameters
 from reflowshock.fem.problem.shock import Ranks, Shock, ShockNumerics
 from reflowshock.fem.problem.structure import DynamicsNumerics, LayerCoupling, SolverName, StructureProblem
+from reflowshock.parameters import Parameters
 
 UNRELATED = {"checkpoint_seconds", "watchdog_seconds"}  # numerics that results do not depend on
 

@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 from pydantic import Field, ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
 
-from reflowshock.fem.parameters import Parameters
+from reflowshock.parameters import Parameters
 
 MOST_RANKS = 100_000  # of one run
 MOST_LEVELS = 4  # below the window, that "auto" tries

@@ -2,8 +2,8 @@
 
 from collections.abc import Iterator
 
-from reflowshock.fem.problem.problem import Problem
 from reflowshock.fem.problem.shock import Damping, JointCoupling, Shock
+from reflowshock.problem import Problem
 
 
 def problems(shock: Shock) -> list[Problem]:
@@ -25,23 +25,23 @@ def _pulse(shock: Shock) -> Iterator[Problem]:
     if not given:
         yield Problem(
             "shock.peak_acceleration",
-            None,
             "is missing",
+            None,
             "peak_acceleration and pulse_duration, service_condition, table",
         )
     elif set(given) <= set(sine):
         for key in set(sine) - set(given):
-            yield Problem(key, None, "is missing", "> 0; a half sine has peak_acceleration and pulse_duration")
+            yield Problem(key, "is missing", None, "> 0; a half sine has peak_acceleration and pulse_duration")
     elif len(given) > 1:
         extra = given[1]
-        yield Problem(extra, ways[extra], f"does not go with {given[0]}, which says what the pulse is", "one of them")
+        yield Problem(extra, f"does not go with {given[0]}, which says what the pulse is", ways[extra], "one of them")
 
 
 def _damping(damping: Damping) -> Iterator[Problem]:
     ratios = {"mass_ratio": damping.mass_ratio, "stiffness_ratio": damping.stiffness_ratio}
     used = [name for name, value in ratios.items() if value]
     if used and damping.frequency is None:
-        yield Problem("shock.damping.frequency", None, f"is missing: at which {' and '.join(used)} is meant", "> 0 Hz")
+        yield Problem("shock.damping.frequency", f"is missing: at which {' and '.join(used)} is meant", None, "> 0 Hz")
 
 
 def _beyond_the_end(shock: Shock) -> Iterator[Problem]:
@@ -50,15 +50,15 @@ def _beyond_the_end(shock: Shock) -> Iterator[Problem]:
     for key, given in ends.items():
         latest = max(given, default=0.0) if isinstance(given, tuple) else given or 0.0
         if latest > shock.duration:
-            yield Problem(key, given, "is after the end of the shock", "<= shock.duration")
+            yield Problem(key, "is after the end of the shock", given, "<= shock.duration")
 
 
 def _large_mass(shock: Shock) -> Iterator[Problem]:
     if shock.method == "large_mass" and shock.damping.coefficients[0]:
         yield Problem(
             "shock.method",
-            shock.method,
             "does not go with mass-proportional damping, which would brake the moving table",
+            shock.method,
             "direct, or stiffness-proportional damping",
         )
 
@@ -68,18 +68,18 @@ def _finite(shock: Shock) -> Iterator[Problem]:
     if shock.numerics.kinematics == "finite" and shock.damping.coefficients[1]:
         yield Problem(
             "shock.numerics.kinematics",
-            "finite",
             "does not go with stiffness-proportional damping, whose stiffness does not turn",
+            "finite",
             "small, or mass-proportional damping",
         )
     if shock.numerics.kinematics == "finite" and shock.numerics.dns_solver == "implicit":
         what = "is not for implicit steps, which are linear"
-        yield Problem("shock.numerics.kinematics", "finite", what, "small, or dns_solver = explicit")
+        yield Problem("shock.numerics.kinematics", what, "finite", "small, or dns_solver = explicit")
 
 
 def _coupling(coupling: JointCoupling) -> Iterator[Problem]:
     """Refuse schemes that need an answer, or to be the whole model, where nothing is answered."""
     if coupling.direction == "one_way" and coupling.scheme not in ("auto", "held_velocity"):
         yield Problem(
-            "shock.coupling.scheme", coupling.scheme, "does not go with direction = one_way", "auto, held_velocity"
+            "shock.coupling.scheme", "does not go with direction = one_way", coupling.scheme, "auto, held_velocity"
         )

@@ -12,8 +12,8 @@ from pydantic import Field
 
 from reflowshock.fem.materials.library import LIBRARY
 from reflowshock.fem.materials.parameters import Material
-from reflowshock.fem.parameters import Parameters
 from reflowshock.fem.problem.shock import MOST_RANKS, Coupling, Damping, ServiceCondition
+from reflowshock.parameters import Parameters
 
 AXES = "xyz"
 ROUNDING = 1e-9  # of the box: closer than that is the same place

@@ -3,18 +3,20 @@
 import math
 from collections.abc import Iterable, Iterator
 
-from reflowshock.fem.problem.coupling_checks import coupling_problems
-from reflowshock.fem.problem.problem import Problem, unknown_name
 from reflowshock.fem.problem.structure import (
     AXES,
     Gravity,
     InputG,
+    LayerCoupling,
     PointForce,
     PrescribedMotion,
     Pressure,
     StructureLoad,
     StructureProblem,
 )
+from reflowshock.problem import Problem, unknown_name
+
+COUPLING = "dynamics.coupling"
 
 
 def problems(problem: StructureProblem) -> list[Problem]:
@@ -45,21 +47,21 @@ def check(problem: StructureProblem) -> None:
 def _structure(problem: StructureProblem) -> Iterator[Problem]:
     structure = problem.structure
     if not structure.layers:
-        yield Problem("structure.layers", None, "the structure has no layer", "at least one table such as layers.board")
+        yield Problem("structure.layers", "the structure has no layer", None, "at least one table such as layers.board")
     for name, layer in structure.layers.items():
         yield from unknown_name(
             f"structure.layers.{name}.material", layer.material, problem.known_materials, "material"
         )
     if structure.element != "hexahedron" and structure.formulation == "one_point":
         message = f"is a choice for hexahedra, the element is {structure.element}"
-        yield Problem("structure.formulation", structure.formulation, message, "incompatible_modes (the default)")
+        yield Problem("structure.formulation", message, structure.formulation, "incompatible_modes (the default)")
 
 
 def _supports(problem: StructureProblem) -> Iterator[Problem]:
     for name, support in problem.supports.items():
         yield from unknown_name(f"supports.{name}.on", support.on, problem.structure.facet_sets, "facet set")
         if not support.hold:
-            yield Problem(f"supports.{name}.hold", "[]", "holds nothing", "any of x, y, z")
+            yield Problem(f"supports.{name}.hold", "holds nothing", "[]", "any of x, y, z")
 
 
 def _load(key: str, load: StructureLoad, problem: StructureProblem) -> Iterator[Problem]:
@@ -69,10 +71,10 @@ def _load(key: str, load: StructureLoad, problem: StructureProblem) -> Iterator[
         yield from _inside(f"{key}.at", load.at, problem)
         yield from _in_hole(f"{key}.at", load.at, problem)
     if isinstance(load, InputG | Gravity | PointForce) and not math.hypot(*load.direction) > 0.0:
-        yield Problem(f"{key}.direction", list(load.direction), "has no length", "any vector but zero")
+        yield Problem(f"{key}.direction", "has no length", list(load.direction), "any vector but zero")
     if isinstance(load, InputG) and load.method == "direct" and not _is_held(problem):
         yield Problem(
-            f"{key}.method", "direct", "needs a support that the table shakes, there is none", "a [supports.NAME]"
+            f"{key}.method", "needs a support that the table shakes, there is none", "direct", "a [supports.NAME]"
         )
     if isinstance(load, PrescribedMotion):
         yield from _conflicts(key, load, problem)
@@ -86,15 +88,15 @@ def _large_mass(problem: StructureProblem) -> Iterator[Problem]:
         return
     key = f"loads.{shaking[0]}.method"
     if not any(set(support.hold) == set(AXES) for support in problem.supports.values()):
-        yield Problem(key, "large_mass", "needs a support that it can shake: one that holds x, y, z", "direct")
+        yield Problem(key, "needs a support that it can shake: one that holds x, y, z", "large_mass", "direct")
     moved = {"initial_velocity": any(problem.dynamics.initial_velocity)}
     moved |= {"mass-proportional damping": bool(problem.dynamics.damping.coefficients[0])}
     moved |= {f"loads.{name}": isinstance(load, PrescribedMotion) for name, load in problem.loads.items()}
     for what in [name for name, is_there in moved.items() if is_there]:
         message = f"does not go with {what}, whose velocities would be those in space, not those seen from the supports"
-        yield Problem(key, "large_mass", message, "direct")
+        yield Problem(key, message, "large_mass", "direct")
     for name in shaking[1:]:
-        yield Problem(f"loads.{name}.method", "large_mass", f"is already that of loads.{shaking[0]}", "direct")
+        yield Problem(f"loads.{name}.method", f"is already that of loads.{shaking[0]}", "large_mass", "direct")
     for name in shaking:
         yield from _left_behind(name, problem)
     yield from _not_shaken(key, problem)
@@ -108,7 +110,7 @@ def _not_shaken(key: str, problem: StructureProblem) -> Iterator[Problem]:
         for what, on, _ in _held_sets(problem):
             if what.removeprefix("supports.") not in shaken and _meet(on, support.on):
                 message = f"cannot move supports.{name}: {what} holds nodes of it in space {_where(on, support.on)}"
-                yield Problem(key, "large_mass", message, "direct")
+                yield Problem(key, message, "large_mass", "direct")
 
 
 def _left_behind(shaking: str, problem: StructureProblem) -> Iterator[Problem]:
@@ -118,7 +120,7 @@ def _left_behind(shaking: str, problem: StructureProblem) -> Iterator[Problem]:
         along = [axis for axis in support.hold if isinstance(load, InputG) and load.direction[AXES.index(axis)]]
         if along and set(support.hold) != set(AXES):
             message = f"would stay in place along {' and '.join(along)} while the large mass of loads.{shaking} moves"
-            yield Problem(f"supports.{name}.hold", list(support.hold), message, "x, y, z, or method = direct")
+            yield Problem(f"supports.{name}.hold", message, list(support.hold), "x, y, z, or method = direct")
 
 
 def _symmetry(problem: StructureProblem) -> Iterator[Problem]:
@@ -133,14 +135,14 @@ def _symmetry(problem: StructureProblem) -> Iterator[Problem]:
             if isinstance(load, PointForce) and axis in problem.structure.planes_at(load.at):
                 yield from _across(axis, f"loads.{name}.direction", load.direction)
             if isinstance(load, Pressure) and load.on == f"{axis}_min":
-                yield Problem(f"loads.{name}.on", load.on, "is a plane of symmetry inside the body", f"{axis}_max")
+                yield Problem(f"loads.{name}.on", "is a plane of symmetry inside the body", load.on, f"{axis}_max")
 
 
 def _across(axis: str, key: str, vector: tuple[float, float, float]) -> Iterator[Problem]:
     """Yield a vector that is not its own mirror image."""
     if vector[AXES.index(axis)]:
         message = f"crosses the plane of symmetry {axis} = 0, on both sides of which it would have to be mirrored"
-        yield Problem(key, list(vector), message, f"0 along {axis}, or no symmetry in {axis}")
+        yield Problem(key, message, list(vector), f"0 along {axis}, or no symmetry in {axis}")
 
 
 def _is_held(problem: StructureProblem) -> bool:
@@ -152,12 +154,12 @@ def _conflicts(key: str, load: PrescribedMotion, problem: StructureProblem) -> I
     """Yield what else decides on the component that a load moves."""
     for what, on, components in _held_sets(problem):
         if _meet(on, load.on) and load.component in components:
-            yield Problem(f"{key}.component", load.component, f"is held by {what} {_where(on, load.on)}")
+            yield Problem(f"{key}.component", f"is held by {what} {_where(on, load.on)}", load.component)
     for name, other in problem.loads.items():
         if f"loads.{name}" == key:  # of two that clash, the later one is named
             return
         if isinstance(other, PrescribedMotion) and _meet(other.on, load.on) and other.component == load.component:
-            yield Problem(f"{key}.component", load.component, f"is moved by loads.{name} {_where(other.on, load.on)}")
+            yield Problem(f"{key}.component", f"is moved by loads.{name} {_where(other.on, load.on)}", load.component)
 
 
 def _held_sets(problem: StructureProblem) -> Iterator[tuple[str, str, tuple[str, ...]]]:
@@ -189,12 +191,12 @@ def _pulse(key: str, load: StructureLoad) -> Iterator[Problem]:
     ]
     ways = "service_condition, or peak and duration, or table" if isinstance(load, InputG) else "peak, or table"
     if len(given) != 1 and not (isinstance(load, Gravity) and not given):
-        yield Problem(key, None, f"is given by {' and '.join(given) or 'nothing'}", f"exactly one of {ways}")
+        yield Problem(key, f"is given by {' and '.join(given) or 'nothing'}", None, f"exactly one of {ways}")
     elif (own_peak is not None or isinstance(load, Gravity)) and load.pulse != "constant" and load.duration is None:
         if load.table is None:
-            yield Problem(f"{key}.duration", None, f"is missing, a {load.pulse.replace('_', ' ')} needs it", "> 0")
+            yield Problem(f"{key}.duration", f"is missing, a {load.pulse.replace('_', ' ')} needs it", None, "> 0")
     elif load.duration is not None and (condition or load.table):
-        yield Problem(f"{key}.duration", f"{load.duration:g} s", f"is already given by {given[0]}")
+        yield Problem(f"{key}.duration", f"is already given by {given[0]}", f"{load.duration:g} s")
 
 
 def _watch(problem: StructureProblem) -> Iterator[Problem]:
@@ -209,7 +211,7 @@ def _inside(key: str, place: tuple[float, float, float], problem: StructureProbl
     distance = math.dist(place, nearest)
     if distance > problem.structure.margin:
         message = f"lies {distance:.3g} m outside the meshed body; the nearest point of it is {_metres(nearest)}"
-        yield Problem(key, _metres(place), message, f"{_metres(low)} to {_metres(high)}")
+        yield Problem(key, message, _metres(place), f"{_metres(low)} to {_metres(high)}")
 
 
 def _in_hole(key: str, place: tuple[float, float, float], problem: StructureProblem) -> Iterator[Problem]:
@@ -220,7 +222,7 @@ def _in_hole(key: str, place: tuple[float, float, float], problem: StructureProb
     radius = math.hypot(*(abs(x) - 0.5 * spacing for x, spacing in zip(place, holes.spacing, strict=False)))
     if radius < 0.5 * holes.diameter - problem.structure.margin:
         allowed = f">= {0.5 * holes.diameter:.6g} m from the axis of the hole"
-        yield Problem(key, _metres(place), f"lies in a mounting hole, {radius:.3g} m from its axis", allowed)
+        yield Problem(key, f"lies in a mounting hole, {radius:.3g} m from its axis", _metres(place), allowed)
 
 
 def _metres(point: Iterable[float]) -> str:
@@ -239,21 +241,21 @@ def _nonlinear_damping(problem: StructureProblem) -> Iterator[Problem]:
     """Stiffness-proportional damping takes the elastic stiffness, which must not turn."""
     key = "dynamics.damping.stiffness_" + ("ratio" if problem.dynamics.damping.stiffness_ratio else "coefficient")
     if problem.dynamics.kinematics == "finite":
-        yield Problem(key, None, "needs a constant stiffness, dynamics.kinematics = finite has none", "mass_ratio")
+        yield Problem(key, "needs a constant stiffness, dynamics.kinematics = finite has none", None, "mass_ratio")
 
 
 def _dynamics(problem: StructureProblem) -> Iterator[Problem]:
     dynamics = problem.dynamics
     damping = dynamics.damping
     if "implicit" in dynamics.solvers and dynamics.kinematics == "finite":
-        yield Problem("dynamics.kinematics", "finite", "the implicit solver is linear", "small, or solver = explicit")
+        yield Problem("dynamics.kinematics", "the implicit solver is linear", "finite", "small, or solver = explicit")
     if "implicit" in dynamics.solvers:
         yield from (
-            Problem(key, material, f"yields, the solver {dynamics.solver} is linear", "dynamics.solver = explicit")
+            Problem(key, f"yields, the solver {dynamics.solver} is linear", material, "dynamics.solver = explicit")
             for key, material in _yielding(problem)
         )
     if (damping.mass_ratio or damping.stiffness_ratio) and damping.frequency is None:
-        yield Problem("dynamics.damping.frequency", None, "is missing: at which the ratios hold", "> 0 Hz")
+        yield Problem("dynamics.damping.frequency", "is missing: at which the ratios hold", None, "> 0 Hz")
     if damping.stiffness_ratio or damping.stiffness_coefficient:
         yield from _nonlinear_damping(problem)
     for name in dynamics.numerics.mass_scaled:
@@ -261,7 +263,7 @@ def _dynamics(problem: StructureProblem) -> Iterator[Problem]:
     yield from _numerics(problem)
     if not problem.loads and not any(dynamics.initial_velocity):
         yield Problem(
-            "loads", None, "nothing moves the structure", "a table such as loads.drop, or an initial_velocity"
+            "loads", "nothing moves the structure", None, "a table such as loads.drop, or an initial_velocity"
         )
 
 
@@ -271,10 +273,80 @@ def _numerics(problem: StructureProblem) -> Iterator[Problem]:
     step = numerics.implicit_step
     if step is not None and step > longest:
         message = "is too long to see the motion: above the duration, or half a pulse"
-        yield Problem("dynamics.numerics.implicit_step", f"{step:g} s", message, f"<= {longest:g} s")
+        yield Problem("dynamics.numerics.implicit_step", message, f"{step:g} s", f"<= {longest:g} s")
     if numerics.mass_scaled and "implicit" in dynamics.solvers:
         message = f"serves explicit steps, the solver is {dynamics.solver}"
-        yield Problem("dynamics.numerics.mass_scaled", list(numerics.mass_scaled), message, "none")
+        yield Problem("dynamics.numerics.mass_scaled", message, list(numerics.mass_scaled), "none")
     if problem.structure.layers and set(numerics.mass_scaled) >= set(problem.structure.layers):
         message = "leaves no layer to take the step from"
-        yield Problem("dynamics.numerics.mass_scaled", list(numerics.mass_scaled), message)
+        yield Problem("dynamics.numerics.mass_scaled", message, list(numerics.mass_scaled))
+
+
+def coupling_problems(problem: StructureProblem) -> Iterator[Problem]:
+    """Find what does not go with two models; nothing where there is one."""
+    coupling = problem.dynamics.coupling
+    if coupling is None:
+        if problem.dynamics.solver == "dns":
+            message = "is one model instead of two that are coupled"
+            yield Problem("dynamics.solver", message, "dns", f"explicit, implicit, both, or a table {COUPLING}")
+        return
+    yield from _fine(coupling, problem)
+    yield from _scheme(coupling, problem)
+    yield from _ranks(coupling, problem.dynamics.ranks)
+    yield from _one_model(problem)
+
+
+def _fine(coupling: LayerCoupling, problem: StructureProblem) -> Iterator[Problem]:
+    layers = problem.structure.layers
+    for name in coupling.fine:
+        yield from unknown_name(f"{COUPLING}.fine", name, layers, "layer")
+    if layers and set(coupling.fine) >= set(layers):
+        yield Problem(f"{COUPLING}.fine", "leaves no layer to the macro model", list(coupling.fine), "fewer layers")
+    if problem.structure.element != "hexahedron":
+        yield Problem(COUPLING, f"couples hexahedra, the element is {problem.structure.element}", None, "hexahedron")
+
+
+def _scheme(coupling: LayerCoupling, problem: StructureProblem) -> Iterator[Problem]:
+    if coupling.direction == "one_way":
+        message = "needs a coarse mesh of the fine part, too, which only a package has"
+        yield Problem(f"{COUPLING}.direction", message, "one_way", "two_way")
+    materials = {name: problem.known_materials.get(layer.material) for name, layer in problem.structure.layers.items()}
+    plastic = [name for name, material in materials.items() if material and material.plasticity is not None]
+    if coupling.scheme == "local_steps" and (plastic or problem.dynamics.kinematics == "finite"):
+        why = f"layers that yield: {', '.join(plastic)}" if plastic else "dynamics.kinematics = finite"
+        message = f"needs elastic layers at small strains, there are {why}"
+        yield Problem(f"{COUPLING}.scheme", message, "local_steps", "held_velocity, impulse, gravouil_combescure, auto")
+
+
+def _ranks(coupling: LayerCoupling, ranks: int) -> Iterator[Problem]:
+    if coupling.placement == "disjoint" and ranks < 2:
+        yield Problem(
+            f"{COUPLING}.placement", "needs a rank for each model", "disjoint", "auto, shared; dynamics.ranks >= 2"
+        )
+    if coupling.macro_ranks is not None and coupling.placement != "disjoint":
+        yield Problem(f"{COUPLING}.macro_ranks", "is for placement = disjoint", coupling.macro_ranks, "none")
+    elif coupling.macro_ranks is not None and coupling.macro_ranks >= ranks:
+        message = "leaves no rank for the meso model"
+        yield Problem(f"{COUPLING}.macro_ranks", message, coupling.macro_ranks, f"< {ranks}, dynamics.ranks")
+
+
+def _one_model(problem: StructureProblem) -> Iterator[Problem]:
+    """Yield what only one model can do."""
+    dynamics = problem.dynamics
+    if dynamics.solver == "implicit":
+        yield Problem("dynamics.solver", "couples nothing", "implicit", "explicit or both, or no dynamics.coupling")
+    if (
+        dynamics.modes
+        and dynamics.solver not in ("both", "dns")
+        and not (dynamics.coupling and dynamics.coupling.compare)
+    ):
+        yield Problem("dynamics.modes", "are those of one model", dynamics.modes, f"0, or {COUPLING}.compare = true")
+    if dynamics.numerics.explicit_step is not None:
+        message = "is the step of one model, two have a window and smaller steps"
+        yield Problem("dynamics.numerics.explicit_step", message, f"{dynamics.numerics.explicit_step:g} s", "none")
+    if dynamics.numerics.critical_step != "element":
+        message = "is for one model: windows rest on the steps of elements"
+        yield Problem("dynamics.numerics.critical_step", message, dynamics.numerics.critical_step, "element")
+    for name, load in problem.loads.items():
+        if isinstance(load, InputG) and load.method == "large_mass":
+            yield Problem(f"loads.{name}.method", "moves one model", "large_mass", "direct")

@@ -3,13 +3,15 @@
 All values are SI floats; see ``meshing.board.parameters`` for what the unit strings mean.
 """
 
+from collections.abc import Iterator, Mapping
 from typing import Annotated, Literal
 
 from pydantic import Field, ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
 
-from reflowshock.fem.materials.parameters import Temperature
-from reflowshock.fem.parameters import Parameters
+from reflowshock.fem.materials.parameters import Material, Temperature
+from reflowshock.parameters import Parameters
+from reflowshock.problem import Problem
 
 KELVIN = 273.15
 Switch = Literal["auto", "on", "off"]
@@ -97,3 +99,29 @@ def in_range(value: float, info: ValidationInfo, low: str | None, high: str | No
         return value
     allowed = " and ".join(f"{sign} {bound - KELVIN:.6g} degC, the {name}" for sign, name, bound in bounds)
     raise PydanticCustomError("inadmissible", "is out of range", {"allowed": allowed})
+
+
+def problems(thermal: Thermal, materials: Mapping[str, Material], warpage: float) -> list[Problem]:
+    """Find what cannot work before anything is meshed or computed.
+
+    Args:
+        thermal: The course of temperatures.
+        materials: Role -> its material.
+        warpage: Prescribed lift of the package's corner [m].
+    """
+    return [*_expansion(thermal, materials), *_warpage(thermal, warpage)]
+
+
+def _expansion(thermal: Thermal, materials: Mapping[str, Material]) -> Iterator[Problem]:
+    """Find materials that do not say how they expand; that of liquid solder does not matter."""
+    for role, material in materials.items():
+        if role == "solder" and thermal.effects.residual_stress == "off":
+            continue
+        for name in material.unknown_expansion:
+            yield Problem(f"materials.{role}.{name}", "is missing, which [thermal] needs", None, "e.g. 16 ppm/K")
+
+
+def _warpage(thermal: Thermal, warpage: float) -> Iterator[Problem]:
+    if warpage and thermal.effects.flexible != "off":
+        message = "does not go with [thermal], which computes the warpage"
+        yield Problem("warpage.corner", message, warpage, "0 mm, or thermal.effects.flexible = off")

@@ -1,1 +1,1 @@
-"""What every rank does, in order; start with `program.py`."""
+"""What every rank does, in order; start with `dynamics.py`."""

@@ -14,11 +14,10 @@ from reflowshock.fem.coupling.scheme import scheme_of
 from reflowshock.fem.coupling.self_check import recorded
 from reflowshock.fem.coupling.stopwatch import Stopwatch
 from reflowshock.fem.dynamics.energy_balance import EnergyBalance
-from reflowshock.fem.dynamics.history import History, Signal
+from reflowshock.fem.dynamics.history import History, Signal, Watch
 from reflowshock.fem.dynamics.implicit import ImplicitMotion
 from reflowshock.fem.dynamics.motion import Motion
 from reflowshock.fem.dynamics.participant import Alone, Participant, explicit_motion
-from reflowshock.fem.dynamics.watch import Watch
 from reflowshock.fem.errors import AgreedError
 from reflowshock.fem.loads.load import Load
 from reflowshock.fem.materials.elasticity import materials_of_parts

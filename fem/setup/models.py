@@ -9,8 +9,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from reflowshock.fem import dolfinx_api
-from reflowshock.fem.division.division import SchemeName
-from reflowshock.fem.division.rules import Rules
+from reflowshock.fem.division.division import Rules, SchemeName
 from reflowshock.fem.division.tables import Tables, TablesT_co
 from reflowshock.fem.division.whole import Treatment
 from reflowshock.fem.forces.force import Kinematics

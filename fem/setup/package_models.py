@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from reflowshock.fem.division.checks import check_division
 from reflowshock.fem.division.divide import divide
+from reflowshock.fem.division.division import Rules
 from reflowshock.fem.division.fine_joints import copied_joints, read_package
 from reflowshock.fem.division.record import coupling_record
-from reflowshock.fem.division.rules import Rules
 from reflowshock.fem.division.tables import JointTables, joined, model_inputs
 from reflowshock.fem.division.whole import survey
 from reflowshock.fem.loads.shock_loads import check_shaken

@@ -1,7 +1,6 @@
 """From the mesh of a structure to its models on each rank: one, or fine layers apart from the others."""
 
 from collections.abc import Mapping
-from dataclasses import replace
 
 import numpy as np
 from mpi4py import MPI
@@ -9,12 +8,10 @@ from numpy.typing import NDArray
 
 from reflowshock.fem.division.checks import check_division
 from reflowshock.fem.division.divide import divide
-from reflowshock.fem.division.division import Division
+from reflowshock.fem.division.division import Division, Rules
 from reflowshock.fem.division.record import coupling_record
-from reflowshock.fem.division.rules import Rules
-from reflowshock.fem.division.split import Part, interface_between, part_of
 from reflowshock.fem.division.structure_tables import StructureTables, structure_tables, tied
-from reflowshock.fem.division.tables import ModelInput
+from reflowshock.fem.division.tables import split
 from reflowshock.fem.division.whole import Survey, Whole, survey
 from reflowshock.fem.errors import CouplingError, StepError
 from reflowshock.fem.estimates.placement import Role
@@ -24,8 +21,14 @@ from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.mesh.mesh_file import read_mesh
 from reflowshock.fem.model.assembly import ForceOptions, Pieces, make_body, make_pieces
 from reflowshock.fem.model.power_iteration import highest_frequency
-from reflowshock.fem.model.steps import Steps, steps_of_division
-from reflowshock.fem.model.structure_steps import check_step, explicit_steps, implicit_steps, with_critical
+from reflowshock.fem.model.steps import (
+    Steps,
+    check_step,
+    explicit_steps,
+    implicit_steps,
+    steps_of_division,
+    with_critical,
+)
 from reflowshock.fem.parallel.agreement import agreed
 from reflowshock.fem.parallel.communicators import Communicators
 from reflowshock.fem.parallel.local_mesh import distribute
@@ -129,7 +132,7 @@ def divided_on_one_rank(request: StructureInput) -> Divided[StructureTables]:
     division = divide(whole, found, rules)
     check_division(whole, found, division, rules)
     check_pulses(request, division.plan.window)
-    inputs = structure_inputs(whole, division, structure_tables(whole, request))
+    inputs = split(whole, structure_tables(whole, request), division)
     check_motions_at_interface(division, inputs["macro"].tables, request)
     return Divided(
         meshes={role: item.mesh for role, item in inputs.items()},
@@ -189,76 +192,3 @@ def layers_that_are_fine(whole: Whole, found: Survey, coupling: LayerCoupling) -
             " dynamics.coupling.fine, or leave dynamics.coupling out"
         )
     return fine
-
-
-def structure_inputs(
-    whole: Whole, division: Division, tables: StructureTables
-) -> dict[Role, ModelInput[StructureTables]]:
-    """Split a structure with its tables into the models ``macro`` and ``meso``.
-
-    What both models have counts in the macro model.
-    """
-    macro, meso = part_of(whole, division.macro), part_of(whole, division.meso)
-    interface = interface_between(whole, macro, meso)
-    rest = np.where(macro.number < 0, meso.number, -1), np.where(macro.cell_number < 0, meso.cell_number, -1)
-    level = division.level[division.meso]
-    own = {
-        "macro": restricted(whole, tables, macro, (macro.number, macro.cell_number)),
-        "meso": replace(restricted(whole, tables, meso, rest), level=level, ratios=division.ratios),
-    }
-    parts: dict[Role, Part] = {"macro": macro, "meso": meso}
-    return {
-        role: ModelInput(
-            part.mesh, replace(own[role], interface=part.number[interface]), np.flatnonzero(part.cell_number >= 0)
-        )
-        for role, part in parts.items()
-    }
-
-
-def restricted(
-    whole: Whole, tables: StructureTables, part: Part, counted: tuple[NDArray[np.int32], NDArray[np.int32]]
-) -> StructureTables:
-    """Return the tables of a part of a structure.
-
-    Args:
-        whole: The structure.
-        tables: Its tables.
-        part: The part.
-        counted: Own numbers of the nodes ``(n,)`` and cells ``(ne,)`` that are loaded and watched in this model, -1 for
-            those of another one.
-    """
-    node, cell = counted
-    mine = np.flatnonzero(part.number >= 0)
-    order = mine[np.argsort(part.number[mine])]
-    held = part.number[tables.held_nodes].astype(np.int64)
-    return replace(
-        tables,
-        part=part.mesh.part,
-        part_names=part.mesh.part_names,
-        tie=part.tie,
-        master_points=whole.mesh.points[order][part.tie.master],
-        held_nodes=held[held >= 0],
-        held=tables.held[held >= 0],
-        nodes=part.nodes,
-        level=np.zeros(len(part.mesh.cells), np.int32),
-        nodes_of={name: present(node[nodes]) for name, nodes in tables.nodes_of.items()},
-        areas={name: (present(node[nodes]), area[node[nodes] >= 0]) for name, (nodes, area) in tables.areas.items()},
-        pressed={
-            name: replace(item, facets=part.number[item.facets], cells=cell[item.cells])
-            for name, item in tables.pressed.items()
-        },
-        pushed={
-            name: (present(node[nodes]), share[node[nodes] >= 0]) for name, (nodes, share) in tables.pushed.items()
-        },
-        watch=replace(
-            tables.watch,
-            nodes=node[tables.watch.nodes],
-            cells=cell[tables.watch.cells],
-            supports={name: (present(node[nodes]), held) for name, (nodes, held) in tables.watch.supports.items()},
-        ),
-    )
-
-
-def present(numbers: NDArray[np.int32]) -> NDArray[np.int32]:
-    """Return the numbers that are none of another model's."""
-    return numbers[numbers >= 0]

@@ -1,1 +1,1 @@
-"""Quasi-static problems: reflow temperatures, cooling, residual stress, modes."""
+"""Quasi-static problems: board and package during reflow, residual stress of cooling."""

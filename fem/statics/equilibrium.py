@@ -13,7 +13,7 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from reflowshock.fem.elements.strain import strain_matrix
+from reflowshock.fem.elements.kind import strain_matrix
 from reflowshock.fem.errors import AgreedError
 from reflowshock.fem.forces.energy import InternalForce
 from reflowshock.fem.forces.force import linear_terms

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reflowshock.fem.elements.element import CHUNK, Elements
+from reflowshock.fem.elements.kind import strain_matrix
 from reflowshock.fem.elements.one_point import hourglass_control, transformed
-from reflowshock.fem.elements.strain import strain_matrix
 from reflowshock.fem.errors import MeshError, ModesError
 from reflowshock.fem.forces.force_assembled import AssembledElements, upper_pattern
 from reflowshock.fem.kernels.force import assemble_upper_blocks

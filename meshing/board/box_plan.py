@@ -6,9 +6,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from reflowshock.meshing.board.checks import SMALLEST_INSET, Problem
+from reflowshock.meshing.board.checks import SMALLEST_INSET
 from reflowshock.meshing.board.estimate import PartEstimate
 from reflowshock.meshing.board.plan import Interval, Plan, uniform
+from reflowshock.problem import Problem
 
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 FACETS = ("x_min", "x_max", "y_min", "y_max", "z_min", "z_max", "mounting_holes")
@@ -156,7 +157,7 @@ def _layer_problems(box: Box) -> Iterator[Problem]:
     for layer in box.layers:
         if NAME.fullmatch(layer.name) is None or layer.name in FACETS:
             allowed = f"letters, digits and _, a letter first; none of {', '.join(FACETS)}"
-            yield Problem(f"structure.layers.{layer.name}", layer.name, allowed, "is not a valid name of a layer")
+            yield Problem(f"structure.layers.{layer.name}", "is not a valid name of a layer", layer.name, allowed)
 
 
 def _stack_problems(box: Box) -> Iterator[Problem]:
@@ -170,10 +171,10 @@ def _stack_problems(box: Box) -> Iterator[Problem]:
         )
         if box.element != "hexahedron":
             message = f"layers of different in_plane are tied, which needs hexahedra, the element is {box.element}"
-            yield Problem(key, str(list(stack.cells)), "structure.element = hexahedron, or the same in_plane", message)
+            yield Problem(key, message, str(list(stack.cells)), "structure.element = hexahedron, or the same in_plane")
         if box.holes is not None:
             message = "the outlines of holes do not match between layers of different in_plane"
-            yield Problem(key, str(list(stack.cells)), "no structure.holes, or the same in_plane", message)
+            yield Problem(key, message, str(list(stack.cells)), "no structure.holes, or the same in_plane")
 
 
 def _hole_problems(box: Box) -> Iterator[Problem]:
@@ -186,4 +187,4 @@ def _hole_problems(box: Box) -> Iterator[Problem]:
         if not smallest <= spacing <= largest:
             allowed = f"{1e3 * smallest:.4g} mm to {1e3 * largest:.4g} mm"
             message = "mounting holes reach beyond the box or into each other"
-            yield Problem("structure.holes.spacing", f"{1e3 * spacing:.4g} mm", allowed, message)
+            yield Problem("structure.holes.spacing", message, f"{1e3 * spacing:.4g} mm", allowed)

@@ -2,30 +2,13 @@
 
 import difflib
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 from reflowshock.meshing.board.pads import joint_name, lift, pad_table
 from reflowshock.meshing.board.parameters import Board, Package, Pad, Warpage
 from reflowshock.meshing.board.plan import hole_square, uniform
+from reflowshock.problem import Problem
 
 SMALLEST_INSET = 0.75  # of a hole's diameter: leaves a quarter of it as a wall between hole and edge
-
-
-@dataclass(frozen=True, slots=True)
-class Problem:
-    """One impossible value.
-
-    Attributes:
-        key: dotted key as in the case file.
-        value: the value with its unit.
-        allowed: the allowed range.
-        message: what is wrong.
-    """
-
-    key: str
-    value: str
-    allowed: str
-    message: str
 
 
 def problems(package: Package, board: Board, warpage: Warpage) -> list[Problem]:
@@ -54,9 +37,9 @@ def _array(package: Package) -> Iterator[Problem]:
     for name in sorted(set(package.depopulated) - set(names)):
         near = difflib.get_close_matches(name.upper(), names, n=1, cutoff=0.0)[0]
         message = f"no such joint, the nearest is {near}"
-        yield Problem("package.depopulated", name, f"{names[0]} to {names[-1]}", message)
+        yield Problem("package.depopulated", message, name, f"{names[0]} to {names[-1]}")
     if set(names) <= set(package.depopulated):
-        yield Problem("package.depopulated", f"{len(names)} joints", f"< {len(names)}", "no joint is left")
+        yield Problem("package.depopulated", "no joint is left", f"{len(names)} joints", f"< {len(names)}")
 
 
 def _symmetry(package: Package, board: Board) -> Iterator[Problem]:
@@ -66,7 +49,7 @@ def _symmetry(package: Package, board: Board) -> Iterator[Problem]:
     for key, count in (("package.rows", package.rows), ("package.columns", package.columns)):
         if count % 2:
             message = "a joint would be cut by the symmetry plane of a quarter model"
-            yield Problem(key, str(count), 'even, or board.symmetry = "full"', message)
+            yield Problem(key, message, str(count), 'even, or board.symmetry = "full"')
     gone = set(package.depopulated)
     for row in range(package.rows):
         for column in range(package.columns):
@@ -74,7 +57,7 @@ def _symmetry(package: Package, board: Board) -> Iterator[Problem]:
             mirrored = {joint_name(package.rows - 1 - row, column), joint_name(row, package.columns - 1 - column)}
             if name in gone and not mirrored <= gone:
                 allowed = f'{", ".join(sorted(mirrored - gone))} too, or board.symmetry = "full"'
-                yield Problem("package.depopulated", name, allowed, "a quarter model needs symmetric depopulation")
+                yield Problem("package.depopulated", "a quarter model needs symmetric depopulation", name, allowed)
 
 
 def _pad(key: str, pad: Pad, package: Package) -> Iterator[Problem]:
@@ -83,13 +66,13 @@ def _pad(key: str, pad: Pad, package: Package) -> Iterator[Problem]:
     for name, diameter in (("diameter", pad.diameter), ("mask_opening", pad.mask_opening)):
         if several and diameter >= package.pitch:
             message = "pads overlap" if name == "diameter" else "mask openings overlap"
-            yield Problem(f"{key}.{name}", _mm(diameter), f"< {_mm(package.pitch)}, the pitch", message)
+            yield Problem(f"{key}.{name}", message, _mm(diameter), f"< {_mm(package.pitch)}, the pitch")
     if pad.definition == "SMD" and pad.mask_opening >= pad.diameter:
         message = "a solder mask that defines the pad (SMD) covers its edge"
-        yield Problem(f"{key}.mask_opening", _mm(pad.mask_opening), f"< {_mm(pad.diameter)}, the diameter", message)
+        yield Problem(f"{key}.mask_opening", message, _mm(pad.mask_opening), f"< {_mm(pad.diameter)}, the diameter")
     if pad.definition == "NSMD" and pad.mask_opening <= pad.diameter:
         message = "a solder mask that does not define the pad (NSMD) leaves its edge free"
-        yield Problem(f"{key}.mask_opening", _mm(pad.mask_opening), f"> {_mm(pad.diameter)}, the diameter", message)
+        yield Problem(f"{key}.mask_opening", message, _mm(pad.mask_opening), f"> {_mm(pad.diameter)}, the diameter")
 
 
 def _layers(package: Package, board: Board) -> Iterator[Problem]:
@@ -100,13 +83,13 @@ def _layers(package: Package, board: Board) -> Iterator[Problem]:
         array = (count - 1) * package.pitch + widest_pad
         if substrate < array:
             message = "the array of pads reaches beyond the substrate"
-            yield Problem(f"package.substrate.{side}", _mm(substrate), f">= {_mm(array)}", message)
+            yield Problem(f"package.substrate.{side}", message, _mm(substrate), f">= {_mm(array)}")
         if die > substrate:
             message = "the die is larger than its substrate"
-            yield Problem(f"package.die.{side}", _mm(die), f"<= {_mm(substrate)}", message)
+            yield Problem(f"package.die.{side}", message, _mm(die), f"<= {_mm(substrate)}")
         if substrate >= whole:
             message = "the package is larger than the board"
-            yield Problem(f"package.substrate.{side}", _mm(substrate), f"< {_mm(whole)}, the board's", message)
+            yield Problem(f"package.substrate.{side}", message, _mm(substrate), f"< {_mm(whole)}, the board's")
 
 
 def _holes(package: Package, board: Board) -> Iterator[Problem]:
@@ -118,13 +101,13 @@ def _holes(package: Package, board: Board) -> Iterator[Problem]:
         largest = 0.5 * whole - taken
         key, allowed = f"board.holes.inset_{axis}", f"{_mm(smallest)} to {_mm(largest)}"
         if inset < smallest:
-            yield Problem(key, _mm(inset), allowed, "a mounting hole reaches beyond the board")
+            yield Problem(key, "a mounting hole reaches beyond the board", _mm(inset), allowed)
         elif largest < smallest:
             message = "too small for the package, its patch and the mounting holes beside each other"
-            yield Problem(f"board.{side}", _mm(whole), f">= {_mm(2.0 * (taken + inset))}", message)
+            yield Problem(f"board.{side}", message, _mm(whole), f">= {_mm(2.0 * (taken + inset))}")
         elif inset > largest:
             message = "a mounting hole lies under or beside the package: it needs strips of the board of its own"
-            yield Problem(key, _mm(inset), allowed, message)
+            yield Problem(key, message, _mm(inset), allowed)
 
 
 def _taken_by_package(side: float, board: Board) -> float:
@@ -145,7 +128,7 @@ def _gaps(package: Package, board: Board, warpage: Warpage) -> Iterator[Problem]
     limit = -min(package.standoff / over_joints if over_joints else room / over_package, room / over_package)
     if warpage.corner <= limit:
         message = "the warped package would touch the board"
-        yield Problem("warpage.corner", _mm(warpage.corner), f"> {_mm(limit)}", message)
+        yield Problem("warpage.corner", message, _mm(warpage.corner), f"> {_mm(limit)}")
 
 
 def _numerics(board: Board) -> Iterator[Problem]:
@@ -153,10 +136,10 @@ def _numerics(board: Board) -> Iterator[Problem]:
     if numerics.patch_layers >= numerics.layers:
         allowed = f"< {numerics.layers}, the board's layers"
         message = "the macro model needs a layer of the board below the patch"
-        yield Problem("board.numerics.patch_layers", str(numerics.patch_layers), allowed, message)
+        yield Problem("board.numerics.patch_layers", message, str(numerics.patch_layers), allowed)
     if numerics.coarse_size < numerics.element_size:
         allowed = f">= {_mm(numerics.element_size)}, the element size"
-        yield Problem("board.numerics.coarse_size", _mm(numerics.coarse_size), allowed, "finer than the fine elements")
+        yield Problem("board.numerics.coarse_size", "finer than the fine elements", _mm(numerics.coarse_size), allowed)
 
 
 def _mm(length: float) -> str:

@@ -6,15 +6,11 @@ user; ``workflow.pipeline.reader`` converts the strings of a case file by it, on
 
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
+
+from reflowshock.parameters import Parameters
 
 Length = Annotated[float, "mm"]
-
-
-class Parameters(BaseModel):
-    """Base of all parameter models: immutable, unknown keys are errors."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
 
 class Pad(Parameters):

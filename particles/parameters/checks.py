@@ -1,35 +1,18 @@
 """Parameters of the solder that are each allowed but make no joint together. Loads neither numba nor PETSc."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from math import degrees, pi
 
 from reflowshock.particles.core.geometry import JointGeometry
 from reflowshock.particles.parameters.effects import Decision, acting_weight, decide_effects
 from reflowshock.particles.parameters.solder import Solder
 from reflowshock.particles.reference.young_laplace import NoMeridian, joint_meridian
+from reflowshock.problem import Problem
 
 SPACINGS_IN_NECK = 2.0
 SPACINGS_IN_GAP = 3.0
 SPACINGS_IN_RADIUS = 2.0
 LARGEST_EXPLICIT = 1.0
-
-
-@dataclass(frozen=True, slots=True)
-class Problem:
-    """One impossible value.
-
-    Attributes:
-        key: dotted key as in the case file.
-        value: the value with its unit.
-        allowed: the allowed range.
-        message: what is wrong, and at which joint.
-    """
-
-    key: str
-    value: str
-    allowed: str
-    message: str
 
 
 def problems(solder: Solder, geometries: Mapping[str, JointGeometry], pitch: float) -> list[Problem]:
@@ -69,17 +52,17 @@ def effect_problems(solder: Solder, effects: Mapping[str, Decision]) -> list[Pro
     if tension["on"] or effects["inertia"]["on"]:
         return []
     message = f"nothing brings the solder to rest without surface tension; {tension['why']}"
-    return [Problem("solder.effects.surface_tension", solder.effects.surface_tension, "on", message)]
+    return [Problem("solder.effects.surface_tension", message, solder.effects.surface_tension, "on")]
 
 
 def _wall_problems(solder: Solder) -> list[Problem]:
     if solder.numerics.scheme == "gripc" and solder.wall != "free-slip":
-        return [Problem("solder.wall", solder.wall, "free-slip", 'the scheme "gripc" has walls with free slip only')]
+        return [Problem("solder.wall", 'the scheme "gripc" has walls with free slip only', solder.wall, "free-slip")]
     if (solder.wall == "slip") == (solder.slip_length is not None):
         return []
     value = "none" if solder.slip_length is None else mm(solder.slip_length)
     message = 'wall = "slip" needs a slip length, other walls have none'
-    return [Problem("solder.slip_length", value, 'a length with wall = "slip", else none', message)]
+    return [Problem("solder.slip_length", message, value, 'a length with wall = "slip", else none')]
 
 
 def _time_step_problems(solder: Solder) -> list[Problem]:
@@ -88,7 +71,7 @@ def _time_step_problems(solder: Solder) -> list[Problem]:
         return []
     message = 'scheme "gripc" takes surface tension explicitly: no step above the capillary limit is stable'
     key = "solder.numerics.time_step_limit"
-    return [Problem(key, f"{numerics.time_step_limit:g}", f"<= {LARGEST_EXPLICIT:g}", message)]
+    return [Problem(key, message, f"{numerics.time_step_limit:g}", f"<= {LARGEST_EXPLICIT:g}")]
 
 
 def _basis_problems(solder: Solder) -> list[Problem]:
@@ -96,7 +79,7 @@ def _basis_problems(solder: Solder) -> list[Problem]:
     if solder.numerics.scheme == "gripc" or basis == "quadratic":
         return []
     message = 'the scheme "energy" has no basis to choose'
-    return [Problem("solder.numerics.basis", basis, 'quadratic, or any with scheme = "gripc"', message)]
+    return [Problem("solder.numerics.basis", message, basis, 'quadratic, or any with scheme = "gripc"')]
 
 
 def _angle_problems(solder: Solder) -> list[Problem]:
@@ -104,7 +87,7 @@ def _angle_problems(solder: Solder) -> list[Problem]:
     if pad < mask:
         return []
     message = "the pad must be wetted better than the solder mask"
-    return [Problem("solder.pad_contact_angle", f"{pad:.4g} deg", f"< {mask:.4g} deg", message)]
+    return [Problem("solder.pad_contact_angle", message, f"{pad:.4g} deg", f"< {mask:.4g} deg")]
 
 
 def _spacing_problems(solder: Solder, name: str, geometry: JointGeometry) -> list[Problem]:
@@ -114,7 +97,7 @@ def _spacing_problems(solder: Solder, name: str, geometry: JointGeometry) -> lis
     if spacing <= limit:
         return []
     message = f"too coarse for joint {name}: gap {mm(geometry.gap)}, smallest radius {mm(smallest_radius)}"
-    return [Problem("solder.numerics.spacing", mm(spacing), f"<= {mm(limit)}", message)]
+    return [Problem("solder.numerics.spacing", message, mm(spacing), f"<= {mm(limit)}")]
 
 
 def _too_much(solder: Solder, name: str, geometry: JointGeometry, pitch: float) -> list[Problem]:
@@ -123,7 +106,7 @@ def _too_much(solder: Solder, name: str, geometry: JointGeometry, pitch: float) 
     if solder.volume < limit:
         return []
     message = f"does not fit: joint {name} has a gap of {mm(geometry.gap)} at a pitch of {mm(pitch)}"
-    return [Problem("solder.volume", mm3(solder.volume), f"< {mm3(limit)}", message)]
+    return [Problem("solder.volume", message, mm3(solder.volume), f"< {mm3(limit)}")]
 
 
 def _too_thin(solder: Solder, name: str, geometry: JointGeometry) -> list[Problem]:
@@ -137,7 +120,7 @@ def _too_thin(solder: Solder, name: str, geometry: JointGeometry) -> list[Proble
         return []
     limit = waist / SPACINGS_IN_NECK
     message = f"too coarse for the neck of joint {name}, which is {mm(waist)} wide in its gap of {mm(geometry.gap)}"
-    return [Problem("solder.numerics.spacing", mm(spacing), f"< {mm(limit)}", message)]
+    return [Problem("solder.numerics.spacing", message, mm(spacing), f"< {mm(limit)}")]
 
 
 def _waist(solder: Solder, geometry: JointGeometry) -> float | None:

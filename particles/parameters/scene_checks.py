@@ -5,13 +5,14 @@ from math import asin, degrees, inf, pi, sin
 from typing import Protocol
 
 from reflowshock.particles.parameters import checks
-from reflowshock.particles.parameters.checks import Problem, mm, mm3
+from reflowshock.particles.parameters.checks import mm, mm3
 from reflowshock.particles.parameters.effects import acting_weight, decide_drop, decide_effects
 from reflowshock.particles.parameters.estimate import particle_count
 from reflowshock.particles.parameters.scenes import Drop, Drops, Joint, Oscillation
 from reflowshock.particles.parameters.solder import Solder
 from reflowshock.particles.reference.drop_oscillation import lamb_decay_rate, rayleigh_frequency
 from reflowshock.particles.reference.young_laplace import NoMeridian, joint_meridian, sessile_meridian
+from reflowshock.problem import Problem
 
 FEWEST_PER_EDGE = 5
 MOST_PARTICLES = 200_000
@@ -53,7 +54,7 @@ def _pair_resolution(pair: Drops) -> list[Problem]:
     limit = min(pair.volumes) ** (1.0 / 3.0) / (FEWEST_PER_EDGE - 1)
     if pair.spacing > limit:
         message = f"too coarse for the smaller drop, of {mm3(min(pair.volumes))}"
-        return [Problem("drops.spacing", mm(pair.spacing), f"<= {mm(limit)}", message)]
+        return [Problem("drops.spacing", message, mm(pair.spacing), f"<= {mm(limit)}")]
     return _too_many("drops", pair.spacing, pair.particles)
 
 
@@ -62,13 +63,13 @@ def _distance_problems(pair: Drops, solder: Solder) -> list[Problem]:
     apart, reach = _distances(pair, solder)
     value, clear = mm(pair.distance), reach + 2.0 * pair.spacing
     if pair.distance < apart:
-        return [Problem("drops.distance", value, f">= {mm(apart)}", "the drops overlap at the start")]
+        return [Problem("drops.distance", "the drops overlap at the start", value, f">= {mm(apart)}")]
     if pair.merge and pair.distance > reach:
         message = "the drops are meant to become one, but do not reach each other"
-        return [Problem("drops.distance", value, f"{mm(apart)} to {mm(reach)}", message)]
+        return [Problem("drops.distance", message, value, f"{mm(apart)} to {mm(reach)}")]
     if not pair.merge and pair.distance < clear:
         message = "the drops are not meant to become one (drops.merge = false), but would touch"
-        return [Problem("drops.distance", value, f">= {mm(clear)}", message)]
+        return [Problem("drops.distance", message, value, f">= {mm(clear)}")]
     return []
 
 
@@ -91,7 +92,7 @@ def oscillation_problems(scene: Oscillation, solder: Solder) -> list[Problem]:
         return []
     value, limit = f"{solder.viscosity:.4g} Pa*s", f"< {solder.viscosity * frequency / decay:.4g} Pa*s"
     message = "a drop that is so small and viscous does not oscillate"
-    return [Problem("solder.viscosity", value, limit, message)]
+    return [Problem("solder.viscosity", message, value, limit)]
 
 
 def free_problems(scene: HasWall, solder: Solder) -> list[Problem]:
@@ -100,14 +101,14 @@ def free_problems(scene: HasWall, solder: Solder) -> list[Problem]:
         return []
     switches = {"gravity": solder.effects.gravity, "solder.effects.wall_adhesion": solder.effects.wall_adhesion}
     message = "without a contact angle there is no wall: a free drop falls as a whole"
-    return [Problem(key, switch, "auto, off", message) for key, switch in switches.items() if switch == "on"]
+    return [Problem(key, message, switch, "auto, off") for key, switch in switches.items() if switch == "on"]
 
 
 def joint_problems(joint: Joint, solder: Solder) -> list[Problem]:
     """Find what cannot work before a joint runs: those of an array without neighbours, under the joint's own keys."""
     if joint.offset >= joint.pad_bottom + joint.pad_top:
         allowed = f"< {mm(joint.pad_bottom + joint.pad_top)}"
-        return [Problem("joint.offset", mm(joint.offset), allowed, "the pads do not overlap")]
+        return [Problem("joint.offset", "the pads do not overlap", mm(joint.offset), allowed)]
     found = checks.problems(solder, {"of the case": joint.geometry}, inf)
     if found:
         return [replace(problem, key=KEYS.get(problem.key, problem.key)) for problem in found]
@@ -122,7 +123,7 @@ def _tilt_problems(joint: Joint) -> list[Problem]:
         drop, tilt, room = joint.pad_top * sin(abs(place.tilt[1])), place.tilt[1], place.gap - joint.spacing
         if tilt and drop >= room:
             message = f"the edge of the upper pad is {mm(drop)} lower than its centre, in a gap of {mm(place.gap)}"
-            return [Problem(key, deg(tilt), f"< {deg(asin(min(1.0, max(0.0, room / joint.pad_top))))}", message)]
+            return [Problem(key, message, deg(tilt), f"< {deg(asin(min(1.0, max(0.0, room / joint.pad_top))))}")]
     return []
 
 
@@ -131,17 +132,17 @@ def _path_problems(joint: Joint) -> list[Problem]:
         return []
     if joint.package is not None:
         message = "a package floats or is moved, not both"
-        return [Problem("joint.path", "", "joint.package or joint.path", message)]
+        return [Problem("joint.path", message, None, "joint.package or joint.path")]
     if joint.places[-1] == joint.geometry:
         message = "the path ends where it starts"
-        return [Problem("joint.path", "", "another standoff, offset or tilt", message)]
+        return [Problem("joint.path", message, None, "another standoff, offset or tilt")]
     end, lowest = joint.places[-1], checks.SPACINGS_IN_GAP * joint.spacing
     if end.gap < (1.0 - ROUNDING) * lowest:
         message = f"too low for particles {mm(joint.spacing)} apart"
-        return [Problem("joint.path.standoff", mm(end.gap), f">= {mm(lowest)}", message)]
+        return [Problem("joint.path.standoff", message, mm(end.gap), f">= {mm(lowest)}")]
     if end.offset[0] >= joint.pad_bottom + joint.pad_top:
         allowed = f"< {mm(joint.pad_bottom + joint.pad_top)}"
-        return [Problem("joint.path.offset", mm(end.offset[0]), allowed, "the pads do not overlap")]
+        return [Problem("joint.path.offset", "the pads do not overlap", mm(end.offset[0]), allowed)]
     return []
 
 
@@ -149,7 +150,7 @@ def _package_problems(joint: Joint) -> list[Problem]:
     if joint.package is None or not {"shift", "turn"} <= set(joint.package.free):
         return []
     message = "a package that is free to shift and to turn rolls off a single joint"
-    return [Problem("joint.package.free", ", ".join(joint.package.free), "lift with shift, or lift with turn", message)]
+    return [Problem("joint.package.free", message, ", ".join(joint.package.free), "lift with shift, or lift with turn")]
 
 
 def _load_problems(joint: Joint, solder: Solder) -> list[Problem]:
@@ -168,9 +169,9 @@ def _load_problems(joint: Joint, solder: Solder) -> list[Problem]:
     place = f"the package down to {mm(lowest)}, too low for particles {mm(joint.spacing)} apart"
     if largest <= 0.0:
         allowed = "more solder, or a smaller joint.spacing"
-        return [Problem("joint.volume", mm3(joint.volume), allowed, f"the solder alone pulls {place}")]
+        return [Problem("joint.volume", f"the solder alone pulls {place}", mm3(joint.volume), allowed)]
     message = f"presses {place}"
-    return [Problem("joint.package.load", mn(joint.package.load), f"< {mn(largest)}", message)]
+    return [Problem("joint.package.load", message, mn(joint.package.load), f"< {mn(largest)}")]
 
 
 def _motion_problems(joint: Joint, solder: Solder) -> list[Problem]:
@@ -178,11 +179,11 @@ def _motion_problems(joint: Joint, solder: Solder) -> list[Problem]:
     if joint.package is None and joint.path is None:
         return []
     if solder.numerics.scheme == "gripc":
-        return [Problem("solder.numerics.scheme", "gripc", "energy", "the scheme gripc needs plates at rest")]
+        return [Problem("solder.numerics.scheme", "the scheme gripc needs plates at rest", "gripc", "energy")]
     inertia = decide_effects(joint.geometry, solder)["inertia"]
     if joint.path is not None and inertia["on"]:
         message = f"a package follows its path from rest to rest, at no particular speed; {inertia['why']}"
-        return [Problem("solder.effects.inertia", solder.effects.inertia, "off", message)]
+        return [Problem("solder.effects.inertia", message, solder.effects.inertia, "off")]
     return []
 
 
@@ -191,11 +192,11 @@ def _resolution_problems(drop: Drop) -> list[Problem]:
         return []
     if drop.particles_per_edge is not None:
         message = f"drop.particles_per_edge = {drop.particles_per_edge} is given as well"
-        return [Problem("drop.spacing", mm(drop.spacing), "one of drop.spacing, drop.particles_per_edge", message)]
+        return [Problem("drop.spacing", message, mm(drop.spacing), "one of drop.spacing, drop.particles_per_edge")]
     limit = drop.edge / (FEWEST_PER_EDGE - 1)
     if drop.count < FEWEST_PER_EDGE:
         message = f"too coarse for a drop that starts as a cube of {mm(drop.edge)}"
-        return [Problem("drop.spacing", mm(drop.spacing), f"<= {mm(limit)}", message)]
+        return [Problem("drop.spacing", message, mm(drop.spacing), f"<= {mm(limit)}")]
     return _too_many("drop", drop.spacing, drop.particles)
 
 
@@ -206,10 +207,10 @@ def _symmetry_problems(drop: Drop, solder: Solder) -> list[Problem]:
     key, effects = "drop.symmetry", decide_drop(solder, drop.is_free)
     if drop.count % 2 == 0:
         message = f"with {drop.count} particles along an edge none lie in the plane of symmetry"
-        return [Problem(key, drop.symmetry, "an odd number of particles along an edge", message)]
+        return [Problem(key, message, drop.symmetry, "an odd number of particles along an edge")]
     if solder.numerics.scheme == "gripc" or effects["inertia"]["on"] or effects["viscosity"]["on"]:
         message = "symmetry needs a drop that relaxes to rest, without inertia or viscosity, and not the scheme gripc"
-        return [Problem(key, drop.symmetry, "none", message)]
+        return [Problem(key, message, drop.symmetry, "none")]
     return []
 
 
@@ -220,15 +221,15 @@ def _wall_problems(drop: Drop) -> list[Problem]:
     key, value = next(iter(angles.items()), ("", 0.0))
     if drop.contact_angle is not None and angles:
         both = "drop.receding_angle and drop.advancing_angle, or drop.contact_angle"
-        return [Problem(key, deg(value), both, "a wall has hysteresis, or one contact angle")]
+        return [Problem(key, "a wall has hysteresis, or one contact angle", deg(value), both)]
     if len(angles) == 1:
-        return [Problem(key, deg(value), "drop.receding_angle with drop.advancing_angle", "one is given alone")]
+        return [Problem(key, "one is given alone", deg(value), "drop.receding_angle with drop.advancing_angle")]
     if drop.hysteresis is not None and drop.hysteresis[0] >= drop.hysteresis[1]:
         allowed = f"< {deg(drop.hysteresis[1])}, the advancing angle"
-        return [Problem(key, deg(value), allowed, "a line recedes at a smaller angle than it advances at")]
+        return [Problem(key, "a line recedes at a smaller angle than it advances at", deg(value), allowed)]
     if drop.pad_radius is not None and drop.contact_angle is None:
         message = "a pad needs a contact angle, and has no hysteresis here"
-        return [Problem("drop.pad_radius", mm(drop.pad_radius), "only with drop.contact_angle", message)]
+        return [Problem("drop.pad_radius", message, mm(drop.pad_radius), "only with drop.contact_angle")]
     return []
 
 
@@ -238,11 +239,11 @@ def _pad_problems(drop: Drop) -> list[Problem]:
     pad, mask = degrees(drop.contact_angle), degrees(drop.mask_contact_angle)
     if pad >= mask:
         message = "the pad must be wetted better than the solder mask"
-        return [Problem("drop.contact_angle", f"{pad:.4g} deg", f"< {mask:.4g} deg", message)]
+        return [Problem("drop.contact_angle", message, f"{pad:.4g} deg", f"< {mask:.4g} deg")]
     limit = SPACINGS_IN_PAD * drop.resolution
     if drop.pad_radius < limit:
         message = f"too small for a particle spacing of {mm(drop.resolution)} with a volume of {mm3(drop.volume)}"
-        return [Problem("drop.pad_radius", mm(drop.pad_radius), f">= {mm(limit)}", message)]
+        return [Problem("drop.pad_radius", message, mm(drop.pad_radius), f">= {mm(limit)}")]
     return []
 
 
@@ -251,7 +252,7 @@ def _too_many(scene: str, spacing: float, count: int) -> list[Problem]:
         return []
     limit = spacing * (count / MOST_PARTICLES) ** (1.0 / 3.0)
     message = f"needs {count} particles, more than {MOST_PARTICLES}: the volume does not fit, or spacing too fine"
-    return [Problem(f"{scene}.spacing", mm(spacing), f">= {mm(limit)}", message)]
+    return [Problem(f"{scene}.spacing", message, mm(spacing), f">= {mm(limit)}")]
 
 
 def mn(force: float) -> str:

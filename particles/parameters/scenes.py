@@ -9,11 +9,11 @@ from typing import Annotated, Literal, Protocol
 
 from pydantic import Field
 
+from reflowshock.parameters import Parameters
 from reflowshock.particles.core.geometry import JointGeometry
 from reflowshock.particles.parameters.solder import (
     FlowEffects,
     FlowNumerics,
-    Parameters,
     Solder,
     SolderEffects,
     SolderNumerics,

@@ -6,15 +6,11 @@ All values are SI floats; see ``meshing.board.parameters`` for what the unit str
 import math
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
+
+from reflowshock.parameters import Parameters
 
 Switch = Literal["auto", "on", "off"]
-
-
-class Parameters(BaseModel):
-    """Base of all parameter models: immutable, unknown keys are errors."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
 
 class FlowNumerics(Parameters):

@@ -50,11 +50,11 @@ def test_damage_of_any_file_is_noticed(tmp_path, case, way):
         for path in [path for path in product.rglob("*") if path.is_file()]:
             kept = path.read_bytes()
             WAYS[way](path)
-            verdict = examine(store, point)[stage.name]
-            assert verdict.stale, path
-            assert path.name in verdict.damaged[0]
+            state = examine(store, point)[stage.name]
+            assert state.stale, path
+            assert path.name in state.damaged[0]
             path.write_bytes(kept)
-    assert not any(verdict.stale for verdict in examine(store, point).values())
+    assert not any(state.stale for state in examine(store, point).values())
 
 
 @pytest.fixture(scope="module")

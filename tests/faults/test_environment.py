@@ -89,7 +89,7 @@ def test_a_run_within_a_job_of_mpi(place):
 def test_several_ranks_are_refused_in_one_line(place):
     done = command(place, "run", "case.toml", "--out", "out", before=mpirun(2))
     assert done.returncode == 2
-    assert done.stderr.count(b"error: started on 2 MPI ranks; start it once, it starts its own ranks") == 1
+    assert done.stderr.count(b"error: started on 2 MPI ranks; start it without mpirun, it starts its own ranks") == 1
     assert not (place / "out").exists()
 
 

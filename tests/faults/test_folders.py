@@ -96,7 +96,7 @@ def test_plain_snakemake_holds_the_folder_and_shows_no_old_report(tmp_path):
     wait_until(lambda: list(folder.glob(".store/work/reflow-*/.reflow.partial")) or process.poll() is not None)
     assert process.poll() is None
     assert not (folder / "report.html").exists()
-    assert "another run is at work" in run_drop(folder).stderr
+    assert "another run is active" in run_drop(folder).stderr
     assert process.wait(timeout=60) == 1
     assert not (folder / "report.html").exists()
     assert "nothing to do" in run_drop(folder).stdout and (folder / "report.html").exists()

@@ -153,12 +153,12 @@ def test_a_million_rows_are_read_in_seconds(tabulated):
 
 NO_CASES = {
     "null character": (b'[case]\nname = "a\x00b"\n', r":2:\d+: is not TOML"),
-    "not a text": (b"a = 1\n\xff\xfe", r":2:1: is not a text in UTF-8"),
+    "not a text": (b"a = 1\n\xff\xfe", r":2:1: is not UTF-8 text"),
     "thousands of digits": (b"[case]\nname = " + b"9" * 5000, r":2:1: has a value that cannot be read"),
     "deep lists": (b"a = " + b"[" * 5000, "nested too deeply"),
     "deep tables": (b"a." * 500 + b"a = 1", "nested too deeply"),
     "too large": (b"#" * 4_100_000, "too large: 4.1 MB; allowed: up to 4 MB"),
-    "a study": (b"[study]\nname = 'x'\n", "is a study, not a case; use: reflowshock study"),
+    "a study": (b"[study]\nname = 'x'\n", "is a study, not a case; use reflowshock study"),
     "nothing": (b"", "does not say what kind of case it is"),
 }
 

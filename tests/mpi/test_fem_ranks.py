@@ -169,7 +169,7 @@ def test_crash_of_one_rank_ends_all(assembly, tmp_path):
         "from mpi4py import MPI\n"
         "from reflowshock.fem.coupling import held_velocity; from reflowshock.fem.run import program\n"
         "def broken(self): raise ZeroDivisionError('broken rank')\n"
-        "held_velocity.Meso.begin_window = broken\n"
+        "held_velocity.HeldVelocityMeso.begin_window = broken\n"
         "sys.exit(program.main(MPI.COMM_WORLD, sys.argv[1:]))\n"
     )
     path = tmp_path / "input.json"

@@ -8,7 +8,7 @@ import pytest
 
 from reflowshock.particles.core.geometry import JointGeometry
 from reflowshock.particles.parameters.solder import Solder, SolderNumerics
-from reflowshock.workflow.reflow.joints import Job
+from reflowshock.workflow.reflow.joints import JointReflow
 from reflowshock.workflow.reflow.pool import ReflowError
 from reflowshock.workflow.reflow.processes import Processes
 from reflowshock.workflow.reflow.ranks import Ranks
@@ -28,8 +28,8 @@ def ranks(tmp_path):
     assert not found.folder.exists()
 
 
-def jobs(folder) -> dict[str, Job]:
-    return {name: Job(place, SOLDER, folder / name) for name, place in PLACES.items()}
+def jobs(folder) -> dict[str, JointReflow]:
+    return {name: JointReflow(place, SOLDER, folder / name) for name, place in PLACES.items()}
 
 
 def test_what_fails_is_named_and_all_end(ranks):

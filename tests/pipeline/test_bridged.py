@@ -12,7 +12,7 @@ def test_bridged_joints_are_told_and_end_the_run(tmp_path):
     result = reflowshock("run", tmp_path, settings=OVERFILLED)
     assert result.returncode == 1
     assert "joints bridged 4 (limit 0)" in result.stdout
-    assert "A3" in result.stderr and "bridged: there is no such joint to mesh" in result.stderr
+    assert "A3" in result.stderr and "bridged: such a joint cannot be meshed" in result.stderr
     joints = json.loads((tmp_path / "reflow/joints.json").read_text())
     assert {joint["verdict"] for joint in joints.values()} == {"bridged"}
     assert "A4" in joints["A3"]["touches"]

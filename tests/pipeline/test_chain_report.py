@@ -25,7 +25,7 @@ def test_the_report_tells_warpage_shape_effect_and_interface(run_folder):
     subprocess.run([sys.executable, "-c", WRITE, str(run_folder)], check=True)
     page = (run_folder / "report.html").read_text()
     sections = ("Result", "Warpage", "Joint shapes", "Joint meshes", "Shock", "What the real shapes change",
-                "Stress at the package", "Two scales", "Energy ledger", "Cost")  # fmt: skip
+                "Stress at the package", "Two scales", "Energy balance", "Cost")  # fmt: skip
     places = [page.index(f"<h2>{section}</h2>") for section in sections]
     assert places == sorted(places)
     assert "The real shapes lower the peak stress" in page

@@ -90,7 +90,7 @@ def test_killed_command_leaves_no_job(slurm, tmp_path, end):
     wait_until(lambda: [row[1] for row in slurm.queue()[before:]] == ["RUNNING"])
     process.send_signal(end)
     errors = process.communicate(timeout=60)[1]
-    assert end == signal.SIGKILL or b"the same command continues" in errors
+    assert end == signal.SIGKILL or b"repeat the command to continue" in errors
     wait_until(lambda: [row[1] for row in slurm.queue()[before:]] == ["CANCELLED"])
     wait_until(lambda: not at_work(folder))
     assert not (folder / "reflow").exists()

@@ -8,9 +8,8 @@ from reflowshock.cases.hard.trials.coupled import Coupled, models_of, surveyed
 from reflowshock.cases.hard.trials.layouts import board, copper_cut, corner, joint, overhang, two_regions
 from reflowshock.fem.coupling.scheme import scheme_of
 from reflowshock.fem.coupling.self_check import self_check
-from reflowshock.fem.division.buffer import touching
 from reflowshock.fem.division.checks import check_division
-from reflowshock.fem.division.divide import cut_nodes, divide, held
+from reflowshock.fem.division.divide import cut_nodes, divide, held, touching
 from reflowshock.fem.errors import CouplingError
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.mesh import MeshData, append

@@ -1,42 +1,19 @@
 """Faults planted in elements, steps and coupling are missed by none: hard cases keep their bounds only without them."""
 
-from pathlib import Path
-
 import pytest
 
+from reflowshock.cases.hard.collector import HARD
+from reflowshock.cases.hard.hard_case import HardCase, read_hard_cases
 from reflowshock.cases.hard.trials import motion
+from reflowshock.cases.hard.verdict import attempt
 from reflowshock.fem.coupling import held_velocity
 from reflowshock.fem.division import whole
 from reflowshock.fem.forces.force_assembled import AssembledElements
 from reflowshock.fem.forces.force_nonlinear import NonlinearElements
-from reflowshock.workflow.case.case import CASES
-from reflowshock.workflow.stress_test.hard_case import HardCase, read_hard_cases
-from reflowshock.workflow.stress_test.verdict import attempt
-
-ELSEWHERE = {  # asserted by tests of their own, which are slow
-    "elements_order_hexahedra",
-    "elements_order_tetrahedra",
-    "elements_order_quadratic",
-    "coupling_long_run",
-    "coupling_layouts",
-    "coupling_copper_cut",
-}
-HARD = [
-    path
-    for family in ("elements", "coupling")
-    for path in sorted((CASES / "hard").glob(f"{family}_*.toml"))
-    if path.stem not in ELSEWHERE
-]
 
 
 def hard_case(name: str, tried: str) -> HardCase:
-    return next(case for case in read_hard_cases(CASES / "hard" / f"{name}.toml") if case.tried.startswith(tried))
-
-
-@pytest.mark.parametrize("path", HARD, ids=lambda path: path.stem)
-def test_first_case_of_each_file_holds(path: Path):
-    verdict = attempt(read_hard_cases(path)[0])
-    assert verdict.ok, verdict
+    return next(case for case in read_hard_cases(HARD / f"{name}.toml") if case.tried.startswith(tried))
 
 
 def flipped(add):

@@ -4,14 +4,14 @@ from dataclasses import replace
 
 import pytest
 
+from reflowshock.cases.hard.collector import HARD
+from reflowshock.cases.hard.hard_case import read_hard_cases
+from reflowshock.cases.hard.verdict import attempt
 from reflowshock.meshing.joint import swept as levels
 from reflowshock.meshing.joint.joint_mesh import JointPlace
 from reflowshock.meshing.surface import user_surface
 from reflowshock.particles.physics.forces import Gravity, Wetting
 from reflowshock.particles.steps.inertial_step import InertialFlow
-from reflowshock.workflow.stress_test.command import HARD
-from reflowshock.workflow.stress_test.hard_case import read_hard_cases
-from reflowshock.workflow.stress_test.verdict import attempt
 
 
 def flip(patch, owner, name):
@@ -59,9 +59,8 @@ def test_a_planted_fault_is_a_miss(name, tried, fault, monkeypatch):
     assert not verdict.ok, verdict.checks
 
 
-def test_a_case_file_is_run_to_its_report_and_judged():
+def test_a_run_that_fails_is_told_in_its_own_words():
     (case,) = read_hard_cases(HARD / "reflow_run.toml")
-    assert attempt(case).ok
     given = case.parameters.model_copy(update={"settings": {"drop": {"particles_per_edge": 1}}})
     verdict = attempt(replace(case, parameters=given))
     assert "drop.particles_per_edge = 1: is out of range" in verdict.message, verdict

@@ -1,8 +1,7 @@
 """Divisions of meshes for tests: by the parts of the mesh, or as a naive scheme would."""
 
 from reflowshock.fem.division.divide import held, two_steps
-from reflowshock.fem.division.division import Division
-from reflowshock.fem.division.rules import Rules
+from reflowshock.fem.division.division import Division, Rules
 from reflowshock.fem.division.whole import Survey, Whole
 
 

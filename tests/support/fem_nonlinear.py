@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.linalg import polar
 
-from reflowshock.fem.elements.strain import strain_matrix
+from reflowshock.fem.elements.kind import strain_matrix
 from reflowshock.fem.elements.stress import symmetric, voigt
 from reflowshock.fem.kernels.hexahedron import GAUSS, shape_derivatives
 from reflowshock.fem.kernels.nonlinear import Path

@@ -7,14 +7,14 @@ from collections.abc import Callable
 from pathlib import Path
 
 from reflowshock.workflow.reflow import joints as reflow_pool
-from reflowshock.workflow.reflow.joints import Job, records
+from reflowshock.workflow.reflow.joints import JointReflow, records
 
 __all__ = ["records"]
 
 Report = Callable[[float], None]
 
 
-def solve(job: Job, progress: Report):
+def solve(job: JointReflow, progress: Report):
     """Return the shape of a joint, and whether it continued."""
     return reflow_pool._solve(job, progress)
 
@@ -28,7 +28,7 @@ def fail(job: str, progress: Report) -> str:
     return job
 
 
-def be_killed(job: Job, progress: Report):
+def be_killed(job: JointReflow, progress: Report):
     """Reflow one joint; where there is no solder to reflow, be killed as soon as the other has left its checkpoint."""
     if job.checkpoint.name != "B1":
         return reflow_pool._solve(job, progress)

@@ -54,7 +54,7 @@ class ScriptedDriver:
 
 
 class ScriptedMacro(ScriptedDriver):
-    """A macro model that moves the interface, as ``held_velocity.Macro``.
+    """A macro model that moves the interface, as ``held_velocity.HeldVelocityMacro``.
 
     Attributes:
         mass: ``(nc, 3)`` [kg] of the meso model at the interface.
@@ -64,7 +64,7 @@ class ScriptedMacro(ScriptedDriver):
     def __init__(
         self, points: NDArray[np.float64], velocity: VelocityScript, plan: WindowPlan, channels: InterfaceChannels
     ) -> None:
-        """Receive the interface mass; a ``held_velocity.Meso`` must have sent it. Arguments as ``ScriptedDriver``."""
+        """Receive the interface mass; a ``HeldVelocityMeso`` must have sent it. Arguments as ``ScriptedDriver``."""
         super().__init__(points, velocity, plan, channels)
         self.mass, self.force = np.zeros_like(points), np.zeros_like(points)
         channels.forces.receive(self.mass)
@@ -75,7 +75,7 @@ class ScriptedMacro(ScriptedDriver):
 
 
 class ScriptedMeso:
-    """A meso model that answers with a force, as ``held_velocity.Meso``: a spring, a dashpot, a table.
+    """A meso model that answers with a force, as ``held_velocity.HeldVelocityMeso``: a spring, a dashpot, a table.
 
     Attributes:
         time: [s].

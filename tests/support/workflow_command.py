@@ -49,4 +49,4 @@ def break_off(line: list[str], folder: Path, end: signal.Signals, whom: str, *, 
     errors = process.communicate(timeout=60)[1]
     assert psutil.wait_procs(children, timeout=15)[1] == []
     assert process.returncode == (-end if (end, whom) == (signal.SIGKILL, "command") else 1)
-    assert end == signal.SIGKILL or b"the same command continues" in errors
+    assert end == signal.SIGKILL or b"repeat the command to continue" in errors

@@ -32,7 +32,7 @@ from reflowshock.particles.parameters.solder import SolderEffects
 from reflowshock.workflow.board_drop.fine_joints import needs_coarse_joints
 from reflowshock.workflow.effects.registry import registry
 from reflowshock.workflow.reflow.between import open_structure
-from reflowshock.workflow.reflow.load_steps import load_steps
+from reflowshock.workflow.reflow.forecast import load_steps
 from tests.support import effect_switches as scene
 from tests.support.drops import solve_drop
 from tests.support.fem_residual import cooled, layered

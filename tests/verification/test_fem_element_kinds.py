@@ -15,7 +15,7 @@ from reflowshock.fem.materials.library import FR4, SAC405
 from reflowshock.fem.materials.parameters import Isotropic
 from reflowshock.fem.mesh.facet import area_vectors
 from reflowshock.fem.mesh.mesh import boundary_facets
-from reflowshock.fem.mesh.mesh_quality import scaled_jacobians
+from reflowshock.fem.mesh.mesh_file import scaled_jacobians
 
 RANDOM = np.random.default_rng(3)
 LINE = np.linspace(0, 1, 4)

@@ -12,9 +12,9 @@ from reflowshock.fem.materials.parameters import Isotropic
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.mesh import append, select
 from reflowshock.fem.problem.thermal import Thermal
-from reflowshock.fem.statics.rigid import RigidMotions
 from reflowshock.fem.statics.state import Assembly
 from reflowshock.fem.statics.structure import ThermalStructure
+from reflowshock.fem.statics.thermal_tables import RigidMotions
 from tests.support.fem_models import write_msh
 from tests.support.thermal_models import (
     LIFT,

@@ -12,9 +12,8 @@ from reflowshock.particles.reference.young_laplace import joint_meridian
 from reflowshock.particles.scenes.carried_joint import stiffness_estimate
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.pipeline.reader import read_case
-from reflowshock.workflow.reflow.coupling import Coupling, NotInBalance, placed
-from reflowshock.workflow.reflow.load_steps import LoadStep, load_steps
-from reflowshock.workflow.reflow.start import floating_height, scale_of, start
+from reflowshock.workflow.reflow.coupling import Coupling, NotInBalance, floating_height, placed, scale_of, start
+from reflowshock.workflow.reflow.forecast import LoadStep, load_steps
 from tests.support.reflow_structures import NAMES, Bow, joints_here, rigid_modes
 from tests.support.workflow_command import SMALL_CASE
 

@@ -1,4 +1,4 @@
-"""The command accuracy: climb the ladder of a case, tell what it costs, recommend, and run the recommendation."""
+"""The command accuracy: run the convergence study of a case, say what it costs, recommend settings and run them."""
 
 import shlex
 from collections.abc import Mapping, Sequence
@@ -9,24 +9,23 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
+from reflowshock.problem import Problem
 from reflowshock.workflow.accuracy.recommend import Goal, recommend
-from reflowshock.workflow.accuracy.runs import Climb, Compute
+from reflowshock.workflow.accuracy.runs import Compute, StudyRunner
 from reflowshock.workflow.case.case import Case
-from reflowshock.workflow.case.problems import CaseError, Problem
+from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.case.text import duration, percent
 from reflowshock.workflow.case.units import UnitError, to_si
 from reflowshock.workflow.convergence import tables
 from reflowshock.workflow.convergence.calibration import calibration, default_folder
-from reflowshock.workflow.convergence.machine import this_machine
-from reflowshock.workflow.convergence.measured import FILE, Accuracy, Recommended, fits_of, write_accuracy
+from reflowshock.workflow.convergence.measured import FILE, Accuracy, Recommended, fits_of, this_host, write_accuracy
 from reflowshock.workflow.convergence.page import PAGE, PICTURE, write_pages
-from reflowshock.workflow.convergence.series import Ladder
+from reflowshock.workflow.convergence.series import ConvergenceStudy
 from reflowshock.workflow.jobs import batch
 from reflowshock.workflow.kinds import kind_of, stage_seconds
 from reflowshock.workflow.pipeline.reader import read_case
 from reflowshock.workflow.process.environment import available_cores
-from reflowshock.workflow.process.progress import progress_bar
-from reflowshock.workflow.process.terminal import styled
+from reflowshock.workflow.process.terminal import progress_bar, styled
 from reflowshock.workflow.store.folders import check_folder, locked
 from reflowshock.workflow.store.point import Point
 from reflowshock.workflow.store.state import failed_checks
@@ -38,7 +37,7 @@ LONGEST = 600.0  # wall time of a run that nobody has given a budget for [s]
 
 
 @dataclass(frozen=True, slots=True)
-class Wish:
+class AccuracyRequest:
     """What a user asks for.
 
     Attributes:
@@ -61,7 +60,7 @@ class Wish:
 
     @property
     def longest(self) -> float:
-        """Wall time that a run of the ladder may take [s]."""
+        """Wall time that a run of the study may take [s]."""
         return LONGEST if self.budget == float("inf") else self.budget
 
     @property
@@ -70,7 +69,7 @@ class Wish:
         return [f"{key}={value}" for key, value in self.settings.items()]
 
 
-def read_wish(case: Path, settings: Sequence[str], tolerance: str | None, budget: str | None) -> Wish:
+def read_request(case: Path, settings: Sequence[str], tolerance: str | None, budget: str | None) -> AccuracyRequest:
     """Read what the command line asks for.
 
     Raises:
@@ -81,7 +80,7 @@ def read_wish(case: Path, settings: Sequence[str], tolerance: str | None, budget
     options += [item for setting in settings for item in ("--set", setting)]
     share = None if tolerance is None else _share(tolerance)
     limit = float("inf") if budget is None else _seconds(budget)
-    return Wish(
+    return AccuracyRequest(
         case,
         dict(_pair(setting) for setting in settings),
         TOLERANCE if tolerance is None and budget is None else share,
@@ -104,7 +103,7 @@ def _share(text: str) -> float:
     except ValueError:
         share = 0.0
     if rest or not 0.0 < share < 1.0:  # nan is neither
-        message = "is no share of the answer"
+        message = "is not a valid relative error"
         raise CaseError("command line", [Problem("--tolerance", message, text, '"0.0001%" to "99%", e.g. "2%"')])
     return share
 
@@ -116,71 +115,84 @@ def _seconds(text: str) -> float:
     except UnitError as error:
         raise CaseError("command line", [Problem("--budget", str(error), text, 'a time, e.g. "10min"')]) from error
     if not seconds > 0.0:
-        raise CaseError("command line", [Problem("--budget", "is no time to spend", text, "> 0 s")])
+        raise CaseError("command line", [Problem("--budget", "is not a valid time", text, "> 0 s")])
     return seconds
 
 
-def measure(wish: Wish, folder: Path, compute: Compute, ladder: Ladder | None = None) -> tuple[Accuracy, Climb]:
-    """Measure what is missing of a case's ladder, choose settings, run them, and write all of it.
+def measure(
+    request: AccuracyRequest, folder: Path, compute: Compute, study: ConvergenceStudy | None = None
+) -> tuple[Accuracy, StudyRunner]:
+    """Compute what is missing of a case's convergence study, choose settings, run them, and write the results.
 
     Args:
-        wish: what is asked for.
+        request: what is asked for.
         folder: of the store and of what is written.
         compute: computes points.
-        ladder: in place of that of the case's kind.
+        study: in place of that of the case's kind.
 
     Returns:
         What was measured, and how.
     """
-    case = read_case(wish.case, wish.overrides, wish.oversubscribe, wish.force)
-    ladder = ladder or kind_of(case).ladder(case)
-    climb = Climb(
-        ladder, wish.case, wish.settings, folder, compute, wish.budget, wish.longest, wish.oversubscribe, wish.force
+    case = read_case(request.case, request.overrides, request.oversubscribe, request.force)
+    study = study or kind_of(case).study(case)
+    runner = StudyRunner(
+        study,
+        request.case,
+        request.settings,
+        folder,
+        compute,
+        request.budget,
+        request.longest,
+        request.oversubscribe,
+        request.force,
     )
-    climb.climb(ladder.rungs)
-    measured = climb.measured(ladder.rungs)
-    fits = fits_of(ladder, measured)
-    goal = Goal(wish.tolerance, climb.left)
-    chosen = recommend(ladder, measured, fits, goal)
+    runner.compute_runs(study.runs)
+    measured = runner.measured(study.runs)
+    fits = fits_of(study, measured)
+    goal = Goal(request.tolerance, runner.left)
+    chosen = recommend(study, measured, fits, goal)
     accuracy = Accuracy(
-        case.case.name, case.kind, wish.command, this_machine(), ladder.errors, tuple(measured.values()), fits,
-        wish.tolerance, None if chosen is None else _run(chosen, climb),
+        case.case.name, case.kind, request.command, this_host(), study.errors, tuple(measured.values()), fits,
+        request.tolerance, None if chosen is None else _run(chosen, runner),
     )  # fmt: skip
     write_accuracy(folder, accuracy)
-    return accuracy, climb
+    return accuracy, runner
 
 
-def _run(chosen: Recommended, climb: Climb) -> Recommended:
+def _run(chosen: Recommended, runner: StudyRunner) -> Recommended:
     """Run what was chosen, if it was not measured, and say what was found."""
-    rungs = [*(rung for rung in climb.ladder.rungs if rung.name != chosen.rung.name), chosen.rung]
-    climb.climb([chosen.rung])
-    return replace(chosen, found=climb.measured(rungs).get(chosen.rung.name))
+    runs = [*(run for run in runner.study.runs if run.name != chosen.run.name), chosen.run]
+    runner.compute_runs([chosen.run])
+    return replace(chosen, found=runner.measured(runs).get(chosen.run.name))
 
 
-def show(wish: Wish, out: Path | None, console: Console) -> bool:
+def show(request: AccuracyRequest, out: Path | None, console: Console) -> bool:
     """Run the command and tell what was found.
 
     Args:
-        wish: what is asked for.
+        request: what is asked for.
         out: folder; None: the default one.
-        console: where it is told.
+        console: where it is shown.
 
     Returns:
         Whether the recommendation was run and keeps its promise: the tolerance, where there is one.
     """
-    case = read_case(wish.case, wish.overrides, wish.oversubscribe, wish.force)
+    case = read_case(request.case, request.overrides, request.oversubscribe, request.force)
     folder = out or default_folder(case)
-    check_folder(folder, WHAT, case.case.name, wish.force)
-    compute = partial(_compute, wish=wish, until=kind_of(case).ladder(case).until)
-    accuracy, climb = measure(wish, folder, compute)
-    tried = (*_left_out(climb), *_impossible(climb), *_failed(climb))
-    remarks = (*tried, *unproved(accuracy), *_unhealthy(accuracy, climb), *_own_size(wish, accuracy))
+    check_folder(folder, WHAT, case.case.name, request.force)
+    compute = partial(_compute, request=request, until=kind_of(case).study(case).until)
+    accuracy, runner = measure(request, folder, compute)
+    tried = (*_left_out(runner), *_impossible(runner), *_failed(runner))
+    remarks = (*tried, *unproved(accuracy), *_unhealthy(accuracy, runner), *_own_size(request, accuracy))
     write_pages(folder, accuracy, remarks)
-    console.print(
-        table(tables.runs(accuracy), f"Errors and costs, the least of all times that it was run: {accuracy.machine}")
-    )
+    console.print(table(tables.runs(accuracy), f"Errors and costs (smallest of repeated runs) on {accuracy.machine}"))
     console.print(styled("[dim]{}", tables.legend(accuracy)), soft_wrap=True)
-    console.print(table(tables.orders(accuracy), "Orders in h, the value of a knob; core-seconds t0 + D h^-q"))
+    console.print(
+        table(
+            tables.orders(accuracy),
+            "Observed orders in h, the value of the parameter; cost in core-seconds: t0 + D h^-q",
+        )
+    )
     for remark in remarks:
         console.print(f"\n{remark}", soft_wrap=True)
     _show_choice(accuracy, console)
@@ -201,38 +213,38 @@ def _compute(
     points: Sequence[Point],
     *,
     until: str,
-    wish: Wish,
+    request: AccuracyRequest,
 ) -> Mapping[str, str]:
     """Compute points one stage at a time, so that measurements do not disturb each other; show how far it is."""
-    again = " once more, for their times" if store.folder.name.startswith("again") else ""
+    again = " again, to measure their times" if store.folder.name.startswith("again") else ""
     with progress_bar(f"{len(points)} point{'s' if len(points) > 1 else ''}{again}") as progress:
 
         def count() -> None:
             progress(sum(store.is_complete(point, until) for point in points) / len(points))
 
-        machine = batch.Machine(available_cores(), True, wish.oversubscribe, each_second=count)
-        with locked(store.folder, WHAT, points[0].case.case.name, wish.force) as lock:
+        machine = batch.Machine(available_cores(), True, request.oversubscribe, each_second=count)
+        with locked(store.folder, WHAT, points[0].case.case.name, request.force) as lock:
             return batch.run_points(store, points, until, machine, lock)
 
 
-def _left_out(climb: Climb) -> list[str]:
-    if not climb.left_out:
+def _left_out(runner: StudyRunner) -> list[str]:
+    if not runner.left_out:
         return []
-    texts = [f"{name} (about {duration(seconds)})" for name, seconds in climb.left_out.items()]
-    limited = climb.budget < float("inf")
-    why = "did not fit into what was left of the budget" if limited else f"take more than {duration(climb.longest)}"
-    more = "" if limited else "; a budget pays for them, e.g. --budget 10h"
-    return [f"Not run, since they {why}: {', '.join(texts)}{more}."]
+    texts = [f"{name} (about {duration(seconds)})" for name, seconds in runner.left_out.items()]
+    limited = runner.budget < float("inf")
+    why = "did not fit into what was left of the budget" if limited else f"take more than {duration(runner.longest)}"
+    more = "" if limited else "; to run them, give a budget, e.g. --budget 10h"
+    return [f"Not run because they {why}: {', '.join(texts)}{more}."]
 
 
-def _impossible(climb: Climb) -> list[str]:
-    return [f"Not possible for this case: {name}: {why}" for name, why in climb.impossible.items()]
+def _impossible(runner: StudyRunner) -> list[str]:
+    return [f"Not possible for this case: {name}: {why}" for name, why in runner.impossible.items()]
 
 
-def _failed(climb: Climb) -> list[str]:
+def _failed(runner: StudyRunner) -> list[str]:
     """Say how runs that failed are tried again, which no call does by itself."""
-    work = climb.stores[0].home / "work"
-    return [f"Runs that failed are not tried again, unless you remove {work}."] if climb.failed else []
+    work = runner.stores[0].home / "work"
+    return [f"Failed runs are not repeated unless you remove {work}."] if runner.failed else []
 
 
 def unproved(accuracy: Accuracy) -> list[str]:
@@ -241,29 +253,29 @@ def unproved(accuracy: Accuracy) -> list[str]:
     if chosen is None or tables.prediction(accuracy) is not None:
         return []
     why = chosen.found.failed if chosen.found is not None else "it did not fit into what was left of the budget"
-    foreseen = f"its error of {percent(chosen.error)} and {chosen.core_seconds:.2f} core-seconds"
-    return [f"The recommendation was not run ({why}): {foreseen} are foreseen, not found."]
+    predicted = f"its error of {percent(chosen.error)} and {chosen.core_seconds:.2f} core-seconds"
+    return [f"The recommendation was not run ({why}): {predicted} are predicted, not measured."]
 
 
-def _unhealthy(accuracy: Accuracy, climb: Climb) -> list[str]:
+def _unhealthy(accuracy: Accuracy, runner: StudyRunner) -> list[str]:
     """Say which checks of the recommended run do not hold, for which `run` would call it a failure."""
     chosen = accuracy.recommended
     if chosen is None or chosen.found is None or chosen.found.failed:
         return []
-    point = climb.points[chosen.rung.name]
-    missed = failed_checks(climb.stores[0], point, climb.ladder.until)
-    return [f"Checks of the recommended run that do not hold: {'; '.join(missed)}."] if missed else []
+    point = runner.points[chosen.run.name]
+    missed = failed_checks(runner.stores[0], point, runner.study.until)
+    return [f"Failed checks of the recommended run: {'; '.join(missed)}."] if missed else []
 
 
-def _own_size(wish: Wish, accuracy: Accuracy) -> list[str]:
+def _own_size(request: AccuracyRequest, accuracy: Accuracy) -> list[str]:
     """Say what the case costs at its own size, as it is and with the recommended settings."""
-    own = {key: value for key, value in wish.settings.items() if key != "scale"}
+    own = {key: value for key, value in request.settings.items() if key != "scale"}
     known, chosen = calibration(one.stages for one in accuracy.measurements), accuracy.recommended
-    told = [f"{duration(total(known, _case(wish.case, own)))} as it is"]
-    if chosen is not None and own != wish.settings:
-        told.append(f"{duration(total(known, _case(wish.case, own | dict(chosen.rung.settings))))} as recommended")
-    how = f"times measured over foreseen of the nearest of {known.points} points" if known.points else "not measured"
-    return [f"Wall time of the case at its own size: about {', '.join(told)} (forecast, {how})."]
+    told = [f"{duration(total(known, _case(request.case, own)))} as it is"]
+    if chosen is not None and own != request.settings:
+        told.append(f"{duration(total(known, _case(request.case, own | dict(chosen.run.settings))))} as recommended")
+    how = f"corrected by the measured time of the nearest of {known.points} runs" if known.points else "not measured"
+    return [f"Wall time of the case at full size: about {', '.join(told)} (forecast, {how})."]
 
 
 def _case(path: Path, settings: Mapping[str, str]) -> Case:
@@ -278,13 +290,13 @@ def total(known, case: Case) -> float:
 def _show_choice(accuracy: Accuracy, console: Console) -> None:
     chosen = accuracy.recommended
     if chosen is None:
-        console.print(styled("\n[bold]Nothing to recommend[/]: no run has a known error within the budget."))
+        console.print(styled("\n[bold]Nothing to recommend[/]: no run within the budget has a known error."))
         return
-    advice = styled("\n[bold]Recommended: {}[/], {}. In the case file:\n", chosen.rung.name, chosen.why)
+    advice = styled("\n[bold]Recommended: {}[/], {}. In the case file:\n", chosen.run.name, chosen.why)
     console.print(advice, soft_wrap=True)
-    for line in tables.as_lines(chosen.rung.settings):
+    for line in tables.as_lines(chosen.run.settings):
         console.print(f"    {line}")
-    console.print(f"\nor {tables.as_options(chosen.rung.settings)}", soft_wrap=True)
+    console.print(f"\nor {tables.as_options(chosen.run.settings)}", soft_wrap=True)
     told = tables.prediction(accuracy)
     if told is not None:
         console.print(table(told, ""))

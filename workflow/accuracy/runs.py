@@ -1,4 +1,4 @@
-"""Climbing a ladder: its points are computed where they are missing, timed, compared; cheap ones several times."""
+"""The runs of a convergence study: computed where they are missing, timed, compared; cheap ones several times."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -8,7 +8,7 @@ from time import perf_counter
 from reflowshock.workflow.convergence.calibration import calibration
 from reflowshock.workflow.convergence.errors import Error, errors_of
 from reflowshock.workflow.convergence.measured import Measurement, StageCost
-from reflowshock.workflow.convergence.series import Ladder, Quantity, Rung
+from reflowshock.workflow.convergence.series import ConvergenceStudy, Quantity, StudyRun
 from reflowshock.workflow.kinds import stage_seconds
 from reflowshock.workflow.pipeline.points import read_possible_points
 from reflowshock.workflow.store.point import Point
@@ -16,33 +16,33 @@ from reflowshock.workflow.store.store import Store
 
 AGAIN = 2  # times that a cheap point is run once more: load of the machine and first compilation are then not counted
 CHEAP = 8.0  # up to these core-seconds [s]
-LEAST = 4  # coarsest rungs of a knob that are run, however long they take
+LEAST = 4  # coarsest runs of a parameter that are run, however long they take
 SECONDS_TO_SCHEDULE = 4.0  # of a call that computes points, until the first stage runs
 
 Compute = Callable[[Store, Sequence[Point]], Mapping[str, str]]
 
 
 @dataclass(slots=True)
-class Climb:
-    """Points of a ladder, and what is known of them.
+class StudyRunner:
+    """Computes the points of a convergence study, and says what is known of them.
 
     Attributes:
-        ladder: its rungs.
+        study: its runs.
         case: the case file.
-        settings: dotted key -> value that hold for all rungs.
+        settings: dotted key -> value that hold for all runs.
         folder: of the store.
-        compute: computes points in a store up to the ladder's last stage; returns the key of each that failed and why.
+        compute: computes points in a store up to the study's last stage; returns the key of each that failed and why.
         budget: wall time that may be spent [s]; infinite without a limit.
-        longest: that a rung of the ladder may be foreseen to take [s], but for the coarsest ones of the knobs.
+        longest: that a run of the study may be predicted to take [s], but for the coarsest ones of the parameters.
         oversubscribe: whether MPI may have more ranks than cores.
         force: whether values that are not plausible are welcome.
         failed: key of a point -> why it failed, also of earlier calls.
-        points: name of rung -> its point.
-        impossible: name of rung -> what is wrong with its settings.
-        left_out: name of rung -> wall time [s] that was foreseen and did not fit.
+        points: name of run -> its point.
+        impossible: name of run -> what is wrong with its settings.
+        left_out: name of run -> wall time [s] that was predicted and did not fit.
     """
 
-    ladder: Ladder
+    study: ConvergenceStudy
     case: Path
     settings: Mapping[str, str]
     folder: Path
@@ -68,118 +68,118 @@ class Climb:
         """The store, and those of runs that are only for their times."""
         return [Store(self.folder), *(Store(self.folder / f"again-{number}") for number in range(1, AGAIN + 1))]
 
-    def climb(self, rungs: Sequence[Rung]) -> None:
-        """Compute the points of rungs that are missing, the cheapest first; then cheap ones again.
+    def compute_runs(self, runs: Sequence[StudyRun]) -> None:
+        """Compute the points of runs that are missing, the cheapest first; then cheap ones again.
 
-        Those of the first knob go before all others, which may have to be compared with them.
+        Those of the first parameter go before all others, which may have to be compared with them.
         """
-        self._read(rungs)
-        main, known = self.ladder.knobs[0].name, [rung for rung in rungs if rung.name in self.points]
-        ready = sorted(known, key=lambda rung: (rung.knob != main, self.foreseen(rung)))
-        for batch in [ready] if self.budget == float("inf") else [[rung] for rung in ready]:
+        self._read(runs)
+        main, known = self.study.parameters[0].name, [run for run in runs if run.name in self.points]
+        ready = sorted(known, key=lambda run: (run.parameter != main, self.predicted(run)))
+        for batch in [ready] if self.budget == float("inf") else [[run] for run in ready]:
             self._run(self.stores[0], batch)
         for store in self.stores[1:]:
-            again = [rung for rung in ready if self._is_done(rung) and self._wants_repetition(rung)]
+            again = [run for run in ready if self._is_done(run) and self._wants_repetition(run)]
             self._run(store, again)
 
-    def measured(self, rungs: Sequence[Rung]) -> dict[str, Measurement]:
-        """Return what is known of rungs: their costs, their errors against each other; failures."""
-        done = [rung for rung in rungs if rung.name in self.points and self._is_done(rung)]
-        answers = {rung.name: self._answers(rung) for rung in done}
-        main = self.ladder.knobs[0]
-        errors = errors_of(answers, rungs, main.rungs, main.order)
-        found = {rung.name: self._measurement(rung, errors.get(rung.name, {})) for rung in rungs}
+    def measured(self, runs: Sequence[StudyRun]) -> dict[str, Measurement]:
+        """Return what is known of runs: their costs, their errors against each other; failures."""
+        done = [run for run in runs if run.name in self.points and self._is_done(run)]
+        answers = {run.name: self._answers(run) for run in done}
+        main = self.study.parameters[0]
+        errors = errors_of(answers, runs, main.runs, main.order)
+        found = {run.name: self._measurement(run, errors.get(run.name, {})) for run in runs}
         return {name: one for name, one in found.items() if one.stages or one.failed}
 
-    def foreseen(self, rung: Rung, store: Store | None = None) -> float:
-        """Wall time of the stages of a rung that a store does not have [s]: the forecast, corrected by measurements."""
-        point, store = self.points[rung.name], store or self.stores[0]
+    def predicted(self, run: StudyRun, store: Store | None = None) -> float:
+        """Wall time of the stages of a run that a store does not have [s]: the forecast, corrected by measurements."""
+        point, store = self.points[run.name], store or self.stores[0]
         known, seconds = calibration(self._costs(self.points[one]) for one in self._known()), self._forecast(point)
-        stages = [stage.name for stage in point.case.pipeline.upstream(self.ladder.until)]
+        stages = [stage.name for stage in point.case.pipeline.upstream(self.study.until)]
         return sum(
             known.seconds(name, seconds[name]) for name in stages if name in seconds and not store.has(point, name)
         )
 
     def _known(self) -> list[str]:
-        return [name for name, point in self.points.items() if self.stores[0].is_complete(point, self.ladder.until)]
+        return [name for name, point in self.points.items() if self.stores[0].is_complete(point, self.study.until)]
 
     def _forecast(self, point: Point) -> dict[str, float]:
         if point.key not in self._forecasts:
             self._forecasts[point.key] = stage_seconds(point.case)
         return self._forecasts[point.key]
 
-    def _read(self, rungs: Sequence[Rung]) -> None:
-        """Read the cases of rungs; one that cannot be is noted, and one that failed before, as it would again."""
-        for rung in rungs:
+    def _read(self, runs: Sequence[StudyRun]) -> None:
+        """Read the cases of runs; one that cannot be is noted, and one that failed before, as it would again."""
+        for run in runs:
             points, wrong = read_possible_points(
-                self.case, [dict(self.settings) | dict(rung.settings)], self.oversubscribe, self.force
+                self.case, [dict(self.settings) | dict(run.settings)], self.oversubscribe, self.force
             )
             if wrong:
-                self.impossible[rung.name] = "; ".join(str(problem) for problem in wrong[0].problems)
+                self.impossible[run.name] = "; ".join(str(problem) for problem in wrong[0].problems)
             else:
-                self.points[rung.name] = points[0]
-                self.failed |= _failed_before(self.stores[0], points[0], self.ladder.until)
+                self.points[run.name] = points[0]
+                self.failed |= _failed_before(self.stores[0], points[0], self.study.until)
 
-    def _run(self, store: Store, rungs: Sequence[Rung]) -> None:
+    def _run(self, store: Store, runs: Sequence[StudyRun]) -> None:
         """Compute what is missing and fits into the budget."""
-        until, wanted = self.ladder.until, []
-        for rung in rungs:
-            point = self.points[rung.name]
+        until, wanted = self.study.until, []
+        for run in runs:
+            point = self.points[run.name]
             if store.is_complete(point, until) or point.key in self.failed:
                 continue
-            expected = self.foreseen(rung, store) + SECONDS_TO_SCHEDULE
-            if expected <= self.left and (expected <= self.longest or self._is_wanted(rung)):
+            expected = self.predicted(run, store) + SECONDS_TO_SCHEDULE
+            if expected <= self.left and (expected <= self.longest or self._is_wanted(run)):
                 wanted.append(point)
             elif store == self.stores[0]:
-                self.left_out[rung.name] = expected
+                self.left_out[run.name] = expected
         if wanted:
             self.failed |= self.compute(store, wanted)
 
-    def _is_wanted(self, rung: Rung) -> bool:
-        """Whether a rung is run however long it takes: one of the coarsest of a knob, or chosen off the ladder."""
-        coarsest = {one.name for knob in self.ladder.knobs for one in knob.rungs[:LEAST]}
-        return rung.name in coarsest or all(rung.name != one.name for one in self.ladder.rungs)
+    def _is_wanted(self, run: StudyRun) -> bool:
+        """Whether a run is run however long it takes: one of the coarsest of a parameter, or chosen off the study."""
+        coarsest = {one.name for parameter in self.study.parameters for one in parameter.runs[:LEAST]}
+        return run.name in coarsest or all(run.name != one.name for one in self.study.runs)
 
-    def _is_done(self, rung: Rung) -> bool:
-        return self.stores[0].is_complete(self.points[rung.name], self.ladder.until)
+    def _is_done(self, run: StudyRun) -> bool:
+        return self.stores[0].is_complete(self.points[run.name], self.study.until)
 
-    def _wants_repetition(self, rung: Rung) -> bool:
+    def _wants_repetition(self, run: StudyRun) -> bool:
         """Whether a point is cheap, by measurement or forecast, or its time is not that of the whole run."""
-        point, store = self.points[rung.name], self.stores[0]
-        stages = [stage.name for stage in point.case.pipeline.upstream(self.ladder.until)]
+        point, store = self.points[run.name], self.stores[0]
+        stages = [stage.name for stage in point.case.pipeline.upstream(self.study.until)]
         records = [record for stage in stages if (record := store.record(point, stage)) is not None]
         taken = sum(record["core_seconds"] for record in records)
-        foreseen = sum(seconds for stage, seconds in self._forecast(point).items() if stage in stages)
-        return min(taken, foreseen or taken) < CHEAP or any(record["continued"] for record in records)
+        predicted = sum(seconds for stage, seconds in self._forecast(point).items() if stage in stages)
+        return min(taken, predicted or taken) < CHEAP or any(record["continued"] for record in records)
 
-    def _answers(self, rung: Rung) -> Mapping[str, Quantity]:
-        point = self.points[rung.name]
-        return self.ladder.measure(point.case, self.stores[0].run_folder(point))
+    def _answers(self, run: StudyRun) -> Mapping[str, Quantity]:
+        point = self.points[run.name]
+        return self.study.measure(point.case, self.stores[0].run_folder(point))
 
-    def _measurement(self, rung: Rung, errors: Mapping[str, Error]) -> Measurement:
-        """Return what is known of a rung; neither costs nor a failure where it was not run."""
-        point = self.points.get(rung.name)
-        costs = self._costs(point) if point is not None and self._is_done(rung) else {}
-        why = self.impossible.get(rung.name, "") if point is None else self.failed.get(point.key, "")
+    def _measurement(self, run: StudyRun, errors: Mapping[str, Error]) -> Measurement:
+        """Return what is known of a run; neither costs nor a failure where it was not run."""
+        point = self.points.get(run.name)
+        costs = self._costs(point) if point is not None and self._is_done(run) else {}
+        why = self.impossible.get(run.name, "") if point is None else self.failed.get(point.key, "")
         key = "" if point is None else point.key
         failed = "" if costs else why
         return Measurement(
-            rung.name, rung.knob, rung.value, rung.settings, key, costs, errors, failed, against=rung.against
+            run.name, run.parameter, run.value, run.settings, key, costs, errors, failed, against=run.against
         )
 
     def _costs(self, point: Point) -> dict[str, StageCost]:
         """Return the smallest times of the stages that count, of all runs that were not broken off."""
-        foreseen, costs = self._forecast(point), {}
-        for stage in self.ladder.timed:
+        predicted, costs = self._forecast(point), {}
+        for stage in self.study.timed:
             records = [record for store in self.stores if (record := store.record(point, stage)) is not None]
             whole = [record for record in records if not record["continued"]] or records
             times = {name: min(record[name] for record in whole) for name in ("seconds", "core_seconds")}
-            costs[stage] = StageCost(**times, forecast=foreseen.get(stage))
+            costs[stage] = StageCost(**times, forecast=predicted.get(stage))
         return costs
 
 
 def _failed_before(store: Store, point: Point, until: str) -> dict[str, str]:
     """Return key and message of a point of which a stage was tried and failed."""
     missing = [stage.name for stage in point.case.pipeline.upstream(until) if not store.has(point, stage.name)]
-    told = [f"stage {stage}: {message}" for stage in missing if (message := store.message(point, stage)) is not None]
-    return {point.key: told[0]} if told else {}
+    found = [f"stage {stage}: {said}" for stage in missing if (said := store.message(point, stage)) is not None]
+    return {point.key: found[0]} if found else {}

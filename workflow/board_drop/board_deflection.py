@@ -27,7 +27,7 @@ class Deflection(NamedTuple):
 def expected_deflection(case: "BoardDropCase") -> Deflection:
     """Return how far the board deflects at small rotations; PulseError where a table of its pulse cannot be read.
 
-    The board is a beam between its holes that swings in its first mode, q'' + omega^2 q = 4/pi a(t): w = q sin(pi x/L).
+    The board is a beam between its holes in its first mode, q'' + omega^2 q = 4/pi a(t): w = q sin(pi x/L).
     Width, package and later modes are left out.
     """
     from reflowshock.fem.loads.shock_pulse import shock_pulse
@@ -89,7 +89,7 @@ def kinematics_effect(case: "BoardDropCase") -> dict:
     if kinematics == "auto":
         why = f"shock.numerics.kinematics = auto: {reason}"
     elif not finite:
-        why += "" if wanted == "small" else "; auto would take it"
+        why += "" if wanted == "small" else "; auto would choose finite"
     why = f"the board is expected to deflect by about {ratio:.2g} times its thickness; {why}"
     return {"finite_rotation": effect(finite, why, stiffened(ratio, STIFFENING_OF_BOARD))}
 

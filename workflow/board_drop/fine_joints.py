@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from reflowshock.fem.names import nearest
-from reflowshock.workflow.case.problems import Problem
+from reflowshock.names import nearest
+from reflowshock.problem import Problem
 
 if TYPE_CHECKING:
     from reflowshock.fem.problem.shock import JointCoupling
@@ -19,7 +19,7 @@ FINE, CRITICAL = "shock.coupling.fine_joints", "shock.coupling.critical_joints"
 
 @dataclass(frozen=True, slots=True)
 class FineJoints:
-    """Names of the fine joints, or "all", and how they were found."""
+    """Names of the fine joints, or "all", and how they were chosen."""
 
     names: tuple[str, ...] | str
     why: str
@@ -87,12 +87,12 @@ def problems(case: "BoardDropCase") -> Iterator[Problem]:
     coupling, sites = case.shock.coupling, pad_table(case.package, case.board, case.warpage)
     chosen = coupling.fine_joints
     if chosen == "critical" and coupling.critical_joints > len(sites):
-        message = "is more than the model has joints"
+        message = "is more than the number of joints in the model"
         yield Problem(CRITICAL, message, coupling.critical_joints, f"1 to {len(sites)}")
     if isinstance(chosen, str):
         return
     if not chosen:
-        yield Problem(FINE, "leaves nothing to the meso model", [], "all, critical, or at least one name")
+        yield Problem(FINE, "leaves the meso model empty", [], "all, critical, or at least one name")
     for name in chosen:
         yield from _unknown(name, sites, case)
 
@@ -103,7 +103,7 @@ def _unknown(name: str, sites: "list[PadSite]", case: "BoardDropCase") -> Iterat
     if name in names:
         return
     image = "" if name.upper() in names else _image(name.upper(), sites, case)
-    message = "lies in another quarter than the model" if image else "no such joint"
+    message = "lies in a quarter that is not modelled" if image else "is not a joint of the model"
     yield Problem(FINE, message, name, f"{names[0]} to {names[-1]}", image or nearest(name, names, alike=0.5))
 
 

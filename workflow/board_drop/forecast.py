@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.problem.thermal import Thermal
+from reflowshock.problem import Problem
 from reflowshock.workflow.board_drop import shock_cooling
 from reflowshock.workflow.board_drop.board_deflection import decided
 from reflowshock.workflow.board_drop.shock_effects import shock_effects
@@ -18,7 +19,6 @@ from reflowshock.workflow.board_drop.shock_forecast import (
     two_scale_parts,
 )
 from reflowshock.workflow.case.forecast import BYTES_OF_ELEMENT, BYTES_OF_PARTICLE, Size, too_many_steps
-from reflowshock.workflow.case.problems import Problem
 from reflowshock.workflow.package.case import BoardDropCase, PackageCase
 from reflowshock.workflow.process.environment import available_cores
 from reflowshock.workflow.reflow.forecast import forecast_heated
@@ -26,7 +26,7 @@ from reflowshock.workflow.reflow.joints import distinct_joints, joint_geometries
 
 
 @dataclass(frozen=True, slots=True)
-class Forecast:
+class PackageForecast:
     """What a run will be like.
 
     Attributes:
@@ -50,7 +50,7 @@ class Forecast:
     load_steps: int = 0
 
 
-def forecast(case: PackageCase) -> Forecast:
+def forecast(case: PackageCase) -> PackageForecast:
     """Predict sizes, time steps and cost of a run."""
     from reflowshock.meshing.board.pads import pad_table
     from reflowshock.particles.parameters.effects import decide_effects
@@ -62,7 +62,7 @@ def forecast(case: PackageCase) -> Forecast:
     distinct = [group.geometry for group in distinct_joints(flowing)]
     counts = [particle_count(case.solder, geometry) for geometry in distinct]
     workers = max(1, min(available_cores(), len(distinct)))
-    of_reflow = Forecast(
+    of_reflow = PackageForecast(
         effects=decide_effects(max(geometries.values(), key=lambda geometry: geometry.gap), case.solder),
         joints=len(geometries),
         distinct=len(distinct),
@@ -75,8 +75,8 @@ def forecast(case: PackageCase) -> Forecast:
     return _with_shock(of_reflow, case) if isinstance(case, BoardDropCase) else of_reflow
 
 
-def _heated(of_reflow: Forecast, case: PackageCase, thermal: Thermal) -> Forecast:
-    """Foresee a reflow in load steps: how many joints the structure makes distinct is not known, all may be."""
+def _heated(of_reflow: PackageForecast, case: PackageCase, thermal: Thermal) -> PackageForecast:
+    """Predict a reflow in load steps: how many joints the structure makes distinct is not known, all may be."""
     heated = forecast_heated(case, thermal)
     share = of_reflow.joints / of_reflow.distinct
     return replace(
@@ -88,8 +88,8 @@ def _heated(of_reflow: Forecast, case: PackageCase, thermal: Thermal) -> Forecas
     )
 
 
-def _with_shock(of_reflow: Forecast, case: BoardDropCase) -> Forecast:
-    told, case = shock_effects(case), decided(case)
+def _with_shock(of_reflow: PackageForecast, case: BoardDropCase) -> PackageForecast:
+    of_shock, case = shock_effects(case), decided(case)
     parts = forecast_parts(case)
     shock = forecast_shock(case, parts)
     numerics = case.shock.numerics
@@ -100,7 +100,7 @@ def _with_shock(of_reflow: Forecast, case: BoardDropCase) -> Forecast:
     identical = again if case.shock.identical_joints else 0.0
     return replace(
         of_reflow,
-        effects=of_reflow.effects | told | cooling,
+        effects=of_reflow.effects | of_shock | cooling,
         parts=two_scale_parts(case) if "two_scale" in numerics.modes else parts,
         shock=shock,
         seconds=of_reflow.seconds | {"shock": identical + sum(modes[mode] for mode in numerics.modes) + seconds},

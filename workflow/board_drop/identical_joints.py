@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from reflowshock.workflow.case.problems import Problem
+from reflowshock.problem import Problem
 from reflowshock.workflow.case.run import Findings, Run, metric
 from reflowshock.workflow.process.products import read_json
 
@@ -30,7 +30,7 @@ def identical_joints_effect(case: "BoardDropCase") -> dict:
     on = case.shock.identical_joints
     why = f"{KEY} = {str(on).lower()}"
     if on:
-        why += f": truncated spheres, {1e6 * identical_sphere(case).height:.4g} um high, under a flat package"
+        why += f": truncated spheres, {1e6 * identical_sphere(case).height:.4g} µm high, under a flat package"
     return {"identical_joints": {"on": on, "why": why}}
 
 
@@ -41,7 +41,7 @@ def problems(case: "BoardDropCase") -> Iterator[Problem]:
         return
     width = 2.0 * identical_sphere(case).radius
     if width >= package.pitch:
-        message = f"needs truncated spheres apart from each other: they would be {1e3 * width:.4g} mm wide"
+        message = f"is not possible: the truncated spheres would touch, they are {1e3 * width:.4g} mm wide"
         yield Problem(KEY, message, True, f"false, or a package.pitch > {1e3 * width:.4g} mm")
 
 

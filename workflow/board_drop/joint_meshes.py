@@ -1,11 +1,10 @@
-"""Meshes of all joints of an array: of the real ones, and of identical ones to compare them with."""
+"""Surfaces and meshes of all joints of an array: real ones, bridged ones, and identical ones to compare with."""
 
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from reflowshock.workflow.board_drop.bridged_joints import mesh_bridges
 from reflowshock.workflow.board_drop.fine_joints import needs_coarse_joints
 from reflowshock.workflow.board_drop.identical_joints import PREFIX, identical_sphere
 from reflowshock.workflow.case.run import Run
@@ -17,6 +16,78 @@ if TYPE_CHECKING:
     from reflowshock.meshing.board.pads import PadSite
     from reflowshock.meshing.joint.joint_mesh import JointMesh
     from reflowshock.meshing.surface.closed_surface import ClosedSurface
+
+import itertools
+import logging
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from reflowshock.meshing.board.package_side import PackageSide
+    from reflowshock.meshing.board.pads import PadSite
+    from reflowshock.meshing.joint.joint_mesh import JointMesh
+    from reflowshock.meshing.surface.closed_surface import ClosedSurface
+
+from typing import TYPE_CHECKING
+
+from reflowshock.workflow.process.products import read_json
+from reflowshock.workflow.reflow.joints import refuse_joints_without_mesh
+
+if TYPE_CHECKING:
+    from reflowshock.particles.steps.shape import JointShape
+
+
+def write_surfaces(run: Run[PackageCase], folder: Path) -> dict[str, dict]:
+    """Write the surface of each joint, in its own orientation, and of bridged ones in common; return their measures.
+
+    Raises:
+        ReflowError: joints are open: they have no surface between their pads.
+    """
+    from reflowshock.meshing.board.pads import read_pads
+    from reflowshock.meshing.surface.closed_surface import measure, write_surface
+    from reflowshock.meshing.surface.user_surface import file_volume, load_surface
+    from reflowshock.particles.scenes.orientation import Orientation, oriented
+    from reflowshock.particles.scenes.products import read_shapes
+
+    package, joints = run.case.package, read_json(run.folder / "reflow/joints.json")
+    sites = {site.name: site for site in read_pads(run.folder / "reflow/pads.json")}
+    flowed = {name: joint for name, joint in joints.items() if name not in package.surfaces}
+    refuse_joints_without_mesh(flowed, ("open",))
+    shapes = read_shapes(run.folder / "reflow/shapes.h5")
+    bodies = {name: shape for name, shape in shapes.items() if BETWEEN in name}
+    for name, joint in flowed.items():
+        if joint["verdict"] != "bridged":
+            bodies[name] = oriented(shapes[joint["shape"]], Orientation(joint["turn"], joint["mirror"]))
+    measures: dict[str, dict] = {}
+    for name, shape in bodies.items():
+        closed = _closed(shape)
+        write_surface(folder / f"{name}.vtu", closed)
+        own = measure(closed)
+        measures[name] = {**own, "volume_error": own["volume"] / shape.metrics["volume"][0] - 1.0}
+    for name, path in package.surfaces.items():
+        closed = load_surface(Path(path), package.surface_unit, sites[name])
+        write_surface(folder / f"{name}.vtu", closed)
+        own = measure(closed)
+        change = own["volume"] / file_volume(Path(path), package.surface_unit) - 1.0
+        measures[name] = {**own, "given": path, "volume_change": change}
+    return measures
+
+
+def _closed(shape: "JointShape"):
+    """Close the free surface of a shape on all its pads."""
+    from reflowshock.meshing.surface.closed_surface import close_rings
+
+    return close_rings(shape.surface_points, shape.triangles, shape.rings)
+
+
+logger = logging.getLogger(__name__)
+
+BETWEEN = "+"  # the names of two joints that are one body
+IMAGE = "_image"  # ends the name of a joint behind a plane of symmetry
 
 
 def mesh_real_joints(run: Run[PackageCase], folder: Path) -> dict[str, dict]:
@@ -99,3 +170,49 @@ def _write(meshes: "Sequence[JointMesh]", kind: str, case: PackageCase, folder: 
     quality = {mesh.name: with_critical_step(joint_quality(mesh), case.materials) for mesh in meshes}
     write_json(folder / f"{kind}quality.json", quality)
     return quality
+
+
+@dataclass(frozen=True, slots=True)
+class MirroredSide:
+    """The underside of a quarter of a package, and its images behind x = 0 and y = 0."""
+
+    quarter: "PackageSide"
+
+    def height(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """Return the height (k,) over the board's top face at points (k,), (k,) [m]."""
+        return self.quarter.height(np.abs(x), np.abs(y))
+
+
+def mesh_bridges(
+    surfaces: "Mapping[str, ClosedSurface]", sites: "Mapping[str, PadSite]", case: PackageCase, side: "PackageSide"
+) -> "list[JointMesh]":
+    """Mesh the joints that are one body, for other codes: no shock is run with them.
+
+    Args:
+        surfaces: by name; those of bridged joints have both names.
+        sites: of all joints, by name.
+        case: package, symmetry.
+        side: the package's underside.
+    """
+    from reflowshock.meshing.joint.solder_mesh import JointMeshError, mesh_bridge
+
+    quarter = case.board.symmetry == "quarter"
+    meshes = []
+    for name in (name for name in surfaces if BETWEEN in name):
+        first, second = (sites[own] for own in name.split(BETWEEN))
+        pair = (first, _nearest_image(first, second)) if quarter else (first, second)
+        try:
+            meshes.append(mesh_bridge(surfaces[name], pair, case.package, MirroredSide(side) if quarter else side))
+        except JointMeshError as error:  # the verdict stands without it
+            logger.warning("%s are bridged, but their common body was not meshed: %s", name, error)
+    return meshes
+
+
+def _nearest_image(first: "PadSite", second: "PadSite") -> "PadSite":
+    """Return the second site or that of its images which is nearest to the first one."""
+    images = [second]
+    for along_x, along_y in itertools.product((1.0, -1.0), repeat=2):
+        if (along_x, along_y) != (1.0, 1.0):
+            images.append(replace(second, name=second.name + IMAGE, x=along_x * second.x, y=along_y * second.y))
+    apart = [site for site in images if math.dist((site.x, site.y), (first.x, first.y)) > 0.0]
+    return min(apart, key=lambda site: math.dist((site.x, site.y), (first.x, first.y)))

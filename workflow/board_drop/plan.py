@@ -5,16 +5,15 @@ from collections.abc import Iterator
 from rich.console import RenderableType
 from rich.table import Table
 
-from reflowshock.workflow.board_drop.forecast import Forecast
+from reflowshock.workflow.board_drop.forecast import PackageForecast
 from reflowshock.workflow.board_drop.shock_forecast import ShockForecast
 from reflowshock.workflow.case.text import duration, short
 from reflowshock.workflow.package.case import BoardDropCase, PackageCase
 from reflowshock.workflow.process.environment import available_cores
-from reflowshock.workflow.process.plan_table import REFLOW_SPEED, new_table
-from reflowshock.workflow.process.terminal import styled
+from reflowshock.workflow.process.terminal import REFLOW_SPEED, new_table, styled
 
 
-def package_tables(case: PackageCase, outlook: Forecast) -> Iterator[RenderableType]:
+def package_tables(case: PackageCase, outlook: PackageForecast) -> Iterator[RenderableType]:
     """Yield sizes and, where the board is dropped, the shock; then what the costs assume."""
     yield _sizes(case, outlook) if outlook.parts else f"\n{_joints(case, outlook)}"
     if not isinstance(case, BoardDropCase) or outlook.shock is None:
@@ -26,11 +25,11 @@ def package_tables(case: PackageCase, outlook: Forecast) -> Iterator[RenderableT
     yield styled("[dim]and the reflow speed in particles/parameters/estimate.py, both as benchmarks/ measured them.")
 
 
-def _sizes(case: PackageCase, outlook: Forecast) -> Table:
+def _sizes(case: PackageCase, outlook: PackageForecast) -> Table:
     table = new_table("\nSizes and critical time steps", "part", "hexahedra", "critical step", "time step")
     step = {name: level for level in (outlook.shock.levels if outlook.shock else ()) for name in level.parts}
     for name, part in outlook.parts.items():
-        remark = f"{short(step[name].step)}, {step[name].count} in a window" if name in step else ""
+        remark = f"{short(step[name].step)}, {step[name].count} per window" if name in step else ""
         if part.mass_scaled:
             remark += "; mass scaled to the smallest step of the others"
         table.add_row(name, f"{part.elements}", short(part.critical_step), remark)
@@ -41,7 +40,7 @@ def _sizes(case: PackageCase, outlook: Forecast) -> Table:
     return table
 
 
-def _joints(case: PackageCase, outlook: Forecast) -> str:
+def _joints(case: PackageCase, outlook: PackageForecast) -> str:
     smallest, largest = outlook.particles
     particles = f"{smallest}" if smallest == largest else f"{smallest} to {largest}"
     distinct = f"up to {outlook.distinct}" if outlook.load_steps else f"{outlook.distinct}"
@@ -57,14 +56,16 @@ def _shock(case: BoardDropCase, shock: ShockForecast) -> Table:
     table.add_row("scheme", scheme.replace("_", " "), why)
     table.add_row("fine joints", *_fine_joints(case))
     table.add_row("window", short(shock.window), f"step of the macro model, {shock.windows} windows")
-    table.add_row("steps in a window", *_levels(shock))
+    table.add_row("steps per window", *_levels(shock))
     table.add_row("step ratio m", f"{shock.substeps}", f"step of the DNS {short(shock.window / shock.substeps)}")
     if shock.search:
-        table.add_row("coarse run", f"about {duration(shock.search)}", "all joints coarse: it finds the critical ones")
+        table.add_row("coarse run", f"about {duration(shock.search)}", "all joints coarse, to find the critical ones")
     table.add_row("two-scale", f"about {duration(shock.two_scale)}", _placement(case) + _absent("two_scale", case))
     if case.shock.identical_joints:
         again = shock.two_scale if "two_scale" in case.shock.numerics.modes else shock.dns
-        table.add_row("identical joints", f"about {duration(again)}", "the first mode again: what shapes change")
+        table.add_row(
+            "identical joints", f"about {duration(again)}", "the first mode again, to see what the real shapes change"
+        )
     part = f"; the first {short(shock.dns_share * case.shock.duration)}" if shock.dns_share < 1.0 else ""
     dns = f"all {every} ranks on one model{part}" + _absent("dns", case)
     table.add_row("DNS", f"about {duration(shock.dns)}", dns)
@@ -83,7 +84,7 @@ def _levels(shock: ShockForecast) -> tuple[str, str]:
     share = 1.0 - elements[0] / sum(elements)
     return (
         counts,
-        f"of {' + '.join(map(str, elements))} hexahedra; meso share f = {share:.2f}, elements beside them left out",
+        f"of {' + '.join(map(str, elements))} hexahedra; meso share f = {share:.2f}, buffer elements not counted",
     )
 
 
@@ -91,7 +92,7 @@ def _fine_joints(case: BoardDropCase) -> tuple[str, str]:
     """Say how many joints are fine, and which."""
     coupling = case.shock.coupling
     if coupling.fine_joints == "critical":
-        return f"{coupling.critical_joints}", "the most stressed ones of a run with coarse joints before"
+        return f"{coupling.critical_joints}", "the most stressed joints of a preceding run with coarse joints"
     if coupling.fine_joints == "all":
         return "all", "one-way: coarse in the macro model" if coupling.direction == "one_way" else ""
     return f"{len(set(coupling.fine_joints))}", ", ".join(coupling.fine_joints)
@@ -108,7 +109,8 @@ def _placement(case: BoardDropCase) -> str:
     own = f"{macro} ranks on the macro model, the others on the meso model, at the same time"
     if ranks.placement == "disjoint":
         return f"{own}, {cores}"
-    return f"all {ranks.total} ranks on both models in turn, or each on one, as speeds measured by the run say, {cores}"
+    shared = f"all {ranks.total} ranks on both models in turn, or each on one"
+    return f"{shared}, decided by speeds measured during the run, {cores}"
 
 
 def _absent(mode: str, case: BoardDropCase) -> str:

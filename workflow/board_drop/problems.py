@@ -1,13 +1,13 @@
 """What does not fit together in the case of a package: its geometry, its solder, its shock."""
 
 from collections.abc import Iterable, Iterator
-from typing import Any
+from dataclasses import replace
 
+from reflowshock.problem import Problem
 from reflowshock.workflow.board_drop import fine_joints, identical_joints, shock_cooling
 from reflowshock.workflow.board_drop.board_deflection import decided
 from reflowshock.workflow.board_drop.forecast import step_problems
 from reflowshock.workflow.case import fields
-from reflowshock.workflow.case.problems import Problem, of_particles
 from reflowshock.workflow.case.pulse_files import unreadable_pulses
 from reflowshock.workflow.package import given_surfaces
 from reflowshock.workflow.package.case import BoardDropCase, PackageCase
@@ -44,7 +44,7 @@ def _of_geometry(case: PackageCase) -> list[Problem]:
 
 def _of_joints(case: PackageCase) -> list[Problem]:
     """Find temperatures, solder and given surfaces that do not go with the joints of a possible package."""
-    from reflowshock.fem.problem import thermal_checks
+    from reflowshock.fem.problem import thermal as thermal_checks
     from reflowshock.meshing.board.pads import pad_table
     from reflowshock.particles.parameters import checks as particles_checks
 
@@ -52,19 +52,16 @@ def _of_joints(case: PackageCase) -> list[Problem]:
     pads = pad_table(package, case.board, case.warpage)
     geometries = joint_geometries(pads)
     heated = thermal_checks.problems(thermal, case.materials.by_role, case.warpage.corner) if thermal else []
-    of_solder = of_particles(particles_checks.problems(case.solder, geometries, package.pitch))
+    of_solder = particles_checks.problems(case.solder, geometries, package.pitch)
     if thermal:
         of_solder += reflow_forecast.problems(case.solder, geometries, thermal, package.pitch)
     return _in_words(case, heated) + of_solder + list(given_surfaces.problems(package, pads, thermal is not None))
 
 
-def _in_words(case: PackageCase, found: Iterable[Any]) -> list[Problem]:
+def _in_words(case: PackageCase, found: Iterable[Problem]) -> list[Problem]:
     """Say what checks of meshing or fem found in the words of a case file, values in the user's units."""
     known = {key: field for key, _, field in fields.leaves(case)}
-    return [
-        Problem(problem.key, problem.message, fields.shown(problem.value, known.get(problem.key)), problem.allowed)
-        for problem in found
-    ]
+    return [replace(problem, value=fields.shown(problem.value, known.get(problem.key))) for problem in found]
 
 
 def _yielding(case: BoardDropCase) -> list[str]:
@@ -76,12 +73,12 @@ def _of_flow(case: BoardDropCase) -> Iterator[Problem]:
     """Find a limit of plastic work where nothing yields, and linear steps where something does."""
     failure, yielding = case.shock.failure, _yielding(case)
     if failure.plastic_work_density is not None and "solder" not in yielding:
-        message = "limits the plastic work of solder that does not yield"
+        message = "limits plastic work, but the solder does not yield"
         allowed = 'materials.solder of the library, such as "SAC405", or with a table plasticity'
         limit = fields.shown(failure.plastic_work_density, type(failure).model_fields["plastic_work_density"])
         yield Problem("shock.failure.plastic_work_density", message, limit, allowed)
     if case.shock.numerics.dns_solver == "implicit" and yielding:
-        message = f"is linear, {' and '.join(yielding)} yields"
+        message = f"is linear, but {' and '.join(yielding)} yields"
         yield Problem("shock.numerics.dns_solver", message, "implicit", "explicit, or elastic materials")
 
 
@@ -93,6 +90,6 @@ def _of_coupling(case: BoardDropCase) -> Iterator[Problem]:
     if not yielding and decided(case).shock.numerics.kinematics == "small":
         return
     why = f"{' and '.join(yielding)} yields" if yielding else "shock.numerics.kinematics is finite"
-    message = f"needs elastic materials at small strains, {why}"
+    message = f"needs elastic materials and small strains, but {why}"
     allowed = "held_velocity, impulse, gravouil_combescure, auto"
     yield Problem("shock.coupling.scheme", message, "local_steps", allowed)

@@ -8,8 +8,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from reflowshock.problem import Problem
 from reflowshock.workflow.board_drop.shock_forecast import PartForecast, role_of
-from reflowshock.workflow.case.problems import Problem
 from reflowshock.workflow.case.run import Findings, Run
 from reflowshock.workflow.case.text import duration
 from reflowshock.workflow.package.case import BoardDropCase
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 SCENE = ("meshes", "coarse_joints", "shock", "materials")  # of a request: what cooling depends on, too
 RESULT, IDENTITY = "result.json", "identity.txt"
-FIRST = {"residual_two_scale": 0, "residual": 1}  # folders of coolings: the first that is there has the figures told
+FIRST = {"residual_two_scale": 0, "residual": 1}  # folders of coolings; the first gives the reported figures
 
 
 def is_wanted(case: BoardDropCase) -> bool:
@@ -32,7 +32,7 @@ def is_wanted(case: BoardDropCase) -> bool:
 def problems(case: BoardDropCase) -> Iterator[Problem]:
     """Find shocks that cannot begin with the stress of cooling."""
     if is_wanted(case) and case.shock.coupling.direction == "one_way" and "two_scale" in case.shock.numerics.modes:
-        message = "does not go with thermal.effects.residual_stress = on: the model that drives has its joints twice"
+        message = "cannot be combined with thermal.effects.residual_stress = on: the macro model has its joints twice"
         yield Problem("shock.coupling.direction", message, "one_way", "two_way")
 
 
@@ -103,7 +103,7 @@ def effect(case: BoardDropCase) -> dict:
     why = f"thermal.effects.residual_stress = {thermal.effects.residual_stress}"
     if is_wanted(case):
         why += (
-            f": cooling by {thermal.solidification - thermal.final:.4g} K; an upper bound, solder relaxes at room"
+            f": cooling by {thermal.solidification - thermal.final:.4g} K; an upper bound: solder relaxes at room"
             " temperature"
         )
     return {"residual_stress": {"on": is_wanted(case), "why": why}}
@@ -116,16 +116,16 @@ def forecast(case: BoardDropCase, parts: Mapping[str, PartForecast]) -> tuple[di
         case: the case.
         parts: of the mesh with all joints fine; modes with other fine joints cool apart.
     """
-    told = effect(case)
+    effects = effect(case)
     if not is_wanted(case):
-        return told, 0.0
+        return effects, 0.0
     cost = _cost(case, parts)
     models = len(case.shock.numerics.modes) if case.shock.coupling.fine_joints != "all" else 1
     models += int(case.shock.identical_joints)
-    told["residual_stress"]["why"] += (
+    effects["residual_stress"]["why"] += (
         f"; predicted: about {duration(cost.seconds)}, {1e-9 * cost.memory:.2g} GB for the factor"
     )
-    return told, models * cost.seconds
+    return effects, models * cost.seconds
 
 
 def _cost(case: BoardDropCase, parts: Mapping[str, PartForecast]) -> "SolverCost":

@@ -13,7 +13,7 @@ from reflowshock.workflow.package.case import BoardDropCase, PackageCase
 
 
 def shock_effects(case: BoardDropCase) -> dict:
-    """Return effect -> {"on", "why"} and, where it is foreseen, "influence"."""
+    """Return effect -> {"on", "why"} and, where it is predicted, "influence"."""
     shock = case.shock
     omega = expected_deflection(case).omega
     return (
@@ -42,10 +42,10 @@ def _method(case: BoardDropCase) -> Iterator[tuple[str, dict]]:
 
 
 def with_influence(found: dict, case: BoardDropCase) -> dict:
-    """Return the effects of a run with what was foreseen of their influence."""
-    foreseen = shock_effects(case)
-    told = {name: foreseen.get(f"{name}_in_the_shock", foreseen.get(name, {})) for name in found}
-    expected = {name: {"influence": item["influence"]} if "influence" in item else {} for name, item in told.items()}
+    """Return the effects of a run with their predicted influence."""
+    predicted = shock_effects(case)
+    known = {name: predicted.get(f"{name}_in_the_shock", predicted.get(name, {})) for name in found}
+    expected = {name: {"influence": item["influence"]} if "influence" in item else {} for name, item in known.items()}
     return {name: record | expected[name] for name, record in found.items()}
 
 

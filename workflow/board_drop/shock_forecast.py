@@ -5,7 +5,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from reflowshock.fem.materials.parameters import Material
-from reflowshock.workflow.case.problems import CaseError, Problem
+from reflowshock.problem import Problem
+from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.case.text import short
 
 if TYPE_CHECKING:
@@ -51,7 +52,7 @@ class ShockForecast:
         scheme: how the models of the two-scale run are coupled, and why.
         levels: elements by the steps that they take, the window first.
         window: step of the macro model [s].
-        substeps: m, steps of a DNS in a window.
+        substeps: m, steps of a DNS per window.
         windows: number of windows.
         search: predicted wall time of the run that finds the critical joints [s], zero where there is none.
         two_scale: the same of the two-scale run.
@@ -216,7 +217,7 @@ def shorter_than_window(case: "BoardDropCase") -> Iterator[Problem]:
         ("shock.pulse_duration", shock.pulse_duration, min(longest, _plan(case, parts).window)),
     ):
         if duration is not None and duration < window:
-            message = f"is shorter than a window of {short(window)}, the time between two exchanges of the models"
+            message = f"is shorter than one coupling window ({short(window)})"
             allowed = f'>= {short(window)}, a smaller shock.numerics.step_fraction, or shock.numerics.modes = ["dns"]'
             yield Problem(key, message, short(duration), allowed)
 
@@ -253,11 +254,11 @@ def _coupled(case: "BoardDropCase", parts: Parts) -> tuple[tuple[str, str], tupl
 
 def forecast_scheme(case: "BoardDropCase", parts: Parts) -> tuple[str, str]:
     """Return the scheme of the coupling, and why; layers of board around the joints are taken to be there."""
-    from reflowshock.fem.division.choice import choose_scheme
+    from reflowshock.fem.division.division import choose_scheme
 
     wanted = case.shock.coupling.scheme
     if case.shock.coupling.direction == "one_way":
-        return "held_velocity", "shock.coupling.direction = one_way: nothing comes back"
+        return "held_velocity", "shock.coupling.direction = one_way"
     if wanted != "auto":
         return wanted, f"shock.coupling.scheme = {wanted}"
     choice = choose_scheme(is_linear(parts), buffer_possible=True)

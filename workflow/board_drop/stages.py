@@ -30,7 +30,7 @@ def geometry(run: Run[PackageCase], folder: Path) -> Findings:
 
 def surface(run: Run[PackageCase], folder: Path) -> Findings:
     """Close the surface of each joint, or take the one that the user gives, and measure it."""
-    from reflowshock.workflow.board_drop.joint_surfaces import write_surfaces
+    from reflowshock.workflow.board_drop.joint_meshes import write_surfaces
 
     surfaces = write_surfaces(run, folder)
     write_json(folder / "surfaces.json", surfaces)

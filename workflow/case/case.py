@@ -3,8 +3,7 @@
 from pathlib import Path
 from typing import ClassVar
 
-from pydantic import BaseModel, ConfigDict
-
+from reflowshock.parameters import Parameters
 from reflowshock.workflow.case.names import Name
 from reflowshock.workflow.case.stage import Pipeline
 
@@ -12,16 +11,14 @@ CASES = Path(__file__).resolve().parents[2] / "cases"  # those that the program 
 FULL = "full"  # the scale of a case as its file says it
 
 
-class Title(BaseModel):
+class Title(Parameters):
     """Name and title of a case; the name is also that of its run folder."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     name: Name
     title: str = ""
 
 
-class Case(BaseModel):
+class Case(Parameters):
     """Everything that a run depends on, in SI floats.
 
     Attributes:
@@ -31,8 +28,6 @@ class Case(BaseModel):
         case: its name.
         scale: "full", or the name of the table of ``[scales]`` whose values replace those of the file.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     kind: ClassVar[str]
     stages: ClassVar[Pipeline]

@@ -9,8 +9,8 @@ import annotated_types
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
+from reflowshock.problem import Problem
 from reflowshock.workflow.case.names import is_name, wrong_name
-from reflowshock.workflow.case.problems import Problem
 from reflowshock.workflow.case.units import UnitError, dimension, from_si, to_si
 
 BOUNDS: tuple[tuple[type, str, str], ...] = (

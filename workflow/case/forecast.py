@@ -6,7 +6,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from reflowshock.workflow.case.problems import Problem
+from reflowshock.problem import Problem
 from reflowshock.workflow.case.text import short
 
 BYTES_OF_ELEMENT, BYTES_OF_PARTICLE = 5.0e3, 5.0e4
@@ -46,8 +46,8 @@ def too_many_steps(key: str, duration: float, step: float, solver: str) -> Itera
         solver: Its name.
     """
     if not step > 0.0:
-        message = f"has no {solver} step: sizes, densities, moduli or damping are beyond all numbers"
+        message = f"has no {solver} time step: sizes, densities, moduli or damping are out of range"
         yield Problem(key, message, short(duration))
     elif duration > STEPS_MOST * step:
-        message = f"takes more than {STEPS_MOST:g} {solver} steps of {step:.3g} s"
+        message = f"would take more than {STEPS_MOST:g} {solver} steps of {short(step)}"
         yield Problem(key, message, short(duration), f"<= {STEPS_MOST * step:.3g} s")

@@ -5,10 +5,10 @@ from typing import Annotated
 
 from pydantic import Field
 
-from reflowshock.workflow.case.problems import Problem
+from reflowshock.problem import Problem
 
 NAME = r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,63}$"
-NAMES = "letters, digits, _ . -, the first one a letter or digit, at most 64"
+NAMES = "letters, digits, _ . -, starting with a letter or digit, at most 64 characters"
 _NAME = re.compile(NAME[1:-1])  # matched in full: $ would let a newline pass at the end
 Name = Annotated[str, Field(pattern=NAME)]
 

@@ -1,4 +1,4 @@
-"""Which magnitudes a physical quantity can have: a slip of a unit or of a digit is told before anything runs."""
+"""Which magnitudes a physical quantity can have: a slip of a unit or of a digit is found before anything runs."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -7,9 +7,9 @@ from functools import cache
 
 from pydantic.fields import FieldInfo
 
+from reflowshock.problem import Problem
 from reflowshock.workflow.case import fields
 from reflowshock.workflow.case.case import Case
-from reflowshock.workflow.case.problems import Problem
 from reflowshock.workflow.case.pulse_files import largest_values
 from reflowshock.workflow.case.units import dimension, from_si, to_si
 
@@ -67,7 +67,7 @@ def implausible_tables(case: Case) -> Iterator[Problem]:
     for key, unit, number in largest_values(case.pulse_tables):
         found = BY_DIMENSION[dimension(unit)]
         if number > to_si(found.high, unit):
-            message = f"has {from_si(number, unit, 6)} in it, which is not plausible"
+            message = f"has {from_si(number, unit, 6)}, which is not plausible"
             yield Problem(key, message, None, f"up to {found.high}, or {FORCE}")
 
 
@@ -79,13 +79,13 @@ def _implausible(key: str, number: float, field: FieldInfo) -> Iterator[Problem]
             yield Problem(key, "is not plausible", number, f"{low:g} to {high:g}, or {FORCE}")
         return
     if unit is None:
-        (low, high), told = NUMBERS, f"{NUMBERS[0]:g} to {NUMBERS[1]:g}"
+        (low, high), limits = NUMBERS, f"{NUMBERS[0]:g} to {NUMBERS[1]:g}"
     else:
         found = _range(name, unit)
-        low, high, told = to_si(found.low, unit), to_si(found.high, unit), f"{found.low} to {found.high}"
+        low, high, limits = to_si(found.low, unit), to_si(found.high, unit), f"{found.low} to {found.high}"
     if not low <= abs(number) <= high:
         shown = fields.display(float(number), field) if unit else number
-        yield Problem(key, "is not plausible", shown, f"{told} in magnitude, or {FORCE}")
+        yield Problem(key, "is not plausible", shown, f"{limits} in magnitude, or {FORCE}")
 
 
 @cache

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-from reflowshock.workflow.case.problems import Problem
+from reflowshock.problem import Problem
 
 UNITS = {"acceleration": "m/s^2", "pressure": "Pa", "velocity": "m/s", "force": "N"}
 Tables = Mapping[str, tuple[Path, str]]
@@ -22,8 +22,8 @@ def unreadable_pulses(tables: Tables) -> Iterator[Problem]:
         try:
             read_pulse(path, quantity)
         except PulseError as error:
-            told = str(error).removeprefix(str(path)).lstrip(":, ")
-            yield Problem(key, told, str(path))
+            message = str(error).removeprefix(str(path)).lstrip(":, ")
+            yield Problem(key, message, str(path))
 
 
 def largest_values(tables: Tables) -> Iterator[tuple[str, str, float]]:

@@ -8,10 +8,10 @@ scale = "full"                                   # or --set scale="quick"
 import tomllib
 from collections.abc import Iterator
 
-from reflowshock.fem.names import nearest
+from reflowshock.names import nearest
+from reflowshock.problem import Problem, as_toml
 from reflowshock.workflow.case.case import FULL
 from reflowshock.workflow.case.names import is_name, wrong_name
-from reflowshock.workflow.case.problems import Problem, as_toml
 from reflowshock.workflow.case.toml_file import DEEPEST
 
 KEYS = 'a table of dotted keys, e.g. "board.numerics.coarse_size" = "2 mm"'
@@ -34,7 +34,7 @@ def take_scales(table: dict, problems: list[Problem]) -> dict[str, dict[str, obj
     scales = {}
     for name, values in given.items():
         if name == FULL:
-            problems.append(Problem(f"scales.{name}", "is the file as it is", None, "any other name"))
+            problems.append(Problem(f"scales.{name}", "is reserved for the file itself", None, "another name"))
         elif not is_name(name):
             problems.append(wrong_name("scales", name))
         elif not isinstance(values, dict):
@@ -69,7 +69,7 @@ def scales_text(scales: dict[str, dict[str, object]]) -> Iterator[str]:
     """Write scales as tables of a case file, one text each."""
     for name, values in scales.items():
         lines = [f"{as_toml(key)} = {as_toml(value)}" for key, value in values.items()]
-        yield "\n".join([f'# What differs by --set scale="{name}".', f"[scales.{name}]", *lines, ""])
+        yield "\n".join([f'# Values that change with --set scale="{name}".', f"[scales.{name}]", *lines, ""])
 
 
 def dotted(values: dict, prefix: str = "") -> Iterator[tuple[str, object]]:

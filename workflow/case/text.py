@@ -71,5 +71,5 @@ def duration(seconds: float) -> str:
 
 def short(seconds: float) -> str:
     """Write a time step in the unit that makes its figure readable."""
-    factor, unit = next(((f, u) for f, u in ((1e9, "ns"), (1e6, "us")) if f * seconds < 1e3), (1e3, "ms"))
+    factor, unit = next(((f, u) for f, u in ((1e9, "ns"), (1e6, "µs")) if f * seconds < 1e3), (1e3, "ms"))
     return f"{factor * seconds:.3g} {unit}"

@@ -5,7 +5,8 @@ import stat
 import tomllib
 from pathlib import Path
 
-from reflowshock.workflow.case.problems import CaseError, Problem
+from reflowshock.problem import Problem
+from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.case.toml_places import Place, message_of, place_of_error
 
 MOST_BYTES = 4_000_000
@@ -27,7 +28,7 @@ def read_text(path: Path) -> str:
         raise CaseError(str(path), [Problem("", f"cannot be read: {error.strerror or error}")]) from error
     except UnicodeDecodeError as error:
         line = path.read_bytes()[: error.start].count(b"\n") + 1
-        raise CaseError(str(path), [Problem("", "is not a text in UTF-8", line=line, column=1)]) from error
+        raise CaseError(str(path), [Problem("", "is not UTF-8 text", line=line, column=1)]) from error
 
 
 def parse_toml(source: str, text: str) -> dict:
@@ -82,7 +83,7 @@ def fault_of(path: Path, most_bytes: int) -> str:
     try:
         found = path.stat()
     except FileNotFoundError:
-        return "there is no such file"
+        return "does not exist"
     except (OSError, ValueError) as error:  # a loop of links, a name too long, a null character
         return f"cannot be read: {getattr(error, 'strerror', None) or error}"
     if stat.S_ISDIR(found.st_mode):
@@ -105,7 +106,7 @@ def beside(folder: Path, name: str) -> str:
 
 
 def _too_deep() -> Problem:
-    return Problem("", "has tables or lists nested too deeply", None, f"up to {DEEPEST} levels")
+    return Problem("", "contains tables or lists nested too deeply", None, f"up to {DEEPEST} levels")
 
 
 def _first_unreadable(text: str) -> Place:

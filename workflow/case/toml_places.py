@@ -19,7 +19,7 @@ class Place:
 
 
 def place_of_error(error: tomllib.TOMLDecodeError, text: str) -> Place:
-    """Return where a text is not TOML; its end where that is told."""
+    """Return where a text is not TOML; its end where the error says so."""
     found = AT.search(str(error))
     return Place(int(found[1]), int(found[2])) if found else Place(text.count("\n") + 1, 1)
 

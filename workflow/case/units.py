@@ -62,7 +62,7 @@ def to_si(text: object, unit: str) -> float:
     if match is None:
         raise UnitError(f'is not a number and a unit, such as "1 {unit}"')
     if COMMA.match(match["unit"]):
-        raise UnitError(f'has a comma in its number; write decimals with a point, as "1.5 {unit}", and 1000 without')
+        raise UnitError(f'contains a comma; write decimals with a point, as "1.5 {unit}", and 1000 without')
     if not match["unit"]:
         raise UnitError(f'needs a unit, such as "{match["number"]} {unit}"')
     parsed = _parse_unit(match["unit"], unit)
@@ -72,7 +72,7 @@ def to_si(text: object, unit: str) -> float:
     if not math.isfinite(value):
         raise UnitError("is not finite")
     if number and not value:
-        raise UnitError("is too small to be told from zero")
+        raise UnitError("is too small to be distinguished from zero")
     return value
 
 
@@ -144,7 +144,7 @@ def _parse_unit(text: str, wanted: str) -> pint.Unit:
     # An angle has no dimension in SI; yet "1", "5 percent" and "3 bit" are not angles, nor is "1 mm*deg" a length.
     pure = [name for name in dict(registry().Quantity(1, parsed).unit_items()) if registry().Unit(name).dimensionless]
     if foreign := [name for name in pure if name not in PURE_FACTORS.get(dimension(wanted), ())]:
-        raise UnitError(f'"{text}" has the pure number {foreign[0]} in it; {expected}')
+        raise UnitError(f'"{text}" contains the bare number {foreign[0]}; {expected}')
     return parsed
 
 

@@ -7,10 +7,10 @@ from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
-from reflowshock.fem.names import nearest
+from reflowshock.names import nearest
+from reflowshock.problem import Problem
 from reflowshock.workflow.case import fields
 from reflowshock.workflow.case.names import wrong_name
-from reflowshock.workflow.case.problems import Problem
 
 RANGES = ("greater_than", "greater_than_equal", "less_than", "less_than_equal", "finite_number")
 
@@ -57,7 +57,7 @@ def _problem(root: type[BaseModel], names: list[str], record: ErrorDetails, tabl
     if fields.models_of(field):
         return Problem(key, "must be a table", value)
     if kind == "literal_error":
-        message = "unknown name" if len(fields.alternatives(field)) == 1 else "is not among what is allowed"
+        message = "unknown name" if len(fields.alternatives(field)) == 1 else "is not allowed"
         return Problem(key, message, value, fields.allowed(field), _nearest_name(value, field))
     if kind in RANGES:
         return Problem(key, "is out of range", value, fields.allowed(field))

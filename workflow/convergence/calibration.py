@@ -1,4 +1,4 @@
-"""What stages really took over what was foreseen, on this machine: by that, forecasts of any size are corrected."""
+"""What stages really took over what was predicted, on this machine: by that, forecasts of any size are corrected."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -6,8 +6,7 @@ from math import log
 from pathlib import Path
 
 from reflowshock.workflow.case.case import Case
-from reflowshock.workflow.convergence.machine import this_machine
-from reflowshock.workflow.convergence.measured import FILE, StageCost, read_accuracy
+from reflowshock.workflow.convergence.measured import FILE, StageCost, read_accuracy, this_host
 
 
 @dataclass(frozen=True, slots=True)
@@ -15,7 +14,7 @@ class Calibration:
     """Measured stages.
 
     Attributes:
-        pairs: stage -> wall time [s] that was foreseen and found, of each run.
+        pairs: stage -> wall time [s] that was predicted and found, of each run.
         points: how many runs there are.
     """
 
@@ -26,16 +25,16 @@ class Calibration:
         """Whether a stage was measured."""
         return bool(self.pairs.get(stage))
 
-    def seconds(self, stage: str, foreseen: float) -> float:
+    def seconds(self, stage: str, predicted: float) -> float:
         """Correct a forecast [s] by the measured run whose forecast was nearest to it; one without stays."""
-        if not self.knows(stage) or foreseen <= 0.0:
-            return foreseen
-        nearest = min(self.pairs[stage], key=lambda pair: abs(log(foreseen / pair[0])))
-        return foreseen * nearest[1] / nearest[0]
+        if not self.knows(stage) or predicted <= 0.0:
+            return predicted
+        nearest = min(self.pairs[stage], key=lambda pair: abs(log(predicted / pair[0])))
+        return predicted * nearest[1] / nearest[0]
 
 
 def calibration(runs: Iterable[Mapping[str, StageCost]]) -> Calibration:
-    """Take what the stages of runs cost and what was foreseen of them."""
+    """Take what the stages of runs cost and what was predicted of them."""
     every = [stages for stages in runs if stages]
     pairs: dict[str, list[tuple[float, float]]] = {}
     for stages in every:
@@ -58,6 +57,6 @@ def default_folder(case: Case) -> Path:
 def calibration_of(case: Case) -> Calibration | None:
     """Return what was measured of a case on this machine; None where nothing was."""
     found = read_accuracy(default_folder(case) / FILE)
-    if found is None or found.machine != this_machine():
+    if found is None or found.machine != this_host():
         return None
     return calibration(one.stages for one in found.measurements)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import brentq
 
-from reflowshock.workflow.convergence.series import Quantity, Rung, Values
+from reflowshock.workflow.convergence.series import Quantity, StudyRun, Values
 
 LARGEST_ORDER = 2.5  # that is believed: no method here is of more than second order
 ORDER_MARGIN = 0.5  # of an observed order from theory, beyond which runs are not yet fine enough to extrapolate from
@@ -25,55 +25,55 @@ Answers = Mapping[str, Quantity]
 
 
 def errors_of(
-    answers: Mapping[str, Answers], rungs: Sequence[Rung], main: Sequence[Rung], order: float | None
+    answers: Mapping[str, Answers], runs: Sequence[StudyRun], main: Sequence[StudyRun], order: float | None
 ) -> dict[str, dict[str, Error]]:
     """Find the errors of all runs.
 
     Args:
-        answers: name of a rung that came to its end -> its answers.
-        rungs: all rungs.
-        main: those of the first knob, the coarsest first.
-        order: of the error in that knob's value by theory; None without one.
+        answers: name of a run that came to its end -> its answers.
+        runs: all runs.
+        main: those of the first parameter, the coarsest first.
+        order: of the error in that parameter's value by theory; None without one.
 
     Returns:
-        Name of rung -> quantity -> error. A run that others are compared with has none of its own, nor one whose answer
+        Name of run -> quantity -> error. A run that others are compared with has none of its own, nor one whose answer
         is not finite.
     """
     found: dict[str, dict[str, Error]] = {}
-    for rung in rungs:
-        for quantity, answer in answers.get(rung.name, {}).items():
-            if answer.exact is not None and not rung.against:
+    for run in runs:
+        for quantity, answer in answers.get(run.name, {}).items():
+            if answer.exact is not None and not run.against:
                 error: Error | None = _exact(answer, answer.exact)
             else:
-                error = _compared(quantity, rung, answers, _Reference.of(quantity, rung, answers, main, order))
+                error = _compared(quantity, run, answers, _Reference.of(quantity, run, answers, main, order))
             if error is not None and math.isfinite(error.value):
-                found.setdefault(rung.name, {})[quantity] = error
+                found.setdefault(run.name, {})[quantity] = error
     return found
 
 
 @dataclass(frozen=True, slots=True)
 class _Reference:
-    """What is compared with: its value, in words, and the rung that it is, if it is one."""
+    """What is compared with: its value, in words, and the run that it is, if it is one."""
 
     value: Values
     words: str
-    rung: str = ""
+    run: str = ""
 
     @classmethod
     def of(
         cls,
         quantity: str,
-        rung: Rung,
+        run: StudyRun,
         answers: Mapping[str, Answers],
-        main: Sequence[Rung],
+        main: Sequence[StudyRun],
         order: float | None,
     ) -> "_Reference | None":
-        """Take the rung that is named, else an extrapolation of the three finest of the first knob, else the finest."""
+        """Take the named run, else an extrapolation of the three finest of the first parameter, else the finest."""
         # What a run has compared with an exact answer itself may be an error, no answer.
         known = [one for one in main if (own := answers.get(one.name, {}).get(quantity)) and own.exact is None]
-        if rung.against:
-            answer = answers.get(rung.against, {}).get(quantity)
-            return None if answer is None else cls(answer.value, f"run {rung.against}", rung.against)
+        if run.against:
+            answer = answers.get(run.against, {}).get(quantity)
+            return None if answer is None else cls(answer.value, f"run {run.against}", run.against)
         if not known:
             return None
         values = [answers[one.name][quantity].value for one in known]
@@ -87,10 +87,12 @@ def _exact(answer: Quantity, exact: Values) -> Error:
     return Error(_difference(answer, exact), f"exact: {answer.source}" if answer.source else "exact")
 
 
-def _compared(quantity: str, rung: Rung, answers: Mapping[str, Answers], reference: _Reference | None) -> Error | None:
-    if reference is None or reference.rung == rung.name:
+def _compared(
+    quantity: str, run: StudyRun, answers: Mapping[str, Answers], reference: _Reference | None
+) -> Error | None:
+    if reference is None or reference.run == run.name:
         return None
-    return Error(_difference(answers[rung.name][quantity], reference.value), reference.words)
+    return Error(_difference(answers[run.name][quantity], reference.value), reference.words)
 
 
 def _difference(answer: Quantity, other: Values) -> float:
@@ -118,7 +120,7 @@ def richardson(sizes: Sequence[float], values: Sequence[Values], order: float | 
         return None
     coarse, fine = (np.asarray(values[k]) - np.asarray(values[k + 1]) for k in (0, 1))
     if np.sum(coarse * fine) <= 0.0:
-        return None  # the answers swing
+        return None  # the answers oscillate
     ratio = _norm(coarse) / _norm(fine)
 
     def excess(power: float) -> float:

@@ -1,26 +1,53 @@
-"""`accuracy.json`: what was measured of a ladder, on which machine, and what follows from it."""
+"""`accuracy.json`: what was measured in a convergence study, on which machine, and what follows from it."""
 
 import json
+import platform
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from reflowshock.workflow.convergence.errors import Error
-from reflowshock.workflow.convergence.machine import Machine
 from reflowshock.workflow.convergence.orders import CostFit, ErrorFit, fit_cost, fit_error
-from reflowshock.workflow.convergence.series import Ladder, Rung
+from reflowshock.workflow.convergence.series import ConvergenceStudy, StudyRun
+from reflowshock.workflow.process.environment import available_cores
+
+CPU_INFO = Path("/proc/cpuinfo")
+
+
+@dataclass(frozen=True, slots=True)
+class Host:
+    """Model of the processor, and the cores that a program may use."""
+
+    processor: str
+    cores: int
+
+    def __str__(self) -> str:
+        return f"{self.processor}, {self.cores} {'core' if self.cores == 1 else 'cores'}"
+
+
+def this_host() -> Host:
+    """Return the machine that this process is on."""
+    return Host(_model() or platform.processor() or platform.machine(), available_cores())
+
+
+def _model() -> str:
+    if not CPU_INFO.is_file():
+        return ""
+    lines = (line.partition(":") for line in CPU_INFO.read_text(encoding="utf-8").splitlines())
+    return next((value.strip() for key, _, value in lines if key.strip() == "model name"), "")
+
 
 FILE = "accuracy.json"
 
 
 @dataclass(frozen=True, slots=True)
 class StageCost:
-    """What a stage of a run cost, and what was foreseen.
+    """What a stage of a run cost, and what was predicted.
 
     Attributes:
         seconds: wall time [s], the smallest of all times that it was run.
         core_seconds: processor time of all its processes [s], the smallest likewise.
-        forecast: wall time [s] that was foreseen; None where there is no forecast of the stage.
+        forecast: wall time [s] that was predicted; None where there is no forecast of the stage.
     """
 
     seconds: float
@@ -30,22 +57,22 @@ class StageCost:
 
 @dataclass(frozen=True, slots=True)
 class Measurement:
-    """A rung that was run.
+    """What was measured of a run.
 
     Attributes:
-        rung: its name.
-        knob: what varies.
-        value: of the knob; None for a choice.
+        run: its name.
+        parameter: what varies.
+        value: of the parameter; None for a choice.
         settings: dotted key -> value.
         key: of its point in the store.
         stages: cost of the stages that count; empty where it failed.
         errors: quantity -> error; one that others are compared with has none.
         failed: message of the stage that failed; empty where none did.
-        against: rung that its errors are from, where they are not those of the whole answer.
+        against: run that its errors are from, where they are not those of the whole answer.
     """
 
-    rung: str
-    knob: str
+    run: str
+    parameter: str
     value: float | None
     settings: Mapping[str, str]
     key: str
@@ -67,7 +94,7 @@ class Measurement:
 
 @dataclass(frozen=True, slots=True)
 class Fit:
-    """How errors and costs follow a knob: quantity -> fit of its error, and that of the cost; None where none fits."""
+    """How errors and cost follow a parameter: quantity -> fit of its error; fit of the cost, None where none fits."""
 
     errors: Mapping[str, ErrorFit]
     cost: CostFit | None
@@ -75,17 +102,17 @@ class Fit:
 
 @dataclass(frozen=True, slots=True)
 class Recommended:
-    """Settings that were chosen, what was foreseen of them and, once they were run, what was found.
+    """Settings that were chosen, what was predicted of them and, once they were run, what was found.
 
     Attributes:
-        rung: name, knob, settings.
+        run: name, parameter, settings.
         why: in words.
-        error: that was foreseen.
-        core_seconds: that were foreseen [s].
+        error: that was predicted.
+        core_seconds: that were predicted [s].
         found: the run; None where it was not run.
     """
 
-    rung: Rung
+    run: StudyRun
     why: str
     error: float
     core_seconds: float
@@ -102,8 +129,8 @@ class Accuracy:
         command: that measured it.
         machine: where.
         errors: quantity -> what its error is called; the first one is judged.
-        measurements: of all rungs that were run.
-        fits: knob -> fits.
+        measurements: of all runs that were run.
+        fits: parameter -> fits.
         tolerance: of the judged error; None where none was asked for.
         recommended: None where nothing was.
     """
@@ -111,7 +138,7 @@ class Accuracy:
     case: str
     kind: str
     command: str
-    machine: Machine
+    machine: Host
     errors: Mapping[str, str]
     measurements: tuple[Measurement, ...]
     fits: Mapping[str, Fit]
@@ -124,23 +151,27 @@ class Accuracy:
         return next(iter(self.errors))
 
 
-def fits_of(ladder: Ladder, measurements: Mapping[str, Measurement]) -> dict[str, Fit]:
-    """Fit errors and costs of every knob.
+def fits_of(study: ConvergenceStudy, measurements: Mapping[str, Measurement]) -> dict[str, Fit]:
+    """Fit errors and costs of every parameter.
 
     Args:
-        ladder: its knobs.
-        measurements: name of rung -> what was measured of it.
+        study: its parameters.
+        measurements: name of run -> what was measured of it.
     """
-    return {knob.name: _fit(knob.rungs, knob.order, ladder, measurements) for knob in ladder.knobs}
+    return {
+        parameter.name: _fit(parameter.runs, parameter.order, study, measurements) for parameter in study.parameters
+    }
 
 
-def _fit(rungs: tuple[Rung, ...], order: float | None, ladder: Ladder, measurements: Mapping[str, Measurement]) -> Fit:
-    known = [found for rung in rungs if (found := measurements.get(rung.name)) is not None and not found.failed]
+def _fit(
+    runs: tuple[StudyRun, ...], order: float | None, study: ConvergenceStudy, measurements: Mapping[str, Measurement]
+) -> Fit:
+    known = [found for run in runs if (found := measurements.get(run.name)) is not None and not found.failed]
     values = [one.value or 0.0 for one in known]
     errors = {}
-    for quantity in ladder.errors:
+    for quantity in study.errors:
         place = [k for k, one in enumerate(known) if quantity in one.errors]
-        theory = order if quantity == ladder.judged else None
+        theory = order if quantity == study.judged else None
         fit = fit_error([values[k] for k in place], [known[k].errors[quantity].value for k in place], theory)
         if fit is not None:
             errors[quantity] = fit
@@ -169,13 +200,13 @@ def _accuracy(table: dict) -> Accuracy:
     chosen = table["recommended"]
     if chosen is not None:
         found = chosen["found"]
-        chosen |= {"rung": Rung(**chosen["rung"]), "found": None if found is None else _measurement(found)}
+        chosen |= {"run": StudyRun(**chosen["run"]), "found": None if found is None else _measurement(found)}
     return Accuracy(
         **table
         | {
-            "machine": Machine(**table["machine"]),
+            "machine": Host(**table["machine"]),
             "measurements": tuple(_measurement(one) for one in table["measurements"]),
-            "fits": {knob: _read_fit(fit) for knob, fit in table["fits"].items()},
+            "fits": {parameter: _read_fit(fit) for parameter, fit in table["fits"].items()},
             "recommended": None if chosen is None else Recommended(**chosen),
         }
     )

@@ -1,4 +1,4 @@
-"""Fits: errors follow a power of the knob's value, costs a constant and a power."""
+"""Fits: errors follow a power of the parameter's value, costs a constant and a power."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -59,7 +59,7 @@ def fit_error(values: Sequence[float], errors: Sequence[float], theory: float | 
     """Fit a power to errors, by least squares of logarithms; None unless three are known and they grow with the value.
 
     Args:
-        values: of the knob, positive.
+        values: of the parameter, positive.
         errors: positive.
         theory: the order by theory.
     """

@@ -1,4 +1,4 @@
-"""Ladder of a package that is dropped: its mesh, joints, particles, and how joints and board are coupled."""
+"""Convergence study of a package that is dropped: its mesh, joints, particles, and how joints and board are coupled."""
 
 from collections.abc import Callable, Iterator
 from math import floor
@@ -9,8 +9,7 @@ from reflowshock.meshing.board.pads import pad_table
 from reflowshock.workflow.board_drop.shock_forecast import implicit_seconds
 from reflowshock.workflow.board_drop.shock_launch import MODES
 from reflowshock.workflow.case.units import from_si
-from reflowshock.workflow.convergence.histories import at_same_times
-from reflowshock.workflow.convergence.series import Knob, Ladder, Quantity, Rung
+from reflowshock.workflow.convergence.series import ConvergenceStudy, Parameter, Quantity, StudyRun, at_same_times
 from reflowshock.workflow.package.case import BoardDropCase, PackageCase
 from reflowshock.workflow.process.products import read_json
 from reflowshock.workflow.store.product import read_record
@@ -39,15 +38,17 @@ TRUE_MASS = {"shock.numerics.mass_scaled": "[]"}  # of copper, whose step two mo
 Settings = dict[str, str]
 
 
-def package_ladder(case: PackageCase) -> Ladder:
+def package_study(case: PackageCase) -> ConvergenceStudy:
     """Vary what a package has: all of its shock where it is dropped, else the particles of its joints."""
     if isinstance(case, BoardDropCase):
         return _dropped(case)
     errors = {"joint_width_error_max": "largest width, worst joint"}
-    return Ladder("reflow", ("reflow",), errors, _widths, (_particles(case, {}, (*SPACINGS, FINEST_SPACING)),))
+    return ConvergenceStudy(
+        "reflow", ("reflow",), errors, _widths, (_particles(case, {}, (*SPACINGS, FINEST_SPACING)),)
+    )
 
 
-def _dropped(case: BoardDropCase) -> Ladder:
+def _dropped(case: BoardDropCase) -> ConvergenceStudy:
     """Meshes by one model, in implicit steps where all is linear; then what two models on the case's mesh lose."""
     whole = _one_model(case)
     parts = [
@@ -55,9 +56,9 @@ def _dropped(case: BoardDropCase) -> Ladder:
         _joints(case, whole).apart(FINEST),
         _particles(case, whole, SPACINGS).apart(FINEST_SPACING),
     ]
-    knobs = (_mesh(case, whole), _critical(case), *(knob for knob, _ in parts))
+    parameters = (_mesh(case, whole), _critical(case), *(parameter for parameter, _ in parts))
     choices = (*(finest for _, finest in parts), *_couplings(case))
-    return Ladder("shock", ("shock",), ERRORS, _motion, knobs, choices)
+    return ConvergenceStudy("shock", ("shock",), ERRORS, _motion, parameters, choices)
 
 
 def _widths(case: Any, run_folder: Path) -> dict[str, Quantity]:
@@ -100,12 +101,12 @@ def _one_model(case: BoardDropCase, solver: str = "") -> Settings:
     }
 
 
-def _mesh(case: BoardDropCase, whole: Settings) -> Knob:
+def _mesh(case: BoardDropCase, whole: Settings) -> Parameter:
     """All elements of board, package and joints."""
     return _sized(MESH, "all", REFINED, lambda size: whole | _of_board(case, size) | _of_joints(case, size))
 
 
-def _critical(case: BoardDropCase) -> Knob:
+def _critical(case: BoardDropCase) -> Parameter:
     """All elements, with two models of which one has the critical joint alone fine."""
     fine = _fine(1)
     return _sized(
@@ -122,35 +123,37 @@ def _fine(count: int) -> Settings:
     return TWO_SCALE | {f"{key}.fine_joints": "critical", f"{key}.critical_joints": f"{count}"}
 
 
-def _board(case: BoardDropCase, whole: Settings) -> Knob:
+def _board(case: BoardDropCase, whole: Settings) -> Parameter:
     """Elements of board and package, joints as they are."""
     return _sized(BOARD, "board", ALONE, lambda size: whole | _of_board(case, size))
 
 
-def _joints(case: BoardDropCase, whole: Settings) -> Knob:
+def _joints(case: BoardDropCase, whole: Settings) -> Parameter:
     """Elements of joints, board and package as they are."""
     return _sized(JOINTS, "joints", ALONE, lambda size: whole | _of_joints(case, size))
 
 
-def _particles(case: PackageCase, settings: Settings, values: tuple[float, ...]) -> Knob:
+def _particles(case: PackageCase, settings: Settings, values: tuple[float, ...]) -> Parameter:
     """Spacing of the particles of the joints, on which their shape depends."""
     own = case.solder.numerics.spacing
 
-    def at(value: float) -> Rung:
+    def at(value: float) -> StudyRun:
         spacing = from_si(value * own, "mm", digits=3)
-        return Rung(f"spacing {spacing}", "particle spacing", settings | {"solder.numerics.spacing": spacing}, value)
+        return StudyRun(
+            f"spacing {spacing}", "particle spacing", settings | {"solder.numerics.spacing": spacing}, value
+        )
 
-    return Knob("particle spacing", values, at)
+    return Parameter("particle spacing", values, at)
 
 
-def _sized(knob: str, word: str, sizes: tuple[float, ...], settings: Callable[[float], Settings]) -> Knob:
-    """A knob whose values are sizes over those of the case, as finely as ``GRAIN``."""
+def _sized(parameter: str, word: str, sizes: tuple[float, ...], settings: Callable[[float], Settings]) -> Parameter:
+    """A parameter whose values are sizes over those of the case, as finely as ``GRAIN``."""
 
-    def at(value: float) -> Rung:
+    def at(value: float) -> StudyRun:
         size = GRAIN * floor(value / GRAIN + ROUNDING)
-        return Rung(f"{word} x {size:.3g}", knob, settings(size), size)
+        return StudyRun(f"{word} x {size:.3g}", parameter, settings(size), size)
 
-    return Knob(knob, sizes, at)
+    return Parameter(parameter, sizes, at)
 
 
 def _of_board(case: BoardDropCase, size: float) -> dict[str, str]:
@@ -186,12 +189,12 @@ def _length(value: float) -> str:
     return from_si(value, "mm", digits=4)
 
 
-def _couplings(case: BoardDropCase) -> Iterator[Rung]:
+def _couplings(case: BoardDropCase) -> Iterator[StudyRun]:
     """Two models, or one in explicit steps, on the mesh of the case; also against one model on that mesh."""
     for name, settings in (_two_models(case) | _explicit(case)).items():
         if settings != _fine(1):  # which is on the way of all meshes
-            yield Rung(name, "coupling", settings)
-        yield Rung(f"{name}: alone", "coupling, same mesh", settings, None, SAME_MESH)
+            yield StudyRun(name, "coupling", settings)
+        yield StudyRun(f"{name}: alone", "coupling, same mesh", settings, None, SAME_MESH)
 
 
 def _two_models(case: BoardDropCase) -> dict[str, Settings]:

@@ -1,15 +1,24 @@
-"""accuracy.html, accuracy.png and accuracy.md; the same as a section of the report of a run."""
+"""accuracy.html, accuracy.png (the Pareto plot) and accuracy.md; the same as a section of the report of a run."""
 
 from pathlib import Path
+from textwrap import fill
+
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from reflowshock.workflow import __version__
 from reflowshock.workflow.case.case import CASES, Case
 from reflowshock.workflow.convergence import tables
 from reflowshock.workflow.convergence.calibration import folder_name
-from reflowshock.workflow.convergence.measured import FILE, Accuracy, read_accuracy
-from reflowshock.workflow.convergence.plot import figure, save_picture
-from reflowshock.workflow.report.curves import svg
+from reflowshock.workflow.convergence.measured import FILE, Accuracy, Measurement, read_accuracy
+from reflowshock.workflow.convergence.tables import compared, every_run, front
+from reflowshock.workflow.report.curves import STYLE, pyplot, svg
 from reflowshock.workflow.report.template import write_page
+
+COLOURS = ("#0b5fa5", "#d1495b", "#2a7d4f", "#7a5ea8", "#e09f3e", "#5f6c7b", "#1b998b", "#8c564b")
+MARKERS = "osD^vP*X"
+LABELLED = 14  # runs that are written beside their marks
+WIDTH = 48  # letters of a line along the axis of errors
+
 
 PAGE, PICTURE, TEXT = "accuracy.html", "accuracy.png", "accuracy.md"
 
@@ -20,7 +29,7 @@ def write_pages(folder: Path, accuracy: Accuracy, remarks: tuple[str, ...] = ())
     Args:
         folder: where they go.
         accuracy: what was measured.
-        remarks: what else is told.
+        remarks: further notes.
     """
     write_page(folder / PAGE, "accuracy.html.j2", {"version": __version__, "accuracy": section(accuracy, remarks)})
     save_picture(accuracy, folder / PICTURE)
@@ -32,7 +41,7 @@ def section(accuracy: Accuracy, remarks: tuple[str, ...] = (), elsewhere: bool =
 
     Args:
         accuracy: what was measured.
-        remarks: what else is told.
+        remarks: further notes.
         elsewhere: whether it was measured of another case than the page is on.
     """
     chosen = accuracy.recommended
@@ -40,10 +49,10 @@ def section(accuracy: Accuracy, remarks: tuple[str, ...] = (), elsewhere: bool =
         {}
         if chosen is None
         else {
-            "chosen": chosen.rung.name,
+            "chosen": chosen.run.name,
             "why": chosen.why[0].upper() + chosen.why[1:],
-            "advice": "\n".join(tables.as_lines(chosen.rung.settings)),
-            "options": tables.as_options(chosen.rung.settings),
+            "advice": "\n".join(tables.as_lines(chosen.run.settings)),
+            "options": tables.as_options(chosen.run.settings),
         }
     )
     stages = dict.fromkeys(stage for one in accuracy.measurements for stage in one.stages)
@@ -82,13 +91,80 @@ def markdown(accuracy: Accuracy) -> str:
     """Return tables of runs, orders and the recommendation in Markdown."""
     legend = tables.legend(accuracy).replace(tables.ON_FRONT, f"\\{tables.ON_FRONT}")
     blocks = [_markdown(tables.runs(accuracy)), f"{legend}.", _markdown(tables.orders(accuracy))]
-    told = tables.prediction(accuracy)
-    if told is not None and accuracy.recommended is not None:
-        options = tables.as_options(accuracy.recommended.rung.settings)
-        blocks += [f"Recommended: `{options}`, {accuracy.recommended.why}.", _markdown(told)]
+    predicted = tables.prediction(accuracy)
+    if predicted is not None and accuracy.recommended is not None:
+        options = tables.as_options(accuracy.recommended.run.settings)
+        blocks += [f"Recommended: `{options}`, {accuracy.recommended.why}.", _markdown(predicted)]
     return "\n\n".join([*blocks, f"Measured by `{accuracy.command}` on {accuracy.machine}."]) + "\n"
 
 
 def _markdown(table: dict) -> str:
     rows = [table["head"], ["---"] * len(table["head"]), *table["rows"]]
     return "\n".join("| " + " | ".join(cell.replace("|", "/") for cell in row) + " |" for row in rows)
+
+
+def save_picture(accuracy: Accuracy, path: Path) -> None:
+    """Write the plot as PNG."""
+    drawing = figure(accuracy)
+    drawing.savefig(path, dpi=150)
+    pyplot.close(drawing)
+
+
+def figure(accuracy: Accuracy):
+    """Plot the judged error against wall time and core-seconds, both logarithmic.
+
+    Returns:
+        A figure of matplotlib: marks of one colour for each parameter, the front as a line, tolerance,
+        recommendation, and the cost of the finest run where others are compared with it.
+    """
+    with pyplot.rc_context(STYLE):
+        drawing, axes = pyplot.subplots(1, 2, figsize=(9.6, 4.6), sharey=True, constrained_layout=True)
+        for axis, cost, label in zip(axes, ("seconds", "core_seconds"), ("wall time [s]", "core-seconds"), strict=True):
+            axis.set(xscale="log", yscale="log", xlabel=label)
+            _panel(axis, accuracy, cost)
+            _plain(axis.xaxis)
+        _plain(axes[0].yaxis)
+        axes[0].set_ylabel(fill(f"error [%]: {accuracy.errors[accuracy.judged]}", WIDTH))
+        hours = axes[1].secondary_xaxis("top", functions=(lambda s: s / 3600.0, lambda h: h * 3600.0))
+        hours.set_xlabel("core-hours")
+        _plain(hours.xaxis)
+        drawing.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=4, frameon=False)
+    return drawing
+
+
+def _plain(axis) -> None:
+    """Write plain numbers, 1, 2 and 5 of each decade."""
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())
+
+
+def _panel(axis, accuracy: Accuracy, cost: str) -> None:
+    known = compared(accuracy)
+    costs, errors = [getattr(one, cost) for one in known], [_error(one, accuracy) for one in known]
+    for number, parameter in enumerate(dict.fromkeys(one.parameter for one in known)):
+        here = [place for place, one in enumerate(known) if one.parameter == parameter]
+        style = {"color": COLOURS[number % len(COLOURS)], "marker": MARKERS[number % len(MARKERS)]}
+        axis.plot([costs[k] for k in here], [errors[k] for k in here], ls="", ms=5, label=parameter, **style)
+    best = front(costs, errors)
+    line = {"color": "#333333", "lw": 0.9, "alpha": 0.6, "zorder": 1, "label": "Pareto front"}
+    axis.step([costs[k] for k in best], [errors[k] for k in best], where="post", **line)
+    for place in best[:LABELLED]:
+        position = (costs[place], errors[place])
+        axis.annotate(known[place].run, position, (4, 3), textcoords="offset points", fontsize=6)
+    for one in every_run(accuracy):
+        if one.value is not None and one.stages and not one.errors:  # the finest, whose own error is not known
+            label = f"cost of the finest run, {one.run}"
+            axis.axvline(getattr(one, cost), color="#5f6c7b", lw=1.2, ls=":", label=label)
+    if accuracy.tolerance is not None:
+        axis.axhline(100.0 * accuracy.tolerance, color="#b3261e", lw=0.9, ls="--", label="tolerance")
+    chosen = accuracy.recommended
+    if chosen is not None and chosen.found is not None and accuracy.judged in chosen.found.errors:
+        ring = {"marker": "o", "ms": 12, "mfc": "none", "mec": "#b3261e", "ls": ""}
+        axis.plot([getattr(chosen.found, cost)], [_error(chosen.found, accuracy)], label="recommended", **ring)
+    axis.margins(x=0.12)
+
+
+def _error(one: Measurement, accuracy: Accuracy) -> float:
+    """Judged error [%]."""
+    return 100.0 * one.errors[accuracy.judged].value

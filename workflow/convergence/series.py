@@ -1,13 +1,17 @@
-"""Ladders: the settings of a case whose errors and costs are measured. Each kind of case has its own."""
+"""Convergence studies: the settings of a case whose errors and costs are measured. Each kind of case has its own."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
 
 from reflowshock.workflow.case.case import Case
+
+Arrays = Mapping[str, NDArray]
+
 
 Values = float | NDArray[np.float64]
 
@@ -31,91 +35,112 @@ class Quantity:
 
 
 @dataclass(frozen=True, slots=True)
-class Rung:
-    """A point of a ladder.
+class StudyRun:
+    """One run of a convergence study.
 
     Attributes:
         name: what it is called in tables, as short as can be and unlike all others: "21 per edge".
-        knob: what varies: the name of a knob, or for a rung of its own what is chosen, "time step".
+        parameter: what varies: the name of a parameter, or for a run of its own what is chosen, "time step".
         settings: dotted key -> value as for ``--set``, over the case as the user has it.
-        value: of the knob; errors follow a power of it. None for a choice that has no size.
-        against: name of the rung that it is compared with, in place of an exact answer or the finest rung: that on the
+        value: of the parameter; errors follow a power of it. None for a choice that has no size.
+        against: name of the run that it is compared with, in place of an exact answer or the finest run: that on the
             same mesh, say, where the error of a scheme is meant and not that of the mesh.
     """
 
     name: str
-    knob: str
+    parameter: str
     settings: Mapping[str, str]
     value: float | None = None
     against: str = ""
 
 
 @dataclass(frozen=True, slots=True)
-class Knob:
+class Parameter:
     """Something whose size the error follows: a spacing, a size of elements, a time step.
 
     Attributes:
         name: what it is called.
         values: those that are measured, the coarsest first: relative sizes, so that half the value is twice as fine.
-        at: the rung of a value, or of the nearest finer one that can be had; its ``value`` is the one that it has.
+        at: the run of a value, or of the nearest finer one that can be had; its ``value`` is the one that it has.
         order: of the error in the value, by theory; None without theory.
-        extent: factor beyond the measured values within which errors and costs may be foreseen.
+        extent: factor beyond the measured values within which errors and costs may be predicted.
     """
 
     name: str
     values: tuple[float, ...]
-    at: Callable[[float], Rung]
+    at: Callable[[float], StudyRun]
     order: float | None = None
     extent: float = 1.5
 
     @property
-    def rungs(self) -> tuple[Rung, ...]:
+    def runs(self) -> tuple[StudyRun, ...]:
         """What is measured of it."""
         return tuple(self.at(value) for value in self.values)
 
-    def apart(self, finest: float) -> tuple["Knob", Rung]:
-        """Return it by itself, and its finest rung: the others are compared with that, so no other error is in theirs.
+    def apart(self, finest: float) -> tuple["Parameter", StudyRun]:
+        """Return it by itself, and its finest run: the others are compared with that, so no other error is in theirs.
 
         Args:
             finest: value finer than all of its values.
         """
         reference = replace(self.at(finest), value=None)
 
-        def at(value: float) -> Rung:
+        def at(value: float) -> StudyRun:
             return replace(self.at(value), against=reference.name)
 
         return replace(self, at=at), reference
 
 
 @dataclass(frozen=True, slots=True)
-class Ladder:
+class ConvergenceStudy:
     """What is measured of a case.
 
     Attributes:
         until: the last stage that is computed.
-        timed: stages whose time is the cost of a rung.
+        timed: stages whose time is the cost of a run.
         errors: quantity -> what its error is called in tables, with what it is relative to. The first one is judged by
-            the tolerance, and by it costs and orders are told.
+            the tolerance, and by it costs and orders are shown.
         measure: what the products of a run, in its run folder, say of each of these quantities; a quantity may be
             missing where it has no meaning.
-        knobs: the first one has the rungs that others are compared with where nothing is exact.
-        choices: rungs that are no value of a knob; one may fail.
+        parameters: the first one has the runs that others are compared with where nothing is exact.
+        choices: runs that are no value of a parameter; one may fail.
     """
 
     until: str
     timed: tuple[str, ...]
     errors: Mapping[str, str]
     measure: Callable[[Case, Path], Mapping[str, Quantity]]
-    knobs: tuple[Knob, ...]
-    choices: tuple[Rung, ...] = field(default=())
+    parameters: tuple[Parameter, ...]
+    choices: tuple[StudyRun, ...] = field(default=())
 
     @property
-    def rungs(self) -> tuple[Rung, ...]:
+    def runs(self) -> tuple[StudyRun, ...]:
         """All that is measured, each once."""
-        every = [rung for knob in self.knobs for rung in knob.rungs] + list(self.choices)
-        return tuple({rung.name: rung for rung in reversed(every)}.values())[::-1]
+        every = [run for parameter in self.parameters for run in parameter.runs] + list(self.choices)
+        return tuple({run.name: run for run in reversed(every)}.values())[::-1]
 
     @property
     def judged(self) -> str:
         """Name of the quantity that the tolerance is meant for."""
         return next(iter(self.errors))
+
+
+def at_same_times(history: Arrays, names: Iterable[str], duration: float, count: int) -> NDArray[np.float64]:
+    """Interpolate arrays of a history at evenly spaced times.
+
+    Args:
+        history: of a run; ``time`` (s,) [s].
+        names: of arrays (s, ...).
+        duration: of the motion [s]; runs end there but for a rounding of their steps.
+        count: of the times.
+
+    Returns:
+        All values, one array after the other, each in the order of times.
+    """
+    times = common_times(duration, count)
+    return np.concatenate([CubicSpline(history["time"], history[name])(times).ravel() for name in names])
+
+
+def common_times(duration: float, count: int) -> NDArray[np.float64]:
+    """Return evenly spaced times (count,) [s] from zero to the end of the motion."""
+    return np.linspace(0.0, duration, count)

@@ -1,4 +1,4 @@
-"""Ladders of solder alone: particles and time steps, against exact shapes and periods."""
+"""Convergence studies of solder alone: particles and time steps, against exact shapes and periods."""
 
 from collections.abc import Callable, Mapping
 from functools import partial
@@ -8,7 +8,7 @@ from typing import Any
 
 from reflowshock.workflow.case.case import Case
 from reflowshock.workflow.case.units import from_si
-from reflowshock.workflow.convergence.series import Knob, Ladder, Quantity, Rung
+from reflowshock.workflow.convergence.series import ConvergenceStudy, Parameter, Quantity, StudyRun
 from reflowshock.workflow.solder.case import DropCase, DropsCase, JointCase, OscillationCase
 from reflowshock.workflow.store.product import read_record
 
@@ -21,7 +21,7 @@ STEPS_PER_PERIOD = (16, 24, 36, 54, 81, 120)
 STEPS_TO_A_PARTICLE = 16  # of a period, that the spacing alone is seen to err
 LARGEST_COUNT, SMALLEST_COUNT = 50, 5
 TIME_STEPS = (20.0, 5.0)  # capillary limits
-WHERE = 11  # particles per edge of rungs that vary something else
+WHERE = 11  # particles per edge of runs that vary something else
 MOVING = {  # what Hu et al. print: so viscous that a drop with inertia comes to rest soon
     "solder.effects.inertia": "on",
     "solder.parameters": "paper",
@@ -59,45 +59,53 @@ def of_metrics(exact: str, errors: Mapping[str, str], stage: str, case: Case, ru
     return found
 
 
-def drop_ladder(case: DropCase) -> Ladder:
+def _study(
+    exact: str, errors: Mapping[str, str], parameters: tuple[Parameter, ...], choices: tuple[StudyRun, ...] = ()
+) -> ConvergenceStudy:
+    """Return the study of a reflow whose errors are those from an exact answer."""
+    measure = partial(of_metrics, exact, errors, "reflow")
+    return ConvergenceStudy("reflow", ("reflow",), errors, measure, parameters, choices)
+
+
+def drop_study(case: DropCase) -> ConvergenceStudy:
     """Particles along the edge of the cube that a drop starts as; half of them left out by symmetry; time steps."""
     drop, errors = case.drop, {"shape_error": SHAPE["shape_error"], "height_error": "height", **SHAPE}
     divisible = drop.symmetry == "none" and not drop.is_free
-    knobs = (_spacing_of_drop(case), _spacing_of_quarter(case)) if divisible else (_spacing_of_drop(case),)
+    parameters = (_spacing_of_drop(case), _spacing_of_quarter(case)) if divisible else (_spacing_of_drop(case),)
     base = _per_edge(case, WHERE)
     steps = [
-        Rung(f"steps {limit:g} x", "time step", base | {"solder.numerics.time_step_limit": f"{limit:g}"})
+        StudyRun(f"steps {limit:g} x", "time step", base | {"solder.numerics.time_step_limit": f"{limit:g}"})
         for limit in TIME_STEPS
         if limit != case.molten.numerics.time_step_limit
     ]
     coarse = _per_edge(case, PER_EDGE[1])
-    others = [Rung(f"inertia, {PER_EDGE[1]} per edge", "effects", coarse | MOVING)]
+    others = [StudyRun(f"inertia, {PER_EDGE[1]} per edge", "effects", coarse | MOVING)]
     for basis in ("linear", "quadratic"):
-        others.append(Rung(f"gripc, {basis}", "scheme", coarse | GRIPC | {"solder.numerics.basis": basis}))
+        others.append(StudyRun(f"gripc, {basis}", "scheme", coarse | GRIPC | {"solder.numerics.basis": basis}))
     exact = "sphere" if drop.is_free else "Young-Laplace"
     choices = (*steps, *(() if drop.is_free else others))
-    return Ladder("reflow", ("reflow",), errors, partial(of_metrics, exact, errors, "reflow"), knobs, choices)
+    return _study(exact, errors, parameters, choices)
 
 
-def _spacing_of_drop(case: DropCase) -> Knob:
+def _spacing_of_drop(case: DropCase) -> Parameter:
     """The spacing over the edge of the cube."""
 
-    def at(value: float) -> Rung:
+    def at(value: float) -> StudyRun:
         count = _count(value, 1)
-        return Rung(f"{count} per edge", "particle spacing", _per_edge(case, count), 1.0 / (count - 1))
+        return StudyRun(f"{count} per edge", "particle spacing", _per_edge(case, count), 1.0 / (count - 1))
 
-    return Knob("particle spacing", tuple(1.0 / (count - 1) for count in PER_EDGE), at, SECOND)
+    return Parameter("particle spacing", tuple(1.0 / (count - 1) for count in PER_EDGE), at, SECOND)
 
 
-def _spacing_of_quarter(case: DropCase) -> Knob:
+def _spacing_of_quarter(case: DropCase) -> Parameter:
     """The same of a quarter of the drop, in whose planes particles lie if there is an odd number along an edge."""
 
-    def at(value: float) -> Rung:
+    def at(value: float) -> StudyRun:
         count = _count(value, 2)
         settings = _per_edge(case, count) | {"drop.symmetry": "quarter"}
-        return Rung(f"{count} per edge, quarter", "particle spacing of a quarter", settings, 1.0 / (count - 1))
+        return StudyRun(f"{count} per edge, quarter", "particle spacing of a quarter", settings, 1.0 / (count - 1))
 
-    return Knob("particle spacing of a quarter", tuple(1.0 / (count - 1) for count in OF_A_QUARTER), at, SECOND)
+    return Parameter("particle spacing of a quarter", tuple(1.0 / (count - 1) for count in OF_A_QUARTER), at, SECOND)
 
 
 def _count(value: float, multiple: int) -> int:
@@ -113,61 +121,61 @@ def _per_edge(case: DropCase, count: int) -> dict[str, str]:
     return {"drop.particles_per_edge": f"{count}"}
 
 
-def joint_ladder(case: JointCase) -> Ladder:
+def joint_study(case: JointCase) -> ConvergenceStudy:
     """Particle spacing of a joint, about the one that the case has."""
     lifted = case.joint.package is not None and "lift" in case.joint.package.free
     own = {"collapse_height_error": "standoff"} if lifted else {"axial_force_error": "axial force"}
     errors = SHAPE | own
-    knob = _spacing("joint.spacing", case.joint.spacing)
-    return Ladder("reflow", ("reflow",), errors, partial(of_metrics, "Young-Laplace", errors, "reflow"), (knob,))
+    parameter = _spacing("joint.spacing", case.joint.spacing)
+    return _study("Young-Laplace", errors, (parameter,))
 
 
-def drops_ladder(case: DropsCase) -> Ladder:
+def drops_study(case: DropsCase) -> ConvergenceStudy:
     """Particle spacing of two drops, about the one that the case has."""
     errors = {"max_width_error": "largest width", "height_error": "height"}
     exact = "sphere" if case.drops.is_free else "Young-Laplace"
-    knob = _spacing("drops.spacing", case.drops.spacing, FINENESS[1:])
-    return Ladder("reflow", ("reflow",), errors, partial(of_metrics, exact, errors, "reflow"), (knob,))
+    parameter = _spacing("drops.spacing", case.drops.spacing, FINENESS[1:])
+    return _study(exact, errors, (parameter,))
 
 
-def _spacing(key: str, own: float, fineness: tuple[float, ...] = FINENESS) -> Knob:
+def _spacing(key: str, own: float, fineness: tuple[float, ...] = FINENESS) -> Parameter:
     """A spacing that the case gives [m], and others about it; values are relative to it."""
 
-    def at(value: float) -> Rung:
+    def at(value: float) -> StudyRun:
         text = from_si(value * own, "mm", digits=3)
-        return Rung(f"spacing {text}", "particle spacing", {key: text}, value)
+        return StudyRun(f"spacing {text}", "particle spacing", {key: text}, value)
 
-    return Knob("particle spacing", tuple(1.0 / one for one in fineness), at, SECOND)
+    return Parameter("particle spacing", tuple(1.0 / one for one in fineness), at, SECOND)
 
 
-def oscillation_ladder(_case: OscillationCase) -> Ladder:
+def oscillation_study(_case: OscillationCase) -> ConvergenceStudy:
     """Particles along the radius, with steps in proportion; and the time step by itself.
 
     What is exact for small swings is not for larger ones, whose period is longer: errors fall to that difference only.
     """
     errors = {"period_error": "period", "decay_rate_error": "decay rate"}
 
-    def spacing(value: float) -> Rung:
+    def spacing(value: float) -> StudyRun:
         count = min(20, max(2, ceil(1.0 / value - ROUNDING)))
         steps = STEPS_TO_A_PARTICLE * count
         settings = {"oscillation.particles_per_radius": f"{count}", "oscillation.steps_per_period": f"{steps}"}
-        return Rung(f"{count} per radius", "spacing and step", settings, 1.0 / count)
+        return StudyRun(f"{count} per radius", "spacing and step", settings, 1.0 / count)
 
-    def step(value: float) -> Rung:
+    def step(value: float) -> StudyRun:
         count = max(STEPS_PER_PERIOD[0], ceil(1.0 / value - ROUNDING))
         settings = {"oscillation.particles_per_radius": "3", "oscillation.steps_per_period": f"{count}"}
-        return Rung(f"{count} steps a period", "time step", settings, 1.0 / count)
+        return StudyRun(f"{count} steps a period", "time step", settings, 1.0 / count)
 
-    knobs = (
-        Knob("spacing and step", tuple(1.0 / count for count in PER_RADIUS), spacing),
-        Knob("time step", tuple(1.0 / count for count in STEPS_PER_PERIOD), step),
+    parameters = (
+        Parameter("spacing and step", tuple(1.0 / count for count in PER_RADIUS), spacing),
+        Parameter("time step", tuple(1.0 / count for count in STEPS_PER_PERIOD), step),
     )
-    return Ladder("reflow", ("reflow",), errors, partial(of_metrics, "Reid, small swings", errors, "reflow"), knobs)
+    return _study("Reid, small swings", errors, parameters)
 
 
-LADDERS: dict[str, Callable[[Any], Ladder]] = {
-    DropCase.kind: drop_ladder,
-    JointCase.kind: joint_ladder,
-    DropsCase.kind: drops_ladder,
-    OscillationCase.kind: oscillation_ladder,
+STUDIES: dict[str, Callable[[Any], ConvergenceStudy]] = {
+    DropCase.kind: drop_study,
+    JointCase.kind: joint_study,
+    DropsCase.kind: drops_study,
+    OscillationCase.kind: oscillation_study,
 }

@@ -1,4 +1,4 @@
-"""Ladder of a structure: size of elements, one model or two, schemes, time steps, solvers, shapes of elements."""
+"""Convergence study of a structure: element size, one model or two, schemes, time steps, solvers, element shapes."""
 
 from collections.abc import Callable, Mapping
 from functools import partial
@@ -6,16 +6,23 @@ from math import ceil
 from pathlib import Path
 from typing import Any
 
-from reflowshock.workflow.case.problems import CaseError, Problem
+from reflowshock.problem import Problem
+from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.case.units import from_si
-from reflowshock.workflow.convergence.histories import at_same_times, common_times
-from reflowshock.workflow.convergence.series import Knob, Ladder, Quantity, Rung
+from reflowshock.workflow.convergence.series import (
+    ConvergenceStudy,
+    Parameter,
+    Quantity,
+    StudyRun,
+    at_same_times,
+    common_times,
+)
 from reflowshock.workflow.process.environment import available_cores
 from reflowshock.workflow.store.product import read_record
 from reflowshock.workflow.structure.case import StructureCase
 from reflowshock.workflow.structure.findings import exact_velocities, read_history, read_places, wave_points
-from reflowshock.workflow.structure.launch import solver_folders
 from reflowshock.workflow.structure.references import BarWave, Cantilever, LayeredBar
+from reflowshock.workflow.structure.stages import solver_folders
 
 SECOND = 2.0  # order of central differences and of trilinear elements (Hughes, The Finite Element Method, 9.2)
 REFINED = (0.3, 0.4, 0.5, 0.6, 0.8, 1.0, 1.2, 1.5, 2.0, 2.5, 4.0)  # times the numbers of elements of the case
@@ -40,14 +47,14 @@ CURVES = {"displacement": "displacements of the watch points, L2 over time", "st
 Settings = dict[str, str]
 
 
-def structure_ladder(case: StructureCase) -> Ladder:
-    """Vary what a structure has; what is not there (two models, an implicit solver) is no knob."""
+def structure_study(case: StructureCase) -> ConvergenceStudy:
+    """Vary what a structure has; what is not there (two models, an implicit solver) is no parameter."""
     errors, measure = _answers(case)
     own = _own_solver(case)
     steps, smallest = _steps(case, own)
-    knobs = (_elements(ELEMENT_SIZE, "", own, REFINED, case), *_other_solvers(case), steps)
+    parameters = (_elements(ELEMENT_SIZE, "", own, REFINED, case), *_other_solvers(case), steps)
     choices = (smallest, *_schemes(case, own), *_shapes(case, own))
-    return Ladder("comparison", ("shock",), errors, measure, knobs, choices)
+    return ConvergenceStudy("comparison", ("shock",), errors, measure, parameters, choices)
 
 
 Measure = Callable[[Any, Path], Mapping[str, Quantity]]
@@ -65,7 +72,7 @@ def _answers(case: StructureCase) -> tuple[Mapping[str, str], Measure]:
         if isinstance(reference, Cantilever):
             return SWING, _swing
     if not case.watch:
-        message = "has no point, and nothing exact is known: there is nothing that could be compared"
+        message = "has no watch point, and there is no exact reference: nothing can be compared"
         raise CaseError("case", [Problem("watch", message, None, "tables [watch.NAME]")])
     return CURVES, _curves
 
@@ -113,14 +120,14 @@ def _own_solver(case: StructureCase) -> Settings:
     return alone | ({"dynamics.coupling.compare": "false"} if compared else {})
 
 
-def _elements(name: str, suffix: str, base: Settings, refined: tuple[float, ...], case: StructureCase) -> Knob:
+def _elements(name: str, suffix: str, base: Settings, refined: tuple[float, ...], case: StructureCase) -> Parameter:
     """Numbers of elements along all axes; the explicit step follows."""
 
-    def at(value: float) -> Rung:
+    def at(value: float) -> StudyRun:
         factor = GRAIN * ceil(1.0 / (GRAIN * value) - ROUNDING)
-        return Rung(f"elements x {factor:.3g}{suffix}", name, base | _refine(case, factor), 1.0 / factor)
+        return StudyRun(f"elements x {factor:.3g}{suffix}", name, base | _refine(case, factor), 1.0 / factor)
 
-    return Knob(name, tuple(1.0 / factor for factor in refined), at, _order(case))
+    return Parameter(name, tuple(1.0 / factor for factor in refined), at, _order(case))
 
 
 def _order(case: StructureCase) -> float | None:
@@ -132,7 +139,7 @@ def _refine(case: StructureCase, factor: float) -> Settings:
     return {"structure.refine": f"{factor * case.structure.refine:.6g}"}
 
 
-def _other_solvers(case: StructureCase) -> list[Knob]:
+def _other_solvers(case: StructureCase) -> list[Parameter]:
     """One model where the case has two; where it has one that is linear, the solver that it has not."""
     if case.dynamics.coupling is not None:
         return [_elements(f"{ELEMENT_SIZE}, one model", ", one model", {"dynamics.solver": "dns"}, ALONE, case)]
@@ -143,22 +150,22 @@ def _other_solvers(case: StructureCase) -> list[Knob]:
 
 
 def _is_linear(case: StructureCase) -> bool:
-    yielding = any(material.plasticity is not None for material in case.scene.layer_materials.values())
+    yielding = any(material.plasticity is not None for material in case.problem.layer_materials.values())
     return not yielding and case.dynamics.kinematics == "small"
 
 
-def _steps(case: StructureCase, own: Settings) -> tuple[Knob, Rung]:
+def _steps(case: StructureCase, own: Settings) -> tuple[Parameter, StudyRun]:
     """The time step by itself, on one mesh, and the much smaller one that it is compared with."""
     implicit = case.dynamics.solver == "implicit"
     values, smallest = (LENGTHENED, SHORTENED) if implicit else (FRACTIONS, SMALLEST)
     setting = _implicit_step(case) if implicit else _step_fraction
     base = own | _refine(case, COARSE)
 
-    def at(value: float) -> Rung:
-        told, settings = setting(value)
-        return Rung(f"step {told}", TIME_STEP, base | settings, value)
+    def at(value: float) -> StudyRun:
+        size, settings = setting(value)
+        return StudyRun(f"step {size}", TIME_STEP, base | settings, value)
 
-    return Knob(TIME_STEP, values, at, SECOND).apart(smallest)
+    return Parameter(TIME_STEP, values, at, SECOND).apart(smallest)
 
 
 def _step_fraction(value: float) -> tuple[str, Settings]:
@@ -179,7 +186,7 @@ def _implicit_step(case: StructureCase) -> Callable[[float], tuple[str, Settings
     return setting
 
 
-def _schemes(case: StructureCase, own: Settings) -> list[Rung]:
+def _schemes(case: StructureCase, own: Settings) -> list[StudyRun]:
     """Other ways to couple two models; each against the exact motion, and against one model on the same mesh."""
     if case.dynamics.coupling is None:
         return []
@@ -194,34 +201,36 @@ def _schemes(case: StructureCase, own: Settings) -> list[Rung]:
     if _is_linear(case) and "own scheme" in ways and chosen in ("auto", "local_steps"):
         ways["one level"] = {f"{key}.scheme": "local_steps", f"{key}.levels": "1"}
     one_model = f"elements x {SCHEMES_AT:.3g}, one model"
-    rungs = []
+    runs = []
     for name, settings in ways.items():
         every = own | mesh | settings
         if settings:
-            rungs.append(Rung(f"{name} x {SCHEMES_AT:.3g}", "scheme", every))
-        rungs.append(Rung(f"{name} alone", "scheme, same mesh", every, None, one_model))
-    return rungs + _placements(own | mesh)
+            runs.append(StudyRun(f"{name} x {SCHEMES_AT:.3g}", "scheme", every))
+        runs.append(StudyRun(f"{name} alone", "scheme, same mesh", every, None, one_model))
+    return runs + _placements(own | mesh)
 
 
-def _placements(base: Settings) -> list[Rung]:
+def _placements(base: Settings) -> list[StudyRun]:
     """Both models on both ranks, or one on each."""
     if available_cores() < 2:
         return []
     ranks = base | {"dynamics.ranks": "2"}
     return [
-        Rung(f"2 ranks, {name}", "placement", ranks | {"dynamics.coupling.placement": name})
+        StudyRun(f"2 ranks, {name}", "placement", ranks | {"dynamics.coupling.placement": name})
         for name in ("shared", "disjoint")
     ]
 
 
-def _shapes(case: StructureCase, own: Settings) -> list[Rung]:
+def _shapes(case: StructureCase, own: Settings) -> list[StudyRun]:
     """Tetrahedra in place of hexahedra, where no layers are tied."""
     body = case.structure
     tied = case.dynamics.coupling is not None or any(layer.in_plane for layer in body.layers.values())
     if tied or body.element != "hexahedron":
         return []
     return [
-        Rung(f"{name} x {factor:g}", "shape of elements", own | _refine(case, factor) | {"structure.element": element})
+        StudyRun(
+            f"{name} x {factor:g}", "shape of elements", own | _refine(case, factor) | {"structure.element": element}
+        )
         for element, name in SHAPES.items()
         for factor in (0.5, 1.0)
     ]

@@ -1,24 +1,39 @@
-"""Tables of what accuracy costs: for the terminal, the page, a report and a README."""
+"""Tables of what accuracy costs, with the Pareto front: for the terminal, the page, a report and a README."""
 
 import shlex
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
-from reflowshock.workflow.case.problems import as_toml
+from reflowshock.problem import as_toml
 from reflowshock.workflow.case.scales import override_value
 from reflowshock.workflow.case.text import number, percent
 from reflowshock.workflow.convergence.measured import Accuracy, Fit, Measurement
-from reflowshock.workflow.convergence.pareto import front
+
+
+def front(costs: Sequence[float], errors: Sequence[float]) -> list[int]:
+    """Return which runs are on the front, the cheapest first.
+
+    Args:
+        costs: of each run.
+        errors: of each run, equally many.
+    """
+    best, chosen = float("inf"), []
+    for place in sorted(range(len(costs)), key=lambda k: (costs[k], errors[k])):
+        if errors[place] < best:
+            best = errors[place]
+            chosen.append(place)
+    return chosen
+
 
 LONGEST_MESSAGE = 90
 ON_FRONT = "*"
 
 
 def every_run(accuracy: Accuracy) -> list[Measurement]:
-    """Return the rungs that were run and, where it is none of them, the recommendation."""
+    """Return the runs that were run and, where it is none of them, the recommendation."""
     chosen = accuracy.recommended
     found = chosen.found if chosen else None
-    extra = [] if found is None or found.rung in {one.rung for one in accuracy.measurements} else [found]
+    extra = [] if found is None or found.run in {one.run for one in accuracy.measurements} else [found]
     return [*accuracy.measurements, *extra]
 
 
@@ -31,7 +46,7 @@ def on_front(accuracy: Accuracy) -> set[str]:
     """Return the names of the runs that no other beats in both error and core-seconds."""
     known = compared(accuracy)
     chosen = front([one.core_seconds for one in known], [one.errors[accuracy.judged].value for one in known])
-    return {known[place].rung for place in chosen}
+    return {known[place].run for place in chosen}
 
 
 def runs(accuracy: Accuracy) -> dict:
@@ -42,7 +57,7 @@ def runs(accuracy: Accuracy) -> dict:
     for one in sorted(every_run(accuracy), key=lambda one: (bool(one.failed), bool(one.against), one.core_seconds)):
         errors = [percent(one.errors[name].value) if name in one.errors else "" for name in accuracy.errors]
         cost = ["", ""] if one.failed else [f"{one.seconds:.1f}", f"{one.core_seconds:.1f}"]
-        name = f"{one.rung} {ON_FRONT}" if one.rung in best else one.rung
+        name = f"{one.run} {ON_FRONT}" if one.run in best else one.run
         rows.append([name, *errors, *cost, _remark(one, accuracy, usual)])
     return {"head": head, "rows": rows, "prose": True}
 
@@ -71,22 +86,28 @@ def legend(accuracy: Accuracy) -> str:
     """Say what marks and errors mean."""
     names = [f"{short(name)}: {words}" for name, words in accuracy.errors.items() if short(name) != words]
     usual = usually_against(accuracy)
-    reference = [f"compared with {usual}, where nothing else is said"] if usual else []
+    reference = [f"compared with {usual} unless stated otherwise"] if usual else []
     return "; ".join([f"{ON_FRONT} on the Pareto front", *reference, *names])
 
 
 def orders(accuracy: Accuracy) -> dict:
     """Observed orders beside theory, and how cost grows."""
     rows = [
-        [knob, short(name), f"{error.order:.2f}", "" if error.theory is None else f"{error.theory:g}", _growth(fit)]
-        for knob, fit in accuracy.fits.items()
-        for name, error in fit.errors.items()
+        [
+            parameter,
+            short(quantity),
+            f"{error.order:.2f}",
+            "" if error.theory is None else f"{error.theory:g}",
+            _growth(fit),
+        ]
+        for parameter, fit in accuracy.fits.items()
+        for quantity, error in fit.errors.items()
     ]
-    return {"head": ["knob", "error", "order", "theory", "core-seconds"], "rows": rows, "prose": True}
+    return {"head": ["parameter", "error", "order", "theory", "core-seconds"], "rows": rows, "prose": True}
 
 
 def _growth(fit: Fit) -> str:
-    """Write the fit of the cost; h is the value of the knob."""
+    """Write the fit of the cost; h is the value of the parameter."""
     if fit.cost is None:
         return ""
     cost = fit.cost
@@ -94,7 +115,7 @@ def _growth(fit: Fit) -> str:
 
 
 def prediction(accuracy: Accuracy) -> dict | None:
-    """Error and cost of the recommendation: foreseen and found; None where none was run."""
+    """Error and cost of the recommendation: predicted and found; None where none was run."""
     chosen = accuracy.recommended
     if chosen is None or chosen.found is None or accuracy.judged not in chosen.found.errors:
         return None
@@ -108,12 +129,12 @@ def prediction(accuracy: Accuracy) -> dict | None:
         ],
         ["core-seconds", f"{chosen.core_seconds:.2f} s", f"{seconds:.2f} s", change(seconds, chosen.core_seconds)],
     ]
-    return {"head": ["", "foreseen", "found", "difference"], "rows": rows}
+    return {"head": ["", "predicted", "found", "difference"], "rows": rows}
 
 
-def change(found: float, foreseen: float) -> str:
-    """Write by how much what was found differs from what was foreseen."""
-    return f"{100.0 * (found / foreseen - 1.0):+.0f} %"
+def change(found: float, predicted: float) -> str:
+    """Write by how much what was found differs from what was predicted."""
+    return f"{100.0 * (found / predicted - 1.0):+.0f} %"
 
 
 def as_lines(settings: Mapping[str, str]) -> list[str]:

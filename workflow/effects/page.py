@@ -1,4 +1,4 @@
-"""The page of the registry, and that of a scene, in a terminal."""
+"""The page of the registry, and that of a case, in a terminal."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -7,13 +7,10 @@ from rich.console import Console
 from rich.table import Table
 
 from reflowshock.workflow.case.case import Case
-from reflowshock.workflow.effects.costs import MEASURED, measured
-from reflowshock.workflow.effects.effect import Effect
-from reflowshock.workflow.effects.registry import registry
-from reflowshock.workflow.effects.table import CAPTION, HEAD, per_cent, rows
+from reflowshock.workflow.effects.registry import Effect, registry
+from reflowshock.workflow.effects.table import CAPTION, HEAD, MEASURED, measured, per_cent, rows
 from reflowshock.workflow.kinds import kind_of
-from reflowshock.workflow.process.plan_table import new_table
-from reflowshock.workflow.process.terminal import styled
+from reflowshock.workflow.process.terminal import new_table, styled
 
 FIELDS = (("adds", "adds"), ("number", "number"), ("influence", "influence"), ("switch", "key"), ("place", "object"))
 
@@ -27,7 +24,7 @@ def show_registry(console: Console) -> None:
                 _add(table, effect)
         console.print(table)
     console.print(
-        styled("\n[dim]An effect that is off is absent: no memory, no work, no branch. `effects CASE` says what acts.")
+        styled("\n[dim]An effect that is off costs nothing. `reflowshock effects CASE` shows which effects act.")
     )
 
 
@@ -36,7 +33,7 @@ def _add(table: Table, effect: Effect) -> None:
     if effect.threshold is not None:
         lines.insert(2, ("threshold", f"acts {effect.acts} {effect.threshold:g}"))
     if effect.name in measured():
-        lines.append(("cost", f"adds {per_cent(measured()[effect.name] - 1.0)} of a step without it ({MEASURED.name})"))
+        lines.append(("cost", f"adds {per_cent(measured()[effect.name] - 1.0)} to a step ({MEASURED.name})"))
     lines.append(("source", effect.source))
     for place, (title, text) in enumerate(lines):
         name = effect.name.replace("_", " ") if place == 0 else ""
@@ -44,7 +41,7 @@ def _add(table: Table, effect: Effect) -> None:
 
 
 def effects_table(case: Case, effects: Mapping[str, Any], of_what: str) -> Table:
-    """Return the effects of a scene: on or off, expected influence, share of the cost, why."""
+    """Return the effects of a case: on or off, expected influence, share of the cost, why."""
     table = new_table(f"\nEffects of the {of_what}", *HEAD)
     for name, acts, influence, cost, why in rows(case, effects):
         table.add_row(name, styled("[green]on[/]" if acts else "[dim]off[/]"), influence, cost, why)

@@ -1,20 +1,69 @@
-"""The effects of a scene as rows of text: state, expected influence on the answer, share of the cost, why."""
+"""The effects of a case as rows of text: state, expected influence, why, and the predicted share of the cost."""
 
+import json
 from collections.abc import Iterator, Mapping
+from functools import cache
+from pathlib import Path
 from typing import Any
 
+from reflowshock.fem.errors import PulseError
 from reflowshock.workflow.case.case import Case
-from reflowshock.workflow.effects.costs import cost_shares
+from reflowshock.workflow.case.problems import CaseError
+from reflowshock.workflow.effects.registry import effect_of
+from reflowshock.workflow.kinds import kind_of, stage_seconds
+
+MEASURED = Path(__file__).with_name("costs.json")  # written by benchmarks/effects.py
+
+
+@cache
+def measured() -> dict[str, float]:
+    """Return effect -> processor seconds of a step with it over those of one without."""
+    return {name: item["ratio"] for name, item in json.loads(MEASURED.read_text(encoding="utf-8"))["effects"].items()}
+
+
+def cost_shares(case: Case, effects: Mapping[str, Any]) -> dict[str, float]:
+    """Return effect -> its share of the predicted cost; of one that is off, what it would add.
+
+    Negative where the effect saves time. Effects whose cost is neither predicted nor measured are left out.
+    """
+    try:
+        seconds = stage_seconds(case)
+    except PulseError:
+        return {}  # a report of a run whose table of the pulse is no longer there
+    total = sum(seconds.values())
+    shares = {}
+    for name, decision in effects.items():
+        sign = 1.0 if decision["on"] else -1.0
+        other = _other_way(case, name, seconds, decision["on"])
+        if other is not None and total > 0.0:
+            shares[name] = sign * (1.0 - other / total)
+    return shares
+
+
+def _other_way(case: Case, name: str, seconds: Mapping[str, float], acts: bool) -> float | None:
+    """Return the predicted cost [s] of the case with an effect the other way; None where nothing tells it."""
+    toggles, total = kind_of(case).toggles(case), sum(seconds.values())
+    if name in toggles:
+        try:
+            return sum(stage_seconds(toggles[name](case, acts)).values())
+        except CaseError:
+            return None  # the case could not be run that way
+    effect = effect_of(name, reflowed="reflow" in case.pipeline.names)
+    if effect is None or effect.name not in measured() or effect.stage not in seconds:
+        return None
+    ratio = measured()[effect.name]
+    return total + seconds[effect.stage] * ((1.0 / ratio if acts else ratio) - 1.0)
+
 
 HEAD = ("effect", "", "influence", "cost", "why")
 CAPTION = (
-    "influence: expected change of the answer; where off, what is left out. cost: share of the predicted time; where"
-    " off, what it would add (below 0: it saves time). –: nothing foresees it."
+    "influence: expected change of the result; if off, the error of leaving it out. cost: share of the predicted time;"
+    " if off, what it would add (below 0: it saves time). –: not predicted."
 )
 
 
 def rows(case: Case, effects: Mapping[str, Any]) -> Iterator[tuple[str, bool, str, str, str]]:
-    """Yield name, whether it is on, influence, cost and why of each effect of a scene."""
+    """Yield name, whether it is on, influence, cost and why of each effect of a case."""
     shares = cost_shares(case, effects)
     for name, decision in effects.items():
         influence, share = decision.get("influence"), shares.get(name)
@@ -40,8 +89,8 @@ def per_cent(share: float) -> str:
 
 def report_table(case: Case, effects: Mapping[str, Any]) -> dict:
     """Which effects were simulated, their expected influence and predicted cost, and why: in prose."""
-    told = [
+    shown = [
         [name, "on" if acts else "off", influence, cost, why]
         for name, acts, influence, cost, why in rows(case, effects)
     ]
-    return {"head": ["effect", "state", *HEAD[2:]], "rows": told, "prose": True, "caption": CAPTION}
+    return {"head": ["effect", "state", *HEAD[2:]], "rows": shown, "prose": True, "caption": CAPTION}

@@ -7,18 +7,17 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from reflowshock.workflow.jobs.engine import SAID, last_words, snakemake
+from reflowshock.workflow.jobs.engine import SAID, JobOutput, failures_of, last_words, snakemake
 from reflowshock.workflow.jobs.executor import Executor, Jobs, Local, Slurm
-from reflowshock.workflow.jobs.job_output import JobOutput, failures_of
 from reflowshock.workflow.store.point import Point
 from reflowshock.workflow.store.product import discard
-from reflowshock.workflow.store.state import Verdict, examine, why_stale
+from reflowshock.workflow.store.state import StageState, examine, why_stale
 from reflowshock.workflow.store.store import Store
 from reflowshock.workflow.store.view import show
 
 BATCH = "batch"  # below the store: jobs, logs and marks of the last call
 JOBS = f"{BATCH}/jobs.json"
-UNTRIED = "was not reached"
+UNTRIED = "was not started"
 LEAST_FREE = 2**20  # bytes of a device on which a stage could still have said why it ended
 
 
@@ -101,9 +100,9 @@ def missing(store: Store, points: Sequence[Point], until: str) -> list[Job]:
     jobs: dict[str, Job] = {}
     for point in points:
         before: list[str] = []
-        verdicts = examine(store, point)
+        states = examine(store, point)
         for stage in point.case.pipeline.upstream(until):
-            if verdicts[stage.name].stale:
+            if states[stage.name].stale:
                 name = job_name(point, stage.name)
                 jobs.setdefault(name, Job(stage.name, point, tuple(before)))
                 before.append(name)
@@ -112,8 +111,8 @@ def missing(store: Store, points: Sequence[Point], until: str) -> list[Job]:
 
 def show_products(store: Store, point: Point) -> list[str]:
     """Show in a point's run folder what is there, intact, and made from what is there; return files put back."""
-    verdicts = examine(store, point)
-    return show(store, point, [name for name, one in verdicts.items() if not (one.stale or one.because_of)])
+    states = examine(store, point)
+    return show(store, point, [name for name, one in states.items() if not (one.stale or one.because_of)])
 
 
 def run_points(
@@ -167,11 +166,11 @@ def why(store: Store, point: Point, until: str) -> str:
 
 def failure_of(store: Store, point: Point, until: str) -> tuple[str, str] | None:
     """Return the first stage of a point that is not there, and why; None where all are."""
-    verdicts = examine(store, point)
-    stale = [stage.name for stage in point.case.pipeline.upstream(until) if verdicts[stage.name].stale]
+    states = examine(store, point)
+    stale = [stage.name for stage in point.case.pipeline.upstream(until) if states[stage.name].stale]
     if not stale:
         return None
-    return stale[0], store.message(point, stale[0]) or _untold(store, point, stale[0], verdicts[stale[0]])
+    return stale[0], store.message(point, stale[0]) or _untold(store, point, stale[0], states[stale[0]])
 
 
 def log_of(store: Store, point: Point, stage: str) -> Path:
@@ -179,19 +178,19 @@ def log_of(store: Store, point: Point, stage: str) -> Path:
     return store.home / BATCH / "logs" / f"{job_name(point, stage)}.txt"
 
 
-def _untold(store: Store, point: Point, stage: str, verdict: Verdict) -> str:
+def _untold(store: Store, point: Point, stage: str, state: StageState) -> str:
     """Say what is known of a stage that said nothing when it ended."""
     name, said, log = job_name(point, stage), store.home / SAID, log_of(store, point, stage)
     if by_cluster := failures_of(said).get(name):
         return f"{by_cluster}; see {said}"
     if not log.exists():
-        told = UNTRIED if verdict.missing else f"{UNTRIED}: {why_stale(verdict)}"
-        return f"{told}; see {said}\n{last_words(store.home)}" if said.is_file() else told
+        reason = UNTRIED if state.missing else f"{UNTRIED}: {why_stale(state)}"
+        return f"{reason}; see {said}\n{last_words(store.home)}" if said.is_file() else reason
     words = log.read_text(encoding="utf-8", errors="replace").strip().splitlines()
-    last = f'; its last words: "{words[-1].strip()}"' if words else ""
+    last = f'; last output: "{words[-1].strip()}"' if words else ""
     if shutil.disk_usage(store.home).free < LEAST_FREE:
         return f"no space left on the device of {store.home}"
-    return f"ended without an error of its own, as when it is killed{last}; see {log}"
+    return f"ended without an error message (it may have been killed){last}; see {log}"
 
 
 def _run(store: Store, jobs: Sequence[Job], machine: Machine, lock: int) -> bool:

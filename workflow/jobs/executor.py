@@ -1,4 +1,4 @@
-"""Where stages run: on this machine, or as jobs of a cluster; how Snakemake is told so, and ended."""
+"""Where stages run: on this machine, or as jobs of a cluster; options of Snakemake for that, and how it is ended."""
 
 import signal
 import subprocess
@@ -10,11 +10,11 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Any, Protocol
 
+from reflowshock.problem import Problem
 from reflowshock.workflow.case.case import Case
-from reflowshock.workflow.case.problems import CaseError, Problem
-from reflowshock.workflow.jobs.checks import check_slurm
+from reflowshock.workflow.case.problems import CaseError
+from reflowshock.workflow.jobs.checks import NoAnswer, cancel, check_slurm, jobs_in
 from reflowshock.workflow.jobs.profile import Profile, read_profile
-from reflowshock.workflow.jobs.queue import NoAnswer, cancel, jobs_in
 from reflowshock.workflow.pipeline.resources import MOST_CORES, stage_resources
 from reflowshock.workflow.process.environment import available_cores
 from reflowshock.workflow.process.launch import DIE_WITH_PARENT, LAUNCHER, end_group
@@ -124,7 +124,7 @@ class Slurm:
         return (*jobs, "--nocolor", "--quiet", "progress", "host")
 
     def jobs(self, case: Case) -> Jobs:
-        """What ``plan`` foresees, with a margin."""
+        """What ``plan`` predicts, with a margin."""
         wanted = stage_resources(case, self.profile.walltime_factor, self.largest)
         return {stage: resources.of_rule(self.profile.launcher) for stage, resources in wanted.items()}
 
@@ -163,5 +163,5 @@ def executor_for(
         chosen = read_profile(profile)
         return Slurm(chosen, at_once or JOBS, check_slurm(chosen, cases).largest, oversubscribe)
     if profile is not None:
-        raise CaseError("run", [Problem("--profile", "is of a cluster", str(profile), "with --executor slurm")])
+        raise CaseError("run", [Problem("--profile", "needs a cluster", str(profile), "with --executor slurm")])
     return Local(at_once or available_cores(), oversubscribe)

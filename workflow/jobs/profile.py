@@ -8,8 +8,9 @@ from typing import Any
 
 import yaml
 
-from reflowshock.fem.names import nearest
-from reflowshock.workflow.case.problems import CaseError, Problem
+from reflowshock.names import nearest
+from reflowshock.problem import Problem
+from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.case.toml_file import MOST_BYTES, fault_of
 
 OWN = Path("profiles/slurm")  # of the user, below the working directory

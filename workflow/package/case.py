@@ -59,7 +59,7 @@ def package_pipeline(heated: bool, dropped: bool) -> Pipeline:
     )
     solid = ("reflow/shapes.h5", "reflow/joints.json", "reflow/pads.json")
     if heated:
-        last = () if dropped else COOLED  # what is told of cooling, where no shock begins with it
+        last = () if dropped else COOLED  # what is reported of cooling, where no shock begins with it
         parameters = (*PADS, *HEATED, *STRUCTURE_ROLES, "solder", *last)
         reflow = Stage("reflow", parameters, ("geometry",), (*solid, "reflow/structure.npz"))
     else:

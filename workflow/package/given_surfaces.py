@@ -5,8 +5,8 @@ from collections.abc import Container, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from reflowshock.fem.names import nearest
-from reflowshock.workflow.case.problems import Problem
+from reflowshock.names import nearest
+from reflowshock.problem import Problem
 from reflowshock.workflow.case.toml_file import beside
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ def problems(package: "Package", pads: "Sequence[PadSite]", heated: bool) -> Ite
             hint = nearest(name, names)
             yield Problem(key, "is not a joint of the model", None, f"{names[0]} to {names[-1]}", hint)
         if path.suffix.lower() not in SUFFIXES:
-            yield Problem(key, "is not in a format that is read", text, ", ".join(SUFFIXES))
+            yield Problem(key, "has an unknown file format", text, ", ".join(SUFFIXES))
         elif name in sites:
             try:
                 if heated:

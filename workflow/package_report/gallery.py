@@ -1,4 +1,4 @@
-"""The joint gallery: every distinct joint at one scale, by how far it is from the truncated sphere of its volume."""
+"""Pictures of all joints: the gallery of distinct shapes at one scale, and maps of the array."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -6,13 +6,30 @@ from typing import Any
 
 import numpy as np
 import pyvista
+from matplotlib import colormaps, pyplot
+from matplotlib.axes import Axes
 
 from reflowshock.meshing.surface.truncated_sphere import TruncatedSphere
 from reflowshock.workflow.package_report.joint_records import by_shape
-from reflowshock.workflow.report.pictures import MILLI, new_plotter, save
+from reflowshock.workflow.report.curves import MICRO, MILLI, STYLE, svg
+from reflowshock.workflow.report.pictures import new_plotter, save
+
+MAPS = (
+    ("standoff", "standoff [µm]", MICRO),
+    ("max_width", "maximum width [µm]", MICRO),
+    ("contact_angle_package", "contact angle at the package [deg]", 1.0),
+    ("tilted", "tilt of the package's pad [mrad]", MILLI),
+    ("contact_angle_board", "contact angle at the board [deg]", 1.0),
+)
+PANELS = 4
+MAP_POINTS = 215.0  # width of a map on the page, in points
+MARK_SHARE = 0.82  # of the pitch that a mark takes
+SMALLEST_TEXT = 3.5  # points; below it a map has colours only
+NOT_OK = "#b3261e"
+
 
 FREE, WIDTH = 0, 1800
-DEVIATION = "deviation [um]"
+DEVIATION = "deviation [µm]"
 LINES, LINE = 6, 31  # of text beneath a joint; pixels of one
 BAR = 100  # pixels beneath all rows
 MAXIMUM_NAMES = 4
@@ -85,9 +102,9 @@ def caption(names: Sequence[str], joint: Mapping[str, Any], surface: pyvista.Dat
     deviation = free_of(surface)[DEVIATION]
     lines = [
         " ".join(names[:MAXIMUM_NAMES]) + more,
-        f"{1e6 * joint['standoff']:.1f} x {1e6 * joint['max_width']:.1f} um",
+        f"{1e6 * joint['standoff']:.1f} x {1e6 * joint['max_width']:.1f} µm",
         f"{joint['angles']} deg" if "angles" in joint else "",
-        f"{deviation.min():+.1f} to {deviation.max():+.1f} um",
+        f"{deviation.min():+.1f} to {deviation.max():+.1f} µm",
         f"tilt {1e3 * joint['tilted']:.1f} mrad" if "tilted" in joint else "",
     ]
     return "\n".join(line for line in lines if line)
@@ -125,7 +142,7 @@ def _add_text(plotter: pyvista.Plotter, text: str, place: np.ndarray) -> None:
 
 def _add_bar(plotter: pyvista.Plotter) -> None:
     plotter.add_scalar_bar(
-        title="deviation from the truncated sphere of the same volume [um]",
+        title="deviation from the truncated sphere of the same volume [µm]",
         n_labels=5,
         fmt="%+.0f",
         vertical=False,
@@ -149,3 +166,56 @@ def _look(plotter: pyvista.Plotter, cell: tuple[float, float], counts: tuple[int
     plotter.camera_position = [tuple(centre + np.array([0.0, -100.0, 100.0 * TILT])), tuple(centre), (0.0, 0.0, 1.0)]
     plotter.enable_parallel_projection()
     plotter.camera.parallel_scale = 0.5 * pixel * plotter.window_size[1]
+
+
+def array_map(joints: Sequence[Mapping[str, Any]]) -> str:
+    """Draw standoff, width, contact angle and tilt or second contact angle of every joint at its place in the array.
+
+    Args:
+        joints: records with name, x, y, standoff, max_width [m] and verdict, and what else of ``MAPS`` the joints have.
+
+    Returns:
+        An SVG element; joints whose verdict is not ok have a red rim.
+    """
+    shown = [entry for entry in MAPS if any(entry[0] in joint for joint in joints)][:PANELS]
+    rows = -(-len(shown) // 2)
+    with pyplot.rc_context(STYLE):
+        figure, axes = pyplot.subplots(rows, 2, figsize=(9.2, 3.9 * rows), constrained_layout=True, squeeze=False)
+        for axis, entry in zip(axes.flat, shown, strict=False):
+            _draw_map(axis, joints, entry)
+        for axis in axes.flat[len(shown) :]:
+            axis.set_visible(False)
+        return svg(figure)
+
+
+def pitch_of(joints: Sequence[Mapping[str, Any]]) -> float:
+    """Return the smallest distance of two joints along x or y [m]; 1 mm for a single one."""
+    steps = [np.diff(np.unique(np.round([joint[axis] for joint in joints], 9))) for axis in ("x", "y")]
+    return float(min(np.concatenate(steps), default=MILLI))
+
+
+def _draw_map(axis: Axes, joints: Sequence[Mapping[str, Any]], entry: tuple[str, str, float]) -> None:
+    key, label, unit = entry
+    values = np.array([joint.get(key, 0.0) for joint in joints]) / unit
+    x, y = (np.array([joint[name] for joint in joints]) / MILLI for name in "xy")
+    count = 1 + max(np.ptp(x), np.ptp(y)) * MILLI / pitch_of(joints)
+    width = MAP_POINTS / (count + 0.3)  # points between two joints
+    rims = ["white" if joint.get("verdict", "ok") in ("ok", "given") else NOT_OK for joint in joints]
+    marks = axis.scatter(x, y, c=values, s=(MARK_SHARE * width) ** 2, cmap="viridis", edgecolors=rims, linewidths=1.2)
+    size = min(8.5, 0.19 * width)
+    if size >= SMALLEST_TEXT:
+        _write_names(axis, joints, (x, y, values), size)
+    margin = 0.65 * pitch_of(joints) / MILLI
+    axis.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal", axisbelow=True)
+    axis.set(xlim=(x.min() - margin, x.max() + margin), ylim=(y.min() - margin, y.max() + margin))
+    axis.figure.colorbar(marks, ax=axis, label=label)
+
+
+def _write_names(axis: Axes, joints: Sequence[Mapping[str, Any]], places: tuple, size: float) -> None:
+    values = places[2]
+    span = float(np.ptp(values)) or 1.0
+    digits = 0 if np.abs(values).max() >= 100.0 else 1 if np.abs(values).max() >= 10.0 else 2
+    for joint, x, y, value in zip(joints, *places, strict=True):
+        light = np.dot(colormaps["viridis"]((value - values.min()) / span)[:3], (0.3, 0.6, 0.1)) > 0.5
+        text = f"{joint['name']}\n{value:.{digits}f}"
+        axis.annotate(text, (x, y), ha="center", va="center", fontsize=size, color="black" if light else "white")

@@ -96,7 +96,7 @@ def table(interfaces: Mapping[str, Arrays]) -> dict:
 
 
 def interface_maps(interfaces: Mapping[str, Arrays]) -> str:
-    """Draw the faces of all joints seen from above, a row a time, a column a mode, one colour scale a time."""
+    """Draw the faces of all joints seen from above, a row a time, a column a mode, one colour scale per time."""
     times = times_of(interfaces)[:ROWS_DRAWN]
     with pyplot.rc_context(STYLE | {"axes.grid": False, "savefig.dpi": 200}):
         size = (PANEL * len(interfaces) + 0.8, (PANEL - 0.2) * len(times))

@@ -32,9 +32,9 @@ def _record(pad: Mapping, reflow: Mapping, surfaces: Mapping, quality: Mapping) 
     joint = {} if "given" in surface else reflow.get(name, {})
     metrics = {key: metric["value"] for key, metric in joint.get("metrics", {}).items()}
     surface = {key: np.degrees(value) if "angle" in key else value for key, value in surface.items()}
-    told = {"shape": joint.get("shape", name), "verdict": joint.get("verdict", "given")}
-    told |= {"given": joint["given"]} if "given" in joint else {}
-    record: dict[str, Any] = {**surface, **pad, **told, **metrics, **quality.get(name, {})}
+    verdict = {"shape": joint.get("shape", name), "verdict": joint.get("verdict", "given")}
+    verdict |= {"given": joint["given"]} if "given" in joint else {}
+    record: dict[str, Any] = {**surface, **pad, **verdict, **metrics, **quality.get(name, {})}
     angles = (record.get("contact_angle_board"), record.get("contact_angle_package"))
     if None not in angles:
         record["angles"] = f"{angles[0]:.1f} / {angles[1]:.1f}"

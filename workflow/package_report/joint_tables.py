@@ -1,14 +1,30 @@
-"""Tables of joints: what the reflow made of each, how it was meshed, how the shock stressed it."""
+"""Tables of joints: their shape after reflow, their meshes, their stress in the shock."""
 
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from reflowshock.workflow.case.text import mega, micro, number, percent
+from reflowshock.workflow.case.text import mega, micro, nano, number, percent
 from reflowshock.workflow.package_report.joint_records import Column, Record, by_shape, record_table
 from reflowshock.workflow.process.products import read_json
 from reflowshock.workflow.report.histories import at_pads
+
+MESH_COLUMNS: tuple[Column, ...] = (
+    ("method", "method", str),
+    ("volume error", "volume_error", percent),
+    ("standoff error", "standoff_error", percent),
+    ("contact area error", "contact_area_error", percent),
+    ("largest deviation [µm]", "shape_deviation", micro),
+    ("min. scaled Jacobian", "minimum_scaled_jacobian", lambda value: f"{value:.2f}"),
+    ("critical step", "critical_time_step", nano),
+    ("tetrahedra", "tetrahedra", number),
+    ("their scaled Jacobian", "tetrahedra_quality", lambda value: f"{value:.2f}"),
+    ("tries", "tries", number),
+)
+SMALLEST_OF = ("minimum_scaled_jacobian", "critical_time_step", "tetrahedra_quality")
+
 
 SHAPE_COLUMNS: tuple[Column, ...] = (
     ("standoff [µm]", "standoff", micro),
@@ -83,7 +99,7 @@ def ranked_joints(
         "pad",
         "time [ms]",
         "peel stress [MPa]",
-        "largest in an element [MPa]",
+        "largest element value [MPa]",
         "standoff [µm]",
         "width [µm]",
         *(["plastic work at pad [kJ/m³]"] if "plastic_work_board" in history else []),
@@ -104,3 +120,41 @@ def failure_cells(history: Mapping[str, np.ndarray], column: int, failure: Mappi
         failed = [name.replace("_", " ") for name, verdicts in failure.items() if not verdicts[joint]["ok"]]
         cells.append(", ".join(failed) or "–")
     return cells
+
+
+def meshes(joints: Sequence[Record]) -> dict | None:
+    """How the joints were meshed, the worst of each shape; None where none is."""
+    if not any("minimum_scaled_jacobian" in joint for joint in joints):
+        return None
+    return record_table(MESH_COLUMNS, by_shape([_counted(joint) for joint in joints]), _worst)
+
+
+def missed_tries(joints: Sequence[Record]) -> dict | None:
+    """What tries to mesh a joint have missed before one succeeded; None where none has."""
+    rows = [[joint["name"], way["method"], way["missed"]] for joint in joints for way in joint.get("tries", ())]
+    return {"head": ["joint", "method", "missed"], "rows": rows, "prose": True} if rows else None
+
+
+def fine_instead(run_folder: Path) -> dict | None:
+    """Why joints of which few hexahedra cannot follow the shape are as fine where they were to be coarse."""
+    path = run_folder / "solder_mesh/coarse_quality.json"
+    coarse = read_json(path) if path.exists() else {}
+    rows = [[name, joint["fine_instead"]] for name, joint in coarse.items() if "fine_instead" in joint]
+    return {"head": ["joint", "why"], "rows": rows, "prose": True} if rows else None
+
+
+def _counted(joint: Record) -> dict[str, Any]:
+    """Return a record with the number of its tries, and of the tetrahedra that its hexahedra were made of."""
+    counted = dict(joint)
+    if "tries" in joint:
+        counted["tries"] = len(joint["tries"]) + 1
+    if tetrahedra := joint.get("tetrahedra"):
+        counted |= {"tetrahedra": tetrahedra["count"], "tetrahedra_quality": tetrahedra["minimum_scaled_jacobian"]}
+    return counted
+
+
+def _worst(key: str, values: list) -> Any:
+    """Return the worst of the values of a column."""
+    if isinstance(values[0], str):
+        return " ".join(dict.fromkeys(values))
+    return min(values) if key in SMALLEST_OF else max(values, key=abs)

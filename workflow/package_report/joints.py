@@ -4,19 +4,19 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from reflowshock.workflow.package_report import joint_tables, mesh_tables
+from reflowshock.workflow.package_report import joint_tables
+from reflowshock.workflow.package_report import joint_tables as mesh_tables
 from reflowshock.workflow.package_report.joint_records import bridge_records, joint_records
 from reflowshock.workflow.process.products import read_json
 
-BRIDGE_CAPTION = "as one body: particles and free surface, right by pressure above ambient."
+BRIDGE_CAPTION = "as one body: particles and free surface; right: coloured by pressure above ambient."
 
 
 def add_joints(run_folder: Path, context: dict) -> None:
     """Add shapes, maps, verdicts and meshes of the joints of an array, as far as the run has gone."""
     if not (run_folder / "reflow/joints.json").exists():
         return
-    from reflowshock.workflow.package_report.array_map import array_map
-    from reflowshock.workflow.package_report.gallery import render_gallery
+    from reflowshock.workflow.package_report.gallery import array_map, render_gallery
     from reflowshock.workflow.report.pictures import embedded
 
     joints = joint_records(run_folder)

@@ -4,19 +4,23 @@ import json
 from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
+from typing import Any
 
-from reflowshock.workflow.case.text import micro
+from reflowshock.workflow.case.text import mega, micro, number, quantity
 from reflowshock.workflow.package import findings
 from reflowshock.workflow.package.case import BoardDropCase
 from reflowshock.workflow.package_report import joint_tables
 from reflowshock.workflow.package_report.joint_records import joint_records
-from reflowshock.workflow.package_report.residual import add_residual
+from reflowshock.workflow.process.products import read_json
 from reflowshock.workflow.report import tables
 from reflowshock.workflow.report.histories import MODES, late_peak, read_modes
 
+FOLDERS = ("residual_two_scale", "residual_dns", "residual")  # of modes with fine joints of their own, or of all modes
+SIDES = ("von_mises_board", "von_mises_package")
+
 
 def add_shock(run_folder: Path, case: BoardDropCase, context: dict, summary: dict) -> None:
-    """Add what is told of the shock, where it was run."""
+    """Add the sections on the shock, where it was run."""
     shock = run_folder / "shock"
     histories, results = read_modes(shock)
     if not histories:
@@ -102,14 +106,14 @@ def _add_ranks(histories: dict, results: dict, joints: list[dict], context: dict
     )
 
 
-def _add_shape_effect(shock: Path, history: dict, told: tuple[list[dict], dict], context: dict) -> None:
-    """Add the shock of identical joints, where it was run; ``told`` of the real ones: records, and metrics of all."""
+def _add_shape_effect(shock: Path, history: dict, text: tuple[list[dict], dict], context: dict) -> None:
+    """Add the shock of identical joints, where it was run; ``text`` of the real ones: records, and metrics of all."""
     from reflowshock.workflow.package_report import shape_effect
 
     histories, _ = read_modes(shock, ("identical",))
     if not histories:
         return
-    (joints, metrics), identical = told, histories["identical"]
+    (joints, metrics), identical = text, histories["identical"]
     context["shape_effect"] = shape_effect.in_words(history, identical)
     if "identical_joint_standoff" in metrics:
         real, flat = (micro(metrics[f"{name}_joint_standoff"]["value"]) for name in ("critical", "identical"))
@@ -159,3 +163,61 @@ def _add_pictures(folder: Path, history: dict, result: dict, context: dict) -> N
     for name, render, series in (("joints", render_joints, joints), ("board", render_board, board)):
         draw = partial(render, series, history, parts)
         context["pictures"][name], context[f"{name}_caption"] = embedded(draw)
+
+
+def add_residual(shock: Path, parts: list[str], context: dict) -> None:
+    """Add what cooling left, where the shock begins with it.
+
+    Args:
+        shock: folder of the shock.
+        parts: names of the parts of its mesh.
+        context: of the page.
+    """
+    from reflowshock.workflow.report.pictures import embedded
+
+    folder = next((shock / name for name in FOLDERS if (shock / name / "result.json").exists()), None)
+    if folder is None:
+        return
+    result = read_json(folder / "result.json")
+    context["residual"] = in_words(result["metrics"])
+    context["tables"]["residual"] = table(result["joints"])
+    if result["joints"]["joints"]:
+        context["pictures"]["residual"], _ = embedded(partial(_draw, folder, result["joints"], parts))
+
+
+def in_words(metrics: Mapping[str, Any]) -> str:
+    """Say what stress cooling leaves in the joints, and how the package's warpage changes."""
+    lifts = (metrics[name]["value"] for name in ("solidified_warpage", "room_temperature_warpage"))
+    warped, cold = (f"{micro(lift)} µm" for lift in lifts)
+    text = f"Cooling from solidification changes the warpage of the package from {warped} to {cold}"
+    if "residual_stress_joint" in metrics:
+        joint, stress = metrics["residual_stress_joint"]["value"], quantity(metrics["residual_stress_largest"])
+        text += f" and leaves {stress} at the pads of {joint}, the largest of all joints"
+    return f"{text}. The shock begins with it: an upper bound, since solder that relaxes afterwards is not modelled."
+
+
+def table(joints: Mapping[str, list]) -> dict:
+    """Stress of every joint before the shock, the largest first."""
+    columns = [joints[name] for name in (*SIDES, "von_mises_max")]
+    strains = joints.get("plastic_strain_max")
+    heads = ["at the board's pad [MPa]", "at the package's pad [MPa]", "largest element value [MPa]"]
+    order = sorted(range(len(joints["joints"])), key=lambda k: -max(joints[side][k] for side in SIDES))
+    rows = [
+        [
+            joints["joints"][k],
+            *(mega(column[k]) for column in columns),
+            *([] if strains is None else [f"{number(100.0 * strains[k])} %"]),
+        ]
+        for k in order
+    ]
+    return {"head": ["joint", *heads, *([] if strains is None else ["largest plastic strain"])], "rows": rows}
+
+
+def _draw(folder: Path, joints: Mapping[str, list], parts: list[str], picture: Path) -> None:
+    import pyvista
+
+    from reflowshock.workflow.report.pictures import draw_joints
+
+    stress = [max(joints[side][k] for side in SIDES) for k in range(len(joints["joints"]))]
+    worst = stress.index(max(stress))
+    draw_joints(pyvista.read(folder / "residual.vtu"), parts, joints["joints"][worst], stress[worst], picture)

@@ -9,9 +9,10 @@ from pathlib import Path
 import numpy as np
 from rich.console import Console
 
+from reflowshock.problem import Problem
 from reflowshock.workflow.case.case import Case
 from reflowshock.workflow.case.plausible import FORCE, implausible, implausible_tables
-from reflowshock.workflow.case.problems import CaseError, Problem
+from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.case.text import duration
 from reflowshock.workflow.case.toml_file import fault_of
 from reflowshock.workflow.kinds import kind_of
@@ -41,7 +42,7 @@ def problems_of(case: Case, leave: Leave) -> list[Problem]:
         except CaseError as error:
             return error.problems
         except (ArithmeticError, ValueError, MemoryError) as error:  # beyond what floats can tell
-            return [Problem("", f"has values with which nothing can be computed: {error or type(error).__name__}")]
+            return [Problem("", f"has values that cannot be computed with: {error or type(error).__name__}")]
 
 
 def _values(case: Case, leave: Leave) -> list[Problem]:
@@ -65,8 +66,8 @@ def too_many_ranks(case: Case) -> Iterator[Problem]:
     cores = available_cores()
     for key, ranks in case.ranks_by_key.items():
         if ranks > cores:
-            message = f"asks for {ranks} MPI ranks, this machine offers {cores} cores"
-            yield Problem(key, message, ranks, f"<= {cores} in all, or more with --oversubscribe")
+            message = f"asks for {ranks} MPI ranks, but this machine has {cores} cores"
+            yield Problem(key, message, ranks, f"<= {cores} in total, or more with --oversubscribe")
 
 
 def too_large(case: Case, leave: Leave | None = None) -> Iterator[Problem]:
@@ -76,9 +77,9 @@ def too_large(case: Case, leave: Leave | None = None) -> Iterator[Problem]:
         return
     allowed = f"larger particles or elements, fewer MPI ranks, or {FORCE}"
     if not needed <= LARGEST_MEMORY:
-        yield Problem("", f"needs about {bytes_text(needed)} of memory, no machine has as much", None, allowed)
+        yield Problem("", f"needs about {bytes_text(needed)} of memory, more than any machine has", None, allowed)
     elif not leave.oversubscribe and needed > machine_memory():
-        message = f"needs about {bytes_text(needed)} of memory, this machine has {bytes_text(machine_memory())}"
+        message = f"needs about {bytes_text(needed)} of memory, but this machine has {bytes_text(machine_memory())}"
         yield Problem("", message, None, allowed)
 
 
@@ -114,10 +115,10 @@ def ask_if_long(name: str, seconds: float, yes: bool, console: Console) -> bool:
     """
     if yes or seconds <= LONG:
         return True
-    told = f"{name} is predicted to take about {duration(seconds)}"
+    prediction = f"{name} is predicted to take about {duration(seconds)}"
     if not (console.is_terminal and sys.stdin is not None and sys.stdin.isatty()):
-        raise CaseError("run", [Problem("", f"{told}; start it with --yes")])
-    return console.input(f"{told}; run it? \\[y/N] ").strip().lower() in ("y", "yes")
+        raise CaseError("run", [Problem("", f"{prediction}; start it with --yes")])
+    return console.input(f"{prediction}; run it? \\[y/N] ").strip().lower() in ("y", "yes")
 
 
 def bytes_text(number: float) -> str:

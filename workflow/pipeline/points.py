@@ -4,8 +4,9 @@ import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from reflowshock.problem import Problem
 from reflowshock.workflow.case.case import Case
-from reflowshock.workflow.case.problems import CaseError, Problem
+from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.kinds import kind_named_in
 from reflowshock.workflow.pipeline.reader import SETTING, read_case
 from reflowshock.workflow.store.keys import digest_of
@@ -83,7 +84,7 @@ def read_case_of_run(folder: Path) -> Case:
             raise ValueError(SEAL)
         return kind_named_in(table).case.model_validate(table)
     except FileNotFoundError as error:
-        raise CaseError(str(folder), [Problem("", "is not a run folder: nothing was run in it")]) from error
+        raise CaseError(str(folder), [Problem("", "is not a run folder")]) from error
     except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
-        message = "is not as it was written; `reflowshock run` with the case file writes it again"
+        message = "was changed since it was written; `reflowshock run` with the case file writes it again"
         raise CaseError(str(path), [Problem("", message)]) from error

@@ -5,9 +5,10 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
+from reflowshock.problem import Problem
 from reflowshock.workflow.case import fields
 from reflowshock.workflow.case.case import FULL, Case
-from reflowshock.workflow.case.problems import CaseError, Origin, Problem
+from reflowshock.workflow.case.problems import CaseError, Origin
 from reflowshock.workflow.case.scales import choose, is_key, override_value, take_scales
 from reflowshock.workflow.case.toml_file import is_too_deep, parse_toml, read_text
 from reflowshock.workflow.case.toml_places import Places
@@ -76,7 +77,7 @@ def _override(table: dict, overrides: Sequence[str], problems: list[Problem]) ->
     wrong = {problem.key for problem in problems}
     for key, value in [*of_scale.items(), *settings]:
         if key not in wrong and not set_value(table, key.split("."), value):
-            problems.append(Problem(key, "is below a key that has a value, not a table", value))
+            problems.append(Problem(key, "cannot be set: the key above it has a value, not a table", value))
     of_file = {key: Origin(f"[scales.{chosen}]", f"scales.{chosen}.{key}") for key in of_scale}
     return of_file | {key: Origin(SETTING) for key, _ in settings}
 

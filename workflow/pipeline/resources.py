@@ -1,4 +1,4 @@
-"""What the job of each stage asks a cluster for: ranks, cores, memory, time; as `plan` foresees, with a margin."""
+"""What the job of each stage asks a cluster for: ranks, cores, memory, time; as `plan` predicts, with a margin."""
 
 from dataclasses import dataclass
 from math import ceil
@@ -46,7 +46,7 @@ class Resources:
 
 
 def stage_resources(case: Case, walltime_factor: float = 1.0, cores: int = MOST_CORES) -> dict[str, Resources]:
-    """Foresee what the jobs of a case need.
+    """Predict what the jobs of a case need.
 
     Args:
         case: the case.

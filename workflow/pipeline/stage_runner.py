@@ -61,7 +61,7 @@ def _check_key(run: Run, stage: Stage, inputs: dict, key: str) -> None:
     """See to it that what a stage finds is what its product is named after, when the command began."""
     follows = [(read_record(run.folder / name) or {}).get("key") for name in stage.follows]
     if None not in follows and product_key(run.case, stage, inputs, follows) != key:
-        raise StageError("a file of the case, or the program, has changed since the command began; run it again")
+        raise StageError("a file of the case or the program itself has changed since the command started; run it again")
 
 
 def _check(run: Run, stage: Stage, before: dict, partial: Path) -> None:
@@ -69,12 +69,12 @@ def _check(run: Run, stage: Stage, before: dict, partial: Path) -> None:
     changed = compare(before["inputs"], stage_inputs(run.case, stage))
     if changed:
         names = ", ".join(change.key.removesuffix(".sha256") for change in changed)
-        raise StageError(f"{names}: the file has changed while the stage was at work; run it again")
+        raise StageError(f"{names}: the file changed while the stage was running; run it again")
     if None in before["reads"].values() or before["reads"] != _reads(run, stage):
-        raise StageError("a product that it reads has changed, or is damaged; run it again")
+        raise StageError("a product that the stage reads has changed or is damaged; run it again")
     missing = [name for name in stage.products if not (partial / name.removeprefix(f"{stage.name}/")).exists()]
     if missing:
-        raise StageError(f"it has not written {', '.join(missing)}")
+        raise StageError(f"the stage has not written {', '.join(missing)}")
 
 
 def core_seconds() -> float:
@@ -94,7 +94,7 @@ def execute(name: str, function: StageFunction, run: Run, product: Path) -> bool
     """
     try:
         record = run_stage(name, function, run, product)
-    except Exception as error:  # the boundary of a stage: whatever went wrong is told with the stage's name
+    except Exception as error:  # the boundary of a stage: whatever went wrong is reported with the stage's name
         if is_interrupt(error):
             raise KeyboardInterrupt from error
         _write_message(name, run.folder / f".{name}.partial", error)
@@ -105,10 +105,10 @@ def execute(name: str, function: StageFunction, run: Run, product: Path) -> bool
 
 def _write_message(name: str, folder: Path, error: Exception) -> None:
     """Leave traceback and message for the command, which tells the user; say it at once where they cannot be."""
-    told = in_words(error, folder)
+    message = in_words(error, folder)
     try:
         folder.mkdir(parents=True, exist_ok=True)
         (folder / TRACEBACK).write_text(traceback.format_exc(), encoding="utf-8")
-        (folder / MESSAGE).write_text(told, encoding="utf-8")
+        (folder / MESSAGE).write_text(message, encoding="utf-8")
     except OSError:
-        console.print(f"stage {name} failed: {told}", soft_wrap=True)
+        console.print(f"stage {name} failed: {message}", soft_wrap=True)

@@ -7,7 +7,8 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
-from reflowshock.fem.names import nearest
+from reflowshock.names import nearest
+from reflowshock.problem import Problem, as_toml
 from reflowshock.workflow.case.case import CASES, Case, Title
 from reflowshock.workflow.case.fields import (
     allowed,
@@ -19,7 +20,7 @@ from reflowshock.workflow.case.fields import (
     unit_of,
 )
 from reflowshock.workflow.case.names import is_name, wrong_name
-from reflowshock.workflow.case.problems import CaseError, Problem, as_toml
+from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.case.scales import scales_text, take_scales
 from reflowshock.workflow.case.toml_file import read_toml
 from reflowshock.workflow.pipeline.reader import read_case
@@ -27,8 +28,8 @@ from reflowshock.workflow.pipeline.reader import read_case
 COMMENT_COLUMN = 44
 HEADER = """\
 # Case "{name}", from the template "{template}".
-# Every parameter is here. A quantity is a string with a unit, which may be any of its dimension ("0.48 mm", "480 um").
-# Tables named "numerics" say how something is computed, all others what. A line that only repeats the default can go.
+# Every parameter is here. A quantity is a string with a unit, any unit of its dimension ("0.48 mm", "480 um").
+# Tables named "numerics" say how something is computed, all others what. Lines that repeat a default can be removed.
 """
 
 

@@ -119,7 +119,7 @@ def check_ranks(environment: Mapping[str, str]) -> None:
     for size, rank in RANKS:
         count = environment.get(size, "")
         if count.isdigit() and int(count) > 1:
-            message = f"started on {count} MPI ranks; start it once, it starts its own ranks"
+            message = f"started on {count} MPI ranks; start it without mpirun, it starts its own ranks"
             raise EnvironmentProblem(message, 2, environment.get(rank, "0") != "0")
 
 

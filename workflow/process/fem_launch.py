@@ -7,9 +7,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 from reflowshock.workflow.case.run import Run
-from reflowshock.workflow.process.launch import launch, mpi_command
-from reflowshock.workflow.process.progress import progress_bar
-from reflowshock.workflow.process.stopped_processes import PATIENCE
+from reflowshock.workflow.process.launch import PATIENCE, launch, mpi_command
+from reflowshock.workflow.process.terminal import progress_bar
 
 AFTER_THE_RANKS = 10.0  # [s]
 

@@ -1,7 +1,7 @@
 """What is said last: whatever ends the program becomes one plain line and an exit code, never a traceback.
 
 Nothing but the standard library is loaded before something is to be said, so that an interrupt while the program loads
-is told, too.
+is reported, too.
 """
 
 import errno
@@ -24,7 +24,7 @@ LAST_LINES = 5
 ENDING = ("SIGTERM", "SIGHUP")  # signals that end a command as Ctrl-C does
 
 OWN_PACKAGE = "reflowshock"  # the text of errors that it defines is for the user
-NO_MEMORY = "the memory is not sufficient (also limited by: ulimit -v)"
+NO_MEMORY = "out of memory (also limited by ulimit -v)"
 SYSTEM = {
     errno.ENOSPC: "no space left on the device",
     errno.EDQUOT: "the disk quota is used up",
@@ -32,7 +32,7 @@ SYSTEM = {
     errno.EROFS: "the file system is read-only",
     errno.EACCES: "permission denied",
     errno.EPERM: "permission denied",
-    errno.ENOENT: "the file or folder does not exist, or was removed meanwhile",
+    errno.ENOENT: "the file or folder does not exist or was removed",
     errno.EMFILE: "too many files are open (ulimit -n)",
     errno.ENFILE: "too many files are open on this machine",
     errno.ENOMEM: NO_MEMORY,
@@ -52,7 +52,7 @@ LIBRARIES = (
     (re.compile(r"failed to map segment|insufficient memory", re.IGNORECASE), NO_MEMORY),
     (re.compile(r"can't start new thread|resource temporarily unavailable", re.IGNORECASE), SYSTEM[errno.EAGAIN]),
     (re.compile(r"terminated abruptly|process pool", re.IGNORECASE),
-     "a process was killed, as the system does when memory is short"),
+     "a process was killed, probably because memory ran out"),
 )  # fmt: skip
 PETSC = {55: NO_MEMORY, 56: "not supported by this PETSc", 71: "zero pivot: the matrix is singular", 76: "MUMPS failed"}
 
@@ -75,13 +75,13 @@ def in_words(error: BaseException, where: Path | None = None) -> str:
         return str(error)
     behind: BaseException | None = error
     while behind is not None:
-        told = _known_words(behind, where)
-        if told:
-            return told
+        words = _known_words(behind, where)
+        if words:
+            return words
         behind = behind.__cause__ or (None if behind.__suppress_context__ else behind.__context__)
     lines = [line.strip() for line in str(error).splitlines() if line.strip()]
     kind = "" if type(error) is RuntimeError else type(error).__name__
-    text = ": ".join(part for part in (kind, lines[0] if lines else "") if part) or "an error without a message"
+    text = ": ".join(part for part in (kind, lines[0] if lines else "") if part) or "unknown error"
     return text if len(text) <= LONGEST else f"{text[:LONGEST]} …"
 
 
@@ -100,8 +100,8 @@ def _known_words(error: BaseException, where: Path | None) -> str:
     if isinstance(error, OSError) and error.errno in SYSTEM:
         does = " while writing" if error.errno in WRITING else ":" if place else ""
         return f"{SYSTEM[error.errno]}{does} {place}".rstrip() if place else SYSTEM[error.errno]
-    told = words_of(str(error))
-    return f"{told} while writing {place}" if told in (SYSTEM[one] for one in WRITING) and place else told
+    words = words_of(str(error))
+    return f"{words} while writing {place}" if words in (SYSTEM[one] for one in WRITING) and place else words
 
 
 def words_of(text: str) -> str:
@@ -167,7 +167,7 @@ def say(error: BaseException) -> int:
         _print_error("interrupted")
         return FAILED
     if isinstance(error, BrokenPipeError):
-        return FAILED  # whoever read has gone: nobody is there to be told
+        return FAILED  # whoever read has gone: nobody reads it
     if getattr(error, "silent", False):
         return int(getattr(error, "exit_code", FAILED))
     if _is_own(error):

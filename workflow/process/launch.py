@@ -1,18 +1,99 @@
-"""Launching MPI programs: command line, lines of output, and a clean end whatever happens."""
+"""Launching MPI programs: command line, lines of output, a clean end whatever happens, also of stopped processes."""
 
 import os
 import shlex
 import shutil
 import signal
 import subprocess
+import threading
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
+from types import TracebackType
 
 from reflowshock.fem.parallel.own_job import own_environment
 from reflowshock.fem.parallel.status_board import ERROR
 from reflowshock.workflow.process.last_word import words_of
-from reflowshock.workflow.process.stopped_processes import PATIENCE, StoppedProcesses
+
+PATIENCE = 60.0  # [s] that a process may be stopped
+TICK = 1.0  # [s] between two looks
+STOPPED = "T"
+RANK = ("OMPI_COMM_WORLD_RANK", "PMI_RANK", "PMIX_RANK", "SLURM_PROCID")  # variables with the number of an MPI rank
+PROC = Path("/proc")
+
+
+class StoppedProcesses:
+    """Looks, while its block lasts, whether a process or one of its descendants is stopped; kills those that stay so.
+
+    Attributes:
+        told: which it was and how long, in words; empty before that.
+    """
+
+    def __init__(self, process: int, patience: float = PATIENCE) -> None:
+        """Take the process id, and how long one may be stopped [s]."""
+        self.told = ""
+        self._process, self._patience = process, patience
+        self._over = threading.Event()
+        self._thread = threading.Thread(target=self._watch, daemon=True)
+
+    def __enter__(self) -> "StoppedProcesses":
+        self._thread.start()
+        return self
+
+    def __exit__(self, kind: type | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        """Look no longer."""
+        self._over.set()
+        self._thread.join()
+
+    def _watch(self) -> None:
+        """Count looks, not seconds: while all is stopped, this one included, nobody waits."""
+        looks: dict[int, int] = {}
+        tick = min(TICK, self._patience / 4)
+        while not self._over.wait(tick):
+            looks = {process: looks.get(process, 0) + 1 for process in stopped(self._process)}
+            late = [process for process, count in looks.items() if count * tick > self._patience]
+            if late:
+                names = " and ".join(name(process) for process in late)
+                self.told = f"{names} had been stopped (SIGSTOP) for {self._patience:g} s, so the run was ended"
+                for process in late:
+                    with suppress(OSError):
+                        os.kill(process, signal.SIGKILL)
+
+
+def stopped(root: int) -> list[int]:
+    """Return the processes that are stopped, of one and all that it started, directly or not."""
+    parents: dict[int, int] = {}
+    halted = []
+    for folder in PROC.iterdir():
+        if not folder.name.isdigit():
+            continue
+        try:
+            said = (folder / "stat").read_text(encoding="utf-8", errors="replace")
+        except OSError:  # it has ended meanwhile
+            continue
+        state, parent = said.rpartition(")")[2].split()[:2]
+        parents[int(folder.name)] = int(parent)
+        if state == STOPPED:
+            halted.append(int(folder.name))
+    return [process for process in halted if _descends(process, root, parents)]
+
+
+def _descends(process: int, root: int, parents: dict[int, int]) -> bool:
+    while process > 1 and process != root:
+        process = parents.get(process, 0)
+    return process == root
+
+
+def name(process: int) -> str:
+    """Return the name of a process in words: that of an MPI rank, where it is one."""
+    with suppress(OSError):
+        variables = (PROC / str(process) / "environ").read_bytes().split(b"\0")
+        known = dict(os.fsdecode(one).partition("=")[::2] for one in variables)
+        number = next((known[key] for key in RANK if key in known), None)
+        if number is not None:
+            return f"rank {number} (process {process})"
+    return f"process {process}"
+
 
 GRACE = 5.0  # seconds that a program has to end by itself after SIGTERM
 TRACEBACK = "Traceback (most recent call last):"
@@ -26,9 +107,9 @@ QUIET = ("--mca", "orte_execute_quiet", "1")  # of Open MPI 4; 5 has no option -
 END_WITH_PARENT = ("setpriv", "--pdeathsig", "TERM")
 DIE_WITH_PARENT = ("setpriv", "--pdeathsig", "KILL")
 ENDINGS: dict[int, str] = {
-    signal.SIGKILL: "was killed, as the system does when memory is short",
-    signal.SIGXFSZ: "was ended, since a file exceeded the largest allowed size (ulimit -f)",
-    signal.SIGXCPU: "was ended, since it took all the processor time allowed (ulimit -t)",
+    signal.SIGKILL: "was killed, probably because memory ran out",
+    signal.SIGXFSZ: "was ended because a file exceeded the largest allowed size (ulimit -f)",
+    signal.SIGXCPU: "was ended because it exceeded the processor time limit (ulimit -t)",
     signal.SIGSEGV: "crashed (segmentation fault)",
     signal.SIGBUS: "crashed (bus error, as when no space is left for a file in memory)",
 }
@@ -94,7 +175,7 @@ def launch(command: Sequence[str], on_line: Callable[[str], None], log: Path, pa
             raise
     if code != 0:
         lines = _read(log) + _read(log.with_name(ERROR))
-        words = "\n".join(lines[-LAST_LINES:]) or "it said nothing"
+        words = "\n".join(lines[-LAST_LINES:]) or "it wrote no message"
         said, words = (without_traceback(text, log) for text in (told(lines), words))
         if watch.told:
             raise LaunchError(f"{watch.told}; {said}".removesuffix("; "))

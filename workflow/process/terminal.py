@@ -1,18 +1,24 @@
-r"""What the user sees: one console that takes no text for markup, errors, one health line a stage.
+r"""What the user sees: one console that takes no text for markup, errors, tables, progress bars, health lines.
 
 A title, a folder or a message may hold anything: brackets are shown as they are, control characters as ``\x1b``.
 """
 
 import os
 import re
-from collections.abc import Iterable
-from typing import Any
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from typing import Any, Protocol
 
 from rich.console import Console, ConsoleOptions, RenderableType
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.segment import Segment
+from rich.table import Table
 from rich.text import Span, Text
 
 from reflowshock.workflow.case.text import against_limit
+
+REFLOW_SPEED = "Costs assume the reflow speed in particles/parameters/estimate.py, as benchmarks/ measured it."
+
 
 # All that a terminal obeys (but for line end and tab), that turns the direction of text, or that no encoding has.
 CONTROL = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
@@ -36,8 +42,8 @@ def styled(template: str, *values: object) -> Text:
     ends = [end for found in re.finditer(re.escape(PLACE), words.plain) for end in found.span()]
     pieces = list(words.divide(ends))
     for place, value in zip(range(1, len(pieces), 2), values, strict=True):
-        told = visible(str(value))
-        pieces[place] = Text(told, spans=[Span(0, len(told), span.style) for span in pieces[place].spans])
+        line = visible(str(value))
+        pieces[place] = Text(line, spans=[Span(0, len(line), span.style) for span in pieces[place].spans])
     return Text("").join(pieces)
 
 
@@ -105,8 +111,8 @@ def health_line(stage: str, seconds: float, health: dict, continued: str = "") -
         text = "done"
     if continued:
         text += f"; {continued} continued from checkpoints"
-    told = styled(" [bold]{}[/] {} s  {}", f"{stage:<11}", f"{seconds:6.1f}", text)
-    console.print(mark + told, soft_wrap=True)
+    line = styled(" [bold]{}[/] {} s  {}", f"{stage:<11}", f"{seconds:6.1f}", text)
+    console.print(mark + line, soft_wrap=True)
 
 
 def _against_limit(name: str, result: dict) -> str:
@@ -118,3 +124,43 @@ def _closeness(result: dict) -> float:
     """How near a value that holds is to its limit, which it may exceed or fall below: 1 is at the limit."""
     smaller, larger = sorted((abs(result["value"]), abs(result["limit"])))
     return smaller / larger if larger > 0.0 else 0.0
+
+
+class ProgressBar(Protocol):
+    """Is called with how far something is."""
+
+    def __call__(self, share: float, text: str = "") -> None:
+        """Take the share that is done, 0 to 1, and what is going on, which stands in place of the description."""
+
+
+@contextmanager
+def progress_bar(description: str) -> Iterator[ProgressBar]:
+    """Show a bar with share, time spent and time left while something runs; it vanishes in the end.
+
+    Where there is no terminal, only the description is printed.
+
+    Yields:
+        What is called with the progress.
+    """
+    columns = (
+        TextColumn("  {task.description}", markup=False),
+        BarColumn(bar_width=30),
+        TaskProgressColumn(),
+        TimeElapsedColumn(),
+        TimeRemainingColumn(),
+    )
+    moving = console.is_terminal and not console.is_dumb_terminal
+    if not moving:
+        console.print(f"       {description} …", soft_wrap=True)
+    with Progress(*columns, console=console, transient=True, disable=not moving) as bar:
+        task = bar.add_task(visible(description), total=1.0)
+        yield lambda share, text="": bar.update(task, completed=share, description=visible(text or description))
+
+
+def new_table(title: str, *columns: str) -> Table:
+    """Return an empty table; its last column takes what room is left."""
+    table = Table(title=title, title_justify="left", title_style="bold", expand=True, show_edge=False, pad_edge=False)
+    for position, name in enumerate(columns):
+        last = position == len(columns) - 1
+        table.add_column(name, no_wrap=not last, overflow="fold", ratio=1 if last else None)
+    return table

@@ -40,7 +40,7 @@ class Left:
 
 
 @dataclass(frozen=True, slots=True)
-class Job:
+class CarriedReflow:
     """A joint that is carried on: from which file to which; the first reflow has none to begin from."""
 
     files: Path
@@ -61,7 +61,7 @@ def records() -> tuple[type, ...]:
     from reflowshock.particles.scenes.carried_joint import Carried
     from reflowshock.particles.steps.shape import JointShape, Snapshot
 
-    return Job, Source, JointGeometry, Solder, Carried, JointShape, Snapshot
+    return CarriedReflow, Source, JointGeometry, Solder, Carried, JointShape, Snapshot
 
 
 class JointArray:
@@ -88,7 +88,7 @@ class JointArray:
         jobs, left = {}, []
         for before, group in self._parted(places):
             now = Source(group.name, number, group.geometry)
-            jobs[group.name] = Job(self._files, self._solder, before.now if before else None, now)
+            jobs[group.name] = CarriedReflow(self._files, self._solder, before.now if before else None, now)
             left.append(Left(group, now, before.first if before else now))
         found: dict[str, Carried] = self._pool.run(carry, jobs, self._progress)
         self.left = left
@@ -115,11 +115,11 @@ class JointArray:
 
     def shapes(self) -> "dict[str, JointShape]":
         """Return the shapes in their last places and canonical orientation, by the first of the joints alike."""
-        jobs = {one.group.name: Job(self._files, self._solder, one.first, one.now) for one in self.left}
+        jobs = {one.group.name: CarriedReflow(self._files, self._solder, one.first, one.now) for one in self.left}
         return self._pool.run(finish, jobs, self._progress)
 
 
-def carry(job: Job, progress: Callable[[float], None]) -> "Carried":
+def carry(job: CarriedReflow, progress: Callable[[float], None]) -> "Carried":
     """Carry one joint on, in a process of the pool."""
     from reflowshock.particles.scenes.carried_joint import carry_joint
 
@@ -127,7 +127,7 @@ def carry(job: Job, progress: Callable[[float], None]) -> "Carried":
     return carry_joint(job.now.place, job.solder, before, job.checkpoint(job.now), progress)
 
 
-def finish(job: Job, _progress: Callable[[float], None]) -> "JointShape":
+def finish(job: CarriedReflow, _progress: Callable[[float], None]) -> "JointShape":
     """Return the shape of one joint, in a process of the pool; what it begins from is its first reflow."""
     from reflowshock.particles.scenes.carried_joint import carried_shape
 

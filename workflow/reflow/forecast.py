@@ -1,4 +1,4 @@
-"""What a reflow that is coupled with board and package would be like, before it runs."""
+"""Load steps of a reflow that is coupled with board and package, and what it would be like before it runs."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -6,13 +6,37 @@ from typing import TYPE_CHECKING
 
 from reflowshock.fem.problem.thermal import KELVIN, Thermal
 from reflowshock.particles.parameters.solder import Solder
-from reflowshock.workflow.case.problems import Problem
+from reflowshock.problem import Problem
 from reflowshock.workflow.reflow.between import thermal_effects
-from reflowshock.workflow.reflow.load_steps import LoadStep, load_steps
 
 if TYPE_CHECKING:
     from reflowshock.particles.core.geometry import JointGeometry
     from reflowshock.workflow.package.case import PackageCase
+
+from itertools import groupby
+
+
+@dataclass(frozen=True, slots=True)
+class LoadStep:
+    """What acts on board and package besides the solder: temperature [K], displacement of the die's corner [m]."""
+
+    temperature: float
+    corner: float
+
+
+def load_steps(thermal: Thermal) -> list[LoadStep]:
+    """Return the load steps with liquid solder, in order; in the last one its shape freezes.
+
+    Those of the heating divide the way from the reference to the peak evenly; cooling takes the same ones backwards.
+    Melting and solidification are load steps of their own.
+    """
+    rise = (thermal.peak - thermal.reference) / thermal.steps
+    way = [thermal.reference + rise * number for number in range(thermal.steps)] if rise > 0.0 else []
+    heating = [thermal.melting, *(value for value in way if value > thermal.melting), thermal.peak]
+    cooling = [*(value for value in reversed(way) if value > thermal.solidification), thermal.solidification]
+    temperatures = [value for value, _ in groupby(heating + cooling)]
+    return [LoadStep(value, thermal.corner(value)) for value in temperatures]
+
 
 # Measured with the structures of tests/verification/test_workflow_coupling.py: a package that floats is sought by
 # three or four exchanges a load step, forces that bend need two, and one way none beyond the first.
@@ -21,7 +45,7 @@ EXCHANGES_TO_FLOAT, EXCHANGES_TO_BEND, EXCHANGES_ONE_WAY = 4, 2, 1
 
 @dataclass(frozen=True, slots=True)
 class HeatedForecast:
-    """What is foreseen.
+    """What is predicted.
 
     Attributes:
         effects: effect -> {"on", "why"}.
@@ -35,7 +59,7 @@ class HeatedForecast:
 
 
 def forecast_heated(case: "PackageCase", thermal: Thermal) -> HeatedForecast:
-    """Foresee load steps, exchanges and effects."""
+    """Predict load steps, exchanges and effects."""
     steps, effects = load_steps(thermal), thermal_effects(case, thermal)
     each = EXCHANGES_TO_BEND if effects["solder_force"]["on"] else EXCHANGES_ONE_WAY
     each = EXCHANGES_TO_FLOAT if thermal.package == "floating" else each
@@ -46,8 +70,8 @@ def thermal_effect(thermal: Thermal, steps: list[LoadStep]) -> dict:
     """Say at which temperatures solder is liquid, as an effect."""
     low, high = (extreme(step.temperature for step in steps) for extreme in (min, max))
     reference = thermal.reference - KELVIN
-    why = f"solder is liquid in {len(steps)} load steps from {low - KELVIN:.4g} to {high - KELVIN:.4g} degC"
-    return {"on": bool(high > low or high != thermal.reference), "why": f"{why}, all is flat at {reference:.4g} degC"}
+    why = f"solder is liquid in {len(steps)} load steps from {low - KELVIN:.4g} to {high - KELVIN:.4g} °C"
+    return {"on": bool(high > low or high != thermal.reference), "why": f"{why}, all is flat at {reference:.4g} °C"}
 
 
 def problems(
@@ -72,7 +96,7 @@ def _no_room(solder: Solder, gap: float, thermal: Thermal, pitch: float) -> Iter
     if thermal.corner_displacement is None or lowest >= 0.0 or gap + lowest > needed:
         return
     limit = (needed - gap) * thermal.corner_displacement / lowest
-    message = f"leaves {1e3 * (gap + lowest):.4g} mm of the gap of {1e3 * gap:.4g} mm, too little for the solder"
+    message = f"leaves {1e3 * (gap + lowest):.4g} mm of the {1e3 * gap:.4g} mm gap, too little for the solder"
     value = f"{1e3 * thermal.corner_displacement:.4g} mm"
     yield Problem("thermal.corner_displacement", message, value, f"> {1e3 * limit:.4g} mm")
 
@@ -87,5 +111,8 @@ def _no_time(solder: Solder, geometries: "Mapping[str, JointGeometry]") -> Itera
             if effect["on"]:
                 key = "solder.process_time" if getattr(solder.effects, name) == "auto" else f"solder.effects.{name}"
                 yield Problem(
-                    key, f"load steps of [thermal] are at rest, but {effect['why']}", None, "a slower process"
+                    key,
+                    f"cannot be combined with [thermal], whose load steps are at rest: {effect['why']}",
+                    None,
+                    "a slower process",
                 )

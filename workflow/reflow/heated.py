@@ -12,17 +12,15 @@ from reflowshock.fem.parallel.checkpoint_files import digest_of_files
 from reflowshock.fem.problem.thermal import KELVIN, Thermal
 from reflowshock.workflow.case.run import Run, at_most, metric
 from reflowshock.workflow.package.case import PackageCase
-from reflowshock.workflow.process.progress import ProgressBar, progress_bar
+from reflowshock.workflow.process.terminal import ProgressBar, progress_bar
 from reflowshock.workflow.reflow.array import JointArray, Left, Source
 from reflowshock.workflow.reflow.between import frozen_displacement, open_structure, thermal_effects
-from reflowshock.workflow.reflow.coupling import Coupled, Coupling, Exchange, placed
-from reflowshock.workflow.reflow.forecast import thermal_effect
+from reflowshock.workflow.reflow.coupling import Coupled, Coupling, Exchange, placed, scale_of, start
+from reflowshock.workflow.reflow.forecast import LoadStep, load_steps, thermal_effect
 from reflowshock.workflow.reflow.joints import Alike, joint_geometries
-from reflowshock.workflow.reflow.load_steps import LoadStep, load_steps
-from reflowshock.workflow.reflow.open_pool import open_pool
 from reflowshock.workflow.reflow.pool import Shares
+from reflowshock.workflow.reflow.processes import open_pool
 from reflowshock.workflow.reflow.rigid_balance import RigidBalance
-from reflowshock.workflow.reflow.start import scale_of, start
 
 if TYPE_CHECKING:
     from reflowshock.fem.statics.state import HeatedStructure
@@ -163,7 +161,7 @@ class Saved:
 
 
 class Telling:
-    """What the terminal is told: load step, temperature, exchange, residual, and which joints are under way."""
+    """What the terminal shows: load step, temperature, exchange, residual, and which joints are under way."""
 
     def __init__(self, bar: ProgressBar, steps: list[LoadStep]) -> None:
         """Begin at the first load step."""
@@ -177,7 +175,7 @@ class Telling:
         busy = [f"{name} {share:.0%}" for name, share in shares.items() if 0.0 < share < 1.0]
         self._bar(
             self._done / len(self._steps),
-            f"load step {self._done + 1} of {len(self._steps)}, {step.temperature - KELVIN:.0f} degC, "
+            f"load step {self._done + 1} of {len(self._steps)}, {step.temperature - KELVIN:.0f} °C, "
             f"exchange {self._number + 1}{self._residual}: {finished} of {len(shares)} joints {' '.join(busy)}",
         )
 

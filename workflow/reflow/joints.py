@@ -22,7 +22,7 @@ ALIKE = 1e-9  # of joints that count as equal: differences of gap, radii, offset
 
 
 @dataclass(frozen=True, slots=True)
-class Job:
+class JointReflow:
     """One reflow: geometry, solder, and the file from which it continues if it is there."""
 
     geometry: "JointGeometry"
@@ -35,7 +35,7 @@ def records() -> tuple[type, ...]:
     from reflowshock.particles.core.geometry import JointGeometry
     from reflowshock.particles.steps.shape import JointShape, Snapshot
 
-    return Job, JointGeometry, Solder, JointShape, Snapshot
+    return JointReflow, JointGeometry, Solder, JointShape, Snapshot
 
 
 def joint_geometries(pads: "Sequence[PadSite]") -> "dict[str, JointGeometry]":
@@ -175,7 +175,7 @@ def refuse_joints_without_mesh(records: Mapping[str, dict], verdicts: Sequence[s
     for verdict in verdicts:
         names = [name for name, record in records.items() if record["verdict"] == verdict]
         if names:
-            raise ReflowError(f"{', '.join(names)} {verdict}: there is no such joint to mesh, see reflow/joints.json")
+            raise ReflowError(f"{', '.join(names)} {verdict}: such a joint cannot be meshed, see reflow/joints.json")
 
 
 def solve_joints(
@@ -200,12 +200,12 @@ def solve_joints(
     Raises:
         ReflowError: names the first joint that failed, and how.
     """
-    jobs = {name: Job(geometry, solder, checkpoints / name) for name, geometry in geometries.items()}
+    jobs = {name: JointReflow(geometry, solder, checkpoints / name) for name, geometry in geometries.items()}
     results = pool.run(_solve, jobs, lambda done: progress(sum(done.values()) / len(done)))
     return {name: shape for name, (shape, _) in results.items()}, sum(continued for _, continued in results.values())
 
 
-def _solve(job: Job, progress: Callable[[float], None]) -> "tuple[JointShape, bool]":
+def _solve(job: JointReflow, progress: Callable[[float], None]) -> "tuple[JointShape, bool]":
     """Return the shape, and whether it continued from a checkpoint."""
     from reflowshock.particles.core.checkpoint import Checkpoint
     from reflowshock.particles.scenes.reflow import solve_joint

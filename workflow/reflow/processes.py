@@ -1,4 +1,4 @@
-"""Processes that bring joints to rest, several joints at a time."""
+"""Processes that bring joints to rest, several joints at a time; `open_pool` chooses them or MPI ranks."""
 
 import multiprocessing
 import os
@@ -9,7 +9,10 @@ from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wai
 from typing import Any
 
 from reflowshock.fem.parallel.own_job import end_with_parent
-from reflowshock.workflow.reflow.pool import Job, ReflowError, Report, Result, Shares
+from reflowshock.workflow.case.run import Run
+from reflowshock.workflow.package.case import PackageCase
+from reflowshock.workflow.reflow.pool import Job, JointPool, ReflowError, Report, Result, Shares
+from reflowshock.workflow.reflow.ranks import Ranks
 
 POLL = 0.2  # seconds between two looks at the progress
 
@@ -83,3 +86,16 @@ def _start_worker(reports: Any, threads: int) -> None:
 
 def _work(work: Callable[[Any, Report], Result], name: str, job: Any) -> Result:
     return work(job, lambda fraction: _progress.put((name, fraction)))
+
+
+def open_pool(run: Run[PackageCase], joints: int) -> JointPool:
+    """Return MPI ranks where the case asks for them, else processes on the cores of this machine.
+
+    Args:
+        run: case, cores, where checkpoints are.
+        joints: how many there are to compute at a time.
+    """
+    ranks = run.case.reflow.ranks
+    if ranks is None:
+        return Processes(run.cores, joints)
+    return Ranks(ranks, run.oversubscribe, run.checkpoints("reflow") / "ranks.jobs")

@@ -87,4 +87,4 @@ class Ranks:
             if failed:
                 return ReflowError(f"joint {name}: {failed}")
         busy = [name for name in jobs if name not in ended and (self.folder / f"{name}{TAKEN}").exists()]
-        return ReflowError(f"{error}; joints under way: {', '.join(busy) or 'none'}")
+        return ReflowError(f"{error}; unfinished joints: {', '.join(busy) or 'none'}")

@@ -12,10 +12,10 @@ from reflowshock.workflow.package import findings
 from reflowshock.workflow.package.case import PackageCase
 from reflowshock.workflow.package.given_surfaces import given_records
 from reflowshock.workflow.process.products import write_json
-from reflowshock.workflow.process.progress import progress_bar
+from reflowshock.workflow.process.terminal import progress_bar
 from reflowshock.workflow.reflow import joints as pool
 from reflowshock.workflow.reflow.heated import reflow_heated
-from reflowshock.workflow.reflow.open_pool import open_pool
+from reflowshock.workflow.reflow.processes import open_pool
 
 if TYPE_CHECKING:
     from reflowshock.meshing.board.pads import PadSite
@@ -32,7 +32,7 @@ class Reflowed:
         geometries: joint name -> geometry.
         groups: joints that are alike.
         shapes: name of the first of them -> its shape.
-        found: what is to be told of them besides their shapes.
+        found: what is reported of them besides their shapes.
         structure: what `structure.npz` holds; nothing between rigid plates at rest.
     """
 

@@ -194,8 +194,8 @@ def embedded(draw: Callable[[Path], Told]) -> tuple[str, Told]:
     """Let a function write a PNG file; return it in base64, and what the function returned."""
     with tempfile.TemporaryDirectory() as folder:
         picture = Path(folder) / "picture.png"
-        told = draw(picture)
-        return base64.b64encode(picture.read_bytes()).decode(), told
+        result = draw(picture)
+        return base64.b64encode(picture.read_bytes()).decode(), result
 
 
 def render_stages(stages: "Sequence[Snapshot]", shape: "JointShape", picture: Path) -> None:

@@ -10,7 +10,7 @@ SHAPE_EFFECT = "shape_effect_on_peak_stress"
 HEADLINE = (
     ("critical_joint", "critical joint"),
     ("peak_von_mises", "peak von Mises at its pads"),
-    (SHAPE_EFFECT, "change of that by the joints' real shapes, against identical ones"),
+    (SHAPE_EFFECT, "change of this peak due to the real joint shapes"),
     ("peak_board_strain", "peak board strain under the package"),
     ("critical_joint_stress_error", "stress history, two-scale against DNS"),
     ("two_scale_dns_time_ratio", "wall time, two-scale over DNS"),
@@ -19,15 +19,15 @@ HEADLINE = (
     ("joint_volume_error_max", "joint volume lost in meshing, worst"),
 )
 COMPARISON = (
-    ("compared_duration", "time that both have; the DNS ends before the shock"),
-    ("critical_joint", "critical joint, of the DNS where that lasts as long"),
+    ("compared_duration", "time covered by both; the DNS ends before the shock"),
+    ("critical_joint", "critical joint (of the DNS where it covers the whole shock)"),
     ("critical_joint_stress_error", "its von Mises history, relative L2"),
-    ("worst_joint_stress_error", "the same of the worst joint that is fine in both"),
+    ("worst_joint_stress_error", "the same, worst joint that is fine in both"),
     ("die_displacement_error", "die centre displacement, relative L2"),
     ("board_displacement_error", "board centre displacement, relative L2"),
     ("two_scale_dns_time_ratio", "wall time, two-scale over DNS on as many ranks"),
-    ("two_scale_ideal_ratio", "the same if all element updates cost the same and all else nothing"),
-    ("coarse_run_dns_time_ratio", "wall time of the coarse run that finds the critical joints, over DNS"),
+    ("two_scale_ideal_ratio", "ideal ratio: equal cost per element update, no overhead"),
+    ("coarse_run_dns_time_ratio", "wall time, coarse run that finds the critical joints over DNS"),
 )
 PACKAGES = (
     "numpy",

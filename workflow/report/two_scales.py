@@ -3,31 +3,31 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from reflowshock.workflow.case.text import nano, number, quantity
+from reflowshock.workflow.case.text import nano, number, quantity, short
 
 Record = Mapping[str, Any]
 
 SCHEMES = {
-    "held_velocity": "held velocity, its cut inside the board",
+    "held_velocity": "held velocity, coupling interface inside the board",
     "local_steps": "local time steps (LTS-leapfrog)",
-    "impulse": "impulses on a cut inside the board, which the meso model carries",
+    "impulse": "impulses at a coupling interface inside the board, carried by the meso model",
     "gravouil_combescure": "Gravouil-Combescure, at the joints' own facets",
 }
-DIRECTIONS = {"two_way": "two-way", "one_way": "one-way: the macro model takes nothing back"}
+DIRECTIONS = {"two_way": "two-way", "one_way": "one-way: no feedback to the macro model"}
 SELF_CHECK = {
-    "rigid": "rigid motion through tie and cut, error",
-    "linear": "linear field through tie and cut, error",
+    "rigid": "rigid motion through tie and interface, error",
+    "linear": "linear field through tie and interface, error",
     "tie": "net force and moment lost at the tie",
-    "cut": "net force and moment lost at the cut",
+    "cut": "net force and moment lost at the interface",
     "macro_mass": "mass of the macro model",
-    "interface_mass": "mass at the cut, of the meso model",
+    "interface_mass": "mass of the meso model at the interface",
     "meso_mass": "mass of the rest of the meso model",
-    "volume_mass": "density times volume, mass scaling included",
+    "volume_mass": "density times volume, including mass scaling",
 }
 
 
 def two_scales(coupling: Record, model: Record, found_by: str = "") -> dict:
-    """Return how the models are coupled: what of it the run has told.
+    """Return how the models are coupled: what the run recorded of it.
 
     Args:
         coupling: ``coupling`` of the result of a two-scale run.
@@ -41,11 +41,11 @@ def two_scales(coupling: Record, model: Record, found_by: str = "") -> dict:
         ("direction", DIRECTIONS.get(coupling.get("direction", ""))),
         ("fine joints", " ".join(joints) if joints is not None and not isinstance(joints, str) else joints),
         ("fine layers", " ".join(coupling.get("fine_layers", ()))),
-        ("how they were found", found_by),
+        ("how they were chosen", found_by),
         ("window", nano(model["window"])),
         ("step ratio m", number(model["substeps"])),
         ("meso share f of the elements", _share(coupling.get("meso_share"))),
-        ("nodes of the cut", _number(coupling.get("cut_nodes"))),
+        ("nodes of the coupling interface", _number(coupling.get("cut_nodes"))),
         *((SELF_CHECK.get(name, name), _checked(name, value)) for name, value in _numbers(coupling, "self_check")),
     ]
     return {"head": ["two scales", ""], "rows": [[name, text] for name, text in rows if text]}
@@ -64,10 +64,10 @@ def placement(coupling: Record) -> dict | None:
     """Return the predicted window of every placement, what was measured, and how busy the ranks were."""
     record = coupling.get("placement", {})
     rows = [
-        (f"window, predicted, {name}{' (chosen)' if name == record.get('chosen') else ''}", _micro(seconds))
+        (f"window, predicted, {name}{' (chosen)' if name == record.get('chosen') else ''}", short(seconds))
         for name, seconds in _numbers(record, "alternatives")
     ]
-    rows += [("window, measured", _micro(record["window_seconds"]))] if "window_seconds" in record else []
+    rows += [("window, measured", short(record["window_seconds"]))] if "window_seconds" in record else []
     rows += [(f"rank {rank} computes", _share(share)) for rank, share in enumerate(record.get("busy_shares", ()))]
     rows += (
         [("coupling, share of a window", _share(record["coupling_overhead"]))] if "coupling_overhead" in record else []
@@ -80,24 +80,20 @@ def oracle(seconds: float, results: Sequence[Record]) -> str:
 
     Args:
         seconds: predicted for the implicit run on one rank.
-        results: of the two-scale run, and of the coarse run before it.
+        results: of the two-scale run, and of the preceding coarse run.
     """
     core_seconds = sum(result["timings"]["windows"] * result["model"]["ranks"] for result in results)
-    told = "the two-scale run" if len(results) == 1 else "the two-scale run and the coarse run before it"
-    winner = "implicit steps win" if seconds < core_seconds else "two scales win"
+    runs = "the two-scale run" if len(results) == 1 else "the two-scale run and the preceding coarse run"
+    winner = "implicit steps are cheaper" if seconds < core_seconds else "two scales are cheaper"
     return (
         f"All is linear elastic here, so {winner}: one model in implicit steps (MUMPS, factored once) is predicted to"
-        f" take {seconds:.0f} core seconds, {told} took {core_seconds:.0f}. Solder that yields, finite"
+        f" take {seconds:.0f} core seconds, {runs} took {core_seconds:.0f}. Solder that yields, finite"
         " rotations and failure need explicit steps."
     )
 
 
 def _numbers(record: Record, name: str) -> list[tuple[str, float]]:
     return [(key, value) for key, value in record.get(name, {}).items() if isinstance(value, int | float)]
-
-
-def _micro(seconds: float) -> str:
-    return f"{1e6 * seconds:.1f} µs"
 
 
 def _share(value: float | None) -> str:

@@ -1,1 +1,1 @@
-"""Solder alone: drops, a joint, drops that merge or swing."""
+"""Solder alone: drops, a joint, drops that merge or oscillate."""

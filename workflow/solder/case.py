@@ -1,9 +1,10 @@
-"""Cases of molten solder alone: a drop, a joint, two drops, a drop that swings."""
+"""Cases of molten solder alone: a drop, a joint, two drops, an oscillating drop; what does not fit together in them."""
 
 from pydantic import Field
 
 from reflowshock.particles.parameters.scenes import Drop, Drops, Fluid, Joint, Liquid, Oscillation
 from reflowshock.particles.parameters.solder import Solder, Switch
+from reflowshock.problem import Problem
 from reflowshock.workflow.case.case import Case
 from reflowshock.workflow.case.stage import Pipeline, Stage, report_of
 
@@ -14,7 +15,7 @@ def _one_body(scene: str) -> Pipeline:
     return Pipeline((reflow, report_of("reflow")))
 
 
-class SceneCase(Case):
+class SolderCase(Case):
     """Molten solder alone, without package and board; the table that names the kind holds its scene."""
 
     gravity: Switch = "auto"
@@ -26,7 +27,7 @@ class SceneCase(Case):
         return self.solder.resolve(getattr(self, self.kind), self.gravity)
 
 
-class DropCase(SceneCase):
+class DropCase(SolderCase):
     """A drop of solder on a wall or pad."""
 
     kind = "drop"
@@ -35,7 +36,7 @@ class DropCase(SceneCase):
     drop: Drop
 
 
-class JointCase(SceneCase):
+class JointCase(SolderCase):
     """A joint of solder between two pads."""
 
     kind = "joint"
@@ -44,7 +45,7 @@ class JointCase(SceneCase):
     joint: Joint
 
 
-class DropsCase(SceneCase):
+class DropsCase(SolderCase):
     """Two drops that become one, or stay apart."""
 
     kind = "drops"
@@ -54,7 +55,7 @@ class DropsCase(SceneCase):
 
 
 class OscillationCase(Case):
-    """A free drop that swings."""
+    """A free drop that oscillates."""
 
     kind = "oscillation"
     stages = _one_body("oscillation")
@@ -66,3 +67,31 @@ class OscillationCase(Case):
     def molten(self) -> Solder:
         """The liquid as the solver takes it."""
         return self.oscillation.resolve(self.solder)
+
+
+def of_drop(case: DropCase) -> list[Problem]:
+    """Find parameters that make no possible drop together."""
+    from reflowshock.particles.parameters.scene_checks import drop_problems
+
+    return drop_problems(case.drop, case.molten)
+
+
+def of_joint(case: JointCase) -> list[Problem]:
+    """Find parameters that make no possible joint together."""
+    from reflowshock.particles.parameters.scene_checks import joint_problems
+
+    return joint_problems(case.joint, case.molten)
+
+
+def of_drops(case: DropsCase) -> list[Problem]:
+    """Find parameters that make no possible pair together."""
+    from reflowshock.particles.parameters.scene_checks import pair_problems
+
+    return pair_problems(case.drops, case.molten)
+
+
+def of_oscillation(case: OscillationCase) -> list[Problem]:
+    """Find a drop that does not oscillate."""
+    from reflowshock.particles.parameters.scene_checks import oscillation_problems
+
+    return oscillation_problems(case.oscillation, case.molten)

@@ -1,19 +1,30 @@
-"""Effects, size and cost of the reflow of solder alone, from the parameters of the scene."""
+"""Effects, size and cost of the reflow of solder alone, and its table of the plan."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from math import ceil
 from typing import Any
 
+from rich.console import RenderableType
+
 from reflowshock.workflow.case.case import Case
 from reflowshock.workflow.case.forecast import BYTES_OF_PARTICLE, Size
-from reflowshock.workflow.solder.case import DropCase, DropsCase, JointCase, OscillationCase, SceneCase
+from reflowshock.workflow.case.text import short
+from reflowshock.workflow.process.terminal import REFLOW_SPEED, new_table, styled
+from reflowshock.workflow.solder.case import DropCase, DropsCase, JointCase, OscillationCase, SolderCase
+
+SCHEMES = {
+    "energy": "minimum energy of the tracked surface at constant volume",
+    "inertia": "moving tetrahedra, second order in space and time; cost of the maximum number of steps",
+    "gripc": "pressure correction of Hu et al., for comparison only; its steps are not part of the predicted cost",
+}
+
 
 SECONDS_TO_START = 2.0  # until a stage has loaded its libraries and kernels
 
 
 @dataclass(frozen=True, slots=True)
-class SceneForecast:
+class SolderForecast:
     """What the reflow of one body will be like.
 
     Attributes:
@@ -35,12 +46,12 @@ class SceneForecast:
     seconds: dict[str, float]
 
 
-def forecast_scene(case: Case) -> SceneForecast:
+def forecast_solder(case: Case) -> SolderForecast:
     """Predict effects, size, time step and cost of a scene of solder alone."""
     return FORECASTS[case.kind](case)
 
 
-def _of_drop(case: DropCase) -> SceneForecast:
+def _of_drop(case: DropCase) -> SolderForecast:
     from reflowshock.particles.parameters.effects import decide_drop
     from reflowshock.particles.parameters.estimate import drop_seconds
 
@@ -48,7 +59,7 @@ def _of_drop(case: DropCase) -> SceneForecast:
     return _towards_rest(case, decide_drop(case.molten, drop.is_free), drop.particles, drop_seconds(drop.particles))
 
 
-def _of_joint(case: JointCase) -> SceneForecast:
+def _of_joint(case: JointCase) -> SolderForecast:
     from reflowshock.particles.parameters.effects import decide_effects
     from reflowshock.particles.parameters.estimate import particle_count, reflow_seconds
 
@@ -58,7 +69,7 @@ def _of_joint(case: JointCase) -> SceneForecast:
     return _towards_rest(case, decide_effects(geometry, solder), particles, seconds)
 
 
-def _of_drops(case: DropsCase) -> SceneForecast:
+def _of_drops(case: DropsCase) -> SolderForecast:
     from reflowshock.particles.parameters.effects import decide_drop
     from reflowshock.particles.parameters.estimate import drop_seconds
 
@@ -69,7 +80,7 @@ def _of_drops(case: DropsCase) -> SceneForecast:
     return _towards_rest(case, decide_drop(case.molten, drops.is_free), drops.particles, seconds)
 
 
-def _towards_rest(case: SceneCase, effects: Mapping[str, Any], particles: int, seconds: float) -> SceneForecast:
+def _towards_rest(case: SolderCase, effects: Mapping[str, Any], particles: int, seconds: float) -> SolderForecast:
     from reflowshock.particles.parameters.estimate import inertial_seconds
     from reflowshock.particles.steps.time_step import capillary_limit
 
@@ -82,10 +93,10 @@ def _towards_rest(case: SceneCase, effects: Mapping[str, Any], particles: int, s
         steps = min(numerics.max_steps, ceil(solder.process_time / largest))
         scheme, seconds = "inertia", inertial_seconds(particles, steps)
     cost = {"reflow": SECONDS_TO_START + seconds}
-    return SceneForecast(effects, particles, scheme, numerics.spacing, limit, largest, cost)
+    return SolderForecast(effects, particles, scheme, numerics.spacing, limit, largest, cost)
 
 
-def _of_oscillation(case: OscillationCase) -> SceneForecast:
+def _of_oscillation(case: OscillationCase) -> SolderForecast:
     from reflowshock.particles.parameters.effects import decide_oscillation
     from reflowshock.particles.parameters.estimate import inertial_seconds
     from reflowshock.particles.parameters.scenes import rayleigh_period
@@ -94,7 +105,7 @@ def _of_oscillation(case: OscillationCase) -> SceneForecast:
     scene, solder = case.oscillation, case.molten
     spacing = solder.numerics.spacing
     steps = ceil(scene.periods * scene.steps_per_period)
-    return SceneForecast(
+    return SolderForecast(
         effects=decide_oscillation(solder),
         particles=scene.particles,
         scheme="inertia",
@@ -105,7 +116,7 @@ def _of_oscillation(case: OscillationCase) -> SceneForecast:
     )
 
 
-FORECASTS: dict[str, Callable[[Any], SceneForecast]] = {
+FORECASTS: dict[str, Callable[[Any], SolderForecast]] = {
     DropCase.kind: _of_drop,
     JointCase.kind: _of_joint,
     DropsCase.kind: _of_drops,
@@ -113,7 +124,21 @@ FORECASTS: dict[str, Callable[[Any], SceneForecast]] = {
 }
 
 
-def scene_size(case: Case) -> Size:
+def solder_size(case: Case) -> Size:
     """Predict what the stages of a case take."""
-    outlook = forecast_scene(case)
+    outlook = forecast_solder(case)
     return Size(outlook.seconds, 1, BYTES_OF_PARTICLE * outlook.particles)
+
+
+def solder_tables(case: Case, outlook: SolderForecast) -> Iterator[RenderableType]:
+    """Yield particles, scheme and time steps; then what the costs assume."""
+    table = new_table("\nReflow", "what", "value", "remark")
+    table.add_row("particles", f"{outlook.particles}", f"{1e6 * outlook.spacing:.3g} µm spacing at the start")
+    table.add_row("scheme", outlook.scheme, SCHEMES[outlook.scheme])
+    table.add_row(
+        "capillary limit", short(outlook.capillary_limit), "largest stable time step of explicit surface tension"
+    )
+    ratio = outlook.largest_step / outlook.capillary_limit
+    table.add_row("largest time step", short(outlook.largest_step), f"{ratio:.3g} times the limit")
+    yield table
+    yield styled("\n[dim]{}", REFLOW_SPEED)

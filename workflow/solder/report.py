@@ -1,4 +1,4 @@
-"""Report of solder alone: pictures, profile or swing against the exact one, histories, metrics with their errors."""
+"""Report of solder alone: pictures, profile or oscillation against the exact one, histories, metrics with errors."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -23,8 +23,8 @@ HEADLINE = (
 )  # fmt: skip
 
 
-def add_scene(run_folder: Path, kind: str, context: dict, summary: dict) -> None:
-    """Add what is told of a scene of solder alone."""
+def add_solder(run_folder: Path, kind: str, context: dict, summary: dict) -> None:
+    """Add the section on solder alone."""
     if not (run_folder / "reflow" / "shape.h5").exists():
         return
     from reflowshock.particles.scenes.products import read_body
@@ -130,7 +130,7 @@ def path_curve(places: Sequence[Mapping]) -> str:
 
 
 def stages(kind: str, shape: "JointShape") -> "list[Snapshot]":
-    """The states that a picture shows before the end: of a swing each quarter of its first period, of a path two."""
+    """The states that a picture shows before the end: each quarter of the first oscillation, two of a path."""
     half = max(1, len(shape.snapshots) // 2)
     shown = {"oscillation": shape.snapshots[:7:2], "drops": shape.snapshots, "path": shape.snapshots[: half + 1 : half]}
     return shown.get(kind, shape.snapshots[:1])

@@ -1,13 +1,35 @@
-"""Reflow of solder alone, without package and board: one function a kind of scene."""
+"""Reflow of solder alone, one function for each kind of case; its metrics and health checks."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
-from reflowshock.workflow.case.run import Findings, Run
+from reflowshock.workflow.case.run import Findings, Run, at_most, metric
 from reflowshock.workflow.process.products import write_json
-from reflowshock.workflow.process.progress import progress_bar
-from reflowshock.workflow.solder import findings
+from reflowshock.workflow.process.terminal import progress_bar
 from reflowshock.workflow.solder.case import DropCase, DropsCase, JointCase, OscillationCase
+
+VOLUME_DRIFT = 1.0e-3  # of the volume during the reflow
+DROP_ERROR = 0.01  # of a drop's height and width, against the Young-Laplace shape
+PRESSURE_ERROR = 0.005  # of a drop's mean pressure, against the Young-Laplace shape
+PRESSURE_SCATTER = 0.01  # of the pressures in a drop, over the capillary pressure
+ANGLE_EXCESS = 3.0  # of contact angles beyond the receding and the advancing one [deg]
+PERIOD_ERROR = 0.01  # of an oscillating drop, against Reid: exact at small amplitude
+DECAY_ERROR = 0.10  # of its decay rate, against Reid
+JOINT_ERROR = 0.005  # of a joint's width and waist, against the Young-Laplace shape
+AXIAL_FORCE_ERROR = 0.02  # of a joint, against the Young-Laplace shape, over pi times radius times surface tension
+CAPILLARY_NUMBER = 1.0e-4  # of the largest speed of a surface at rest
+ONE_JOINT_NAMES = {
+    "standoff": "height",
+    "width_error": "max_width_error",
+    "contact_radius_board": "contact_radius",
+    "contact_angle_board": "contact_angle",
+    "contact_radius_package": "contact_radius_top",
+    "contact_angle_package": "contact_angle_top",
+}
+
+Numbers = Mapping[str, tuple[float, str]]
 
 
 def reflow_drop(run: Run[DropCase], folder: Path) -> Findings:
@@ -21,7 +43,7 @@ def reflow_drop(run: Run[DropCase], folder: Path) -> Findings:
     with progress_bar(f"reflow of {drop.particles} particles") as progress:
         result = drop_to_rest(drop, solder, progress, checkpoint)
     write_body(folder, result.shape, result.reference)
-    found = findings.of_drop(result.shape.metrics, result.shape.verdict, result.effects)
+    found = of_drop(result.shape.metrics, result.shape.verdict, result.effects)
     return replace(found, continued="the drop" if checkpoint.continued else "")
 
 
@@ -43,7 +65,7 @@ def reflow_joint(run: Run[JointCase], folder: Path) -> Findings:
     write_body(folder, result.shape, result.reference)
     if result.places:
         write_json(folder / "path.json", result.places)
-    found = findings.of_joint(result.shape.metrics, result.shape.verdict, result.effects)
+    found = of_joint(result.shape.metrics, result.shape.verdict, result.effects)
     return replace(found, continued="the joint" if any(one.continued for one in used) else "")
 
 
@@ -58,21 +80,73 @@ def reflow_drops(run: Run[DropsCase], folder: Path) -> Findings:
     with progress_bar("reflow of two drops") as progress:
         result = pair_to_rest(drops, solder, progress, checkpoint)
     write_body(folder, result.shape, result.reference)
-    found = findings.of_drops(result.shape.metrics, 1 if drops.merge else 2, result.effects)
+    found = of_drops(result.shape.metrics, 1 if drops.merge else 2, result.effects)
     return replace(found, continued="the drops" if checkpoint.continued else "")
 
 
 def reflow_oscillation(run: Run[OscillationCase], folder: Path) -> Findings:
-    """Let a free drop swing."""
+    """Let a free drop oscillate."""
     from reflowshock.particles.core.checkpoint import Checkpoint
     from reflowshock.particles.parameters.effects import decide_oscillation
     from reflowshock.particles.scenes.free_drop import solve_oscillation
     from reflowshock.particles.scenes.products import write_body
 
-    scene, solder = run.case.oscillation, run.case.molten
-    checkpoint = Checkpoint(run.checkpoints("reflow") / "drop", (scene, solder))
-    with progress_bar(f"oscillation of {scene.particles} particles") as progress:
-        shape = solve_oscillation(scene, solder, progress, checkpoint)
+    oscillation, solder = run.case.oscillation, run.case.molten
+    checkpoint = Checkpoint(run.checkpoints("reflow") / "drop", (oscillation, solder))
+    with progress_bar(f"oscillation of {oscillation.particles} particles") as progress:
+        shape = solve_oscillation(oscillation, solder, progress, checkpoint)
     write_body(folder, shape, None)
-    found = findings.of_oscillation(shape.metrics, decide_oscillation(solder))
+    found = of_oscillation(shape.metrics, decide_oscillation(solder))
     return replace(found, continued="the drop" if checkpoint.continued else "")
+
+
+def of_drop(metrics: Numbers, verdict: str, effects: Mapping[str, Any]) -> Findings:
+    """Judge a drop by volume, rest and the Young-Laplace shape; overflow is no failure, but said."""
+    limits = {
+        "height_error": DROP_ERROR,
+        "max_width_error": DROP_ERROR,
+        "mean_pressure_error": PRESSURE_ERROR,
+        "pressure_scatter": PRESSURE_SCATTER,
+        "contact_angle_excess": ANGLE_EXCESS,
+    }
+    return Findings(_known(metrics) | {"verdict": metric(verdict)}, _at_rest(metrics, limits), dict(effects))
+
+
+def of_joint(metrics: Numbers, verdict: str, effects: Mapping[str, Any]) -> Findings:
+    """Judge one joint by volume, rest, verdict and, where there is one, the Young-Laplace shape."""
+    named = {ONE_JOINT_NAMES.get(name, name): number for name, number in metrics.items()}
+    limits = {"max_width_error": JOINT_ERROR, "waist_error": JOINT_ERROR}
+    if "force_balance_error" in metrics:  # of a package that floats the force is given, the height is found
+        limits |= {"collapse_height_error": JOINT_ERROR, "force_balance_error": AXIAL_FORCE_ERROR}
+    else:
+        limits["axial_force_error"] = AXIAL_FORCE_ERROR
+    verdict_check = "joints_not_ok" if verdict == "ok" else f"joint_{verdict}"
+    health = _at_rest(named, limits) | {verdict_check: at_most(int(verdict != "ok"), 0)}
+    return Findings(_known(named) | {"verdict": metric(verdict)}, health, dict(effects))
+
+
+def of_drops(metrics: Numbers, expected: int, effects: Mapping[str, Any]) -> Findings:
+    """Judge drops by how many are left, volume, rest and their exact shapes."""
+    limits = {"height_error": DROP_ERROR, "max_width_error": DROP_ERROR, "radius_error": DROP_ERROR}
+    unexpected = abs(int(metrics["drops_left"][0]) - expected)
+    health = _at_rest(metrics, limits) | {"drops_not_as_meant": at_most(unexpected, 0)}
+    return Findings(_known(metrics), health, dict(effects))
+
+
+def of_oscillation(metrics: Numbers, effects: Mapping[str, Any]) -> Findings:
+    """Judge an oscillating drop by volume, and by Reid's period and decay rate."""
+    limits = {"period_error": PERIOD_ERROR, "decay_rate_error": DECAY_ERROR}
+    return Findings(_known(metrics), _at_rest(metrics, limits), dict(effects))
+
+
+def _known(metrics: Numbers) -> dict:
+    """Metrics that have a value: without a reference there are no errors."""
+    return {name: metric(value, unit) for name, (value, unit) in metrics.items() if value == value}
+
+
+def _at_rest(metrics: Numbers, limits: Mapping[str, float]) -> dict:
+    """Checks of volume, rest and errors that are known; a process that ended before rest has no shape to compare."""
+    known, at_rest = _known(metrics), metrics.get("at_rest", (1.0, ""))[0]
+    of_rest = {"capillary_number_at_rest": CAPILLARY_NUMBER, **limits} if at_rest else {}
+    limits = {"volume_drift": VOLUME_DRIFT, **of_rest}
+    return {name: at_most(abs(metrics[name][0]), limit) for name, limit in limits.items() if name in known}

@@ -7,15 +7,16 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from reflowshock.problem import Problem
 from reflowshock.workflow import __version__
-from reflowshock.workflow.case.problems import CaseError, Problem
+from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.store.product import discard
 from reflowshock.workflow.store.store import HOME
 
 MARK = ".reflowshock.json"
 LOCK = ".lock"
 PARTIAL = ".reflowshock.partial"  # a mark that was being written when the program was killed
-UNKNOWN = {"holds": "run", "name": "a case that is not known, since its mark is damaged"}
+UNKNOWN = {"holds": "run", "name": "an unknown case (its mark is damaged)"}
 
 
 class RunFolderBusy(RuntimeError):
@@ -39,7 +40,7 @@ def check_folder(folder: Path, what: str, name: str, force: bool = False) -> Non
         names = {path.name for path in folder.iterdir()}
     except FileNotFoundError:
         if HOME in folder.resolve().parts:
-            words = f"is in a folder {HOME}, of which the program removes files"
+            words = f"is inside {HOME}, a folder from which the program removes files"
             raise _refused(folder, words, "a folder elsewhere") from None
         return
     except NotADirectoryError as error:
@@ -50,7 +51,9 @@ def check_folder(folder: Path, what: str, name: str, force: bool = False) -> Non
     if mark is None and {"inputs", "stages"} & names and ".snakemake" in names:
         raise _refused(folder, "was written by an earlier version of reflowshock", "another folder, or remove it")
     if mark is None and names - {LOCK, PARTIAL}:
-        raise _refused(folder, "has files that are not the program's", "an empty folder, or the name of a new one")
+        raise _refused(
+            folder, "contains files that the program did not write", "an empty folder, or the name of a new one"
+        )
     if mark is not None and (mark["holds"], mark["name"]) != (what, name) and not force:
         held = f"holds the {mark['holds']} of {mark['name']}, not the {what} of {name}"
         raise _refused(folder, held, "another folder, or --force")
@@ -96,7 +99,7 @@ def locked(folder: Path, what: str, name: str, force: bool = False) -> Iterator[
         try:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError as error:
-            raise RunFolderBusy(f"another run is at work in {folder}") from error
+            raise RunFolderBusy(f"another run is active in {folder}") from error
         if not _is_there(folder / LOCK, descriptor):
             raise RunFolderBusy(f"another command has just removed {folder}; try again")
         _mark(folder, what, name)

@@ -12,7 +12,7 @@ from reflowshock.workflow.store.view import shown_records
 
 
 @dataclass(frozen=True, slots=True)
-class Verdict:
+class StageState:
     """Whether a stage has to run, and why.
 
     Attributes:
@@ -30,45 +30,45 @@ class Verdict:
     damaged: tuple[str, ...] = ()
 
 
-def examine(store: Store, point: Point) -> dict[str, Verdict]:
+def examine(store: Store, point: Point) -> dict[str, StageState]:
     """Say for each stage, in order, whether it has to run, and why; every file of every product is looked at.
 
     A product that is intact stays when one before it is made again, as long as that comes out the same.
     """
-    verdicts: dict[str, Verdict] = {}
+    states: dict[str, StageState] = {}
     shown = shown_records(store, point)
     for stage in point.case.pipeline.stages:
         if store.product(point, stage.name).exists():
-            verdicts[stage.name] = _of_product(store, point, stage.name, verdicts)
+            states[stage.name] = _of_product(store, point, stage.name, states)
         else:
-            verdicts[stage.name] = _of_absence(point, stage.name, shown, verdicts)
-    return verdicts
+            states[stage.name] = _of_absence(point, stage.name, shown, states)
+    return states
 
 
-def _of_product(store: Store, point: Point, name: str, before: Mapping[str, Verdict]) -> Verdict:
+def _of_product(store: Store, point: Point, name: str, before: Mapping[str, StageState]) -> StageState:
     """Judge a product that is there."""
     stage, product = point.case.pipeline[name], store.product(point, name)
     if found := damage(product):
-        return Verdict(stale=True, missing=False, damaged=found)
+        return StageState(stale=True, missing=False, damaged=found)
     folders = {one.name: store.product(point, one.name) for one in point.case.pipeline.stages}
     present = reads(folders, point.case, stage)
     was = (store.record(point, name) or {}).get("reads", {})
     redone = tuple(one for one in present if before[one].stale)
     changed = tuple(one for one in present if one not in redone and present[one] != was.get(one))
     if changed:
-        return Verdict(stale=True, missing=False, because_of=changed)
+        return StageState(stale=True, missing=False, because_of=changed)
     # Whether the pads are the same is seen when the geometry is there.
-    return Verdict(stale=False, missing=False, because_of=() if stage.pads else redone)
+    return StageState(stale=False, missing=False, because_of=() if stage.pads else redone)
 
 
-def _of_absence(point: Point, name: str, shown: Mapping[str, dict], before: Mapping[str, Verdict]) -> Verdict:
+def _of_absence(point: Point, name: str, shown: Mapping[str, dict], before: Mapping[str, StageState]) -> StageState:
     """Say why there is no product: what differs from the one that the run folder shows."""
     stage = point.case.pipeline[name]
     if name not in shown:
-        return Verdict(stale=True, missing=True)
+        return StageState(stale=True, missing=True)
     changes = compare(shown[name].get("inputs", {}), stage_inputs(point.case, stage))
     because_of = tuple(one for one in stage.follows if before[one].stale or _differs(shown, one, point))
-    return Verdict(stale=True, missing=False, changes=changes, because_of=because_of)
+    return StageState(stale=True, missing=False, changes=changes, because_of=because_of)
 
 
 def _differs(shown: Mapping[str, dict], name: str, point: Point) -> bool:
@@ -76,12 +76,12 @@ def _differs(shown: Mapping[str, dict], name: str, point: Point) -> bool:
     return name in shown and shown[name].get("key") != point.digests[name]
 
 
-def why_stale(verdict: Verdict) -> str:
+def why_stale(state: StageState) -> str:
     """Say in a few words why a stage has to run, but for its parameters."""
-    if verdict.damaged:
-        return "its product is damaged: " + ", ".join(verdict.damaged)
-    if verdict.because_of:
-        return "it follows " + ", ".join(verdict.because_of)
+    if state.damaged:
+        return "its product is damaged: " + ", ".join(state.damaged)
+    if state.because_of:
+        return "it follows " + ", ".join(state.because_of)
     return "it has no product yet"
 
 

@@ -1,36 +1,45 @@
-"""A sample: the random cases of one random trial, their verdicts, and the simplest that misses as a file."""
+"""A sample: the random cases of one file, their verdicts, and the simplest that misses as a file."""
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
-from reflowshock.workflow.stress_test.families import random_trials
-from reflowshock.workflow.stress_test.pool import Pool
-from reflowshock.workflow.stress_test.random_cases import Simplifier, drawn, file_table, random_case, shares
-from reflowshock.workflow.stress_test.random_trial import RandomTrial
-from reflowshock.workflow.stress_test.verdict import Check, Verdict
+from reflowshock.cases.hard.hard_case import HardCase
+from reflowshock.cases.hard.random_cases import RandomFile
+from reflowshock.cases.hard.verdict import Check, Verdict
+
+MOST_REFUSED = 0.2  # largest share of cases that may be refused in words instead of tried
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Sample:
     """Random cases that were tried.
 
     Attributes:
-        trial: what was drawn.
-        tables: parameters of each, as a file has them.
-        verdicts: one a table.
+        file: what drew them.
+        cases: in the order in which they were drawn.
+        found: their verdicts, as they came.
         simplest: the simplest case that misses, as a file has it; None where all survived.
     """
 
-    trial: RandomTrial
-    tables: list[dict[str, Any]]
-    verdicts: list[Verdict]
-    simplest: dict[str, Any] | None
+    file: RandomFile
+    cases: list[HardCase]
+    found: list[Verdict] = field(default_factory=list)
+    simplest: dict[str, Any] | None = None
+
+    @property
+    def name(self) -> str:
+        """Name of the file."""
+        return self.file.name
 
     @property
     def family(self) -> str:
-        """Family of the trial."""
-        return self.trial.name.split("_")[0]
+        """Family of the cases."""
+        return self.cases[0].family
+
+    @property
+    def verdicts(self) -> list[Verdict]:
+        """The verdicts in the order in which the cases were drawn."""
+        return sorted(self.found, key=lambda verdict: self.cases.index(verdict.case))
 
     @property
     def missed(self) -> list[Verdict]:
@@ -40,12 +49,12 @@ class Sample:
     @property
     def refused(self) -> int:
         """How many were refused in words."""
-        return sum(verdict.is_refused for verdict in self.verdicts)
+        return sum(verdict.is_refused for verdict in self.found)
 
     @property
     def too_many_refused(self) -> bool:
         """Whether so many were refused that the sample says little."""
-        return self.refused > self.trial.most_refused * len(self.verdicts)
+        return self.refused > MOST_REFUSED * len(self.found)
 
     @property
     def ok(self) -> bool:
@@ -55,27 +64,5 @@ class Sample:
     @property
     def closest(self) -> Check | None:
         """The check of all cases that was kept by the smallest factor."""
-        checks = [verdict.closest for verdict in self.verdicts if verdict.closest is not None]
+        checks = [verdict.closest for verdict in self.found if verdict.closest is not None]
         return min(checks, key=lambda check: check.rank, default=None)
-
-
-def try_sample(family: str, count: int, seed: int, pool: Pool) -> Iterator[Sample]:
-    """Try random cases of a family, one random trial after the other.
-
-    Args:
-        family: its name.
-        count: of cases, over all its random trials.
-        seed: from which they are drawn.
-        pool: which tries.
-    """
-    for trial, own in shares(random_trials(family), count):
-        tables = drawn(trial, own, seed)
-        cases = [random_case(trial, table, number) for number, table in enumerate(tables)]
-        by_name = {verdict.case.tried: verdict for verdict in pool.attempt(cases)}
-        verdicts = [by_name[case.tried] for case in cases]
-        simplest = None
-        if any(not verdict.ok for verdict in verdicts):
-            tried = list(zip(tables, verdicts, strict=True))
-            first = next(table for table, verdict in tried if not verdict.ok)
-            simplest = file_table(trial, Simplifier.of(trial, pool, tried).search(own, seed) or first)
-        yield Sample(trial, tables, verdicts, simplest)

@@ -62,7 +62,7 @@ class StructureCase(StructureProblem, Case):
         return {key: path for key, (path, _) in self.pulse_tables.items()}
 
     @property
-    def scene(self) -> StructureProblem:
+    def problem(self) -> StructureProblem:
         """All of it as the solver takes it."""
         return StructureProblem(**{name: getattr(self, name) for name in StructureProblem.model_fields})
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from reflowshock.workflow.case.problems import Problem
+from reflowshock.problem import Problem
 from reflowshock.workflow.case.run import Findings, at_least, at_most, in_words_continued, metric
 from reflowshock.workflow.case.text import short
 from reflowshock.workflow.structure import exact_bar, exact_cantilever, exact_layers
@@ -146,7 +146,7 @@ def bars_of(case: StructureCase, reference: BarWave) -> exact_bar.Bars:
     """Return the two layers as bars."""
     from reflowshock.fem.materials.elasticity import elasticity_matrix
 
-    layers, materials = case.structure.layers.values(), case.scene.layer_materials.values()
+    layers, materials = case.structure.layers.values(), case.problem.layer_materials.values()
     lower, upper = (float(elasticity_matrix(material)[2, 2]) for material in materials)
     below, above = (material.density for material in materials)
     first, second = (layer.thickness for layer in layers)
@@ -157,7 +157,7 @@ def layers_of(case: StructureCase) -> exact_layers.Layers:
     """Return all layers as bars."""
     from reflowshock.fem.materials.elasticity import elasticity_matrix
 
-    materials = case.scene.layer_materials.values()
+    materials = case.problem.layer_materials.values()
     return exact_layers.Layers(
         tuple(layer.thickness for layer in case.structure.layers.values()),
         tuple(float(elasticity_matrix(material)[2, 2]) for material in materials),
@@ -174,7 +174,7 @@ def waves_that_do_not_pass(case: StructureCase) -> Iterator[Problem]:
             starts = [start for _, start in exact_layers.passes(layers_of(case), heights).values()]
             least = max(starts) + 0.5 * _pulse_of(case, reference.load).duration
             if case.dynamics.duration < least:
-                message = f"ends before the waves of references.{key} have passed its watch points"
+                message = f"ends before the waves of references.{key} have passed the watch points"
                 yield Problem("dynamics.duration", message, short(case.dynamics.duration), f">= {short(least)}")
 
 
@@ -182,7 +182,7 @@ def strip_of(case: StructureCase, reference: Cantilever) -> exact_cantilever.Str
     """Return the only layer as a strip."""
     from reflowshock.fem.materials.elasticity import elasticity_matrix
 
-    (material,) = case.scene.layer_materials.values()
+    (material,) = case.problem.layer_materials.values()
     pressure, body = case.loads[reference.load].peak or 0.0, case.structure
     return exact_cantilever.Strip(body.length, body.thickness, elasticity_matrix(material), material.density, pressure)
 

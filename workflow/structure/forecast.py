@@ -1,17 +1,32 @@
-"""Size, time steps and cost of a structure's motion, from its parameters alone."""
+"""Size, time steps and cost of a structure from its parameters, and its tables of the plan."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from math import ceil
 from typing import TYPE_CHECKING, Any
 
+from reflowshock.problem import Problem
 from reflowshock.workflow.case.forecast import BYTES_OF_ELEMENT, Size, Toggle, between, too_many_steps
-from reflowshock.workflow.case.problems import Problem
 from reflowshock.workflow.case.text import short
 from reflowshock.workflow.structure.case import StructureCase
 
 if TYPE_CHECKING:
     from reflowshock.fem.estimates.solver_cost import SolverForecast
+
+from typing import TYPE_CHECKING
+
+from rich.console import RenderableType
+from rich.table import Table
+
+from reflowshock.workflow.case.text import duration
+from reflowshock.workflow.process.terminal import new_table
+
+if TYPE_CHECKING:
+    from reflowshock.fem.estimates.solver_cost import SolverCost
+
+
+MEGA = 1.0e6
+
 
 SECONDS_TO_START = 4.0  # until the ranks of a solver have loaded their libraries and kernels
 
@@ -66,13 +81,13 @@ def forecast_structure(case: StructureCase) -> StructureForecast:
     steps = forecast_steps(case, layers)
     counts = {solver: ceil(dynamics.duration / step) for solver, step in steps.items()}
     elements = sum(layer.elements for layer in layers.values())
-    solvers = forecast_solvers(case.scene, elements, counts["explicit"], counts["implicit"])
+    solvers = forecast_solvers(case.problem, elements, counts["explicit"], counts["implicit"])
     coupled = forecast_coupled(case, layers, solvers.explicit.seconds / counts["explicit"] / elements)
     alone = solvers.explicit.seconds / case.ranks
     cost = {"explicit": alone, "implicit": solvers.implicit.seconds, "dns": alone}
     cost |= {"explicit": coupled.seconds / case.ranks} if coupled else {}
     seconds = {"shock": sum(SECONDS_TO_START + cost[solver] for solver in dynamics.solvers)}
-    return StructureForecast(effects(case.scene, added_mass(case, layers)), layers, steps, solvers, coupled, seconds)
+    return StructureForecast(effects(case.problem, added_mass(case, layers)), layers, steps, solvers, coupled, seconds)
 
 
 def forecast_coupled(case: StructureCase, layers: Mapping[str, LayerForecast], update: float) -> CoupledForecast | None:
@@ -122,14 +137,12 @@ def step_problems(case: StructureCase) -> Iterator[Problem]:
         with np.errstate(all="ignore"):
             layers = forecast_layers(case)
     except np.linalg.LinAlgError:
-        yield Problem(
-            "structure", "has elements without a time step: sizes, densities or moduli are beyond all numbers"
-        )
+        yield Problem("structure", "has elements without a time step: sizes, densities or moduli are out of range")
         return
     numerics, critical = case.dynamics.numerics, critical_step(case, layers)
     exact = numerics.critical_step == "element" and case.structure.holes is None
     if numerics.explicit_step and exact and numerics.explicit_step > critical and "explicit" in case.dynamics.solvers:
-        message = "is above the critical step, beyond which every motion grows"
+        message = "is above the critical step: the solution would be unstable"
         allowed = f"<= {short(critical)}; critical_step = power_iteration may allow more"
         yield Problem("dynamics.numerics.explicit_step", message, short(numerics.explicit_step), allowed)
     steps = forecast_steps(case, layers)
@@ -147,7 +160,7 @@ def shorter_than_window(case: StructureCase, window: float) -> Iterator[Problem]
     for name, pulse in pulses_of(case.loads).items():
         shortest = min(pulse_durations({name: pulse}), default=window)
         if shortest < window:
-            message = f"is shorter than a window of {short(window)}, the time between two exchanges of the models"
+            message = f"is shorter than one coupling window ({short(window)})"
             allowed = f">= {short(window)}, smaller elements of the coarse layers, or no dynamics.coupling"
             yield Problem(f"loads.{name}.duration", message, short(shortest), allowed)
 
@@ -159,7 +172,7 @@ def forecast_layers(case: StructureCase) -> dict[str, LayerForecast]:
     from reflowshock.fem.elements.box_step import box_element_step
     from reflowshock.meshing.board.box_plan import count_box
 
-    body, materials = case.structure, case.scene.layer_materials
+    body, materials = case.structure, case.problem.layer_materials
     layers = {}
     for name, part in count_box(case.box).items():
         step = box_element_step(body.element, body.formulation, materials[name], np.array(part.smallest))
@@ -170,7 +183,7 @@ def forecast_layers(case: StructureCase) -> dict[str, LayerForecast]:
 
 def added_mass(case: StructureCase, layers: Mapping[str, LayerForecast]) -> float:
     """Predict the mass [kg] that scaling adds: it raises the steps of some layers to the smallest of the others."""
-    body, materials = case.structure, case.scene.layer_materials
+    body, materials = case.structure, case.problem.layer_materials
     target = min(layer.critical_step for layer in layers.values() if not layer.mass_scaled)
     area = case.box.extent(0) * case.box.extent(1)
     return sum(
@@ -194,3 +207,51 @@ def structure_size(case: StructureCase) -> Size:
 def toggles(case: StructureCase) -> dict[str, Toggle]:
     """Return the toggles of the effects whose cost the forecast knows."""
     return {"finite_rotation": between("dynamics.kinematics", "finite", "small")}
+
+
+def structure_tables(case: StructureCase, outlook: StructureForecast) -> Iterator[RenderableType]:
+    """Yield layers and solvers."""
+    yield layers(outlook)
+    yield solvers(case, outlook)
+
+
+def layers(outlook: StructureForecast) -> Table:
+    """Elements and critical steps of the layers, top first."""
+    table = new_table("\nLayers, top first", "layer", "elements", "critical step", "material")
+    for name, layer in reversed(outlook.layers.items()):
+        remark = "; mass scaled to the smallest step of the others" if layer.mass_scaled else ""
+        table.add_row(name, f"{layer.elements}", short(layer.critical_step), layer.material + remark)
+    table.add_row("all", f"{sum(layer.elements for layer in outlook.layers.values())}", "", "", style="bold")
+    return table
+
+
+def solvers(case: StructureCase, outlook: StructureForecast) -> Table:
+    """Steps, cost and memory of both solvers, and which to take."""
+    table = new_table("\nSolvers, on one core", "solver", "step", "steps", "cost", "memory", "remark")
+    numerics, found = case.dynamics.numerics, outlook.solvers
+    given = numerics.explicit_step is not None
+    fraction = "as given" if given else f"{numerics.step_fraction:g} of the smallest critical step"
+    factor = f"of it {duration(found.implicit.setup)} for the factor"
+    for name, cost, remark in (("explicit", found.explicit, fraction), ("implicit", found.implicit, factor)):
+        unused = "" if name in case.dynamics.solvers else "; not in dynamics.solver"
+        table.add_row(name, short(outlook.steps[name]), f"{cost.steps}", _about(cost), _memory(cost), remark + unused)
+    if outlook.coupled:
+        table.add_row("two models", *_coupled(outlook.coupled))
+    table.caption, table.caption_justify = found.sentence, "left"
+    return table
+
+
+def _coupled(found: CoupledForecast) -> tuple[str, str, str, str, str]:
+    """Window, steps in it, cost of two models."""
+    remark = f"window; fine: {', '.join(found.fine) or 'nothing'}; without buffers and levels inside it"
+    return short(found.window), f"m = {found.substeps}", f"about {duration(found.seconds)}", "", remark
+
+
+def _about(cost: "SolverCost") -> str:
+    return f"about {duration(cost.seconds)}"
+
+
+def _memory(cost: "SolverCost") -> str:
+    size, unit = (MEGA, "MB") if cost.memory < 100.0 * MEGA else (1000.0 * MEGA, "GB")
+    figure = cost.memory / size
+    return f"{figure:.2g} {unit}" if figure < 100.0 else f"{figure:.0f} {unit}"

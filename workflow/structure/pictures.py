@@ -25,7 +25,7 @@ def render_deformation(series: list[Path], time: float, picture: Path) -> str:
     size = np.linalg.norm(grid.point_data["displacement"], axis=1)
     extent = float(np.ptp(grid.points, axis=0).max())
     factor = max(round_down(SHARE * extent / float(size.max())), 1.0) if size.max() > 0.0 else 1.0
-    unit, scale = ("mm", MILLI) if size.max() > 1e-2 * MILLI else ("um", 1e-6)
+    unit, scale = ("mm", MILLI) if size.max() > 1e-2 * MILLI else ("µm", 1e-6)
     title = f"displacement [{unit}]"
     grid[title] = size / scale
     plotter = new_plotter((1800, 900))

@@ -1,6 +1,6 @@
 """What does not fit together in the case of a structure."""
 
-from reflowshock.workflow.case.problems import Problem
+from reflowshock.problem import Problem
 from reflowshock.workflow.case.pulse_files import unreadable_pulses
 from reflowshock.workflow.structure.case import StructureCase
 from reflowshock.workflow.structure.forecast import step_problems
@@ -13,11 +13,6 @@ def structure_problems(case: StructureCase) -> list[Problem]:
     from reflowshock.meshing.board.box_plan import box_problems
     from reflowshock.workflow.structure.findings import waves_that_do_not_pass
 
-    boxes = [Problem(found.key, found.message, found.value, found.allowed) for found in box_problems(case.box)]
-    scenes = [
-        Problem(found.key, found.message, found.value, found.allowed, found.hint)
-        for found in structure_checks.problems(case.scene)
-    ]
-    found = [*boxes, *scenes, *unreadable_pulses(case.pulse_tables)]
-    found += reference_problems(case.references, case.scene)
+    found = [*box_problems(case.box), *structure_checks.problems(case.problem), *unreadable_pulses(case.pulse_tables)]
+    found += reference_problems(case.references, case.problem)
     return found or [*step_problems(case), *waves_that_do_not_pass(case)]

@@ -3,17 +3,16 @@
 from collections.abc import Iterator
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
-from reflowshock.fem.names import nearest
 from reflowshock.fem.problem.structure import Pressure, StructureProblem
-from reflowshock.workflow.case.problems import Problem
+from reflowshock.names import nearest
+from reflowshock.parameters import Parameters
+from reflowshock.problem import Problem
 
 
-class Reference(BaseModel):
+class Reference(Parameters):
     """Base of all references: immutable, unknown keys are errors."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
 
 class BarWave(Reference):
@@ -76,52 +75,50 @@ class Published(Reference):
 AnyReference = Annotated[BarWave | LayeredBar | Cantilever | FrequencyRange | Published, Field(discriminator="kind")]
 
 
-def reference_problems(references: dict[str, AnyReference], scene: StructureProblem) -> Iterator[Problem]:
+def reference_problems(references: dict[str, AnyReference], problem: StructureProblem) -> Iterator[Problem]:
     """Find references to loads, points or modes that are not there, or to what has no exact solution."""
     for name, reference in references.items():
         key = f"references.{name}"
         if isinstance(reference, BarWave):
-            yield from _pressure(f"{key}.load", reference.load, scene, "half_sine")
-            yield from _layers(key, 2, scene)
-            yield from _heights(key, reference, scene)
+            yield from _pressure(f"{key}.load", reference.load, problem, "half_sine")
+            yield from _layers(key, 2, problem)
+            yield from _heights(key, reference, problem)
         elif isinstance(reference, LayeredBar):
-            yield from _pulse(f"{key}.load", reference.load, scene)
-            yield from _heights(key, reference, scene)
+            yield from _pulse(f"{key}.load", reference.load, problem)
+            yield from _heights(key, reference, problem)
         elif isinstance(reference, Cantilever):
-            yield from _pressure(f"{key}.load", reference.load, scene, "constant")
-            yield from _known(f"{key}.tip", reference.tip, scene.watch, "watch point")
-            yield from _layers(key, 1, scene)
-        elif isinstance(reference, FrequencyRange) and reference.mode > scene.dynamics.modes:
-            allowed = f"<= {scene.dynamics.modes}, or more dynamics.modes"
+            yield from _pressure(f"{key}.load", reference.load, problem, "constant")
+            yield from _known(f"{key}.tip", reference.tip, problem.watch, "watch point")
+            yield from _layers(key, 1, problem)
+        elif isinstance(reference, FrequencyRange) and reference.mode > problem.dynamics.modes:
+            allowed = f"<= {problem.dynamics.modes}, or more dynamics.modes"
             yield Problem(f"{key}.mode", "is not computed", reference.mode, allowed)
 
 
-def _heights(key: str, reference: BarWave | LayeredBar, scene: StructureProblem) -> Iterator[Problem]:
+def _heights(key: str, reference: BarWave | LayeredBar, problem: StructureProblem) -> Iterator[Problem]:
     points = [*(("incident", name) for name in reference.incident), ("transmitted", reference.transmitted)]
     for item, name in points:
-        yield from _known(f"{key}.{item}", name, scene.watch, "watch point")
-    thickness = [layer.thickness for layer in scene.structure.layers.values()]
-    if len(thickness) < 2 or any(name not in scene.watch for _, name in points):
+        yield from _known(f"{key}.{item}", name, problem.watch, "watch point")
+    thickness = [layer.thickness for layer in problem.structure.layers.values()]
+    if len(thickness) < 2 or any(name not in problem.watch for _, name in points):
         return
     lower, upper = thickness[0], sum(thickness[:-1])
-    heights = [scene.watch[name].at[2] for _, name in points]
+    heights = [problem.watch[name].at[2] for _, name in points]
     if not 0.0 <= heights[0] < heights[1] < lower <= upper < heights[2]:
         allowed = f"two heights below {1e3 * lower:g} mm, upwards, then one above {1e3 * upper:g} mm"
-        yield Problem(key, "the watch points are not in their layers", None, allowed)
+        yield Problem(key, "has watch points outside their layers", None, allowed)
 
 
-def _pressure(key: str, name: str, scene: StructureProblem, pulse: str) -> Iterator[Problem]:
-    yield from _known(key, name, scene.loads, "load")
-    load = scene.loads.get(name)
+def _pressure(key: str, name: str, problem: StructureProblem, pulse: str) -> Iterator[Problem]:
+    yield from _known(key, name, problem.loads, "load")
+    load = problem.loads.get(name)
     if load is not None and not (isinstance(load, Pressure) and load.peak is not None and load.pulse == pulse):
-        yield Problem(
-            key, f"is not a {pulse} pressure that is given by its peak", name, f'a pressure with pulse = "{pulse}"'
-        )
+        yield Problem(key, f"is not a {pulse} pressure given by its peak", name, f'a pressure with pulse = "{pulse}"')
 
 
-def _pulse(key: str, name: str, scene: StructureProblem) -> Iterator[Problem]:
-    yield from _known(key, name, scene.loads, "load")
-    load = scene.loads.get(name)
+def _pulse(key: str, name: str, problem: StructureProblem) -> Iterator[Problem]:
+    yield from _known(key, name, problem.loads, "load")
+    load = problem.loads.get(name)
     if load is not None and not (isinstance(load, Pressure) and load.on == "z_min" and _ends(load)):
         yield Problem(
             key, "is not a pulse of pressure on z_min", name, "a pressure on z_min with a duration or a table"
@@ -137,7 +134,7 @@ def _known(key: str, name: str, names: dict, what: str) -> Iterator[Problem]:
         yield Problem(key, f"no such {what}", name, "one of " + ", ".join(names), nearest(name, names))
 
 
-def _layers(key: str, count: int, scene: StructureProblem) -> Iterator[Problem]:
-    found = len(scene.structure.layers)
+def _layers(key: str, count: int, problem: StructureProblem) -> Iterator[Problem]:
+    found = len(problem.structure.layers)
     if found != count:
         yield Problem(f"{key}.kind", f"has no exact solution for {found} layers", None, f"{count} in structure.layers")

@@ -7,14 +7,12 @@ from pathlib import Path
 
 from rich.table import Table
 
-from reflowshock.fem.names import nearest
+from reflowshock.names import nearest
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.case.text import duration
 from reflowshock.workflow.jobs.batch import Machine, missing, run_points, show_products
 from reflowshock.workflow.pipeline.points import PointsError, read_possible_points
-from reflowshock.workflow.process.plan_table import new_table
-from reflowshock.workflow.process.progress import progress_bar
-from reflowshock.workflow.process.terminal import console, print_error
+from reflowshock.workflow.process.terminal import console, new_table, print_error, progress_bar
 from reflowshock.workflow.store.folders import locked
 from reflowshock.workflow.store.point import Point
 from reflowshock.workflow.store.product import discard
@@ -22,8 +20,7 @@ from reflowshock.workflow.store.store import Store
 from reflowshock.workflow.store.view import adopt
 from reflowshock.workflow.study import tables
 from reflowshock.workflow.study.main_effects import is_number
-from reflowshock.workflow.study.outlook import outlook
-from reflowshock.workflow.study.progress import teller
+from reflowshock.workflow.study.progress import outlook, teller
 from reflowshock.workflow.study.results import HEALTHY, IMPOSSIBLE, Row, row_of
 from reflowshock.workflow.study.study_file import Study, read_study
 
@@ -70,7 +67,7 @@ def read_points_of(path: Path, oversubscribe: bool = False, force: bool = False)
 
 
 def show_outlook(points: Points, store: Store) -> None:
-    """Print what would be computed, and its foreseen cost."""
+    """Print what would be computed, and its predicted cost."""
     every = list(points.possible.values())
     stages = outlook(every, missing(store, every, LAST))
     table = new_table(
@@ -96,7 +93,7 @@ def show_outlook(points: Points, store: Store) -> None:
     )
     console.print(table)
     if points.impossible:
-        console.print(f"{len(points.impossible)} points cannot be and are skipped")
+        console.print(f"{len(points.impossible)} points are not possible and are skipped")
 
 
 def predicted_study_seconds(points: Points, store: Store) -> float:
@@ -172,7 +169,9 @@ def warn_of_metrics(points: Points, store: Store, first: Point) -> None:
         if name not in known:
             hint = nearest(name, sorted(known))
             told = f"; did you mean {hint}?" if hint else ""
-            print_error(f"the first point has no number {name}{told} Ctrl-C stops the study and keeps what is finished")
+            print_error(
+                f"the first point has no numeric metric {name}{told} Ctrl-C stops the study and keeps finished results"
+            )
 
 
 def has_metrics(study: Study, rows: Sequence[Row]) -> bool:
@@ -181,7 +180,7 @@ def has_metrics(study: Study, rows: Sequence[Row]) -> bool:
     missing_ones = [name for name in study.metrics if known and name not in known]
     for name in missing_ones:
         hint = nearest(name, sorted(known))
-        print_error(f"no point has a number {name}" + (f"; did you mean {hint}?" if hint else ""))
+        print_error(f"no point has a numeric metric {name}" + (f"; did you mean {hint}?" if hint else ""))
     return not missing_ones
 
 

@@ -1,13 +1,82 @@
-"""Designs: which settings the points of a study have. A factor is what is varied as one, of one key or several."""
+"""Designs: the settings of the points of a study, from grids, lists and Latin hypercubes. A factor varies as one."""
 
+import json
 import math
+import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 
-from reflowshock.workflow.case.problems import Problem
-from reflowshock.workflow.study.hypercube import Hypercube
-from reflowshock.workflow.study.setting_text import as_text, between
+import numpy as np
+
+from reflowshock.problem import Problem
+from reflowshock.workflow.case.units import QUANTITY
+
+
+@dataclass(frozen=True, slots=True)
+class Hypercube:
+    """A random Latin hypercube: in each dimension one sample in each of as many equal parts of the unit interval.
+
+    It is grown from the odd factor of its size by doubling: of the halves of each part one has a sample already, the
+    new samples take the others, in random order. So 2 n samples begin with the same n; any other size begins anew.
+    """
+
+    samples: int
+    seed: int
+
+    def shares(self, dimensions: int) -> np.ndarray:
+        """Return the samples (samples, dimensions), each in [0, 1)."""
+        from scipy.stats import qmc
+
+        size = self.samples // (self.samples & -self.samples)
+        found = qmc.LatinHypercube(dimensions, seed=np.random.default_rng((self.seed, size))).random(size)
+        while size < self.samples:
+            random = np.random.default_rng((self.seed, 2 * size))
+            free = [np.setdiff1d(np.arange(2 * size), (2 * size * column).astype(int)) for column in found.T]
+            parts = np.stack([random.permutation(column) for column in free], axis=1)
+            found = np.concatenate([found, (parts + random.random((size, dimensions))) / (2 * size)])
+            size *= 2
+        return found
+
+
+DIGITS = 6
+
+
+def as_text(value: object) -> str:
+    """Write a value of TOML as ``--set`` takes it: names, quantities and dates without quotes."""
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False) if _is_toml(value) else value
+    return json.dumps(value, ensure_ascii=False, default=str)
+
+
+def between(low: object, high: object, share: float) -> str | None:
+    """Return the value at a share of a range, with six digits: a quantity, number or whole number; None if it is none.
+
+    Args:
+        low: its beginning, e.g. "0.8 mm".
+        high: its end, in the same unit.
+        share: 0 to 1.
+    """
+    if isinstance(low, int) and isinstance(high, int) and not isinstance(low, bool) and not isinstance(high, bool):
+        return str(min(low + int(share * (high - low + 1)), high))
+    if isinstance(low, str) and isinstance(high, str):
+        ends = QUANTITY.fullmatch(low), QUANTITY.fullmatch(high)
+        if ends[0] is None or ends[1] is None or ends[0]["unit"] != ends[1]["unit"]:
+            return None
+        first, last = float(ends[0]["number"]), float(ends[1]["number"])
+        return f"{(1.0 - share) * first + share * last:.{DIGITS}g} {ends[0]['unit']}"
+    if isinstance(low, float | int) and isinstance(high, float | int):
+        return f"{(1.0 - share) * low + share * high:.{DIGITS}g}"
+    return None
+
+
+def _is_toml(text: str) -> bool:
+    try:
+        tomllib.loads(f"value = {text}")
+    except (ValueError, RecursionError):
+        return False
+    return True
+
 
 MOST_POINTS = 10_000  # each a run
 MOST_SAMPLED = 1_000_000  # values of a Latin hypercube
@@ -86,10 +155,10 @@ def grid_axes(table: Mapping[str, object], problems: list[Problem]) -> Iterator[
             continue
         points = [_level(keys, value) for value in values]
         if len({tuple(point.items()) for point in points if point is not None}) < len(points) - points.count(None):
-            problems.append(Problem(f"grid.{text}", "has a value twice", values, VALUES))
+            problems.append(Problem(f"grid.{text}", "contains a value twice", values, VALUES))
         if None in points:
             problems.append(
-                Problem(f"grid.{text}", f"has values that are not one for each of {len(keys)} keys", values, VALUES)
+                Problem(f"grid.{text}", f"must have one value for each of its {len(keys)} keys", values, VALUES)
             )
         yield Design((Factor(keys),), tuple(point for point in points if point is not None))
 

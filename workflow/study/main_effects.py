@@ -27,7 +27,7 @@ class Level:
 
 
 @dataclass(frozen=True, slots=True)
-class Effect:
+class MainEffect:
     """What a metric does with one factor.
 
     Attributes:
@@ -81,7 +81,7 @@ def is_number(value: object) -> bool:
     return isinstance(value, float | int) and not isinstance(value, bool) and bool(np.isfinite(value))
 
 
-def effect_of(factor: Factor, rows: Sequence[Row], metric: str) -> Effect:
+def effect_of(factor: Factor, rows: Sequence[Row], metric: str) -> MainEffect:
     """Return what a metric does with a factor.
 
     Args:
@@ -99,7 +99,7 @@ def effect_of(factor: Factor, rows: Sequence[Row], metric: str) -> Effect:
         result = spearmanr(np.array(values, dtype=float), found)
         correlation, probability = float(result.statistic), float(result.pvalue)
     named = tuple(value if isinstance(value, float) else str(value) for value in values)
-    return Effect(factor, unit, named, found, correlation, probability)
+    return MainEffect(factor, unit, named, found, correlation, probability)
 
 
 def ranked(rows: Sequence[Row], metric: str, goal: str) -> list[Row]:

@@ -1,12 +1,13 @@
-"""How far a study is: points done, points failed, time left."""
+"""How far a study is: what will be computed; points done, points failed, time left."""
 
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 from reflowshock.workflow.case.text import duration
 from reflowshock.workflow.jobs.batch import Job
-from reflowshock.workflow.process.progress import ProgressBar
-from reflowshock.workflow.process.terminal import console
+from reflowshock.workflow.kinds import stage_seconds
+from reflowshock.workflow.process.terminal import ProgressBar, console
 from reflowshock.workflow.store.point import Point
 from reflowshock.workflow.store.store import Store
 
@@ -70,3 +71,39 @@ def seconds_left(waiting: Sequence[str], done: dict[str, list[float]], elapsed: 
     mean = sum(every) / len(every)
     rest = sum(sum(own) / len(own) if (own := done.get(stage)) else mean for stage in waiting)
     return rest * elapsed / max(sum(every), 1e-9)
+
+
+@dataclass(frozen=True, slots=True)
+class StageOutlook:
+    """Products of one stage.
+
+    Attributes:
+        stage: its name.
+        points: number of points that need one.
+        products: number of distinct ones.
+        missing: number of those that will be computed.
+        seconds: wall time [s] predicted for these, one after the other; None where there is no forecast.
+    """
+
+    stage: str
+    points: int
+    products: int
+    missing: int
+    seconds: float | None
+
+
+def outlook(points: Sequence[Point], jobs: Sequence[Job]) -> list[StageOutlook]:
+    """Predict what a study will compute.
+
+    Args:
+        points: all of them.
+        jobs: the products that are missing.
+    """
+    found = []
+    for stage in dict.fromkeys(name for point in points for name in point.case.pipeline.names):
+        wanted = [point.digests[stage] for point in points if stage in point.digests]
+        own = [job for job in jobs if job.stage == stage]
+        seconds = [stage_seconds(job.point.case).get(stage) for job in own]
+        known = [value for value in seconds if value is not None]
+        found.append(StageOutlook(stage, len(wanted), len(set(wanted)), len(own), sum(known) if known else None))
+    return found

@@ -6,26 +6,33 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field, ValidationError
 
+from reflowshock.parameters import Parameters
+from reflowshock.problem import Problem
 from reflowshock.workflow.case.names import Name
-from reflowshock.workflow.case.problems import CaseError, Problem
+from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.case.scales import dotted, is_key
 from reflowshock.workflow.case.toml_file import parse_toml, read_text
 from reflowshock.workflow.case.toml_places import Places
 from reflowshock.workflow.case.validation import translate
 from reflowshock.workflow.kinds import NAMES
-from reflowshock.workflow.study.designs import MOST_POINTS, Design, TooManyPoints, grid_axes, list_axis, sampled
-from reflowshock.workflow.study.hypercube import Hypercube
-from reflowshock.workflow.study.setting_text import as_text
+from reflowshock.workflow.study.designs import (
+    MOST_POINTS,
+    Design,
+    Hypercube,
+    TooManyPoints,
+    as_text,
+    grid_axes,
+    list_axis,
+    sampled,
+)
 
 DESIGNS = "at least one of [grid], [[list]], [latin_hypercube]"
 
 
-class StudyTable(BaseModel):
+class StudyTable(Parameters):
     """What the table ``[study]`` says: the case, relative to the file, and what is made of the results."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     name: Name
     title: str = ""
@@ -37,24 +44,20 @@ class StudyTable(BaseModel):
     skip_impossible: bool = False
 
 
-class LatinHypercubeTable(BaseModel):
+class LatinHypercubeTable(Parameters):
     """A Latin hypercube: each parameter once in each of ``samples`` equal parts of its range."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     samples: int = Field(ge=1, le=10000)
     seed: int = Field(0, ge=0)
     ranges: dict[str, Any]
 
 
-class StudyFile(BaseModel):
+class StudyFile(Parameters):
     """The tables of a study file."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
     study: StudyTable
-    settings: dict[str, Any] = {}
-    grid: dict[str, Any] = {}
+    settings: dict[str, Any] = Field(default_factory=dict)
+    grid: dict[str, Any] = Field(default_factory=dict)
     list: tuple[dict[str, Any], ...] = ()
     latin_hypercube: LatinHypercubeTable | None = None
 
@@ -102,7 +105,7 @@ def read_study(path: Path) -> Study:
 def _study(path: Path, table: dict) -> Study:
     """Return the study of a table; errors as ``read_study``, without their places."""
     if "study" not in table and any(kind in table for kind in NAMES):
-        raise CaseError(str(path), [Problem("", "is a case, not a study; use: reflowshock plan, or run")])
+        raise CaseError(str(path), [Problem("", "is a case, not a study; use reflowshock plan or run")])
     values = table | ({"list": tuple(table["list"])} if isinstance(table.get("list"), list) else {})
     if isinstance(given := table.get("study"), dict) and isinstance(given.get("metrics"), list):
         values["study"] = given | {"metrics": tuple(given["metrics"])}
@@ -116,7 +119,7 @@ def _study(path: Path, table: dict) -> Study:
     settings |= {"scale": file.study.scale} if file.study.scale else {}
     varied = {key for point in design.points for key in point}
     problems += [
-        Problem(key, "is fixed and varied at once", settings[key], "either [settings] or a design")
+        Problem(key, "is both fixed and varied", settings[key], "either [settings] or a design")
         for key in sorted(settings.keys() & varied)
     ]
     problems += [
@@ -143,7 +146,7 @@ def _design(file: StudyFile, problems: list[Problem]) -> Design:
         problems.append(Problem("", str(error), None, f"up to {MOST_POINTS}"))
         return Design()
     problems += [
-        Problem(key, "is given twice, of which one would be lost", None, "one place in [grid], [[list]] or ranges")
+        Problem(key, "is given twice", None, "one place in [grid], [[list]] or ranges")
         for key, count in Counter(key for axis in axes for key in axis.given).items()
         if count > 1
     ]

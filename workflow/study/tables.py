@@ -3,12 +3,12 @@
 from collections.abc import Iterable, Sequence
 
 from reflowshock.workflow.case.text import quantity
-from reflowshock.workflow.study.main_effects import Effect, effect_of, measured, ranked
+from reflowshock.workflow.study.main_effects import MainEffect, effect_of, measured, ranked
 from reflowshock.workflow.study.results import HEALTHY, UNHEALTHY, Row
 from reflowshock.workflow.study.study_file import Study
 
-MIXED = "{} of {} points have no result: means at the values of a factor then differ also by what other factors do."
-UNSOUND = "{} of {} points, which count in the means, broke a check."
+MIXED = "{} of {} points have no result, so means at the values of a factor also differ by the other factors."
+UNSOUND = "{} of {} points failed a check; they count in the means."
 
 
 def ranking(study: Study, rows: Sequence[Row]) -> dict:
@@ -30,7 +30,7 @@ def ranking(study: Study, rows: Sequence[Row]) -> dict:
     }
 
 
-def effects(study: Study, rows: Sequence[Row]) -> list[tuple[str, str, list[Effect]]]:
+def effects(study: Study, rows: Sequence[Row]) -> list[tuple[str, str, list[MainEffect]]]:
     """Return metric, unit and effect of every factor, for each metric that points have."""
     return [
         (name, found[0].metrics[name]["unit"], [effect_of(factor, found, name) for factor in study.design.factors])
@@ -39,7 +39,7 @@ def effects(study: Study, rows: Sequence[Row]) -> list[tuple[str, str, list[Effe
     ]
 
 
-def effect_table(found: Sequence[tuple[str, str, Sequence[Effect]]]) -> dict:
+def effect_table(found: Sequence[tuple[str, str, Sequence[MainEffect]]]) -> dict:
     """Return the table of factors, for each metric the largest effect first."""
     return {
         "head": ["factor", "metric", "effect", "rank correlation", "chance alone"],
@@ -60,8 +60,8 @@ def effect_table(found: Sequence[tuple[str, str, Sequence[Effect]]]) -> dict:
 def imbalance(rows: Sequence[Row]) -> str:
     """Say that means at a factor's values are not of equal points where some have no result, or a bad one."""
     missing, unsound = sum(not row.metrics for row in rows), sum(row.verdict == UNHEALTHY for row in rows)
-    told = [text.format(count, len(rows)) for text, count in ((MIXED, missing), (UNSOUND, unsound)) if count]
-    return " ".join(told)
+    remarks = [text.format(count, len(rows)) for text, count in ((MIXED, missing), (UNSOUND, unsound)) if count]
+    return " ".join(remarks)
 
 
 def troubles(rows: Sequence[Row]) -> dict:

@@ -15,7 +15,7 @@ from reflowshock.fem.elements.kind import ElementKind
 from reflowshock.fem.elements.tetrahedron import EDGES
 from reflowshock.fem.materials.elasticity import elasticity_matrix
 from reflowshock.fem.materials.parameters import Isotropic, Material, Orthotropic
-from reflowshock.fem.mesh.mesh_quality import scaled_jacobians
+from reflowshock.fem.mesh.mesh_file import scaled_jacobians
 
 KINDS = {
     "incompatible_modes": element_kind(8),

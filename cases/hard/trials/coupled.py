@@ -13,8 +13,7 @@ from reflowshock.fem.coupling.impulse import Impulse
 from reflowshock.fem.coupling.scheme import Scheme
 from reflowshock.fem.division.checks import check_division
 from reflowshock.fem.division.divide import divide
-from reflowshock.fem.division.division import Division
-from reflowshock.fem.division.rules import Rules
+from reflowshock.fem.division.division import Division, Rules
 from reflowshock.fem.division.tables import ModelInput, Tables, joined, model_inputs
 from reflowshock.fem.division.whole import Survey, Treatment, Whole, survey
 from reflowshock.fem.dynamics.central_difference import ExplicitMotion

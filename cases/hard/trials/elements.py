@@ -1,13 +1,11 @@
-"""Parameters of the trials of elements and of coupled models.
-
-All values are SI floats; see ``meshing.board.parameters`` for what the unit strings mean.
-"""
+"""Trials of elements and of one model that moves: their parameters, in SI values, and what they measure."""
 
 from typing import Annotated, Literal
 
 from pydantic import Field
 
-from reflowshock.fem.parameters import Parameters
+from reflowshock.cases.hard.trial import pure_trial
+from reflowshock.parameters import Parameters
 
 Element = Literal["incompatible_modes", "one_point", "tetrahedron", "tetrahedron_quadratic"]
 Hexahedron = Literal["incompatible_modes", "one_point"]
@@ -130,70 +128,18 @@ class PulseTrial(Parameters):
     peak: Annotated[float, "G"] = Field(14709.975, ge=0)
 
 
-SchemeOfTrial = Literal[
-    "held_velocity", "impulse", "gravouil_combescure", "local_steps", "local_steps, levels auto", "as_printed"
-]
-
-
-class PairTrial(Parameters):
-    """A board and a finer block tied to it off its grid, coupled by a scheme.
-
-    ``substeps`` is m; ``impedance`` and ``mesh_ratio`` are of block over board and of their elements; ``orthotropy`` is
-    the board's modulus in plane over that across (0: FR4's). The top layer of the block is thinner by ``thinnest``.
-    The scheme ``as_printed`` is the paper's.
-    """
-
-    scheme: SchemeOfTrial = "held_velocity"
-    substeps: int = Field(4, ge=1, le=40)
-    impedance: float = Field(1.0, ge=0.1, le=10)
-    mesh_ratio: float = Field(2.0, ge=1, le=8)
-    shape: Literal["flat", "distorted", "curved"] = "flat"
-    orthotropy: float = Field(0.0, ge=0, le=100)
-    step_fraction: float = Field(0.9, gt=0, le=0.95)
-    layers: int = Field(4, ge=3, le=8)
-    columns: int = Field(3, ge=2, le=5)
-    height: int = Field(2, ge=1, le=4)
-    thinnest: float = Field(1.0, ge=0.05, le=1)
-
-
-class PairRun(PairTrial):
-    """A pair that swings for some windows; ``free`` ones are held nowhere."""
-
-    free: bool = False
-    windows: int = Field(10_000, ge=400, le=1_000_000)
-
-
-class PairTransfer(PairTrial):
-    """A pair whose block is a little off the board's face."""
-
-    offset: Annotated[float, "nm"] = Field(0.0, ge=-1e-6, le=1e-6)
-
-
-class Yielding(Parameters):
-    """A pair whose block is of solder that yields."""
-
-    scheme: Literal["held_velocity", "impulse", "gravouil_combescure"] = "held_velocity"
-    mesh_ratio: float = Field(2.0, ge=1, le=8)
-    speed: Annotated[float, "m/s"] = Field(20.0, gt=0, le=100)
-    windows: int = Field(300, ge=20, le=10_000)
-
-
-class Reflection(Parameters):
-    """A pulse, some elements long, that runs along a bar of board into a finer bar tied to its end."""
-
-    scheme: Literal["held_velocity", "impulse", "gravouil_combescure", "local_steps"] = "held_velocity"
-    substeps: int = Field(4, ge=1, le=20)
-    impedance: float = Field(1.0, ge=0.1, le=10)
-    mesh_ratio: int = Field(2, ge=1, le=4)
-    elements: int = Field(20, ge=6, le=60)
-
-
-class Layout(Parameters):
-    """A board with joints that is hard to divide.
-
-    ``copper_cut``: the cut goes through copper and board; ``overhang``: a plate thinner than its elements are long
-    hangs over a joint; ``corner``: joint in a corner of the board; ``two_regions``: joints far apart.
-    """
-
-    layout: Literal["copper_cut", "overhang", "corner", "two_regions"] = "corner"
-    scheme: Literal["held_velocity", "impulse", "gravouil_combescure", "local_steps"] = "local_steps"
+TRIALS = {
+    "patch": pure_trial(Patch, "fields:patch", "force_error stress_error softest_mode rigid_mode"),
+    "turns": pure_trial(Turns, "fields:turns", "force_error stress_error"),
+    "tension": pure_trial(Tension, "fields:tension", "stress_error stress_scatter force_error"),
+    "compression": pure_trial(Compression, "fields:compression", "stress_error stress_scatter force_error"),
+    "tied_blocks": pure_trial(Tied, "fields:tied", "stress_error mean_stress_error pull_error"),
+    "bending": pure_trial(Bending, "beams:bending", "deflection_error"),
+    "order": pure_trial(Order, "beams:order", "displacement_order strain_order"),
+    "hinge": pure_trial(Hinge, "beams:hinge", "moment_error"),
+    "flight": pure_trial(
+        Flight, "motion:flight", "energy_error momentum_error angular_momentum_error energy_left step_gain"
+    ),
+    "impact": pure_trial(Impact, "motion:impact", "energy_error plastic_share plastic_return hourglass_share"),
+    "pulse": pure_trial(PulseTrial, "motion:pulse", "velocity_error displacement_error strain_energy energy_error"),
+}

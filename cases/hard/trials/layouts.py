@@ -3,7 +3,7 @@
 import numpy as np
 
 from reflowshock.cases.hard.trials.coupled import Coupled, models_of
-from reflowshock.cases.hard.trials.elements import Layout
+from reflowshock.cases.hard.trials.coupling import Layout
 from reflowshock.cases.hard.trials.grids import grid, joint_mesh, mesh_of, on
 from reflowshock.cases.hard.trials.pairs import FRACTION
 from reflowshock.cases.hard.trials.windows import through

@@ -5,10 +5,10 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from pydantic import Field
 
+from reflowshock.cases.hard.trial import Measured, Refused, Trial
+from reflowshock.parameters import Parameters
 from reflowshock.particles.parameters.scenes import Drop, Drops, Fluid, Joint, Liquid, Oscillation
-from reflowshock.particles.parameters.solder import Parameters, Solder, Switch
-from reflowshock.workflow.case.problems import of_particles
-from reflowshock.workflow.stress_test.trial import Measured, Refused, Trial
+from reflowshock.particles.parameters.solder import Solder, Switch
 
 if TYPE_CHECKING:
     from reflowshock.particles.steps.shape import JointShape
@@ -155,7 +155,7 @@ def _swings(amplitude: np.ndarray) -> float:
 
 def _refuse(problems: list) -> None:
     if problems:
-        raise Refused("; ".join(str(problem) for problem in of_particles(problems)))
+        raise Refused("; ".join(str(problem) for problem in problems))
 
 
 def _energy(energy: np.ndarray) -> dict[str, Measured]:

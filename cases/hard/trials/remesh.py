@@ -4,8 +4,9 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field
 
-from reflowshock.meshing.board.parameters import JointNumerics, Parameters
-from reflowshock.workflow.stress_test.trial import Measured, Refused, Trial
+from reflowshock.cases.hard.trial import Measured, Refused, Trial
+from reflowshock.meshing.board.parameters import JointNumerics
+from reflowshock.parameters import Parameters
 
 if TYPE_CHECKING:
     from reflowshock.cases.hard.trials.joints import Meshed

@@ -6,7 +6,7 @@ import numpy as np
 from mpi4py import MPI
 
 from reflowshock.cases.hard.trials.coupled import Coupled, Models, models_of, surveyed
-from reflowshock.cases.hard.trials.elements import PairRun, PairTransfer, PairTrial, Reflection, Yielding
+from reflowshock.cases.hard.trials.coupling import PairRun, PairTransfer, PairTrial, Reflection, Yielding
 from reflowshock.cases.hard.trials.grids import grid, mesh_of, on
 from reflowshock.cases.hard.trials.pairs import FRACTION, SCHEMES, SIZE, Pair
 from reflowshock.fem.coupling.scheme import scheme_of

@@ -14,8 +14,7 @@ from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.facet import area_vectors
 from reflowshock.fem.mesh.facet_areas import outward_areas
 from reflowshock.fem.mesh.mesh import append, boundary_facets, cells_of_facets
-from reflowshock.fem.mesh.mesh_file import read_mesh
-from reflowshock.fem.mesh.mesh_quality import scaled_jacobians
+from reflowshock.fem.mesh.mesh_file import read_mesh, scaled_jacobians
 from reflowshock.fem.model.assembly import make_body, make_pieces
 from reflowshock.fem.output.fields import Fields
 from reflowshock.fem.parallel.local_mesh import distribute

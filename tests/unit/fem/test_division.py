@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from reflowshock.cases.hard.trials.coupled import surveyed
-from reflowshock.fem.division.buffer import grown
 from reflowshock.fem.division.checks import check_division
-from reflowshock.fem.division.divide import divide, scheme_for
+from reflowshock.fem.division.divide import divide, grown, scheme_for
 from reflowshock.fem.division.split import interface_between, part_of
 from reflowshock.fem.division.tables import model_inputs
 from reflowshock.fem.errors import CouplingError

@@ -8,7 +8,7 @@ from reflowshock.cases.hard.trials.bodies import force_of, nonlinear
 from reflowshock.fem.elements.element import Elements, element_kind, element_stiffness
 from reflowshock.fem.elements.stress import symmetric, voigt
 from reflowshock.fem.errors import MeshError
-from reflowshock.fem.kernels.hencky import Law, hencky
+from reflowshock.fem.kernels.hencky import PointLaw, hencky
 from reflowshock.fem.kernels.plasticity import plastic_constants
 from reflowshock.fem.materials.elasticity import elasticity_matrix
 from reflowshock.fem.materials.library import FR4, SAC405
@@ -36,7 +36,7 @@ def twin(strain: np.ndarray, material: Isotropic) -> tuple[np.ndarray, float]:
 
 def at_point(strain: np.ndarray, material: Isotropic) -> tuple[np.ndarray, np.ndarray, float]:
     stress, tangent = np.empty(6), np.empty((6, 6))
-    plastic = hencky(strain, Law(elasticity_matrix(material), plastic_constants(material)), stress, tangent)
+    plastic = hencky(strain, PointLaw(elasticity_matrix(material), plastic_constants(material)), stress, tangent)
     return stress, tangent, plastic
 
 

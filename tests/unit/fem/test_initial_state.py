@@ -15,7 +15,7 @@ from reflowshock.fem.model.assembly import ForceOptions
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.stress_recovery import StressRecovery
 from reflowshock.fem.parallel import portable
-from reflowshock.fem.statics.pins import pins, rigid_motions
+from reflowshock.fem.run.cooling import pins, rigid_motions
 from tests.support.fem_residual import Cooled, cooled, layered
 
 CHANGE = -192.0

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from reflowshock.fem.errors import MeshError
-from reflowshock.fem.mesh.point_table import point_table
-from reflowshock.fem.mesh.recovery import fit, patch
+from reflowshock.fem.mesh.point_table import fit, patch, point_table
 from tests.support.fem_structures import LENGTH, THICKNESS, strip_mesh
 
 SURFACE = (0.0, -4e-3 / 3, THICKNESS)

@@ -4,7 +4,7 @@ import pytest
 
 from reflowshock.fem.coupling.one_way import OneWay
 from reflowshock.fem.coupling.scheme import scheme_of
-from reflowshock.fem.division.choice import choose_scheme
+from reflowshock.fem.division.division import choose_scheme
 
 
 @pytest.mark.parametrize(

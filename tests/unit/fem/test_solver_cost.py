@@ -2,8 +2,7 @@ import math
 
 import pytest
 
-from reflowshock.fem.estimates.factor_cost import box_factor
-from reflowshock.fem.estimates.solver_cost import forecast_solvers, plate_nodes
+from reflowshock.fem.estimates.solver_cost import box_factor, forecast_solvers, plate_nodes
 from reflowshock.fem.problem.structure import StructureProblem
 from tests.support.fem_structures import structure_tables_of
 

@@ -5,13 +5,14 @@ import pytest
 
 from reflowshock.fem.division.division import Division
 from reflowshock.fem.division.structure_tables import structure_tables, tied
+from reflowshock.fem.division.tables import split
 from reflowshock.fem.errors import CouplingError, StepError
 from reflowshock.fem.estimates.estimate import WindowPlan
 from reflowshock.fem.mesh.mesh_file import read_mesh
 from reflowshock.fem.output.compare import relative_error
 from reflowshock.fem.output.compare_structures import solver_differences
 from reflowshock.fem.problem.structure_checks import problems
-from reflowshock.fem.setup.structure_models import divided_on_one_rank, structure_inputs
+from reflowshock.fem.setup.structure_models import divided_on_one_rank
 from tests.support.fem_bars import bar_layers, run_bar, write_bar
 
 WIDTH = 2e-3
@@ -45,7 +46,7 @@ def test_fine_layers_are_those_of_small_steps_and_all_is_counted_once(tmp_path):
     meso = (whole.mesh.points[whole.mesh.cells].mean(axis=1)[:, 2] > 3e-3) & whole.mesh.in_parts("layer_2".__ne__)
     plan = WindowPlan(1e-7, 2, 200, 1)
     division = Division("held_velocity", ~meso, meso, np.zeros(len(meso), np.int32), (), plan)
-    inputs = [item.tables for item in structure_inputs(whole, division, tables).values()]
+    inputs = [item.tables for item in split(whole, tables, division).values()]
     (area,) = tables.areas.values()
     assert sum(item.areas["x_max"][1].sum(axis=0) for item in inputs) == pytest.approx(area[1].sum(axis=0))
     assert sum(len(item.areas["x_max"][0]) for item in inputs) == len(area[0])

@@ -102,7 +102,7 @@ def test_own_materials_go_before_those_of_the_library():
         ),
         (
             {"supports": {"holes": HELD, "foot": {"on": "z_min", "hold": ["z"]}}, "loads": {"drop": SHAKEN}},
-            "supports.foot.hold = ['z']: would stay in place along z while the large mass of loads.drop moves",
+            "supports.foot.hold = [z]: would stay in place along z while the large mass of loads.drop moves",
         ),
         ({"loads": {"drop": SHAKEN, "again": SHAKEN}}, "loads.again.method = large_mass: is already that of loads."),
         (
@@ -177,7 +177,7 @@ def test_own_materials_go_before_those_of_the_library():
 def test_what_does_not_fit_is_said(changes, message):
     with pytest.raises(ValueError) as error:
         check(scene(**changes))
-    assert message in str(error.value)
+    assert message in str(error.value).replace(chr(34), "")  # values as TOML writes them
 
 
 def test_large_mass_with_supports_across_its_direction():

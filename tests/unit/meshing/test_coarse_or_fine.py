@@ -15,7 +15,7 @@ from reflowshock.meshing.board.pads import pad_table
 from reflowshock.meshing.board.parameters import Warpage
 from reflowshock.meshing.joint.joints_file import write_joints
 from reflowshock.meshing.joint.solder_mesh import joint_quality, mesh_coarse_or_fine, mesh_joint
-from reflowshock.workflow.package_report import mesh_tables
+from reflowshock.workflow.package_report import joint_tables as mesh_tables
 
 BULGES = {"A4": 0.25 * MM, "B4": 0.04 * MM}  # two layers cannot hold the first
 

@@ -1,4 +1,4 @@
-"""The command accuracy on a ladder whose runs are made up: error h^2, cost 2 s + h^-4 / 1000."""
+"""The command accuracy on a study whose runs are made up: error h^2, cost 2 s + h^-4 / 1000."""
 
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from reflowshock.workflow.accuracy import command
-from reflowshock.workflow.accuracy.command import Wish, keeps_promise, measure, read_wish, unproved
+from reflowshock.workflow.accuracy.command import AccuracyRequest, keeps_promise, measure, read_request, unproved
 from reflowshock.workflow.accuracy.runs import AGAIN
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.cli import main
@@ -16,7 +16,7 @@ from reflowshock.workflow.convergence.page import section, section_for, write_pa
 from reflowshock.workflow.convergence.tables import as_lines, as_options, legend, on_front, runs
 from reflowshock.workflow.kinds import kind_of
 from reflowshock.workflow.pipeline.reader import read_case
-from reflowshock.workflow.plan import foreseen_costs
+from reflowshock.workflow.plan import predicted_costs
 from reflowshock.workflow.store.store import MESSAGE
 from reflowshock.workflow.store.view import show
 from tests.support.products import record_of
@@ -56,16 +56,16 @@ class Fake:
         return times | {"metrics": metrics, "health": health, "continued": "", "inputs": {}}
 
 
-def wish(tolerance: float | None = 0.02, budget: float = float("inf"), **settings: str) -> Wish:
-    return Wish(CASE, settings, tolerance, budget, "reflowshock accuracy")
+def request(tolerance: float | None = 0.02, budget: float = float("inf"), **settings: str) -> AccuracyRequest:
+    return AccuracyRequest(CASE, settings, tolerance, budget, "reflowshock accuracy")
 
 
 @pytest.fixture(scope="module")
 def done(tmp_path_factory):
     folder = tmp_path_factory.mktemp("runs") / "sessile_drop-accuracy"
     compute = Fake()
-    accuracy, climb = measure(wish(0.002), folder, compute)
-    return accuracy, climb, compute, folder
+    accuracy, runner = measure(request(0.002), folder, compute)
+    return accuracy, runner, compute, folder
 
 
 def test_orders_and_costs_are_found(done):
@@ -79,7 +79,7 @@ def test_orders_and_costs_are_found(done):
 def test_what_is_recommended_lies_between_measured_points_and_was_run(done):
     accuracy = done[0]
     chosen = accuracy.recommended
-    assert chosen.rung.settings == {"drop.particles_per_edge": "25", "drop.symmetry": "quarter"}
+    assert chosen.run.settings == {"drop.particles_per_edge": "25", "drop.symmetry": "quarter"}
     assert 24**-2 < 0.002 < 22**-2
     assert chosen.found.errors["shape_error"].value == pytest.approx(chosen.error)
     assert chosen.found.core_seconds == pytest.approx(chosen.core_seconds, rel=0.02)
@@ -89,19 +89,19 @@ def test_what_is_recommended_lies_between_measured_points_and_was_run(done):
 def test_a_second_call_computes_nothing_and_another_tolerance_only_what_is_new(done):
     accuracy, _, compute, folder = done
     before = len(compute.computed)
-    again, _ = measure(wish(0.002), folder, compute)
+    again, _ = measure(request(0.002), folder, compute)
     assert len(compute.computed) == before and again == accuracy
-    other, _ = measure(wish(0.004), folder, compute)
+    other, _ = measure(request(0.004), folder, compute)
     fresh = [key for store, key in compute.computed[before:] if store == folder.name]
     assert fresh == [other.recommended.found.key]
-    measure(wish(0.002), folder, compute)
+    measure(request(0.002), folder, compute)
 
 
 def test_cheap_points_are_run_again_and_the_smallest_time_counts(done):
-    _, climb, compute, folder = done
+    _, runner, compute, folder = done
     often = [key for store, key in compute.computed if store != folder.name]
-    assert often.count(climb.points["6 per edge"].key) == AGAIN
-    assert climb.points["27 per edge"].key not in often
+    assert often.count(runner.points["6 per edge"].key) == AGAIN
+    assert runner.points["27 per edge"].key not in often
 
 
 def test_a_failed_run_is_a_row_with_its_message(done):
@@ -137,21 +137,21 @@ def test_a_report_shows_what_was_measured_beside_its_run_folder(done):
 
 def test_within_a_budget_nothing_is_started_that_does_not_fit(tmp_path):
     compute = Fake()
-    accuracy, climb = measure(wish(None, 30.0), tmp_path, compute)
-    assert {one.rung for one in accuracy.measurements if one.stages}.isdisjoint(climb.left_out)
-    assert "27 per edge" in climb.left_out and "6 per edge" not in climb.left_out
+    accuracy, runner = measure(request(None, 30.0), tmp_path, compute)
+    assert {one.run for one in accuracy.measurements if one.stages}.isdisjoint(runner.left_out)
+    assert "27 per edge" in runner.left_out and "6 per edge" not in runner.left_out
     assert accuracy.recommended.core_seconds <= 30.0 and "within the budget" in accuracy.recommended.why
-    nothing, _ = measure(wish(0.02, 0.1), tmp_path / "short", compute)
+    nothing, _ = measure(request(0.02, 0.1), tmp_path / "short", compute)
     assert not nothing.measurements and nothing.recommended is None and not keeps_promise(nothing)
 
 
 def test_without_a_budget_long_runs_of_the_ladder_are_left_out(tmp_path, monkeypatch):
     monkeypatch.setattr(command, "LONGEST", 20.0)
-    accuracy, climb = measure(wish(), tmp_path, Fake())
-    assert "27 per edge" in climb.left_out and "11 per edge" not in climb.left_out
-    coarsest = {rung.name for knob in climb.ladder.knobs for rung in knob.rungs[:4]}
-    assert coarsest.isdisjoint(climb.left_out)
-    (told,) = command._left_out(climb)
+    accuracy, runner = measure(request(), tmp_path, Fake())
+    assert "27 per edge" in runner.left_out and "11 per edge" not in runner.left_out
+    coarsest = {run.name for parameter in runner.study.parameters for run in parameter.runs[:4]}
+    assert coarsest.isdisjoint(runner.left_out)
+    (told,) = command._left_out(runner)
     assert "more than 20 s" in told and "--budget" in told
     assert accuracy.recommended.found is not None
 
@@ -168,8 +168,8 @@ def test_a_broken_off_run_is_timed_again(tmp_path):
                     record_of(store.product(point, "reflow"), **record | {"continued": "the drop", "core_seconds": 9.9})
         return failed
 
-    accuracy, _ = measure(wish(), tmp_path, broken_off)
-    costs = {one.rung: one.core_seconds for one in accuracy.measurements}
+    accuracy, _ = measure(request(), tmp_path, broken_off)
+    costs = {one.run: one.core_seconds for one in accuracy.measurements}
     assert costs["27 per edge"] == pytest.approx(2.0 + 26**4 / 1000.0)
 
 
@@ -177,27 +177,27 @@ def test_forecasts_are_corrected_by_the_nearest_measured_run():
     pairs = [{"reflow": StageCost(4.0, 4.0, 2.0)}, {"reflow": StageCost(100.0, 100.0, 20.0)}, {}]
     known = calibration(pairs)
     assert known.points == 2
-    assert [known.seconds("reflow", foreseen) for foreseen in (3.0, 15.0)] == pytest.approx([6.0, 75.0])
+    assert [known.seconds("reflow", predicted) for predicted in (3.0, 15.0)] == pytest.approx([6.0, 75.0])
     assert known.seconds("shock", 3.0) == 3.0 and not known.knows("shock")
 
 
 def test_the_plan_says_that_a_cost_was_measured(done, monkeypatch):
     case = read_case(CASE)
     monkeypatch.chdir(done[3].parents[1])
-    assert foreseen_costs(case, {"reflow": 3.0}) == {"reflow": "about 3 s"}
+    assert predicted_costs(case, {"reflow": 3.0}) == {"reflow": "about 3 s"}
     default_folder(case).parent.mkdir(exist_ok=True)
     default_folder(case).symlink_to(done[3])
     known = calibration_of(case)
     expected = known.seconds("reflow", 3.0)
     assert expected != 3.0
-    assert foreseen_costs(case, {"reflow": 3.0})["reflow"].endswith(f"s (measured: accuracy, {known.points} points)")
+    assert predicted_costs(case, {"reflow": 3.0})["reflow"].endswith(f"s (measured: accuracy, {known.points} points)")
 
 
 def test_a_recommendation_that_was_not_run_is_told(done):
     accuracy = done[0]
     assert unproved(accuracy) == []
     (told,) = unproved(replace(accuracy, recommended=replace(accuracy.recommended, found=None)))
-    assert "was not run (it did not fit into what was left of the budget)" in told and "foreseen, not found" in told
+    assert "was not run (it did not fit into what was left of the budget)" in told and "predicted, not measured" in told
 
 
 def test_settings_can_be_pasted():
@@ -215,9 +215,9 @@ def test_checks_and_runs_that_failed_are_told(tmp_path, monkeypatch, capsys):
     with pytest.raises(SystemExit):
         main()
     said = capsys.readouterr().out
-    assert "Checks of the recommended run that do not hold: reflow: volume drift" in said
+    assert "Failed checks of the recommended run: reflow: volume drift" in said
     place = tmp_path / ".store/work"
-    assert f"Runs that failed are not tried again, unless you remove {place}." in said.replace("\n", "")
+    assert f"Failed runs are not repeated unless you remove {place}." in said.replace("\n", "")
 
 
 @pytest.mark.parametrize(("tolerance", "code"), [("0.2%", 0), ("0.0001%", 1)])
@@ -242,15 +242,15 @@ def test_the_command_tells_it_in_a_hundred_columns(tmp_path, monkeypatch, capsys
 )  # fmt: skip
 def test_what_is_no_tolerance_or_budget_is_refused(tolerance, budget, key):
     with pytest.raises(CaseError, match=key):
-        read_wish(CASE, [], tolerance, budget)
+        read_request(CASE, [], tolerance, budget)
 
 
 def test_a_wish_is_read():
-    read = read_wish(CASE, ["gravity=on"], "2%", "10min")
+    read = read_request(CASE, ["gravity=on"], "2%", "10min")
     assert (read.tolerance, read.budget, read.settings) == (0.02, 600.0, {"gravity": "on"})
     assert "--tolerance 2% --budget 10min --set gravity=on" in read.command
-    assert read_wish(CASE, [], None, None).tolerance == 0.02
-    assert read_wish(CASE, [], None, "1 h").tolerance is None
+    assert read_request(CASE, [], None, None).tolerance == 0.02
+    assert read_request(CASE, [], None, "1 h").tolerance is None
 
 
 @pytest.mark.parametrize(
@@ -259,9 +259,10 @@ def test_a_wish_is_read():
 def test_every_rung_of_solder_alone_is_a_case(name):
     path = CASE.parents[1] / name / "case.toml"
     case = read_case(path)
-    ladder = kind_of(case).ladder(case)
-    for rung in ladder.rungs:
-        read_case(path, [f"{key}={value}" for key, value in rung.settings.items()])
-    for knob in ladder.knobs:
-        sizes = [rung.value for rung in knob.rungs]
-        assert sizes == sorted(sizes, reverse=True) and knob.at(0.97 * sizes[1]).value <= 0.97 * sizes[1] * (1 + 1e-6)
+    study = kind_of(case).study(case)
+    for run in study.runs:
+        read_case(path, [f"{key}={value}" for key, value in run.settings.items()])
+    for parameter in study.parameters:
+        sizes = [run.value for run in parameter.runs]
+        assert sizes == sorted(sizes, reverse=True)
+        assert parameter.at(0.97 * sizes[1]).value <= 0.97 * sizes[1] * (1 + 1e-6)

@@ -1,4 +1,4 @@
-"""Ladders of structures and packages: rungs that can be run, and answers read from their products."""
+"""Convergence studies of structures and packages: runs that can be run, and answers read from their products."""
 
 import json
 
@@ -9,11 +9,10 @@ from reflowshock.workflow.accuracy.recommend import Goal, recommend
 from reflowshock.workflow.case.case import CASES
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.convergence.errors import Error, errors_of
-from reflowshock.workflow.convergence.histories import at_same_times
 from reflowshock.workflow.convergence.measured import Measurement, StageCost, fits_of
-from reflowshock.workflow.convergence.packages import SAME_MESH, package_ladder
-from reflowshock.workflow.convergence.series import Knob, Ladder, Rung
-from reflowshock.workflow.convergence.structures import structure_ladder
+from reflowshock.workflow.convergence.packages import SAME_MESH, package_study
+from reflowshock.workflow.convergence.series import ConvergenceStudy, Parameter, StudyRun, at_same_times
+from reflowshock.workflow.convergence.structures import structure_study
 from reflowshock.workflow.pipeline.reader import read_case
 from reflowshock.workflow.structure.findings import exact_velocities, wave_points
 from tests.support.workflow_command import SMALL_CASE
@@ -41,37 +40,39 @@ def test_histories_of_other_steps_are_compared_at_the_same_times():
     assert first == pytest.approx(second, abs=1e-5)
 
 
-def test_a_structure_of_which_nothing_could_be_compared_has_no_ladder():
+def test_a_structure_of_which_nothing_could_be_compared_has_no_study():
     case = read_case(SMALL_CASE.with_name("structure.toml"))
-    assert structure_ladder(case).judged == "displacement"
-    with pytest.raises(CaseError, match="watch: has no point"):
-        structure_ladder(case.model_copy(update={"watch": {}}))
+    assert structure_study(case).judged == "displacement"
+    with pytest.raises(CaseError, match="watch: has no watch point"):
+        structure_study(case.model_copy(update={"watch": {}}))
 
 
 @pytest.mark.parametrize("name", ["two_scale_bar", "cantilever"])
 def test_rungs_of_a_structure_can_be_run(name):
-    ladder = structure_ladder(case_of(name))
-    for rung in ladder.rungs:
-        case = case_of(name, *(f"{key}={value}" for key, value in rung.settings.items()))
+    study = structure_study(case_of(name))
+    for run in study.runs:
+        case = case_of(name, *(f"{key}={value}" for key, value in run.settings.items()))
         assert len(case.dynamics.solvers) == 1
-    names = {rung.name for rung in ladder.rungs}
-    assert {rung.against for rung in ladder.rungs if rung.against} <= names
-    assert len(ladder.knobs[0].values) >= 8
+    names = {run.name for run in study.runs}
+    assert {run.against for run in study.runs if run.against} <= names
+    assert len(study.parameters[0].values) >= 8
 
 
 def test_elements_between_the_measured_ones_are_chosen_the_finer_way(bar):
-    knob = structure_ladder(bar).knobs[0]
-    rung = knob.at(1.0 / 0.72)
-    assert rung.settings["structure.refine"] == "0.75"
-    assert rung.value == pytest.approx(1.0 / 0.75)
-    assert knob.at(knob.values[0]).name == knob.rungs[0].name
+    parameter = structure_study(bar).parameters[0]
+    run = parameter.at(1.0 / 0.72)
+    assert run.settings["structure.refine"] == "0.75"
+    assert run.value == pytest.approx(1.0 / 0.75)
+    assert parameter.at(parameter.values[0]).name == parameter.runs[0].name
 
 
 def test_one_model_is_on_the_ladder_of_two_and_implicit_steps_on_that_of_one(bar):
-    assert "element size, one model" in [knob.name for knob in structure_ladder(bar).knobs]
-    assert "element size, implicit" in [knob.name for knob in structure_ladder(case_of("cantilever")).knobs]
-    yielding = structure_ladder(case_of("jedec_board", "dynamics.kinematics=finite", "dynamics.solver=explicit"))
-    assert not any("implicit" in knob.name for knob in yielding.knobs)
+    assert "element size, one model" in [one.name for one in structure_study(bar).parameters]
+    assert "element size, implicit" in [
+        parameter.name for parameter in structure_study(case_of("cantilever")).parameters
+    ]
+    yielding = structure_study(case_of("jedec_board", "dynamics.kinematics=finite", "dynamics.solver=explicit"))
+    assert not any("implicit" in parameter.name for parameter in yielding.parameters)
 
 
 def wave_run(folder, bar, shift):
@@ -90,39 +91,39 @@ def wave_run(folder, bar, shift):
 
 
 def test_exact_waves_have_no_error_and_late_ones_as_much_as_they_are_late(bar, tmp_path):
-    ladder = structure_ladder(bar)
-    rungs = ladder.knobs[0].rungs[:3]
+    study = structure_study(bar)
+    runs = study.parameters[0].runs[:3]
     shifts = (8e-8, 4e-8, 0.0)
     answers = {
-        rung.name: ladder.measure(bar, wave_run(tmp_path / str(k), bar, shift))
-        for k, (rung, shift) in enumerate(zip(rungs, shifts, strict=True))
+        run.name: study.measure(bar, wave_run(tmp_path / str(k), bar, shift))
+        for k, (run, shift) in enumerate(zip(runs, shifts, strict=True))
     }
-    errors = [found["wave_error"].value for found in errors_of(answers, rungs, rungs, 2.0).values()]
+    errors = [found["wave_error"].value for found in errors_of(answers, runs, runs, 2.0).values()]
     assert errors[2] < 1e-3
     assert errors[0] == pytest.approx(2.0 * errors[1], rel=0.02)
 
 
 def test_rungs_of_a_package_can_be_run(package):
-    ladder = package_ladder(package)
-    names = {rung.name for rung in ladder.rungs}
-    assert {rung.against for rung in ladder.rungs if rung.against} <= names
-    assert {rung.against for rung in ladder.rungs if rung.knob == "coupling, same mesh"} == {SAME_MESH}
-    for rung in ladder.rungs:
-        settings = [f"{key}={value}" for key, value in rung.settings.items()]
+    study = package_study(package)
+    names = {run.name for run in study.runs}
+    assert {run.against for run in study.runs if run.against} <= names
+    assert {run.against for run in study.runs if run.parameter == "coupling, same mesh"} == {SAME_MESH}
+    for run in study.runs:
+        settings = [f"{key}={value}" for key, value in run.settings.items()]
         assert len(case_of("bga_drop", "scale=quick", *settings).shock.numerics.modes) == 1
 
 
 def test_elements_of_a_package_follow_their_size(package):
-    (half,) = (rung for rung in package_ladder(package).rungs if rung.name == "all x 0.5")
+    (half,) = (run for run in package_study(package).runs if run.name == "all x 0.5")
     assert half.settings["board.numerics.element_size"] == "0.25 mm"
     assert half.settings["package.joint_numerics.core"] == "6"
     assert half.settings["package.joint_numerics.layers"] == "12"
 
 
 def test_solder_that_yields_has_no_implicit_steps_nor_local_ones():
-    rungs = package_ladder(case_of("bga_drop", "scale=quick", "materials.solder=SAC405")).rungs
-    assert not any(rung.settings.get("shock.numerics.dns_solver") == "implicit" for rung in rungs)
-    assert not any(rung.settings.get("shock.coupling.scheme") == "local_steps" for rung in rungs)
+    runs = package_study(case_of("bga_drop", "scale=quick", "materials.solder=SAC405")).runs
+    assert not any(run.settings.get("shock.numerics.dns_solver") == "implicit" for run in runs)
+    assert not any(run.settings.get("shock.coupling.scheme") == "local_steps" for run in runs)
 
 
 def test_a_package_is_judged_by_its_critical_joint(package, tmp_path):
@@ -134,7 +135,7 @@ def test_a_package_is_judged_by_its_critical_joint(package, tmp_path):
     moved = dict.fromkeys(("board_centre", "die_centre"), np.outer(ramp, (0, 0, 1e-3)))
     np.savez(own / "history.npz", time=time, joints=np.array(["A1", "A2"]), **stress, **moved)
     (own / "result.json").write_text(json.dumps({"metrics": {"critical_joint": {"value": "A2", "unit": ""}}}))
-    found = package_ladder(package).measure(package, tmp_path)
+    found = package_study(package).measure(package, tmp_path)
     assert found["peak_stress"].value == pytest.approx(3e6)
     assert found["stress_history"].value.max() == pytest.approx(3e6)
     assert len(found["stress_history"].value) == 2 * (package.shock.numerics.history_samples + 1)
@@ -150,27 +151,27 @@ def test_a_package_without_a_shock_has_its_particles(tmp_path):
             kept.append(line)
     path = tmp_path / "case.toml"
     path.write_text("\n".join(kept))
-    ladder = package_ladder(read_case(path, []))
-    assert ladder.until == "reflow"
-    assert [knob.name for knob in ladder.knobs] == ["particle spacing"]
+    study = package_study(read_case(path, []))
+    assert study.until == "reflow"
+    assert [parameter.name for parameter in study.parameters] == ["particle spacing"]
 
 
 def test_a_part_of_an_error_is_no_recommendation():
-    """A knob whose errors are from a run on the same mesh leaves out what the mesh errs."""
+    """A parameter whose errors are from a run on the same mesh leaves out what the mesh errs."""
 
-    def at(value: float) -> Rung:
-        return Rung(f"step {value}", "step", {}, value, "mesh")
+    def at(value: float) -> StudyRun:
+        return StudyRun(f"step {value}", "step", {}, value, "mesh")
 
-    ladder = Ladder(
-        "shock", ("shock",), {"wave": "wave"}, lambda case, folder: {}, (Knob("step", (4.0, 2.0, 1.0), at),)
+    study = ConvergenceStudy(
+        "shock", ("shock",), {"wave": "wave"}, lambda case, folder: {}, (Parameter("step", (4.0, 2.0, 1.0), at),)
     )
     found = {
-        rung.name: Measurement(
-            rung.name, "step", rung.value, {}, "", {"shock": StageCost(1.0, 1.0 + 1.0 / rung.value, None)},
-            {"wave": Error(1e-4 * rung.value**2, "mesh")}, against=rung.against,
+        run.name: Measurement(
+            run.name, "step", run.value, {}, "", {"shock": StageCost(1.0, 1.0 + 1.0 / run.value, None)},
+            {"wave": Error(1e-4 * run.value**2, "mesh")}, against=run.against,
         )
-        for rung in ladder.rungs
+        for run in study.runs
     }  # fmt: skip
-    fits = fits_of(ladder, found)
+    fits = fits_of(study, found)
     assert fits["step"].errors["wave"].order == pytest.approx(2.0)
-    assert recommend(ladder, found, fits, Goal(0.01)) is None
+    assert recommend(study, found, fits, Goal(0.01)) is None

@@ -67,7 +67,7 @@ BAD_VALUES = {
         ['shock.numerics.dns_solver = "implicit"', "solder yields", "allowed: explicit"],
     ),
     "unknown constant of plasticity": ("materials.solder.plasticity.D=1", ["unknown key", "one of A, B, n, C"]),
-    "table below a value": ("package.rows.all=1", ["package.rows.all", "is below a key that has a value"]),
+    "table below a value": ("package.rows.all=1", ["package.rows.all", "cannot be set: the key above it has a value"]),
     "no setting": ("package.rows", ["package.rows", "is not a setting", "dotted.key=value"]),
     "more ranks than cores": (
         "shock.ranks.total=4096",
@@ -135,7 +135,7 @@ def test_broken_files(tmp_path, text, words):
 
 
 def test_absent_file(tmp_path):
-    assert "there is no such file" in problems_of(path=tmp_path / "absent.toml")[0]
+    assert "does not exist" in problems_of(path=tmp_path / "absent.toml")[0]
 
 
 def test_overrides_are_toml_or_bare_text():

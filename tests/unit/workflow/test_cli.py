@@ -79,9 +79,9 @@ def test_a_new_case_overwrites_nothing(call):
     [
         (("new", "mine", "--template", "bga_dorp"), "did you mean bga_drop?"),
         (("new", "no name"), "is not a valid name"),
-        (("run", str(CASE), "--until", "shok"), "is no stage"),
+        (("run", str(CASE), "--until", "shok"), "is not a stage"),
         (("run", str(CASE), "--set", "shock.duration=1"), 'such as "1 ms"'),
-        (("run", "absent.toml"), "there is no such file"),
+        (("run", "absent.toml"), "does not exist"),
         (("plan", str(CASE), "--set", "shock.ranks.total=1000"), "--oversubscribe"),
         (("fly",), "No such command"),
     ],
@@ -106,7 +106,7 @@ def test_status_of_nothing(call):
 
 def test_a_report_of_nothing_fails(call, tmp_path):
     code, _, errors = call("report", str(CASE))
-    assert (code, "nothing was run" in errors) == (1, True)
+    assert (code, "is not a run folder" in errors) == (1, True)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -140,7 +140,7 @@ def test_a_run_folder_in_use_is_left_alone(call, tmp_path):
     with locked(tmp_path / "busy", "run", "bga_drop"):
         before = sorted(tmp_path.rglob("*"))
         code, _, errors = call("run", str(CASE), "--out", str(tmp_path / "busy"))
-    assert (code, "another run is at work" in errors) == (1, True)
+    assert (code, "another run is active" in errors) == (1, True)
     assert sorted(tmp_path.rglob("*")) == before
 
 

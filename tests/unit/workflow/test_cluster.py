@@ -6,11 +6,12 @@ from pathlib import Path
 import pytest
 
 from reflowshock.workflow.case.problems import CaseError
-from reflowshock.workflow.jobs import checks, queue
+from reflowshock.workflow.jobs import checks
+from reflowshock.workflow.jobs import checks as queue
+from reflowshock.workflow.jobs.checks import Partition, jobs_in, partitions
+from reflowshock.workflow.jobs.engine import JobOutput, failures_of
 from reflowshock.workflow.jobs.executor import ExecutorName, Local, Slurm, executor_for
-from reflowshock.workflow.jobs.job_output import JobOutput, failures_of
 from reflowshock.workflow.jobs.profile import FILE, SHIPPED, Profile, read_profile
-from reflowshock.workflow.jobs.queue import Partition, jobs_in, partitions
 from reflowshock.workflow.pipeline.reader import read_case
 from reflowshock.workflow.pipeline.resources import stage_resources
 from reflowshock.workflow.process.launch import LAUNCHER, mpi_command
@@ -136,7 +137,7 @@ def test_partitions_and_jobs_of_a_folder(tmp_path, monkeypatch):
     assert partitions() == [Partition("short", 80, 32, False), Partition("long", 64, 64, True)]
     assert jobs_in(tmp_path) == ["7"]
     monkeypatch.setattr(checks, "_missing", lambda: ())
-    with pytest.raises(CaseError, match="asks for 70 MPI ranks, Slurm's partition long has 64 cores"):
+    with pytest.raises(CaseError, match="asks for 70 MPI ranks, but the Slurm partition long has 64 cores"):
         checks.check_slurm(Profile(tmp_path), [case("bga_drop", "shock.ranks.total=70")])
     program(tmp_path, "sinfo", "pass")
     with pytest.raises(CaseError, match="no partition"):

@@ -17,10 +17,9 @@ from reflowshock.fem.estimates.effects import (
 from reflowshock.workflow.board_drop.board_deflection import decided
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.cli import app
-from reflowshock.workflow.effects.costs import cost_shares, measured
 from reflowshock.workflow.effects.page import effects_table
 from reflowshock.workflow.effects.registry import effect_of, registry
-from reflowshock.workflow.effects.table import per_cent
+from reflowshock.workflow.effects.table import cost_shares, measured, per_cent
 from reflowshock.workflow.kinds import kind_of
 from reflowshock.workflow.pipeline.reader import read_case
 from tests.support.workflow_command import SMALL_CASE

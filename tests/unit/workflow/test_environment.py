@@ -106,7 +106,7 @@ def test_what_a_job_of_mpi_left_is_removed(tmp_path):
 def test_several_ranks_are_refused_by_the_first():
     for rank in "01":
         with pytest.raises(
-            EnvironmentProblem, match="started on 2 MPI ranks; start it once, it starts its own"
+            EnvironmentProblem, match="started on 2 MPI ranks; start it without mpirun, it starts its own"
         ) as told:
             check_ranks({"OMPI_COMM_WORLD_SIZE": "2", "OMPI_COMM_WORLD_RANK": rank})
         assert (told.value.exit_code, told.value.silent) == (2, rank == "1")

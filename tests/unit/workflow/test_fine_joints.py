@@ -17,11 +17,11 @@ from reflowshock.workflow.pipeline.template import case_text
 from tests.support.workflow_command import SMALL_CASE
 
 FAULTS = {
-    "shock.coupling.fine_joints=['A9']": ("no such joint", "A3 to B4", "did you mean A4?"),
-    "shock.coupling.fine_joints=['a3']": ("no such joint", "did you mean A3?"),
-    "shock.coupling.fine_joints=['D1']": ("another quarter", "did you mean A4?"),
-    "shock.coupling.fine_joints=['d1']": ("another quarter", "did you mean A4?"),
-    "shock.coupling.fine_joints=[]": ("leaves nothing", "at least one name"),
+    "shock.coupling.fine_joints=['A9']": ("is not a joint of the model", "A3 to B4", "did you mean A4?"),
+    "shock.coupling.fine_joints=['a3']": ("is not a joint of the model", "did you mean A3?"),
+    "shock.coupling.fine_joints=['D1']": ("a quarter that is not modelled", "did you mean A4?"),
+    "shock.coupling.fine_joints=['d1']": ("a quarter that is not modelled", "did you mean A4?"),
+    "shock.coupling.fine_joints=[]": ("leaves the meso model empty", "at least one name"),
     "shock.coupling.fine_joints='criticl'": ("all, critical, or a list of names", "did you mean critical?"),
     "shock.coupling.fine_joints=[3]": ("shock.coupling.fine_joints = [3]", "a list of names"),
     "shock.coupling.levels=0": ("shock.coupling.levels = 0", "auto, or >= 1"),
@@ -38,7 +38,9 @@ def test_wrong_choices_are_said(setting):
 
 
 def test_more_critical_joints_than_joints_are_refused():
-    with pytest.raises(CaseError, match=r"critical_joints = 5: is more than the model has joints; allowed: 1 to 4"):
+    with pytest.raises(
+        CaseError, match=r"critical_joints = 5: is more than the number of joints in the model; allowed: 1 to 4"
+    ):
         read_case(SMALL_CASE, ["shock.coupling.fine_joints=critical", "shock.coupling.critical_joints=5"])
 
 

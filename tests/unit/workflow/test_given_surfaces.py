@@ -19,8 +19,7 @@ from reflowshock.meshing.core.facets import outlines
 from reflowshock.meshing.surface.closed_surface import enclosed_volume, read_surface
 from reflowshock.particles.scenes.products import write_shapes
 from reflowshock.particles.steps.shape import JointShape, Snapshot
-from reflowshock.workflow.board_drop.joint_meshes import mesh_real_joints
-from reflowshock.workflow.board_drop.joint_surfaces import write_surfaces
+from reflowshock.workflow.board_drop.joint_meshes import mesh_real_joints, write_surfaces
 from reflowshock.workflow.case.fields import display_values
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.case.run import Run
@@ -73,8 +72,8 @@ def test_a_case_with_them_can_be_written_as_a_template(case_file):
     ("name", "path", "told"),
     [
         ("A44", "a4.stl", r"package\.surfaces\.A44.*not a joint.*A4"),
-        ("A4", "case.toml", r"package\.surfaces\.A4.*not in a format.*\.stl, \.ply, \.vtu"),
-        ("A4", "a5.stl", r"package\.surfaces\.A4.*no such file"),
+        ("A4", "case.toml", r"package\.surfaces\.A4.*unknown file format.*\.stl, \.ply, \.vtu"),
+        ("A4", "a5.stl", r"package\.surfaces\.A4.*does not exist"),
         ("A4", "low.ply", r"package\.surfaces\.A4.*its flat ends are .* m apart, allowed"),
         ("A4", "index.ply", r"package\.surfaces\.A4.*triangle 7 has the vertices .*, allowed 0 to"),
     ],

@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from reflowshock.workflow.case.problems import CaseError, Problem
+from reflowshock.problem import Problem
+from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.process import last_word
 from reflowshock.workflow.process.last_word import in_words, say
 from reflowshock.workflow.process.launch import LaunchError
@@ -40,7 +41,7 @@ def raised(error: BaseException, cause: BaseException | None = None) -> BaseExce
         (OSError(errno.EDQUOT, "x"), "the disk quota is used up while writing /where"),
         (OSError(errno.EROFS, "x", "/a"), "the file system is read-only while writing /a"),
         (PermissionError(errno.EACCES, "x", "/a"), "permission denied: /a"),
-        (FileNotFoundError(errno.ENOENT, "x", "/a"), "the file or folder does not exist, or was removed meanwhile: /a"),
+        (FileNotFoundError(errno.ENOENT, "x", "/a"), "the file or folder does not exist or was removed: /a"),
         (OSError(errno.EMFILE, "x", "/a"), "too many files are open (ulimit -n): /a"),
         (MemoryError(), last_word.NO_MEMORY),
         (ImportError("libx.so: failed to map segment from shared object"), last_word.NO_MEMORY),

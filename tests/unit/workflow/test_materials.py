@@ -41,7 +41,7 @@ def test_bad_materials_are_named(setting, words):
 def test_a_layer_takes_nine_constants_or_a_solder_that_yields():
     settings = ["dynamics.solver=explicit", "structure.layers.board.material=SnPb"]
     case = read_case(STRUCTURE, [*settings, LAMINATE.replace("RATIO", "0.3")])
-    materials = case.scene.layer_materials
+    materials = case.problem.layer_materials
     assert materials["cover"].young_modulus_z == pytest.approx(5e9)
     assert materials["board"].plasticity.melting_temperature == pytest.approx(456.15)
 

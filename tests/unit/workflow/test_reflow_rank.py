@@ -22,9 +22,9 @@ SOLDER = Solder(volume=7.2e-11)
 PLACE = JointGeometry(3.0e-4, 2.4e-4, 2.4e-4, (1e-5, 0.0), (0.0, -0.01))
 SOURCE = array.Source("A1", 3, PLACE)
 JOBS = {
-    reflow_pool._solve: reflow_pool.Job(PLACE, SOLDER, Path("checkpoints/A1")),
-    array.carry: array.Job(Path("checkpoints"), SOLDER, None, SOURCE),
-    array.finish: array.Job(Path("checkpoints"), SOLDER, SOURCE, SOURCE),
+    reflow_pool._solve: reflow_pool.JointReflow(PLACE, SOLDER, Path("checkpoints/A1")),
+    array.carry: array.CarriedReflow(Path("checkpoints"), SOLDER, None, SOURCE),
+    array.finish: array.CarriedReflow(Path("checkpoints"), SOLDER, SOURCE, SOURCE),
 }
 
 

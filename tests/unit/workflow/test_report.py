@@ -8,10 +8,10 @@ import pytest
 from reflowshock.fem.output.failure import failure_criteria, judge
 from reflowshock.fem.problem.shock import Failure
 from reflowshock.workflow.package_report import joint_tables
-from reflowshock.workflow.package_report.array_map import array_map
+from reflowshock.workflow.package_report.gallery import array_map
 from reflowshock.workflow.package_report.shock import ranking_mode
 from reflowshock.workflow.pipeline.reader import read_case
-from reflowshock.workflow.pipeline.summary import collect_summary, write_summary
+from reflowshock.workflow.pipeline.report import collect_summary, write_summary
 from reflowshock.workflow.report import tables
 from reflowshock.workflow.report.curves import energy_curves, history_curves
 from reflowshock.workflow.report.histories import late_peak

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 import pyvista
 
-from reflowshock.workflow.package_report import cost, gallery, mesh_tables, residual, shape_effect, shock, warpage
+from reflowshock.workflow.package_report import cost, gallery, shape_effect, shock, warpage
 from reflowshock.workflow.package_report import interface as section
-from reflowshock.workflow.package_report.array_map import array_map
+from reflowshock.workflow.package_report import joint_tables as mesh_tables
+from reflowshock.workflow.package_report import shock as residual
+from reflowshock.workflow.package_report.gallery import array_map
 from reflowshock.workflow.package_report.joint_records import joint_records
 from reflowshock.workflow.package_report.joints import headline
 from tests.support.chain_products import BOW, MICRO, MILLI, bowed_structure, interface
@@ -54,7 +56,7 @@ def test_captions_of_the_gallery_are_narrower_than_a_joint():
     surface[gallery.DEVIATION] = np.linspace(-12.3, 24.6, surface.n_points)
     joint = {"standoff": 278.2e-6, "max_width": 615.1e-6, "angles": "142.9 / 142.7", "tilted": 8.6e-3}
     lines = gallery.caption(["A10"], joint, surface).split("\n")
-    assert lines[-2:] == ["-12.3 to +24.6 um", "tilt 8.6 mrad"]
+    assert lines[-2:] == ["-12.3 to +24.6 µm", "tilt 8.6 mrad"]
     assert max(map(len, lines)) <= len("142.9 / 142.7 deg") and len(lines) < gallery.LINES
 
 

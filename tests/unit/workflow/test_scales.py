@@ -67,14 +67,14 @@ def test_settings_count_more_than_the_scale(case_file):
     [
         (SCALES, "scale=quik", ['--set: scale = "quik"', "one of full, quick, fine", "did you mean quick?"]),
         ("", "scale=quick", ['scale = "quick"', "unknown scale", "one of full"]),
-        ("[scales.full]\nx = 1\n", "scale=full", ["scales.full", "is the file as it is"]),
+        ("[scales.full]\nx = 1\n", "scale=full", ["scales.full", "is reserved for the file itself"]),
         ("[scales]\nquick = 3\n", "scale=full", ["scales.quick = 3", "must be a table", "coarse_size"]),
         ('[scales.quick]\n"board.thicknes" = "1 mm"\n', "scale=quick",
          ["[scales.quick]: board.thicknes", "unknown key", "board.thickness?"]),
         ('[scales.quick]\n"board.thickness" = "1 kg"\n', "scale=quick",
          ["[scales.quick]: board.thickness", "is a mass"]),
         ('[scales.quick]\n"board.thickness.x" = 1\n', "scale=quick",
-         ["[scales.quick]: board.thickness.x", "is below a key that has a value"]),
+         ["[scales.quick]: board.thickness.x", "cannot be set: the key above it has a value"]),
     ],
 )  # fmt: skip
 def test_wrong_scales_are_named(case_file, text, setting, words):

@@ -12,9 +12,8 @@ from reflowshock.workflow.package.case import BoardDropCase
 from reflowshock.workflow.pipeline.reader import read_case
 from reflowshock.workflow.pipeline.schema import case_schema
 from reflowshock.workflow.pipeline.template import templates, write_new_case
-from reflowshock.workflow.solder.case import DropCase, JointCase
-from reflowshock.workflow.solder.forecast import forecast_scene
-from reflowshock.workflow.solder.problems import of_joint
+from reflowshock.workflow.solder.case import DropCase, JointCase, of_joint
+from reflowshock.workflow.solder.forecast import forecast_solder
 from reflowshock.workflow.store.keys import stage_inputs
 from tests.support.workflow_command import WHO_COMPUTES
 
@@ -195,7 +194,7 @@ def test_the_scheme_is_ours_unless_the_seeds_is_asked_for():
 
 
 def test_motion_that_matters_costs_all_steps_allowed():
-    calm, moving = (forecast_scene(read_case(DROP, [f"solder.effects.inertia={on}"])) for on in ("off", "on"))
-    longer = forecast_scene(read_case(DROP, ["solder.effects.inertia=on", "solder.numerics.max_steps=10000"]))
+    calm, moving = (forecast_solder(read_case(DROP, [f"solder.effects.inertia={on}"])) for on in ("off", "on"))
+    longer = forecast_solder(read_case(DROP, ["solder.effects.inertia=on", "solder.numerics.max_steps=10000"]))
     assert (calm.scheme, moving.scheme) == ("energy", "inertia")
     assert 5.0 * calm.seconds["reflow"] < moving.seconds["reflow"] < 0.2 * longer.seconds["reflow"]

@@ -93,7 +93,7 @@ def test_a_product_that_changes_while_a_stage_reads_it_is_noticed(run, product):
         record_of(run.folder / "reflow")
         return write_surfaces(run, folder)
 
-    with pytest.raises(StageError, match="a product that it reads has changed"):
+    with pytest.raises(StageError, match="a product that the stage reads has changed"):
         run_stage("surface", change, run, product)
 
 
@@ -107,7 +107,7 @@ def test_a_file_of_the_case_that_changes_while_a_stage_is_at_work_is_noticed(run
         surface.write_text("second")
         return write_surfaces(run, folder)
 
-    with pytest.raises(StageError, match=r"package\.surfaces\.A1: the file has changed"):
+    with pytest.raises(StageError, match=r"package\.surfaces\.A1: the file changed"):
         run_stage("surface", change, run, product)
 
 

@@ -67,21 +67,21 @@ def test_a_point_has_a_run_folder_as_any_other(tmp_path):
     assert (store.run_folder(point) / "geometry/assembly.msh").samefile(
         store.product(point, "geometry") / "assembly.msh"
     )
-    verdicts = examine(store, point)
-    assert not verdicts["geometry"].stale
-    assert verdicts["reflow"].missing
+    states = examine(store, point)
+    assert not states["geometry"].stale
+    assert states["reflow"].missing
 
 
 def test_why_a_point_is_not_complete_is_told(tmp_path):
     store, point = Store(tmp_path), read_possible_points(SMALL_CASE, [{}])[0][0]
     make(store, point, ["geometry"])
     assert why(store, point, "geometry") == ""
-    assert why(store, point, "report") == "stage reflow: was not reached"
+    assert why(store, point, "report") == "stage reflow: was not started"
     log = log_of(store, point, "reflow")
     log.parent.mkdir(parents=True)
     log.write_text("some words\nKilled\n")
     assert (
-        f'stage reflow: ended without an error of its own, as when it is killed; its last words: "Killed"; see {log}'
+        f'stage reflow: ended without an error message (it may have been killed); last output: "Killed"; see {log}'
         == (why(store, point, "report"))
     )
     message = store.work_folder(point, "reflow") / ".reflow.partial" / MESSAGE

@@ -50,7 +50,7 @@ def done(store):
 
 
 def stale(store: Store, point: Point) -> tuple[str, ...]:
-    return tuple(name for name, verdict in examine(store, point).items() if verdict.stale)
+    return tuple(name for name, state in examine(store, point).items() if state.stale)
 
 
 def test_every_parameter_belongs_to_a_stage():
@@ -62,7 +62,7 @@ def test_every_parameter_belongs_to_a_stage():
 
 def test_nothing_was_run(store):
     assert stale(store, point_of()) == NAMES
-    assert all(verdict.missing for verdict in examine(store, point_of()).values())
+    assert all(state.missing for state in examine(store, point_of()).values())
 
 
 def test_all_is_up_to_date(done):
@@ -76,11 +76,11 @@ def test_only_what_depends_on_a_value_is_stale(done, setting, names):
 
 
 def test_the_changed_key_is_named(done):
-    verdicts = examine(done, point_of("shock.peak_acceleration=1000 G"))
-    (change,) = verdicts["shock"].changes
+    states = examine(done, point_of("shock.peak_acceleration=1000 G"))
+    (change,) = states["shock"].changes
     assert change.key == "shock.peak_acceleration"
     assert (change.old, change.new) == pytest.approx((14709.975, 9806.65))
-    assert verdicts["report"].because_of == ("shock",)
+    assert states["report"].because_of == ("shock",)
 
 
 def test_a_value_that_returns_finds_its_products(done):
@@ -94,10 +94,10 @@ def test_a_lost_product_is_made_again_and_what_follows_only_if_it_comes_out_othe
     point = point_of()
     lost = done.product(point, "solder_mesh") / "joints.msh"
     lost.unlink()
-    verdicts = examine(done, point)
+    states = examine(done, point)
     assert stale(done, point) == ("solder_mesh",)
-    assert verdicts["solder_mesh"].damaged == ("joints.msh is missing",)
-    assert verdicts["shock"].because_of == ("solder_mesh",)
+    assert states["solder_mesh"].damaged == ("joints.msh is missing",)
+    assert states["shock"].because_of == ("solder_mesh",)
     make(done, point, ["solder_mesh"])
     assert stale(done, point) == ()
     lost.unlink()
@@ -139,10 +139,10 @@ def test_a_check_that_failed_is_named(store):
 def test_a_damaged_case_of_a_run_is_told(done):
     path = done.folder / CASE
     path.write_text(path.read_text().replace('"small"', '"smell"'))
-    with pytest.raises(CaseError, match="is not as it was written"):
+    with pytest.raises(CaseError, match="was changed since it was written"):
         read_case_of_run(done.folder)
     path.unlink()
-    with pytest.raises(CaseError, match="nothing was run"):
+    with pytest.raises(CaseError, match="is not a run folder"):
         read_case_of_run(done.folder)
 
 

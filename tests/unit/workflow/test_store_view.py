@@ -195,7 +195,7 @@ def test_whatever_stands_where_a_product_is_made_gives_way(store, tmp_path, plac
     else:
         shutil.copytree(tmp_path / "mine", path)
     make(store, POINT, ["surface"])
-    assert not any(verdict.stale for verdict in examine(store, POINT).values())
+    assert not any(state.stale for state in examine(store, POINT).values())
     assert not product.is_symlink()
     assert [file.name for file in (tmp_path / "mine").iterdir()] == ["notes.txt"]
 
@@ -209,7 +209,7 @@ def test_a_file_where_a_folder_of_the_store_belongs_gives_way(store, name):
             if not store.has(POINT, stage):
                 make(store, POINT, [stage])
         show_products(store, POINT)
-    assert not any(verdict.stale for verdict in examine(store, POINT).values())
+    assert not any(state.stale for state in examine(store, POINT).values())
     assert not_as_put(store, store.folder) == []
 
 
@@ -264,13 +264,13 @@ def test_without_hard_links_products_are_copied(store, monkeypatch):
 def test_unused_products_can_be_removed(store):
     make(store, OTHER, ("shock", "report"))
     assert remove_unused(store) == 2
-    assert not any(verdict.stale for verdict in examine(store, POINT).values())
+    assert not any(state.stale for state in examine(store, POINT).values())
 
 
 def test_a_copy_of_a_run_folder_is_one(store, tmp_path):
     copy = Store(shutil.copytree(store.folder, tmp_path / "copy"), one_run=True)
     assert show_products(copy, POINT) == []
-    assert not any(verdict.stale for verdict in examine(copy, POINT).values())
+    assert not any(state.stale for state in examine(copy, POINT).values())
 
 
 @pytest.mark.parametrize(("what", "name"), [("run", "other"), ("study", "small")])
@@ -284,7 +284,7 @@ def test_another_case_needs_force(store, what, name):
 
 
 @pytest.mark.parametrize(
-    ("names", "words"), [(["notes.txt"], "files that are not"), (["inputs", ".snakemake"], "earlier")]
+    ("names", "words"), [(["notes.txt"], "files that the program did not write"), (["inputs", ".snakemake"], "earlier")]
 )
 def test_a_folder_of_somebody_else_is_left_alone(tmp_path, names, words):
     for name in names:
@@ -297,7 +297,7 @@ def test_a_folder_of_somebody_else_is_left_alone(tmp_path, names, words):
 
 def test_no_run_folder_is_made_in_a_store(store):
     folder = store.home / "products/mine"
-    with pytest.raises(CaseError, match=r"is in a folder \.store"), locked(folder, "run", "small"):
+    with pytest.raises(CaseError, match=r"is inside \.store"), locked(folder, "run", "small"):
         pass
     assert not folder.exists()
 
@@ -325,7 +325,7 @@ def test_what_the_run_folder_lacks_is_told(store):
 
 def test_a_run_folder_has_one_user(tmp_path):
     first, second = locked(tmp_path, "run", "a"), locked(tmp_path, "run", "a")
-    with first, pytest.raises(RunFolderBusy, match="another run is at work"), second:
+    with first, pytest.raises(RunFolderBusy, match="another run is active"), second:
         pass
     with locked(tmp_path, "run", "a"):
         pass

@@ -1,77 +1,34 @@
 """Hard cases: what is read of a file, refused, tried and judged; a hang or a crash is a miss, and the rest goes on."""
 
-import dataclasses
 import json
 import math
-import multiprocessing
 import os
 import signal
 import subprocess
 import sys
-import time
 from functools import partial
-from typing import Annotated
+from pathlib import Path
 
 import numpy as np
 import psutil
 import pytest
-from hypothesis import strategies as st
-from pydantic import Field
+from hypothesis import given
 
-from reflowshock.cases.hard.trials.elements import Impact, PairRun, Turns
-from reflowshock.particles.parameters.solder import Parameters
+from reflowshock.cases.hard.bound import read_bound
+from reflowshock.cases.hard.collector import HARD
+from reflowshock.cases.hard.draws import quantities
+from reflowshock.cases.hard.hard_case import hard_case_text, hard_cases, read_hard_cases
+from reflowshock.cases.hard.random_cases import read_random_file
+from reflowshock.cases.hard.trial import Measured
+from reflowshock.cases.hard.trials.coupling import PairRun
+from reflowshock.cases.hard.trials.elements import Impact, Turns
+from reflowshock.cases.hard.verdict import attempt
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.case.units import UnitError
-from reflowshock.workflow.stress_test import families, hard_case, sample
-from reflowshock.workflow.stress_test.bound import read_bound
-from reflowshock.workflow.stress_test.case_file import hard_case_text
-from reflowshock.workflow.stress_test.command import HARD, Request, stress_test
-from reflowshock.workflow.stress_test.hard_case import hard_cases, read_hard_cases
-from reflowshock.workflow.stress_test.pool import Pool
-from reflowshock.workflow.stress_test.random_cases import drawn
-from reflowshock.workflow.stress_test.random_trial import RandomTrial, quantities
-from reflowshock.workflow.stress_test.results import write_results
-from reflowshock.workflow.stress_test.sample import try_sample
-from reflowshock.workflow.stress_test.trial import Measured, Refused, Trial
-from reflowshock.workflow.stress_test.verdict import attempt
+from reflowshock.workflow.stress_test import command
+from reflowshock.workflow.stress_test.command import Request, stress_test
+from tests.support.rods import TABLE
 from tests.support.workflow_command import wait_until
-
-
-class Rod(Parameters):
-    """A rod that is stretched."""
-
-    length: Annotated[float, "mm"] = Field(gt=0)
-    fate: str = "holds"
-
-
-def stretch(rod: Rod) -> dict[str, Measured]:
-    """Do what the rod's fate is."""
-    if rod.fate == "hangs":
-        time.sleep(60.0)
-    if rod.fate == "dies":
-        os._exit(3)
-    if rod.fate == "raises":
-        raise ArithmeticError("the rod broke")
-    error = math.nan if rod.fate == "is lost" else -2e-3
-    return {"error": Measured(100.0 * error, "%"), "width": Measured(1e3 * rod.length, "mm")}
-
-
-ROD = Trial(Rod, stretch, {"error": "", "width": "mm"})
-
-
-@pytest.fixture(autouse=True)
-def rods(monkeypatch):
-    monkeypatch.setattr(hard_case, "trials", lambda: {"rod": ROD})
-
-
-TABLE = {
-    "family": "elements",
-    "title": "a rod",
-    "why": "rods break",
-    "trial": "rod",
-    "parameters": {"length": "3 mm"},
-    "bounds": {"error": "0.5 %", "width": "> 2 mm"},
-}
 
 
 def cases(**changes):
@@ -160,11 +117,10 @@ def test_what_is_wrong_in_a_file_is_told(changes, told):
     assert told in refused(**changes)
 
 
-def test_a_run_that_cannot_be_is_told_before_it_is_tried(monkeypatch, tmp_path):
-    monkeypatch.setattr(hard_case, "trials", families.trials)
+def test_a_run_that_cannot_be_is_told_before_it_is_tried(tmp_path):
     drop = {"case": str(HARD.parent / "sessile_drop/case.toml"), "settings": {"drop": {"volum": "1 mm^3"}}}
     run = {"family": "reflow", "title": "a run", "why": "", "trial": "run", "bounds": {"shape_error": "1 %"}}
-    for parameters, told in (({"case": "no.toml"}, "there is no such file"), (drop, "did you mean drop.volume?")):
+    for parameters, told in (({"case": "no.toml"}, "does not exist"), (drop, "did you mean drop.volume?")):
         with pytest.raises(CaseError, match=f"parameters.*{told}"):
             hard_cases("reflow_run", run | {"parameters": parameters}, "reflow_run.toml", tmp_path)
 
@@ -174,13 +130,28 @@ def test_a_measure_that_only_the_run_knows_is_compared_by_its_dimension():
         read_bound("standoff", "1 kg", None).margin(Measured(1.0, "m"))
 
 
-def test_hangs_and_deaths_are_misses_and_the_rest_goes_on():
-    found = cases(vary={"fate": ["hangs", "dies", "holds"]}, deadline="4 s")
-    with Pool(2) as pool:
-        verdicts = {verdict.case.tried: verdict for verdict in pool.attempt(found)}
-    assert verdicts["fate hangs"].message == "no answer in 4 s: taken to hang"
-    assert verdicts["fate dies"].message == "the process ended with code 3"
-    assert verdicts["fate holds"].ok
+@pytest.fixture
+def rods(monkeypatch, tmp_path):
+    """Write cases of rods to a folder, and have them tried there by processes that know rods."""
+    monkeypatch.setenv("PYTEST_PLUGINS", "tests.support.rods")
+    monkeypatch.setattr(command, "HARD", tmp_path)
+
+    def attempt_rods(count=0, **changes):
+        (tmp_path / "elements_rod.toml").write_text(hard_case_text(TABLE | changes))
+        survived = stress_test(Request([], ["elements"], count, 1, 2, tmp_path / "out"))
+        return survived, json.loads((tmp_path / "out/stress_test.json").read_text())
+
+    return attempt_rods
+
+
+def test_hangs_and_deaths_are_misses_and_the_rest_goes_on(rods):
+    survived, told = rods(vary={"fate": ["hangs", "dies", "holds"]}, deadline="4 s")
+    assert not survived
+    assert {one["tried"]: one["message"] for one in told["fixed"]} == {
+        "fate hangs": "no answer in 4 s: taken to hang",
+        "fate dies": "the process ended with code 3",
+        "fate holds": "",
+    }
 
 
 def test_ctrl_c_ends_a_stress_test_with_a_word(tmp_path):
@@ -212,61 +183,48 @@ def test_results_that_cannot_be_written_are_told_before_anything_is_tried(tmp_pa
         stress_test(Request([case], [], 0, 1, 1, case))
 
 
-def test_a_process_that_ended_between_two_cases_is_replaced():
-    with Pool(1) as pool:
-        for _ in range(2):
-            (verdict,) = pool.attempt(cases())
-            assert verdict.ok, verdict.message
-            for child in multiprocessing.active_children():
-                child.kill()
-                child.join()
+def test_the_same_seed_draws_the_same_cases():
+    file = read_random_file(HARD / "remesh_random_bodies.toml")
+    first, same, other = ([case.given for case in file.cases(20, seed)] for seed in (3, 3, 4))
+    assert first == same != other
 
 
-@pytest.fixture
-def rods_of_any_length(monkeypatch):
-    """A random trial whose rods miss when they are longer than 7 mm."""
-    tables = st.fixed_dictionaries({"length": quantities(1.0, 10.0, "mm")})
-    trial = RandomTrial("elements_random", "rods", "none grows", "rod", tables, {"width": "< 7 mm"})
-    monkeypatch.setattr(sample, "random_trials", lambda family: [trial])
-    return trial
+RANDOM = {"draws": "rods", "parameters": {}, "bounds": {"width": "< 7 mm"}}
 
 
-class PoolHere:
-    """Tries in this process."""
-
-    def attempt(self, cases):
-        return map(attempt, cases)
-
-
-def test_the_same_seed_draws_the_same_cases(rods_of_any_length):
-    assert drawn(rods_of_any_length, 20, 3) == drawn(rods_of_any_length, 20, 3) != drawn(rods_of_any_length, 20, 4)
-
-
-def test_a_random_case_that_misses_is_made_simple_and_is_a_hard_case(rods_of_any_length, tmp_path, monkeypatch):
-    (found,) = try_sample("elements", 30, 1, PoolHere())
-    assert len(found.verdicts) == 30
-    assert 0 < len(found.missed) < 30
-    write_results(tmp_path, [attempt(case) for case in cases()], [found], 1)
-    (case,) = read_hard_cases(tmp_path / "counterexamples/elements_random.toml")
+def test_a_random_case_that_misses_is_made_simple_and_is_a_hard_case(rods, tmp_path):
+    survived, told = rods(30, **RANDOM)
+    assert not survived
+    (sample,) = told["random"]
+    assert sample["tried"] == len(sample["cases"]) == 30
+    assert 0 < sum(not case["ok"] for case in sample["cases"]) < 30
+    (case,) = read_hard_cases(tmp_path / "out/counterexamples/elements_rod.toml")
     assert 7e-3 < case.parameters.length <= 8e-3
     assert not attempt(case).ok
-    told = json.loads((tmp_path / "stress_test.json").read_text())
-    assert [len(told["fixed"]), told["random"][0]["tried"]] == [1, 30]
-    assert "30 random ones (seed 1)" in (tmp_path / "stress_test.html").read_text()
+    assert "30 random ones (seed 1)" in (tmp_path / "out/stress_test.html").read_text()
 
 
-def test_refusals_in_words_are_counted_and_too_many_are_a_miss(rods_of_any_length, monkeypatch, tmp_path):
-    def refuse(rod):
-        raise Refused("no such rod")
-
-    monkeypatch.setattr(hard_case, "trials", lambda: {"rod": dataclasses.replace(ROD, run=refuse)})
-    (found,) = try_sample("elements", 5, 1, PoolHere())
-    assert (found.refused, found.missed, found.ok) == (5, [], False)
-    write_results(tmp_path, [], [found], 1)
-    assert "0 missed, 1 random trials refused too many" in (tmp_path / "stress_test.html").read_text()
+def test_refusals_in_words_are_counted_and_too_many_are_a_miss(rods, tmp_path):
+    survived, told = rods(5, **RANDOM | {"draws": "refused rods"})
+    assert not survived
+    assert [told["random"][0][name] for name in ("refused", "ok")] == [5, False]
+    assert "0 missed, 1 random trials refused too many" in (tmp_path / "out/stress_test.html").read_text()
 
 
-def test_all_cases_of_the_program_can_be_read(monkeypatch):
-    monkeypatch.setattr(hard_case, "trials", families.trials)
-    found = [case for path in sorted(HARD.glob("*.toml")) for case in read_hard_cases(path)]
+def test_pytest_collects_the_first_case_of_each_file():
+    line = [sys.executable, "-m", "pytest", "--collect-only", str(HARD)]
+    told = subprocess.run(line, capture_output=True, text=True, cwd=HARD.parents[1], check=True, timeout=120).stdout
+    fixed = [path.stem for path in HARD.glob("*.toml") if read_random_file(path) is None]
+    assert sorted(Path(line.split("::")[0]).stem for line in told.splitlines() if "::" in line) == sorted(fixed)
+
+
+def test_all_cases_of_the_program_can_be_read():
+    files = [(path, read_random_file(path)) for path in sorted(HARD.glob("*.toml"))]
+    found = [case for path, random in files for case in (random.cases(2, 1) if random else read_hard_cases(path))]
     assert all(case.name.split("_")[0] == case.family for case in found)
+
+
+@given(quantities(-30.0, 30.0, "deg"))
+def test_what_is_drawn_is_zero_or_can_be_told_from_it(quantity):
+    value = float(quantity.removesuffix(" deg"))
+    assert value == 0.0 or abs(value) > 1e-5

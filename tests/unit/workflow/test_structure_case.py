@@ -51,12 +51,12 @@ BAD_VALUES = {
     "too many ranks": ("dynamics.ranks=4096", ["dynamics.ranks", "4096 MPI ranks", "--oversubscribe"]),
     "other case": ("structure.layers.cover.material=fr4", ["did you mean FR4?"]),
     "no support": ("supports={}", ["loads.drop.method", "needs a support that the table shakes"]),
-    "too many steps": ("dynamics.duration=1e300 s", ["dynamics.duration", "takes more than 1e+10 explicit steps"]),
+    "too many steps": ("dynamics.duration=1e300 s", ["dynamics.duration", "would take more than 1e+10 explicit steps"]),
     "damped too much": (
         "dynamics.damping={stiffness_ratio=0.9,frequency='1e-6 Hz'}",
-        ["dynamics.duration", "takes more than 1e+10 explicit steps of"],
+        ["dynamics.duration", "would take more than 1e+10 explicit steps of"],
     ),
-    "beyond all numbers": ("structure.layers.board.thickness=1e-200 mm", ["structure", "beyond all numbers"]),
+    "beyond all numbers": ("structure.layers.board.thickness=1e-200 mm", ["structure", "out of range"]),
     "value in a material": ("materials.cover.density=3 mm", ["materials.cover.density", "is a length"]),
     "layer named as a face": (
         "structure.layers.z_max={material='FR4',thickness='1 mm'}",
@@ -179,7 +179,7 @@ def test_what_a_table_of_a_load_holds_is_a_parameter(tmp_path):
 def test_an_unreadable_table_is_refused(tmp_path):
     path = tmp_path / "case.toml"
     path.write_text(BOARD.read_text().replace('peak = "1000 G"\nduration = "0.1 ms"\n', 'table = "pulse.csv"\n'))
-    with pytest.raises(CaseError, match=r"loads\.drop\.table = .*there is no such file"):
+    with pytest.raises(CaseError, match=r"loads\.drop\.table = .*does not exist"):
         read_case(path)
 
 
@@ -240,9 +240,9 @@ def test_effects_have_reasons():
     [
         (
             "loads.push.duration=10 ns",
-            r'loads.push.duration = "10 ns": is shorter than a window of .* no dynamics.coup',
+            r'loads.push.duration = "10 ns": is shorter than one coupling window .* no dynamics.coup',
         ),
-        ("dynamics.duration=12 us", r'dynamics.duration = "12 us": ends before the waves of references.wave'),
+        ("dynamics.duration=12 us", r'dynamics.duration = "12 µs": ends before the waves of references.wave'),
     ],
 )
 def test_two_models_of_a_bar_need_time(setting, words):

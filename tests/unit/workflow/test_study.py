@@ -13,13 +13,10 @@ from reflowshock.workflow.pipeline.points import PointsError
 from reflowshock.workflow.store.store import Store
 from reflowshock.workflow.study import tables
 from reflowshock.workflow.study.command import read_points_of, results, run_study
-from reflowshock.workflow.study.designs import Factor
-from reflowshock.workflow.study.hypercube import Hypercube
+from reflowshock.workflow.study.designs import Factor, Hypercube, as_text, between
 from reflowshock.workflow.study.main_effects import effect_of, ranked
-from reflowshock.workflow.study.outlook import outlook
-from reflowshock.workflow.study.progress import seconds_left
+from reflowshock.workflow.study.progress import outlook, seconds_left
 from reflowshock.workflow.study.results import HEALTHY, IMPOSSIBLE, UNHEALTHY, Row, columns, write_csv, write_parquet
-from reflowshock.workflow.study.setting_text import as_text, between
 from reflowshock.workflow.study.study_file import read_study
 from tests.support.workflow_command import SMALL_CASE
 
@@ -93,10 +90,10 @@ def test_ends_of_a_range_must_be_alike():
         ("", ["varies nothing", "[latin_hypercube]"]),
         ("[gird]\na = [1]\n", ["gird", "unknown key", "did you mean grid?"]),
         ("[grid]\na = 1\n", ["grid.a = 1", "a list"]),
-        ('[grid]\n"a, b" = [[1, 2, 3]]\n', ["one for each of 2 keys"]),
-        ('[grid]\n"a, b" = [[1, 1], [1, 2], 1]\n', ["has a value twice"]),
+        ('[grid]\n"a, b" = [[1, 2, 3]]\n', ["one value for each of its 2 keys"]),
+        ('[grid]\n"a, b" = [[1, 1], [1, 2], 1]\n', ["contains a value twice"]),
         ('[latin_hypercube]\nsamples = 2\nranges.a = ["1 mm", "1 mm"]\n', ["ranges.a", "two different values"]),
-        ("[grid]\na = [1]\n[settings]\na = 2\n", ["fixed and varied at once"]),
+        ("[grid]\na = [1]\n[settings]\na = 2\n", ["both fixed and varied"]),
         ("[grid]\na = [1]\n[[list]]\na = 2\n", ["a: is given twice"]),
         ("[grid]\n'a, a' = [1]\n", ["a: is given twice"]),
         ("[grid]\na = [1, 2]\n[[list]]\na = 3\nb = 1\n[[list]]\na = 3\nb = 2\n", ["a: is given twice"]),
@@ -204,7 +201,7 @@ def test_the_page_tells_ranks_effects_and_troubles(write, tmp_path):
     assert "points/key1/report.html" in page
     assert "1 without a healthy result" in page
     assert "1 of 5 points have no result" in page and not tables.imbalance(ROWS)
-    assert "1 of 5 points, which count in the means," in tables.imbalance([*ROWS, row(5, 1.0, 0.08, 1.0, UNHEALTHY)])
+    assert "1 of 5 points failed a check" in tables.imbalance([*ROWS, row(5, 1.0, 0.08, 1.0, UNHEALTHY)])
     assert (tmp_path / "main_effects.png").stat().st_size > 10_000
     assert [line[1] for line in tables.ranking(study, rows)["rows"]] == ["key1", "key3", "key2", "key4"]
 

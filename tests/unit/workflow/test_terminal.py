@@ -10,9 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from reflowshock.workflow.process import terminal
-from reflowshock.workflow.process.plan_table import new_table
-from reflowshock.workflow.process.progress import progress_bar
-from reflowshock.workflow.process.terminal import Terminal, styled, visible
+from reflowshock.workflow.process.terminal import Terminal, new_table, progress_bar, styled, visible
 
 NASTY = "a[/x] [ ] [bold]b :smile: \x1b[31m\x07\x9b2J\r\u202e"
 SHOWN = r"a[/x] [ ] [bold]b :smile: \x1b[31m\x07\x9b2J\r\u202e"
@@ -75,7 +73,7 @@ def test_a_value_for_each_place():
 
 def test_descriptions_of_progress_are_text(shown, monkeypatch):
     console, written = shown
-    monkeypatch.setattr("reflowshock.workflow.process.progress.console", console)
+    monkeypatch.setattr("reflowshock.workflow.process.terminal.console", console)
     with progress_bar(NASTY) as bar:
         bar(0.5, NASTY)
     assert SHOWN in written()

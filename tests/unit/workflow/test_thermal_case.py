@@ -66,7 +66,7 @@ FAULTS = {
     "name": (["thermal.corner_displacment=1"], ["did you mean thermal.corner_displacement?"]),
     "crushed": (
         [*PAPER, MOVED[0], 'thermal.corner_displacement="-0.25 mm"'],
-        ['thermal.corner_displacement = "-0.25 mm"', "leaves 0.06 mm of the gap of 0.31 mm", "> -0.2376 mm"],
+        ['thermal.corner_displacement = "-0.25 mm"', "leaves 0.06 mm of the 0.31 mm gap", "> -0.2376 mm"],
     ),
     "switch": (["thermal.effects.flexible=yes"], ["one of auto, on, off"]),
     "steps": (["thermal.steps=0"], [">= 1 and <= 200"]),

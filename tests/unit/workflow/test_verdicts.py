@@ -8,7 +8,7 @@ import pytest
 from reflowshock.workflow.package import findings
 from reflowshock.workflow.package_report import joint_tables
 from reflowshock.workflow.reflow.joints import ReflowError, mark_bridges, refuse_joints_without_mesh
-from reflowshock.workflow.solder.findings import of_drop, of_joint
+from reflowshock.workflow.solder.stages import of_drop, of_joint
 
 PADS = [SimpleNamespace(name=f"A{k}", x=k * 1e-3, y=2.5e-3) for k in (1, 2, 3, 4)]
 

@@ -1,0 +1,1 @@
+"""The cases of the program: a folder each, and the hard ones."""

@@ -1,0 +1,106 @@
+"""Collector of hard cases for pytest: each combination of the values of a file is a test, its bounds are the asserts.
+
+Without options the first combination of each file is tried, and no random case.
+"""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from reflowshock.cases.hard.hard_case import HardCase, read_hard_cases
+from reflowshock.cases.hard.random_cases import LONGEST_SEARCH, RandomFile, read_random_file
+from reflowshock.cases.hard.verdict import attempt
+from reflowshock.workflow.case.problems import CaseError
+
+HARD = Path(__file__).resolve().parent
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add the options of hard cases."""
+    group = parser.getgroup("hard cases")
+    group.addoption("--every-combination", action="store_true", help="try all values that hard cases vary")
+    group.addoption("--random-seed", type=int, default=1, help="of random hard cases")
+    group.addoption("--random-cases", action="append", metavar="NAME=COUNT", default=[], help="of a random file")
+    group.addoption("--simplify", action="append", metavar="NAME=NUMBER", default=[], help="of a random case instead")
+
+
+def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> "HardFile | None":
+    """Collect the files of the program, and those that are named."""
+    is_hard = file_path.resolve().parent == HARD or parent.session.isinitpath(file_path)
+    return HardFile.from_parent(parent, path=file_path) if is_hard and file_path.suffix == ".toml" else None
+
+
+class HardFile(pytest.File):
+    """A file of hard cases."""
+
+    def collect(self) -> Iterator[pytest.Item]:
+        """Yield its cases, or the search for a simpler one."""
+        try:
+            random = read_random_file(self.path)
+            if random is None:
+                cases = read_hard_cases(self.path)
+                yield from map(self._item, cases if self.config.getoption("every_combination", False) else cases[:1])
+            else:
+                yield from self._random_items(random)
+        except CaseError as error:
+            raise self.CollectError(str(error)) from error
+
+    def _random_items(self, file: RandomFile) -> Iterator[pytest.Item]:
+        count, number = (self._number(option) for option in ("random_cases", "simplify"))
+        if number is not None and count is not None:
+            yield Search.from_parent(self, name="simplest", file=file, drawn=(count, number))
+        elif count is not None:
+            yield from map(self._item, file.cases(count, self.config.getoption("random_seed")))
+
+    def _item(self, case: HardCase) -> "HardItem":
+        return HardItem.from_parent(self, name=case.tried or case.name, case=case)
+
+    def _number(self, option: str) -> int | None:
+        given = dict(text.split("=") for text in self.config.getoption(option, []))
+        return int(given[self.path.stem]) if self.path.stem in given else None
+
+
+class MissError(Exception):
+    """A hard case did not keep its bounds."""
+
+
+class HardItem(pytest.Item):
+    """A hard case; its report has the verdict as property "verdict"."""
+
+    def __init__(self, *, case: HardCase, **others) -> None:
+        """Limit its time."""
+        super().__init__(**others)
+        self.case = case
+        self.add_marker(pytest.mark.timeout(case.deadline, method="thread"))
+
+    def runtest(self) -> None:
+        """Try it."""
+        verdict = attempt(self.case)
+        self.user_properties.append(("verdict", verdict.record()))
+        if not verdict.ok:
+            raise MissError(verdict)
+
+    def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style=None):
+        """Tell a miss in its own words."""
+        return str(excinfo.value) if isinstance(excinfo.value, MissError) else super().repr_failure(excinfo, style)
+
+    def reportinfo(self) -> tuple[Path, None, str]:
+        """Name it."""
+        return self.path, None, f"{self.path.stem} ({self.name})"
+
+
+class Search(pytest.Item):
+    """The search for the simplest random case that misses; its report has the table as property "simplest"."""
+
+    def __init__(self, *, file: RandomFile, drawn: tuple[int, int], **others) -> None:
+        """Keep how many were drawn and which one missed."""
+        super().__init__(**others)
+        self.file, self.drawn = file, drawn
+        self.add_marker(pytest.mark.timeout(3.0 * LONGEST_SEARCH, method="thread"))
+
+    def runtest(self) -> None:
+        """Search."""
+        count, number = self.drawn
+        found = self.file.simplest(count, self.config.getoption("random_seed"), number)
+        self.user_properties.append(("simplest", found))

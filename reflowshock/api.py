@@ -1,0 +1,269 @@
+"""The program from Python: a case is loaded, planned and run; a run folder is opened and read."""
+
+import subprocess
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from io import StringIO
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from rich.console import Console
+
+from reflowshock.names import nearest
+from reflowshock.problem import as_toml
+from reflowshock.workflow import plan
+from reflowshock.workflow.case.case import Case as ResolvedCase
+from reflowshock.workflow.case.problems import CaseError
+from reflowshock.workflow.kinds import kind_of, stage_seconds
+from reflowshock.workflow.pipeline.points import read_case_of_run
+from reflowshock.workflow.pipeline.reader import read_case
+from reflowshock.workflow.process.products import read_json
+from reflowshock.workflow.store.folders import read_mark
+from reflowshock.workflow.store.point import Point
+from reflowshock.workflow.store.state import examine
+from reflowshock.workflow.store.store import Store
+
+if TYPE_CHECKING:
+    import numpy as np
+    import pandas
+    import pyvista
+
+__all__ = ["Case", "CaseError", "Metric", "Plan", "PlannedStage", "Run", "RunFailed", "UnknownName"]
+
+WIDTH = 120  # of a plan as text
+
+
+class UnknownName(LookupError):
+    """A joint, a mode or a folder that does not exist; the message says which name is nearest."""
+
+
+class RunFailed(RuntimeError):
+    """A run that did not complete; the message is the command's."""
+
+
+class Metric(NamedTuple):
+    """A number with its SI unit."""
+
+    value: float | str
+    unit: str
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedStage:
+    """What a run would do with a stage: whether it runs, why, and its predicted wall time [s] where that is known."""
+
+    runs: bool
+    why: str
+    seconds: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """What a run would do and cost; printed, it reads as ``reflowshock plan``.
+
+    Attributes:
+        stages: name -> what would be done, in order.
+        effects: name -> whether it acts ("on"), "why", and where it is predicted its "influence" on the results.
+        text: all of it in words.
+    """
+
+    stages: Mapping[str, PlannedStage]
+    effects: Mapping[str, Mapping[str, Any]]
+    text: str
+
+    @property
+    def seconds(self) -> float:
+        """Predicted wall time of the stages that would run [s]."""
+        return sum(stage.seconds or 0.0 for stage in self.stages.values() if stage.runs)
+
+    def __str__(self) -> str:
+        return self.text
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """A case file with settings, checked.
+
+    Attributes:
+        path: of the file.
+        settings: "dotted.key=value", applied over the file.
+        resolved: every value in SI units.
+    """
+
+    path: Path
+    settings: tuple[str, ...]
+    resolved: ResolvedCase
+
+    @classmethod
+    def load(cls, path: str | Path, overrides: Mapping[str, object] | Sequence[str] = ()) -> "Case":
+        """Read and check a case file.
+
+        Args:
+            path: TOML file.
+            overrides: dotted key -> value with its unit, as ``{"shock.duration": "2 ms"}``, or "dotted.key=value".
+
+        Raises:
+            CaseError: with all problems found, each with its place in the file, what is allowed, and the nearest name.
+        """
+        pairs = overrides.items() if isinstance(overrides, Mapping) else ()
+        settings = tuple(f"{key}={_toml(value)}" for key, value in pairs) or tuple(overrides)
+        return cls(Path(path), settings, read_case(Path(path), settings, True))
+
+    @property
+    def name(self) -> str:
+        """Name of the case."""
+        return self.resolved.case.name
+
+    def plan(self, out: str | Path | None = None) -> Plan:
+        """Predict what a run in a folder would do and cost; nothing is run, nothing is written."""
+        store, point = self._store(out), Point({}, self.resolved)
+        verdicts, seconds = examine(store, point), stage_seconds(self.resolved)
+        stages = {
+            name: PlannedStage(verdict.stale, plan.reason(verdict, self.resolved), seconds.get(name))
+            for name, verdict in verdicts.items()
+        }
+        text = StringIO()
+        plan.show_plan(store, point, Console(file=text, width=WIDTH))
+        return Plan(stages, kind_of(self.resolved).forecast(self.resolved).effects, text.getvalue())
+
+    def run(
+        self, out: str | Path | None = None, *, until: str = "report", cores: int | None = None, force: bool = False
+    ) -> "Run":
+        """Make what is missing, stale or damaged, as ``reflowshock run`` does, in a process of its own.
+
+        Args:
+            out: run folder; runs/<name of the case> if it is not given.
+            until: the last stage.
+            cores: to use; all of them if it is not given.
+            force: whether the folder may hold another case, and values may be implausible.
+
+        Returns:
+            The run, also where a health check failed: see ``Run.is_healthy``.
+
+        Raises:
+            RunFailed: a stage failed, or the command refused to run.
+        """
+        store = self._store(out)
+        options = ["--out", str(store.folder), "--until", until, "--yes"]
+        options += [part for setting in self.settings for part in ("--set", setting)]
+        options += [] if cores is None else ["--cores", str(cores)]
+        options += ["--force"] if force else []
+        command = [sys.executable, "-m", "reflowshock", "run", str(self.path), *options]
+        done = subprocess.run(command, stderr=subprocess.PIPE, text=True, encoding="utf-8", check=False)
+        if done.returncode and not store.is_complete(Point({}, self.resolved), until):
+            raise RunFailed(done.stderr.strip() or f"the command ended with exit code {done.returncode}")
+        return Run.open(store.folder)
+
+    def _store(self, out: str | Path | None) -> Store:
+        return Store(Path(out) if out is not None else Path("runs") / self.resolved.run_name, one_run=True)
+
+
+@dataclass(frozen=True)
+class Run:
+    """A run folder.
+
+    Attributes:
+        folder: with the products.
+        case: as it was run, every value in SI units.
+    """
+
+    folder: Path
+    case: ResolvedCase
+
+    @classmethod
+    def open(cls, folder: str | Path) -> "Run":
+        """Open a run folder.
+
+        Raises:
+            UnknownName: it is not a run folder; names the nearest one beside it.
+            CaseError: nothing was run in it, or its case is damaged.
+        """
+        folder = Path(folder)
+        mark = read_mark(folder)
+        if mark is None or mark["holds"] != "run":
+            beside = folder.parent.iterdir() if folder.parent.is_dir() else ()
+            names = [path.name for path in beside if (read_mark(path) or {}).get("holds") == "run"]
+            raise UnknownName(f"{folder} is not a run folder{_hint(folder.name, names)}")
+        return cls(folder, read_case_of_run(folder))
+
+    @cached_property
+    def summary(self) -> dict[str, Any]:
+        """Content of ``summary.json``."""
+        return read_json(self._product("summary.json"))
+
+    @property
+    def metrics(self) -> dict[str, Metric]:
+        """Results by name, each with its unit."""
+        return {name: Metric(found["value"], found["unit"]) for name, found in self.summary["metrics"].items()}
+
+    @property
+    def is_healthy(self) -> bool:
+        """Whether every health check held."""
+        return all(check["ok"] for check in self.summary["health"].values())
+
+    @cached_property
+    def joints(self) -> "pandas.DataFrame":
+        """One row a joint: place, shape, verdict of the reflow, errors, mesh; SI units, contact angles in degrees."""
+        import pandas
+
+        from reflowshock.workflow.package_report.joint_records import joint_records
+
+        if not (self.folder / "reflow/joints.json").exists():
+            raise UnknownName(
+                f"{self.folder} has no joints: it is a case of kind {self.case.kind!r}, or not yet reflowed"
+            )
+        records = joint_records(self.folder)
+        flat = [{key: value for key, value in record.items() if _is_scalar(value)} for record in records]
+        return pandas.DataFrame(flat).set_index("name")
+
+    @cached_property
+    def history(self) -> dict[str, dict[str, "np.ndarray"]]:
+        """Histories of each mode (or solver) of the shock: name -> array, "time" [s] among them; SI units."""
+        import numpy as np
+
+        result = {}
+        for path in sorted(self.folder.glob("shock/*/history.npz")):
+            with np.load(path) as arrays:
+                result[path.parent.name] = dict(arrays)
+        return result
+
+    def surface(self, joint: str) -> "pyvista.PolyData":
+        """Return the closed surface of a joint in its own frame [m]; cell data "boundary": 0 free, 1 board, 2 package.
+
+        Raises:
+            UnknownName: there is no such joint; names the nearest one.
+        """
+        path = self.folder / "surface" / f"{joint}.vtu"
+        names = sorted(found.stem for found in path.parent.glob("*.vtu"))
+        if joint not in names:
+            raise UnknownName(f"{self.folder} has no surface of a joint {joint!r}{_hint(joint, names)}")
+        import pyvista
+
+        from reflowshock.meshing.surface.closed_surface import read_surface
+
+        closed = read_surface(path)
+        surface = pyvista.PolyData.from_regular_faces(closed.points, closed.triangles)
+        surface.cell_data["boundary"] = closed.boundary
+        return surface
+
+    def _product(self, name: str) -> Path:
+        path = self.folder / name
+        if not path.exists():
+            raise UnknownName(f"{path} does not exist: the run is not complete")
+        return path
+
+
+def _hint(name: str, names: Sequence[str]) -> str:
+    """Say which name is meant; nothing where there is none."""
+    return f"; did you mean {nearest(name, names) or names[0]}?" if names else ""
+
+
+def _is_scalar(value: object) -> bool:
+    return value is None or isinstance(value, bool | int | float | str)
+
+
+def _toml(value: object) -> str:
+    """Write a value as the option ``--set`` takes it."""
+    return value if isinstance(value, str) else as_toml(value)

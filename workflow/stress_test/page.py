@@ -1,0 +1,147 @@
+"""Results of a stress test: stress_test.json, .png and .html, and a TOML file for each counterexample."""
+
+import base64
+import json
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+
+matplotlib.use("Agg")
+from matplotlib import pyplot
+from matplotlib.axes import Axes
+from matplotlib.ticker import LogFormatter
+
+from reflowshock.cases.hard.hard_case import hard_case_text
+from reflowshock.cases.hard.trial import FAMILIES
+from reflowshock.cases.hard.verdict import Check, Verdict
+from reflowshock.workflow import __version__
+from reflowshock.workflow.report.curves import STYLE
+from reflowshock.workflow.report.template import template_environment
+from reflowshock.workflow.stress_test.sample import Sample
+from reflowshock.workflow.stress_test.words import sample_said
+
+TEMPLATES = Path(__file__).parent / "templates"
+LEAST, MOST = 0.05, 1000.0  # margins beyond are drawn at the edge
+SURVIVED, MISSED, REFUSED = "#0b5fa5", "#b3261e", "#2a7d4f"
+ROW = 0.19  # height of a row [in]
+
+
+def write_results(folder: Path, verdicts: Sequence[Verdict], samples: Sequence[Sample], seed: int) -> None:
+    """Write all results to a folder; counterexamples of an earlier test stay.
+
+    Args:
+        folder: of the results.
+        verdicts: of the fixed cases.
+        samples: random cases.
+        seed: from which they were drawn.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    for sample in samples:
+        if sample.simplest is not None:
+            path = folder / "counterexamples" / f"{sample.name}.toml"
+            path.parent.mkdir(exist_ok=True)
+            path.write_text(hard_case_text(sample.simplest), encoding="utf-8")
+    draw_margins(folder / "stress_test.png", verdicts, samples)
+    told = {
+        "version": __version__,
+        "seed": seed,
+        "fixed": [_record(verdict) for verdict in verdicts],
+        "random": [_sample_record(sample) for sample in samples],
+    }
+    (folder / "stress_test.json").write_text(json.dumps(told, indent=1), encoding="utf-8")
+    (folder / "stress_test.html").write_text(_page(folder, verdicts, samples, seed), encoding="utf-8")
+
+
+def _record(verdict: Verdict) -> dict[str, Any]:
+    return {
+        "name": verdict.case.name,
+        "tried": verdict.case.tried,
+        "family": verdict.case.family,
+        "ok": verdict.ok,
+        "refused": verdict.is_refused,
+        "message": verdict.message,
+        "seconds": round(verdict.seconds, 3),
+        "checks": [_check(check) for check in verdict.checks],
+    }
+
+
+def _check(check: Check) -> dict[str, Any]:
+    margin = check.margin if math.isfinite(check.margin) else None
+    return {"measure": check.measure, "found": check.found, "bound": check.bound, "margin": margin, "ok": check.holds}
+
+
+def _sample_record(sample: Sample) -> dict[str, Any]:
+    return {
+        "name": sample.name,
+        "family": sample.family,
+        "ok": sample.ok,
+        "tried": len(sample.verdicts),
+        "refused": sample.refused,
+        "cases": [_record(verdict) | {"parameters": verdict.case.given} for verdict in sample.verdicts],
+    }
+
+
+def _page(folder: Path, verdicts: Sequence[Verdict], samples: Sequence[Sample], seed: int) -> str:
+    environment = template_environment(TEMPLATES)
+    environment.globals.update(sample_said=sample_said)
+    in_order = sorted(verdicts, key=lambda one: (FAMILIES.index(one.case.family), one.case.name))
+    return environment.get_template("stress_test.html.j2").render(
+        version=__version__,
+        seed=seed,
+        verdicts=in_order,
+        samples=samples,
+        tried=sum(len(sample.verdicts) for sample in samples),
+        missed=sum(not verdict.ok for verdict in verdicts) + sum(len(sample.missed) for sample in samples),
+        refused=sum(sample.too_many_refused for sample in samples),
+        picture=base64.b64encode((folder / "stress_test.png").read_bytes()).decode(),
+    )
+
+
+def draw_margins(path: Path, verdicts: Sequence[Verdict], samples: Sequence[Sample]) -> None:
+    """Write a PNG.
+
+    Args:
+        path: of the file.
+        verdicts: of the fixed cases.
+        samples: random cases; their row has a dot for each.
+    """
+    rows = _rows(verdicts, samples)
+    with pyplot.rc_context(STYLE | {"font.size": 8}):
+        figure, axis = pyplot.subplots(figsize=(9.2, ROW * len(rows) + 1.2), constrained_layout=True)
+        axis.axvspan(LEAST, 1.0, color=MISSED, alpha=0.07, lw=0)
+        axis.axvline(1.0, color=MISSED, lw=1.2)
+        for place, (name, own) in enumerate(rows):
+            _draw_row(axis, place, own, 0.35 if "random" in name else 0.9)
+        axis.set_yticks(range(len(rows)), [name.replace("_", " ") for name, _ in rows])
+        axis.set(xscale="log", xlim=(LEAST, 1.3 * MOST), ylim=(len(rows) - 0.3, -0.7))
+        axis.xaxis.set_major_formatter(LogFormatter())  # no formula, which STYLE does not write
+        axis.set_xlabel("margin: bound over measured value (1: at the bound; left of it: a miss); square: refused")
+        figure.savefig(path, dpi=110)
+        pyplot.close(figure)
+
+
+def _rows(verdicts: Sequence[Verdict], samples: Sequence[Sample]) -> list[tuple[str, list[Verdict]]]:
+    """Names of files and random trials with their verdicts, family by family."""
+    rows: dict[str, list[Verdict]] = {}
+    for family in FAMILIES:
+        for verdict in sorted(verdicts, key=lambda one: one.case.name):
+            if verdict.case.family == family:
+                rows.setdefault(verdict.case.name, []).append(verdict)
+        for sample in samples:
+            if sample.family == family:
+                rows[sample.name] = sample.verdicts
+    return list(rows.items())
+
+
+def _draw_row(axis: Axes, place: int, verdicts: Sequence[Verdict], opacity: float) -> None:
+    """Draw the closest margin of each verdict; a case that broke, or was refused, has none and lies at an edge."""
+    for verdict in verdicts:
+        closest = verdict.closest
+        margin = closest.margin if closest else (MOST if verdict.ok else LEAST)
+        shown = LEAST if math.isnan(margin) else min(MOST, max(LEAST, margin))
+        colour = MISSED if not verdict.ok else REFUSED if verdict.is_refused else SURVIVED
+        marker = "s" if verdict.is_refused else "o" if closest else "X"
+        axis.plot(shown, place, marker, color=colour, alpha=opacity, ms=5, mew=0, clip_on=False)

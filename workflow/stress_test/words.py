@@ -1,0 +1,69 @@
+"""Verdicts in the terminal: a line a case, and a table of the families."""
+
+from collections.abc import Sequence
+
+from rich.table import Table
+from rich.text import Text
+
+from reflowshock.cases.hard.trial import FAMILIES
+from reflowshock.cases.hard.verdict import Verdict
+from reflowshock.workflow.process.terminal import console, styled
+from reflowshock.workflow.stress_test.sample import MOST_REFUSED, Sample
+
+
+def show_verdict(verdict: Verdict) -> None:
+    """Print one verdict: what was tried, the closest bound, what was measured, the margin."""
+    told = styled(" {}  {}  {} s", named(verdict), str(verdict), f"{verdict.seconds:.1f}")
+    console.print(_mark(verdict.ok) + told, soft_wrap=True)
+
+
+def _mark(ok: bool) -> Text:
+    return styled("[green]ok  [/]" if ok else "[bold red]MISS[/]")
+
+
+def named(verdict: Verdict) -> str:
+    """Name a case with the values that were varied."""
+    return verdict.case.name + (f" ({verdict.case.tried})" if verdict.case.tried else "")
+
+
+def show_sample(sample: Sample) -> None:
+    """Print how the random cases of a trial ended, and what was missed."""
+    seconds = f"{sum(verdict.seconds for verdict in sample.verdicts):.1f}"
+    told = styled(" {}  {}  {} s", sample.name, sample_said(sample), seconds)
+    console.print(_mark(sample.ok) + told, soft_wrap=True)
+    for verdict in sample.missed:
+        console.print(f"     {named(verdict)}  {verdict!s}", soft_wrap=True)
+
+
+def sample_said(sample: Sample) -> str:
+    """Say how the random cases of a trial ended."""
+    counts = f"{len(sample.verdicts)} tried, {sample.refused} refused, {len(sample.missed)} missed"
+    if sample.too_many_refused:
+        counts += f"; allowed to be refused: {MOST_REFUSED:.0%}"
+    return counts + (f"; closest: {sample.closest}, margin {sample.closest.margin_text}" if sample.closest else "")
+
+
+def show_table(verdicts: Sequence[Verdict], samples: Sequence[Sample]) -> None:
+    """Print how many of each family were tried and missed, the closest of each, and what was refused too often."""
+    table = Table(box=None, header_style="bold")
+    for column in ("family", "fixed", "random", "missed", "smallest margin", "of"):
+        table.add_column(column, justify="left" if column in ("family", "of") else "right")
+    for family in FAMILIES:
+        fixed = [verdict for verdict in verdicts if verdict.case.family == family]
+        drawn = [verdict for sample in samples if sample.family == family for verdict in sample.verdicts]
+        if own := [*fixed, *drawn]:
+            missed = sum(not verdict.ok for verdict in own)
+            table.add_row(family, str(len(fixed)), str(len(drawn)), str(missed), *_least(own))
+    console.print(table)
+    for sample in samples:
+        if sample.too_many_refused:
+            show_sample(sample)
+
+
+def _least(verdicts: Sequence[Verdict]) -> tuple[str, str]:
+    """The smallest margin of all, and whose it is."""
+    found = [(verdict.closest, verdict) for verdict in verdicts if verdict.closest is not None]
+    if not found:
+        return "", ""
+    check, verdict = min(found, key=lambda pair: pair[0].rank)
+    return check.margin_text, named(verdict)
