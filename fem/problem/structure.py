@@ -252,7 +252,7 @@ class Dynamics(Parameters):
 
 
 class StructureProblem(Parameters):
-    """All that describes a structure and its motion; ``structure.checks.problems`` says what does not fit together."""
+    """All that describes a structure and its motion; ``structure_checks.problems`` says what does not fit together."""
 
     structure: Structure
     materials: dict[str, Material] = Field(default_factory=dict)
