@@ -58,6 +58,11 @@ class GripcStep:
         """No: its pressure is explicit, and it loses volume."""
         return False
 
+    @property
+    def keeps_time(self) -> bool:
+        """Always."""
+        return True
+
     def prepare(self, body: Body, physics: Physics, _neighbours: NeighbourList) -> "PreparedGripcStep":
         """Fit the operators at the current positions.
 

@@ -27,8 +27,9 @@ ROUNDING = 1e-10
 # Of the spacing: a plate that a step moves by less has arrived.
 ARRIVED = 1e-12
 SHARE_PASSES = 12
-# Of the energy that a step may give to smoothing: so much may be left.
-LEFT_OVER = 0.01
+# Of the energy that a step may give to smoothing: so much may be left. Where smoothing undoes a step, this decides how
+# fast a body creeps on that would else be at rest: at 0.01 by more energy in a step than `solder.numerics.tolerance`.
+LEFT_OVER = 1e-4
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,18 +157,22 @@ def _smooth(body: Body, physics: Physics, volume: float, evening: Evening) -> bo
 def _largest_share(excess: Callable[[float], float], below: float, above: float) -> float:
     """Return the largest share in [0, 1] at which an excess, below zero at 0 and above at 1, is not positive.
 
-    To a hundredth of the excess at 0, by false position; an end that stays counts half (the Illinois method).
+    To a small part of the excess at 0, by false position; an end that stays twice counts half (the Illinois method).
     """
     low, high, reached, enough = 0.0, 1.0, below, LEFT_OVER * below
+    was_below = None
     for _ in range(SHARE_PASSES):
         if reached >= enough:
             break
         share = low + (high - low) * below / (below - above)
         value = excess(share)
         if value <= 0.0:
-            low, below, reached, above = share, value, value, 0.5 * above
+            low, below, reached = share, value, value
+            above *= 0.5 if was_below is True else 1.0
         else:
-            high, above, below = share, value, 0.5 * below
+            high, above = share, value
+            below *= 0.5 if was_below is False else 1.0
+        was_below = value <= 0.0
     return low
 
 

@@ -24,8 +24,9 @@ from reflowshock.particles.steps.time_step import StepCollapsed, TimeStep
 
 SKIN = 0.2
 FLIP_INTERVAL = 2
+STEADY = 0.02  # share of itself by which a steady motion changes in a step
 FLOW_RECORDS = (Body, Cloud, Plate, Pad, TimeStep)  # that a saved flow consists of
-SAVED = ("body", "time_step", "volume", "time", "steps")
+SAVED = ("body", "time_step", "volume", "time", "steps", "pace")
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,6 +72,7 @@ class LiquidFlow:
         self.volume = body.volume()[0]
         self.neighbours = NeighbourList(solver.support * spacing, SKIN * spacing)
         self.time, self.steps = 0.0, 0
+        self.pace = np.zeros((body.cloud.surface_count, 3))  # mean velocity of the surface in the last step [m/s]
 
     def saved(self) -> dict[str, Any]:
         """All that a flow of the same physics needs to continue to the same bits, for a checkpoint."""
@@ -108,7 +110,8 @@ class LiquidFlow:
         body.points[body.cloud.surface_count :] += interior_shift(body, self.neighbours)
         self.steps += 1
         self.time += self.time_step.size
-        record = self._record(before, flips, motion.iterations)
+        self.pace = (body.points[: len(before)] - before) / self.time_step.size
+        record = self._record(flips, motion.iterations)
         # Where momentum is kept, the next step will be as fast.
         self.time_step.grow(motion.top_speed if self.physics.momenta else 0.0)
         return record
@@ -138,9 +141,40 @@ class LiquidFlow:
         """Move the body by one step; None where its energy is too high after it."""
         body = self.body
         motion = self._accelerate(self.solver.prepare(body, self.physics, self.neighbours))
-        body.move(self.time_step.size, motion.transport, motion.twists)
-        flips = even_out(body, self.physics, self.volume, evening)
+        steps = 1.0 if np.isinf(evening.highest) else self._steady_steps(motion)
+        if steps > 1.0:
+            start, time_step = Start.of(body, self.physics.lines), replace(self.time_step)
+            self.time_step.prolong(steps)
+            flips = self._follow(motion, evening)
+            if flips is not None:
+                return motion, flips
+            start.restore(body, self.physics.lines)
+            self.time_step = time_step
+        flips = self._follow(motion, evening)
         return None if flips is None else (motion, flips)
+
+    def _follow(self, motion: Motion, evening: Evening) -> int | None:
+        """Move the body along; return the number of flips, None where its energy is too high after it."""
+        self.body.move(self.time_step.size, motion.transport, motion.twists)
+        return even_out(self.body, self.physics, self.volume, evening)
+
+    def _steady_steps(self, motion: Motion) -> float:
+        """Over how many steps a motion goes on that is steady: at the rate of its change, until nothing of it is left.
+
+        A body that has overflowed both pads slides as a whole, and nothing resists but the mass, the more the smaller
+        the steps are: it would creep. It must go as it went in the last step, smoothing included: where smoothing
+        undoes what the forces move, these move the same in each step, too, but lead nowhere.
+        """
+        if self.solver.keeps_time:
+            return 1.0
+        normal = self._normals()
+        last, now = ((field[: len(normal)] * normal).sum(axis=1) for field in (self.pace, motion.transport))
+        change, whole = float(np.linalg.norm(now - last)), float(np.linalg.norm(now))
+        if change >= STEADY * whole:
+            return 1.0
+        return min(
+            whole / max(change, float(np.finfo(float).tiny)), self.time_step.steps_within_reach(motion.top_speed)
+        )
 
     def _accelerate(self, prepared: PreparedStep) -> Motion:
         """Solve for velocity and pressure, again with a smaller step where a particle would move too far."""
@@ -163,22 +197,24 @@ class LiquidFlow:
             where = f"step {self.steps + 1} at time {self.time:.4g} s, particle {particle} at ({place}) m"
             raise StepCollapsed(f"{where}: {error}") from error
 
-    def _record(self, before: Floats, flips: int, iterations: int) -> StepRecord:
-        body, size, count = self.body, self.time_step.size, len(before)
-        volume, gradient = body.volume()
-        normal = self.physics.admit(body, gradient)[:count]
-        normal /= np.maximum(np.linalg.norm(normal, axis=1), np.finfo(float).tiny)[:, None]
-        moved = float(np.abs(((body.points[:count] - before) * normal).sum(axis=1)).max())
+    def _normals(self) -> Floats:
+        """Unit normals of the surface `(s, 3)`, along the walls on contact lines; zero where an edge holds a vertex."""
+        normal = self.physics.admit(self.body, self.body.volume()[1])[: self.body.cloud.surface_count]
+        return normal / np.maximum(np.linalg.norm(normal, axis=1), np.finfo(float).tiny)[:, None]
+
+    def _record(self, flips: int, iterations: int) -> StepRecord:
+        body, size = self.body, self.time_step.size
+        speed = float(np.abs((self.pace * self._normals()).sum(axis=1)).max())
         return StepRecord(
             step=self.steps,
             time=self.time,
             time_step=size,
             binding=self.time_step.binding,
-            height=float(np.ptp(body.points[:count, 2])),
-            volume=body.cloud.parts * volume,
+            height=float(np.ptp(body.points[: body.cloud.surface_count, 2])),
+            volume=body.cloud.parts * body.volume()[0],
             energy=body.cloud.parts * self.physics.energy(body),
-            speed=moved / size,
-            displacement=moved / body.cloud.spacing,
+            speed=speed,
+            displacement=speed * size / body.cloud.spacing,
             flips=flips,
             iterations=iterations,
         )

@@ -120,6 +120,11 @@ class InertialStep:
         """Always: viscosity and mass only slow down what the forces drive."""
         return True
 
+    @property
+    def keeps_time(self) -> bool:
+        """Always."""
+        return True
+
     def prepare(self, body: Body, physics: Physics, _neighbours: NeighbourList) -> "PreparedInertialStep":
         """Start a step; tetrahedra need no neighbour list."""
         return self.start(body, physics)

@@ -64,6 +64,11 @@ class Relaxation:
         """Always: the step goes along the forces."""
         return True
 
+    @property
+    def keeps_time(self) -> bool:
+        """Never: a step is no physical motion."""
+        return False
+
     def prepare(self, body: Body, physics: Physics, neighbours: NeighbourList) -> "PreparedRelaxation":
         """Build the equations of the surface and the operators of the potential flow."""
         if self.centre is None and not body.plates and not body.cloud.symmetry:

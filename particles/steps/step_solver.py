@@ -64,6 +64,10 @@ class StepSolver(Protocol):
     def descends(self) -> bool:
         """Whether a short enough step without momentum lowers the energy."""
 
+    @property
+    def keeps_time(self) -> bool:
+        """Whether a motion takes its physical time; else only where it leads to counts."""
+
     def prepare(self, body: Body, physics: Physics, neighbours: NeighbourList) -> PreparedStep:
         """Build what does not depend on the size of the step."""
 

@@ -30,7 +30,7 @@ class TimeStep:
         largest: upper bound, a multiple of the capillary limit [s].
         spacing: particle spacing [m].
         size: current step [s].
-        binding: "capillary multiple", "growth", "displacement" or "energy".
+        binding: "capillary multiple", "growth", "displacement", "energy" or, for one made longer, "steady motion".
     """
 
     largest: float
@@ -66,6 +66,16 @@ class TimeStep:
                 "the flow is unstable"
             )
         self.size, self.binding = share * self.size, binding
+
+    def steps_within_reach(self, speed: float) -> float:
+        """How many steps of this size a largest particle speed [m/s] allows in one; one, unless it is at its bound."""
+        if self.size < self.largest:
+            return 1.0
+        return AIM * LARGEST_DISPLACEMENT * self.spacing / max(speed * self.size, float(np.finfo(float).tiny))
+
+    def prolong(self, steps: float) -> None:
+        """Make this step as long as several; the next one has the bound again."""
+        self.size, self.binding = steps * self.size, "steady motion"
 
     def grow(self, speed: float) -> None:
         """Grow after an accepted step, up to the bound and as far as a largest particle speed [m/s] allows."""

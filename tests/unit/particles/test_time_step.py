@@ -26,3 +26,15 @@ def test_a_step_that_raises_the_energy_is_halved_but_not_for_ever():
     with pytest.raises(StepCollapsed, match="the energy still rises"):
         for _ in range(40):
             step.cut_for_energy()
+
+
+def test_a_step_at_its_bound_goes_on_as_far_as_the_spacing_allows_and_the_next_one_has_the_bound_again():
+    step = TimeStep(largest=1.0, spacing=0.1, size=1.0)
+    assert step.steps_within_reach(speed=1e-4) == pytest.approx(0.9 * 0.25 * 0.1 / 1e-4)
+    assert step.steps_within_reach(speed=0.0) > 1e100
+    step.prolong(200.0)
+    assert (step.size, step.binding) == (200.0, "steady motion")
+    step.grow(speed=0.0)
+    assert (step.size, step.binding) == (1.0, "capillary multiple")
+    step.cut_for_energy()
+    assert step.steps_within_reach(speed=1e-4) == 1.0
