@@ -45,7 +45,12 @@ def test_a_folder_that_cannot_be_taken_is_told_before_anything(tmp_path):
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine/notes.txt").write_text("mine")
     long = "/".join(["d" * 200] * 25)
-    for out, words in (("file", "is not a folder"), ("mine", "has files"), (".", "has files"), ("/", "has files")):
+    for out, words in (
+        ("file", "is not a folder"),
+        ("mine", "contains files"),
+        (".", "contains files"),
+        ("/", "contains files"),
+    ):
         result = run_drop(out, "plan", cwd=tmp_path)
         assert result.returncode == 2 and words in result.stderr
     for command, code in (("plan", 2), ("run", 2), ("status", 1), ("clean", 2)):

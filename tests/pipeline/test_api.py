@@ -82,5 +82,5 @@ def test_command_runs_beside_modules_of_a_users_own(run_folder, tmp_path, monkey
 def test_a_run_that_fails_says_why(tmp_path):
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "letter.txt").write_text("dear")
-    with pytest.raises(reflowshock.RunFailed, match="has files that are not the program's"):
+    with pytest.raises(reflowshock.RunFailed, match="contains files that the program did not write"):
         reflowshock.Case.load(SMALL_CASE).run(tmp_path / "mine")

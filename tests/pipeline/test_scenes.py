@@ -44,7 +44,7 @@ def run(name: str, folder: Path, *settings: str) -> subprocess.CompletedProcess:
         pytest.param(
             "bga_ball", COARSE_DROP, CONTACT | {"height_error", "contact_angle_error"}, marks=pytest.mark.long
         ),
-        ("laplace_drop", COARSE_DROP, {"height_error", "mean_pressure_error"}),
+        pytest.param("laplace_drop", COARSE_DROP, {"height_error", "mean_pressure_error"}, marks=pytest.mark.long),
         ("solder_joint", COARSE_JOINT, CONTACT | {"waist", "waist_error", "axial_force", "axial_force_error"}),
     ],
 )
@@ -142,7 +142,13 @@ def rest_of_joint(case: JointCase) -> np.ndarray:
             signal.SIGKILL,
             marks=pytest.mark.long,
         ),
-        ("solder_joint", (COARSE_JOINT, *short_steps(1)), rest_of_joint, signal.SIGTERM),
+        pytest.param(
+            "solder_joint",
+            (COARSE_JOINT, *short_steps(1)),
+            rest_of_joint,
+            signal.SIGTERM,
+            marks=pytest.mark.long,
+        ),
     ],
 )
 def test_a_run_that_is_broken_off_continues_to_the_same_bits(tmp_path, name, settings, at_rest, end):

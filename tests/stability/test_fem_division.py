@@ -76,7 +76,7 @@ def test_points_a_little_outside_the_interface_are_tied_exactly(off):
     checked = self_check(MPI.COMM_SELF, bodies, channels)
     checked.judge()
     assert max(checked.rigid, checked.linear, checked.tie, checked.cut) < 1e-12
-    assert checked.cut_mass > 0.0
+    assert checked.interface_mass > 0.0
 
 
 def test_self_check_sees_a_weight_that_is_wrong():

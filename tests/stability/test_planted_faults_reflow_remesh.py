@@ -40,7 +40,12 @@ def forget_check(patch):
 
 
 FAULTS = [
-    ("reflow_resolution", "particles per edge 5", lambda patch: flip(patch, Wetting, "force")),
+    pytest.param(
+        "reflow_resolution",
+        "particles per edge 5",
+        lambda patch: flip(patch, Wetting, "force"),
+        marks=pytest.mark.long,
+    ),
     ("reflow_bond", "bond 1, contact angle 120 deg", lambda patch: flip(patch, Gravity, "force")),
     ("reflow_swing", "amplitude 0.05, parameters paper", double_step),
     ("remesh_warped", "corner 0.1 mm", flip_shear),

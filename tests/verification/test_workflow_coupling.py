@@ -143,7 +143,7 @@ def test_load_steps_are_those_with_liquid_solder():
 
 
 def test_a_process_too_short_for_rest_is_refused():
-    with pytest.raises(CaseError, match=r"solder\.process_time.*load steps of \[thermal\] are at rest"):
+    with pytest.raises(CaseError, match=r"solder\.process_time.*with \[thermal\], whose load steps are at rest"):
         read_case(
             SMALL_CASE,
             ['warpage.corner="0 mm"', "thermal.steps=2", 'solder.process_time="5 ms"'],
