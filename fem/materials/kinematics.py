@@ -17,7 +17,7 @@ def finite_rotation(
     """
     finite, why = kinematics == "finite", f"{table}.kinematics = {kinematics}"
     if not finite and neglected_strain is not None:
-        strain = f"{1e6 * neglected_strain:{'.0f' if neglected_strain > NEGLIGIBLE_STRAIN else '.3g'}} um/m"
+        strain = f"{float(f'{1e6 * neglected_strain:.3g}'):g} µm/m"
         why += f"; it leaves out strains of up to {strain} (half the squared displacement gradient)"
         if neglected_strain > NEGLIGIBLE_STRAIN:
             why += f": not negligible, compare with a run of {table}.kinematics = finite"
