@@ -107,7 +107,7 @@ def test_the_last_lines_are_said_where_no_file_can_be_written(monkeypatch, capsy
 
 
 def command(*arguments: str, **options) -> subprocess.CompletedProcess:
-    heed = ["env", "--default-signal=INT"]  # a job in the background of a shell ignores it
+    heed = ["env", "--default-signal=INT,HUP"]  # ignored in the background of a shell, under nohup
     line = [*heed, sys.executable, "-c", COMMAND, *arguments]
     return subprocess.run(line, capture_output=True, encoding="utf-8", timeout=100, check=False, **options)
 
