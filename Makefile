@@ -3,6 +3,8 @@ export OMP_NUM_THREADS = 1
 
 PYTHON := .venv/bin/python
 CASE := cases/bga_drop/case.toml
+# A worker that dies ends the tests: replaced, xdist would wait for its files for ever.
+PARALLEL := --numprocesses=logical --maxprocesses=8 --dist=loadfile --max-worker-restart=0
 
 help:  ## this list
 	@grep -hE '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 16
@@ -15,10 +17,10 @@ demo: setup  ## run the default case from case file to report
 
 test: setup  ## run every check and test, on all cores
 	@.ci/setup-slurm
-	$(PYTHON) -m pytest --numprocesses=logical --maxprocesses=8 --dist=loadfile
+	$(PYTHON) -m pytest $(PARALLEL)
 
 test-long: setup  ## the sweeps that `make test` leaves out: 50 interrupts, ..., random hard cases on three new seeds
-	$(PYTHON) -m pytest -m long --numprocesses=logical --maxprocesses=4
+	$(PYTHON) -m pytest -m long $(PARALLEL)
 	@for seed in $$($(PYTHON) -c 'import random; print(*random.sample(range(10**6), 3))'); do echo "seed $$seed"; \
 	    $(PYTHON) -m reflowshock stress-test --random 500 --seed $$seed --out runs/stress-test-$$seed || exit 1; done
 
