@@ -28,7 +28,9 @@ test-debian13:  ## run every test on Debian 13 too, in a chroot; compare results
 	@.ci/debian13
 
 test-golden: setup  ## run every case with this checkout and with the commit BASE: equal to the bit
-	@git worktree add --force --detach build/golden/base $(BASE)
+	@[ -n "$(BASE)" ] || { echo "which commit? make test-golden BASE=COMMIT" >&2; exit 2; }
+	@rm -rf build/golden && git worktree prune  # a product of earlier code with the same version would count as made
+	@git worktree add --detach build/golden/base $(BASE)
 	$(PYTHON) -m tests.same_results run build/golden/before --every --checkout build/golden/base
 	$(PYTHON) -m tests.same_results run build/golden/after --every
 	@git worktree remove --force build/golden/base
