@@ -107,7 +107,7 @@ SHOCK: Entries = (
         "threshold": NEGLIGIBLE_STIFFENING,
         "influence": f"1 - w / w0 of the deflection, c = {STIFFENING_OF_BOARD:g} of boards on four holes",
         "place": "reflowshock.fem.kernels.nonlinear.Path",
-        "switch": "shock.numerics.kinematics = auto, small, finite",
+        "switch": "shock.numerics.kinematics = auto, small, corotational, finite",
         "source": "Woinowsky-Krieger 1950",
     },
     {

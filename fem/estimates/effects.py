@@ -3,6 +3,8 @@
 import math
 from typing import Any, Literal
 
+from reflowshock.fem.materials.kinematics import Kinematics
+
 NEGLIGIBLE_WEIGHT = 1e-3  # of the peak acceleration: weight below it is left out
 # A strip between ends that do not approach each other: w deflects it against k w (1 + 3 (w / t)^2), since its tension
 # E A / (4 L^2) (pi w)^2 adds N (pi / L)^2 to the bending stiffness (Woinowsky-Krieger, J. Appl. Mech. 17, 1950).
@@ -54,13 +56,13 @@ def stiffened(ratio: float, coefficient: float) -> float:
     return 1.0 - math.sqrt(2.0 / (1.0 + math.sqrt(1.0 + 4.0 * share)))
 
 
-def called_for(ratio: float) -> tuple[Literal["small", "finite"], str]:
+def called_for(ratio: float) -> tuple[Kinematics, str]:
     """Decide kinematics from a board's deflection over its thickness, and say why."""
     bound = stiffened(ratio, STIFFENING_BOUND)
     finite = bound > NEGLIGIBLE_STIFFENING
     relation = f"{'>' if finite else '<='} {100.0 * NEGLIGIBLE_STIFFENING:g} %"
     return (
-        "finite" if finite else "small",
+        "corotational" if finite else "small",
         f"stretching changes deflections by up to {100.0 * bound:.2g} % ({relation})",
     )
 

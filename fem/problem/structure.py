@@ -10,6 +10,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from reflowshock.fem.materials.kinematics import Kinematics
 from reflowshock.fem.materials.library import LIBRARY
 from reflowshock.fem.materials.parameters import Material
 from reflowshock.fem.problem.shock import MOST_RANKS, Coupling, Damping, ServiceCondition
@@ -146,7 +147,10 @@ class InputG(Pulsed):
 
 
 class Pressure(Pulsed):
-    """Pressure on a facet set, positive where it pushes into the body; it follows the surface in finite kinematics."""
+    """Pressure on a facet set, positive where it pushes into the body.
+
+    It follows the surface unless kinematics are small.
+    """
 
     kind: Literal["pressure"] = "pressure"
     on: str
@@ -235,7 +239,7 @@ class Dynamics(Parameters):
 
     duration: Annotated[float, "ms"] = Field(gt=0)
     solver: Literal["explicit", "implicit", "both", "dns"] = "explicit"
-    kinematics: Literal["small", "finite"] = "small"
+    kinematics: Kinematics = "small"
     initial_velocity: Annotated[tuple[float, float, float], "m/s"] = (0.0, 0.0, 0.0)
     damping: Damping = Damping()
     modes: int = Field(0, ge=0, le=200)

@@ -2,11 +2,13 @@
 
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from reflowshock.fem.estimates.effects import STIFFENING_OF_BOARD, called_for, effect, stiffened
+from reflowshock.fem.materials.kinematics import Kinematics
+from reflowshock.workflow.board_drop import shock_cooling
 
 if TYPE_CHECKING:
     from reflowshock.workflow.package.case import BoardDropCase
@@ -60,13 +62,16 @@ def first_mode_peak(omega: float, velocity: Callable[[float], float], duration: 
     return float(np.abs(swing).max()) / omega
 
 
-def decide_kinematics(case: "BoardDropCase") -> tuple[Literal["small", "finite"], str]:
+def decide_kinematics(case: "BoardDropCase") -> tuple[Kinematics, str]:
     """Return the kinematics that the deflection of the board calls for, and why; errors as ``expected_deflection``."""
-    return called_for(expected_deflection(case).largest / case.board.thickness)
+    kinematics, why = called_for(expected_deflection(case).largest / case.board.thickness)
+    if kinematics == "corotational" and shock_cooling.is_wanted(case):
+        return "finite", f"{why}; residual stress needs a path"
+    return kinematics, why
 
 
 def decided(case: "BoardDropCase") -> "BoardDropCase":
-    """Return the case with kinematics that are small or finite, as its board's deflection calls for.
+    """Return the case with the kinematics that its board's deflection calls for.
 
     Raises:
         PulseError: the table of the pulse cannot be read.
@@ -83,13 +88,13 @@ def kinematics_effect(case: "BoardDropCase") -> dict:
 
     expected, kinematics = expected_deflection(case), case.shock.numerics.kinematics
     ratio = expected.largest / case.board.thickness
-    wanted, reason = called_for(ratio)
+    wanted, reason = decide_kinematics(case)
     taken = wanted if kinematics == "auto" else kinematics
     finite, why = finite_rotation("shock.numerics", taken, 0.5 * expected.slope**2)
     if kinematics == "auto":
         why = f"shock.numerics.kinematics = auto: {reason}"
     elif not finite:
-        why += "" if wanted == "small" else "; auto would choose finite"
+        why += "" if wanted == "small" else f"; auto would choose {wanted}"
     why = f"the board is expected to deflect by about {ratio:.2g} times its thickness; {why}"
     return {"finite_rotation": effect(finite, why, stiffened(ratio, STIFFENING_OF_BOARD))}
 
