@@ -44,6 +44,6 @@ class Quantity:
         numbers = handler(schema)
         form: dict[str, Any] = {"type": "string", "pattern": units.PATTERN, "examples": [f"1 {self.unit}"]}
         if numbers.get("type") == "array":
-            sizes = {name: numbers[name] for name in ("minItems", "maxItems") if name in numbers}
+            sizes = {str(name): numbers[name] for name in ("minItems", "maxItems") if name in numbers}
             form = {"type": "array", "items": form, **sizes}
         return {**form, "description": self.described, "x-unit": self.unit}
