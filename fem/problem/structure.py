@@ -6,7 +6,7 @@ Tables of named members are dictionaries, so that one value of one member can be
 
 import math
 from collections.abc import Mapping
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal, get_args
 
 from pydantic import Field
 
@@ -126,19 +126,52 @@ class Pulsed(Parameters):
 
     ``half_sine`` and ``haversine``, its square, act for ``duration``; ``constant`` from the start, for ``duration`` or
     to the end. ``table`` is a CSV file of times and values and stands instead of peak and pulse.
+
+    Attributes:
+        effect: Its name among the effects of a run.
+        quantity: What its values are, a key of ``fem.loads.pulse_table.QUANTITIES``.
     """
 
+    effect: ClassVar[str]
+    quantity: ClassVar[str]
     pulse: Literal["half_sine", "haversine", "constant"] = "half_sine"
     duration: Annotated[float | None, Quantity("ms")] = Field(None, gt=0)
     table: str | None = None
 
 
-class InputG(Pulsed):
+class OnBody(Pulsed):
+    """A load of the whole body, along ``direction``."""
+
+    direction: Direction
+
+
+class OnNodes(Pulsed):
+    """A load of the nodes of a facet set."""
+
+    on: str
+
+
+class OnAreas(Pulsed):
+    """A load per area of a facet set."""
+
+    on: str
+
+
+class AtPoint(Pulsed):
+    """A load at a point, along ``direction``."""
+
+    at: Annotated[tuple[float, float, float], Quantity("mm")]
+    direction: Direction
+
+
+class InputG(OnBody):
     """Acceleration of all supports along ``direction``; displacements are relative to them with ``direct``.
 
     Given by a JEDEC service condition, by peak and duration, or by a table.
     """
 
+    effect: ClassVar = "input_g"
+    quantity: ClassVar = "acceleration"
     kind: Literal["input_g"] = "input_g"
     service_condition: ServiceCondition | None = None
     peak: Annotated[float | None, Quantity("G")] = Field(None, gt=0)
@@ -146,46 +179,52 @@ class InputG(Pulsed):
     method: Literal["direct", "large_mass"] = "direct"
 
 
-class Pressure(Pulsed):
+class Pressure(OnAreas):
     """Pressure on a facet set, positive where it pushes into the body; it follows the surface in finite kinematics."""
 
+    effect: ClassVar = "pressure"
+    quantity: ClassVar = "pressure"
     kind: Literal["pressure"] = "pressure"
-    on: str
     peak: Annotated[float | None, Quantity("MPa")] = None
 
 
-class PrescribedMotion(Pulsed):
+class PrescribedMotion(OnNodes):
     """Velocity of one component of a facet set."""
 
+    effect: ClassVar = "prescribed_motion"
+    quantity: ClassVar = "velocity"
     kind: Literal["motion"] = "motion"
-    on: str
     component: Axis
     peak: Annotated[float | None, Quantity("m/s")] = None
 
 
-class Gravity(Pulsed):
+class Gravity(OnBody):
     """Weight, constant unless a pulse or a table says otherwise."""
 
+    effect: ClassVar = "gravity"
+    quantity: ClassVar = "acceleration"
     kind: Literal["gravity"] = "gravity"
     pulse: Literal["half_sine", "haversine", "constant"] = "constant"
     peak: Annotated[float, Quantity("m/s^2")] = Field(9.80665, gt=0)
     direction: Direction = (0.0, 0.0, -1.0)
 
 
-class PointForce(Pulsed):
+class PointForce(AtPoint):
     """Force at a point, shared by the nodes of the element there; its direction stays also where the body turns.
 
     It is the force on the whole body: with a plane of symmetry its mirror image acts as well, and of a force on that
     plane each half bears half. Strains within an element of the point depend on the mesh.
     """
 
+    effect: ClassVar = "point_force"
+    quantity: ClassVar = "force"
     kind: Literal["point_force"] = "point_force"
-    at: Annotated[tuple[float, float, float], Quantity("mm")]
-    direction: Direction
     peak: Annotated[float | None, Quantity("N")] = Field(None, gt=0)
 
 
-StructureLoad = Annotated[InputG | Pressure | PrescribedMotion | Gravity | PointForce, Field(discriminator="kind")]
+AnyLoad = InputG | Gravity | Pressure | PrescribedMotion | PointForce
+StructureLoad = Annotated[AnyLoad, Field(discriminator="kind")]
+KINDS: tuple[type[Pulsed], ...] = get_args(AnyLoad)
 
 
 class WatchPoint(Parameters):

@@ -210,6 +210,14 @@ def test_defaults_are_what_their_text_says(kind):
                     assert quantity.to_si(display(value, field)) == value, f"{model.__name__}.{name}"
 
 
+@pytest.mark.parametrize("kind", [kind.case for kind in KINDS], ids=lambda kind: kind.__name__)
+def test_units_are_annotations_of_quantities(kind):
+    """Else a case could only have bare numbers."""
+    for model in _reachable(kind):
+        for name, field in model.model_fields.items():
+            assert not any(isinstance(one, str) for one in field.metadata), f"{model.__name__}.{name}"
+
+
 @pytest.mark.parametrize("path", templates().values(), ids=templates())
 def test_shipped_cases_pass(path: Path, monkeypatch):
     monkeypatch.setattr(gate, "machine_memory", lambda: 16e9)
