@@ -5,6 +5,7 @@ from typing import Annotated, Literal
 from pydantic import Field, StringConstraints
 
 from reflowshock.parameters import Parameters
+from reflowshock.quantity import Quantity
 
 Source = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1)]
 Measure = Literal["peel_stress", "layer_von_mises", "layer_plastic_work"]
@@ -13,14 +14,14 @@ Measure = Literal["peel_stress", "layer_von_mises", "layer_plastic_work"]
 class StressLimit(Parameters):
     """The largest stress that a joint bears, and where that number is from: a test, a data sheet, a paper."""
 
-    limit: Annotated[float, "MPa"] = Field(gt=0)
+    limit: Annotated[float, Quantity("MPa")] = Field(gt=0)
     source: Source
 
 
 class WorkLimit(Parameters):
     """The largest plastic work density that a joint bears, and where that number is from."""
 
-    limit: Annotated[float, "kJ/m^3"] = Field(gt=0)
+    limit: Annotated[float, Quantity("kJ/m^3")] = Field(gt=0)
     source: Source
 
 
