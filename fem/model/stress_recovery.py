@@ -83,7 +83,7 @@ class StressRecovery:
         """Return the stresses ``(r, 6)`` [Pa] of corotational boxes with stretches ``(r, 3, 3)``, before they turn."""
         strain = voigt(stretch - np.eye(3)) * [1.0, 1.0, 1.0, 2.0, 2.0, 2.0]
         elastic = np.einsum("kij,kj->ki", self._elasticity[self._turning], strain)
-        return elastic + (self._initial if np.isscalar(self._initial) else self._initial[self._turning])
+        return np.asarray(elastic + np.broadcast_to(self._initial, (len(self._cells), 6))[self._turning])
 
     def _displacement_gradient(self, displacement: NDArray[np.float64], rows: NDArray[np.bool_]) -> NDArray[np.float64]:
         """Return the mean displacement gradients ``(r, 3, 3)`` of some elements."""
