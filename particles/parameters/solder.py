@@ -8,9 +8,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from reflowshock.effect import Switch
 from reflowshock.parameters import Parameters
-
-Switch = Literal["auto", "on", "off"]
 
 
 class FlowNumerics(Parameters):

@@ -1,9 +1,13 @@
 """Failure criteria judge only what has a limit, at either end of a joint and at any time."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
-from reflowshock.fem.estimates.material_effects import failure_effect, material_effects
+from reflowshock.effect import decided
+from reflowshock.fem.estimates.drop_effects import Failing
+from reflowshock.fem.estimates.material_effects import MATERIAL_EFFECTS
 from reflowshock.fem.materials.library import SAC305, SILICON, SNPB
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.output.failure import failed_joints, failure_criteria, judge, worst
@@ -21,7 +25,7 @@ HISTORY = {
 def test_without_limits_nothing_is_judged():
     assert failure_criteria(Failure()) == []
     assert judge([], HISTORY) == {}
-    assert failure_effect(Failure()) == {"failure": {"on": False, "why": "shock.failure gives no limit"}}
+    assert Failing.by_limits(Failure()) == {"on": False, "why": "shock.failure gives no limit"}
 
 
 def test_tension_counts_compression_does_not():
@@ -46,10 +50,10 @@ def test_a_model_without_joints_has_no_verdicts():
 
 
 def test_effects_name_the_materials_that_call_for_them():
-    off = material_effects(Materials().by_role)
+    off = decided(MATERIAL_EFFECTS, SimpleNamespace(materials=Materials().by_role))
     assert not any(effect["on"] for effect in off.values())
     hot = SNPB.model_copy(update={"temperature": 398.15})
-    on = material_effects({"solder": hot, "bump": SAC305, "die": SILICON})
+    on = decided(MATERIAL_EFFECTS, SimpleNamespace(materials={"solder": hot, "bump": SAC305, "die": SILICON}))
     assert all(effect["on"] for effect in on.values())
     assert on["plasticity"]["why"].startswith("solder yields from 18 MPa on, hardening 55 MPa p^0.55; bump yields")
     assert on["thermal_softening"]["why"] == f"solder: yield stress times {1 - (100 / 158) ** 1.4:.3g}"
