@@ -239,7 +239,7 @@ class Failing(DropEffect):
         return self.by_limits(run.shock.failure)
 
 
-class OneWay(DropEffect):
+class DrivenJoints(DropEffect):
     """A coarse model that drives the joints, which do not act on it."""
 
     name = "one_way"
@@ -318,7 +318,7 @@ DROP_EFFECTS: tuple[DropEffect | MaterialEffect, ...] = (
     RayleighEffect(),
     *MATERIAL_EFFECTS,
     Failing(),
-    OneWay(),
+    DrivenJoints(),
     MassScaling(),
     ByLargeMass(),
     Symmetry(),

@@ -59,7 +59,7 @@ def _numbers(solder: Solder, length: float, area: float) -> Numbers:
 
 
 @dataclass(frozen=True, slots=True)
-class Liquid:
+class LiquidScene:
     """Solder in a scene.
 
     Attributes:
@@ -95,7 +95,7 @@ class Liquid:
         return self.solder.process_time / self.slowest_time < PROCESS_TIME_RATIO
 
 
-class LiquidEffect(Effect[Liquid]):
+class LiquidEffect(Effect[LiquidScene]):
     """An effect of the reflow; its `place` is an `Acting` of `physics/physics.py`, its switch in `SolderEffects`.
 
     Attributes:
@@ -108,10 +108,10 @@ class LiquidEffect(Effect[Liquid]):
     is_measured = False
 
     @abstractmethod
-    def auto(self, liquid: Liquid) -> Decision:
+    def auto(self, liquid: LiquidScene) -> Decision:
         """Decide from the numbers alone."""
 
-    def decide(self, liquid: Liquid) -> Decision:
+    def decide(self, liquid: LiquidScene) -> Decision:
         """Follow the user's switch, else the numbers."""
         auto, switch = self.auto(liquid), getattr(liquid.solder.effects, self.name)
         if switch == "auto":
@@ -132,13 +132,13 @@ class GravityEffect(LiquidEffect):
     source = "Bashforth & Adams 1883, heights of sessile drops"
     is_measured = True
 
-    def auto(self, liquid: Liquid) -> Decision:
+    def auto(self, liquid: LiquidScene) -> Decision:
         """By the change of the height."""
         change = SHAPE_CHANGE_BY_BOND * liquid.numbers.bond
         why = f"Bond number {liquid.numbers.bond:.3g}: changes the shape by about {100 * change:.2g} %"
         return decision(change > NEGLIGIBLE_SHAPE_CHANGE, why, min(change, 1.0))
 
-    def decide(self, liquid: Liquid) -> Decision:
+    def decide(self, liquid: LiquidScene) -> Decision:
         """Nothing without a wall, whatever the switch."""
         if not liquid.has_wall:
             return decision(False, "no wall: the drop falls as a whole, which does not change its shape")
@@ -153,7 +153,7 @@ class MotionEffect(LiquidEffect):
     of_motion = True
     is_measured = True
 
-    def auto(self, liquid: Liquid) -> Decision:
+    def auto(self, liquid: LiquidScene) -> Decision:
         """By process time over slowest time."""
         ratio = liquid.solder.process_time / liquid.slowest_time
         times = f"process time {liquid.solder.process_time:.3g} s is {ratio:.3g} times the slowest time"
@@ -172,7 +172,7 @@ class InertiaEffect(MotionEffect):
     switch = "solder.effects.inertia = auto, on, off"
     source = "Lamb 1932, art. 355, decay of mode 2"
 
-    def decide(self, liquid: Liquid) -> Decision:
+    def decide(self, liquid: LiquidScene) -> Decision:
         """Always where a drop swings."""
         return decision(True, "a drop swings by its inertia") if liquid.swings else super().decide(liquid)
 
@@ -188,12 +188,12 @@ class ViscosityEffect(MotionEffect):
     switch = "solder.effects.viscosity = auto, on, off"
     source = "Lamb 1932, art. 355"
 
-    def auto(self, liquid: Liquid) -> Decision:
+    def auto(self, liquid: LiquidScene) -> Decision:
         """As all motion, with its own number told."""
         found = super().auto(liquid)
         return found | decision(found["on"], f"Ohnesorge number {liquid.numbers.ohnesorge:.2g}; {found['why']}")
 
-    def decide(self, liquid: Liquid) -> Decision:
+    def decide(self, liquid: LiquidScene) -> Decision:
         """Always where a drop swings."""
         if liquid.swings:
             return decision(True, f"Ohnesorge number {liquid.numbers.ohnesorge:.2g}: the swing decays")
@@ -213,7 +213,7 @@ class SurfaceTensionEffect(LiquidEffect):
     switch = "solder.effects.surface_tension = auto, on, off"
     source = "de Gennes, Brochard-Wyart & Quere 2004, 2.1"
 
-    def auto(self, liquid: Liquid) -> Decision:
+    def auto(self, liquid: LiquidScene) -> Decision:
         """By the Bond number of the weight that acts."""
         rival = liquid.rival
         why = f"Bond number {rival:.3g} (off above {LARGEST_BOND:g})" if rival > 0.0 else "no gravity rivals it"
@@ -233,12 +233,12 @@ class WallAdhesionEffect(LiquidEffect):
     switch = "solder.effects.wall_adhesion = auto, on, off"
     source = "Young 1805; Brakke 1992"
 
-    def auto(self, liquid: Liquid) -> Decision:
+    def auto(self, liquid: LiquidScene) -> Decision:
         """As surface tension."""
         why = "contact angles of pad and mask hold or move the contact lines wherever surface tension acts"
         return decision(liquid.rival < LARGEST_BOND, why, liquid.shaped)
 
-    def decide(self, liquid: Liquid) -> Decision:
+    def decide(self, liquid: LiquidScene) -> Decision:
         """Nothing without a wall, whatever the switch."""
         return super().decide(liquid) if liquid.has_wall else decision(False, "no wall")
 
@@ -257,7 +257,7 @@ AT_REST = {
 
 def decide(numbers: Numbers, solder: Solder) -> dict[str, Decision]:
     """Decide each effect of a reflow; return name to on or off, and the reason with its number."""
-    return decided(LIQUID_EFFECTS, Liquid(numbers, solder))
+    return decided(LIQUID_EFFECTS, LiquidScene(numbers, solder))
 
 
 def decide_effects(geometry: JointGeometry, solder: Solder) -> dict[str, Decision]:
@@ -267,12 +267,12 @@ def decide_effects(geometry: JointGeometry, solder: Solder) -> dict[str, Decisio
 
 def decide_drop(solder: Solder, is_free: bool) -> dict[str, Decision]:
     """Decide each effect of a drop; what needs a wall is off where a drop is free."""
-    return decided(LIQUID_EFFECTS, Liquid(drop_numbers(solder), solder, has_wall=not is_free))
+    return decided(LIQUID_EFFECTS, LiquidScene(drop_numbers(solder), solder, has_wall=not is_free))
 
 
 def decide_oscillation(solder: Solder) -> dict[str, Decision]:
     """Decide each effect of a free drop that swings."""
-    return decided(LIQUID_EFFECTS, Liquid(drop_numbers(solder), solder, has_wall=False, swings=True))
+    return decided(LIQUID_EFFECTS, LiquidScene(drop_numbers(solder), solder, has_wall=False, swings=True))
 
 
 def switched(effects: Mapping[str, Decision]) -> dict[str, bool]:
