@@ -1,7 +1,7 @@
 """Parameters of a structure: a box of layers, its supports and loads, and how its motion is computed.
 
-All values are SI floats; see ``meshing.board.parameters`` for what the unit strings mean. A unit beside a tuple is
-that of each of its items. Tables of named members are dictionaries, so that one value of one member can be set.
+All values are SI floats; ``Quantity`` has the unit in which a user sees them, that of a tuple each of its items.
+Tables of named members are dictionaries, so that one value of one member can be set.
 """
 
 import math
@@ -14,6 +14,7 @@ from reflowshock.fem.materials.library import LIBRARY
 from reflowshock.fem.materials.parameters import Material
 from reflowshock.fem.problem.shock import MOST_RANKS, Coupling, Damping, ServiceCondition
 from reflowshock.parameters import Parameters
+from reflowshock.quantity import Quantity
 
 AXES = "xyz"
 ROUNDING = 1e-9  # of the box: closer than that is the same place
@@ -32,7 +33,7 @@ class Layer(Parameters):
     """
 
     material: str
-    thickness: Annotated[float, "mm"] = Field(gt=0)
+    thickness: Annotated[float, Quantity("mm")] = Field(gt=0)
     cells: int = Field(1, ge=1, le=1000)
     in_plane: tuple[Cells, Cells] | None = None
 
@@ -40,8 +41,8 @@ class Layer(Parameters):
 class Holes(Parameters):
     """Four mounting holes at (+-spacing/2), through all layers; their walls are the facet set ``mounting_holes``."""
 
-    spacing: Annotated[tuple[float, float], "mm"]
-    diameter: Annotated[float, "mm"] = Field(gt=0)
+    spacing: Annotated[tuple[float, float], Quantity("mm")]
+    diameter: Annotated[float, Quantity("mm")] = Field(gt=0)
 
 
 class Structure(Parameters):
@@ -52,8 +53,8 @@ class Structure(Parameters):
     multiplies all numbers of elements, along and across the layers, each rounded and at least one.
     """
 
-    length: Annotated[float, "mm"] = Field(gt=0)
-    width: Annotated[float, "mm"] = Field(gt=0)
+    length: Annotated[float, Quantity("mm")] = Field(gt=0)
+    width: Annotated[float, Quantity("mm")] = Field(gt=0)
     cells: tuple[Cells, Cells]
     refine: float = Field(1.0, gt=0, le=100)
     layers: dict[str, Layer]
@@ -134,7 +135,7 @@ class Pulsed(Parameters):
     effect: ClassVar[str]
     quantity: ClassVar[str]
     pulse: Literal["half_sine", "haversine", "constant"] = "half_sine"
-    duration: Annotated[float | None, "ms"] = Field(None, gt=0)
+    duration: Annotated[float | None, Quantity("ms")] = Field(None, gt=0)
     table: str | None = None
 
 
@@ -159,7 +160,7 @@ class OnAreas(Pulsed):
 class AtPoint(Pulsed):
     """A load at a point, along ``direction``."""
 
-    at: Annotated[tuple[float, float, float], "mm"]
+    at: Annotated[tuple[float, float, float], Quantity("mm")]
     direction: Direction
 
 
@@ -173,7 +174,7 @@ class InputG(OnBody):
     quantity: ClassVar = "acceleration"
     kind: Literal["input_g"] = "input_g"
     service_condition: ServiceCondition | None = None
-    peak: Annotated[float | None, "G"] = Field(None, gt=0)
+    peak: Annotated[float | None, Quantity("G")] = Field(None, gt=0)
     direction: Direction = (0.0, 0.0, 1.0)
     method: Literal["direct", "large_mass"] = "direct"
 
@@ -184,7 +185,7 @@ class Pressure(OnAreas):
     effect: ClassVar = "pressure"
     quantity: ClassVar = "pressure"
     kind: Literal["pressure"] = "pressure"
-    peak: Annotated[float | None, "MPa"] = None
+    peak: Annotated[float | None, Quantity("MPa")] = None
 
 
 class PrescribedMotion(OnNodes):
@@ -194,7 +195,7 @@ class PrescribedMotion(OnNodes):
     quantity: ClassVar = "velocity"
     kind: Literal["motion"] = "motion"
     component: Axis
-    peak: Annotated[float | None, "m/s"] = None
+    peak: Annotated[float | None, Quantity("m/s")] = None
 
 
 class Gravity(OnBody):
@@ -204,7 +205,7 @@ class Gravity(OnBody):
     quantity: ClassVar = "acceleration"
     kind: Literal["gravity"] = "gravity"
     pulse: Literal["half_sine", "haversine", "constant"] = "constant"
-    peak: Annotated[float, "m/s^2"] = Field(9.80665, gt=0)
+    peak: Annotated[float, Quantity("m/s^2")] = Field(9.80665, gt=0)
     direction: Direction = (0.0, 0.0, -1.0)
 
 
@@ -218,7 +219,7 @@ class PointForce(AtPoint):
     effect: ClassVar = "point_force"
     quantity: ClassVar = "force"
     kind: Literal["point_force"] = "point_force"
-    peak: Annotated[float | None, "N"] = Field(None, gt=0)
+    peak: Annotated[float | None, Quantity("N")] = Field(None, gt=0)
 
 
 AnyLoad = InputG | Gravity | Pressure | PrescribedMotion | PointForce
@@ -229,7 +230,7 @@ KINDS: tuple[type[Pulsed], ...] = get_args(AnyLoad)
 class WatchPoint(Parameters):
     """A point whose displacement, velocity, strain and stress are recorded."""
 
-    at: Annotated[tuple[float, float, float], "mm"]
+    at: Annotated[tuple[float, float, float], Quantity("mm")]
 
 
 class LayerCoupling(Coupling):
@@ -255,15 +256,15 @@ class DynamicsNumerics(Parameters):
 
     step_fraction: float = Field(0.9, gt=0, le=0.99)
     critical_step: Literal["element", "power_iteration"] = "element"
-    explicit_step: Annotated[float | None, "us"] = Field(None, gt=0)
-    implicit_step: Annotated[float | None, "us"] = Field(None, gt=0)
+    explicit_step: Annotated[float | None, Quantity("us")] = Field(None, gt=0)
+    implicit_step: Annotated[float | None, Quantity("us")] = Field(None, gt=0)
     hht_alpha: float = Field(0.0, ge=-1 / 3, le=0)
     mass_scaled: tuple[str, ...] = ()
     energy_balance_limit: float = Field(0.02, gt=0)
     history_samples: int = Field(600, ge=2)
     field_samples: int = Field(12, ge=2)
-    checkpoint_seconds: Annotated[float, "s"] = Field(300.0, gt=0)
-    watchdog_seconds: Annotated[float, "s"] = Field(60.0, gt=0)
+    checkpoint_seconds: Annotated[float, Quantity("s")] = Field(300.0, gt=0)
+    watchdog_seconds: Annotated[float, Quantity("s")] = Field(60.0, gt=0)
 
 
 class Dynamics(Parameters):
@@ -272,10 +273,10 @@ class Dynamics(Parameters):
     ``dns`` is, where there is a coupling, one model at the smallest step instead of two.
     """
 
-    duration: Annotated[float, "ms"] = Field(gt=0)
+    duration: Annotated[float, Quantity("ms")] = Field(gt=0)
     solver: Literal["explicit", "implicit", "both", "dns"] = "explicit"
     kinematics: Literal["small", "finite"] = "small"
-    initial_velocity: Annotated[tuple[float, float, float], "m/s"] = (0.0, 0.0, 0.0)
+    initial_velocity: Annotated[tuple[float, float, float], Quantity("m/s")] = (0.0, 0.0, 0.0)
     damping: Damping = Damping()
     modes: int = Field(0, ge=0, le=200)
     ranks: int = Field(1, ge=1, le=MOST_RANKS)
