@@ -243,12 +243,13 @@ class WallAdhesionEffect(LiquidEffect):
         return super().decide(liquid) if liquid.has_wall else decision(False, "no wall")
 
 
+# In the order in which they join what acts: wall adhesion needs all other forces on the surface.
 LIQUID_EFFECTS: tuple[LiquidEffect, ...] = (
-    GravityEffect(),
-    InertiaEffect(),
-    ViscosityEffect(),
     SurfaceTensionEffect(),
-    WallAdhesionEffect(),  # needs all other forces on the surface: the last of them
+    GravityEffect(),
+    WallAdhesionEffect(),
+    ViscosityEffect(),
+    InertiaEffect(),
 )
 AT_REST = {
     effect.name: False for effect in LIQUID_EFFECTS if effect.of_motion

@@ -164,7 +164,7 @@ def build_physics(solder: Solder, effects: dict[str, bool], lines: tuple[Contact
         lines: contact lines.
     """
     physics = Physics((), (Mass(solder.density),), (), (), lines)
-    for effect in sorted(LIQUID_EFFECTS, key=lambda effect: effect.of_motion):  # first what shapes the surface
+    for effect in LIQUID_EFFECTS:
         if effects[effect.name]:
             acting: type[Acting] = resolve_name(effect.place)
             physics = acting.added_to(physics, solder)
