@@ -25,6 +25,7 @@ from reflowshock.workflow.case.run import StageFunction
 from reflowshock.workflow.convergence.series import ConvergenceStudy
 from reflowshock.workflow.package.case import BoardDropCase, PackageCase
 from reflowshock.workflow.reflow.stage import reflow
+from reflowshock.workflow.report.errors import Discretisation
 from reflowshock.workflow.solder import case as solder_case
 from reflowshock.workflow.solder import stages as solder_stages
 from reflowshock.workflow.solder.case import DropCase, DropsCase, JointCase, OscillationCase
@@ -63,6 +64,7 @@ class Kind:
         report: adds its sections to the context of a report: run folder, case, context, summary.
         study: its convergence study.
         effects: those that it may call for.
+        conclude: adds to a summary what follows from all stages: run folder, case, summary, discretisation errors.
     """
 
     case: type[Case]
@@ -75,6 +77,7 @@ class Kind:
     report: Callable[[Path, Any, dict, dict], None]
     study: Callable[[Any], ConvergenceStudy]
     effects: Sequence[Effect]
+    conclude: Callable[[Path, Any, dict, Discretisation], None] = lambda folder, case, summary, known: None
 
     @property
     def name(self) -> str:
@@ -93,6 +96,12 @@ def _board_drop_report(run_folder: Path, case: BoardDropCase, context: dict, sum
 
     _package_report(run_folder, case, context, summary)
     add_shock(run_folder, case, context, summary)
+
+
+def _conclude_drop(run_folder: Path, case: BoardDropCase, summary: dict, known: Discretisation) -> None:
+    from reflowshock.workflow.package_report.conclusion import conclude
+
+    conclude(run_folder, case, summary, known)
 
 
 def _structure_report(run_folder: Path, case: StructureCase, context: dict, summary: dict) -> None:
@@ -168,6 +177,7 @@ BOARD_DROP = replace(
     acts="reflow and shock",
     report=_board_drop_report,
     effects=(*PACKAGE.effects, *SHOCK_EFFECTS),
+    conclude=_conclude_drop,
 )
 STRUCTURE = Kind(
     case=StructureCase,

@@ -9,7 +9,8 @@ from reflowshock.effect import Decision, Effect, Switch, Toggle, decision
 from reflowshock.fem.estimates.material_effects import MATERIAL_EFFECTS, MaterialEffect
 from reflowshock.fem.materials.kinematics import finite_rotation
 from reflowshock.fem.materials.parameters import Material
-from reflowshock.fem.problem.shock import Failure, Shock
+from reflowshock.fem.problem.failure import Failure
+from reflowshock.fem.problem.shock import Shock
 
 NEGLIGIBLE_WEIGHT = 1e-3  # of the peak acceleration: weight below it is left out
 # A strip between ends that do not approach each other: w deflects it against k w (1 + 3 (w / t)^2), since its tension
@@ -215,28 +216,23 @@ class Failing(DropEffect):
     """Joints that are judged by limits."""
 
     name = "failure"
-    adds = "peel stress and plastic work of each pad against limits"
+    adds = "peel stress, von Mises stress and plastic work at each pad against limits"
     number = "value / limit"
     threshold = 1.0
     influence = "none: joints are judged, not broken"
-    place = "reflowshock.fem.output.failure.failure_criteria"
-    switch = "shock.failure.*, a limit or none"
+    place = "reflowshock.workflow.package.verdict.verdict_of"
+    switch = "shock.failure.*.limit, each with its source, or none"
     source = "JESD22-B111"
 
     @staticmethod
     def by_limits(failure: Failure) -> Decision:
-        """Decide whether joints are judged: where a criterion has a limit."""
-        limits = {name: value for name, value in failure.model_dump().items() if value is not None}
-        why = "limits of " + " and ".join(name.replace("_", " ") for name in limits)
-        return decision(bool(limits), why if limits else "shock.failure gives no limit")
+        """Decide whether joints are judged: where a measure has a limit. Judging changes no result."""
+        why = "limits of " + " and ".join(name.replace("_", " ") for name in failure.limits)
+        return decision(bool(failure.limits), why if failure.limits else "shock.failure gives no limit", 0.0)
 
     def decide(self, drop: Drop) -> Decision:
         """By the limits of the case."""
         return self.by_limits(drop.shock.failure)
-
-    def tell(self, run: DropRun) -> Decision:
-        """Tell the same."""
-        return self.by_limits(run.shock.failure)
 
 
 class DrivenJoints(DropEffect):

@@ -12,7 +12,6 @@ from reflowshock.fem.division.tables import JointTables
 from reflowshock.fem.dynamics.history import History
 from reflowshock.fem.estimates.drop_effects import DropRun, told
 from reflowshock.fem.loads.shock_pulse import shock_pulse
-from reflowshock.fem.output.failure import Verdicts, failed_joints, failure_criteria, judge, worst
 from reflowshock.fem.output.result import Outcome, Timings, health, model_summary, peak_memory, quantity, sizes
 from reflowshock.fem.output.watch_joints import FLOW_LAYERS, LAYERS
 from reflowshock.fem.parallel.communicators import Communicators
@@ -48,19 +47,16 @@ class PackageReport:
         summary: dict[str, Any],
         timings: Timings,
     ) -> dict[str, Any]:
-        """Return metrics, health, effects, verdicts on the joints, and the coupling."""
-        verdicts = judge(failure_criteria(self.request.shock.failure), arrays)
+        """Return metrics, health, effects and the coupling."""
         coupling = coupling_of(self.request, outcome.coupling)
         residual = outcome.history.balance.force_residual, FORCE_RESIDUAL_LIMIT
         return {
             "metrics": cost_metrics(summary, updates_a_window(summary, coupling), timings)
             | health_metrics(outcome.history, arrays)
             | shock_metrics(arrays)
-            | {"peak_neglected_strain": quantity(outcome.neglected_strain)}
-            | failure_metrics(verdicts),
-            "health": health(self.request, outcome, {"interface_force_residual": residual}) | worst(verdicts),
+            | {"peak_neglected_strain": quantity(outcome.neglected_strain)},
+            "health": health(self.request, outcome, {"interface_force_residual": residual}),
             "effects": effects(self.request, summary, outcome.neglected_strain),
-            "failure": verdicts,
             "coupling": coupling | {"placement": timings.balance},
         }
 
@@ -133,11 +129,6 @@ def flow_metrics(arrays: Mapping[str, NDArray]) -> dict[str, Any]:
         "peak_plastic_strain": quantity(float(arrays["plastic_strain_max"].max())),
         "peak_plastic_work_density": quantity(work, "J/m^3"),
     }
-
-
-def failure_metrics(verdicts: Verdicts) -> dict[str, Any]:
-    """Return how many joints fail, where they are judged."""
-    return {"failed_joints": quantity(len(failed_joints(verdicts)))} if verdicts else {}
 
 
 def effects(request: RunInput, summary: dict[str, Any], neglected_strain: float) -> dict[str, Any]:
