@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -32,14 +32,34 @@ def expected_deflection(case: "BoardDropCase") -> Deflection:
     """
     from reflowshock.fem.loads.shock_pulse import shock_pulse
 
+    length, omega = first_mode(case)
+    deflection = first_mode_peak(omega, shock_pulse(case.shock).pulse.integral, longest_duration(case))
+    return Deflection(deflection, math.pi / length * deflection, omega)
+
+
+def first_mode(case: "BoardDropCase") -> tuple[float, float]:
+    """Return length [m] and angular frequency [rad/s] of the board as a beam that is pinned at its holes."""
     board, (young_x, young_y, _) = case.board, case.materials.board.engineering_constants.young
     holes = board.holes
     spans = ((board.length - 2.0 * holes.inset_x, young_x), (board.width - 2.0 * holes.inset_y, young_y))
     length, young = max(spans)
     stiffness = young * board.thickness * board.thickness / 12.0 / case.materials.board.density
-    omega = (math.pi / length) ** 2 * math.sqrt(stiffness)
-    deflection = first_mode_peak(omega, shock_pulse(case.shock).pulse.integral, case.shock.duration)
-    return Deflection(deflection, math.pi / length * deflection, omega)
+    return length, (math.pi / length) ** 2 * math.sqrt(stiffness)
+
+
+def longest_duration(case: "BoardDropCase") -> float:
+    """Return the time [s] that a shock is followed: if it is ``auto``, at most, a period after its pulse.
+
+    Screws hold a board more firmly than pins, so its own period is shorter. Errors as ``expected_deflection``.
+    """
+    from reflowshock.fem.loads.pulse import Tabulated
+    from reflowshock.fem.loads.shock_pulse import input_pulse
+
+    if case.shock.duration != "auto":
+        return case.shock.duration
+    pulse, _ = input_pulse(case.shock)
+    end = float(pulse.times[-1]) if isinstance(pulse, Tabulated) else pulse.duration
+    return end + math.tau / first_mode(case)[1]
 
 
 def first_mode_peak(omega: float, velocity: Callable[[float], float], duration: float) -> float:
@@ -66,15 +86,15 @@ def decide_kinematics(case: "BoardDropCase") -> tuple[Literal["small", "finite"]
 
 
 def decided(case: "BoardDropCase") -> "BoardDropCase":
-    """Return the case with kinematics that are small or finite, as its board's deflection calls for.
+    """Return the case with kinematics that are small or finite, as its board's deflection calls for, and a duration.
 
     Raises:
         PulseError: the table of the pulse cannot be read.
     """
-    if case.shock.numerics.kinematics != "auto":
-        return case
-    numerics = case.shock.numerics.model_copy(update={"kinematics": decide_kinematics(case)[0]})
-    return case.model_copy(update={"shock": case.shock.model_copy(update={"numerics": numerics})})
+    update: dict[str, Any] = {"duration": longest_duration(case)}
+    if case.shock.numerics.kinematics == "auto":
+        update["numerics"] = case.shock.numerics.model_copy(update={"kinematics": decide_kinematics(case)[0]})
+    return case.model_copy(update={"shock": case.shock.model_copy(update=update)})
 
 
 def kinematics_effect(case: "BoardDropCase") -> dict:
@@ -103,6 +123,6 @@ def weight_effect(case: "BoardDropCase") -> dict:
     from reflowshock.fem.loads.shock_pulse import shock_pulse
 
     expected = expected_deflection(case)
-    alone = first_mode_peak(expected.omega, lambda time: STANDARD_GRAVITY * time, case.shock.duration)
+    alone = first_mode_peak(expected.omega, lambda time: STANDARD_GRAVITY * time, longest_duration(case))
     influence = min(1.0, alone / expected.largest) if expected.largest > 0.0 else 1.0
     return {"gravity_in_the_shock": shock_pulse(case.shock).gravity | {"influence": influence}}

@@ -5,7 +5,12 @@ from collections.abc import Iterator, Mapping
 from reflowshock.fem.estimates.effects import damping, effect
 from reflowshock.fem.estimates.material_effects import failure_effect, material_effects
 from reflowshock.fem.materials.library import SAC405
-from reflowshock.workflow.board_drop.board_deflection import expected_deflection, kinematics_effect, weight_effect
+from reflowshock.workflow.board_drop.board_deflection import (
+    expected_deflection,
+    kinematics_effect,
+    longest_duration,
+    weight_effect,
+)
 from reflowshock.workflow.board_drop.fine_joints import coarse_joints_effect
 from reflowshock.workflow.board_drop.identical_joints import identical_joints_effect
 from reflowshock.workflow.case.forecast import Toggle, between, changed
@@ -19,7 +24,7 @@ def shock_effects(case: BoardDropCase) -> dict:
     return (
         weight_effect(case)
         | kinematics_effect(case)
-        | {"damping": damping(shock.damping.coefficients, omega, shock.duration)}
+        | {"damping": damping(shock.damping.coefficients, omega, longest_duration(case))}
         | material_effects(case.materials.by_role)
         | failure_effect(shock.failure)
         | coarse_joints_effect(shock.coupling)
