@@ -1,4 +1,4 @@
-"""A shock of automatic duration ends at the same window on any number of ranks, and when it is continued."""
+"""A shock of automatic duration ends at the same window when it is continued, on as many ranks or on more."""
 
 import json
 from pathlib import Path
@@ -10,7 +10,7 @@ from tests.support.fem_models import write_small_assembly
 from tests.support.fem_program import run_program
 
 LONGEST = 1.2e-4
-NUMERICS = {"mass_scaled": ["copper"], "history_samples": 60, "field_samples": 3, "checkpoint_seconds": 0.2}
+NUMERICS = {"mass_scaled": ["copper"], "history_samples": 60, "field_samples": 3, "checkpoint_seconds": 0.5}
 
 
 def pulse(time: float) -> float:
@@ -37,7 +37,7 @@ def run(meshes: list[Path], name: str, ranks: int, checkpoints: str) -> tuple[di
         return dict(arrays), json.loads((output / "result.json").read_text())
 
 
-def test_it_ends_at_the_same_window_on_two_ranks_and_after_a_restart(tmp_path):
+def test_it_ends_at_the_same_window_after_a_restart_and_on_two_ranks(tmp_path):
     meshes = write_small_assembly(tmp_path)
     history, result = run(meshes, "one", 1, "kept")
     end = history["time"][-1]
@@ -46,9 +46,9 @@ def test_it_ends_at_the_same_window_on_two_ranks_and_after_a_restart(tmp_path):
     assert is_settled(history)
     before = {name: values[:-1] for name, values in history.items() if len(values) == len(history["time"])}
     assert not is_settled(before)
-    for name, ranks, checkpoints in (("two", 2, "other"), ("again", 1, "kept")):
-        found, other = run(meshes, name, ranks, checkpoints)
+    for name, ranks in (("again", 1), ("two", 2)):
+        found, other = run(meshes, name, ranks, "kept")
+        assert other["continued_from"] > 0
         assert other["model"]["windows"] == result["model"]["windows"]
         scale = np.abs(history["von_mises_board"]).max()
         assert np.abs(found["von_mises_board"] - history["von_mises_board"]).max() <= 1e-8 * scale
-    assert other["continued_from"] > 0
