@@ -40,8 +40,13 @@ class WatchTable:
     strain_facets: NDArray[np.int32]
     strain_cells: NDArray[np.integer]
 
-    def within(self, node_number: NDArray[np.int32], cell_number: NDArray[np.int32]) -> "WatchTable":
-        """Return the part of a model, in its numbers of nodes ``(n,)`` and cells ``(ne,)``: -1 for what it has not."""
+    def within(
+        self, node_number: NDArray[np.int32], cell_number: NDArray[np.int32], every_node: NDArray[np.int32]
+    ) -> "WatchTable":
+        """Return the part of a model, in its numbers of nodes ``(n,)`` and cells ``(ne,)``: -1 for what it has not.
+
+        A node at the interface counts in one model; ``every_node (n,)`` has it in both, for the facets of their cells.
+        """
         layer, solder = cell_number[self.layer_cells], cell_number[self.solder_cells]
         strain = cell_number[self.strain_cells]
         return WatchTable(
@@ -54,7 +59,7 @@ class WatchTable:
             layer_area=self.layer_area[layer >= 0],
             solder_cells=solder[solder >= 0],
             solder_joint=self.solder_joint[solder >= 0],
-            strain_facets=node_number[self.strain_facets[strain >= 0]],
+            strain_facets=every_node[self.strain_facets[strain >= 0]],
             strain_cells=strain[strain >= 0],
         )
 
