@@ -41,8 +41,9 @@ class Criterion:
 def failure_criteria(failure: Failure) -> list[Criterion]:
     """Return the criteria that have a limit.
 
-    Peel stress is the normal stress averaged over a pad, plastic work density that of the layer of elements at the pad,
-    averaged over its volume, so that neither follows a singular corner (Darveaux, ECTC 2000, for the latter).
+    Peel stress is the axial section force over the area of a pad, plastic work density the average over a layer of
+    fixed thickness at the pad (``shock.joint_layer``), so that neither follows a singular corner or the mesh
+    (Darveaux, ECTC 2000, for the latter).
     """
     ends = ("board", "package")
     known = {

@@ -13,6 +13,7 @@ from reflowshock.parameters import Parameters
 
 MOST_RANKS = 100_000  # of one run
 MOST_LEVELS = 4  # below the window, that "auto" tries
+JOINT_LAYER = 25e-6  # [m] of fatigue practice (Darveaux, ECTC 2000); thickness conventions differ
 ServiceCondition = Literal["A", "B", "C", "D", "E", "F", "G", "H"]
 
 
@@ -145,7 +146,8 @@ class ShockNumerics(Parameters):
 class Failure(Parameters):
     """What the solder at the pads of a joint may bear; a criterion without a limit is not computed.
 
-    ``peel_stress`` is the average over a pad, ``plastic_work_density`` that of the layer of elements at it.
+    ``peel_stress`` is the section's axial force over the pad's area, ``plastic_work_density`` the average over the
+    layer of ``shock.joint_layer`` at the pad.
     """
 
     peel_stress: Annotated[float | None, "MPa"] = Field(None, gt=0)
@@ -158,7 +160,8 @@ class Shock(Parameters):
     The pulse is that of a JEDEC service condition, or a half sine of ``peak_acceleration`` and ``pulse_duration``, or a
     table of times and accelerations (CSV). ``method`` gives it to the board as body acceleration, its holes held, or
     to a large mass at the holes. Gravity is left out by ``auto`` where it is less than a thousandth of the peak. The
-    stress at the joints' upper interface is kept at ``picture_times``. ``identical_joints`` repeats the shock under a
+    stress at the joints' upper interface is kept at ``picture_times``. ``joint_layer`` is the thickness of the solder
+    at either pad over which stress and plastic work are averaged. ``identical_joints`` repeats the shock under a
     flat package on truncated spheres of the solder's volume: what the joints' own shapes change is the difference.
     """
 
@@ -168,6 +171,7 @@ class Shock(Parameters):
     table: str | None = None
     duration: Annotated[float, "ms"] = Field(gt=0)
     picture_times: Annotated[tuple[Annotated[float, Field(ge=0)], ...], "ms"] = ()
+    joint_layer: Annotated[float, "um"] = Field(JOINT_LAYER, gt=0, le=1e-3)
     identical_joints: bool = False
     method: Literal["direct", "large_mass"] = "direct"
     gravity: Literal["auto", "on", "off"] = "auto"
