@@ -5,7 +5,7 @@ from typing import Any
 
 from reflowshock.fem.estimates.material_effects import material_effects
 from reflowshock.fem.materials.kinematics import finite_rotation
-from reflowshock.fem.problem.structure import StructureProblem
+from reflowshock.fem.problem.structure import KINDS, StructureProblem
 
 
 def effects(problem: StructureProblem, added_mass: float, neglected_strain: float | None = None) -> dict[str, Any]:
@@ -22,10 +22,9 @@ def effects(problem: StructureProblem, added_mass: float, neglected_strain: floa
 
 
 def _loads(problem: StructureProblem) -> Iterator[tuple[str, bool, str]]:
-    for kind in ("input_g", "gravity", "pressure", "motion", "point_force"):
-        names = [f"loads.{name}" for name, load in problem.loads.items() if load.kind == kind]
-        effect = "prescribed_motion" if kind == "motion" else kind
-        yield effect, bool(names), ", ".join(names) or f"no load of kind {kind}"
+    for kind in KINDS:
+        names = [f"loads.{name}" for name, load in problem.loads.items() if isinstance(load, kind)]
+        yield kind.effect, bool(names), ", ".join(names) or f"no load of kind {kind.model_fields['kind'].default}"
     velocity = problem.dynamics.initial_velocity
     yield "initial_velocity", any(velocity), f"dynamics.initial_velocity = {list(velocity)} m/s"
 
