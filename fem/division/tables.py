@@ -11,6 +11,7 @@ from reflowshock.fem.division.division import Division
 from reflowshock.fem.division.split import Part, interface_between, part_of
 from reflowshock.fem.division.whole import Whole
 from reflowshock.fem.estimates.placement import Role
+from reflowshock.fem.mesh.column import with_columns
 from reflowshock.fem.mesh.coupling_interface import find_interface
 from reflowshock.fem.mesh.joint_interface import JointInterfaceTable, whole_joint_interface
 from reflowshock.fem.mesh.mesh import MeshData, merge_nodes
@@ -115,7 +116,7 @@ class JointTables(Tables):
     def counted(self, part: Part, node: NDArray[np.int32], cell: NDArray[np.int32]) -> dict[str, Any]:
         """Return watch points, shaken nodes and interfaces of joints."""
         return {
-            "watch": self.watch.within(node, cell),
+            "watch": self.watch.within(node, cell, part.number),
             "shaken": present(node[self.shaken]),
             "joint_interface": self.joint_interface.within(cell),
         }
@@ -135,13 +136,13 @@ class ModelInput(Generic[TablesT_co]):
 
 
 def joined(data: MeshData) -> Whole:
-    """Let board and patch share their nodes, and tie the joints.
+    """Let board and patch share their nodes, give columns their place, and tie the joints.
 
     Raises:
-        CouplingError, TieError: They do not fit.
+        CouplingError, MeshError, TieError: They do not fit.
     """
     macro_nodes, meso_nodes = find_interface(data)
-    return Whole(*tie_joints(merge_nodes(data, meso_nodes, macro_nodes)[0]))
+    return Whole(*tie_joints(with_columns(merge_nodes(data, meso_nodes, macro_nodes)[0])))
 
 
 def prepare(

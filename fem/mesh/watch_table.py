@@ -39,18 +39,23 @@ class WatchTable:
     strain_facets: NDArray[np.int32]
     strain_cells: NDArray[np.integer]
 
-    def within(self, node_number: NDArray[np.int32], cell_number: NDArray[np.int32]) -> "WatchTable":
-        """Return the part of a model, in its numbers of nodes ``(n,)`` and cells ``(ne,)``: -1 for what it has not."""
+    def within(
+        self, node_number: NDArray[np.int32], cell_number: NDArray[np.int32], every_node: NDArray[np.int32]
+    ) -> "WatchTable":
+        """Return the part of a model, in its numbers of nodes ``(n,)`` and cells ``(ne,)``: -1 for what it has not.
+
+        A node at the interface counts in one model; ``every_node (n,)`` has it in both, for the facets of their cells.
+        """
         solder, strain = cell_number[self.solder_cells], cell_number[self.strain_cells]
         return WatchTable(
             joints=self.joints,
             centres=np.where(self.centres >= 0, node_number[self.centres], -1),
-            faces=self.faces.within(node_number, cell_number),
+            faces=self.faces.within(every_node, cell_number),
             layer=self.layer.within(cell_number),
             thickness=self.thickness,
             solder_cells=solder[solder >= 0],
             solder_joint=self.solder_joint[solder >= 0],
-            strain_facets=node_number[self.strain_facets[strain >= 0]],
+            strain_facets=every_node[self.strain_facets[strain >= 0]],
             strain_cells=strain[strain >= 0],
         )
 

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from reflowshock.workflow.package.case import BoardDropCase
 
 MACRO = "board"  # role of the parts whose elements the window follows
+COLUMN = "_column"  # ends the names of parts of board and substrate around fine joints
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +112,9 @@ def _driven_parts(case: "BoardDropCase") -> dict[str, PartForecast]:
     from reflowshock.meshing.board.estimate import count_elements
 
     estimates = count_elements(case.package, case.board, case.warpage, fine_joint_count(case))
-    return _forecasts(case, {name: part for name, part in estimates.items() if name in ("solder", "copper")})
+    return _forecasts(
+        case, {name: part for name, part in estimates.items() if name in ("solder", "copper") or name.endswith(COLUMN)}
+    )
 
 
 def fine_joint_count(case: "BoardDropCase") -> int | None:
@@ -190,7 +193,7 @@ def is_linear(parts: Parts) -> bool:
 def _slow(case: "BoardDropCase", parts: Parts) -> frozenset[str]:
     """Return the parts that the window follows: the board, or all that drives."""
     driving = coarse_parts(case) if case.shock.coupling.direction == "one_way" else ()
-    return frozenset(driving or (name for name in parts if role_of(name) == MACRO))
+    return frozenset(driving or (name for name in parts if is_box(name)))
 
 
 def _plan(case: "BoardDropCase", parts: Parts):
@@ -248,7 +251,7 @@ def _coupled(case: "BoardDropCase", parts: Parts) -> tuple[tuple[str, str], tupl
         cost = sum(part.elements * part.cost for part in here.values())
         levels.append(LevelForecast(tuple(here), plan.window / count, count, elements, cost))
     work = [(level.cost, level.count) for level in levels[1:]]
-    boxes = sum(parts[name].elements * (1.0 if role_of(name) == MACRO else BOARD_ADVANTAGE) for name in levels[0].parts)
+    boxes = sum(parts[name].elements * (1.0 if is_box(name) else BOARD_ADVANTAGE) for name in levels[0].parts)
     return scheme, tuple(levels), predict_seconds(boxes, work, plan, case.shock.ranks)[0]
 
 
@@ -281,7 +284,7 @@ def _levels(case: "BoardDropCase", parts: Parts, window: float) -> tuple[tuple[i
 
     scaled_to = min(part.critical_step for part in parts.values() if not part.mass_scaled)
     steps = np.array([scaled_to if part.mass_scaled else part.critical_step for part in parts.values()])
-    box = np.array([role_of(name) == MACRO for name in parts])
+    box = np.array([is_box(name) for name in parts])
     cost = np.array([part.elements * part.cost for part in parts.values()]) * np.where(box, 1.0, BOARD_ADVANTAGE)
     coupling = case.shock.coupling
     pace = Pace(steps, cost, window, case.shock.numerics.step_fraction)
@@ -309,6 +312,11 @@ def relative_cost(case: "BoardDropCase", part: str) -> float:
 def role_of(part: str) -> str:
     """Return the material role of a part: its name up to "@", then up to "_"."""
     return part.split("@")[0].split("_")[0]
+
+
+def is_box(part: str) -> bool:
+    """Whether a part is of the board's boxes: a column in their place has smaller elements."""
+    return role_of(part) == MACRO and not part.endswith(COLUMN)
 
 
 def material_of(case: "BoardDropCase", part: str) -> Material:

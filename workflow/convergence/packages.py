@@ -174,10 +174,27 @@ def _of_board(case: BoardDropCase, size: float) -> dict[str, str]:
 def _of_joints(case: BoardDropCase, size: float) -> dict[str, str]:
     """Elements of fine joints that are so many times as large."""
     own, key = case.package.joint_numerics, "package.joint_numerics"
-    return {
+    settings = {
         f"{key}.core": f"{_count(own.core, size)}",
         f"{key}.rings": f"{_count(own.rings, size)}" if own.rings else "0",
         f"{key}.layers": f"{max(2, _count(own.layers, size))}",
+    }
+    if own.copper_layers > 1:
+        settings |= {f"{key}.copper_layers": f"{_count(own.copper_layers, size)}"}
+    if own.pad_layer is not None:
+        settings |= {f"{key}.pad_layers": f"{_count(own.pad_layers, size)}"}
+    return settings | _of_columns(case, size)
+
+
+def _of_columns(case: BoardDropCase, size: float) -> dict[str, str]:
+    """Elements of the columns of fine joints that are so many times as large, where there are columns."""
+    imprint, key = case.package.imprint, "package.imprint"
+    if imprint is None:
+        return {}
+    return {
+        f"{key}.rings": f"{_count(imprint.rings, size)}",
+        f"{key}.first_layer": _length(size * imprint.first_layer),
+        f"{key}.growth": f"{1.0 + size * (imprint.growth - 1.0):.4g}",
     }
 
 
