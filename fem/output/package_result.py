@@ -114,6 +114,7 @@ def health_metrics(history: History, arrays: Mapping[str, NDArray]) -> dict[str,
 def shock_metrics(arrays: Mapping[str, NDArray]) -> dict[str, Any]:
     """Return peaks of the histories."""
     metrics = {
+        "simulated_time": quantity(float(arrays["time"][-1]), "s"),
         "peak_board_strain": quantity(float(arrays["board_strain"].max())),
         "peak_board_displacement": quantity(float(np.abs(arrays["board_centre"][:, 2]).max()), "m"),
     }

@@ -45,7 +45,7 @@ def divided_on_one_rank(request: RunInput) -> Divided[JointTables]:
         coarse=whole.mesh.in_parts(lambda name: role_of_part(name) == COARSE and not joint_of(name)),
         fraction=numerics.step_fraction,
         stiffness=shock.damping.coefficients[1],
-        duration=shock.duration,
+        duration=shock.decided_duration,
         samples=numerics.history_samples,
         **(dict(zip(("copied", "copy"), copied_joints(whole.mesh), strict=True)) if request.one_way else {}),
     )

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from reflowshock.fem.materials.parameters import Material
 from reflowshock.problem import Problem
+from reflowshock.workflow.board_drop.board_deflection import longest_duration
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.case.text import short
 
@@ -156,10 +157,10 @@ def forecast_shock(case: "BoardDropCase", parts: Parts) -> ShockForecast:
     scheme, levels, seconds = _coupled(case, two_scale_parts(case))
     search = _coupled(case, coarse_parts(case))[2] if shock.coupling.fine_joints == "critical" else 0.0
     plan, dns = _direct(case, parts)
-    direct = shortened(plan, shock.numerics.dns_duration or shock.duration)
+    direct = shortened(plan, shock.numerics.dns_duration or longest_duration(case))
     share = direct.windows / plan.windows
     pulses = [shock.pulse_duration] if shock.pulse_duration else []
-    slow = implicit_plan(direct, largest_implicit_step(shock.duration, pulses))
+    slow = implicit_plan(direct, largest_implicit_step(longest_duration(case), pulses))
     elements = sum(part.elements for part in parts.values())
     implicit = implicit_cost(plate_nodes(elements), slow.windows * slow.substeps).seconds
     return ShockForecast(
@@ -205,7 +206,7 @@ def _plan(case: "BoardDropCase", parts: Parts):
     limiting = [part.critical_step for part in parts.values() if not part.mass_scaled]
     meso = min(limiting, default=macro)
     macro, meso = (damped_critical_step(step, shock.damping.coefficients[1]) for step in (macro, meso))
-    return window_plan(macro, meso, numerics.step_fraction, shock.duration, numerics.history_samples)
+    return window_plan(macro, meso, numerics.step_fraction, longest_duration(case), numerics.history_samples)
 
 
 def shorter_than_window(case: "BoardDropCase") -> Iterator[Problem]:
@@ -216,7 +217,7 @@ def shorter_than_window(case: "BoardDropCase") -> Iterator[Problem]:
     slowest = min(parts[name].critical_step for name in _slow(case, parts) & parts.keys())
     longest = shock.numerics.step_fraction * damped_critical_step(slowest, shock.damping.coefficients[1])
     for key, duration, window in (
-        ("shock.duration", shock.duration, longest),
+        ("shock.duration", longest_duration(case), longest),
         ("shock.pulse_duration", shock.pulse_duration, min(longest, _plan(case, parts).window)),
     ):
         if duration is not None and duration < window:

@@ -7,6 +7,7 @@ from typing import Any
 
 from reflowshock.meshing.board.pads import pad_table
 from reflowshock.units import from_si
+from reflowshock.workflow.board_drop.board_deflection import longest_duration
 from reflowshock.workflow.board_drop.shock_forecast import implicit_seconds
 from reflowshock.workflow.board_drop.shock_launch import MODES
 from reflowshock.workflow.convergence.series import ConvergenceStudy, Parameter, Quantity, StudyRun, at_same_times
@@ -58,6 +59,10 @@ def _dropped(case: BoardDropCase) -> ConvergenceStudy:
     ]
     parameters = (_mesh(case, whole), _critical(case), *(parameter for parameter, _ in parts))
     choices = (*(finest for _, finest in parts), *_couplings(case))
+    if case.shock.duration == "auto":  # runs are compared over the same time
+        given = {"shock.duration": from_si(longest_duration(case), "ms", digits=6)}
+        parameters = tuple(parameter.under(given) for parameter in parameters)
+        choices = tuple(run.under(given) for run in choices)
     return ConvergenceStudy("shock", ("shock",), ERRORS, _motion, parameters, choices)
 
 
@@ -77,7 +82,7 @@ def _motion(case: Any, run_folder: Path) -> dict[str, Quantity]:
     result = read_json(folder / "result.json")
     joint = list(history["joints"]).index(result["metrics"]["critical_joint"]["value"])
     stress = {"time": history["time"], **{side: history[side][:, joint] for side in SIDES}}
-    duration, count = case.shock.duration, case.shock.numerics.history_samples + 1
+    duration, count = case.shock.decided_duration, case.shock.numerics.history_samples + 1
     peak = max(float(stress[side].max()) for side in SIDES)
     return {
         "stress_history": Quantity(at_same_times(stress, SIDES, duration, count)),
