@@ -1,11 +1,7 @@
 """The only place that knows versions of DOLFINx: 0.5 (Debian 12) and 0.9 (Debian 13)."""
 
-from collections.abc import Callable
-from functools import partial
-from operator import methodcaller
 from pathlib import Path
 
-import basix
 import dolfinx
 import dolfinx.fem
 import dolfinx.fem.petsc
@@ -105,17 +101,6 @@ def quadrature_space(mesh: dolfinx.mesh.Mesh, degree: int, shape: tuple[int, ...
 
     element = basix.ufl.quadrature_element(mesh.basix_cell(), value_shape=shape, degree=degree)
     return dolfinx.fem.functionspace(mesh, element)
-
-
-def at_quadrature_points(
-    mesh: dolfinx.mesh.Mesh, expression: ufl.core.expr.Expr, degree: int
-) -> Callable[[], NDArray[np.float64]]:
-    """Return what evaluates an expression of UFL at the integration points of all cells, ``(ne, points * size)``."""
-    points, _ = basix.make_quadrature(getattr(basix.CellType, shape_of(cell_nodes(mesh)).cell), degree)
-    compiled = dolfinx.fem.Expression(expression, points)
-    cells = np.arange(mesh.topology.index_map(3).size_local, dtype=np.int32)
-    evaluate = methodcaller("eval", cells) if OLD else methodcaller("eval", mesh, cells)  # compiled code, no text
-    return partial(evaluate, compiled)
 
 
 def assembled_csr(form) -> scipy.sparse.csr_matrix:  # its type has another name in each version
