@@ -1,5 +1,6 @@
 """The only place that knows versions of DOLFINx: 0.5 (Debian 12) and 0.9 (Debian 13)."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import dolfinx
@@ -13,9 +14,11 @@ import ufl
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from reflowshock.fem.cell_shape import shape_of
+from reflowshock.fem.cell_shape import SHAPES
 
 OLD = tuple(int(part) for part in dolfinx.__version__.split(".")[:2]) < (0, 8)
+# Cell and degree of the geometry by the number of nodes; the program's own shapes, and quadratic hexahedra for oracles.
+GEOMETRIES = {shape.nodes: (shape.cell, shape.degree) for shape in SHAPES.values()} | {27: ("hexahedron", 2)}
 
 
 def make_mesh(
@@ -32,19 +35,19 @@ def make_mesh(
         cells: ``(ne, k)`` input node numbers; k is the same on all ranks and says which shape the cells have.
         ranks: ``(ne,)`` rank that gets each of these cells; None on all ranks for DOLFINx's own partition.
     """
-    cells, shape = np.ascontiguousarray(cells, np.int64), shape_of(cells)
+    cells, geometry = np.ascontiguousarray(cells, np.int64), GEOMETRIES[cells.shape[1]]
     ghosts = dolfinx.mesh.GhostMode.none
 
     def partitioner(*_: object) -> dolfinx.cpp.graph.AdjacencyList_int32:
         return dolfinx.cpp.graph.AdjacencyList_int32(ranks, np.arange(len(cells) + 1, dtype=np.int32))
 
     if OLD:
-        domain = ufl.Mesh(ufl.VectorElement("Lagrange", shape.cell, shape.degree))
+        domain = ufl.Mesh(ufl.VectorElement("Lagrange", *geometry))
         chosen = dolfinx.cpp.mesh.create_cell_partitioner() if ranks is None else partitioner
         return dolfinx.mesh.create_mesh(comm, cells, points, domain, ghost_mode=ghosts, partitioner=chosen)
     import basix.ufl
 
-    domain = ufl.Mesh(basix.ufl.element("Lagrange", shape.cell, shape.degree, shape=(3,)))
+    domain = ufl.Mesh(basix.ufl.element("Lagrange", *geometry, shape=(3,)))
     chosen = dolfinx.mesh.create_cell_partitioner(ghosts) if ranks is None else partitioner
     return dolfinx.mesh.create_mesh(comm, cells, points, domain, partitioner=chosen)
 
@@ -59,7 +62,7 @@ def cell_nodes(mesh: dolfinx.mesh.Mesh) -> NDArray[np.int32]:
 
 def degree(mesh: dolfinx.mesh.Mesh) -> int:
     """Return the polynomial degree of the geometry."""
-    return shape_of(cell_nodes(mesh)).degree
+    return GEOMETRIES[cell_nodes(mesh).shape[1]][1]
 
 
 def input_nodes(mesh: dolfinx.mesh.Mesh) -> NDArray[np.int64]:
@@ -101,6 +104,29 @@ def quadrature_space(mesh: dolfinx.mesh.Mesh, degree: int, shape: tuple[int, ...
 
     element = basix.ufl.quadrature_element(mesh.basix_cell(), value_shape=shape, degree=degree)
     return dolfinx.fem.functionspace(mesh, element)
+
+
+def at_quadrature_points(
+    mesh: dolfinx.mesh.Mesh, expression: ufl.core.expr.Expr, degree: int
+) -> Callable[[], NDArray[np.float64]]:
+    """Return what evaluates an expression of UFL at the integration points of all cells, ``(ne, points * size)``.
+
+    Each test function of their space is one at its own point and zero at all others, so that the integral of the
+    expression times it is the value there times the weight.
+    """
+    shape = expression.ufl_shape
+    space, dx = quadrature_space(mesh, degree, shape), ufl.dx(domain=mesh, metadata={"quadrature_degree": degree})
+    test, dofs = ufl.TestFunction(space), cell_dofs(space)
+    ones = ufl.as_tensor(np.ones(shape).tolist()) if shape else ufl.as_ufl(1.0)
+    integral, weight = (dolfinx.fem.form(ufl.inner(item, test) * dx) for item in (expression, ones))
+    weights = np.array(dolfinx.fem.assemble_vector(weight).array)
+
+    def evaluate() -> NDArray[np.float64]:
+        vector = dolfinx.fem.assemble_vector(integral)
+        values = (vector.array / weights).reshape(-1, int(np.prod(shape)))
+        return values[dofs].reshape(len(dofs), -1)
+
+    return evaluate
 
 
 def assembled_csr(form) -> scipy.sparse.csr_matrix:  # its type has another name in each version

@@ -157,20 +157,14 @@ class _Internal:
         stress = law.first_piola_kirchhoff(gradient, new)
         work = old["work"] + ufl.inner(0.5 * (stress + old["stress"]), gradient - old["gradient"])
         new |= {"gradient": gradient, "stress": stress, "work": work}
-        tests = {name: ufl.TestFunction(own) for name, own in spaces.items()}
-        # Each is one at its own point: integrals of a value times them are the value times the weights.
-        self._update = {name: dolfinx.fem.form(ufl.inner(new[name], tests[name]) * space.dx) for name in tests}
-        self._weights = {
-            name: assembled(dolfinx.fem.form(ufl.inner(_ones(shape), tests[name]) * space.dx))
-            for name, shape in shapes.items()
+        self._update = {
+            name: dolfinx_api.at_quadrature_points(space.mesh, new[name], space.degree) for name in self.variables
         }
         self._work = dolfinx.fem.form(old["work"] * space.dx)
 
     def step(self) -> None:
         """Replace all values by those after a step to the present displacement."""
-        new = {name: assembled(form) / self._weights[name] for name, form in self._update.items()}
-        for name, values in new.items():
-            self.variables[name].x.array[:] = values
+        self.take({name: evaluate() for name, evaluate in self._update.items()})
 
     def work(self) -> float:
         """Return the work that the stress has taken up [J]."""
@@ -190,16 +184,6 @@ class _Internal:
         """Return a view of a variable's values by integration point, ``(ne * points, size)``."""
         variable = self.variables[name]
         return variable.x.array.reshape(-1, variable.function_space.dofmap.index_map_bs)
-
-
-def _ones(shape: tuple[int, ...]) -> Expression:
-    return ufl.as_tensor(np.ones(shape).tolist()) if shape else ufl.as_ufl(1.0)
-
-
-def assembled(form: Expression) -> NDArray[np.float64]:
-    """Return the vector of a linear form, by degree of freedom."""
-    vector = dolfinx.fem.assemble_vector(form)
-    return np.array(vector.array)
 
 
 def tangent_at_rest(elements: Elements, law: Law) -> NDArray[np.float64]:
