@@ -99,7 +99,11 @@ def quadrature_space(mesh: dolfinx.mesh.Mesh, degree: int, shape: tuple[int, ...
     """Return the space of values of a shape at the integration points of a rule of some degree."""
     if OLD:
         element = ufl.FiniteElement("Quadrature", mesh.ufl_cell(), degree=degree, quad_scheme="default")
-        return dolfinx.fem.FunctionSpace(mesh, ufl.TensorElement(element, shape=shape) if shape else element)
+        if len(shape) == 1:
+            element = ufl.VectorElement(element, dim=shape[0])
+        elif shape:
+            element = ufl.TensorElement(element, shape=shape)
+        return dolfinx.fem.FunctionSpace(mesh, element)
     import basix.ufl
 
     element = basix.ufl.quadrature_element(mesh.basix_cell(), value_shape=shape, degree=degree)
