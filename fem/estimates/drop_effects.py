@@ -56,6 +56,10 @@ class Drop(Protocol):
         """Whether weight acts, from g over the peak acceleration."""
 
     @property
+    def duration(self) -> float:
+        """How long it is followed, at most [s]."""
+
+    @property
     def expected(self) -> Deflection:
         """How the shock bends the board."""
 
@@ -203,7 +207,7 @@ class RayleighEffect(DropEffect):
         if not (alpha or beta):
             return decision(False, "shock.damping gives none", 0.0)
         ratio = 0.5 * (alpha / omega + beta * omega)
-        taken = -math.expm1(-ratio * omega * drop.shock.duration)
+        taken = -math.expm1(-ratio * omega * drop.duration)
         return decision(True, f"{100.0 * ratio:.2g} % of critical damping in the board's first mode", taken)
 
     def tell(self, run: DropRun) -> Decision:

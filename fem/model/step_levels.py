@@ -155,6 +155,30 @@ class SubsteppedElements:
         end_substeps(self.rows, self.foreign, self.state, force)
         return force
 
+    def means(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return what elements of each level feel on average over the step, of linear forces the mean; collective.
+
+        Args:
+            values: ``(m, 3)`` displacements, or velocities, of the level around.
+
+        Returns:
+            ``(levels, m, 3)``, of this level and those inside it; in each the nodes of its elements count.
+        """
+        steps, place, pull = self.substeps, self.state[0], self.state[1]
+        begin_substeps(self.rows, values, self.state)
+        total = np.zeros(())
+        for coefficients in zip(steps.memory, steps.rate, steps.weight, strict=True):
+            inner = [level.means(place) for level in levels_of(self.terms)]
+            total = total + coefficients[2] * np.concatenate([place[None], *inner])
+            for term in self.terms:
+                term.add(place, pull)
+            self.shared.add(pull)
+            take_substep(coefficients, self.inverse, self.change, self.state)
+        self.state[2] = 0.0
+        result = np.repeat(values[None], len(total), axis=0)
+        result[:, self.rows] = total
+        return result
+
     def energy(self, displacement: NDArray[np.float64]) -> Energy:
         """Return u . K_eff u / 2, of which hourglass modes have what they have without levels; collective."""
         hourglass = sum(term.energy(displacement).hourglass for term in self.plain)

@@ -15,6 +15,7 @@ from reflowshock.quantity import Quantity
 
 MOST_RANKS = 100_000  # of one run
 MOST_LEVELS = 4  # below the window, that "auto" tries
+JOINT_LAYER = 25e-6  # [m] of fatigue practice (Darveaux, ECTC 2000); thickness conventions differ
 ServiceCondition = Literal["A", "B", "C", "D", "E", "F", "G", "H"]
 
 
@@ -150,16 +151,20 @@ class Shock(Parameters):
     The pulse is that of a JEDEC service condition, or a half sine of ``peak_acceleration`` and ``pulse_duration``, or a
     table of times and accelerations (CSV). ``method`` gives it to the board as body acceleration, its holes held, or
     to a large mass at the holes. Gravity is left out by ``auto`` where it is less than a thousandth of the peak. The
-    stress at the joints' upper interface is kept at ``picture_times``. ``identical_joints`` repeats the shock under a
+    stress at the joints' upper interface is kept at ``picture_times``. ``joint_layer`` is the thickness of the solder
+    at either pad over which stress and plastic work are averaged. ``identical_joints`` repeats the shock under a
     flat package on truncated spheres of the solder's volume: what the joints' own shapes change is the difference.
+    A ``duration`` that is ``auto`` ends when the joints' first peak has passed and half a swing of the board brought no
+    higher one, at the latest a period of the board after the pulse.
     """
 
     service_condition: ServiceCondition | None = None
     peak_acceleration: Annotated[float | None, Quantity("G")] = Field(None, gt=0)
     pulse_duration: Annotated[float | None, Quantity("ms")] = Field(None, gt=0)
     table: str | None = None
-    duration: Annotated[float, Quantity("ms")] = Field(gt=0)
+    duration: Annotated[float, Quantity("ms"), Field(gt=0)] | Literal["auto"]
     picture_times: Annotated[tuple[Annotated[float, Field(ge=0)], ...], Quantity("ms")] = ()
+    joint_layer: Annotated[float, Quantity("um")] = Field(JOINT_LAYER, gt=0, le=1e-3)
     identical_joints: bool = False
     method: Literal["direct", "large_mass"] = "direct"
     gravity: Literal["auto", "on", "off"] = "auto"
@@ -168,3 +173,10 @@ class Shock(Parameters):
     ranks: Ranks = Ranks()
     coupling: JointCoupling = JointCoupling()
     numerics: ShockNumerics = ShockNumerics()
+
+    @property
+    def decided_duration(self) -> float:
+        """Return the duration of a run [s], the longest where it is ``auto``, which a case decides; else ValueError."""
+        if self.duration == "auto":
+            raise ValueError("shock.duration = auto is decided by the case, before a run")
+        return self.duration

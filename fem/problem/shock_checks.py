@@ -45,7 +45,9 @@ def _damping(damping: Damping) -> Iterator[Problem]:
 
 
 def _beyond_the_end(shock: Shock) -> Iterator[Problem]:
-    """Find times after the end of the shock."""
+    """Find times after the end of the shock, where that is given."""
+    if shock.duration == "auto":
+        return
     ends = {"shock.numerics.dns_duration": shock.numerics.dns_duration, "shock.picture_times": shock.picture_times}
     for key, given in ends.items():
         latest = max(given, default=0.0) if isinstance(given, tuple) else given or 0.0
