@@ -24,10 +24,11 @@ from reflowshock.fem.division.chebyshev import Substeps
 from reflowshock.fem.elements.element import Elements
 from reflowshock.fem.errors import LevelError
 from reflowshock.fem.forces.energy import Energy, InternalForce, linear_energy
-from reflowshock.fem.forces.force import ForceTerm, Kinematics, linear_terms
+from reflowshock.fem.forces.force import ForceTerm, linear_terms
 from reflowshock.fem.forces.force_assembled import AssembledElements
 from reflowshock.fem.forces.force_congruent import CongruentElements, in_rows
 from reflowshock.fem.kernels.levels import begin_substeps, end_substeps, run_levels, take_substep
+from reflowshock.fem.materials.kinematics import Kinematics
 from reflowshock.fem.materials.parameters import Material
 from reflowshock.fem.mesh.tie import Tie
 from reflowshock.fem.model.body import Body
@@ -197,8 +198,8 @@ def check_elastic(materials: Sequence[Material], kinematics: Kinematics, ratios:
         LevelError: With what is not linear elastic.
     """
     yielding = [material for material in materials if material.plasticity is not None]
-    if yielding or kinematics == "finite":
-        cause = f"{len(yielding)} of the materials yield" if yielding else "kinematics = finite"
+    if yielding or kinematics != "small":
+        cause = f"{len(yielding)} of the materials yield" if yielding else f"kinematics = {kinematics}"
         raise LevelError(
             f"local steps (ratios {', '.join(map(str, ratios))}) need linear elastic elements at small strains, but"
             f" {cause}; scheme = held_velocity or gravouil_combescure is for them"

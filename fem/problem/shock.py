@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 from pydantic import Field, ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
 
+from reflowshock.fem.materials.kinematics import TURNING, Kinematics
 from reflowshock.fem.problem.failure import Failure
 from reflowshock.parameters import Parameters
 from reflowshock.quantity import Quantity
@@ -109,7 +110,7 @@ class ShockNumerics(Parameters):
 
     ``kinematics`` and ``formulation`` of hexahedra as for a structure. Elastic hexahedra are the same in both
     formulations; those that yield are seven to eight times cheaper with one point, a few per cent stronger in bending.
-    Kinematics that are ``auto`` are finite where the board's deflection calls for it.
+    Kinematics that are ``auto`` are corotational where the board's deflection calls for it.
     ``dns_duration`` ends the DNS before the shock does: the modes are compared over the time that both have.
     """
 
@@ -118,7 +119,7 @@ class ShockNumerics(Parameters):
     dns_duration: Annotated[float | None, Quantity("ms")] = Field(None, gt=0)
     step_fraction: float = Field(0.9, gt=0, le=0.95)
     critical_step: Literal["element", "power_iteration"] = "element"
-    kinematics: Literal["auto", "small", "finite"] = "small"
+    kinematics: Literal["auto"] | Kinematics = "small"
     formulation: Literal["incompatible_modes", "one_point"] = "incompatible_modes"
     mass_scaled: tuple[Literal["board", "substrate", "die", "copper", "solder"], ...] = ()
     history_samples: int = Field(600, ge=2)
@@ -130,7 +131,7 @@ class ShockNumerics(Parameters):
     @field_validator("kinematics")
     @classmethod
     def _fit_the_solver(cls, value: str, info: ValidationInfo) -> str:
-        if value == "finite" and info.data.get("dns_solver") == "implicit":
+        if value in TURNING and info.data.get("dns_solver") == "implicit":
             allowed = "small, or dns_solver = explicit"
             raise PydanticCustomError(
                 "inadmissible", "is not for implicit steps, which are linear", {"allowed": allowed}
@@ -138,7 +139,7 @@ class ShockNumerics(Parameters):
         return value
 
     @property
-    def decided_kinematics(self) -> Literal["small", "finite"]:
+    def decided_kinematics(self) -> Kinematics:
         """Return the kinematics of a run, which only a case decides that are ``auto``; ValueError until it has."""
         if self.kinematics == "auto":
             raise ValueError("shock.numerics.kinematics = auto is decided by the case, before a run")
