@@ -70,9 +70,10 @@ class JointNumerics(Parameters):
 class Imprint(Parameters):
     """Pads imprinted in the faces of board and substrate: each fine joint stands in a square column of its own.
 
-    The column goes through board and substrate. From the pad's edge ``rings`` of elements reach out to a square of side
-    ``size`` (the pitch, if none is given). Its layers are as high as ``first_layer`` at the pad and grow with the depth
-    z, h = first_layer + (growth - 1) z. Outside are the structured boxes, to which its sides are tied.
+    The column goes through board and substrate. From the pad's edge ``rings`` of elements, each ``growth`` times as
+    wide as the one inside it, reach out to a square of side ``size`` (the pitch, if none is given). Its layers are as
+    high as ``first_layer`` at the pad and grow with the depth z, h = first_layer + (growth - 1) z. Its sides are tied
+    to structured boxes, which should be a quarter of its side long: larger ones make the joint too stiff.
     """
 
     size: Length | None = Field(None, gt=0)

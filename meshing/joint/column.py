@@ -23,6 +23,7 @@ class Column:
         levels: heights as drawn, from the pad's face (k + 1,) [m].
         square: (2, 2) lower and upper corner in plan, as drawn [m].
         rings: of elements between the pad's edge and the square.
+        growth: width of each ring over that of the one inside it.
         drawn: x and y (n, 2) as drawn of points (n, 3) on the pad's face [m].
         place: where points (n, 3) as drawn are in the assembly (n, 3) [m].
     """
@@ -32,6 +33,7 @@ class Column:
     levels: np.ndarray
     square: np.ndarray
     rings: int
+    growth: float
     drawn: Callable[[np.ndarray], np.ndarray]
     place: Callable[[np.ndarray], np.ndarray]
 
@@ -67,13 +69,16 @@ def columns_of(site: PadSite, package: Package, board: Board, side: PackageSide)
         )
     )
     return (
-        Column("board", "board_column", -foot, square, imprint.rings, lambda points: points[:, :2], np.copy),
+        Column(
+            "board", "board_column", -foot, square, imprint.rings, imprint.growth, lambda points: points[:, :2], np.copy
+        ),
         Column(
             "package",
             "substrate_column",
             underside(package) + head,
             square,
             imprint.rings,
+            imprint.growth,
             lambda points: side.origin(points[:, 0], points[:, 1]),
             side.displaced,
         ),
@@ -93,8 +98,8 @@ def grow_column(column: Column, points: np.ndarray, quads: np.ndarray, rim: np.n
     flat = column.drawn(points[inner])
     edge = np.searchsorted(inner, rim)
     outline = _outline(column.square, len(rim) // 4)
-    shares = np.arange(1, column.rings + 1) / column.rings
-    plan = np.vstack([flat, *(flat[edge] + share * (outline - flat[edge]) for share in shares)])
+    shares = np.cumsum(column.growth ** np.arange(column.rings))
+    plan = np.vstack([flat, *(flat[edge] + share * (outline - flat[edge]) for share in shares / shares[-1])])
     ids = [edge, *(len(flat) + len(edge) * ring + np.arange(len(edge)) for ring in range(column.rings))]
     rings = [np.column_stack([low, high, np.roll(high, -1), np.roll(low, -1)]) for low, high in pairwise(ids)]
     section = np.vstack([local.reshape(quads.shape), *rings])
