@@ -18,6 +18,7 @@ from reflowshock.fem.mesh.mesh import MeshData, merge_nodes
 from reflowshock.fem.mesh.supports import HELD, held_components
 from reflowshock.fem.mesh.tie import Tie, tie_joints
 from reflowshock.fem.mesh.watch_table import WatchTable, whole_watch
+from reflowshock.fem.problem.shock import JOINT_LAYER
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,13 +102,13 @@ class JointTables(Tables):
     joint_interface: JointInterfaceTable
 
     @classmethod
-    def of(cls, whole: Whole, rules: Mapping[str, Sequence[int]]) -> Self:
-        """Find out what is held, as ``rules`` say, and watched."""
+    def of(cls, whole: Whole, rules: Mapping[str, Sequence[int]], layer: float) -> Self:
+        """Find out what is held, as ``rules`` say, and watched: joints with a ``layer`` [m] of solder at the pads."""
         mesh = whole.mesh
         return cls.undivided(
             whole,
             held_components(mesh, rules),
-            watch=whole_watch(mesh),
+            watch=whole_watch(mesh, layer),
             shaken=mesh.facet_nodes("mounting_holes"),
             joint_interface=whole_joint_interface(mesh),
         )
@@ -152,17 +153,20 @@ def prepare(
 
 
 def model_inputs(
-    whole: Whole, division: Division | Literal["dns"], rules: Mapping[str, Sequence[int]] = HELD
+    whole: Whole,
+    division: Division | Literal["dns"],
+    rules: Mapping[str, Sequence[int]] = HELD,
+    layer: float = JOINT_LAYER,
 ) -> dict[Role, ModelInput[JointTables]]:
-    """Split a package on a board into its models; ``rules`` say what is held, as ``supports.HELD``.
+    """Split a package on a board into its models; arguments as ``JointTables.of``.
 
     Returns:
         ``macro`` and ``meso``, or ``dns``: all of it.
 
     Raises:
-        MeshError: A pad has no solder.
+        MeshError: A pad has no solder, or the layer is thicker than a joint.
     """
-    tables = JointTables.of(whole, rules)
+    tables = JointTables.of(whole, rules, layer)
     if division != "dns":
         return split(whole, tables, division)
     part = part_of(whole, np.ones(len(whole.mesh.cells), dtype=bool))

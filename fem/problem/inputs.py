@@ -5,6 +5,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, TypeAdapter
 
+from reflowshock.fem.materials.kinematics import Kinematics
 from reflowshock.fem.materials.parameters import Material
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.problem.shock import Ranks, Shock, ShockNumerics
@@ -78,7 +79,7 @@ class RunInput(PackageInput):
         return self.shock.numerics.formulation
 
     @property
-    def kinematics(self) -> Literal["small", "finite"]:
+    def kinematics(self) -> Kinematics:
         """Return whether rotations and strains are small."""
         return self.shock.numerics.decided_kinematics
 
@@ -169,7 +170,7 @@ class StructureInput(StructureProblem):
         return self.structure.formulation
 
     @property
-    def kinematics(self) -> Literal["small", "finite"]:
+    def kinematics(self) -> Kinematics:
         """Return whether rotations and strains are small."""
         return self.dynamics.kinematics
 

@@ -85,7 +85,8 @@ class PackageDrop:
 
     def watch(self, model: Model[JointTables]) -> JointWatch:
         """Return the watch points of a model."""
-        return JointWatch(model.tables.watch, model.body, self.request.materials.solder.plasticity is not None)
+        yields, damping = self.request.materials.solder.plasticity is not None, self.request.shock.damping.coefficients
+        return JointWatch(model.tables, model.body, yields, damping)
 
     def trivial_energy(self, steps: Steps) -> float:
         """Return a small part of the energy [J] that the pulse gives a free body."""

@@ -54,10 +54,10 @@ def divided_on_one_rank(request: RunInput) -> Divided[JointTables]:
     held = HELD if shock.method == "direct" else SYMMETRY
     if request.mode == "dns":
         steps = undivided(steps, float(found.step.min()), rules)
-        inputs = model_inputs(whole, "dns", held)
+        inputs = model_inputs(whole, "dns", held, shock.joint_layer)
     else:
         check_division(whole, found, division, rules)
-        inputs = model_inputs(whole, division, held)
+        inputs = model_inputs(whole, division, held, shock.joint_layer)
     check_shaken([item.tables for item in inputs.values()], shock)
     first = next(iter(inputs.values()))
     return Divided(

@@ -10,6 +10,8 @@ import numpy as np
 
 from reflowshock.effect import Decision
 from reflowshock.fem.estimates.drop_effects import Deflection, called_for
+from reflowshock.fem.materials.kinematics import Kinematics
+from reflowshock.workflow.board_drop import shock_cooling
 
 if TYPE_CHECKING:
     from reflowshock.fem.materials.parameters import Material
@@ -77,13 +79,13 @@ def first_mode_peak(omega: float, velocity: Callable[[float], float], duration: 
     return float(np.abs(swing).max()) / omega
 
 
-def decide_kinematics(case: "BoardDropCase") -> tuple[Literal["small", "finite"], str]:
+def decide_kinematics(case: "BoardDropCase") -> tuple[Kinematics, str]:
     """Return the kinematics that the deflection of the board calls for, and why; errors as ``expected_deflection``."""
-    return called_for(expected_deflection(case).largest / case.board.thickness)
+    return called_for(expected_deflection(case).largest / case.board.thickness, shock_cooling.is_wanted(case))
 
 
 def decided(case: "BoardDropCase") -> "BoardDropCase":
-    """Return the case with kinematics that are small or finite, as its board's deflection calls for, and a duration.
+    """Return the case with the kinematics and the duration that its scene calls for.
 
     Raises:
         PulseError: the table of the pulse cannot be read.
@@ -126,6 +128,11 @@ class DropScene:
         from reflowshock.fem.loads.shock_pulse import shock_pulse
 
         return shock_pulse(self.case.shock).gravity
+
+    @property
+    def cooled(self) -> bool:
+        """Whether the shock begins with the stress of cooling."""
+        return shock_cooling.is_wanted(self.case)
 
     @property
     def duration(self) -> float:

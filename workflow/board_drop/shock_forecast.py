@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from reflowshock.workflow.package.case import BoardDropCase
 
 MACRO = "board"  # role of the parts whose elements the window follows
+BOXES = ("board", "substrate", "die")  # roles whose elements are boxes
 COLUMN = "_column"  # ends the names of parts of board and substrate around fine joints
 
 
@@ -303,11 +304,15 @@ def _levels(case: "BoardDropCase", parts: Parts, window: float) -> tuple[tuple[i
 def relative_cost(case: "BoardDropCase", part: str) -> float:
     """Return the cost of an element of a part over that of an elastic one: what yields or turns has a path."""
     from reflowshock.fem.estimates.estimate import UPDATES_PER_SECOND
-    from reflowshock.fem.estimates.solver_cost import NONLINEAR_RATE
+    from reflowshock.fem.estimates.solver_cost import COROTATIONAL_RATE, NONLINEAR_RATE
 
     numerics = case.shock.numerics
-    has_path = material_of(case, part).plasticity is not None or numerics.kinematics == "finite"
-    return UPDATES_PER_SECOND / NONLINEAR_RATE[numerics.formulation] if has_path else 1.0
+    elastic = material_of(case, part).plasticity is None
+    if elastic and numerics.kinematics == "small":
+        return 1.0
+    if elastic and numerics.kinematics == "corotational" and role_of(part) in BOXES and not part.endswith(COLUMN):
+        return UPDATES_PER_SECOND / COROTATIONAL_RATE
+    return UPDATES_PER_SECOND / NONLINEAR_RATE[numerics.formulation]
 
 
 def role_of(part: str) -> str:
