@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from reflowshock.workflow.case.text import mega, micro, nano, number, percent
-from reflowshock.workflow.package.verdict import MEASURES
+from reflowshock.workflow.package.verdict import WORDS
 from reflowshock.workflow.package_report.joint_records import Column, Record, by_shape, record_table
 from reflowshock.workflow.process.products import read_json
 from reflowshock.workflow.report.histories import at_pads
@@ -123,7 +123,7 @@ def verdict_cells(judged: Mapping[str, Any]) -> list[str]:
     """Verdict and margin of a joint, with the criterion of least margin."""
     if judged["margin"] is None:
         return [judged["verdict"], "–"]
-    return [judged["verdict"], f"{judged['margin']:.3g} by {MEASURES[judged['criterion']].word}"]
+    return [judged["verdict"], f"{judged['margin']:.3g} by {WORDS[judged['criterion']]}"]
 
 
 def meshes(joints: Sequence[Record]) -> dict | None:
