@@ -13,6 +13,7 @@ from reflowshock.fem.dynamics.history import History
 from reflowshock.fem.estimates.material_effects import failure_effect, material_effects
 from reflowshock.fem.loads.shock_pulse import shock_pulse
 from reflowshock.fem.materials.kinematics import finite_rotation
+from reflowshock.fem.output.acceleration import package_acceleration
 from reflowshock.fem.output.failure import Verdicts, failed_joints, failure_criteria, judge, worst
 from reflowshock.fem.output.result import Outcome, Timings, health, model_summary, peak_memory, quantity, sizes
 from reflowshock.fem.output.watch_joints import FLOW_LAYERS, LAYERS
@@ -57,6 +58,7 @@ class PackageReport:
             "metrics": cost_metrics(summary, updates_a_window(summary, coupling), timings)
             | health_metrics(outcome.history, arrays)
             | shock_metrics(arrays)
+            | acceleration_metrics(arrays, self.request)
             | {"peak_neglected_strain": quantity(outcome.neglected_strain)}
             | failure_metrics(verdicts),
             "health": health(self.request, outcome, {"interface_force_residual": residual}) | worst(verdicts),
@@ -123,6 +125,14 @@ def shock_metrics(arrays: Mapping[str, NDArray]) -> dict[str, Any]:
         **({"residual_stress_critical_joint": quantity(start, "Pa")} if start > 0.0 else {}),
         **flow_metrics(arrays),
     }
+
+
+def acceleration_metrics(arrays: Mapping[str, NDArray], request: RunInput) -> dict[str, Any]:
+    """Return the peaks of the package's acceleration after the filter; none of a board without a package."""
+    chosen = shock_pulse(request.shock)
+    found = package_acceleration(arrays, chosen.pulse, request.shock.filter) if arrays["die_centre"].any() else None
+    peaks = found.peaks_in_g("package") if found else {}
+    return {name: quantity(value, "G") for name, value in peaks.items()}
 
 
 def flow_metrics(arrays: Mapping[str, NDArray]) -> dict[str, Any]:

@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 from pydantic import Field, ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
 
+from reflowshock.fem.problem.filters import LowPass
 from reflowshock.parameters import Parameters
 
 MOST_RANKS = 100_000  # of one run
@@ -155,23 +156,27 @@ class Failure(Parameters):
 class Shock(Parameters):
     """Input-G at the mounting holes, package facing down (JESD22-B111; H 4.4).
 
-    The pulse is that of a JEDEC service condition, or a half sine of ``peak_acceleration`` and ``pulse_duration``, or a
-    table of times and accelerations (CSV). ``method`` gives it to the board as body acceleration, its holes held, or
-    to a large mass at the holes. Gravity is left out by ``auto`` where it is less than a thousandth of the peak. The
-    stress at the joints' upper interface is kept at ``picture_times``. ``identical_joints`` repeats the shock under a
-    flat package on truncated spheres of the solder's volume: what the joints' own shapes change is the difference.
+    The pulse is that of a JEDEC service condition, or a half sine of ``peak_acceleration`` and ``pulse_duration``,
+    or a table of times and accelerations (CSV; ``table_column`` is the title of one of several columns). ``method``
+    gives it to the board as body acceleration, its holes held, or to a large mass at the holes. Gravity is left out
+    by ``auto`` where it is less than a thousandth of the peak. The stress at the joints' upper interface is kept at
+    ``picture_times``. ``identical_joints`` repeats the shock under a flat package on truncated spheres of the
+    solder's volume: what the joints' own shapes change is the difference. ``filter`` is that of the package's
+    acceleration.
     """
 
     service_condition: ServiceCondition | None = None
     peak_acceleration: Annotated[float | None, "G"] = Field(None, gt=0)
     pulse_duration: Annotated[float | None, "ms"] = Field(None, gt=0)
     table: str | None = None
+    table_column: str | None = None
     duration: Annotated[float, "ms"] = Field(gt=0)
     picture_times: Annotated[tuple[Annotated[float, Field(ge=0)], ...], "ms"] = ()
     identical_joints: bool = False
     method: Literal["direct", "large_mass"] = "direct"
     gravity: Literal["auto", "on", "off"] = "auto"
     damping: Damping = Damping()
+    filter: LowPass = LowPass()
     failure: Failure = Failure()
     ranks: Ranks = Ranks()
     coupling: JointCoupling = JointCoupling()

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 
+from reflowshock.fem.problem.attachment_checks import filter_problems
 from reflowshock.fem.problem.shock import Damping, JointCoupling, Shock
 from reflowshock.problem import Problem
 
@@ -15,6 +16,7 @@ def problems(shock: Shock) -> list[Problem]:
         *_large_mass(shock),
         *_finite(shock),
         *_coupling(shock.coupling),
+        *_filter(shock),
     ]
 
 
@@ -42,6 +44,11 @@ def _damping(damping: Damping) -> Iterator[Problem]:
     used = [name for name, value in ratios.items() if value]
     if used and damping.frequency is None:
         yield Problem("shock.damping.frequency", f"is missing: at which {' and '.join(used)} is meant", None, "> 0 Hz")
+
+
+def _filter(shock: Shock) -> Iterator[Problem]:
+    if "filter" in shock.model_fields_set:
+        yield from filter_problems("shock", shock.filter, shock.duration, shock.numerics.history_samples)
 
 
 def _beyond_the_end(shock: Shock) -> Iterator[Problem]:

@@ -12,6 +12,7 @@ from reflowshock.workflow.case.toml_file import beside
 from reflowshock.workflow.structure.references import AnyReference
 
 MESHED = ("length", "width", "cells", "refine", "symmetry", "element", "layers", "holes")
+MOVED = ("structure", "materials", "supports", "masses", "loads", "watch", "dynamics")
 STRUCTURE = Pipeline(
     (
         Stage(
@@ -20,7 +21,9 @@ STRUCTURE = Pipeline(
             (),
             ("geometry/structure.msh", "geometry/preview.png"),
         ),
-        Stage("shock", ("structure", "materials", "supports", "loads", "watch", "dynamics"), ("geometry",), ()),
+        Stage(
+            "shock", ("structure", "materials", "supports", "masses", "loads", "watch", "dynamics"), ("geometry",), ()
+        ),
         Stage("comparison", ("references",), ("shock",), ("comparison/comparison.json",)),
         report_of("geometry", "shock", "comparison"),
     )
@@ -46,10 +49,10 @@ class StructureCase(StructureProblem, Case):
         return table
 
     @property
-    def pulse_tables(self) -> dict[str, tuple[Path, str]]:
+    def pulse_tables(self) -> dict[str, tuple[Path, str, str | None]]:
         """Tables of loads."""
         return {
-            f"loads.{name}.table": (Path(load.table), load.quantity)
+            f"loads.{name}.table": (Path(load.table), load.quantity, load.table_column)
             for name, load in self.loads.items()
             if load.table is not None
         }
@@ -57,7 +60,7 @@ class StructureCase(StructureProblem, Case):
     @property
     def files(self) -> dict[str, Path]:
         """Tables of loads."""
-        return {key: path for key, (path, _) in self.pulse_tables.items()}
+        return {key: path for key, (path, *_) in self.pulse_tables.items()}
 
     @property
     def problem(self) -> StructureProblem:
