@@ -139,26 +139,33 @@ def clean(folder: Path, name: str, *, unused: bool = False, force: bool = False)
         folder: the run folder.
         name: of the case.
         unused: remove only products that the run folder does not show, and work that was broken off.
-        force: whether the folder may hold another case.
+        force: whether the folder may hold another case, a study or a convergence study: all that is in it is removed.
 
     Raises:
         CaseError: the folder holds another case.
         RunFolderBusy: a run is at work in it.
     """
-    if read_mark(folder) is None:
+    mark = read_mark(folder)
+    if mark is None:
         console.print(f"nothing to remove: {folder} is not a run folder")
         return
-    with locked(folder, WHAT, name, force):
-        store = Store(folder, one_run=True)
+    with locked(folder, *((mark["holds"], mark["name"]) if force else (WHAT, name))):
+        store = Store(folder)
         if unused:
-            count = remove_unused(store)
-            console.print(f"removed {count} unused products from {folder}")
+            products, works = remove_unused(store)
+            removed = [_count(products, "unused product"), *([_count(works, "unfinished stage")] if works else [])]
+            console.print(f"removed {' and '.join(removed)} from {folder}")
             return
-        withdraw_all(store, folder)
-        left = remove_own(folder)
+        for one in (*(one for one in store.repeated if one.home.is_dir()), store):
+            withdraw_all(one)
+            left = remove_own(one.folder)
     console.print(f"removed {folder}" if not folder.exists() else f"removed all products from {folder}")
     if left:
         console.print(f"kept files that the program did not write: {', '.join(left)}")
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number} {what}" if number == 1 else f"{number} {what}s"
 
 
 def _shower(store: Store, point: Point) -> Callable[[], None]:

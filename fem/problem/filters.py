@@ -5,6 +5,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from reflowshock.parameters import Parameters
+from reflowshock.quantity import Quantity
 
 TWO_PASSES = (2.0**0.5 - 1.0) ** 0.25  # -3 dB of two second-order passes over -3 dB of one
 CFC_DESIGN = 2.0775  # SAE J211-1: -3 dB of one pass [Hz] over the channel frequency class
@@ -19,7 +20,7 @@ class LowPass(Parameters):
 
     kind: Literal["cfc", "butterworth"] = "cfc"
     channel_class: float = Field(1000.0, gt=0)
-    corner: Annotated[float | None, "Hz"] = Field(None, gt=0)
+    corner: Annotated[float | None, Quantity("Hz")] = Field(None, gt=0)
     order: int = Field(4, ge=1, le=8)
 
     @property

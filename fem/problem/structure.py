@@ -1,7 +1,7 @@
 """Parameters of a structure: a box of layers, its supports and loads, and how its motion is computed.
 
-All values are SI floats; see ``meshing.board.parameters`` for what the unit strings mean. A unit beside a tuple is
-that of each of its items. Tables of named members are dictionaries, so that one value of one member can be set.
+All values are SI floats; ``Quantity`` has the unit in which a user sees them, that of a tuple each of its items.
+Tables of named members are dictionaries, so that one value of one member can be set.
 """
 
 import math
@@ -15,6 +15,7 @@ from reflowshock.fem.materials.parameters import Material
 from reflowshock.fem.problem.filters import LowPass
 from reflowshock.fem.problem.shock import MOST_RANKS, Coupling, Damping, ServiceCondition
 from reflowshock.parameters import Parameters
+from reflowshock.quantity import Quantity
 
 AXES = "xyz"
 ROUNDING = 1e-9  # of the box: closer than that is the same place
@@ -36,7 +37,7 @@ class Layer(Parameters):
     """
 
     material: str
-    thickness: Annotated[float, "mm"] = Field(gt=0)
+    thickness: Annotated[float, Quantity("mm")] = Field(gt=0)
     cells: int = Field(1, ge=1, le=1000)
     in_plane: tuple[Cells, Cells] | None = None
 
@@ -44,8 +45,8 @@ class Layer(Parameters):
 class Holes(Parameters):
     """Four mounting holes at (+-spacing/2), through all layers; their walls are the facet set ``mounting_holes``."""
 
-    spacing: Annotated[tuple[float, float], "mm"]
-    diameter: Annotated[float, "mm"] = Field(gt=0)
+    spacing: Annotated[tuple[float, float], Quantity("mm")]
+    diameter: Annotated[float, Quantity("mm")] = Field(gt=0)
 
 
 class Structure(Parameters):
@@ -56,8 +57,8 @@ class Structure(Parameters):
     multiplies all numbers of elements, along and across the layers, each rounded and at least one.
     """
 
-    length: Annotated[float, "mm"] = Field(gt=0)
-    width: Annotated[float, "mm"] = Field(gt=0)
+    length: Annotated[float, Quantity("mm")] = Field(gt=0)
+    width: Annotated[float, Quantity("mm")] = Field(gt=0)
     cells: tuple[Cells, Cells]
     refine: float = Field(1.0, gt=0, le=100)
     layers: dict[str, Layer]
@@ -136,9 +137,9 @@ class Bedding(Parameters):
     Over an area A with the second moment I it is a total stiffness of k A and a rotational one of k I.
     """
 
-    x: Annotated[float, "N/m^3"] = Field(0.0, ge=0)
-    y: Annotated[float, "N/m^3"] = Field(0.0, ge=0)
-    z: Annotated[float, "N/m^3"] = Field(0.0, ge=0)
+    x: Annotated[float, Quantity("N/m^3")] = Field(0.0, ge=0)
+    y: Annotated[float, Quantity("N/m^3")] = Field(0.0, ge=0)
+    z: Annotated[float, Quantity("N/m^3")] = Field(0.0, ge=0)
 
 
 class Support(Parameters):
@@ -161,9 +162,9 @@ class PointMass(Parameters):
     With a plane of symmetry its mirror image is there as well; of one on that plane each half bears half.
     """
 
-    mass: Annotated[float, "g"] = Field(gt=0)
-    at: Annotated[tuple[float, float, float], "mm"]
-    footprint: Annotated[tuple[PositiveLength, PositiveLength] | None, "mm"] = None
+    mass: Annotated[float, Quantity("g")] = Field(gt=0)
+    at: Annotated[tuple[float, float, float], Quantity("mm")]
+    footprint: Annotated[tuple[PositiveLength, PositiveLength] | None, Quantity("mm")] = None
 
 
 class Pulsed(Parameters):
@@ -181,7 +182,7 @@ class Pulsed(Parameters):
     effect: ClassVar[str]
     quantity: ClassVar[str]
     pulse: Literal["half_sine", "haversine", "constant"] = "half_sine"
-    duration: Annotated[float | None, "ms"] = Field(None, gt=0)
+    duration: Annotated[float | None, Quantity("ms")] = Field(None, gt=0)
     table: str | None = None
     table_column: str | None = None
 
@@ -207,7 +208,7 @@ class OnAreas(Pulsed):
 class AtPoint(Pulsed):
     """A load at a point, along ``direction``."""
 
-    at: Annotated[tuple[float, float, float], "mm"]
+    at: Annotated[tuple[float, float, float], Quantity("mm")]
     direction: Direction
 
 
@@ -221,7 +222,7 @@ class InputG(OnBody):
     quantity: ClassVar = "acceleration"
     kind: Literal["input_g"] = "input_g"
     service_condition: ServiceCondition | None = None
-    peak: Annotated[float | None, "G"] = Field(None, gt=0)
+    peak: Annotated[float | None, Quantity("G")] = Field(None, gt=0)
     direction: Direction = (0.0, 0.0, 1.0)
     method: Literal["direct", "large_mass"] = "direct"
 
@@ -232,7 +233,7 @@ class Pressure(OnAreas):
     effect: ClassVar = "pressure"
     quantity: ClassVar = "pressure"
     kind: Literal["pressure"] = "pressure"
-    peak: Annotated[float | None, "MPa"] = None
+    peak: Annotated[float | None, Quantity("MPa")] = None
 
 
 class PrescribedMotion(OnNodes):
@@ -242,7 +243,7 @@ class PrescribedMotion(OnNodes):
     quantity: ClassVar = "velocity"
     kind: Literal["motion"] = "motion"
     component: Axis
-    peak: Annotated[float | None, "m/s"] = None
+    peak: Annotated[float | None, Quantity("m/s")] = None
 
 
 class Gravity(OnBody):
@@ -252,7 +253,7 @@ class Gravity(OnBody):
     quantity: ClassVar = "acceleration"
     kind: Literal["gravity"] = "gravity"
     pulse: Literal["half_sine", "haversine", "constant"] = "constant"
-    peak: Annotated[float, "m/s^2"] = Field(9.80665, gt=0)
+    peak: Annotated[float, Quantity("m/s^2")] = Field(9.80665, gt=0)
     direction: Direction = (0.0, 0.0, -1.0)
 
 
@@ -266,7 +267,7 @@ class PointForce(AtPoint):
     effect: ClassVar = "point_force"
     quantity: ClassVar = "force"
     kind: Literal["point_force"] = "point_force"
-    peak: Annotated[float | None, "N"] = Field(None, gt=0)
+    peak: Annotated[float | None, Quantity("N")] = Field(None, gt=0)
 
 
 AnyLoad = InputG | Gravity | Pressure | PrescribedMotion | PointForce
@@ -280,7 +281,7 @@ class WatchPoint(Parameters):
     ``direction`` is that of its accelerometer; without it, that of the input-G, else the axis of its largest motion.
     """
 
-    at: Annotated[tuple[float, float, float], "mm"]
+    at: Annotated[tuple[float, float, float], Quantity("mm")]
     direction: Direction | None = None
 
 
@@ -307,15 +308,15 @@ class DynamicsNumerics(Parameters):
 
     step_fraction: float = Field(0.9, gt=0, le=0.99)
     critical_step: Literal["element", "power_iteration"] = "element"
-    explicit_step: Annotated[float | None, "us"] = Field(None, gt=0)
-    implicit_step: Annotated[float | None, "us"] = Field(None, gt=0)
+    explicit_step: Annotated[float | None, Quantity("us")] = Field(None, gt=0)
+    implicit_step: Annotated[float | None, Quantity("us")] = Field(None, gt=0)
     hht_alpha: float = Field(0.0, ge=-1 / 3, le=0)
     mass_scaled: tuple[str, ...] = ()
     energy_balance_limit: float = Field(0.02, gt=0)
     history_samples: int = Field(600, ge=2)
     field_samples: int = Field(12, ge=2)
-    checkpoint_seconds: Annotated[float, "s"] = Field(300.0, gt=0)
-    watchdog_seconds: Annotated[float, "s"] = Field(60.0, gt=0)
+    checkpoint_seconds: Annotated[float, Quantity("s")] = Field(300.0, gt=0)
+    watchdog_seconds: Annotated[float, Quantity("s")] = Field(60.0, gt=0)
 
 
 class Dynamics(Parameters):
@@ -325,10 +326,10 @@ class Dynamics(Parameters):
     ``dns`` is, where there is a coupling, one model at the smallest step instead of two.
     """
 
-    duration: Annotated[float, "ms"] = Field(gt=0)
+    duration: Annotated[float, Quantity("ms")] = Field(gt=0)
     solver: Literal["explicit", "implicit", "both", "dns"] = "explicit"
     kinematics: Literal["small", "finite"] = "small"
-    initial_velocity: Annotated[tuple[float, float, float], "m/s"] = (0.0, 0.0, 0.0)
+    initial_velocity: Annotated[tuple[float, float, float], Quantity("m/s")] = (0.0, 0.0, 0.0)
     damping: Damping = Damping()
     filter: LowPass = LowPass()
     modes: int = Field(0, ge=0, le=200)

@@ -10,12 +10,12 @@ from rich.console import Console
 from rich.table import Table
 
 from reflowshock.problem import Problem
+from reflowshock.units import UnitError, to_si
 from reflowshock.workflow.accuracy.recommend import Goal, recommend
 from reflowshock.workflow.accuracy.runs import Compute, StudyRunner
 from reflowshock.workflow.case.case import Case
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.case.text import duration, percent
-from reflowshock.workflow.case.units import UnitError, to_si
 from reflowshock.workflow.convergence import tables
 from reflowshock.workflow.convergence.calibration import calibration, default_folder
 from reflowshock.workflow.convergence.measured import FILE, Accuracy, Recommended, fits_of, this_host, write_accuracy
