@@ -10,11 +10,10 @@ from numpy.typing import NDArray
 
 from reflowshock.fem.division.tables import JointTables
 from reflowshock.fem.dynamics.history import History
-from reflowshock.fem.estimates.material_effects import failure_effect, material_effects
+from reflowshock.fem.estimates.material_effects import material_effects
 from reflowshock.fem.loads.shock_pulse import shock_pulse
 from reflowshock.fem.materials.kinematics import finite_rotation
 from reflowshock.fem.output.acceleration import package_acceleration
-from reflowshock.fem.output.failure import Verdicts, failed_joints, failure_criteria, judge, worst
 from reflowshock.fem.output.result import Outcome, Timings, health, model_summary, peak_memory, quantity, sizes
 from reflowshock.fem.output.watch_joints import FLOW_LAYERS, LAYERS
 from reflowshock.fem.parallel.communicators import Communicators
@@ -50,8 +49,7 @@ class PackageReport:
         summary: dict[str, Any],
         timings: Timings,
     ) -> dict[str, Any]:
-        """Return metrics, health, effects, verdicts on the joints, and the coupling."""
-        verdicts = judge(failure_criteria(self.request.shock.failure), arrays)
+        """Return metrics, health, effects and the coupling."""
         coupling = coupling_of(self.request, outcome.coupling)
         residual = outcome.history.balance.force_residual, FORCE_RESIDUAL_LIMIT
         return {
@@ -59,11 +57,9 @@ class PackageReport:
             | health_metrics(outcome.history, arrays)
             | shock_metrics(arrays)
             | acceleration_metrics(arrays, self.request)
-            | {"peak_neglected_strain": quantity(outcome.neglected_strain)}
-            | failure_metrics(verdicts),
-            "health": health(self.request, outcome, {"interface_force_residual": residual}) | worst(verdicts),
+            | {"peak_neglected_strain": quantity(outcome.neglected_strain)},
+            "health": health(self.request, outcome, {"interface_force_residual": residual}),
             "effects": effects(self.request, summary, outcome.neglected_strain),
-            "failure": verdicts,
             "coupling": coupling | {"placement": timings.balance},
         }
 
@@ -131,8 +127,10 @@ def acceleration_metrics(arrays: Mapping[str, NDArray], request: RunInput) -> di
     """Return the peaks of the package's acceleration after the filter; none of a board without a package."""
     chosen = shock_pulse(request.shock)
     found = package_acceleration(arrays, chosen.pulse, request.shock.filter) if arrays["die_centre"].any() else None
-    peaks = found.peaks_in_g("package") if found else {}
-    return {name: quantity(value, "G") for name, value in peaks.items()}
+    if found is None:
+        return {}
+    peaks = {name: quantity(value, "G") for name, value in found.peaks_in_g("package").items()}
+    return peaks | {"acceleration_filter": quantity(request.shock.filter.label)}
 
 
 def flow_metrics(arrays: Mapping[str, NDArray]) -> dict[str, Any]:
@@ -144,11 +142,6 @@ def flow_metrics(arrays: Mapping[str, NDArray]) -> dict[str, Any]:
         "peak_plastic_strain": quantity(float(arrays["plastic_strain_max"].max())),
         "peak_plastic_work_density": quantity(work, "J/m^3"),
     }
-
-
-def failure_metrics(verdicts: Verdicts) -> dict[str, Any]:
-    """Return how many joints fail, where they are judged."""
-    return {"failed_joints": quantity(len(failed_joints(verdicts)))} if verdicts else {}
 
 
 def effects(request: RunInput, summary: dict[str, Any], neglected_strain: float) -> dict[str, Any]:
@@ -176,5 +169,4 @@ def effects(request: RunInput, summary: dict[str, Any], neglected_strain: float)
         },
         "finite_rotation": {"on": finite, "why": why},
         **material_effects(request.materials.by_role),
-        **failure_effect(request.shock.failure),
     }

@@ -138,8 +138,11 @@ def point_metrics(arrays: Mapping[str, NDArray]) -> dict[str, Any]:
 def acceleration_metrics(arrays: Mapping[str, NDArray], request: StructureInput) -> dict[str, Any]:
     """Return the peaks of the accelerations of watch points after the filter."""
     found = watch_accelerations(arrays, request, pulses_of(request.loads))
+    if not found:
+        return {}
     peaks = [course.peaks_in_g(name) for name, course in found.items()]
-    return {metric: quantity(value, "G") for point in peaks for metric, value in point.items()}
+    metrics = {metric: quantity(value, "G") for point in peaks for metric, value in point.items()}
+    return metrics | {"acceleration_filter": quantity(request.dynamics.filter.label)}
 
 
 def layer_metrics(peaks: dict[str, dict[str, float]]) -> dict[str, Any]:
