@@ -207,5 +207,7 @@ def held_by_supports(mesh: MeshData, problem: StructureProblem) -> NDArray[np.bo
     rules += [(f"{axis}_min", (axis,)) for axis in problem.structure.symmetry]
     held = np.zeros((len(mesh.points), 3), dtype=bool)
     for name, components in rules:
-        held[np.ix_(np.unique(facet_set(mesh, name)), np.array([AXES.index(axis) for axis in components]))] = True
+        held[np.ix_(np.unique(facet_set(mesh, name)), np.array([AXES.index(axis) for axis in components], np.intp))] = (
+            True
+        )
     return held
