@@ -15,7 +15,7 @@ from reflowshock.workflow.report.curves import ENERGIES, MILLI, STYLE, svg
 from reflowshock.workflow.report.tables import costs
 from reflowshock.workflow.structure.case import StructureCase
 from reflowshock.workflow.structure.findings import read_history, read_modes
-from reflowshock.workflow.structure.records import acceleration_curves, spectrum_curves
+from reflowshock.workflow.structure.record_curves import acceleration_curves, spectrum_curves
 from reflowshock.workflow.structure.references import Published
 from reflowshock.workflow.structure.stages import read_results
 
