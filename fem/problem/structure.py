@@ -165,7 +165,7 @@ class PointMass(Parameters):
 
     mass: Annotated[float, Quantity("g")] = Field(gt=0)
     at: Annotated[tuple[float, float, float], Quantity("mm")]
-    footprint: Annotated[tuple[PositiveLength, PositiveLength] | None, Quantity("mm")] = None
+    footprint: Annotated[tuple[PositiveLength, PositiveLength], Quantity("mm")] | None = None
 
 
 class Pulsed(Parameters):
