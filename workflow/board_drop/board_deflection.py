@@ -11,7 +11,6 @@ import numpy as np
 from reflowshock.effect import Decision
 from reflowshock.fem.estimates.drop_effects import Deflection, called_for
 from reflowshock.fem.materials.kinematics import Kinematics
-from reflowshock.workflow.board_drop import shock_cooling
 
 if TYPE_CHECKING:
     from reflowshock.fem.materials.parameters import Material
@@ -81,7 +80,7 @@ def first_mode_peak(omega: float, velocity: Callable[[float], float], duration: 
 
 def decide_kinematics(case: "BoardDropCase") -> tuple[Kinematics, str]:
     """Return the kinematics that the deflection of the board calls for, and why; errors as ``expected_deflection``."""
-    return called_for(expected_deflection(case).largest / case.board.thickness, shock_cooling.is_wanted(case))
+    return called_for(expected_deflection(case).largest / case.board.thickness, case.cooled)
 
 
 def decided(case: "BoardDropCase") -> "BoardDropCase":
@@ -132,7 +131,7 @@ class DropScene:
     @property
     def cooled(self) -> bool:
         """Whether the shock begins with the stress of cooling."""
-        return shock_cooling.is_wanted(self.case)
+        return self.case.cooled
 
     @property
     def duration(self) -> float:

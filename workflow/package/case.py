@@ -138,6 +138,11 @@ class BoardDropCase(PackageCase):
     shock: Shock
 
     @property
+    def cooled(self) -> bool:
+        """Whether shocks begin with the stress of cooling."""
+        return self.thermal is not None and self.thermal.effects.residual_stress == "on"
+
+    @property
     def pipeline(self) -> Pipeline:
         """The stages: those of the package, then the shock."""
         return package_pipeline(heated=self.thermal is not None, dropped=True)
