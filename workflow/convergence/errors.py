@@ -5,7 +5,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import brentq
 
 from reflowshock.workflow.convergence.series import Quantity, StudyRun, Values
 
@@ -128,6 +127,8 @@ def richardson(sizes: Sequence[float], values: Sequence[Values], order: float | 
 
     if excess(ORDER_MARGIN) * excess(LARGEST_ORDER) > 0.0:
         return None
+    from scipy.optimize import brentq  # reports and plans start without it
+
     observed = float(brentq(excess, ORDER_MARGIN, LARGEST_ORDER))
     if order is not None and abs(observed - order) > ORDER_MARGIN:
         return None

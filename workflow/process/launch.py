@@ -106,6 +106,8 @@ QUIET = ("--mca", "orte_execute_quiet", "1")  # of Open MPI 4; 5 has no option -
 # In front of a command: the system sends the signal when the process that starts it ends, however that happens.
 END_WITH_PARENT = ("setpriv", "--pdeathsig", "TERM")
 DIE_WITH_PARENT = ("setpriv", "--pdeathsig", "KILL")
+# Options of env: Open MPI would take a stage that is a step of Slurm for one of the ranks that srun starts.
+OWN_STEP = "-u SLURM_STEPID -u SLURM_STEP_ID"
 ENDINGS: dict[int, str] = {
     signal.SIGKILL: "was killed, probably because memory ran out",
     signal.SIGXFSZ: "was ended because a file exceeded the largest allowed size (ulimit -f)",
