@@ -1,26 +1,31 @@
 """All kinds of case: one record each, with all that the program does with a case of that kind."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Protocol
 
 from rich.console import RenderableType
 
+from reflowshock.effect import Effect
+from reflowshock.fem.estimates.structure_effects import STRUCTURE_EFFECTS
+from reflowshock.fem.estimates.thermal_effects import HEATED_EFFECTS
 from reflowshock.names import nearest
+from reflowshock.particles.parameters.effects import LIQUID_EFFECTS
 from reflowshock.problem import Problem
 from reflowshock.workflow.board_drop import problems as package_checks
-from reflowshock.workflow.board_drop import shock_effects
 from reflowshock.workflow.board_drop import stages as package_stages
 from reflowshock.workflow.board_drop.forecast import forecast, package_size
 from reflowshock.workflow.board_drop.plan import package_tables
+from reflowshock.workflow.board_drop.shock_effects import SHOCK_EFFECTS
 from reflowshock.workflow.case.case import Case
-from reflowshock.workflow.case.forecast import Size, Toggle
+from reflowshock.workflow.case.forecast import Size
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.case.run import StageFunction
 from reflowshock.workflow.convergence.series import ConvergenceStudy
 from reflowshock.workflow.package.case import BoardDropCase, PackageCase
 from reflowshock.workflow.reflow.stage import reflow
+from reflowshock.workflow.report.errors import Discretisation
 from reflowshock.workflow.solder import case as solder_case
 from reflowshock.workflow.solder import stages as solder_stages
 from reflowshock.workflow.solder.case import DropCase, DropsCase, JointCase, OscillationCase
@@ -58,7 +63,8 @@ class Kind:
         acts: what its effects belong to, for readers.
         report: adds its sections to the context of a report: run folder, case, context, summary.
         study: its convergence study.
-        toggles: effect -> the case with that effect the other way, where the forecast knows what it costs.
+        effects: those that it may call for.
+        conclude: adds to a summary what follows from all stages: run folder, case, summary, discretisation errors.
     """
 
     case: type[Case]
@@ -70,7 +76,8 @@ class Kind:
     acts: str
     report: Callable[[Path, Any, dict, dict], None]
     study: Callable[[Any], ConvergenceStudy]
-    toggles: Callable[[Any], Mapping[str, Toggle]] = lambda case: {}
+    effects: Sequence[Effect]
+    conclude: Callable[[Path, Any, dict, Discretisation], None] = lambda folder, case, summary, known: None
 
     @property
     def name(self) -> str:
@@ -89,6 +96,12 @@ def _board_drop_report(run_folder: Path, case: BoardDropCase, context: dict, sum
 
     _package_report(run_folder, case, context, summary)
     add_shock(run_folder, case, context, summary)
+
+
+def _conclude_drop(run_folder: Path, case: BoardDropCase, summary: dict, known: Discretisation) -> None:
+    from reflowshock.workflow.package_report.conclusion import conclude
+
+    conclude(run_folder, case, summary, known)
 
 
 def _structure_report(run_folder: Path, case: StructureCase, context: dict, summary: dict) -> None:
@@ -135,6 +148,7 @@ def _solder_kind(case: type[Case], problems: Callable[[Any], list[Problem]], ref
         "reflow",
         _solder_report,
         _solder_study,
+        LIQUID_EFFECTS,
     )
 
 
@@ -153,7 +167,7 @@ PACKAGE = Kind(
     acts="reflow",
     report=_package_report,
     study=_package_study,
-    toggles=shock_effects.toggles,
+    effects=(*LIQUID_EFFECTS, *HEATED_EFFECTS),
 )
 BOARD_DROP = replace(
     PACKAGE,
@@ -162,6 +176,8 @@ BOARD_DROP = replace(
     stages={**PACKAGE.stages, "shock": package_stages.shock},
     acts="reflow and shock",
     report=_board_drop_report,
+    effects=(*PACKAGE.effects, *SHOCK_EFFECTS),
+    conclude=_conclude_drop,
 )
 STRUCTURE = Kind(
     case=StructureCase,
@@ -177,7 +193,7 @@ STRUCTURE = Kind(
     acts="motion",
     report=_structure_report,
     study=_structure_study,
-    toggles=structure_forecast.toggles,
+    effects=STRUCTURE_EFFECTS,
 )
 KINDS = (
     BOARD_DROP,

@@ -4,7 +4,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from reflowshock.workflow.case.units import from_si
+from reflowshock.units import from_si
 from reflowshock.workflow.process.terminal import styled
 from reflowshock.workflow.store.point import Point
 from reflowshock.workflow.store.state import StageState, examine

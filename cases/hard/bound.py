@@ -5,7 +5,7 @@ import re
 from dataclasses import dataclass
 
 from reflowshock.cases.hard.trial import Measured
-from reflowshock.workflow.case.units import UnitError, dimension, in_unit, quantity_in_si, to_si
+from reflowshock.units import UnitError, dimension, in_unit, quantity_in_si, to_si
 
 TEXT = re.compile(r"\s*(?P<sign><=|>=|<|>|)\s*(?P<quantity>.*?)\s*")
 PURE = re.compile(r"(?P<number>[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(?P<percent>%?)")

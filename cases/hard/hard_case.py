@@ -13,11 +13,12 @@ from reflowshock.cases.hard.bound import Bound, read_bound
 from reflowshock.cases.hard.trial import FAMILIES, Trial, trials
 from reflowshock.names import nearest
 from reflowshock.problem import Problem, as_toml
+from reflowshock.quantity import Quantity
+from reflowshock.units import UnitError
 from reflowshock.workflow.case import fields
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.case.scales import dotted
 from reflowshock.workflow.case.toml_file import read_toml
-from reflowshock.workflow.case.units import UnitError
 from reflowshock.workflow.case.validation import translate
 from reflowshock.workflow.pipeline.reader import set_value
 
@@ -40,7 +41,7 @@ class HardCaseFile(BaseModel):
     why: str
     trial: str
     expect: str = ""
-    deadline: Annotated[float, "s"] = Field(DEADLINE, gt=0)
+    deadline: Annotated[float, Quantity("s")] = Field(DEADLINE, gt=0)
     parameters: dict = {}
     vary: dict = {}
     bounds: dict = {}

@@ -9,7 +9,7 @@ from typing import Any
 from reflowshock.cases.hard.bound import Bound
 from reflowshock.cases.hard.hard_case import HardCase
 from reflowshock.cases.hard.trial import Measured, Refused
-from reflowshock.workflow.case.units import UnitError
+from reflowshock.units import UnitError
 
 LARGEST_SHOWN = 1000.0  # margin
 

@@ -16,7 +16,15 @@ from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.mesh.point_shares import point_shares
 from reflowshock.fem.mesh.point_table import PointTable, Support, point_table
 from reflowshock.fem.mesh.tie import tie_joints
-from reflowshock.fem.problem.structure import AXES, InputG, PointForce, PrescribedMotion, Pressure, StructureProblem
+from reflowshock.fem.problem.structure import (
+    AXES,
+    AtPoint,
+    InputG,
+    OnAreas,
+    OnNodes,
+    PrescribedMotion,
+    StructureProblem,
+)
 
 Shares = tuple[NDArray[np.integer], NDArray[np.float64]]
 NODES = {"hexahedron": 8, "tetrahedron": 4, "tetrahedron_quadratic": 10}
@@ -81,12 +89,12 @@ def structure_tables(whole: Whole, problem: StructureProblem) -> StructureTables
         LoadError: A facet set without facets, a force outside, or a prescribed motion of what is held.
     """
     mesh, tie = whole.mesh, whole.tie
-    moved = [load.on for load in problem.loads.values() if isinstance(load, PrescribedMotion)]
+    moved = [load.on for load in problem.loads.values() if isinstance(load, OnNodes)]
     sets = [*(support.on for support in problem.supports.values()), *moved]
     nodes_of: dict[str, NDArray[np.integer]] = {}
     for name in sets:  # slaves follow their masters
         nodes_of[name] = np.setdiff1d(facet_set(mesh, name), tie.slave)
-    pressed = {load.on for load in problem.loads.values() if isinstance(load, Pressure)}
+    pressed = {load.on for load in problem.loads.values() if isinstance(load, OnAreas)}
     held = held_by_supports(mesh, problem)
     check_motions(problem, nodes_of, held)
     check_shaken(problem, nodes_of, held)
@@ -109,7 +117,7 @@ def pushed_nodes(mesh: MeshData, problem: StructureProblem) -> dict[str, Shares]
     """Return the nodes at forces and their shares, see ``StructureTables.pushed``; errors as ``structure_tables``."""
     found: dict[str, Shares] = {}
     for name, load in problem.loads.items():
-        if isinstance(load, PointForce):
+        if isinstance(load, AtPoint):
             nodes, shares = point_shares(mesh, f"loads.{name}.at", load.at)
             found[name] = nodes, shares * 0.5 ** len(problem.structure.planes_at(load.at))
     return found

@@ -10,13 +10,6 @@ from reflowshock.fem.loads.pulse_table import read_pulse
 from reflowshock.fem.problem.structure import InputG, StructureLoad
 
 SHAPES: dict[str, type[HalfSine] | type[Haversine]] = {"half_sine": HalfSine, "haversine": Haversine}
-QUANTITY = {
-    "input_g": "acceleration",
-    "gravity": "acceleration",
-    "pressure": "pressure",
-    "motion": "velocity",
-    "point_force": "force",
-}
 
 
 def pulses_of(loads: Mapping[str, StructureLoad]) -> dict[str, Pulse]:
@@ -31,7 +24,7 @@ def pulses_of(loads: Mapping[str, StructureLoad]) -> dict[str, Pulse]:
 def pulse_of(load: StructureLoad) -> Pulse:
     """Return the pulse of a load, in its own unit; errors as ``pulses_of``."""
     if load.table is not None:
-        return read_pulse(Path(load.table), QUANTITY[load.kind])
+        return read_pulse(Path(load.table), load.quantity)
     if isinstance(load, InputG) and load.service_condition is not None:
         return service_condition(load.service_condition)
     if load.peak is None:

@@ -1,6 +1,6 @@
 """Parameters of materials: elasticity of three symmetries, thermal expansion, plasticity of Johnson and Cook.
 
-All values are SI floats; see ``meshing.board.parameters`` for what the unit strings mean.
+All values are SI floats; ``Quantity`` has the unit in which a user sees them.
 """
 
 import math
@@ -10,12 +10,13 @@ from pydantic import Field, ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
 
 from reflowshock.parameters import Parameters
+from reflowshock.quantity import Quantity
 
-Pressure = Annotated[float, "GPa"]
-Stress = Annotated[float, "MPa"]
-Density = Annotated[float, "kg/m^3"]
-Temperature = Annotated[float, "degC"]
-Expansion = Annotated[float | None, "ppm/K"]
+Pressure = Annotated[float, Quantity("GPa")]
+Stress = Annotated[float, Quantity("MPa")]
+Density = Annotated[float, Quantity("kg/m^3")]
+Temperature = Annotated[float, Quantity("degC")]
+Expansion = Annotated[float | None, Quantity("ppm/K")]
 
 
 class Expanding(Parameters):
@@ -72,7 +73,7 @@ class JohnsonCook(Parameters):
     B: Stress = Field(0.0, ge=0)
     n: float = Field(1.0, gt=0, le=1)
     C: float = Field(0.0, ge=0)
-    reference_rate: Annotated[float, "s^-1"] = Field(1.0, gt=0)
+    reference_rate: Annotated[float, Quantity("s^-1")] = Field(1.0, gt=0)
     room_temperature: Temperature = Field(298.15, gt=0)
     melting_temperature: Temperature = Field(490.15, gt=0)
     m: float = Field(1.0, gt=0)

@@ -1,7 +1,5 @@
-"""Processes that a process starts: apart from its MPI job, and no longer than it lives. Loads no MPI."""
+"""The environment of processes that a process starts: apart from its MPI job. Loads no MPI."""
 
-import multiprocessing
-import os
 from collections.abc import Mapping
 
 # What Open MPI leaves in the environment of a process that initialised MPI. An mpirun, or a child, that inherits it
@@ -18,14 +16,3 @@ OTHER_MPI_JOB = (
 def own_environment(environment: Mapping[str, str]) -> dict[str, str]:
     """Return an environment without the traces of an MPI job that this process may be part of."""
     return {name: value for name, value in environment.items() if not name.startswith(OTHER_MPI_JOB)}
-
-
-def end_with_parent() -> None:
-    """Wait, in a thread of a process that multiprocessing started, until the parent has ended; then end this process.
-
-    Where the parent was killed, its children would compete with those of the run that continues.
-    """
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)

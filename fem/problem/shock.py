@@ -1,6 +1,6 @@
 """Parameters of the drop shock: pulse, coupling, ranks.
 
-All values are SI floats; see ``meshing.board.parameters`` for what the unit strings mean.
+All values are SI floats; ``Quantity`` has the unit in which a user sees them.
 """
 
 import math
@@ -9,7 +9,9 @@ from typing import Annotated, Literal
 from pydantic import Field, ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
 
+from reflowshock.fem.problem.failure import Failure
 from reflowshock.parameters import Parameters
+from reflowshock.quantity import Quantity
 
 MOST_RANKS = 100_000  # of one run
 MOST_LEVELS = 4  # below the window, that "auto" tries
@@ -87,11 +89,11 @@ class JointCoupling(Coupling):
 class Damping(Parameters):
     """Rayleigh damping C = alpha M + beta K, given as coefficients or as ratios of critical damping at a frequency."""
 
-    mass_coefficient: Annotated[float, "Hz"] = Field(0.0, ge=0)
-    stiffness_coefficient: Annotated[float, "us"] = Field(0.0, ge=0)
+    mass_coefficient: Annotated[float, Quantity("Hz")] = Field(0.0, ge=0)
+    stiffness_coefficient: Annotated[float, Quantity("us")] = Field(0.0, ge=0)
     mass_ratio: float = Field(0.0, ge=0, lt=1)
     stiffness_ratio: float = Field(0.0, ge=0, lt=1)
-    frequency: Annotated[float | None, "Hz"] = Field(None, gt=0)
+    frequency: Annotated[float | None, Quantity("Hz")] = Field(None, gt=0)
 
     @property
     def coefficients(self) -> tuple[float, float]:
@@ -112,7 +114,7 @@ class ShockNumerics(Parameters):
 
     modes: tuple[Literal["two_scale", "dns"], ...] = ("two_scale", "dns")
     dns_solver: Literal["explicit", "implicit"] = "explicit"
-    dns_duration: Annotated[float | None, "ms"] = Field(None, gt=0)
+    dns_duration: Annotated[float | None, Quantity("ms")] = Field(None, gt=0)
     step_fraction: float = Field(0.9, gt=0, le=0.95)
     critical_step: Literal["element", "power_iteration"] = "element"
     kinematics: Literal["auto", "small", "finite"] = "small"
@@ -121,8 +123,8 @@ class ShockNumerics(Parameters):
     history_samples: int = Field(600, ge=2)
     field_samples: int = Field(12, ge=2)
     energy_balance_limit: float = Field(0.02, gt=0)
-    checkpoint_seconds: Annotated[float, "s"] = Field(60.0, gt=0)
-    watchdog_seconds: Annotated[float, "s"] = Field(60.0, gt=0)
+    checkpoint_seconds: Annotated[float, Quantity("s")] = Field(60.0, gt=0)
+    watchdog_seconds: Annotated[float, Quantity("s")] = Field(60.0, gt=0)
 
     @field_validator("kinematics")
     @classmethod
@@ -142,16 +144,6 @@ class ShockNumerics(Parameters):
         return self.kinematics
 
 
-class Failure(Parameters):
-    """What the solder at the pads of a joint may bear; a criterion without a limit is not computed.
-
-    ``peel_stress`` is the average over a pad, ``plastic_work_density`` that of the layer of elements at it.
-    """
-
-    peel_stress: Annotated[float | None, "MPa"] = Field(None, gt=0)
-    plastic_work_density: Annotated[float | None, "kJ/m^3"] = Field(None, gt=0)
-
-
 class Shock(Parameters):
     """Input-G at the mounting holes, package facing down (JESD22-B111; H 4.4).
 
@@ -163,11 +155,11 @@ class Shock(Parameters):
     """
 
     service_condition: ServiceCondition | None = None
-    peak_acceleration: Annotated[float | None, "G"] = Field(None, gt=0)
-    pulse_duration: Annotated[float | None, "ms"] = Field(None, gt=0)
+    peak_acceleration: Annotated[float | None, Quantity("G")] = Field(None, gt=0)
+    pulse_duration: Annotated[float | None, Quantity("ms")] = Field(None, gt=0)
     table: str | None = None
-    duration: Annotated[float, "ms"] = Field(gt=0)
-    picture_times: Annotated[tuple[Annotated[float, Field(ge=0)], ...], "ms"] = ()
+    duration: Annotated[float, Quantity("ms")] = Field(gt=0)
+    picture_times: Annotated[tuple[Annotated[float, Field(ge=0)], ...], Quantity("ms")] = ()
     identical_joints: bool = False
     method: Literal["direct", "large_mass"] = "direct"
     gravity: Literal["auto", "on", "off"] = "auto"

@@ -1,12 +1,12 @@
 """Parameters of a structure: a box of layers, its supports and loads, and how its motion is computed.
 
-All values are SI floats; see ``meshing.board.parameters`` for what the unit strings mean. A unit beside a tuple is
-that of each of its items. Tables of named members are dictionaries, so that one value of one member can be set.
+All values are SI floats; ``Quantity`` has the unit in which a user sees them, that of a tuple each of its items.
+Tables of named members are dictionaries, so that one value of one member can be set.
 """
 
 import math
 from collections.abc import Mapping
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal, get_args
 
 from pydantic import Field
 
@@ -14,6 +14,7 @@ from reflowshock.fem.materials.library import LIBRARY
 from reflowshock.fem.materials.parameters import Material
 from reflowshock.fem.problem.shock import MOST_RANKS, Coupling, Damping, ServiceCondition
 from reflowshock.parameters import Parameters
+from reflowshock.quantity import Quantity
 
 AXES = "xyz"
 ROUNDING = 1e-9  # of the box: closer than that is the same place
@@ -32,7 +33,7 @@ class Layer(Parameters):
     """
 
     material: str
-    thickness: Annotated[float, "mm"] = Field(gt=0)
+    thickness: Annotated[float, Quantity("mm")] = Field(gt=0)
     cells: int = Field(1, ge=1, le=1000)
     in_plane: tuple[Cells, Cells] | None = None
 
@@ -40,8 +41,8 @@ class Layer(Parameters):
 class Holes(Parameters):
     """Four mounting holes at (+-spacing/2), through all layers; their walls are the facet set ``mounting_holes``."""
 
-    spacing: Annotated[tuple[float, float], "mm"]
-    diameter: Annotated[float, "mm"] = Field(gt=0)
+    spacing: Annotated[tuple[float, float], Quantity("mm")]
+    diameter: Annotated[float, Quantity("mm")] = Field(gt=0)
 
 
 class Structure(Parameters):
@@ -52,8 +53,8 @@ class Structure(Parameters):
     multiplies all numbers of elements, along and across the layers, each rounded and at least one.
     """
 
-    length: Annotated[float, "mm"] = Field(gt=0)
-    width: Annotated[float, "mm"] = Field(gt=0)
+    length: Annotated[float, Quantity("mm")] = Field(gt=0)
+    width: Annotated[float, Quantity("mm")] = Field(gt=0)
     cells: tuple[Cells, Cells]
     refine: float = Field(1.0, gt=0, le=100)
     layers: dict[str, Layer]
@@ -125,72 +126,111 @@ class Pulsed(Parameters):
 
     ``half_sine`` and ``haversine``, its square, act for ``duration``; ``constant`` from the start, for ``duration`` or
     to the end. ``table`` is a CSV file of times and values and stands instead of peak and pulse.
+
+    Attributes:
+        effect: Its name among the effects of a run.
+        quantity: What its values are, a key of ``fem.loads.pulse_table.QUANTITIES``.
     """
 
+    effect: ClassVar[str]
+    quantity: ClassVar[str]
     pulse: Literal["half_sine", "haversine", "constant"] = "half_sine"
-    duration: Annotated[float | None, "ms"] = Field(None, gt=0)
+    duration: Annotated[float | None, Quantity("ms")] = Field(None, gt=0)
     table: str | None = None
 
 
-class InputG(Pulsed):
+class OnBody(Pulsed):
+    """A load of the whole body, along ``direction``."""
+
+    direction: Direction
+
+
+class OnNodes(Pulsed):
+    """A load of the nodes of a facet set."""
+
+    on: str
+
+
+class OnAreas(Pulsed):
+    """A load per area of a facet set."""
+
+    on: str
+
+
+class AtPoint(Pulsed):
+    """A load at a point, along ``direction``."""
+
+    at: Annotated[tuple[float, float, float], Quantity("mm")]
+    direction: Direction
+
+
+class InputG(OnBody):
     """Acceleration of all supports along ``direction``; displacements are relative to them with ``direct``.
 
     Given by a JEDEC service condition, by peak and duration, or by a table.
     """
 
+    effect: ClassVar = "input_g"
+    quantity: ClassVar = "acceleration"
     kind: Literal["input_g"] = "input_g"
     service_condition: ServiceCondition | None = None
-    peak: Annotated[float | None, "G"] = Field(None, gt=0)
+    peak: Annotated[float | None, Quantity("G")] = Field(None, gt=0)
     direction: Direction = (0.0, 0.0, 1.0)
     method: Literal["direct", "large_mass"] = "direct"
 
 
-class Pressure(Pulsed):
+class Pressure(OnAreas):
     """Pressure on a facet set, positive where it pushes into the body; it follows the surface in finite kinematics."""
 
+    effect: ClassVar = "pressure"
+    quantity: ClassVar = "pressure"
     kind: Literal["pressure"] = "pressure"
-    on: str
-    peak: Annotated[float | None, "MPa"] = None
+    peak: Annotated[float | None, Quantity("MPa")] = None
 
 
-class PrescribedMotion(Pulsed):
+class PrescribedMotion(OnNodes):
     """Velocity of one component of a facet set."""
 
+    effect: ClassVar = "prescribed_motion"
+    quantity: ClassVar = "velocity"
     kind: Literal["motion"] = "motion"
-    on: str
     component: Axis
-    peak: Annotated[float | None, "m/s"] = None
+    peak: Annotated[float | None, Quantity("m/s")] = None
 
 
-class Gravity(Pulsed):
+class Gravity(OnBody):
     """Weight, constant unless a pulse or a table says otherwise."""
 
+    effect: ClassVar = "gravity"
+    quantity: ClassVar = "acceleration"
     kind: Literal["gravity"] = "gravity"
     pulse: Literal["half_sine", "haversine", "constant"] = "constant"
-    peak: Annotated[float, "m/s^2"] = Field(9.80665, gt=0)
+    peak: Annotated[float, Quantity("m/s^2")] = Field(9.80665, gt=0)
     direction: Direction = (0.0, 0.0, -1.0)
 
 
-class PointForce(Pulsed):
+class PointForce(AtPoint):
     """Force at a point, shared by the nodes of the element there; its direction stays also where the body turns.
 
     It is the force on the whole body: with a plane of symmetry its mirror image acts as well, and of a force on that
     plane each half bears half. Strains within an element of the point depend on the mesh.
     """
 
+    effect: ClassVar = "point_force"
+    quantity: ClassVar = "force"
     kind: Literal["point_force"] = "point_force"
-    at: Annotated[tuple[float, float, float], "mm"]
-    direction: Direction
-    peak: Annotated[float | None, "N"] = Field(None, gt=0)
+    peak: Annotated[float | None, Quantity("N")] = Field(None, gt=0)
 
 
-StructureLoad = Annotated[InputG | Pressure | PrescribedMotion | Gravity | PointForce, Field(discriminator="kind")]
+AnyLoad = InputG | Gravity | Pressure | PrescribedMotion | PointForce
+StructureLoad = Annotated[AnyLoad, Field(discriminator="kind")]
+KINDS: tuple[type[Pulsed], ...] = get_args(AnyLoad)
 
 
 class WatchPoint(Parameters):
     """A point whose displacement, velocity, strain and stress are recorded."""
 
-    at: Annotated[tuple[float, float, float], "mm"]
+    at: Annotated[tuple[float, float, float], Quantity("mm")]
 
 
 class LayerCoupling(Coupling):
@@ -216,15 +256,15 @@ class DynamicsNumerics(Parameters):
 
     step_fraction: float = Field(0.9, gt=0, le=0.99)
     critical_step: Literal["element", "power_iteration"] = "element"
-    explicit_step: Annotated[float | None, "us"] = Field(None, gt=0)
-    implicit_step: Annotated[float | None, "us"] = Field(None, gt=0)
+    explicit_step: Annotated[float | None, Quantity("us")] = Field(None, gt=0)
+    implicit_step: Annotated[float | None, Quantity("us")] = Field(None, gt=0)
     hht_alpha: float = Field(0.0, ge=-1 / 3, le=0)
     mass_scaled: tuple[str, ...] = ()
     energy_balance_limit: float = Field(0.02, gt=0)
     history_samples: int = Field(600, ge=2)
     field_samples: int = Field(12, ge=2)
-    checkpoint_seconds: Annotated[float, "s"] = Field(300.0, gt=0)
-    watchdog_seconds: Annotated[float, "s"] = Field(60.0, gt=0)
+    checkpoint_seconds: Annotated[float, Quantity("s")] = Field(300.0, gt=0)
+    watchdog_seconds: Annotated[float, Quantity("s")] = Field(60.0, gt=0)
 
 
 class Dynamics(Parameters):
@@ -233,10 +273,10 @@ class Dynamics(Parameters):
     ``dns`` is, where there is a coupling, one model at the smallest step instead of two.
     """
 
-    duration: Annotated[float, "ms"] = Field(gt=0)
+    duration: Annotated[float, Quantity("ms")] = Field(gt=0)
     solver: Literal["explicit", "implicit", "both", "dns"] = "explicit"
     kinematics: Literal["small", "finite"] = "small"
-    initial_velocity: Annotated[tuple[float, float, float], "m/s"] = (0.0, 0.0, 0.0)
+    initial_velocity: Annotated[tuple[float, float, float], Quantity("m/s")] = (0.0, 0.0, 0.0)
     damping: Damping = Damping()
     modes: int = Field(0, ge=0, le=200)
     ranks: int = Field(1, ge=1, le=MOST_RANKS)

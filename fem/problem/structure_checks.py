@@ -5,12 +5,14 @@ from collections.abc import Iterable, Iterator
 
 from reflowshock.fem.problem.structure import (
     AXES,
+    AtPoint,
     Gravity,
     InputG,
     LayerCoupling,
-    PointForce,
+    OnAreas,
+    OnBody,
+    OnNodes,
     PrescribedMotion,
-    Pressure,
     StructureLoad,
     StructureProblem,
 )
@@ -65,12 +67,12 @@ def _supports(problem: StructureProblem) -> Iterator[Problem]:
 
 
 def _load(key: str, load: StructureLoad, problem: StructureProblem) -> Iterator[Problem]:
-    if isinstance(load, Pressure | PrescribedMotion):
+    if isinstance(load, OnNodes | OnAreas):
         yield from unknown_name(f"{key}.on", load.on, problem.structure.facet_sets, "facet set")
-    if isinstance(load, PointForce):
+    if isinstance(load, AtPoint):
         yield from _inside(f"{key}.at", load.at, problem)
         yield from _in_hole(f"{key}.at", load.at, problem)
-    if isinstance(load, InputG | Gravity | PointForce) and not math.hypot(*load.direction) > 0.0:
+    if isinstance(load, OnBody | AtPoint) and not math.hypot(*load.direction) > 0.0:
         yield Problem(f"{key}.direction", "has no length", list(load.direction), "any vector but zero")
     if isinstance(load, InputG) and load.method == "direct" and not _is_held(problem):
         yield Problem(
@@ -126,15 +128,15 @@ def _left_behind(shaking: str, problem: StructureProblem) -> Iterator[Problem]:
 def _symmetry(problem: StructureProblem) -> Iterator[Problem]:
     """What both halves of a body do must be mirror images."""
     pushes = {f"loads.{name}.direction": load for name, load in problem.loads.items()}
-    vectors = {key: load.direction for key, load in pushes.items() if isinstance(load, InputG | Gravity)}
+    vectors = {key: load.direction for key, load in pushes.items() if isinstance(load, OnBody)}
     vectors["dynamics.initial_velocity"] = problem.dynamics.initial_velocity
     for axis in problem.structure.symmetry:
         for key, vector in vectors.items():
             yield from _across(axis, key, vector)
         for name, load in problem.loads.items():
-            if isinstance(load, PointForce) and axis in problem.structure.planes_at(load.at):
+            if isinstance(load, AtPoint) and axis in problem.structure.planes_at(load.at):
                 yield from _across(axis, f"loads.{name}.direction", load.direction)
-            if isinstance(load, Pressure) and load.on == f"{axis}_min":
+            if isinstance(load, OnAreas) and load.on == f"{axis}_min":
                 yield Problem(f"loads.{name}.on", "is a plane of symmetry inside the body", load.on, f"{axis}_max")
 
 

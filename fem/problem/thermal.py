@@ -1,6 +1,6 @@
 """Parameters of the reflow's temperatures: the process, what holds the package, which effects are called for.
 
-All values are SI floats; see ``meshing.board.parameters`` for what the unit strings mean.
+All values are SI floats; ``Quantity`` has the unit in which a user sees them.
 """
 
 from collections.abc import Iterator, Mapping
@@ -9,12 +9,13 @@ from typing import Annotated, Literal
 from pydantic import Field, ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
 
+from reflowshock.effect import Switch
 from reflowshock.fem.materials.parameters import Material, Temperature
 from reflowshock.parameters import Parameters
 from reflowshock.problem import Problem
+from reflowshock.quantity import Quantity
 
 KELVIN = 273.15
-Switch = Literal["auto", "on", "off"]
 
 
 class ThermalEffects(Parameters):
@@ -48,7 +49,7 @@ class Thermal(Parameters):
     final: Temperature = Field(25.0 + KELVIN, gt=0, validate_default=True)
     steps: int = Field(7, ge=1, le=200)
     package: Literal["floating", "moved"] = "floating"
-    corner_displacement: Annotated[float | None, "mm"] = Field(None, validate_default=True)
+    corner_displacement: Annotated[float | None, Quantity("mm")] = Field(None, validate_default=True)
     tolerance: float = Field(1e-3, gt=0, le=0.1)
     effects: ThermalEffects = ThermalEffects()
 

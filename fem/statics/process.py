@@ -4,20 +4,23 @@ The process is one rank: its factor is needed once and its solutions take a frac
 at once, and is waited for when it is asked for the first time. It ends with its parent, however that ends.
 """
 
-import multiprocessing
 import os
-import threading
-from contextlib import suppress
-from multiprocessing.connection import Connection
-from typing import Any, Self
+from concurrent.futures import Future
+from concurrent.futures.process import BrokenProcessPool
+from types import TracebackType
+from typing import TYPE_CHECKING, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from reflowshock.fem.parallel.own_job import end_with_parent, own_environment
+from reflowshock.fem.parallel.own_job import own_environment
 from reflowshock.fem.statics.state import Assembly, HeatedState, RigidModes
+from reflowshock.processes import ProcessPool
 
-GRACE = 5.0  # seconds that the process has to end when it is told to
+if TYPE_CHECKING:
+    from reflowshock.fem.statics.structure import ThermalStructure
+
+Answer = TypeVar("Answer")
 
 
 class StructureError(RuntimeError):
@@ -29,78 +32,54 @@ class StructureProcess:
 
     def __init__(self, assembly: Assembly) -> None:
         """Start to read and to factor."""
-        context = multiprocessing.get_context("spawn")
-        self._pipe, end = context.Pipe()
-        self._process = context.Process(target=_serve, args=(end, assembly), name="structure", daemon=True)
-        self._process.start()
-        end.close()
-        self._built: tuple[NDArray[np.float64], NDArray[np.bool_], RigidModes] | None = None
+        self._pool = ProcessPool(1)
+        self._built = self._pool.submit(_build, assembly)
 
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, *_: object) -> None:
-        self.close()
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._pool.__exit__(kind, error, trace)
 
     @property
     def points(self) -> NDArray[np.float64]:
         """Return the nodes ``(n, 3)`` [m] as drawn; this and all below wait for the factor and raise StructureError."""
-        return self._ready()[0]
+        return self._answer(self._built)[0]
 
     @property
     def package(self) -> NDArray[np.bool_]:
         """Return ``(n,)``: whether a node belongs to the package."""
-        return self._ready()[1]
+        return self._answer(self._built)[1]
 
     @property
     def rigid_modes(self) -> RigidModes:
         """Return the free rigid motions of the package."""
-        return self._ready()[2]
+        return self._answer(self._built)[2]
 
     def solve(
         self, temperature: float, corner: float, wrenches: NDArray[np.float64], rigid: NDArray[np.float64]
     ) -> HeatedState:
         """Return the state at a temperature [K], see ``state.Structure``."""
-        self._ready()
+        self._answer(self._built)
+        return self._answer(self._pool.submit(_solve, temperature, corner, wrenches, rigid))
+
+    def _answer(self, future: Future[Answer]) -> Answer:
         try:
-            self._pipe.send((temperature, corner, wrenches, rigid))
-        except OSError as error:
-            raise self._ended() from error
-        state: HeatedState = self._answer()
-        return state
-
-    def close(self) -> None:
-        """End the process."""
-        self._pipe.close()
-        self._process.join(GRACE)
-        if self._process.is_alive():  # it factors, and hears nothing
-            self._process.terminate()
-            self._process.join()
-
-    def _ready(self) -> tuple[NDArray[np.float64], NDArray[np.bool_], RigidModes]:
-        if self._built is None:
-            self._built = self._answer()
-        return self._built
-
-    def _answer(self) -> Any:
-        try:
-            answer = self._pipe.recv()
-        except (EOFError, OSError) as error:
-            raise self._ended() from error
-        if isinstance(answer, str):
-            raise StructureError(answer)
-        return answer
-
-    def _ended(self) -> StructureError:
-        self._process.join(GRACE)
-        code = self._process.exitcode
-        killed = ": it was killed, as the system does when memory is short" if code == -9 else ""
-        return StructureError(f"the process of the structure has ended with exit code {code}{killed}")
+            return future.result()
+        except BrokenProcessPool as error:
+            raise StructureError(f"the process of the structure has ended with {self._pool.ending()}") from error
+        except Exception as error:  # whatever it is there, it is the structure's
+            raise StructureError(str(error)) from error
 
 
-def _serve(pipe: Connection, assembly: Assembly) -> None:
-    """Build the structure and answer until the other end closes the pipe; errors are answered as text."""
-    threading.Thread(target=end_with_parent, daemon=True).start()
+_structure: "ThermalStructure"  # of the process that has built it
+
+
+def _build(assembly: Assembly) -> tuple[NDArray[np.float64], NDArray[np.bool_], RigidModes]:
+    """Build the structure, and keep it for `_solve`."""
+    global _structure
     own = own_environment(os.environ)
     os.environ.clear()
     os.environ.update(own)
@@ -108,16 +87,9 @@ def _serve(pipe: Connection, assembly: Assembly) -> None:
 
     from reflowshock.fem.statics.structure import ThermalStructure
 
-    with suppress(EOFError, BrokenPipeError):
-        try:
-            structure = ThermalStructure.build(MPI.COMM_SELF, assembly)
-        except Exception as error:  # whatever it is, the parent must hear of it
-            pipe.send(str(error))
-            return
-        pipe.send((structure.points, structure.package, structure.rigid_modes))
-        while True:
-            loads = pipe.recv()
-            try:
-                pipe.send(structure.solve(*loads))
-            except ValueError as error:
-                pipe.send(str(error))
+    _structure = ThermalStructure.build(MPI.COMM_SELF, assembly)
+    return _structure.points, _structure.package, _structure.rigid_modes
+
+
+def _solve(temperature: float, corner: float, wrenches: NDArray[np.float64], rigid: NDArray[np.float64]) -> HeatedState:
+    return _structure.solve(temperature, corner, wrenches, rigid)

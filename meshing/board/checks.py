@@ -5,10 +5,12 @@ from collections.abc import Iterator
 
 from reflowshock.meshing.board.pads import joint_name, lift, pad_table
 from reflowshock.meshing.board.parameters import Board, Package, Pad, Warpage
-from reflowshock.meshing.board.plan import hole_square, uniform
+from reflowshock.meshing.board.plan import WIDEST_SQUARE, square_around, uniform
 from reflowshock.problem import Problem
 
 SMALLEST_INSET = 0.75  # of a hole's diameter: leaves a quarter of it as a wall between hole and edge
+WIDE_HOLE = 0.25  # of a side of the board: a wider hole is probably the mistake, not the board
+SMALLEST_ROOM = SMALLEST_INSET * (1.0 + 0.5 * WIDEST_SQUARE)  # of a hole's diameter: from the edge to its block's end
 
 
 def problems(package: Package, board: Board, warpage: Warpage) -> list[Problem]:
@@ -94,20 +96,33 @@ def _layers(package: Package, board: Board) -> Iterator[Problem]:
 
 def _holes(package: Package, board: Board) -> Iterator[Problem]:
     """Holes lie inside the board, and the blocks around them beyond the package along both axes."""
-    smallest = SMALLEST_INSET * board.holes.diameter
-    for axis, side in (("x", "length"), ("y", "width")):
-        inset, whole = getattr(board.holes, f"inset_{axis}"), getattr(board, side)
-        taken = _taken_by_package(getattr(package.substrate, side), board) + 0.5 * hole_square(board)
-        largest = 0.5 * whole - taken
-        key, allowed = f"board.holes.inset_{axis}", f"{_mm(smallest)} to {_mm(largest)}"
-        if inset < smallest:
+    diameter, x, y = board.holes.diameter, board.holes.inset_x, board.holes.inset_y
+    for axis, side, inset, other in (("x", "length", x, y), ("y", "width", y, x)):
+        whole = getattr(board, side)
+        room = 0.5 * whole - _taken_by_package(getattr(package.substrate, side), board)
+        missing = SMALLEST_ROOM * diameter - room
+        # A block grows with its inset, until the inset along the other axis, or the hole, limits it.
+        largest = max(room - 0.5 * square_around(diameter, other), room / (1.0 + 0.5 * WIDEST_SQUARE))
+        key, allowed = f"board.holes.inset_{axis}", f"{_mm(SMALLEST_INSET * diameter)} to {_mm(largest)}"
+        if missing > 0.0:
+            yield _no_room(side, whole + 2.0 * missing, room, board)
+        elif inset < SMALLEST_INSET * diameter:
             yield Problem(key, "a mounting hole reaches beyond the board", _mm(inset), allowed)
-        elif largest < smallest:
-            message = "too small for the package, its patch and the mounting holes beside each other"
-            yield Problem(f"board.{side}", message, _mm(whole), f">= {_mm(2.0 * (taken + inset))}")
         elif inset > largest:
             message = "a mounting hole lies under or beside the package: it needs strips of the board of its own"
             yield Problem(key, message, _mm(inset), allowed)
+
+
+def _no_room(side: str, needed: float, room: float, board: Board) -> Problem:
+    """Say that the board is too small, or its holes too large: there is room [m] beside the package on each side."""
+    whole, diameter = getattr(board, side), board.holes.diameter
+    board_at_least = f">= {_mm(needed)}"
+    if room > 0.0 and diameter > WIDE_HOLE * whole:
+        message = "the mounting holes do not fit beside the package and its patch"
+        allowed = f"<= {_mm(room / SMALLEST_ROOM)}, or board.{side} {board_at_least}"
+        return Problem("board.holes.diameter", message, _mm(diameter), allowed)
+    message = "too small for the package, its patch and the mounting holes beside each other"
+    return Problem(f"board.{side}", message, _mm(whole), board_at_least)
 
 
 def _taken_by_package(side: float, board: Board) -> float:

@@ -1,7 +1,6 @@
 """Parameters of the geometry: array, pads, package, board, warpage.
 
-All values are SI floats. The second argument of ``Annotated`` is the unit in which a field is shown to a
-user; ``workflow.pipeline.reader`` converts the strings of a case file by it, once.
+All values are SI floats; ``Quantity`` has the unit in which a user sees them.
 """
 
 from typing import Annotated, Literal
@@ -9,8 +8,9 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from reflowshock.parameters import Parameters
+from reflowshock.quantity import Quantity
 
-Length = Annotated[float, "mm"]
+Length = Annotated[float, Quantity("mm")]
 
 
 class Pad(Parameters):

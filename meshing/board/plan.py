@@ -8,6 +8,7 @@ import numpy as np
 from reflowshock.meshing.board.parameters import Board, BoardNumerics, Package
 
 MOST_LINES = 100_000
+WIDEST_SQUARE = 1.6  # of a hole's distance from the edge: the side of the square around it
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,9 +81,13 @@ def package_axes(package: Package) -> tuple[tuple[Interval, ...], tuple[Interval
 
 
 def hole_square(board: Board) -> float:
-    """Side of the square around a mounting hole that is meshed as an O-grid [m]: twice the diameter, if it fits."""
-    holes = board.holes
-    return min(2.0 * holes.diameter, 1.6 * min(holes.inset_x, holes.inset_y))
+    """Side of the square around a mounting hole that is meshed as an O-grid [m]."""
+    return square_around(board.holes.diameter, min(board.holes.inset_x, board.holes.inset_y))
+
+
+def square_around(diameter: float, inset: float) -> float:
+    """Side of the square around a hole [m]: twice the diameter, if that fits between hole and edge."""
+    return min(2.0 * diameter, WIDEST_SQUARE * inset)
 
 
 def uniform(start: float, end: float, size: float) -> Interval:

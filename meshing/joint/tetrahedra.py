@@ -1,9 +1,7 @@
 """Tetrahedra in any closed surface by Gmsh: surface remeshed to a size, edges of pads kept."""
 
 import math
-import multiprocessing
 from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 
@@ -13,6 +11,7 @@ import numpy as np
 from reflowshock.meshing.board.blocks import MILLI
 from reflowshock.meshing.core.gmsh_session import gmsh_model
 from reflowshock.meshing.surface.closed_surface import BOARD_PAD, FREE, PACKAGE_PAD, ClosedSurface, pad_planes
+from reflowshock.processes import ProcessPool
 
 TRIANGLE, TETRAHEDRON = 2, 4  # Gmsh's element types
 LONGEST = 300.0  # seconds
@@ -73,16 +72,12 @@ def fill_apart(surface: ClosedSurface, size: float, cut_into_patches: bool) -> T
 
     The mesh does not depend on what Gmsh made before, and a surface on which it fails takes nothing else with it.
     """
-    others = set(multiprocessing.active_children())
-    with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
-        job = pool.submit(fill_with_tetrahedra, surface, size, cut_into_patches)
+    with ProcessPool(1) as pool:
         try:
-            return job.result(LONGEST)
+            return pool.submit(fill_with_tetrahedra, surface, size, cut_into_patches).result(LONGEST)
         except BrokenProcessPool as error:
             raise FreeFormError("Gmsh ended without a word") from error
         except TimeoutError as error:
-            for process in set(multiprocessing.active_children()) - others:
-                process.kill()
             raise FreeFormError(f"Gmsh: no mesh within {LONGEST:g} s") from error
 
 

@@ -21,6 +21,7 @@ from reflowshock.particles.parameters.solder import (
     Walls,
 )
 from reflowshock.particles.reference.drop_oscillation import rayleigh_frequency
+from reflowshock.quantity import Quantity
 
 PI = 3.14159265
 Direction = Literal["lift", "shift", "turn"]
@@ -39,7 +40,7 @@ class FloatingPackage(Parameters):
     weight over the number of its joints.
     """
 
-    load: Annotated[float, "mN"] = Field(0.0, ge=0)
+    load: Annotated[float, Quantity("mN")] = Field(0.0, ge=0)
     free: tuple[Direction, ...] = Field(("lift", "shift"), min_length=1)
 
 
@@ -49,9 +50,9 @@ class PackagePath(Parameters):
     What is not given stays as it was at the start.
     """
 
-    standoff: Annotated[float | None, "mm"] = Field(None, gt=0)
-    offset: Annotated[float | None, "mm"] = Field(None, ge=0)
-    tilt: Annotated[float | None, "deg"] = Field(None, gt=-PI / 6.0, lt=PI / 6.0)
+    standoff: Annotated[float | None, Quantity("mm")] = Field(None, gt=0)
+    offset: Annotated[float | None, Quantity("mm")] = Field(None, ge=0)
+    tilt: Annotated[float | None, Quantity("deg")] = Field(None, gt=-PI / 6.0, lt=PI / 6.0)
     steps: int = Field(10, ge=1, le=200)
 
 
@@ -64,13 +65,13 @@ class Drop(Parameters):
     With ``symmetry`` only half or a quarter of the drop is computed; volume and results are those of the whole.
     """
 
-    volume: Annotated[float, "mm^3"] = Field(gt=0)
-    contact_angle: Annotated[float | None, "deg"] = Field(None, gt=0, lt=PI)
-    receding_angle: Annotated[float | None, "deg"] = Field(None, gt=0, lt=PI)
-    advancing_angle: Annotated[float | None, "deg"] = Field(None, gt=0, lt=PI)
-    pad_radius: Annotated[float | None, "mm"] = Field(None, gt=0)
-    mask_contact_angle: Annotated[float, "deg"] = Field(math.radians(148.0), gt=0, lt=PI)
-    spacing: Annotated[float | None, "mm"] = Field(None, gt=0)
+    volume: Annotated[float, Quantity("mm^3")] = Field(gt=0)
+    contact_angle: Annotated[float | None, Quantity("deg")] = Field(None, gt=0, lt=PI)
+    receding_angle: Annotated[float | None, Quantity("deg")] = Field(None, gt=0, lt=PI)
+    advancing_angle: Annotated[float | None, Quantity("deg")] = Field(None, gt=0, lt=PI)
+    pad_radius: Annotated[float | None, Quantity("mm")] = Field(None, gt=0)
+    mask_contact_angle: Annotated[float, Quantity("deg")] = Field(math.radians(148.0), gt=0, lt=PI)
+    spacing: Annotated[float | None, Quantity("mm")] = Field(None, gt=0)
     particles_per_edge: int | None = Field(None, ge=5, le=50)
     symmetry: Literal["none", "half", "quarter"] = "none"
 
@@ -134,15 +135,15 @@ class Joint(Parameters):
     table joint.package (it floats) or joint.path (it is moved).
     """
 
-    volume: Annotated[float, "mm^3"] = Field(gt=0)
-    pad_bottom: Annotated[float, "mm"] = Field(gt=0)
-    pad_top: Annotated[float, "mm"] = Field(gt=0)
-    standoff: Annotated[float, "mm"] = Field(gt=0)
-    offset: Annotated[float, "mm"] = Field(0.0, ge=0)
-    tilt: Annotated[float, "deg"] = Field(0.0, gt=-PI / 6.0, lt=PI / 6.0)
-    pad_contact_angle: Annotated[float, "deg"] = Field(math.radians(5.0), gt=0, lt=PI)
-    mask_contact_angle: Annotated[float, "deg"] = Field(math.radians(148.0), gt=0, lt=PI)
-    spacing: Annotated[float, "mm"] = Field(4.0e-5, gt=0)
+    volume: Annotated[float, Quantity("mm^3")] = Field(gt=0)
+    pad_bottom: Annotated[float, Quantity("mm")] = Field(gt=0)
+    pad_top: Annotated[float, Quantity("mm")] = Field(gt=0)
+    standoff: Annotated[float, Quantity("mm")] = Field(gt=0)
+    offset: Annotated[float, Quantity("mm")] = Field(0.0, ge=0)
+    tilt: Annotated[float, Quantity("deg")] = Field(0.0, gt=-PI / 6.0, lt=PI / 6.0)
+    pad_contact_angle: Annotated[float, Quantity("deg")] = Field(math.radians(5.0), gt=0, lt=PI)
+    mask_contact_angle: Annotated[float, Quantity("deg")] = Field(math.radians(148.0), gt=0, lt=PI)
+    spacing: Annotated[float, Quantity("mm")] = Field(4.0e-5, gt=0)
     package: FloatingPackage | None = None
     path: PackagePath | None = None
 
@@ -198,9 +199,9 @@ class Liquid(Parameters):
     """
 
     parameters: Literal["physical", "paper"] = "physical"
-    density: Annotated[float | None, "kg/m^3"] = Field(None, gt=0)
-    surface_tension: Annotated[float | None, "N/m"] = Field(None, gt=0)
-    viscosity: Annotated[float | None, "Pa*s"] = Field(None, gt=0)
+    density: Annotated[float | None, Quantity("kg/m^3")] = Field(None, gt=0)
+    surface_tension: Annotated[float | None, Quantity("N/m")] = Field(None, gt=0)
+    viscosity: Annotated[float | None, Quantity("Pa*s")] = Field(None, gt=0)
 
     @property
     def properties(self) -> dict[str, float]:
@@ -216,8 +217,8 @@ class Fluid(Liquid, Walls):
     the viscosity.
     """
 
-    gravity: Annotated[float, "m/s^2"] = Field(9.81, ge=0)
-    process_time: Annotated[float, "s"] = Field(60.0, gt=0)
+    gravity: Annotated[float, Quantity("m/s^2")] = Field(9.81, ge=0)
+    process_time: Annotated[float, Quantity("s")] = Field(60.0, gt=0)
     effects: FlowEffects = FlowEffects()
     numerics: FlowNumerics = FlowNumerics()
 
@@ -247,12 +248,12 @@ class Drops(Parameters):
     With a contact angle they start as cubes on a wall and spread; without, there is no wall and they start as balls.
     """
 
-    volume_left: Annotated[float, "mm^3"] = Field(gt=0)
-    volume_right: Annotated[float, "mm^3"] = Field(gt=0)
-    distance: Annotated[float, "mm"] = Field(gt=0)
+    volume_left: Annotated[float, Quantity("mm^3")] = Field(gt=0)
+    volume_right: Annotated[float, Quantity("mm^3")] = Field(gt=0)
+    distance: Annotated[float, Quantity("mm")] = Field(gt=0)
     merge: bool = True
-    contact_angle: Annotated[float | None, "deg"] = Field(None, gt=0, lt=PI)
-    spacing: Annotated[float, "mm"] = Field(1.0e-4, gt=0)
+    contact_angle: Annotated[float | None, Quantity("deg")] = Field(None, gt=0, lt=PI)
+    spacing: Annotated[float, Quantity("mm")] = Field(1.0e-4, gt=0)
 
     @property
     def volumes(self) -> tuple[float, float]:
@@ -295,7 +296,7 @@ class Oscillation(Parameters):
     The amplitude is in radii, the duration in Rayleigh's periods.
     """
 
-    volume: Annotated[float, "mm^3"] = Field(gt=0)
+    volume: Annotated[float, Quantity("mm^3")] = Field(gt=0)
     amplitude: float = Field(0.1, gt=0, le=0.3)
     periods: float = Field(2.0, ge=1, le=50)
     particles_per_radius: int = Field(4, ge=2, le=20)

@@ -1,6 +1,6 @@
 """Parameters of the molten solder and of how its flow is computed.
 
-All values are SI floats; see ``meshing.board.parameters`` for what the unit strings mean.
+All values are SI floats; ``Quantity`` has the unit in which a user sees them.
 """
 
 import math
@@ -8,9 +8,9 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from reflowshock.effect import Switch
 from reflowshock.parameters import Parameters
-
-Switch = Literal["auto", "on", "off"]
+from reflowshock.quantity import Quantity
 
 
 class FlowNumerics(Parameters):
@@ -30,7 +30,7 @@ class FlowNumerics(Parameters):
 class SolderNumerics(FlowNumerics):
     """How the reflow is computed."""
 
-    spacing: Annotated[float, "mm"] = Field(4.0e-5, gt=0)
+    spacing: Annotated[float, Quantity("mm")] = Field(4.0e-5, gt=0)
 
 
 class Reflow(Parameters):
@@ -58,7 +58,7 @@ class Walls(Parameters):
     """
 
     wall: Literal["free-slip", "no-slip", "slip"] = "free-slip"
-    slip_length: Annotated[float | None, "mm"] = Field(None, gt=0)
+    slip_length: Annotated[float | None, Quantity("mm")] = Field(None, gt=0)
 
 
 class SolderEffects(FlowEffects):
@@ -70,13 +70,13 @@ class SolderEffects(FlowEffects):
 class Solder(Walls):
     """Molten solder: volume of a ball, fluid properties, contact angles, process."""
 
-    volume: Annotated[float, "mm^3"] = Field(gt=0)
-    density: Annotated[float, "kg/m^3"] = Field(8930.0, gt=0)
-    surface_tension: Annotated[float, "N/m"] = Field(0.4985, gt=0)
-    viscosity: Annotated[float, "Pa*s"] = Field(2.27e-3, gt=0)
-    pad_contact_angle: Annotated[float, "deg"] = Field(math.radians(5.0), gt=0, lt=3.14159265)
-    mask_contact_angle: Annotated[float, "deg"] = Field(math.radians(148.0), gt=0, lt=3.14159265)
-    gravity: Annotated[float, "m/s^2"] = Field(9.81, ge=0)
-    process_time: Annotated[float, "s"] = Field(60.0, gt=0)
+    volume: Annotated[float, Quantity("mm^3")] = Field(gt=0)
+    density: Annotated[float, Quantity("kg/m^3")] = Field(8930.0, gt=0)
+    surface_tension: Annotated[float, Quantity("N/m")] = Field(0.4985, gt=0)
+    viscosity: Annotated[float, Quantity("Pa*s")] = Field(2.27e-3, gt=0)
+    pad_contact_angle: Annotated[float, Quantity("deg")] = Field(math.radians(5.0), gt=0, lt=3.14159265)
+    mask_contact_angle: Annotated[float, Quantity("deg")] = Field(math.radians(148.0), gt=0, lt=3.14159265)
+    gravity: Annotated[float, Quantity("m/s^2")] = Field(9.81, ge=0)
+    process_time: Annotated[float, Quantity("s")] = Field(60.0, gt=0)
     effects: SolderEffects = SolderEffects()
     numerics: SolderNumerics = SolderNumerics()

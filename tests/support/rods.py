@@ -10,12 +10,13 @@ from pydantic import Field
 from reflowshock.cases.hard.draws import DRAWS, quantities, tables
 from reflowshock.cases.hard.trial import Measured, Refused, Trial, trials
 from reflowshock.parameters import Parameters
+from reflowshock.quantity import Quantity
 
 
 class Rod(Parameters):
     """A rod that is stretched."""
 
-    length: Annotated[float, "mm"] = Field(gt=0)
+    length: Annotated[float, Quantity("mm")] = Field(gt=0)
     fate: str = "holds"
 
 

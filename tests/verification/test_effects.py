@@ -15,7 +15,14 @@ from mpi4py import MPI
 from reflowshock.cases.hard.trials.grids import grid, mesh_of
 from reflowshock.fem.coupling.one_way import OneWay
 from reflowshock.fem.coupling.scheme import scheme_of
-from reflowshock.fem.estimates.effects import NEGLIGIBLE_STIFFENING, NEGLIGIBLE_WEIGHT, called_for, damping, weight
+from reflowshock.fem.estimates.drop_effects import (
+    NEGLIGIBLE_STIFFENING,
+    NEGLIGIBLE_WEIGHT,
+    Failing,
+    RayleighEffect,
+    WeightEffect,
+    called_for,
+)
 from reflowshock.fem.forces.force import force_terms
 from reflowshock.fem.forces.force_nonlinear import NonlinearElements
 from reflowshock.fem.kernels.plasticity import plastic_constants
@@ -23,8 +30,8 @@ from reflowshock.fem.loads.pretension import Pretension
 from reflowshock.fem.materials.library import FR4, SAC305, SILICON
 from reflowshock.fem.mesh.supports import held_components
 from reflowshock.fem.model.steps import mass_factor
-from reflowshock.fem.output.failure import failure_criteria, judge
-from reflowshock.fem.problem.shock import Damping, Failure, JointCoupling
+from reflowshock.fem.problem.failure import Failure
+from reflowshock.fem.problem.shock import Damping, JointCoupling
 from reflowshock.fem.problem.thermal import Thermal
 from reflowshock.fem.statics.plates import RigidPlates
 from reflowshock.fem.statics.structure import ThermalStructure
@@ -32,6 +39,7 @@ from reflowshock.particles.parameters.effects import NEGLIGIBLE_SHAPE_CHANGE, de
 from reflowshock.particles.parameters.solder import SolderEffects
 from reflowshock.workflow.board_drop.fine_joints import needs_coarse_joints
 from reflowshock.workflow.effects.registry import registry
+from reflowshock.workflow.package.verdict import verdict_of
 from reflowshock.workflow.reflow.between import open_structure
 from reflowshock.workflow.reflow.forecast import load_steps
 from tests.support import effect_switches as scene
@@ -290,7 +298,7 @@ def _(effect, _folder):
 @on("gravity_in_the_shock")
 def _(_effect, _folder):
     body, step = scene.strip()
-    left_out = weight("auto", 1500 * G, G)
+    left_out = WeightEffect.beside("auto", 1500 * G, G)
     assert not left_out["on"] and left_out["influence"] < NEGLIGIBLE_WEIGHT
     both = [scene.moved(body, step, scene.loads_of(body, scene.shock(gravity=g)), 3e-4)[1] for g in ("off", "on")]
     assert 0.0 < both[1] / both[0] - 1.0 < 1.2 * left_out["influence"]
@@ -300,8 +308,9 @@ def _(_effect, _folder):
 def _(_effect, _folder):
     body, step = scene.strip()
     duration, rate = 3e-4, 1.0
-    foreseen = damping((rate, 0.0), 1.5e4, duration)["influence"]
     given = scene.shock(damping=Damping(mass_coefficient=rate))
+    drop = SimpleNamespace(shock=given.model_copy(update={"duration": duration}), expected=SimpleNamespace(omega=1.5e4))
+    foreseen = RayleighEffect().decide(drop)["influence"]
     both = [scene.moved(body, step, scene.loads_of(body, item), duration)[1] for item in (scene.shock(), given)]
     assert abs(both[1] / both[0] - 1.0) < foreseen < 1e-3
 
@@ -365,7 +374,7 @@ def _(_effect, _folder):
 
 @off("failure")
 def _(_effect, _folder):
-    assert failure_criteria(Failure()) == []
+    assert not Failing.by_limits(Failure())["on"]
 
 
 @on("failure")
@@ -375,5 +384,6 @@ def _(_effect, _folder):
     arrays = {name: rng.random((5, 2)) for name in ("peel_board", "peel_package")} | {"joints": np.array(["A1", "B1"])}
     arrays["time"] = np.arange(5.0)
     before = {name: value.copy() for name, value in arrays.items()}
-    assert judge(failure_criteria(Failure(peel_stress=1e9)), arrays)
+    limit = {"peel_stress": {"limit": 1e9, "source": "none breaks"}}
+    assert verdict_of(Failure.model_validate(limit), arrays, "A1")["design"] == "PASS"
     assert all(np.array_equal(arrays[name], before[name]) for name in arrays)

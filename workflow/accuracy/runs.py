@@ -14,7 +14,6 @@ from reflowshock.workflow.pipeline.points import read_possible_points
 from reflowshock.workflow.store.point import Point
 from reflowshock.workflow.store.store import Store
 
-AGAIN = 2  # times that a cheap point is run once more: load of the machine and first compilation are then not counted
 CHEAP = 8.0  # up to these core-seconds [s]
 LEAST = 4  # coarsest runs of a parameter that are run, however long they take
 SECONDS_TO_SCHEDULE = 4.0  # of a call that computes points, until the first stage runs
@@ -66,7 +65,8 @@ class StudyRunner:
     @property
     def stores(self) -> list[Store]:
         """The store, and those of runs that are only for their times."""
-        return [Store(self.folder), *(Store(self.folder / f"again-{number}") for number in range(1, AGAIN + 1))]
+        store = Store(self.folder)
+        return [store, *store.repeated]
 
     def compute_runs(self, runs: Sequence[StudyRun]) -> None:
         """Compute the points of runs that are missing, the cheapest first; then cheap ones again.

@@ -10,8 +10,9 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from reflowshock.problem import Problem
+from reflowshock.quantity import Quantity
+from reflowshock.units import UnitError
 from reflowshock.workflow.case.names import is_name, wrong_name
-from reflowshock.workflow.case.units import UnitError, dimension, from_si, to_si
 
 BOUNDS: tuple[tuple[type, str, str], ...] = (
     (annotated_types.Gt, "gt", ">"),
@@ -21,9 +22,9 @@ BOUNDS: tuple[tuple[type, str, str], ...] = (
 )
 
 
-def unit_of(field: FieldInfo) -> str | None:
-    """Return the display unit of a field or of the items of its list, e.g. "mm"; None for numbers, names, tables."""
-    return next((item for item in _metadata(field) if isinstance(item, str)), None)
+def quantity_of(field: FieldInfo) -> Quantity | None:
+    """Return what a field, or each item of its list, measures; None for numbers, names, tables."""
+    return next((item for item in _metadata(field) if isinstance(item, Quantity)), None)
 
 
 def holds_named_tables(field: FieldInfo) -> bool:
@@ -70,16 +71,16 @@ def allowed(field: FieldInfo) -> str:
         return _choice(field) + ", ".join(names)
     if field.annotation is bool:
         return "true or false"
-    unit = unit_of(field)
+    quantity = quantity_of(field)
     bounds = [
-        f"{sign} {from_si(getattr(item, attribute), unit, 6) if unit else f'{getattr(item, attribute):g}'}"
+        f"{sign} {quantity.text(getattr(item, attribute), 6) if quantity else f'{getattr(item, attribute):g}'}"
         for item in _metadata(field)
         for kind, attribute, sign in BOUNDS
         if isinstance(item, kind)
     ]
     if bounds:
         return " and ".join(bounds)
-    return f"any {dimension(unit)}, e.g. in {unit}" if unit else ""
+    return f"any {quantity.described}" if quantity else ""
 
 
 def literal_names(field: FieldInfo) -> tuple[str, ...]:
@@ -117,11 +118,11 @@ def to_si_table(model: type[BaseModel], table: dict, prefix: str, problems: list
 
 
 def _to_si_value(field: FieldInfo, value: object, key: str, problems: list[Problem]) -> object:
-    unit = unit_of(field)
-    if unit is not None and isinstance(value, list):
-        return tuple(_quantity(field, unit, (key, item), problems) for item in value)
-    if unit is not None:
-        return _quantity(field, unit, (key, value), problems)
+    quantity = quantity_of(field)
+    if quantity is not None and isinstance(value, list):
+        return tuple(_converted(quantity, field, key, item, problems) for item in value)
+    if quantity is not None:
+        return _converted(quantity, field, key, value, problems)
     if isinstance(value, dict) and holds_named_tables(field):
         problems += [wrong_name(key, name) for name in value if not is_name(name)]
         return {name: _of_table(field, item, f"{key}.{name}", problems) for name, item in value.items()}
@@ -130,11 +131,10 @@ def _to_si_value(field: FieldInfo, value: object, key: str, problems: list[Probl
     return tuple(value) if isinstance(value, list) else value
 
 
-def _quantity(field: FieldInfo, unit: str, given: tuple[str, object], problems: list[Problem]) -> float:
-    """Convert the value of a key, ``given`` as (key, value); nan where it is no such quantity."""
-    key, value = given
+def _converted(quantity: Quantity, field: FieldInfo, key: str, value: object, problems: list[Problem]) -> float:
+    """Convert the value of a key; nan, and a problem, where it is no such quantity."""
     try:
-        return to_si(value, unit)
+        return quantity.to_si(value)
     except UnitError as error:
         problems.append(Problem(key, str(error), value, allowed(field)))
         return math.nan
@@ -169,9 +169,9 @@ def leaves(parameters: BaseModel, prefix: str = "") -> Iterator[tuple[str, objec
 
 def display(value: object, field: FieldInfo) -> str:
     """Write an SI value as a user would in a case file, without quotes."""
-    unit = unit_of(field)
-    if unit is not None and isinstance(value, float):
-        return from_si(value, unit)
+    quantity = quantity_of(field)
+    if quantity is not None and isinstance(value, float):
+        return quantity.text(value)
     if isinstance(value, tuple):
         return "[" + ", ".join(display(item, field) for item in value) + "]"
     return f"{value:.10g}" if isinstance(value, float) else str(value)
@@ -179,7 +179,7 @@ def display(value: object, field: FieldInfo) -> str:
 
 def shown(value: object, field: FieldInfo | None) -> object:
     """Write an SI value as its field is shown to users; other values, and none, stay as they are."""
-    return display(value, field) if value is not None and field is not None and unit_of(field) else value
+    return display(value, field) if value is not None and field is not None and quantity_of(field) else value
 
 
 def _choice(field: FieldInfo) -> str:
@@ -187,7 +187,7 @@ def _choice(field: FieldInfo) -> str:
 
 
 def _metadata(field: FieldInfo) -> Iterator[object]:
-    """Yield units and bounds of a field, or of the items of its list, which may be absent."""
+    """Yield quantities and bounds of a field, or of the items of its list, which may be absent."""
     yield from field.metadata
     outer = typing.get_args(field.annotation)[:1]
     for item in (*outer, *(inner for kind in outer for inner in typing.get_args(kind)[:1])):

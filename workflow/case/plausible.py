@@ -8,10 +8,11 @@ from functools import cache
 from pydantic.fields import FieldInfo
 
 from reflowshock.problem import Problem
+from reflowshock.quantity import Quantity
+from reflowshock.units import dimension, from_si, to_si
 from reflowshock.workflow.case import fields
 from reflowshock.workflow.case.case import Case
 from reflowshock.workflow.case.pulse_files import largest_values
-from reflowshock.workflow.case.units import dimension, from_si, to_si
 
 FORCE = "--force"
 
@@ -49,9 +50,12 @@ BY_NAME = {
     "explicit_step": Range("1e-15 s", "1 s"),
     "implicit_step": Range("1e-15 s", "1e3 s"),
 }
-# Numbers without a unit; of those that are signed the whole range.
+# Numbers without a unit; of those that are named the whole range.
 NUMBERS = (1e-12, 1e6)
-SIGNED_NUMBERS = {"poisson_ratio": (-0.99, 0.4999)}  # of isotropic solids: nearer to 0.5 no explicit step is left
+NAMED_NUMBERS = {
+    "poisson_ratio": (-0.99, 0.4999),  # of isotropic solids: nearer to 0.5 no explicit step is left
+    "constant": (1e-300, 1e300),  # of a law of life, whose unit depends on its exponent
+}
 
 
 def implausible(case: Case) -> Iterator[Problem]:
@@ -72,24 +76,24 @@ def implausible_tables(case: Case) -> Iterator[Problem]:
 
 
 def _implausible(key: str, number: float, field: FieldInfo) -> Iterator[Problem]:
-    unit, name = fields.unit_of(field), key.rpartition(".")[2]
-    if name in SIGNED_NUMBERS:
-        low, high = SIGNED_NUMBERS[name]
+    quantity, name = fields.quantity_of(field), key.rpartition(".")[2]
+    if name in NAMED_NUMBERS:
+        low, high = NAMED_NUMBERS[name]
         if not low <= number <= high:
             yield Problem(key, "is not plausible", number, f"{low:g} to {high:g}, or {FORCE}")
         return
-    if unit is None:
+    if quantity is None:
         (low, high), limits = NUMBERS, f"{NUMBERS[0]:g} to {NUMBERS[1]:g}"
     else:
-        found = _range(name, unit)
-        low, high, limits = to_si(found.low, unit), to_si(found.high, unit), f"{found.low} to {found.high}"
+        found = _range(name, quantity)
+        low, high, limits = quantity.to_si(found.low), quantity.to_si(found.high), f"{found.low} to {found.high}"
     if not low <= abs(number) <= high:
-        shown = fields.display(float(number), field) if unit else number
+        shown = fields.display(float(number), field) if quantity else number
         yield Problem(key, "is not plausible", shown, f"{limits} in magnitude, or {FORCE}")
 
 
 @cache
-def _range(name: str, unit: str) -> Range:
-    """Return the plausible magnitudes of a quantity, by the last name of its key and its unit."""
+def _range(name: str, quantity: Quantity) -> Range:
+    """Return the plausible magnitudes of a quantity, by the last name of its key and its dimension."""
     own = next((found for pattern, found in BY_NAME.items() if fnmatchcase(name, pattern)), None)
-    return own or BY_DIMENSION[dimension(unit)]
+    return own or BY_DIMENSION[quantity.dimension]

@@ -5,7 +5,6 @@ from pathlib import Path
 
 from reflowshock.problem import Problem
 
-UNITS = {"acceleration": "m/s^2", "pressure": "Pa", "velocity": "m/s", "force": "N"}
 Tables = Mapping[str, tuple[Path, str]]
 
 
@@ -29,7 +28,7 @@ def unreadable_pulses(tables: Tables) -> Iterator[Problem]:
 def largest_values(tables: Tables) -> Iterator[tuple[str, str, float]]:
     """Yield key, SI unit and magnitude of the last time and of the largest value of each table that can be read."""
     from reflowshock.fem.errors import PulseError
-    from reflowshock.fem.loads.pulse_table import read_pulse
+    from reflowshock.fem.loads.pulse_table import QUANTITIES, read_pulse
 
     for key, (path, quantity) in tables.items():
         try:
@@ -37,4 +36,4 @@ def largest_values(tables: Tables) -> Iterator[tuple[str, str, float]]:
         except PulseError:
             continue
         yield key, "s", float(pulse.times[-1])
-        yield key, UNITS[quantity], float(abs(pulse.values).max())
+        yield key, next(iter(QUANTITIES[quantity])), float(abs(pulse.values).max())

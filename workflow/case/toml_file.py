@@ -7,7 +7,7 @@ from pathlib import Path
 
 from reflowshock.problem import Problem
 from reflowshock.workflow.case.problems import CaseError
-from reflowshock.workflow.case.toml_places import Place, message_of, place_of_error
+from reflowshock.workflow.case.toml_places import Place, place_of_error, toml_fault
 
 MOST_BYTES = 4_000_000
 DEEPEST = 16  # tables in tables; no case has more than five
@@ -44,8 +44,8 @@ def parse_toml(source: str, text: str) -> dict:
     try:
         table = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        place = place_of_error(error, text)
-        problem = Problem("", f"is not TOML: {message_of(error)}", None, "", "", place.line, place.column)
+        place, (key, fault) = place_of_error(error, text), toml_fault(error, text)
+        problem = Problem(key, f"is not TOML: {fault}", None, "", "", place.line, place.column)
         raise CaseError(source, [problem]) from error
     except RecursionError:
         raise CaseError(source, [_too_deep()]) from None

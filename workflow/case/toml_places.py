@@ -3,10 +3,14 @@
 import re
 import time
 import tomllib
+from ast import literal_eval
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 
 MOST_SECONDS = 1.0  # without a position a message is still right
+NAMES = re.compile(r"\(['\"].*\)")  # of a table, as the parser shows them
+INLINE = "Duplicate inline table key "
 AT = re.compile(r"\(at line (\d+), column (\d+)\)$")
 
 
@@ -24,10 +28,24 @@ def place_of_error(error: tomllib.TOMLDecodeError, text: str) -> Place:
     return Place(int(found[1]), int(found[2])) if found else Place(text.count("\n") + 1, 1)
 
 
-def message_of(error: tomllib.TOMLDecodeError) -> str:
-    """Return what is wrong without its place."""
-    text = AT.sub("", str(error)).strip()
-    return text[:1].lower() + text[1:]
+def toml_fault(error: tomllib.TOMLDecodeError, text: str) -> tuple[str, str]:
+    """Return of which key a text is not TOML, or an empty string, and what is wrong; without the place."""
+    message = AT.sub("", str(error)).strip()
+    has_value = "this key already has a value"
+    if names := NAMES.search(message):
+        return ".".join(literal_eval(names[0])), "this table is declared twice" if "declare" in message else has_value
+    if message.startswith(INLINE):
+        return literal_eval(message.removeprefix(INLINE)), has_value
+    if message.startswith("Cannot overwrite"):
+        return _key_in(text.split("\n")[place_of_error(error, text).line - 1]), has_value
+    return "", message[:1].lower() + message[1:]
+
+
+def _key_in(line: str) -> str:
+    """Return the first key that a line gives, or an empty string."""
+    with suppress(ValueError, RecursionError):
+        return next(_keys(tomllib.loads(line), ""), "")
+    return ""
 
 
 class Places:

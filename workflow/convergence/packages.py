@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import Any
 
 from reflowshock.meshing.board.pads import pad_table
+from reflowshock.units import from_si
 from reflowshock.workflow.board_drop.shock_forecast import implicit_seconds
 from reflowshock.workflow.board_drop.shock_launch import MODES
-from reflowshock.workflow.case.units import from_si
 from reflowshock.workflow.convergence.series import ConvergenceStudy, Parameter, Quantity, StudyRun, at_same_times
 from reflowshock.workflow.package.case import BoardDropCase, PackageCase
 from reflowshock.workflow.process.products import read_json

@@ -6,8 +6,8 @@ from math import ceil
 from pathlib import Path
 from typing import Any
 
+from reflowshock.units import from_si
 from reflowshock.workflow.case.case import Case
-from reflowshock.workflow.case.units import from_si
 from reflowshock.workflow.convergence.series import ConvergenceStudy, Parameter, Quantity, StudyRun
 from reflowshock.workflow.solder.case import DropCase, DropsCase, JointCase, OscillationCase
 from reflowshock.workflow.store.product import read_record

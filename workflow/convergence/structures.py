@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from reflowshock.problem import Problem
+from reflowshock.units import from_si
 from reflowshock.workflow.case.problems import CaseError
-from reflowshock.workflow.case.units import from_si
 from reflowshock.workflow.convergence.series import (
     ConvergenceStudy,
     Parameter,

@@ -1,6 +1,5 @@
 """JSON schema of the case file, in which a quantity is a string with its unit."""
 
-import re
 from collections.abc import Iterator
 from typing import Any
 
@@ -9,9 +8,8 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
 from reflowshock.workflow.case.case import Case
-from reflowshock.workflow.case.fields import allowed, display, holds_named_tables, models_of, unit_of
+from reflowshock.workflow.case.fields import allowed, display, holds_named_tables, models_of, quantity_of
 from reflowshock.workflow.case.names import NAME
-from reflowshock.workflow.case.units import QUANTITY, dimension
 from reflowshock.workflow.kinds import KINDS
 
 SCALES = {
@@ -20,7 +18,6 @@ SCALES = {
     "propertyNames": {"pattern": NAME},
     "additionalProperties": {"type": "object"},
 }
-PATTERN = re.sub(r"\?P<\w+>", "", f"^{QUANTITY.pattern}$")
 
 
 def case_schema() -> dict:
@@ -63,14 +60,8 @@ def _kind_schema(kind: type[Case]) -> dict:
     for model in set(_reachable(kind)):
         properties = schema if model is kind else schema["$defs"][model.__name__]
         for name, field in model.model_fields.items():
-            unit = unit_of(field)
-            if unit is not None:
-                properties["properties"][name] = {
-                    **_quantities(properties["properties"][name]),
-                    "description": f"{dimension(unit)}, e.g. in {unit}; {allowed(field)}",
-                    "x-unit": unit,
-                    **_default(field),
-                }
+            if quantity_of(field) is not None:
+                _add_range_and_default(properties["properties"][name], field)
             if holds_named_tables(field):
                 properties["properties"][name]["propertyNames"] = {"pattern": NAME}
     # Defaults of whole tables would be repeated in SI floats; each field has its own.
@@ -78,17 +69,13 @@ def _kind_schema(kind: type[Case]) -> dict:
     return schema
 
 
-def _quantities(numbers: dict) -> dict:
-    """Turn the schema of a number, or of a list of them, into that of strings with a unit."""
-    text = {"type": "string", "pattern": PATTERN}
-    if numbers.get("type") != "array":
-        return text
-    sizes = {name: numbers[name] for name in ("minItems", "maxItems") if name in numbers}
-    return {"type": "array", "items": text, **sizes}
-
-
-def _default(field: FieldInfo) -> dict:
-    return {} if field.default in (PydanticUndefined, None) else {"default": display(field.default, field)}
+def _add_range_and_default(schema: dict, field: FieldInfo) -> None:
+    """Add to the schema of a quantity what its annotation does not know: which values it may have, and has."""
+    schema["description"] += f"; {allowed(field)}"
+    if field.default in (PydanticUndefined, None):
+        schema.pop("default", None)
+    else:
+        schema["default"] = display(field.default, field)
 
 
 def _reachable(model: type[BaseModel]) -> Iterator[type[BaseModel]]:

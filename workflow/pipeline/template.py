@@ -17,7 +17,7 @@ from reflowshock.workflow.case.fields import (
     holds_named_tables,
     literal_names,
     models_of,
-    unit_of,
+    quantity_of,
 )
 from reflowshock.workflow.case.names import is_name, wrong_name
 from reflowshock.workflow.case.problems import CaseError
@@ -128,7 +128,7 @@ def _value(value: object, field: FieldInfo) -> str:
     """Write a value as TOML, a quantity with its unit."""
     if isinstance(value, tuple):
         return "[" + ", ".join(_value(item, field) for item in value) + "]"
-    return f'"{display(value, field)}"' if unit_of(field) else as_toml(value)
+    return f'"{display(value, field)}"' if quantity_of(field) else as_toml(value)
 
 
 def _default(field: FieldInfo) -> str:

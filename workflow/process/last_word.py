@@ -18,7 +18,7 @@ from typing import Any, NoReturn
 
 FAILED, BAD_INPUT = 1, 2
 INTERRUPTED = 130  # what Typer makes of Ctrl-C
-LOGS = "logs"  # folder of a run that takes the details
+LOGS, LOG = "logs", "reflowshock-error-"  # folder of a run that takes the details; how its files begin
 LONGEST = 400  # characters of a message of unknown origin
 LAST_LINES = 5
 ENDING = ("SIGTERM", "SIGHUP")  # signals that end a command as Ctrl-C does
@@ -202,7 +202,7 @@ def _keep(details: str) -> Path | None:
     for place in places:
         with suppress(OSError):
             place.mkdir(exist_ok=True)
-            descriptor, path = tempfile.mkstemp(".txt", "reflowshock-error-", place, text=True)
+            descriptor, path = tempfile.mkstemp(".txt", LOG, place, text=True)
             try:
                 with os.fdopen(descriptor, "w", encoding="utf-8", errors="backslashreplace") as file:
                     file.write(details)

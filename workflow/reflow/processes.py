@@ -1,14 +1,14 @@
 """Processes that bring joints to rest, several joints at a time; `open_pool` chooses them or MPI ranks."""
 
-import multiprocessing
 import os
 import queue
-import threading
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, Future, wait
+from concurrent.futures.process import BrokenProcessPool
+from types import TracebackType
 from typing import Any
 
-from reflowshock.fem.parallel.own_job import end_with_parent
+from reflowshock.processes import SPAWN, ProcessPool
 from reflowshock.workflow.case.run import Run
 from reflowshock.workflow.package.case import PackageCase
 from reflowshock.workflow.reflow.pool import Job, JointPool, ReflowError, Report, Result, Shares
@@ -29,21 +29,18 @@ class Processes:
             cores: how many processes at most; with fewer joints each has several threads.
             joints: how many there are to compute at a time.
         """
-        context = multiprocessing.get_context("spawn")
         workers = max(1, min(cores, joints))
-        self._reports = context.Queue()
-        start = (self._reports, max(1, cores // workers))
-        self._pool = ProcessPoolExecutor(workers, context, _start_worker, start)
+        self._reports = SPAWN.Queue()
+        self._pool = ProcessPool(workers, _start_worker, (self._reports, max(1, cores // workers)))
 
     def __enter__(self) -> "Processes":
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
         """Wait for the processes; where something failed, end them."""
-        self._pool.shutdown(wait=kind is None, cancel_futures=True)
-        if kind is not None:
-            for process in multiprocessing.active_children():
-                process.terminate()
+        self._pool.__exit__(kind, error, trace)
 
     def run(
         self, work: Callable[[Job, Report], Result], jobs: Mapping[str, Job], progress: Callable[[Shares], None]
@@ -62,6 +59,8 @@ class Processes:
             self._take_reports(done)
             for future in finished:
                 error = future.exception()
+                if isinstance(error, BrokenProcessPool):
+                    raise ReflowError(f"joint {futures[future]}: its process has ended with {self._pool.ending()}")
                 if error is not None:
                     raise ReflowError(f"joint {futures[future]}: {type(error).__name__}: {error}") from error
                 done[futures[future]] = 1.0
@@ -81,7 +80,6 @@ def _start_worker(reports: Any, threads: int) -> None:
     global _progress
     os.environ["NUMBA_NUM_THREADS"] = str(threads)  # numba, which is loaded after this, would take all cores
     _progress = reports
-    threading.Thread(target=end_with_parent, daemon=True).start()
 
 
 def _work(work: Callable[[Any, Report], Result], name: str, job: Any) -> Result:

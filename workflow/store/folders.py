@@ -10,6 +10,7 @@ from pathlib import Path
 from reflowshock.problem import Problem
 from reflowshock.workflow import __version__
 from reflowshock.workflow.case.problems import CaseError
+from reflowshock.workflow.process.last_word import LOG, LOGS
 from reflowshock.workflow.store.product import discard
 from reflowshock.workflow.store.store import HOME
 
@@ -110,7 +111,7 @@ def locked(folder: Path, what: str, name: str, force: bool = False) -> Iterator[
 
 
 def remove_own(folder: Path) -> list[str]:
-    """Remove a folder's store, mark and lock; and the folder, if nothing else is in it and nobody works in it.
+    """Remove a folder's store, logs, mark and lock; and the folder, if nothing else is in it and nobody works in it.
 
     Returns:
         Names of what is left.
@@ -120,10 +121,21 @@ def remove_own(folder: Path) -> list[str]:
     discard(folder / HOME)
     for name in (MARK, LOCK, PARTIAL):
         (folder / name).unlink(missing_ok=True)
+    _remove_logs(folder / LOGS)
     left = sorted(path.name for path in folder.iterdir())
     if not left and folder.resolve() not in (Path.cwd(), *Path.cwd().parents):
         folder.rmdir()
     return left
+
+
+def _remove_logs(folder: Path) -> None:
+    """Remove what the program wrote of its errors, and the folder if nothing else is in it."""
+    if folder.is_symlink() or not folder.is_dir():
+        return
+    for path in folder.glob(f"{LOG}*.txt"):
+        path.unlink()
+    with suppress(OSError):
+        folder.rmdir()
 
 
 def _mark(folder: Path, what: str, name: str) -> None:

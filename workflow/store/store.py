@@ -13,6 +13,7 @@ from reflowshock.workflow.store.point import Point
 from reflowshock.workflow.store.product import RECORD, SEAL, content_digest, discard, read_record
 
 HOME = ".store"  # in a run folder, or in the folder of a study
+AGAIN = 2  # times that a cheap point is run once more: load of the machine and first compilation are then not counted
 CASE = "inputs/case.json"
 MESSAGE, TRACEBACK = "message.txt", "error.txt"  # in the partial folder of a stage that failed: why
 
@@ -31,6 +32,11 @@ class Store:
 
     folder: Path
     one_run: bool = False
+
+    @property
+    def repeated(self) -> "list[Store]":
+        """The stores of runs that a convergence study repeats for their times."""
+        return [Store(self.folder / f"again-{number}") for number in range(1, AGAIN + 1)]
 
     @property
     def home(self) -> Path:

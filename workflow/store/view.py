@@ -117,24 +117,29 @@ def not_as_put(store: Store, folder: Path) -> list[str]:
     ]
 
 
-def withdraw_all(store: Store, folder: Path) -> None:
-    """Remove all that the program has put into a run folder, and folders that are empty then."""
-    for name, shown in listed(store, folder).items():
-        _withdraw(store, folder, name, shown)
-    if (folder / CASE).is_file() and not _is_behind_link(folder, CASE):
-        (folder / CASE).unlink()
-        _remove_empty(folder / CASE, folder)
+def withdraw_all(store: Store) -> None:
+    """Remove all that the program has put into the folders of a store, and folders that are empty then."""
+    for folder in _folders(store):
+        for name, shown in listed(store, folder).items():
+            _withdraw(store, folder, name, shown)
+        if (folder / CASE).is_file() and not _is_behind_link(folder, CASE):
+            (folder / CASE).unlink()
+            _remove_empty(folder / CASE, store.folder)
 
 
-def remove_unused(store: Store) -> int:
-    """Remove products that no run folder shows, and what is left of work that was broken off; return how many."""
-    folders = [store.folder, *(store.folder / "points").glob("*")]
-    shown = {Path(one.source).parts[1] for folder in folders for one in listed(store, folder).values()}
-    unused = [path for path in (store.home / "products").glob("*") if path.name not in shown]
-    unused += (store.home / "work").glob("*")
-    for path in unused:
+def remove_unused(store: Store) -> tuple[int, int]:
+    """Remove products that no run folder shows, and work that was broken off; return how many of each."""
+    shown = {Path(one.source).parts[1] for folder in _folders(store) for one in listed(store, folder).values()}
+    products = [path for path in (store.home / "products").glob("*") if path.name not in shown]
+    works = list((store.home / "work").glob("*"))
+    for path in products + works:
         discard(path)
-    return len(unused)
+    return len(products), len(works)
+
+
+def _folders(store: Store) -> list[Path]:
+    """Return the folder of a store, and the run folders of its points."""
+    return [store.folder, *(store.folder / "points").glob("*")]
 
 
 def _list(store: Store, folder: Path) -> Path:

@@ -48,10 +48,8 @@ class StructureCase(StructureProblem, Case):
     @property
     def pulse_tables(self) -> dict[str, tuple[Path, str]]:
         """Tables of loads."""
-        from reflowshock.fem.loads.structure_pulses import QUANTITY
-
         return {
-            f"loads.{name}.table": (Path(load.table), QUANTITY[load.kind])
+            f"loads.{name}.table": (Path(load.table), load.quantity)
             for name, load in self.loads.items()
             if load.table is not None
         }

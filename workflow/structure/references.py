@@ -9,6 +9,7 @@ from reflowshock.fem.problem.structure import Pressure, StructureProblem
 from reflowshock.names import nearest
 from reflowshock.parameters import Parameters
 from reflowshock.problem import Problem
+from reflowshock.quantity import Quantity
 
 
 class Reference(Parameters):
@@ -59,8 +60,8 @@ class FrequencyRange(Reference):
 
     kind: Literal["frequency"] = "frequency"
     mode: int = Field(1, ge=1)
-    at_least: Annotated[float, "Hz"] = Field(gt=0)
-    at_most: Annotated[float, "Hz"] = Field(gt=0)
+    at_least: Annotated[float, Quantity("Hz")] = Field(gt=0)
+    at_most: Annotated[float, Quantity("Hz")] = Field(gt=0)
 
 
 class Published(Reference):

@@ -10,7 +10,7 @@ from itertools import product
 import numpy as np
 
 from reflowshock.problem import Problem
-from reflowshock.workflow.case.units import QUANTITY
+from reflowshock.units import QUANTITY
 
 
 @dataclass(frozen=True, slots=True)

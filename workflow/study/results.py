@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from reflowshock.units import QUANTITY
 from reflowshock.workflow.case.fields import display_values
 from reflowshock.workflow.case.text import against_limit
-from reflowshock.workflow.case.units import QUANTITY
 from reflowshock.workflow.store.point import Point
 from reflowshock.workflow.store.store import Store
 from reflowshock.workflow.study.study_file import Study

@@ -6,6 +6,7 @@ from pydantic import Field
 
 from reflowshock.cases.hard.trial import pure_trial
 from reflowshock.parameters import Parameters
+from reflowshock.quantity import Quantity
 
 SchemeOfTrial = Literal[
     "held_velocity", "impulse", "gravouil_combescure", "local_steps", "local_steps, levels auto", "as_printed"
@@ -43,7 +44,7 @@ class PairRun(PairTrial):
 class PairTransfer(PairTrial):
     """A pair whose block is a little off the board's face."""
 
-    offset: Annotated[float, "nm"] = Field(0.0, ge=-1e-6, le=1e-6)
+    offset: Annotated[float, Quantity("nm")] = Field(0.0, ge=-1e-6, le=1e-6)
 
 
 class Yielding(Parameters):
@@ -51,7 +52,7 @@ class Yielding(Parameters):
 
     scheme: Literal["held_velocity", "impulse", "gravouil_combescure"] = "held_velocity"
     mesh_ratio: float = Field(2.0, ge=1, le=8)
-    speed: Annotated[float, "m/s"] = Field(20.0, gt=0, le=100)
+    speed: Annotated[float, Quantity("m/s")] = Field(20.0, gt=0, le=100)
     windows: int = Field(300, ge=20, le=10_000)
 
 

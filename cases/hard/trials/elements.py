@@ -6,6 +6,7 @@ from pydantic import Field
 
 from reflowshock.cases.hard.trial import pure_trial
 from reflowshock.parameters import Parameters
+from reflowshock.quantity import Quantity
 
 Element = Literal["incompatible_modes", "one_point", "tetrahedron", "tetrahedron_quadratic"]
 Hexahedron = Literal["incompatible_modes", "one_point"]
@@ -89,7 +90,7 @@ class Flight(Elastic):
 
     kinematics: Kinematics = "small"
     contrast: float = Field(1.0, ge=1, le=1e6)
-    foil: Annotated[float, "um"] = Field(0.0, ge=0, le=1e-3)
+    foil: Annotated[float, Quantity("um")] = Field(0.0, ge=0, le=1e-3)
     mass_scaled: bool = False
     critical_step: Literal["element", "power_iteration"] = "element"
     step_fraction: float = Field(0.99, gt=0, le=3)
@@ -103,7 +104,7 @@ class Impact(Parameters):
 
     element: Hexahedron = "one_point"
     kinematics: Kinematics = "finite"
-    speed: Annotated[float, "m/s"] = Field(60.0, gt=0, le=300)
+    speed: Annotated[float, Quantity("m/s")] = Field(60.0, gt=0, le=300)
     skew: float = Field(0.0, ge=0, le=3)
     step_fraction: float = Field(0.6, gt=0, le=0.95)
     steps: int = Field(400, ge=10, le=5000)
@@ -125,7 +126,7 @@ class PulseTrial(Parameters):
 
     pulse: Literal["half_sine", "haversine", "constant", "triangle"] = "half_sine"
     steps: float = Field(20.0, gt=0, le=1000)
-    peak: Annotated[float, "G"] = Field(14709.975, ge=0)
+    peak: Annotated[float, Quantity("G")] = Field(14709.975, ge=0)
 
 
 TRIALS = {

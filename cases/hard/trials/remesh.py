@@ -7,6 +7,7 @@ from pydantic import Field
 from reflowshock.cases.hard.trial import Measured, Refused, Trial
 from reflowshock.meshing.board.parameters import JointNumerics
 from reflowshock.parameters import Parameters
+from reflowshock.quantity import Quantity
 
 if TYPE_CHECKING:
     from reflowshock.cases.hard.trials.joints import Meshed
@@ -17,7 +18,7 @@ Fault = Literal[
     "no_fault", "hole", "flipped", "inside_out", "doubled", "two_shells", "crossing", "void_outside", "round_top",
     "far_too_high",
 ]  # fmt: skip
-Length = Annotated[float, "mm"]
+Length = Annotated[float, Quantity("mm")]
 
 
 class Barrel(Parameters):
@@ -43,7 +44,7 @@ class Overflow(Parameters):
 
     kind: Literal["overflow"]
     gap: Length = Field(3.0e-4, gt=0)
-    angle: Annotated[float, "deg"] = Field(gt=PI / 2.0, lt=PI)
+    angle: Annotated[float, Quantity("deg")] = Field(gt=PI / 2.0, lt=PI)
     reach: Length = Field(3.0e-4, gt=0)
 
     def surface(self) -> "ClosedSurface":
@@ -104,7 +105,7 @@ class BodyTrial(Parameters):
 
     shape: Barrel | Overflow | Lobed | Hooked | Bridged = Field(discriminator="kind")
     offset: Length = 0.0
-    tilt: Annotated[float, "deg"] = Field(0.0, gt=-PI / 6.0, lt=PI / 6.0)
+    tilt: Annotated[float, Quantity("deg")] = Field(0.0, gt=-PI / 6.0, lt=PI / 6.0)
     numerics: JointNumerics = JointNumerics()
 
 
@@ -124,8 +125,8 @@ class GivenTrial(Parameters):
 
     fault: Fault = "no_fault"
     bulge: Length = 4.0e-5
-    noise: Annotated[float, "um"] = Field(0.0, ge=0)
-    turn: Annotated[float, "deg"] = Field(0.0, gt=-PI / 6.0, lt=PI / 6.0)
+    noise: Annotated[float, Quantity("um")] = Field(0.0, ge=0)
+    turn: Annotated[float, Quantity("deg")] = Field(0.0, gt=-PI / 6.0, lt=PI / 6.0)
 
 
 def body(parameters: BodyTrial) -> dict[str, Measured]:

@@ -1,3 +1,5 @@
+import re
+
 import pytest
 
 from reflowshock.cases.hard.trials.packages import MM, board, package
@@ -51,6 +53,37 @@ def test_impossible_packages(changes, key, allowed):
 )
 def test_impossible_boards(changes, key):
     assert key in found(package(), board(**changes))
+
+
+def with_holes(diameter, **changes):
+    return board(
+        holes={"diameter": diameter * MM, "inset_x": 0.7501 * diameter * MM, "inset_y": 0.7501 * diameter * MM},
+        **changes,
+    )
+
+
+@pytest.mark.parametrize("diameter", [9.0, 100.0])
+def test_a_hole_and_a_board_that_are_said_to_fit_do(diameter):
+    allowed = found(package(), with_holes(diameter))["board.holes.diameter"].allowed
+    largest, side, length = re.fullmatch(r"<= (\S+) mm, or board.(\w+) >= (\S+) mm", allowed).groups()
+    assert not found(package(), with_holes(0.995 * float(largest)))
+    sides = {"length": 1.0, "width": 1.0} | {side: 1.001 * float(length) * MM}
+    assert not found(package(), with_holes(diameter, **sides))
+
+
+def test_a_board_that_is_said_to_be_long_enough_is():
+    allowed = found(package(), board(length=9.0 * MM))["board.length"].allowed
+    inset = {"diameter": 2.0 * MM, "inset_x": 1.501 * MM, "inset_y": 1.501 * MM}
+    assert not found(package(), board(length=1.001 * float(allowed.split()[1]) * MM, holes=inset))
+
+
+def test_an_inset_between_the_limits_that_are_told_fits():
+    holes = {"diameter": 2 * MM, "inset_x": 3 * MM, "inset_y": 13 * MM}
+    allowed = found(package(), board(holes=holes))["board.holes.inset_y"].allowed
+    least, most = (float(text.split()[0]) for text in allowed.split(" to "))
+    assert least < most < 13.0
+    for inset in (1.001 * least, 0.999 * most):
+        assert not found(package(), board(holes=holes | {"inset_y": inset * MM}))
 
 
 def test_unknown_joint_names_its_nearest():

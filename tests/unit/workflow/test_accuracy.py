@@ -7,7 +7,6 @@ import pytest
 
 from reflowshock.workflow.accuracy import command
 from reflowshock.workflow.accuracy.command import AccuracyRequest, keeps_promise, measure, read_request, unproved
-from reflowshock.workflow.accuracy.runs import AGAIN
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.cli import main
 from reflowshock.workflow.convergence.calibration import calibration, calibration_of, default_folder
@@ -17,7 +16,7 @@ from reflowshock.workflow.convergence.tables import as_lines, as_options, legend
 from reflowshock.workflow.kinds import kind_of
 from reflowshock.workflow.pipeline.reader import read_case
 from reflowshock.workflow.plan import predicted_costs
-from reflowshock.workflow.store.store import MESSAGE
+from reflowshock.workflow.store.store import AGAIN, MESSAGE
 from reflowshock.workflow.store.view import show
 from tests.support.products import record_of
 

@@ -7,11 +7,10 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-from reflowshock.workflow.case.fields import display, leaves, unit_of
+from reflowshock.workflow.case.fields import display, leaves, quantity_of
 from reflowshock.workflow.case.names import is_name
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.case.toml_places import Place, Places
-from reflowshock.workflow.case.units import to_si
 from reflowshock.workflow.kinds import KINDS
 from reflowshock.workflow.pipeline import gate
 from reflowshock.workflow.pipeline.gate import Leave, ask_if_long, bytes_text, machine_memory, needed_memory, too_large
@@ -205,10 +204,18 @@ def test_defaults_are_what_their_text_says(kind):
     """A line of a case file that repeats a default changes nothing."""
     for model in _reachable(kind):
         for name, field in model.model_fields.items():
-            unit, default = unit_of(field), field.default
+            quantity, default = quantity_of(field), field.default
             for value in default if isinstance(default, tuple) else (default,):
-                if unit is not None and isinstance(value, float):
-                    assert to_si(display(value, field), unit) == value, f"{model.__name__}.{name}"
+                if quantity is not None and isinstance(value, float):
+                    assert quantity.to_si(display(value, field)) == value, f"{model.__name__}.{name}"
+
+
+@pytest.mark.parametrize("kind", [kind.case for kind in KINDS], ids=lambda kind: kind.__name__)
+def test_units_are_annotations_of_quantities(kind):
+    """Else a case could only have bare numbers."""
+    for model in _reachable(kind):
+        for name, field in model.model_fields.items():
+            assert not any(isinstance(one, str) for one in field.metadata), f"{model.__name__}.{name}"
 
 
 @pytest.mark.parametrize("path", templates().values(), ids=templates())
@@ -216,6 +223,7 @@ def test_shipped_cases_pass(path: Path, monkeypatch):
     monkeypatch.setattr(gate, "machine_memory", lambda: 16e9)
     case = read_case(path, oversubscribe=True)
     for key, value, field in leaves(case):
-        if unit_of(field) is not None and isinstance(value, float):
-            assert to_si(display(value, field), unit_of(field)) == pytest.approx(value, rel=1e-9), key
+        quantity = quantity_of(field)
+        if quantity is not None and isinstance(value, float):
+            assert quantity.to_si(display(value, field)) == pytest.approx(value, rel=1e-9), key
     assert not list(too_large(case))

@@ -9,6 +9,8 @@ import pytest
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.jobs.batch import show_products
 from reflowshock.workflow.pipeline.reader import read_case
+from reflowshock.workflow.process.last_word import LOG, LOGS
+from reflowshock.workflow.run import clean
 from reflowshock.workflow.store import view
 from reflowshock.workflow.store.folders import RunFolderBusy, locked, remove_own
 from reflowshock.workflow.store.point import Point
@@ -76,7 +78,7 @@ def test_files_of_a_user_stay(store):
     assert (store.folder / "report.html").read_text() == "report/report.html"
     assert (store.folder / "report.html.kept-1").read_text() == "mine, too"
     show_products(store, OTHER)
-    withdraw_all(store, store.folder)
+    withdraw_all(store)
     assert remove_own(store.folder) == ["notes.txt", "report.html.kept-1", "shock"]
     assert all(path.read_text() == "mine" for path in mine)
 
@@ -101,7 +103,7 @@ def test_copies_behind_a_link_are_a_users(store, tmp_path, clean):
     shutil.rmtree(store.folder / "shock")
     (store.folder / "shock").symlink_to(copy)
     if clean:
-        withdraw_all(store, store.folder)
+        withdraw_all(store)
         assert remove_own(store.folder) == ["shock"]
     else:
         assert show_products(store, POINT) == ["shock/stage.json"]
@@ -162,7 +164,7 @@ def test_copies_of_a_user_stay_where_the_list_is_lost(store, harm):
     mine.write_bytes((store.folder / "report.html").read_bytes())
     names = store.home / "views/run.json"
     names.unlink() if harm is None else names.write_text(harm)
-    assert remove_unused(store) == 0
+    assert remove_unused(store) == (0, 0)
     show_products(store, OTHER)
     assert mine.read_text() == "report/report.html" and not (store.folder / "report.html").exists()
 
@@ -172,7 +174,7 @@ def test_a_users_inputs_are_set_aside_or_left(store, tmp_path):
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine/case.json").write_text("mine")
     (store.folder / "inputs").symlink_to(tmp_path / "mine")
-    withdraw_all(store, store.folder)
+    withdraw_all(store)
     assert (tmp_path / "mine/case.json").read_text() == "mine"
     show_products(store, POINT)
     assert (store.folder / "inputs.kept-1").is_symlink() and (store.folder / "inputs/case.json").is_file()
@@ -222,7 +224,7 @@ def test_a_folder_where_the_list_belongs_gives_way(store):
 
 
 def test_all_is_removed_where_nothing_is_a_users(store, monkeypatch):
-    withdraw_all(store, store.folder)
+    withdraw_all(store)
     assert remove_own(store.folder) == []
     assert not store.folder.exists()
     store.folder.mkdir()
@@ -263,8 +265,74 @@ def test_without_hard_links_products_are_copied(store, monkeypatch):
 
 def test_unused_products_can_be_removed(store):
     make(store, OTHER, ("shock", "report"))
-    assert remove_unused(store) == 2
+    (store.home / "work/reflow-0/reflow").mkdir(parents=True)
+    assert remove_unused(store) == (2, 1)
     assert not any(state.stale for state in examine(store, POINT).values())
+
+
+def test_what_is_unused_is_counted_apart_from_unfinished_work(store, capsys):
+    make(store, OTHER, ("shock", "report"))
+    (store.home / "work/reflow-0/reflow").mkdir(parents=True)
+    clean(store.folder, "small", unused=True)
+    clean(store.folder, "small", unused=True)
+    first, second = capsys.readouterr().out.replace("\n", " ").split("removed")[1:]
+    assert first.startswith(" 2 unused products and 1 unfinished stage from")
+    assert second.startswith(" 0 unused products from")
+
+
+def test_details_of_errors_are_the_programs_own(store):
+    logs = store.folder / LOGS
+    logs.mkdir()
+    (logs / f"{LOG}x1.txt").write_text("Traceback")
+    clean(store.folder, "small")
+    assert not store.folder.exists()
+
+
+def test_a_users_logs_stay(store):
+    logs = store.folder / LOGS
+    logs.mkdir()
+    for name in (f"{LOG}x1.txt", "mine.txt"):
+        (logs / name).write_text("text")
+    clean(store.folder, "small")
+    assert [path.relative_to(store.folder).as_posix() for path in store.folder.rglob("*")] == ["logs", "logs/mine.txt"]
+
+
+@pytest.fixture
+def study(tmp_path):
+    """The folder of a study of two points, with a table of its own; one of them was also repeated for its times."""
+    study = Store(tmp_path / "study")
+    with locked(study.folder, "study", "pads"):
+        for one, points in ((study, (POINT, OTHER)), (study.repeated[0], (POINT,))):
+            for point in points:
+                make(one, point, NAMES)
+                show_products(one, point)
+        made = study.home / "work/report"
+        made.mkdir(parents=True)
+        (made / "results.csv").write_text("")
+        view.adopt(study, study.folder, made)
+    return study
+
+
+def test_a_study_is_cleaned_as_a_whole_with_force_only(study):
+    with pytest.raises(CaseError, match=r"holds the study of pads, not the run of small.*--force"):
+        clean(study.folder, "small")
+    assert (study.folder / "results.csv").exists()
+    clean(study.folder, "small", force=True)
+    assert not study.folder.exists()
+
+
+def test_a_users_files_in_a_study_stay(study):
+    note = study.folder / "points" / POINT.key / "notes.txt"
+    note.write_text("mine")
+    clean(study.folder, "small", force=True)
+    assert [path for path in study.folder.rglob("*") if path.is_file()] == [note]
+
+
+def test_a_study_stays_one_when_its_unused_products_are_removed(study):
+    (study.home / "work/reflow-0").mkdir()
+    clean(study.folder, "small", unused=True, force=True)
+    with locked(study.folder, "study", "pads"):
+        assert not any(state.stale for point in (POINT, OTHER) for state in examine(study, point).values())
 
 
 def test_a_copy_of_a_run_folder_is_one(store, tmp_path):

@@ -23,8 +23,8 @@ from reflowshock.cases.hard.trial import Measured
 from reflowshock.cases.hard.trials.coupling import PairRun
 from reflowshock.cases.hard.trials.elements import Impact, Turns
 from reflowshock.cases.hard.verdict import attempt
+from reflowshock.units import UnitError
 from reflowshock.workflow.case.problems import CaseError
-from reflowshock.workflow.case.units import UnitError
 from reflowshock.workflow.stress_test import command
 from reflowshock.workflow.stress_test.command import Request, stress_test
 from tests.support.rods import TABLE

@@ -22,7 +22,7 @@ SECOND_LAYER = "structure.layers.cover.material=coper"
 BAD_VALUES = {
     "unknown key of a load": ("loads.drop.pekk=3 G", ["loads.drop.pekk", "unknown key", "mean loads.drop.peak?"]),
     "wrong dimension": ("loads.drop.peak=3 mm", ["loads.drop.peak", "is a length; expected an acceleration", "> 0 G"]),
-    "unknown kind": ("loads.drop.kind=inputg", ["loads.drop.kind", "input_g, pressure, motion, gravity", "input_g?"]),
+    "unknown kind": ("loads.drop.kind=inputg", ["loads.drop.kind", "input_g, gravity, pressure, motion", "input_g?"]),
     "no kind": ("loads.push.peak=3 MPa", ["loads.push.kind: is missing", "one of input_g"]),
     "no table": ("loads.drop=3", ["loads.drop = 3: must be a table"]),
     "no tables": ("loads=3", ["loads = 3: must be a table"]),

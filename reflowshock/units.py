@@ -4,14 +4,17 @@ import math
 import re
 from decimal import Decimal
 from functools import cache, lru_cache
+from typing import TYPE_CHECKING
 
-import pint
+if TYPE_CHECKING:  # it takes longer to load than the parameters of a rank, which never converts anything
+    import pint
 
 # The digits of a number are counted: a pattern without bounds takes minutes for a megabyte of them.
 QUANTITY = re.compile(
     r"\s*(?P<number>[-+]?(?:[0-9]{1,400}(?:\.[0-9]{0,400})?|\.[0-9]{1,400})(?:[eE][-+]?[0-9]{1,9})?)"
     r"\s*(?P<unit>(?:\S(?:.*\S)?)?)\s*"
 )
+PATTERN = re.sub(r"\?P<\w+>", "", f"^{QUANTITY.pattern}$")  # as JSON schemas have it, without names of groups
 COMMA = re.compile(r",\s*[0-9]")  # after the digits of a number: decimals, or thousands
 FACTOR = r"[^\W\d]\w*(?:(?:\^|\*\*)-?\d)?"
 UNIT = re.compile(rf"(?:1?\s*/\s*)?{FACTOR}(?:\s*[*/]\s*{FACTOR})*")
@@ -31,8 +34,10 @@ class UnitError(ValueError):
 
 
 @cache
-def registry() -> pint.UnitRegistry:
+def registry() -> "pint.UnitRegistry":
     """Return the unit registry; G is the standard acceleration of gravity, as in shock specifications, mil a thou."""
+    import pint
+
     # Decimals: "0.04 mm" and "40 um" are the same float, the one nearest to 4e-5.
     units: pint.UnitRegistry = pint.UnitRegistry(
         on_redefinition="ignore", autoconvert_offset_to_baseunit=True, non_int_type=Decimal
@@ -95,7 +100,7 @@ def in_unit(value: float, unit: str) -> float:
     return float(registry().Quantity(Decimal(repr(float(value))), base).to(parsed).magnitude)
 
 
-def dimension(unit: str | pint.Unit) -> str:
+def dimension(unit: "str | pint.Unit") -> str:
     """Name the dimension of a unit: "length" for "mm", "acceleration" for "G"; else its formula."""
     wanted = registry().Unit(unit)
     if wanted.dimensionless:
@@ -125,7 +130,9 @@ KINDS = {
 
 
 @lru_cache(maxsize=1024)
-def _parse_unit(text: str, wanted: str) -> pint.Unit:
+def _parse_unit(text: str, wanted: str) -> "pint.Unit":
+    import pint
+
     expected = f"expected {_article(dimension(wanted))}, e.g. in {wanted}"
     spelled = text
     for written, read in SPELLINGS.items():
@@ -148,8 +155,10 @@ def _parse_unit(text: str, wanted: str) -> pint.Unit:
     return parsed
 
 
-def _in_base_units(number: Decimal, unit: pint.Unit) -> Decimal:
+def _in_base_units(number: Decimal, unit: "pint.Unit") -> Decimal:
     """Convert a number; UnitError where the unit has a zero of its own inside a product, as degC/m."""
+    import pint
+
     try:
         return registry().Quantity(number, unit).to_base_units().magnitude
     except (pint.PintError, ArithmeticError) as error:

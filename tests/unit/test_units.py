@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from reflowshock.workflow.case.units import UnitError, dimension, from_si, to_si
+from reflowshock.units import UnitError, dimension, from_si, to_si
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,49 @@
+"""Quantities among parameters: text with a unit in a case file, floats in SI units in the program."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from pydantic import GetJsonSchemaHandler
+from pydantic_core import CoreSchema
+
+from reflowshock import units
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """Annotation of a float, or of a tuple of floats, that has a dimension: ``Annotated[float, Quantity("mm")]``.
+
+    Models hold SI floats and check their ranges in them. A case file may use any unit of the same dimension.
+
+    Attributes:
+        unit: in which a user sees the value, e.g. "mm".
+    """
+
+    unit: str
+
+    @property
+    def dimension(self) -> str:
+        """Name of the dimension, e.g. "length"."""
+        return units.dimension(self.unit)
+
+    @property
+    def described(self) -> str:
+        """What a user may write, in words."""
+        return f"{self.dimension}, e.g. in {self.unit}"
+
+    def to_si(self, text: object) -> float:
+        """Convert what a case file has, e.g. "0.48 mm"; raise UnitError, in words, where it is no such quantity."""
+        return units.to_si(text, self.unit)
+
+    def text(self, value: float, digits: int = 10) -> str:
+        """Write an SI value as a case file has it."""
+        return units.from_si(value, self.unit, digits)
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        """Return the schema of case files: a string with a unit, or a list of them."""
+        numbers = handler(schema)
+        form: dict[str, Any] = {"type": "string", "pattern": units.PATTERN, "examples": [f"1 {self.unit}"]}
+        if numbers.get("type") == "array":
+            sizes = {str(name): numbers[name] for name in ("minItems", "maxItems") if name in numbers}
+            form = {"type": "array", "items": form, **sizes}
+        return {**form, "description": self.described, "x-unit": self.unit}
