@@ -82,7 +82,7 @@ class Fineness:
     substrate: tuple[float, ...]
 
 
-# Of quadratic hexahedra: force and moment of the elastic patch 3.5, 1.0, 0.3 % from the limit (joint_oracle.py).
+# Of quadratic hexahedra: forces and moments of the elastic patch change by 2 % to the next, then by 1 %.
 QUADRATIC = {
     "coarse": Fineness(
         sectors=2,

@@ -58,6 +58,15 @@ def test_imprinted_pads_agree_with_the_oracle(oracle):
         assert found[name] == pytest.approx(oracle[name], rel=0.05), name
 
 
+@pytest.mark.long
+def test_finest_meshes_agree_within_two_per_cent():
+    patch = JointPatch()
+    reference = equilibrium(Patch(patch, mesh_patch(patch, QUADRATIC["fine"], 2), yields=False))[-1]
+    found = ProgramPatch(patch, matching_mesh(patch, TRILINEAR["fine"]), Course()).at_rest()
+    for name in ("axial@foot", "shear@foot", "peel@foot", "von_mises@foot:25um"):  # the foot is the critical end
+        assert found[name] == pytest.approx(reference[name], rel=0.02), name
+
+
 def test_boxes_that_ignore_the_pad_are_too_stiff(oracle):
     """The excess of a joint tied to facets of 0.5 mm, as another model has found it (40, 83-130, 86-181 %)."""
     patch = JointPatch()

@@ -25,14 +25,12 @@ RESULT, IDENTITY = "result.json", "identity.txt"
 FIRST = {"residual_two_scale": 0, "residual": 1}  # folders of coolings; the first gives the reported figures
 
 
-def is_wanted(case: BoardDropCase) -> bool:
-    """Whether shocks begin with the stress of cooling."""
-    return case.thermal is not None and case.thermal.effects.residual_stress == "on"
-
-
 def problems(case: BoardDropCase) -> Iterator[Problem]:
     """Find shocks that cannot begin with the stress of cooling."""
-    if is_wanted(case) and case.shock.coupling.direction == "one_way" and "two_scale" in case.shock.numerics.modes:
+    if case.cooled and case.shock.numerics.kinematics == "corotational":
+        message = "cannot be combined with thermal.effects.residual_stress = on, which needs a path"
+        yield Problem("shock.numerics.kinematics", message, "corotational", "finite, auto")
+    if case.cooled and case.shock.coupling.direction == "one_way" and "two_scale" in case.shock.numerics.modes:
         message = "cannot be combined with thermal.effects.residual_stress = on: the macro model has its joints twice"
         yield Problem("shock.coupling.direction", message, "one_way", "two_way")
 
@@ -49,7 +47,7 @@ def begun(run: Run[BoardDropCase], folder: Path, request: dict, prefix: str = ""
     Raises:
         LaunchError: the run failed; the message has its last words.
     """
-    if not is_wanted(run.case):
+    if not run.case.cooled:
         return request
     name = cooling_name(request, prefix)
     if not (folder / name).exists():
@@ -114,7 +112,7 @@ def forecast(case: BoardDropCase, parts: Mapping[str, PartForecast]) -> tuple[di
         parts: of the mesh with all joints fine; modes with other fine joints cool apart.
     """
     effects = effect(case)
-    if not is_wanted(case):
+    if not case.cooled:
         return effects, 0.0
     cost = _cost(case, parts)
     models = len(case.shock.numerics.modes) if case.shock.coupling.fine_joints != "all" else 1

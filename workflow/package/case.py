@@ -31,11 +31,14 @@ GIVEN = ("package.surfaces", "package.surface_unit")
 JOINT_MESHES = (
     "package.joint_numerics",
     "package.coarse_joint_numerics",
+    "package.imprint",
     "shock.coupling.fine_joints",
     "shock.coupling.direction",
     "shock.identical_joints",
 )
-DRAWN_MESH = (*DRAWN, "package.copper", "package.substrate", "package.die", "package.numerics", "board")
+DRAWN_MESH = (
+    *DRAWN, "package.copper", "package.substrate", "package.die", "package.numerics", "package.imprint", "board",
+)  # fmt: skip
 HEATED = tuple(
     f"thermal.{name}"
     for name in (
@@ -133,6 +136,11 @@ class BoardDropCase(PackageCase):
     ranks_key = "shock.ranks.total"
 
     shock: Shock
+
+    @property
+    def cooled(self) -> bool:
+        """Whether shocks begin with the stress of cooling."""
+        return self.thermal is not None and self.thermal.effects.residual_stress == "on"
 
     @property
     def pipeline(self) -> Pipeline:
