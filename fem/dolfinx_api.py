@@ -1,11 +1,8 @@
 """The only place that knows versions of DOLFINx: 0.5 (Debian 12) and 0.9 (Debian 13)."""
 
 from collections.abc import Callable
-from functools import partial
-from operator import methodcaller
 from pathlib import Path
 
-import basix
 import dolfinx
 import dolfinx.fem
 import dolfinx.fem.petsc
@@ -102,7 +99,11 @@ def quadrature_space(mesh: dolfinx.mesh.Mesh, degree: int, shape: tuple[int, ...
     """Return the space of values of a shape at the integration points of a rule of some degree."""
     if OLD:
         element = ufl.FiniteElement("Quadrature", mesh.ufl_cell(), degree=degree, quad_scheme="default")
-        return dolfinx.fem.FunctionSpace(mesh, ufl.TensorElement(element, shape=shape) if shape else element)
+        if len(shape) == 1:
+            element = ufl.VectorElement(element, dim=shape[0])
+        elif shape:
+            element = ufl.TensorElement(element, shape=shape)
+        return dolfinx.fem.FunctionSpace(mesh, element)
     import basix.ufl
 
     element = basix.ufl.quadrature_element(mesh.basix_cell(), value_shape=shape, degree=degree)
@@ -112,13 +113,24 @@ def quadrature_space(mesh: dolfinx.mesh.Mesh, degree: int, shape: tuple[int, ...
 def at_quadrature_points(
     mesh: dolfinx.mesh.Mesh, expression: ufl.core.expr.Expr, degree: int
 ) -> Callable[[], NDArray[np.float64]]:
-    """Return what evaluates an expression of UFL at the integration points of all cells, ``(ne, points * size)``."""
-    cell, _ = GEOMETRIES[cell_nodes(mesh).shape[1]]
-    points, _ = basix.make_quadrature(getattr(basix.CellType, cell), degree)
-    compiled = dolfinx.fem.Expression(expression, points)
-    cells = np.arange(mesh.topology.index_map(3).size_local, dtype=np.int32)
-    evaluate = methodcaller("eval", cells) if OLD else methodcaller("eval", mesh, cells)  # compiled code, no text
-    return partial(evaluate, compiled)
+    """Return what evaluates an expression of UFL at the integration points of all cells, ``(ne, points * size)``.
+
+    Each test function of their space is one at its own point and zero at all others, so that the integral of the
+    expression times it is the value there times the weight.
+    """
+    shape = expression.ufl_shape
+    space, dx = quadrature_space(mesh, degree, shape), ufl.dx(domain=mesh, metadata={"quadrature_degree": degree})
+    test, dofs = ufl.TestFunction(space), cell_dofs(space)
+    ones = ufl.as_tensor(np.ones(shape).tolist()) if shape else ufl.as_ufl(1.0)
+    integral, weight = (dolfinx.fem.form(ufl.inner(item, test) * dx) for item in (expression, ones))
+    weights = np.array(dolfinx.fem.assemble_vector(weight).array)
+
+    def evaluate() -> NDArray[np.float64]:
+        vector = dolfinx.fem.assemble_vector(integral)
+        values = (vector.array / weights).reshape(-1, int(np.prod(shape)))
+        return values[dofs].reshape(len(dofs), -1)
+
+    return evaluate
 
 
 def assembled_csr(form) -> scipy.sparse.csr_matrix:  # its type has another name in each version

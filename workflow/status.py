@@ -21,7 +21,8 @@ FIGURES = {
     "surface": ("surface_volume_error_max",),
     "solder_mesh": ("joint_volume_error_max", "joint_scaled_jacobian_min", "joint_critical_time_step"),
     "shock": (
-        "critical_joint", "peak_von_mises", "shape_effect_on_peak_stress", "residual_stress_largest",
+        "critical_joint", "peel_stress", "layer_von_mises", "layer_plastic_work",
+        "shape_effect_on_peak_stress", "residual_stress_largest",
         "peak_board_strain", "deflection_over_thickness", "step_ratio", "critical_joint_stress_error",
         "die_displacement_error", "two_scale_dns_time_ratio", "first_frequency", "steps", "energy_balance_error",
     ),

@@ -18,6 +18,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from reflowshock.fem.dynamics.motion import Motion
+from reflowshock.fem.forces.bedding import BeddedFacets
 from reflowshock.fem.forces.force_assembled import AssembledElements
 from reflowshock.fem.forces.force_congruent import CongruentElements
 from reflowshock.fem.loads.damping import RayleighDamping
@@ -296,7 +297,9 @@ class ImplicitMotion(Motion):
 
 def check_linear(body: Body) -> None:
     """Raise ``ValueError`` where the force of an element is not a matrix times the displacement."""
-    foreign = [term for term in body.terms if not isinstance(term, CongruentElements | AssembledElements)]
+    foreign = [
+        term for term in body.terms if not isinstance(term, CongruentElements | AssembledElements | BeddedFacets)
+    ]
     if foreign:
         names = ", ".join(type(term).__name__ for term in foreign)
         raise ValueError(

@@ -61,17 +61,19 @@ def named_joints(coupling: "JointCoupling") -> FineJoints:
 
 
 def most_stressed(history: Path, count: int) -> FineJoints:
-    """Return the joints whose von Mises stress, averaged over the solder at either pad, peaks highest in a history."""
+    """Return the critical joints of a history, by peel stress, or by plastic work where solder yields."""
     import numpy as np
 
+    from reflowshock.fem.output.ranking import ranked, ranking_measure
+    from reflowshock.workflow.case.text import quantity
+
     with np.load(history) as arrays:
-        names, ends = arrays["joints"], (arrays["von_mises_board"], arrays["von_mises_package"])
-    peak = np.maximum(*ends).max(axis=0)
-    order = np.argsort(-peak, kind="stable")
-    ranked = [f"{names[k]} {1e-6 * peak[k]:.1f} MPa" for k in order[: count + 1]]
-    why = f"the most stressed of {len(names)} in a run with coarse joints: {', '.join(ranked[:count])}"
-    if len(ranked) > count:
-        why += f"; the next is {ranked[count]}"
+        names, order, measure = arrays["joints"], ranked(arrays), ranking_measure(arrays)
+        peak = measure.peaks(arrays)
+    told = [f"{names[k]} {quantity({'value': float(peak[k]), 'unit': measure.unit})}" for k in order[: count + 1]]
+    why = f"the most stressed of {len(names)} by {measure.name} in a run with coarse joints: {', '.join(told[:count])}"
+    if len(told) > count:
+        why += f"; the next is {told[count]}"
     return FineJoints(tuple(str(names[k]) for k in order[:count]), why)
 
 

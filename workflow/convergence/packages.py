@@ -1,13 +1,14 @@
 """Convergence study of a package that is dropped: its mesh, joints, particles, and how joints and board are coupled."""
 
 from collections.abc import Callable, Iterator
-from math import floor
+from dataclasses import replace
+from math import floor, pi, sqrt
 from pathlib import Path
 from typing import Any
 
 from reflowshock.meshing.board.pads import pad_table
 from reflowshock.units import from_si
-from reflowshock.workflow.board_drop.board_deflection import longest_duration
+from reflowshock.workflow.board_drop.duration import longest_duration
 from reflowshock.workflow.board_drop.shock_forecast import implicit_seconds
 from reflowshock.workflow.board_drop.shock_launch import MODES
 from reflowshock.workflow.convergence.series import ConvergenceStudy, Parameter, Quantity, StudyRun, at_same_times
@@ -26,8 +27,12 @@ MESH, BOARD, JOINTS = "element size", "element size of board and package", "elem
 ROUNDING = 1e-9
 
 ERRORS = {
-    "stress_history": "von Mises stress of the critical joint, mean over its pads, L2 over time",
-    "peak_stress": "its peak",
+    "peel_stress": "peel stress of the critical joint, peak",
+    "layer_von_mises": "von Mises stress of its solder layer, peak",
+    "layer_plastic_work": "plastic work density of its solder layer",
+    "section_axial_force": "its axial force, peak",
+    "section_bending_moment": "its bending moment, peak, over axial force times pad radius",
+    "stress_history": "von Mises stress of its solder layers, L2 over time",
     "deflection": "deflection of board and die, L2 over time",
 }
 SIDES = ("von_mises_board", "von_mises_package")
@@ -73,20 +78,23 @@ def _widths(case: Any, run_folder: Path) -> dict[str, Quantity]:
 
 
 def _motion(case: Any, run_folder: Path) -> dict[str, Quantity]:
-    """Histories of the joint whose stress is the largest, and of the board's and the die's centre."""
+    """Peaks and history of the critical joint, and histories of the board's and the die's centre."""
     import numpy as np
 
     folder = next(folder for mode in MODES if (folder := run_folder / "shock" / mode).is_dir())
     with np.load(folder / "history.npz") as arrays:
         history = dict(arrays)
-    result = read_json(folder / "result.json")
-    joint = list(history["joints"]).index(result["metrics"]["critical_joint"]["value"])
+    metrics = read_json(folder / "result.json")["metrics"]
+    joint = list(history["joints"]).index(metrics["critical_joint"]["value"])
     stress = {"time": history["time"], **{side: history[side][:, joint] for side in SIDES}}
     duration, count = case.shock.decided_duration, case.shock.numerics.history_samples + 1
-    peak = max(float(stress[side].max()) for side in SIDES)
-    return {
+    peaks = {name: Quantity(metrics[name]["value"]) for name in ERRORS if name in metrics}
+    moment = peaks["section_bending_moment"]
+    force, peel = (float(metrics[name]["value"]) for name in ("section_axial_force", "peel_stress"))
+    scale = force * sqrt(force / peel / pi) if force > 0.0 < peel else None
+    return peaks | {
+        "section_bending_moment": replace(moment, scale=scale),
         "stress_history": Quantity(at_same_times(stress, SIDES, duration, count)),
-        "peak_stress": Quantity(peak),
         "deflection": Quantity(at_same_times(history, DEFLECTIONS, duration, count)),
     }
 

@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
+from reflowshock.fem.output.ranking import ENDS, OUTER_FIBRE, PEEL, PLASTIC_WORK, VON_MISES, ranked, ranking_measure
 from reflowshock.workflow.case.text import mega, micro, nano, number, percent
-from reflowshock.workflow.package.verdict import MEASURES
+from reflowshock.workflow.package.verdict import WORDS
 from reflowshock.workflow.package_report.joint_records import Column, Record, by_shape, record_table
 from reflowshock.workflow.process.products import read_json
-from reflowshock.workflow.report.histories import at_pads
 
 MESH_COLUMNS: tuple[Column, ...] = (
     ("method", "method", str),
@@ -65,7 +65,7 @@ def ranked_joints(
     judged: Mapping[str, dict],
     fine: Collection[str] | None = None,
 ) -> dict:
-    """Joints ranked by peak von Mises stress at their pads.
+    """Joints ranked by peel stress, or by plastic work where solder yields; what depends on the mesh comes last.
 
     Args:
         history: of one mode.
@@ -74,40 +74,47 @@ def ranked_joints(
         fine: names of the fine joints, where some are coarse.
     """
     shape = {joint["name"]: joint for joint in joints}
-    stress = at_pads(history)
-    peel = np.maximum(history["peel_board"], history["peel_package"])
+    measure = ranking_measure(history)
     rows = []
-    for column in np.argsort(-stress.max(axis=0)):
-        name, row = str(history["joints"][column]), int(np.argmax(stress[:, column]))
-        side = "board" if history["von_mises_board"][row, column] == stress[row, column] else "package"
+    for column in ranked(history):
+        name = str(history["joints"][column])
+        forces = np.stack([history[f"section_{end}"][:, column] for end in ENDS])
+        row = int(np.argmax(measure.worse(history)[:, column]))
         rows.append(
             [
                 name,
-                mega(stress[row, column]),
-                side,
+                mega(PEEL.peaks(history)[column]),
+                mega(VON_MISES.peaks(history)[column]),
+                *work_cells(history, column),
+                measure.worse_end(history, column),
                 f"{1e3 * history['time'][row]:.3f}",
-                mega(peel[:, column].max()),
-                mega(history["von_mises_max"][:, column].max()),
+                number(float(forces[..., 0].max())),
+                number(float(1e3 * np.hypot(forces[..., 4], forces[..., 5]).max())),
+                mega(OUTER_FIBRE.peaks(history)[column]),
                 micro(shape[name]["standoff"]),
                 micro(shape[name]["max_width"]),
-                *work_cells(history, column),
                 *verdict_cells(judged[name]),
                 *([] if fine is None else ["fine" if name in fine else "coarse"]),
+                mega(history["von_mises_max"][:, column].max()),
             ]
         )
+    layer = f"{micro(float(history['joint_layer']))} µm"
     head = [
         "joint",
-        "von Mises at pad [MPa]",
+        "peel stress [MPa]",
+        f"von Mises of the {layer} at the pad [MPa]",
+        *([f"plastic work of the {layer} [kJ/m³]"] if "plastic_work_board" in history else []),
         "pad",
         "time [ms]",
-        "peel stress [MPa]",
-        "largest element value [MPa]",
+        "axial force [N]",
+        "bending moment [N mm]",
+        "outer-fibre stress [MPa]",
         "standoff [µm]",
         "width [µm]",
-        *(["plastic work at pad [kJ/m³]"] if "plastic_work_board" in history else []),
         "verdict",
         "margin",
         *([] if fine is None else ["mesh"]),
+        "largest element value [MPa], depends on the mesh",
     ]
     return {"head": head, "rows": rows}
 
@@ -116,14 +123,14 @@ def work_cells(history: Mapping[str, np.ndarray], column: int) -> list[str]:
     """Plastic work at the worse pad of the joint in a column of the history, where solder yields."""
     if "plastic_work_board" not in history:
         return []
-    return [number(1e-3 * max(history[f"plastic_work_{end}"][:, column].max() for end in ("board", "package")))]
+    return [number(1e-3 * float(PLASTIC_WORK.peaks(history)[column]))]
 
 
 def verdict_cells(judged: Mapping[str, Any]) -> list[str]:
     """Verdict and margin of a joint, with the criterion of least margin."""
     if judged["margin"] is None:
         return [judged["verdict"], "–"]
-    return [judged["verdict"], f"{judged['margin']:.3g} by {MEASURES[judged['criterion']].word}"]
+    return [judged["verdict"], f"{judged['margin']:.3g} by {WORDS[judged['criterion']]}"]
 
 
 def meshes(joints: Sequence[Record]) -> dict | None:

@@ -122,7 +122,7 @@ def _draw_histories(axes, mode: str, history: dict, critical_joint: str) -> None
     axes[1, 0].plot(time, 1.0e3 * history["board_strain"], **style)
     axes[1, 0].set_ylabel("largest board strain under the package [1e-3]")
     axes[1, 1].plot(time, joint_stress(history, critical_joint) / 1.0e6, **style)
-    axes[1, 1].set_ylabel(f"von Mises at the pads of {critical_joint} [MPa]")
+    axes[1, 1].set_ylabel(f"von Mises of the layers of {critical_joint} [MPa]")
 
 
 def svg(figure) -> str:

@@ -10,6 +10,8 @@ import numpy as np
 import pyvista
 from matplotlib import pyplot
 
+from reflowshock.fem.output.ranking import VON_MISES, critical_joint
+
 if TYPE_CHECKING:
     from reflowshock.particles.steps.shape import JointShape, Snapshot
 
@@ -24,7 +26,7 @@ SCALAR_BAR = {"vertical": True, "position_x": 0.88, "position_y": 0.3, "height":
 
 
 def render_joints(series: list[Path], history: dict, parts: list[str], picture: Path) -> str:
-    """Render all joints under their package, coloured by von Mises stress, when the worst one is stressed most.
+    """Render all joints under their package, coloured by von Mises stress, when the critical one is stressed most.
 
     Args:
         series: PVD files of the models that have them, all of one run.
@@ -35,14 +37,14 @@ def render_joints(series: list[Path], history: dict, parts: list[str], picture: 
     Returns:
         A caption.
     """
-    stress = np.maximum(history["von_mises_board"], history["von_mises_package"])
-    row, column = np.unravel_index(np.argmax(stress), stress.shape)
-    critical = str(history["joints"][column])
-    grid, time = _fields_near(series, float(history["time"][row]))
+    column = critical_joint(history)
+    critical, stress = str(history["joints"][column]), VON_MISES.worse(history)[:, column]
+    grid, time = _fields_near(series, float(history["time"][np.argmax(stress)]))
     draw_joints(grid, parts, critical, float(stress.max()), picture)
     return (
         f"Von Mises stress in the joints at {1e3 * time:.3f} ms, seen from the package's corner; the package is drawn "
-        f"as an outline. The scale ends at {critical}'s average at its worse pad; single elements reach more."
+        f"as an outline. The scale ends at the average over {critical}'s layer at its worse pad; single elements reach"
+        " more, the more so the finer they are."
     )
 
 

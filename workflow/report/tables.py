@@ -18,8 +18,10 @@ HEADLINE = (
 COMPARISON = (
     ("compared_duration", "time covered by both; the DNS ends before the shock"),
     ("critical_joint", "critical joint (of the DNS where it covers the whole shock)"),
-    ("critical_joint_stress_error", "its von Mises history, relative L2"),
+    ("critical_joint_stress_error", "von Mises history of its layers, relative L2"),
     ("worst_joint_stress_error", "the same, worst joint that is fine in both"),
+    ("critical_joint_peel_error", "peel history of the critical joint, relative L2"),
+    ("critical_joint_work_error", "plastic work history of the critical joint, relative L2"),
     ("die_displacement_error", "die centre displacement, relative L2"),
     ("board_displacement_error", "board centre displacement, relative L2"),
     ("two_scale_dns_time_ratio", "wall time, two-scale over DNS on as many ranks"),

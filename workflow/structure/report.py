@@ -15,6 +15,7 @@ from reflowshock.workflow.report.curves import ENERGIES, MILLI, STYLE, svg
 from reflowshock.workflow.report.tables import costs
 from reflowshock.workflow.structure.case import StructureCase
 from reflowshock.workflow.structure.findings import read_history, read_modes
+from reflowshock.workflow.structure.record_curves import acceleration_curves, spectrum_curves
 from reflowshock.workflow.structure.references import Published
 from reflowshock.workflow.structure.stages import read_results
 
@@ -31,10 +32,10 @@ Histories = Mapping[str, Mapping[str, NDArray]]
 
 
 HEADLINE = (
-    "first_frequency", "peak_displacement", "displacement_range", "peak_strain", "displacement_difference",
-    "strain_difference", "two_scale_dns_time_ratio", "two_scale_displacement_error", "wave_speed_error",
-    "transmitted_velocity_error", "reflected_velocity_error", "tip_deflection_error", "swing_frequency_error",
-    "energy_balance_error",
+    "first_frequency", "peak_acceleration", "second_peak_acceleration", "peak_displacement", "displacement_range",
+    "peak_strain", "displacement_difference", "strain_difference", "two_scale_dns_time_ratio",
+    "two_scale_displacement_error", "wave_speed_error", "transmitted_velocity_error", "reflected_velocity_error",
+    "tip_deflection_error", "swing_frequency_error", "energy_balance_error",
 )  # fmt: skip
 FRACTIONS = ("_error", "_difference", "_fraction")
 SHORTEST_IN_MM = 1e-5  # m
@@ -63,6 +64,9 @@ def add_structure(run_folder: Path, case: StructureCase, context: dict, metrics:
     context["meshed"] = meshed_part(case)
     context["points"] = [{"name": name, "curve": point_curves(histories, name)} for name in case.watch]
     context["curves"]["energies"] = energy_curves(histories)
+    context["curves"]["accelerations"] = acceleration_curves(case, histories, SOLVER_STYLE)
+    context["curves"]["spectrum"] = spectrum_curves(case)
+    context["filter"] = case.dynamics.filter.label
     if case.supports:
         context["curves"]["reactions"] = reaction_curves(histories, list(case.supports))
     context["tables"] |= {

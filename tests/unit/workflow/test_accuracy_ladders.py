@@ -149,9 +149,14 @@ def test_a_package_is_judged_by_its_critical_joint(package, tmp_path):
     stress = {"von_mises_board": np.outer(ramp, (1e6, 3e6)), "von_mises_package": np.outer(ramp, (2e6, 1e6))}
     moved = dict.fromkeys(("board_centre", "die_centre"), np.outer(ramp, (0, 0, 1e-3)))
     np.savez(own / "history.npz", time=time, joints=np.array(["A1", "A2"]), **stress, **moved)
-    (own / "result.json").write_text(json.dumps({"metrics": {"critical_joint": {"value": "A2", "unit": ""}}}))
+    figures = {"critical_joint": "A2", "peel_stress": 3e6, "section_axial_force": 0.4, "section_bending_moment": 1e-5}
+    figures |= {"layer_von_mises": 5e6}
+    metrics = {name: {"value": value, "unit": ""} for name, value in figures.items()}
+    (own / "result.json").write_text(json.dumps({"metrics": metrics}))
     found = package_study(package).measure(package, tmp_path)
-    assert found["peak_stress"].value == pytest.approx(3e6)
+    assert found["peel_stress"].value == pytest.approx(3e6)
+    assert found["section_bending_moment"].scale == pytest.approx(0.4 * np.sqrt(0.4 / 3e6 / np.pi))
+    assert "layer_plastic_work" not in found
     assert found["stress_history"].value.max() == pytest.approx(3e6)
     assert len(found["stress_history"].value) == 2 * (package.shock.numerics.history_samples + 1)
 

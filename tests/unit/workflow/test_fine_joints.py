@@ -71,16 +71,27 @@ def test_coarse_joints_are_an_effect_of_what_is_not_fine(chosen, direction, need
     assert effect["why"]
 
 
-def test_the_most_stressed_joints_are_those_of_the_highest_peak_at_either_pad(tmp_path):
+def test_the_most_stressed_joints_are_those_of_the_highest_peel_at_either_pad(tmp_path):
     board = np.array([[1.0, 9.0, 3.0], [2.0, 1.0, 3.0]]) * 1e6
     package = np.array([[1.0, 1.0, 3.0], [10.0, 1.0, 4.0]]) * 1e6
     path = tmp_path / "history.npz"
-    np.savez(path, joints=np.array(["A1", "A2", "A3"]), von_mises_board=board, von_mises_package=package)
+    np.savez(path, joints=np.array(["A1", "A2", "A3"]), peel_board=board, peel_package=package)
     fine = most_stressed(path, 2)
     assert fine.names == ("A1", "A2")
-    assert "most stressed of 3" in fine.why
-    assert "A1 10.0 MPa, A2 9.0 MPa; the next is A3 4.0 MPa" in fine.why
-    assert most_stressed(path, 3).why.endswith("A3 4.0 MPa")
+    assert "most stressed of 3 by peel stress" in fine.why
+    assert "A1 10 MPa, A2 9 MPa; the next is A3 4 MPa" in fine.why
+    assert most_stressed(path, 3).why.endswith("A3 4 MPa")
+
+
+def test_joints_that_yield_rank_by_their_plastic_work(tmp_path):
+    peel, work = np.array([[9e6, 1e6, 8e6]]), np.array([[1e3, 5e3, 0.0]])
+    ends = {f"peel_{end}": peel for end in ("board", "package")}
+    ends |= {f"plastic_work_{end}": work for end in ("board", "package")}
+    np.savez(tmp_path / "history.npz", joints=np.array(["A1", "A2", "A3"]), **ends)
+    fine = most_stressed(tmp_path / "history.npz", 1)
+    assert fine.names == ("A2",)
+    assert "by plastic work density of the layer" in fine.why
+    assert "A2 5 kJ/m^3; the next is A1" in fine.why
 
 
 @pytest.mark.parametrize("names", ["all", ("A3", "B4")])

@@ -41,6 +41,11 @@ def history():
         "von_mises_max": np.outer(wave, [70e6, 150e6]),
         "peel_board": np.outer(wave, [5e6, 9e6]),
         "peel_package": np.outer(wave, [4e6, 8e6]),
+        "section_board": np.einsum("k,jc->kjc", wave, [[1, 0, 0, 0, 3e-3, 4e-3], [2, 0, 0, 0, 0, 1e-3]]),
+        "section_package": np.einsum("k,jc->kjc", wave, [[1, 0, 0, 0, 0, 0], [1.5, 0, 0, 0, 0, 0]]),
+        "outer_fibre_board": np.outer(wave, [20e6, 30e6]),
+        "outer_fibre_package": np.outer(wave, [4e6, 8e6]),
+        "joint_layer": np.array(25e-6),
         "kinetic": 1e-3 * wave, "internal": 2e-3 * wave, "external": 3e-3 * wave, "interface": zero, "balance": zero,
     }  # fmt: skip
 
@@ -49,8 +54,10 @@ def test_joints_are_ranked_by_their_worse_pad(history):
     judged = verdict_of(Failure(), history, "A10")["joints"]
     table = joint_tables.ranked_joints(history, [{"name": name, **JOINT} for name in ("A9", "A10")], judged)
     assert [row[0] for row in table["rows"]] == ["A10", "A9"]
-    assert table["rows"][0][1:6] == ["100.0", "board", "0.500", "9.0", "150.0"]
-    assert table["rows"][1][2] == "package"
+    assert table["rows"][0][1:8] == ["9.0", "100.0", "board", "0.500", "2", "1", "30.0"]
+    assert table["rows"][1][5:7] == ["1", "5"]
+    assert table["head"][2] == "von Mises of the 25.0 µm at the pad [MPa]"
+    assert (table["head"][-1], table["rows"][0][-1]) == ("largest element value [MPa], depends on the mesh", "150.0")
 
 
 def test_a_dns_that_ended_early_ranks_no_joints(history):
@@ -67,9 +74,10 @@ def test_joints_tell_their_verdict_and_by_what(history):
     limits = {"peel_stress": {"limit": 8e6, "source": "us"}, "layer_plastic_work": {"limit": 3e5, "source": "us"}}
     found = verdict_of(Failure.model_validate(limits), yielding, "A10")["joints"]
     table = joint_tables.ranked_joints(yielding, joints, found)
-    assert table["head"][-3:] == ["plastic work at pad [kJ/m³]", "verdict", "margin"]
+    assert table["head"][3] == "plastic work of the 25.0 µm [kJ/m³]"
     assert [row[0] for row in table["rows"]] == ["A10", "A9"]
-    assert [row[-3:] for row in table["rows"]] == [["200", "FAIL", "0.889 by peel"], ["100", "PASS", "1.6 by peel"]]
+    assert [row[-3:-1] for row in table["rows"]] == [["FAIL", "0.889 by peel"], ["PASS", "1.6 by peel"]]
+    assert [row[3] for row in table["rows"]] == ["200", "100"]
 
 
 def test_a_drop_may_stand_anywhere():
