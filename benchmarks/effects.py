@@ -36,7 +36,7 @@ BOARD = dns_body(
     )
 )
 
-# Effect -> what is told of the measurement, the name of the side with it, that of the side without.
+# Effect -> how the measurement is described, the name of the side with it, that of the side without.
 PAIRS = {
     "gravity": (f"a step towards rest of {PER_EDGE**3} particles", "reflow", "reflow_weightless"),
     "inertia": (f"a step of {PER_EDGE**3} particles, which is also shorter", "reflow_inertia", "reflow"),

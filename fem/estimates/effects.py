@@ -31,7 +31,7 @@ def effect(on: bool, why: str, influence: float | None = None) -> Effect:
 def weight(switch: Switch, peak: float, gravity: float) -> Effect:
     """Decide whether weight acts beside a shock of a peak acceleration [m/s^2]: everything is linear in their sum."""
     ratio = gravity / peak if peak > 0.0 else math.inf
-    reason = f"1 G is {ratio:.2g} of the peak acceleration"
+    reason = f"1 G is {ratio:.3g} of the peak acceleration"
     if switch != "auto":
         return effect(switch == "on", f"shock.gravity = {switch}; {reason}", min(ratio, 1.0))
     on = ratio >= NEGLIGIBLE_WEIGHT
@@ -61,7 +61,7 @@ def called_for(ratio: float) -> tuple[Literal["small", "finite"], str]:
     relation = f"{'>' if finite else '<='} {100.0 * NEGLIGIBLE_STIFFENING:g} %"
     return (
         "finite" if finite else "small",
-        f"stretching changes deflections by up to {100.0 * bound:.2g} % ({relation})",
+        f"stretching changes deflections by up to {100.0 * bound:.3g} % ({relation})",
     )
 
 
@@ -78,4 +78,4 @@ def damping(coefficients: tuple[float, float], omega: float, duration: float) ->
         return effect(False, "shock.damping gives none", 0.0)
     ratio = 0.5 * (alpha / omega + beta * omega)
     taken = -math.expm1(-ratio * omega * duration)
-    return effect(True, f"{100.0 * ratio:.2g} % of critical damping in the board's first mode", taken)
+    return effect(True, f"{100.0 * ratio:.3g} % of critical damping in the board's first mode", taken)

@@ -126,10 +126,10 @@ def decide(
     warped = warpage_number(thermal, materials, sizes)
     forced = solder_force_number(materials, sizes, surface_tension)
     force = _switched(
-        thermal.effects.solder_force, forced, f"the solder's pull bends package and board by {forced:.2g} of the gap"
+        thermal.effects.solder_force, forced, f"the solder's pull bends package and board by {forced:.3g} of the gap"
     )
     larger, why = max(
-        (warped, f"heating changes gaps or places of pads by {warped:.2g} of their size"), (forced, force["why"])
+        (warped, f"heating changes gaps or places of pads by {warped:.3g} of their size"), (forced, force["why"])
     )
     flexible = _switched(thermal.effects.flexible, larger, why)
     flexible["influence"] = larger

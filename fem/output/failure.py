@@ -1,4 +1,7 @@
-"""Failure criteria of joints: objects in a list, each judging the histories of a shock."""
+"""Failure criteria of joints: objects in a list, each judging the histories of a shock.
+
+The measures are peel stress and plastic work density, with limits of the user's (``[shock.failure]``).
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -76,7 +76,7 @@ def run_time_loop(world: MPI.Comm, participants: Participants, outputs: Outputs,
     """
     plan = next(iter(participants.values())).plan
     field_windows = set(np.linspace(0, plan.windows, outputs.field_samples).round().astype(int).tolist())
-    told, output_seconds, first = time.perf_counter(), 0.0, 0
+    reported, output_seconds, first = time.perf_counter(), 0.0, 0
     state = outputs.checkpoints.read(state_of(participants, outputs))
     if state is not None and outputs.checkpoints.continued is not None:
         first = outputs.checkpoints.continued + 1
@@ -92,8 +92,8 @@ def run_time_loop(world: MPI.Comm, participants: Participants, outputs: Outputs,
             output_seconds += write_fields(participants, outputs, window)
         if sampled and window < plan.windows and outputs.checkpoints.is_due():
             save(participants, outputs, window)
-        if world.rank == 0 and time.perf_counter() - told > PROGRESS_INTERVAL:
-            told = time.perf_counter()
+        if world.rank == 0 and time.perf_counter() - reported > PROGRESS_INTERVAL:
+            reported = time.perf_counter()
             print(json.dumps({"progress": window / plan.windows, "time": time_of(participants)}), flush=True)
     HERE.slow = "writes the results"
     for file in outputs.fields.values():

@@ -104,7 +104,7 @@ def decide_oscillation(solder: Solder) -> dict[str, Decision]:
     ohnesorge = drop_numbers(solder).ohnesorge
     motion: dict[str, Decision] = {
         "inertia": {"on": True, "why": "a drop swings by its inertia"},
-        "viscosity": {"on": True, "why": f"Ohnesorge number {ohnesorge:.2g}: the swing decays"},
+        "viscosity": {"on": True, "why": f"Ohnesorge number {ohnesorge:.3g}: the swing decays"},
     }
     return decide_drop(solder, is_free=True) | motion
 
@@ -127,13 +127,13 @@ def decide(numbers: Numbers, solder: Solder) -> dict[str, Decision]:
     auto: dict[str, Decision] = {
         "gravity": {
             "on": change > NEGLIGIBLE_SHAPE_CHANGE,
-            "why": f"Bond number {numbers.bond:.3g}: changes the shape by about {100 * change:.2g} %",
+            "why": f"Bond number {numbers.bond:.3g}: changes the shape by about {100 * change:.3g} %",
             "influence": min(change, 1.0),
         },
         "inertia": {"on": transient, "why": rest, "influence": moving},
         "viscosity": {
             "on": transient,
-            "why": f"Ohnesorge number {numbers.ohnesorge:.2g}; {rest}",
+            "why": f"Ohnesorge number {numbers.ohnesorge:.3g}; {rest}",
             "influence": moving,
         },
         "surface_tension": {
@@ -176,7 +176,7 @@ ENTRIES: tuple[dict[str, Any], ...] = (
     {
         "name": "viscosity",
         "adds": "-div(2 mu D(v))",
-        "number": "as inertia; Oh = mu / sqrt(rho gamma L) is told",
+        "number": "as inertia; Oh = mu / sqrt(rho gamma L) is given",
         "threshold": PROCESS_TIME_RATIO,
         "acts": "below",
         "influence": "exp(-T / slowest time): at rest it does nothing",

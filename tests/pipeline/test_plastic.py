@@ -1,4 +1,4 @@
-"""Solder that yields, through the whole pipeline: both modes, energy ledger, failure criteria, report."""
+"""Solder that yields, through the whole pipeline: both modes, energy balance, failure criteria, report."""
 
 import json
 import shutil

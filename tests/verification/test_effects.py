@@ -289,10 +289,10 @@ def _(_effect, _folder):
 def _(_effect, _folder):
     body, step = scene.strip()
     duration, rate = 3e-4, 1.0
-    foreseen = damping((rate, 0.0), 1.5e4, duration)["influence"]
+    predicted = damping((rate, 0.0), 1.5e4, duration)["influence"]
     given = scene.shock(damping=Damping(mass_coefficient=rate))
     both = [scene.moved(body, step, scene.loads_of(body, item), duration)[1] for item in (scene.shock(), given)]
-    assert abs(both[1] / both[0] - 1.0) < foreseen < 1e-3
+    assert abs(both[1] / both[0] - 1.0) < predicted < 1e-3
 
 
 @off("finite_rotation")

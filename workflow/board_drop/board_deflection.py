@@ -90,7 +90,7 @@ def kinematics_effect(case: "BoardDropCase") -> dict:
         why = f"shock.numerics.kinematics = auto: {reason}"
     elif not finite:
         why += "" if wanted == "small" else "; auto would choose finite"
-    why = f"the board is expected to deflect by about {ratio:.2g} times its thickness; {why}"
+    why = f"the board is expected to deflect by about {ratio:.3g} times its thickness; {why}"
     return {"finite_rotation": effect(finite, why, stiffened(ratio, STIFFENING_OF_BOARD))}
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from reflowshock.names import nearest
 from reflowshock.problem import Problem
+from reflowshock.workflow.case.text import mega
 
 if TYPE_CHECKING:
     from reflowshock.fem.problem.shock import JointCoupling
@@ -56,7 +57,7 @@ def most_stressed(history: Path, count: int) -> FineJoints:
         names, ends = arrays["joints"], (arrays["von_mises_board"], arrays["von_mises_package"])
     peak = np.maximum(*ends).max(axis=0)
     order = np.argsort(-peak, kind="stable")
-    ranked = [f"{names[k]} {1e-6 * peak[k]:.1f} MPa" for k in order[: count + 1]]
+    ranked = [f"{names[k]} {mega(peak[k])} MPa" for k in order[: count + 1]]
     why = f"the most stressed of {len(names)} in a run with coarse joints: {', '.join(ranked[:count])}"
     if len(ranked) > count:
         why += f"; the next is {ranked[count]}"

@@ -65,7 +65,7 @@ def test_runs_without_the_order_of_theory_are_not_extrapolated():
     assert errors["size 0.1"]["height"].against == "finest run, size 0.05"
 
 
-def test_a_rung_may_name_what_it_is_compared_with():
+def test_a_run_may_name_what_it_is_compared_with():
     scheme = StudyRun("one way", "scheme", {}, against="size 0.1")
     found = answers(3.0) | {"one way": {"height": Quantity(3.02 * 1.01, 3.0)}}
     errors = errors_of(found, [*RUNS, scheme], RUNS, 2.0)

@@ -77,8 +77,8 @@ def test_the_most_stressed_joints_are_those_of_the_highest_peak_at_either_pad(tm
     fine = most_stressed(path, 2)
     assert fine.names == ("A1", "A2")
     assert "most stressed of 3" in fine.why
-    assert "A1 10.0 MPa, A2 9.0 MPa; the next is A3 4.0 MPa" in fine.why
-    assert most_stressed(path, 3).why.endswith("A3 4.0 MPa")
+    assert "A1 10.00 MPa, A2 9.000 MPa; the next is A3 4.000 MPa" in fine.why
+    assert most_stressed(path, 3).why.endswith("A3 4.000 MPa")
 
 
 @pytest.mark.parametrize("names", ["all", ("A3", "B4")])

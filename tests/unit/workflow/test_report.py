@@ -48,7 +48,7 @@ def history():
 def test_joints_are_ranked_by_their_worse_pad(history):
     table = joint_tables.ranked_joints(history, [{"name": name, **JOINT} for name in ("A9", "A10")], {})
     assert [row[0] for row in table["rows"]] == ["A10", "A9"]
-    assert table["rows"][0][1:6] == ["100.0", "board", "0.500", "9.0", "150.0"]
+    assert table["rows"][0][1:6] == ["100.0", "board", "0.500", "9.000", "150.0"]
     assert table["rows"][1][2] == "package"
 
 
@@ -90,7 +90,7 @@ def test_a_peak_at_the_end_is_said(history):
         ("volume", {"value": 7.5e-10, "unit": "m^3"}, "0.75 mm^3"),
         ("added_mass", {"value": 2.0e-5, "unit": "kg"}, "20 mg"),
         ("critical_joint", {"value": "A10", "unit": ""}, "A10"),
-        ("joint_width_error_max", {"value": 6.354e-4, "unit": ""}, "0.064 %"),
+        ("joint_width_error_max", {"value": 6.354e-4, "unit": ""}, "0.0635 %"),
         ("peak_board_strain", {"value": 2.25e-3, "unit": ""}, "2250 µm/m"),
     ],
 )
