@@ -118,9 +118,13 @@ def run(
     profile: ProfileOption = None,
     force: Force = False,
     yes: Yes = False,
+    fail_on_verdict: Annotated[
+        bool, typer.Option("--fail-on-verdict", help="exit code 3 where the verdict on the design is FAIL")
+    ] = False,
 ) -> None:
-    """Run all stages that are missing, stale or damaged."""
+    """Run all stages that are missing, stale or damaged; ends with the verdict on the design."""
     from reflowshock.workflow.jobs.batch import machine_of
+    from reflowshock.workflow.package.verdict import FAIL
     from reflowshock.workflow.pipeline.gate import ask_if_long
     from reflowshock.workflow.plan import predicted_seconds
     from reflowshock.workflow.run import WHAT, run_case
@@ -129,6 +133,8 @@ def run(
     if until not in point.case.pipeline.names:
         allowed = ", ".join(point.case.pipeline.names)
         raise typer.BadParameter(f"'{until}' is not a stage of this case; allowed: {allowed}", param_hint="--until")
+    if fail_on_verdict and until != point.case.pipeline.names[-1]:
+        raise typer.BadParameter("needs the report, which has the verdict", param_hint="--fail-on-verdict")
     check_folder(store.folder, WHAT, point.case.case.name, force)
     machine = machine_of(executor_for(executor, profile, cores, oversubscribe, [point.case]), one_run=True)
     if executor == ExecutorName.LOCAL:
@@ -136,8 +142,9 @@ def run(
         if not ask_if_long(point.case.run_name, seconds, yes, console):
             raise typer.Exit(1)
     with interruptible("complete stages and checkpoints are kept; repeat the command to continue"):
-        healthy = run_case(store, point, until, machine, force=force)
-    raise typer.Exit(0 if healthy else 1)
+        ended = run_case(store, point, until, machine, force=force)
+    broken = fail_on_verdict and ended.verdict == FAIL
+    raise typer.Exit(1 if not ended.healthy else 3 if broken else 0)
 
 
 @app.command()
@@ -324,7 +331,7 @@ def stage(
 
 
 def main() -> None:
-    """Run the command line; exit codes: 0 done and healthy, 1 failed, 2 bad input."""
+    """Run the command line; exit codes: 0 done and healthy, 1 failed, 2 bad input, 3 a verdict FAIL, if asked for."""
     with last_word():
         heed_signals()
         prepare()

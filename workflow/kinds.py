@@ -21,6 +21,7 @@ from reflowshock.workflow.case.run import StageFunction
 from reflowshock.workflow.convergence.series import ConvergenceStudy
 from reflowshock.workflow.package.case import BoardDropCase, PackageCase
 from reflowshock.workflow.reflow.stage import reflow
+from reflowshock.workflow.report.errors import Discretisation
 from reflowshock.workflow.solder import case as solder_case
 from reflowshock.workflow.solder import stages as solder_stages
 from reflowshock.workflow.solder.case import DropCase, DropsCase, JointCase, OscillationCase
@@ -59,6 +60,7 @@ class Kind:
         report: adds its sections to the context of a report: run folder, case, context, summary.
         study: its convergence study.
         toggles: effect -> the case with that effect the other way, where the forecast knows what it costs.
+        conclude: adds to a summary what follows from all stages: run folder, case, summary, discretisation errors.
     """
 
     case: type[Case]
@@ -71,6 +73,7 @@ class Kind:
     report: Callable[[Path, Any, dict, dict], None]
     study: Callable[[Any], ConvergenceStudy]
     toggles: Callable[[Any], Mapping[str, Toggle]] = lambda case: {}
+    conclude: Callable[[Path, Any, dict, Discretisation], None] = lambda folder, case, summary, known: None
 
     @property
     def name(self) -> str:
@@ -89,6 +92,12 @@ def _board_drop_report(run_folder: Path, case: BoardDropCase, context: dict, sum
 
     _package_report(run_folder, case, context, summary)
     add_shock(run_folder, case, context, summary)
+
+
+def _conclude_drop(run_folder: Path, case: BoardDropCase, summary: dict, known: Discretisation) -> None:
+    from reflowshock.workflow.package_report.conclusion import conclude
+
+    conclude(run_folder, case, summary, known)
 
 
 def _structure_report(run_folder: Path, case: StructureCase, context: dict, summary: dict) -> None:
@@ -162,6 +171,7 @@ BOARD_DROP = replace(
     stages={**PACKAGE.stages, "shock": package_stages.shock},
     acts="reflow and shock",
     report=_board_drop_report,
+    conclude=_conclude_drop,
 )
 STRUCTURE = Kind(
     case=StructureCase,

@@ -1,7 +1,7 @@
 """The commands run, report, verify and clean: what they do with a run folder, and what the user sees."""
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from reflowshock.workflow.case.case import Case
@@ -9,7 +9,8 @@ from reflowshock.workflow.case.run import Run
 from reflowshock.workflow.jobs.batch import Machine, failure_of, run_points, show_products
 from reflowshock.workflow.pipeline.points import read_case_of_run
 from reflowshock.workflow.pipeline.stage_runner import execute
-from reflowshock.workflow.process.terminal import console, print_error
+from reflowshock.workflow.process.products import read_json
+from reflowshock.workflow.process.terminal import console, print_error, styled
 from reflowshock.workflow.store.folders import locked, read_mark, remove_own
 from reflowshock.workflow.store.point import Point
 from reflowshock.workflow.store.product import discard
@@ -19,9 +20,18 @@ from reflowshock.workflow.store.view import adopt, not_as_put, remove_unused, wi
 
 WHAT = "run"  # a run folder holds
 REPORT = "report"
+COLOURS = {"PASS": "green", "FAIL": "red", "NO LIMIT": "default"}
 
 
-def run_case(store: Store, point: Point, until: str, machine: Machine, *, force: bool = False) -> bool:
+@dataclass(frozen=True, slots=True)
+class Ended:
+    """How a run ended: whether all products are there and every health check holds, and the verdict on the design."""
+
+    healthy: bool
+    verdict: str = ""
+
+
+def run_case(store: Store, point: Point, until: str, machine: Machine, *, force: bool = False) -> Ended:
     """Make what is missing, stale or damaged of a run, and tell how it ended.
 
     Args:
@@ -32,7 +42,7 @@ def run_case(store: Store, point: Point, until: str, machine: Machine, *, force:
         force: whether the folder may hold another case.
 
     Returns:
-        Whether every product up to that stage is there and intact, and every health check holds.
+        How it ended; the verdict is empty where there is no report, or nothing in the case is judged.
 
     Raises:
         CaseError: the folder must not, or cannot be written into.
@@ -52,13 +62,24 @@ def run_case(store: Store, point: Point, until: str, machine: Machine, *, force:
         failure = failure_of(store, point, until)
     if failure:
         _tell_failure(store, point, *failure)
-        return False
+        return Ended(healthy=False)
     failures = failed_checks(store, point, until)
     for failed in failures:
         print_error(failed)
-    if until == REPORT:
-        console.print(f"report: {store.folder / 'report.html'}")
-    return not failures
+    return Ended(not failures, _conclude(store, point) if until == REPORT else "")
+
+
+def _conclude(store: Store, point: Point) -> str:
+    """Tell where the report is, its warnings and, last, its answer; return the verdict on the design."""
+    console.print(f"report: {store.folder / 'report.html'}")
+    summary = read_json(store.product(point, REPORT) / "summary.json")
+    for warning in summary.get("warnings", ()):
+        console.print(styled("[bold yellow]warning:[/] {}", warning), soft_wrap=True)
+    if "verdict" not in summary:
+        return ""
+    design = summary["verdict"]["design"]
+    console.print(styled(f"[bold {COLOURS[design]}]{{}}[/]", summary["answer"]), soft_wrap=True)
+    return design
 
 
 def report_again(folder: Path, name: str, write: Callable[[Path, Case, Path], object], stage: Callable) -> bool:

@@ -176,12 +176,12 @@ SHOCK: Entries = (
     },
     {
         "name": "failure",
-        "adds": "peel stress and plastic work of each pad against limits",
+        "adds": "peel stress, von Mises stress and plastic work at each pad against limits",
         "number": "value / limit",
         "threshold": 1.0,
         "influence": "none: joints are judged, not broken",
-        "place": "reflowshock.fem.output.failure.failure_criteria",
-        "switch": "shock.failure.*, a limit or none",
+        "place": "reflowshock.workflow.package.verdict.verdict_of",
+        "switch": "shock.failure.*.limit, each with its source, or none",
         "source": "JESD22-B111",
     },
 )

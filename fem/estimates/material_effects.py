@@ -5,7 +5,7 @@ from math import log
 from typing import Any
 
 from reflowshock.fem.materials.parameters import Isotropic, JohnsonCook, Material
-from reflowshock.fem.problem.shock import Failure
+from reflowshock.fem.problem.failure import Failure
 
 RATE_OF_DROPS = 100.0  # [1/s] of solder: cases/bga_drop finds up to 50
 
@@ -60,7 +60,7 @@ def yields(name: str, law: JohnsonCook) -> str:
 
 
 def failure_effect(failure: Failure) -> dict[str, dict[str, Any]]:
-    """Decide whether joints are judged: where a criterion has a limit."""
-    limits = {name: value for name, value in failure.model_dump().items() if value is not None}
-    why = "limits of " + " and ".join(name.replace("_", " ") for name in limits)
-    return {"failure": {"on": bool(limits), "why": why if limits else "shock.failure gives no limit"}}
+    """Decide whether joints are judged: where a measure has a limit. Judging changes no result."""
+    why = "limits of " + " and ".join(name.replace("_", " ") for name in failure.limits)
+    on = bool(failure.limits)
+    return {"failure": {"on": on, "why": why if on else "shock.failure gives no limit", "influence": 0.0}}

@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 
 from reflowshock.fem.division.tables import JointTables
 from reflowshock.fem.dynamics.history import History
-from reflowshock.fem.estimates.material_effects import failure_effect, material_effects
+from reflowshock.fem.estimates.material_effects import material_effects
 from reflowshock.fem.loads.shock_pulse import shock_pulse
 from reflowshock.fem.materials.kinematics import finite_rotation
-from reflowshock.fem.output.failure import Verdicts, failed_joints, failure_criteria, judge, worst
 from reflowshock.fem.output.result import Outcome, Timings, health, model_summary, peak_memory, quantity, sizes
 from reflowshock.fem.output.watch_joints import FLOW_LAYERS, LAYERS
 from reflowshock.fem.parallel.communicators import Communicators
@@ -49,19 +48,16 @@ class PackageReport:
         summary: dict[str, Any],
         timings: Timings,
     ) -> dict[str, Any]:
-        """Return metrics, health, effects, verdicts on the joints, and the coupling."""
-        verdicts = judge(failure_criteria(self.request.shock.failure), arrays)
+        """Return metrics, health, effects and the coupling."""
         coupling = coupling_of(self.request, outcome.coupling)
         residual = outcome.history.balance.force_residual, FORCE_RESIDUAL_LIMIT
         return {
             "metrics": cost_metrics(summary, updates_a_window(summary, coupling), timings)
             | health_metrics(outcome.history, arrays)
             | shock_metrics(arrays)
-            | {"peak_neglected_strain": quantity(outcome.neglected_strain)}
-            | failure_metrics(verdicts),
-            "health": health(self.request, outcome, {"interface_force_residual": residual}) | worst(verdicts),
+            | {"peak_neglected_strain": quantity(outcome.neglected_strain)},
+            "health": health(self.request, outcome, {"interface_force_residual": residual}),
             "effects": effects(self.request, summary, outcome.neglected_strain),
-            "failure": verdicts,
             "coupling": coupling | {"placement": timings.balance},
         }
 
@@ -136,11 +132,6 @@ def flow_metrics(arrays: Mapping[str, NDArray]) -> dict[str, Any]:
     }
 
 
-def failure_metrics(verdicts: Verdicts) -> dict[str, Any]:
-    """Return how many joints fail, where they are judged."""
-    return {"failed_joints": quantity(len(failed_joints(verdicts)))} if verdicts else {}
-
-
 def effects(request: RunInput, summary: dict[str, Any], neglected_strain: float) -> dict[str, Any]:
     """Return which effects the run simulated, and why."""
     finite, why = finite_rotation("shock.numerics", request.shock.numerics.decided_kinematics, neglected_strain)
@@ -166,5 +157,4 @@ def effects(request: RunInput, summary: dict[str, Any], neglected_strain: float)
         },
         "finite_rotation": {"on": finite, "why": why},
         **material_effects(request.materials.by_role),
-        **failure_effect(request.shock.failure),
     }

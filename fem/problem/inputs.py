@@ -90,8 +90,8 @@ class RunInput(PackageInput):
 
     @property
     def computed(self) -> str:
-        """Return all that results depend on: not where they go, nor which ranks compute them."""
-        shock: Any = {"ranks": True, "numerics": UNRELATED}
+        """Return all that results depend on: not where they go, which ranks compute them, nor how they are judged."""
+        shock: Any = {"ranks": True, "failure": True, "numerics": UNRELATED}
         return self.model_dump_json(exclude={"output": True, "checkpoints": True, "cooling": True, "shock": shock})
 
     @property

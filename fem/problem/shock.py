@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 from pydantic import Field, ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
 
+from reflowshock.fem.problem.failure import Failure
 from reflowshock.parameters import Parameters
 from reflowshock.quantity import Quantity
 
@@ -143,16 +144,6 @@ class ShockNumerics(Parameters):
         if self.kinematics == "auto":
             raise ValueError("shock.numerics.kinematics = auto is decided by the case, before a run")
         return self.kinematics
-
-
-class Failure(Parameters):
-    """What the solder at the pads of a joint may bear; a criterion without a limit is not computed.
-
-    ``peel_stress`` is the average over a pad, ``plastic_work_density`` that of the layer of elements at it.
-    """
-
-    peel_stress: Annotated[float | None, Quantity("MPa")] = Field(None, gt=0)
-    plastic_work_density: Annotated[float | None, Quantity("kJ/m^3")] = Field(None, gt=0)
 
 
 class Shock(Parameters):

@@ -1,4 +1,4 @@
-"""Solder that yields, through the whole pipeline: both modes, energy balance, failure criteria, report."""
+"""Solder that yields, through the whole pipeline: both modes, energy balance, verdict, report."""
 
 import json
 import shutil
@@ -8,13 +8,14 @@ import pytest
 
 from tests.support.workflow_command import reflowshock
 
+LIMIT = ('shock.failure.layer_plastic_work={ limit = "0.3 MJ/m^3", source = "some break" }',)
 # A pulse as short as the small case's hardly bends the board: only an absurd peak lets its solder yield.
 SETTINGS = (
     "shock.ranks.total=1",
     "materials.solder=SAC405",
     "shock.peak_acceleration=300000 G",
-    "shock.failure.peel_stress=100 MPa",
-    "shock.failure.plastic_work_density=0.3 MJ/m^3",
+    'shock.failure.peel_stress={ limit = "100 MPa", source = "none breaks" }',
+    *LIMIT,
 )
 
 
@@ -27,16 +28,28 @@ def plastic_run(first_run, tmp_path_factory):
     return folder, result, json.loads((folder / "summary.json").read_text()), histories
 
 
-def test_a_joint_that_fails_is_told_and_the_run_is_not_healthy(plastic_run):
+def test_a_joint_that_breaks_is_the_verdict_of_a_healthy_run(plastic_run):
     folder, result, summary, _ = plastic_run
-    assert result.returncode == 1
-    assert "plastic work density" in result.stderr
-    failed = {name for name, check in summary["health"].items() if not check["ok"]}
-    assert failed == {"plastic_work_density", "dns_plastic_work_density"}
-    assert 1 <= summary["metrics"]["failed_joints"]["value"] < 4
+    assert result.returncode == 0, result.stderr
+    assert all(check["ok"] for check in summary["health"].values())
+    verdict = summary["verdict"]
+    verdicts = [joint["verdict"] for joint in verdict["joints"].values()]
+    assert verdict["design"] == "FAIL" and 1 <= verdicts.count("FAIL") < 4
+    assert result.stdout.splitlines()[-1] == summary["answer"]
+    assert f"{verdict['joint']}: plastic work " in summary["answer"] and ", FAIL; discretisation" in summary["answer"]
     page = (folder / "report.html").read_text()
-    assert "fails by" in page
-    assert "plastic work at pad" in page
+    assert "some break" in page and "plastic work at pad" in page
+
+
+def test_a_verdict_ends_a_run_with_3_where_that_is_asked_for(plastic_run, tmp_path):
+    folder = shutil.copytree(plastic_run[0], tmp_path / "small")
+    shown = (folder / "shock/stage.json").read_text()
+    assert reflowshock("run", folder, "--fail-on-verdict", settings=SETTINGS).returncode == 3
+    held = (*SETTINGS[:-1], SETTINGS[-1].replace("0.3 MJ", "3000 MJ"))
+    other = reflowshock("run", folder, "--fail-on-verdict", settings=held)
+    assert other.returncode == 0 and ", PASS; " in other.stdout.splitlines()[-1]
+    assert (folder / "shock/stage.json").read_text() == shown  # judged again, not computed again
+    assert reflowshock("run", folder, "--fail-on-verdict", "--until", "shock", settings=SETTINGS).returncode == 2
 
 
 def test_effects_say_why_they_are_on(plastic_run):

@@ -15,6 +15,7 @@ from reflowshock.cases.hard.trials.grids import grid, mesh_of
 from reflowshock.fem.coupling.one_way import OneWay
 from reflowshock.fem.coupling.scheme import scheme_of
 from reflowshock.fem.estimates.effects import NEGLIGIBLE_STIFFENING, NEGLIGIBLE_WEIGHT, called_for, damping, weight
+from reflowshock.fem.estimates.material_effects import failure_effect
 from reflowshock.fem.forces.force import force_terms
 from reflowshock.fem.forces.force_nonlinear import NonlinearElements
 from reflowshock.fem.kernels.plasticity import plastic_constants
@@ -22,8 +23,8 @@ from reflowshock.fem.loads.pretension import Pretension
 from reflowshock.fem.materials.library import FR4, SAC305, SILICON
 from reflowshock.fem.mesh.supports import held_components
 from reflowshock.fem.model.steps import mass_factor
-from reflowshock.fem.output.failure import failure_criteria, judge
-from reflowshock.fem.problem.shock import Damping, Failure, JointCoupling
+from reflowshock.fem.problem.failure import Failure
+from reflowshock.fem.problem.shock import Damping, JointCoupling
 from reflowshock.fem.problem.thermal import Thermal
 from reflowshock.fem.statics.plates import RigidPlates
 from reflowshock.fem.statics.structure import ThermalStructure
@@ -31,6 +32,7 @@ from reflowshock.particles.parameters.effects import NEGLIGIBLE_SHAPE_CHANGE, de
 from reflowshock.particles.parameters.solder import SolderEffects
 from reflowshock.workflow.board_drop.fine_joints import needs_coarse_joints
 from reflowshock.workflow.effects.registry import registry
+from reflowshock.workflow.package.verdict import verdict_of
 from reflowshock.workflow.reflow.between import open_structure
 from reflowshock.workflow.reflow.forecast import load_steps
 from tests.support import effect_switches as scene
@@ -354,7 +356,7 @@ def _(_effect, _folder):
 
 @off("failure")
 def _(_effect, _folder):
-    assert failure_criteria(Failure()) == []
+    assert not failure_effect(Failure())["failure"]["on"]
 
 
 @on("failure")
@@ -364,5 +366,6 @@ def _(_effect, _folder):
     arrays = {name: rng.random((5, 2)) for name in ("peel_board", "peel_package")} | {"joints": np.array(["A1", "B1"])}
     arrays["time"] = np.arange(5.0)
     before = {name: value.copy() for name, value in arrays.items()}
-    assert judge(failure_criteria(Failure(peel_stress=1e9)), arrays)
+    limit = {"peel_stress": {"limit": 1e9, "source": "none breaks"}}
+    assert verdict_of(Failure.model_validate(limit), arrays, "A1")["design"] == "PASS"
     assert all(np.array_equal(arrays[name], before[name]) for name in arrays)

@@ -27,6 +27,7 @@ from reflowshock.workflow.pipeline.reader import read_case
 from reflowshock.workflow.process.environment import available_cores
 from reflowshock.workflow.process.terminal import progress_bar, styled
 from reflowshock.workflow.store.folders import check_folder, locked
+from reflowshock.workflow.store.keys import product_keys
 from reflowshock.workflow.store.point import Point
 from reflowshock.workflow.store.state import failed_checks
 from reflowshock.workflow.store.store import Store
@@ -153,7 +154,7 @@ def measure(
     chosen = recommend(study, measured, fits, goal)
     accuracy = Accuracy(
         case.case.name, case.kind, request.command, this_host(), study.errors, tuple(measured.values()), fits,
-        request.tolerance, None if chosen is None else _run(chosen, runner),
+        request.tolerance, None if chosen is None else _run(chosen, runner), product_keys(case)[study.until],
     )  # fmt: skip
     write_accuracy(folder, accuracy)
     return accuracy, runner

@@ -72,11 +72,14 @@ def _yielding(case: BoardDropCase) -> list[str]:
 def _of_flow(case: BoardDropCase) -> Iterator[Problem]:
     """Find a limit of plastic work where nothing yields, and linear steps where something does."""
     failure, yielding = case.shock.failure, _yielding(case)
-    if failure.plastic_work_density is not None and "solder" not in yielding:
-        message = "limits plastic work, but the solder does not yield"
+    if "solder" not in yielding:
         allowed = 'materials.solder of the library, such as "SAC405", or with a table plasticity'
-        limit = fields.shown(failure.plastic_work_density, type(failure).model_fields["plastic_work_density"])
-        yield Problem("shock.failure.plastic_work_density", message, limit, allowed)
+        message = "by plastic work, but the solder does not yield"
+        if (work := failure.layer_plastic_work) is not None:
+            limit = fields.shown(work.limit, type(work).model_fields["limit"])
+            yield Problem("shock.failure.layer_plastic_work.limit", f"judges {message}", limit, allowed)
+        if failure.life is not None and failure.life.measure == "layer_plastic_work":
+            yield Problem("shock.failure.life.measure", f"counts drops {message}", failure.life.measure, allowed)
     if case.shock.numerics.dns_solver == "implicit" and yielding:
         message = f"is linear, but {' and '.join(yielding)} yields"
         yield Problem("shock.numerics.dns_solver", message, "implicit", "explicit, or elastic materials")

@@ -50,9 +50,12 @@ BY_NAME = {
     "explicit_step": Range("1e-15 s", "1 s"),
     "implicit_step": Range("1e-15 s", "1e3 s"),
 }
-# Numbers without a unit; of those that are signed the whole range.
+# Numbers without a unit; of those that are named the whole range.
 NUMBERS = (1e-12, 1e6)
-SIGNED_NUMBERS = {"poisson_ratio": (-0.99, 0.4999)}  # of isotropic solids: nearer to 0.5 no explicit step is left
+NAMED_NUMBERS = {
+    "poisson_ratio": (-0.99, 0.4999),  # of isotropic solids: nearer to 0.5 no explicit step is left
+    "constant": (1e-300, 1e300),  # of a law of life, whose unit depends on its exponent
+}
 
 
 def implausible(case: Case) -> Iterator[Problem]:
@@ -74,8 +77,8 @@ def implausible_tables(case: Case) -> Iterator[Problem]:
 
 def _implausible(key: str, number: float, field: FieldInfo) -> Iterator[Problem]:
     quantity, name = fields.quantity_of(field), key.rpartition(".")[2]
-    if name in SIGNED_NUMBERS:
-        low, high = SIGNED_NUMBERS[name]
+    if name in NAMED_NUMBERS:
+        low, high = NAMED_NUMBERS[name]
         if not low <= number <= high:
             yield Problem(key, "is not plausible", number, f"{low:g} to {high:g}, or {FORCE}")
         return

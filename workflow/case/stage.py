@@ -21,6 +21,7 @@ class Stage:
             so that it need not run again when the geometry changes elsewhere.
         products: files that it writes, relative to the run folder.
         on_top: those of its files that a run folder also shows at its top.
+        without: those of its parameters, or tables of them, that it does not depend on.
     """
 
     name: str
@@ -29,11 +30,20 @@ class Stage:
     products: tuple[str, ...]
     pads: bool = False
     on_top: tuple[str, ...] = ()
+    without: tuple[str, ...] = ()
+
+    def depends_on(self, key: str) -> bool:
+        """Whether it depends on a parameter."""
+        return _stands_in(key, self.parameters) and not _stands_in(key, self.without)
 
     @property
     def record(self) -> str:
         """File, relative to the run folder, in which the stage says what it used, found and measured."""
         return f"{self.name}/stage.json"
+
+
+def _stands_in(key: str, tables: tuple[str, ...]) -> bool:
+    return any(key == table or key.startswith(table + ".") for table in tables)
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,6 +74,7 @@ class Pipeline:
         return tuple(one for one in self.names if one in found)
 
 
-def report_of(*follows: str) -> Stage:
-    """Return the last stage of a pipeline, which tells what the others found."""
-    return Stage("report", ("case", "scale"), follows, tuple(f"report/{name}" for name in PAGE), on_top=PAGE)
+def report_of(*follows: str, parameters: tuple[str, ...] = ()) -> Stage:
+    """Return the last stage of a pipeline, which tells what the others found; ``parameters`` are what it judges by."""
+    pages = tuple(f"report/{name}" for name in PAGE)
+    return Stage("report", ("case", "scale", *parameters), follows, pages, on_top=PAGE)

@@ -15,10 +15,11 @@ ORDER_MARGIN = 0.5  # of an observed order from theory, beyond which runs are no
 
 @dataclass(frozen=True, slots=True)
 class Error:
-    """Error of an answer, and what it was compared with, for readers."""
+    """Error of an answer, what it was compared with, for readers, and the order by which a limit was found, if any."""
 
     value: float
     against: str
+    order: float | None = None
 
 
 Answers = Mapping[str, Quantity]
@@ -58,6 +59,7 @@ class _Reference:
     value: Values
     words: str
     run: str = ""
+    order: float | None = None
 
     @classmethod
     def of(
@@ -79,7 +81,7 @@ class _Reference:
         values = [answers[one.name][quantity].value for one in known]
         limit = richardson([one.value or 0.0 for one in known[-3:]], values[-3:], order)
         if limit is not None:
-            return cls(limit[0], f"Richardson, order {limit[1]:.3g}")
+            return cls(limit[0], f"Richardson, order {limit[1]:.3g}", order=limit[1])
         return cls(values[-1], f"finest run, {known[-1].name}", known[-1].name)
 
 
@@ -92,7 +94,7 @@ def _compared(
 ) -> Error | None:
     if reference is None or reference.run == run.name:
         return None
-    return Error(_difference(answers[run.name][quantity], reference.value), reference.words)
+    return Error(_difference(answers[run.name][quantity], reference.value), reference.words, reference.order)
 
 
 def _difference(answer: Quantity, other: Values) -> float:

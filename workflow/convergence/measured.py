@@ -133,6 +133,7 @@ class Accuracy:
         fits: parameter -> fits.
         tolerance: of the judged error; None where none was asked for.
         recommended: None where nothing was.
+        key: of the product with the case's own answer; that of another case, or of one changed since, differs.
     """
 
     case: str
@@ -144,6 +145,7 @@ class Accuracy:
     fits: Mapping[str, Fit]
     tolerance: float | None = None
     recommended: Recommended | None = None
+    key: str = ""
 
     @property
     def judged(self) -> str:

@@ -8,7 +8,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from reflowshock.workflow import __version__
 from reflowshock.workflow.case.case import CASES, Case
 from reflowshock.workflow.convergence import tables
-from reflowshock.workflow.convergence.calibration import folder_name
+from reflowshock.workflow.convergence.known import is_of, own_accuracy
 from reflowshock.workflow.convergence.measured import FILE, Accuracy, Measurement, read_accuracy
 from reflowshock.workflow.convergence.tables import compared, every_run, front
 from reflowshock.workflow.report.curves import STYLE, pyplot, svg
@@ -36,13 +36,14 @@ def write_pages(folder: Path, accuracy: Accuracy, remarks: tuple[str, ...] = ())
     (folder / TEXT).write_text(markdown(accuracy), encoding="utf-8")
 
 
-def section(accuracy: Accuracy, remarks: tuple[str, ...] = (), elsewhere: bool = False) -> dict:
+def section(accuracy: Accuracy, remarks: tuple[str, ...] = (), *, elsewhere: bool = False, stale: bool = False) -> dict:
     """Return what the section of a page tells.
 
     Args:
         accuracy: what was measured.
         remarks: further notes.
         elsewhere: whether it was measured of another case than the page is on.
+        stale: whether the case has changed since.
     """
     chosen = accuracy.recommended
     advice = (
@@ -69,6 +70,7 @@ def section(accuracy: Accuracy, remarks: tuple[str, ...] = (), elsewhere: bool =
         "prediction": tables.prediction(accuracy),
         "remarks": remarks,
         "elsewhere": elsewhere,
+        "stale": stale,
     }
 
 
@@ -77,9 +79,9 @@ def section_for(run_folder: Path, case: Case) -> dict | None:
 
     Without that, what a case of the same kind that comes with the program has; None where none does.
     """
-    own = read_accuracy(run_folder.resolve().parent / folder_name(case) / FILE)
-    if own is not None and own.kind == case.kind:
-        return section(own)
+    own = own_accuracy(run_folder, case)
+    if own is not None:
+        return section(own, stale=not is_of(own, case))
     for path in sorted(CASES.glob(f"*/{FILE}")):
         found = read_accuracy(path)
         if found is not None and found.kind == case.kind:

@@ -44,6 +44,7 @@ HEATED = tuple(
     )
 )  # fmt: skip
 STRUCTURE_ROLES = tuple(f"materials.{role}" for role in ("board", "substrate", "die", "copper"))
+JUDGED_BY = ("shock.failure",)  # which changes no history: what was computed is judged again by other limits
 COOLED = ("thermal.solidification", "thermal.final", "thermal.effects.residual_stress")
 
 
@@ -71,10 +72,10 @@ def package_pipeline(heated: bool, dropped: bool) -> Pipeline:
         ("solder_mesh/assembly.msh", "solder_mesh/joints.msh", "solder_mesh/quality.json"),
     )
     surface = Stage("surface", GIVEN, ("reflow",), ("surface/surfaces.json",))
-    shock = Stage("shock", ("shock", "materials", *COOLED), ("solder_mesh",), ())
+    shock = Stage("shock", ("shock", "materials", *COOLED), ("solder_mesh",), (), without=JUDGED_BY)
     stages = (geometry, reflow, surface, solder_mesh, *((shock,) if dropped else ()))
     follows = tuple(stage.name for stage in stages)
-    return Pipeline((*stages, report_of(*follows)))
+    return Pipeline((*stages, report_of(*follows, parameters=JUDGED_BY if dropped else ())))
 
 
 BOARD_DROP = package_pipeline(heated=False, dropped=True)

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from reflowshock.workflow.case.text import mega, micro, nano, number, percent
+from reflowshock.workflow.package.verdict import MEASURES
 from reflowshock.workflow.package_report.joint_records import Column, Record, by_shape, record_table
 from reflowshock.workflow.process.products import read_json
 from reflowshock.workflow.report.histories import at_pads
@@ -61,7 +62,7 @@ def verdicts(run_folder: Path) -> dict:
 def ranked_joints(
     history: Mapping[str, np.ndarray],
     joints: Sequence[Record],
-    failure: Mapping[str, dict],
+    judged: Mapping[str, dict],
     fine: Collection[str] | None = None,
 ) -> dict:
     """Joints ranked by peak von Mises stress at their pads.
@@ -69,7 +70,7 @@ def ranked_joints(
     Args:
         history: of one mode.
         joints: ``joint_records``.
-        failure: criterion -> joint -> value, limit, ok; of the same mode.
+        judged: joint -> verdict, margin.
         fine: names of the fine joints, where some are coarse.
     """
     shape = {joint["name"]: joint for joint in joints}
@@ -89,7 +90,8 @@ def ranked_joints(
                 mega(history["von_mises_max"][:, column].max()),
                 micro(shape[name]["standoff"]),
                 micro(shape[name]["max_width"]),
-                *failure_cells(history, column, failure),
+                *work_cells(history, column),
+                *verdict_cells(judged[name]),
                 *([] if fine is None else ["fine" if name in fine else "coarse"]),
             ]
         )
@@ -103,23 +105,25 @@ def ranked_joints(
         "standoff [µm]",
         "width [µm]",
         *(["plastic work at pad [kJ/m³]"] if "plastic_work_board" in history else []),
-        *(["fails by"] if failure else []),
+        "verdict",
+        "margin",
         *([] if fine is None else ["mesh"]),
     ]
     return {"head": head, "rows": rows}
 
 
-def failure_cells(history: Mapping[str, np.ndarray], column: int, failure: Mapping[str, dict]) -> list[str]:
-    """Plastic work and failed criteria of the joint in a column of the history: only what the run has."""
-    cells = []
-    if "plastic_work_board" in history:
-        work = max(history[f"plastic_work_{end}"][:, column].max() for end in ("board", "package"))
-        cells.append(number(1e-3 * work))
-    if failure:
-        joint = str(history["joints"][column])
-        failed = [name.replace("_", " ") for name, verdicts in failure.items() if not verdicts[joint]["ok"]]
-        cells.append(", ".join(failed) or "–")
-    return cells
+def work_cells(history: Mapping[str, np.ndarray], column: int) -> list[str]:
+    """Plastic work at the worse pad of the joint in a column of the history, where solder yields."""
+    if "plastic_work_board" not in history:
+        return []
+    return [number(1e-3 * max(history[f"plastic_work_{end}"][:, column].max() for end in ("board", "package")))]
+
+
+def verdict_cells(judged: Mapping[str, Any]) -> list[str]:
+    """Verdict and margin of a joint, with the criterion of least margin."""
+    if judged["margin"] is None:
+        return [judged["verdict"], "–"]
+    return [judged["verdict"], f"{judged['margin']:.3g} by {MEASURES[judged['criterion']].word}"]
 
 
 def meshes(joints: Sequence[Record]) -> dict | None:

@@ -9,11 +9,13 @@ from typing import Any
 from reflowshock.workflow.case.text import mega, micro, number, quantity
 from reflowshock.workflow.package import findings
 from reflowshock.workflow.package.case import BoardDropCase
+from reflowshock.workflow.package.verdict import limits_table
 from reflowshock.workflow.package_report import joint_tables
+from reflowshock.workflow.package_report.headline import headline
 from reflowshock.workflow.package_report.joint_records import joint_records
 from reflowshock.workflow.process.products import read_json
 from reflowshock.workflow.report import tables
-from reflowshock.workflow.report.histories import MODES, late_peak, read_modes
+from reflowshock.workflow.report.histories import MODES, read_modes
 
 FOLDERS = ("residual_two_scale", "residual_dns", "residual")  # of modes with fine joints of their own, or of all modes
 SIDES = ("von_mises_board", "von_mises_package")
@@ -32,9 +34,9 @@ def add_shock(run_folder: Path, case: BoardDropCase, context: dict, summary: dic
     metrics = summary["metrics"]
     joints = joint_records(run_folder)
     critical = metrics["critical_joint"]["value"]
-    figures = tables.headline(metrics)  # the critical joint and its stress come first
-    context["headline"] = figures[:2] + margins(results[main]) + figures[2:] + context["headline"]
-    context["late_peak"] = late_peak(histories[main])
+    context["headline"] = tables.headline(metrics) + context["headline"]
+    context["figures"] = headline(metrics, context["discretisation"], summary, results)
+    context |= {"verdict": summary["verdict"], "answer": summary["answer"]}
     context["kinematics"] = kinematics_note(metrics, case.shock.numerics.kinematics)
     context["curves"] |= {
         "histories": history_curves(histories, critical),
@@ -47,29 +49,15 @@ def add_shock(run_folder: Path, case: BoardDropCase, context: dict, summary: dic
         energy=tables.energies(histories),
         cost=tables.costs(results),
         published_cost=cost.table(results, metrics),
+        limits=limits_table(case.shock.failure),
     )
     context["published_source"] = cost.PAPER
-    _add_ranks(histories, results, joints, context)
+    _add_ranks(histories, results, (joints, summary["verdict"]["joints"]), context)
     _add_shape_effect(shock, histories[main], (joints, metrics), context)
     _add_interface(shock, context)
     add_residual(shock, results[main]["parts"], context)
     _add_two_scales(run_folder, case, context, results)
     _add_pictures(shock / main, histories[main], results[main], context)
-
-
-def margins(result: Mapping) -> list[dict]:
-    """The least margin of the joints to a limit that the case sets, as a figure of the headline."""
-    ratios = {
-        (verdict["limit"] / verdict["value"], joint, criterion)
-        for criterion, verdicts in result.get("failure", {}).items()
-        for joint, verdict in verdicts.items()
-        if verdict["value"] > 0.0
-    }
-    if not ratios:
-        return []
-    ratio, joint, criterion = min(ratios)
-    label = f"least margin, limit over {criterion.replace('_', ' ')} of {joint}"
-    return [{"value": f"{ratio:.2f}", "label": label}]
 
 
 def kinematics_note(metrics: dict, kinematics: str) -> str:
@@ -95,14 +83,14 @@ def ranking_mode(histories: dict, results: dict) -> str:
     return "dns" if is_whole and findings.fine_joints_of(results[main]) else main
 
 
-def _add_ranks(histories: dict, results: dict, joints: list[dict], context: dict) -> None:
-    """Rank the joints by ``ranking_mode``."""
+def _add_ranks(histories: dict, results: dict, joints: tuple[list[dict], dict], context: dict) -> None:
+    """Rank the joints by ``ranking_mode``; ``joints`` are their records and their verdicts."""
     main, ranked = next(iter(histories)), ranking_mode(histories, results)
     whose = f"of the {tables.mode_name(ranked)}, whose joints are all fine"
     context["ranked_by"] = whose if ranked != main else ""
     result = results[ranked]
     context["tables"]["joints"] = joint_tables.ranked_joints(
-        histories[ranked], joints, result["failure"], findings.fine_joints_of(result)
+        histories[ranked], *joints, findings.fine_joints_of(result)
     )
 
 

@@ -8,10 +8,12 @@ from typing import Any
 from reflowshock.workflow import __version__
 from reflowshock.workflow.case.case import Case
 from reflowshock.workflow.case.fields import display_values
+from reflowshock.workflow.convergence.known import discretisation
 from reflowshock.workflow.convergence.page import section_for
 from reflowshock.workflow.effects.table import report_table
 from reflowshock.workflow.kinds import kind_of
 from reflowshock.workflow.report import tables
+from reflowshock.workflow.report.errors import Discretisation
 from reflowshock.workflow.report.template import write_page
 from reflowshock.workflow.store.keys import inputs_digest
 from reflowshock.workflow.store.product import read_record
@@ -28,13 +30,14 @@ def write_report(run_folder: Path, case: Case, folder: Path) -> dict:
     Returns:
         The summary.
     """
-    summary = collect_summary(run_folder, case)
+    summary, known = collect_summary(run_folder, case), discretisation(run_folder, case)
+    kind_of(case).conclude(run_folder, case, summary, known)
     write_summary(folder, summary)
-    write_page(folder / "report.html", "report.html.j2", _context(run_folder, case, summary))
+    write_page(folder / "report.html", "report.html.j2", _context(run_folder, case, summary, known))
     return summary
 
 
-def _context(run_folder: Path, case: Case, summary: dict) -> dict:
+def _context(run_folder: Path, case: Case, summary: dict, known: Discretisation) -> dict:
     context = {
         "case": case.case,
         "version": summary["version"],
@@ -50,6 +53,8 @@ def _context(run_folder: Path, case: Case, summary: dict) -> dict:
             "effects": report_table(case, summary["effects"]),
             "versions": tables.versions(),
         },
+        "discretisation": known,
+        "warnings": summary.get("warnings", []),
         "preview_caption": "Mesh of board and package, coloured by part. Joints are meshed after reflow.",
         "curves": {},
         "pictures": {},

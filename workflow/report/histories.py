@@ -40,12 +40,14 @@ def peaks(history: Arrays) -> dict[str, float]:
 
 
 def late_peak(history: Arrays) -> str:
-    """A warning if the worst joint's stress is largest at the end of the simulated time; empty if it is not."""
-    stress = at_pads(history).max(axis=1)
-    if np.argmax(stress) < len(stress) - max(2, len(stress) // 50):
+    """A warning if the largest peel or von Mises stress of all joints stands at the end of the run; empty if not."""
+    peel = np.maximum(history["peel_board"], history["peel_package"])
+    largest = {"peel": peel.max(axis=1), "von Mises": at_pads(history).max(axis=1)}
+    late = [name for name, stress in largest.items() if np.argmax(stress) >= len(stress) - max(2, len(stress) // 50)]
+    if not late:
         return ""
     end = 1e3 * history["time"][-1]
     return (
-        f"The stress is still rising when the simulated time ends ({end:.3g} ms): "
+        f"The {' and '.join(late)} stress is still rising when the simulated time ends ({end:.3g} ms): "
         "a longer shock.duration gives a higher peak."
     )

@@ -25,11 +25,7 @@ class Change:
 def stage_inputs(case: Case, stage: Stage) -> dict:
     """Return the parameters that a stage depends on, as dotted key -> SI value; of files, also what they hold."""
     contents = [(f"{key}.sha256", _digest(path)) for key, path in case.files.items()]
-    return {
-        key: value
-        for key, value in [*_flat(case.model_dump(mode="json")), *contents]
-        if any(key == prefix or key.startswith(prefix + ".") for prefix in stage.parameters)
-    }
+    return {key: value for key, value in [*_flat(case.model_dump(mode="json")), *contents] if stage.depends_on(key)}
 
 
 def product_keys(case: Case) -> dict[str, str]:

@@ -47,7 +47,9 @@ def test_an_exact_answer_is_compared_with():
 
 def test_without_it_three_runs_are_extrapolated():
     errors = errors_of(answers(None), RUNS, RUNS, 2.0)
-    assert errors["size 0.05"]["height"] == Error(pytest.approx(0.005 / 3.0), "Richardson, order 2")
+    assert errors["size 0.05"]["height"] == Error(
+        pytest.approx(0.005 / 3.0), "Richardson, order 2", order=pytest.approx(2.0)
+    )
 
 
 def test_samples_are_extrapolated_each():

@@ -60,8 +60,32 @@ BAD_VALUES = {
         ["materials.solder.plasticity.A", "is missing", "> 0 MPa"],
     ),
     "plastic work of elastic solder": (
-        "shock.failure.plastic_work_density=2 MJ/m^3",
-        ['shock.failure.plastic_work_density = "2000 kJ/m^3"', "does not yield", '"SAC405"'],
+        'shock.failure.layer_plastic_work={ limit = "2 MJ/m^3", source = "a test" }',
+        ['shock.failure.layer_plastic_work.limit = "2000 kJ/m^3"', "does not yield", '"SAC405"'],
+    ),
+    "life by plastic work of elastic solder": (
+        'shock.failure.life={ measure = "layer_plastic_work", constant = 1, exponent = 1, scatter = 2, source = "us" }',
+        ['shock.failure.life.measure = "layer_plastic_work"', "counts drops by plastic work", "does not yield"],
+    ),
+    "limit without a source": (
+        "shock.failure.peel_stress.limit=80 MPa",
+        ["shock.failure.peel_stress.source", "is missing"],
+    ),
+    "limit with a blank source": (
+        'shock.failure.peel_stress={ limit = "80 MPa", source = "  " }',
+        ["shock.failure.peel_stress.source", "at least 1 character"],
+    ),
+    "negative limit": (
+        'shock.failure.layer_von_mises={ limit = "-80 MPa", source = "a test" }',
+        ["shock.failure.layer_von_mises.limit", "out of range", "> 0 MPa"],
+    ),
+    "limit that is no table": (
+        "shock.failure.peel_stress=80 MPa",
+        ["shock.failure.peel_stress", "must be a table"],
+    ),
+    "scatter below one": (
+        'shock.failure.life={ measure = "peel_stress", constant = 1, exponent = 1, scatter = 0.5, source = "us" }',
+        ["shock.failure.life.scatter", "out of range", ">= 1"],
     ),
     "linear steps of solder that yields": (
         'materials.solder={ plasticity = { A = "38 MPa" } }\nshock.numerics.dns_solver=implicit',

@@ -5,8 +5,8 @@ import json
 import numpy as np
 import pytest
 
-from reflowshock.fem.output.failure import failure_criteria, judge
-from reflowshock.fem.problem.shock import Failure
+from reflowshock.fem.problem.failure import Failure
+from reflowshock.workflow.package.verdict import verdict_of
 from reflowshock.workflow.package_report import joint_tables
 from reflowshock.workflow.package_report.gallery import array_map
 from reflowshock.workflow.package_report.shock import ranking_mode
@@ -46,7 +46,8 @@ def history():
 
 
 def test_joints_are_ranked_by_their_worse_pad(history):
-    table = joint_tables.ranked_joints(history, [{"name": name, **JOINT} for name in ("A9", "A10")], {})
+    judged = verdict_of(Failure(), history, "A10")["joints"]
+    table = joint_tables.ranked_joints(history, [{"name": name, **JOINT} for name in ("A9", "A10")], judged)
     assert [row[0] for row in table["rows"]] == ["A10", "A9"]
     assert table["rows"][0][1:6] == ["100.0", "board", "0.500", "9.000", "150.0"]
     assert table["rows"][1][2] == "package"
@@ -59,15 +60,16 @@ def test_a_dns_that_ended_early_ranks_no_joints(history):
     assert ranking_mode({"two_scale": history, "dns": early}, results) == "two_scale"
 
 
-def test_joints_that_fail_say_by_what(history):
+def test_joints_tell_their_verdict_and_by_what(history):
     work = np.outer(history["time"], [1e8, 2e8])
     yielding = history | {"plastic_work_board": work, "plastic_work_package": 0.5 * work}
     joints = [{"name": name, **JOINT} for name in ("A9", "A10")]
-    found = judge(failure_criteria(Failure(peel_stress=8e6, plastic_work_density=3e5)), yielding)
+    limits = {"peel_stress": {"limit": 8e6, "source": "us"}, "layer_plastic_work": {"limit": 3e5, "source": "us"}}
+    found = verdict_of(Failure.model_validate(limits), yielding, "A10")["joints"]
     table = joint_tables.ranked_joints(yielding, joints, found)
-    assert table["head"][-2:] == ["plastic work at pad [kJ/m³]", "fails by"]
+    assert table["head"][-3:] == ["plastic work at pad [kJ/m³]", "verdict", "margin"]
     assert [row[0] for row in table["rows"]] == ["A10", "A9"]
-    assert [row[-2:] for row in table["rows"]] == [["200", "peel stress"], ["100", "–"]]
+    assert [row[-3:] for row in table["rows"]] == [["200", "FAIL", "0.889 by peel"], ["100", "PASS", "1.6 by peel"]]
 
 
 def test_a_drop_may_stand_anywhere():
@@ -78,7 +80,9 @@ def test_a_drop_may_stand_anywhere():
 def test_a_peak_at_the_end_is_said(history):
     assert late_peak(history) == ""
     rising = {**history, "von_mises_board": np.outer(history["time"], [1e11, 2e11])}
-    assert "still rising when the simulated time ends (1 ms)" in late_peak(rising)
+    assert "The von Mises stress is still rising when the simulated time ends (1 ms)" in late_peak(rising)
+    pulled = {**history, "peel_package": np.outer(history["time"], [1e11, 2e11])}
+    assert late_peak(pulled).startswith("The peel stress is still rising")
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,33 @@
+"""Effects say which materials or limits call for them; a law of life has its scatter."""
+
+import pytest
+
+from reflowshock.fem.estimates.material_effects import failure_effect, material_effects
+from reflowshock.fem.materials.library import SAC305, SILICON, SNPB
+from reflowshock.fem.materials.roles import Materials
+from reflowshock.fem.problem.failure import Failure, Life
+
+
+def test_joints_are_judged_where_there_is_a_limit():
+    off = failure_effect(Failure())["failure"]
+    assert (off["on"], off["why"]) == (False, "shock.failure gives no limit")
+    limits = {name: {"limit": 1e7, "source": "a test"} for name in ("peel_stress", "layer_von_mises")}
+    on = failure_effect(Failure.model_validate(limits))["failure"]
+    assert (on["on"], on["why"]) == (True, "limits of peel stress and layer von mises")
+
+
+def test_life_follows_the_law_within_its_scatter():
+    law = Life(measure="peel_stress", constant=4.8e6, exponent=3.0, scatter=2.0, source="ten boards")
+    assert law.drops(60.0) == pytest.approx((4.8e6 / 60.0**3, 4.8e6 / 60.0**3 / 2.0, 2.0 * 4.8e6 / 60.0**3))
+    assert law.drops(120.0)[0] == pytest.approx(law.drops(60.0)[0] / 8.0)
+
+
+def test_effects_name_the_materials_that_call_for_them():
+    off = material_effects(Materials().by_role)
+    assert not any(effect["on"] for effect in off.values())
+    hot = SNPB.model_copy(update={"temperature": 398.15})
+    on = material_effects({"solder": hot, "bump": SAC305, "die": SILICON})
+    assert all(effect["on"] for effect in on.values())
+    assert on["plasticity"]["why"].startswith("solder yields from 18 MPa on, hardening 55 MPa p^0.55; bump yields")
+    assert on["thermal_softening"]["why"] == f"solder: yield stress times {1 - (100 / 158) ** 1.4:.3g}"
+    assert pytest.approx(1 - (100 / 158) ** 1.4) == SNPB.plasticity.softening(398.15)

@@ -1,0 +1,137 @@
+"""The verdict on a package that is dropped: does each joint hold, by how much, and how many drops will it bear?"""
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reflowshock.fem.problem.failure import Failure, Life
+from reflowshock.workflow.case.text import SHOWN, number, quantity
+
+Arrays = Mapping[str, NDArray]
+
+PASS, FAIL, NO_LIMIT = "PASS", "FAIL", "NO LIMIT"
+ENDS = ("board", "package")
+
+
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """A measure of joints: its histories at both pads, its SI unit, and what it is called."""
+
+    histories: str
+    unit: str
+    word: str
+
+    def peaks(self, history: Arrays) -> NDArray[np.float64]:
+        """Return the largest value of each joint ``(joints,)``, at any time and at either pad."""
+        return np.maximum(*(history[f"{self.histories}_{end}"].max(axis=0) for end in ENDS))
+
+
+MEASURES = {
+    "peel_stress": Measured("peel", "Pa", "peel"),
+    "layer_von_mises": Measured("von_mises", "Pa", "von Mises"),
+    "layer_plastic_work": Measured("plastic_work", "J/m^3", "plastic work"),
+}
+
+
+def verdict_of(failure: Failure, history: Arrays, critical: str, coarse: Collection[str] = ()) -> dict:
+    """Judge the joints of a run.
+
+    Args:
+        failure: the limits, and the law of life.
+        history: of the run.
+        critical: the joint whose figures count where there is no limit.
+        coarse: joints that have the coarse mesh: their values are rough.
+
+    Returns:
+        ``design`` and ``joint``, which decides it; ``joints`` by name, each with its ``verdict`` by the ``criterion``
+        of least ``margin``, which is ``limit`` over ``value``; ``life``, the shortest of all joints, where there is a
+        law. A margin is None without a limit, and where the value is not positive.
+    """
+    names = [str(name) for name in history["joints"]]
+    joints = {name: _of_joint(failure, history, column) for column, name in enumerate(names)}
+    joints = {name: found | ({"mesh": "coarse"} if name in coarse else {}) for name, found in joints.items()}
+    margins = {name: found["margin"] for name, found in joints.items() if found["margin"] is not None}
+    verdicts = {found["verdict"] for found in joints.values()}
+    design = next(word for word in (FAIL, PASS, NO_LIMIT) if word in verdicts or word == NO_LIMIT)
+    law = {} if failure.life is None else {"life": _life(failure.life, history)}
+    return {"design": design, "joint": min(margins, key=margins.__getitem__, default=critical), "joints": joints} | law
+
+
+def _of_joint(failure: Failure, history: Arrays, column: int) -> dict:
+    """Judge the joint in a column by the criterion of least margin."""
+    judged = [
+        _against(name, float(MEASURES[name].peaks(history)[column]), limit.limit) | {"source": limit.source}
+        for name, limit in failure.limits.items()
+    ]
+    if not judged:
+        value = float(MEASURES["peel_stress"].peaks(history)[column])
+        return {"criterion": "peel_stress", "value": value, "limit": None, "margin": None, "verdict": NO_LIMIT}
+    return min(judged, key=lambda found: float("inf") if found["margin"] is None else found["margin"])
+
+
+def _against(criterion: str, value: float, limit: float) -> dict:
+    margin = limit / value if value > 0.0 else None
+    verdict = PASS if value <= limit else FAIL
+    return {"criterion": criterion, "value": value, "limit": limit, "margin": margin, "verdict": verdict}
+
+
+def _life(life: Life, history: Arrays) -> dict:
+    """Return drops to failure of the joint that fails first by the user's law, None where no measure is positive."""
+    measure = MEASURES[life.measure]
+    peaks = measure.peaks(history)
+    column = int(np.argmax(peaks))
+    value = float(peaks[column])
+    drops, least, most = life.drops(SHOWN[measure.unit][0] * value) if value > 0.0 else (None, None, None)
+    told = {"joint": str(history["joints"][column]), "measure": life.measure, "value": value, "source": life.source}
+    return told | {"drops": drops, "least": least, "most": most}
+
+
+def answer(verdict: dict, error: float | None) -> str:
+    """Say what the verdict is, in one line.
+
+    Args:
+        verdict: ``verdict_of``.
+        error: discretisation error of the deciding measure; None where it is not known.
+    """
+    joint = verdict["joints"][verdict["joint"]]
+    known = "not known, run reflowshock accuracy" if error is None else f"±{100.0 * error:.2g} %"
+    life = f"; {in_drops(verdict['life'])}" if "life" in verdict else ""
+    return f"{verdict['joint']}: {against_limit(joint)}, {joint['verdict']}{life}; discretisation {known}"
+
+
+def against_limit(joint: dict) -> str:
+    """Write a joint's value of its limit, with the margin."""
+    measure = MEASURES[joint["criterion"]]
+    value, unit = _text(joint["value"], measure.unit)
+    if joint["limit"] is None:
+        return f"{measure.word} {value} {unit}"
+    margin = "" if joint["margin"] is None else f" (margin {joint['margin']:.2g})"
+    return f"{measure.word} {value} {unit} of {_text(joint['limit'], measure.unit)[0]}{margin}"
+
+
+def in_drops(life: dict) -> str:
+    """Write a life with its scatter band."""
+    if life["drops"] is None:
+        return f"life unlimited, {life['measure'].replace('_', ' ')} is not positive"
+    middle, least, most = (number(float(f"{life[name]:.2g}")) for name in ("drops", "least", "most"))
+    return f"life of {life['joint']} {middle} drops ({least} to {most})"
+
+
+def _text(value: float, unit: str) -> tuple[str, str]:
+    """Write a value with three digits, and its unit."""
+    factor, shown = SHOWN[unit]
+    return f"{factor * value:.3g}", shown
+
+
+def limits_table(failure: Failure) -> dict | None:
+    """Return the limits and the law of life with their sources; None where there are none."""
+    rows = [
+        [name.replace("_", " "), quantity({"value": limit.limit, "unit": MEASURES[name].unit}), limit.source]
+        for name, limit in failure.limits.items()
+    ]
+    if (life := failure.life) is not None:
+        law = f"N = {life.constant:.4g} s^-{life.exponent:g}, scatter factor {life.scatter:g}"
+        rows.append([f"life by {life.measure.replace('_', ' ')}", law, life.source])
+    return {"head": ["limit", "value", "source"], "rows": rows, "prose": True} if rows else None

@@ -1,0 +1,47 @@
+"""What a run of a drop concludes: the verdict, the errors of its figures, warnings, and the answer in one line."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from reflowshock.fem.estimates.material_effects import failure_effect
+from reflowshock.workflow.case.run import metric
+from reflowshock.workflow.package import findings
+from reflowshock.workflow.package.case import BoardDropCase
+from reflowshock.workflow.package.verdict import answer, verdict_of
+from reflowshock.workflow.report.errors import Discretisation
+from reflowshock.workflow.report.histories import late_peak, read_modes
+
+PEEL = "peel_stress"
+
+
+def conclude(run_folder: Path, case: BoardDropCase, summary: dict, known: Discretisation) -> None:
+    """Add verdict, warnings, answer and discretisation error to a summary, where the shock was run.
+
+    Args:
+        run_folder: of the run.
+        case: with the limits.
+        summary: what its stages found.
+        known: discretisation errors of its figures.
+    """
+    histories, results = read_modes(run_folder / "shock")
+    critical = summary["metrics"].get("critical_joint")
+    if not histories or critical is None:
+        return
+    main = next(iter(histories))
+    summary["effects"] |= failure_effect(case.shock.failure)
+    coarse = _coarse(results[main], histories[main]["joints"])
+    verdict = verdict_of(case.shock.failure, histories[main], critical["value"], coarse)
+    if PEEL in known.errors:
+        summary["metrics"]["discretisation_error"] = metric(known.errors[PEEL])
+    deciding = verdict["joints"][verdict["joint"]]["criterion"]
+    summary |= {
+        "verdict": verdict,
+        "warnings": [warning for warning in (late_peak(histories[main]),) if warning],
+        "answer": answer(verdict, known.errors.get(deciding)),
+    }
+
+
+def _coarse(result: Mapping, joints) -> list[str]:
+    """Return the joints that have the coarse mesh."""
+    fine = findings.fine_joints_of(result)
+    return [] if fine is None else [str(name) for name in joints if str(name) not in fine]
