@@ -18,6 +18,7 @@ from reflowshock.fem.loads.pulse import STANDARD_GRAVITY, Constant, HalfSine
 from reflowshock.fem.materials.library import FR4, SAC305
 from reflowshock.fem.materials.parameters import Material
 from reflowshock.particles.core.cloud import box_cloud
+from reflowshock.particles.parameters.effects import LIQUID_EFFECTS
 from reflowshock.particles.parameters.solder import Solder
 from reflowshock.particles.scenes.reflow import contact_line, start_flow
 from reflowshock.workflow.effects.table import MEASURED
@@ -36,11 +37,11 @@ BOARD = dns_body(
     )
 )
 
+LIQUID = [effect.name for effect in LIQUID_EFFECTS if effect.is_measured]
 # Effect -> how the measurement is described, the name of the side with it, that of the side without.
 PAIRS = {
-    "gravity": (f"a step towards rest of {PER_EDGE**3} particles", "reflow", "reflow_weightless"),
-    "inertia": (f"a step of {PER_EDGE**3} particles, which is also shorter", "reflow_inertia", "reflow"),
-    "viscosity": ("the same: both are solved on tetrahedra", "reflow_viscosity", "reflow"),
+    name: (f"a step of {PER_EDGE**3} particles", f"reflow_{name}", f"reflow_without_{name}") for name in LIQUID
+} | {
     "gravity_in_the_shock": ("an explicit step of 3200 boxes", "drop_weight", "drop"),
     "damping": ("the same, alpha alone; with beta see damping_stiffness", "drop_alpha", "drop"),
     "damping_stiffness": ("the same", "drop_beta", "drop"),
@@ -88,11 +89,8 @@ def force(material: Material, kinematics: Kinematics = "small", stretch: float =
 def sides() -> dict[str, Callable[[], object]]:
     """Return the work of each side."""
     body = BOARD[0]
-    return {
-        "reflow": reflow(),
-        "reflow_weightless": reflow(gravity=False),
-        "reflow_inertia": reflow(inertia=True),
-        "reflow_viscosity": reflow(viscosity=True),
+    reflows = {PAIRS[name][2 - acts]: reflow(**{name: acts}) for name in LIQUID for acts in (True, False)}
+    return reflows | {
         "drop": drop(PULSE),
         "drop_weight": drop(PULSE, WEIGHT),
         "drop_alpha": drop(PULSE, RayleighDamping.build(body, (1.0, 0.0))),

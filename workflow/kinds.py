@@ -1,21 +1,25 @@
 """All kinds of case: one record each, with all that the program does with a case of that kind."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Protocol
 
 from rich.console import RenderableType
 
+from reflowshock.effect import Effect
+from reflowshock.fem.estimates.structure_effects import STRUCTURE_EFFECTS
+from reflowshock.fem.estimates.thermal_effects import HEATED_EFFECTS
 from reflowshock.names import nearest
+from reflowshock.particles.parameters.effects import LIQUID_EFFECTS
 from reflowshock.problem import Problem
 from reflowshock.workflow.board_drop import problems as package_checks
-from reflowshock.workflow.board_drop import shock_effects
 from reflowshock.workflow.board_drop import stages as package_stages
 from reflowshock.workflow.board_drop.forecast import forecast, package_size
 from reflowshock.workflow.board_drop.plan import package_tables
+from reflowshock.workflow.board_drop.shock_effects import SHOCK_EFFECTS
 from reflowshock.workflow.case.case import Case
-from reflowshock.workflow.case.forecast import Size, Toggle
+from reflowshock.workflow.case.forecast import Size
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.case.run import StageFunction
 from reflowshock.workflow.convergence.series import ConvergenceStudy
@@ -59,7 +63,7 @@ class Kind:
         acts: what its effects belong to, for readers.
         report: adds its sections to the context of a report: run folder, case, context, summary.
         study: its convergence study.
-        toggles: effect -> the case with that effect the other way, where the forecast knows what it costs.
+        effects: those that it may call for.
         conclude: adds to a summary what follows from all stages: run folder, case, summary, discretisation errors.
     """
 
@@ -72,7 +76,7 @@ class Kind:
     acts: str
     report: Callable[[Path, Any, dict, dict], None]
     study: Callable[[Any], ConvergenceStudy]
-    toggles: Callable[[Any], Mapping[str, Toggle]] = lambda case: {}
+    effects: Sequence[Effect]
     conclude: Callable[[Path, Any, dict, Discretisation], None] = lambda folder, case, summary, known: None
 
     @property
@@ -144,6 +148,7 @@ def _solder_kind(case: type[Case], problems: Callable[[Any], list[Problem]], ref
         "reflow",
         _solder_report,
         _solder_study,
+        LIQUID_EFFECTS,
     )
 
 
@@ -162,7 +167,7 @@ PACKAGE = Kind(
     acts="reflow",
     report=_package_report,
     study=_package_study,
-    toggles=shock_effects.toggles,
+    effects=(*LIQUID_EFFECTS, *HEATED_EFFECTS),
 )
 BOARD_DROP = replace(
     PACKAGE,
@@ -171,6 +176,7 @@ BOARD_DROP = replace(
     stages={**PACKAGE.stages, "shock": package_stages.shock},
     acts="reflow and shock",
     report=_board_drop_report,
+    effects=(*PACKAGE.effects, *SHOCK_EFFECTS),
     conclude=_conclude_drop,
 )
 STRUCTURE = Kind(
@@ -187,7 +193,7 @@ STRUCTURE = Kind(
     acts="motion",
     report=_structure_report,
     study=_structure_study,
-    toggles=structure_forecast.toggles,
+    effects=STRUCTURE_EFFECTS,
 )
 KINDS = (
     BOARD_DROP,

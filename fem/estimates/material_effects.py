@@ -1,51 +1,115 @@
-"""Which effects the materials of a run call for, and why. Plain Python, for ``plan`` and for the run itself."""
+"""The effects of materials that yield. Plain Python, for ``plan`` and for the run itself."""
 
 from collections.abc import Mapping
 from math import log
-from typing import Any
+from typing import Any, Protocol
 
+from reflowshock.effect import Decision, Effect, decision
+from reflowshock.fem.materials.library import SAC405
 from reflowshock.fem.materials.parameters import Isotropic, JohnsonCook, Material
-from reflowshock.fem.problem.failure import Failure
+from reflowshock.fem.materials.roles import Materials
+from reflowshock.parameters import changed
 
 RATE_OF_DROPS = 100.0  # [1/s] of solder: cases/bga_drop finds up to 50
 
 
-def material_effects(materials: Mapping[str, Material]) -> dict[str, dict[str, Any]]:
-    """Decide on plasticity, its rate and temperature dependence.
+class OfMaterials(Protocol):
+    """A scene with materials."""
 
-    Args:
-        materials: Part or role -> its material.
+    @property
+    def materials(self) -> Mapping[str, Material]:
+        """Part or role -> its material."""
 
-    Returns:
-        Effect -> on, why.
-    """
-    laws = plastic_laws(materials)
-    if not laws:
-        why = "all materials are elastic"
-        return {name: {"on": False, "why": why} for name in ("plasticity", "strain_rate", "thermal_softening")}
-    raised = max((law.C * log(RATE_OF_DROPS / law.reference_rate) for law in laws.values()), default=0.0)
-    fast = {name: law for name, law in laws.items() if law.C > 0.0}
-    soft = {
-        name: item.softening for name, item in materials.items() if isinstance(item, Isotropic) and item.softening < 1.0
-    }
-    return {
-        "plasticity": {"on": True, "why": "; ".join(yields(name, law) for name, law in laws.items())},
-        "strain_rate": {
-            "on": bool(fast),
-            "why": "; ".join(
-                f"{name}: C = {law.C:g} above {law.reference_rate:g} 1/s at which A and B are measured"
-                for name, law in fast.items()
-            )
-            or "C = 0: no dependence given",
-            "influence": max(raised, 0.0),
-        },
-        "thermal_softening": {
-            "on": bool(soft),
-            "why": "; ".join(f"{name}: yield stress times {factor:.3g}" for name, factor in soft.items())
-            or "at the temperature at which A and B are measured",
-            "influence": 1.0 - min(soft.values(), default=1.0),
-        },
-    }
+
+class MaterialEffect(Effect[OfMaterials]):
+    """An effect of materials that yield."""
+
+    source = "Johnson & Cook 1983"
+
+    def decide(self, scene: OfMaterials) -> Decision:
+        """Nothing where all are elastic."""
+        laws = plastic_laws(scene.materials)
+        return self.of_laws(scene, laws) if laws else decision(False, "all materials are elastic")
+
+    def of_laws(self, scene: OfMaterials, laws: Mapping[str, JohnsonCook]) -> Decision:
+        """Decide where some yield, by their laws."""
+        raise NotImplementedError
+
+    def tell(self, run: OfMaterials) -> Decision:
+        """Return what a run says of it: the same."""
+        return self.decide(run)
+
+
+class Plasticity(MaterialEffect):
+    """Yielding and hardening."""
+
+    name = "plasticity"
+    adds = "deps_p = 3/2 dp s / sigma_eq, sigma_eq <= sigma_y(p)"
+    number = "sigma_eq / sigma_y"
+    threshold = 1.0
+    influence = "none below sigma_y; above it not predicted"
+    place = "reflowshock.fem.forces.force_nonlinear.NonlinearElements"
+    switch = "materials.solder = SAC405 …, or a table with or without plasticity"
+    source = "von Mises; Johnson & Cook 1983"
+
+    def of_laws(self, scene: OfMaterials, laws: Mapping[str, JohnsonCook]) -> Decision:
+        """Say from which stress on each yields."""
+        return decision(True, "; ".join(yields(name, law) for name, law in laws.items()))
+
+    def other_way(self, case: Any, acts: bool) -> Any | None:
+        """Return a package's case with elastic materials, or with solder that yields."""
+        if not isinstance(case.materials, Materials):
+            return None
+        if not acts:
+            return changed(case, "materials.solder", SAC405)
+        roles = {role: material for role, material in case.materials.by_role.items() if material.plasticity is not None}
+        elastic = {role: material.model_copy(update={"plasticity": None}) for role, material in roles.items()}
+        return changed(case, "materials", case.materials.model_copy(update=elastic))
+
+
+class StrainRate(MaterialEffect):
+    """Yield stress that rises with the rate."""
+
+    name = "strain_rate"
+    adds = "sigma_y times 1 + C ln max(1, p' / p0')"
+    number = "C"
+    threshold = 0.0
+    influence = f"C ln(p' / p0') of the yield stress at p' = {RATE_OF_DROPS:g} 1/s"
+    place = "reflowshock.fem.kernels.plasticity.plastic_increment"
+    switch = "materials.*.plasticity.C"
+
+    def of_laws(self, scene: OfMaterials, laws: Mapping[str, JohnsonCook]) -> Decision:
+        """By the constant C."""
+        raised = max(law.C * log(RATE_OF_DROPS / law.reference_rate) for law in laws.values())
+        fast = [
+            f"{name}: C = {law.C:g} above {law.reference_rate:g} 1/s at which A and B are measured"
+            for name, law in laws.items()
+            if law.C > 0.0
+        ]
+        return decision(bool(fast), "; ".join(fast) or "C = 0: no dependence given", max(raised, 0.0))
+
+
+class ThermalSoftening(MaterialEffect):
+    """Yield stress that falls with temperature."""
+
+    name = "thermal_softening"
+    adds = "sigma_y times 1 - T*^m"
+    number = "T*^m"
+    threshold = 0.0
+    influence = "T*^m of the yield stress"
+    place = "reflowshock.fem.materials.parameters.JohnsonCook"
+    switch = "materials.*.temperature"
+
+    def of_laws(self, scene: OfMaterials, laws: Mapping[str, JohnsonCook]) -> Decision:
+        """By the temperature of each."""
+        isotropic = {name: item for name, item in scene.materials.items() if isinstance(item, Isotropic)}
+        soft = {name: item.softening for name, item in isotropic.items() if item.softening < 1.0}
+        why = "; ".join(f"{name}: yield stress times {factor:.3g}" for name, factor in soft.items())
+        why = why or "at the temperature at which A and B are measured"
+        return decision(bool(soft), why, 1.0 - min(soft.values(), default=1.0))
+
+
+MATERIAL_EFFECTS: tuple[MaterialEffect, ...] = (Plasticity(), StrainRate(), ThermalSoftening())
 
 
 def plastic_laws(materials: Mapping[str, Material]) -> dict[str, JohnsonCook]:
@@ -57,10 +121,3 @@ def yields(name: str, law: JohnsonCook) -> str:
     """Say when a material yields."""
     hardening = f", hardening {1e-6 * law.B:g} MPa p^{law.n:g}" if law.B > 0.0 else ", no hardening"
     return f"{name} yields from {1e-6 * law.A:g} MPa on{hardening}"
-
-
-def failure_effect(failure: Failure) -> dict[str, dict[str, Any]]:
-    """Decide whether joints are judged: where a measure has a limit. Judging changes no result."""
-    why = "limits of " + " and ".join(name.replace("_", " ") for name in failure.limits)
-    on = bool(failure.limits)
-    return {"failure": {"on": on, "why": why if on else "shock.failure gives no limit", "influence": 0.0}}

@@ -1,39 +1,116 @@
-"""Which effects a run of a structure simulates, and why."""
+"""The effects of a structure's motion, before a run and after it."""
 
-from collections.abc import Iterator
-from typing import Any
+from collections.abc import Mapping
+from dataclasses import dataclass
 
-from reflowshock.fem.estimates.material_effects import material_effects
+from reflowshock.effect import Decision, Effect, Toggle, decided, decision
+from reflowshock.fem.estimates.material_effects import MATERIAL_EFFECTS, MaterialEffect
 from reflowshock.fem.materials.kinematics import finite_rotation
-from reflowshock.fem.problem.structure import KINDS, StructureProblem
+from reflowshock.fem.materials.parameters import Material
+from reflowshock.fem.problem.structure import KINDS, Pulsed, StructureProblem
 
 
-def effects(problem: StructureProblem, added_mass: float, neglected_strain: float | None = None) -> dict[str, Any]:
-    """Return name -> whether it is on, and why.
+@dataclass(frozen=True, slots=True)
+class MotionScene:
+    """The motion of a structure.
 
-    Args:
-        problem: The structure.
-        added_mass: Mass that scaling has added [kg].
+    Attributes:
+        problem: Its parameters.
+        added_mass: Mass that scaling adds [kg].
         neglected_strain: Largest strain that a run of small kinematics has left out; None before a run.
     """
-    rotation = finite_rotation("dynamics", problem.dynamics.kinematics, neglected_strain)
-    others = [*_loads(problem), ("finite_rotation", *rotation), *_scheme(problem, added_mass)]
-    return material_effects(problem.layer_materials) | {name: {"on": on, "why": why} for name, on, why in others}
+
+    problem: StructureProblem
+    added_mass: float
+    neglected_strain: float | None = None
+
+    @property
+    def materials(self) -> Mapping[str, Material]:
+        """Layer -> its material."""
+        return self.problem.layer_materials
 
 
-def _loads(problem: StructureProblem) -> Iterator[tuple[str, bool, str]]:
-    for kind in KINDS:
-        names = [f"loads.{name}" for name, load in problem.loads.items() if isinstance(load, kind)]
-        yield kind.effect, bool(names), ", ".join(names) or f"no load of kind {kind.model_fields['kind'].default}"
-    velocity = problem.dynamics.initial_velocity
-    yield "initial_velocity", any(velocity), f"dynamics.initial_velocity = {list(velocity)} m/s"
+class Loading(Effect[MotionScene]):
+    """Loads of one kind."""
+
+    def __init__(self, kind: type[Pulsed]) -> None:
+        """Take the name from the kind."""
+        self.kind, self.name = kind, kind.effect
+
+    def decide(self, motion: MotionScene) -> Decision:
+        """By the loads of the case."""
+        names = [f"loads.{name}" for name, load in motion.problem.loads.items() if isinstance(load, self.kind)]
+        return decision(bool(names), ", ".join(names) or f"no load of kind {self.kind.model_fields['kind'].default}")
 
 
-def _scheme(problem: StructureProblem, added_mass: float) -> Iterator[tuple[str, bool, str]]:
-    damping, numerics = problem.dynamics.damping, problem.dynamics.numerics
-    given = {name: value for name, value in damping.model_dump().items() if value and name != "frequency"}
-    yield "damping", bool(given), ", ".join(f"{name} = {value:g}" for name, value in given.items()) or "none is given"
-    scaled = f"dynamics.numerics.mass_scaled = {list(numerics.mass_scaled)}; adds {added_mass:.3e} kg"
-    yield "mass_scaling", added_mass > 0.0, scaled
-    one_point = problem.structure.formulation == "one_point"
-    yield "hourglass_stiffness", one_point, f"structure.formulation = {problem.structure.formulation}"
+class InitialVelocity(Effect[MotionScene]):
+    """A velocity at the start."""
+
+    name = "initial_velocity"
+
+    def decide(self, motion: MotionScene) -> Decision:
+        """As the case says."""
+        velocity = motion.problem.dynamics.initial_velocity
+        return decision(any(velocity), f"dynamics.initial_velocity = {list(velocity)} m/s")
+
+
+class StructureRotation(Effect[MotionScene]):
+    """Rotations that are finite."""
+
+    name = "finite_rotation"
+    toggle = Toggle("dynamics.kinematics", "finite", "small")
+
+    def decide(self, motion: MotionScene) -> Decision:
+        """As the case says, with the strain that was left out."""
+        return decision(*finite_rotation("dynamics", motion.problem.dynamics.kinematics, motion.neglected_strain))
+
+
+class StructureDamping(Effect[MotionScene]):
+    """Rayleigh damping."""
+
+    name = "damping"
+
+    def decide(self, motion: MotionScene) -> Decision:
+        """As the case says."""
+        keys = motion.problem.dynamics.damping.model_dump().items()
+        given = [f"{key} = {value:g}" for key, value in keys if value and key != "frequency"]
+        return decision(bool(given), ", ".join(given) or "none is given")
+
+
+class StructureMassScaling(Effect[MotionScene]):
+    """Mass added to small elements, for longer steps."""
+
+    name = "mass_scaling"
+
+    def decide(self, motion: MotionScene) -> Decision:
+        """By the mass that it adds."""
+        scaled = list(motion.problem.dynamics.numerics.mass_scaled)
+        why = f"dynamics.numerics.mass_scaled = {scaled}; adds {motion.added_mass:.3e} kg"
+        return decision(motion.added_mass > 0.0, why)
+
+
+class HourglassStiffness(Effect[MotionScene]):
+    """Stiffness of the modes that one integration point misses."""
+
+    name = "hourglass_stiffness"
+
+    def decide(self, motion: MotionScene) -> Decision:
+        """By the formulation."""
+        formulation = motion.problem.structure.formulation
+        return decision(formulation == "one_point", f"structure.formulation = {formulation}")
+
+
+STRUCTURE_EFFECTS: tuple[Effect[MotionScene] | MaterialEffect, ...] = (
+    *MATERIAL_EFFECTS,
+    *(Loading(kind) for kind in KINDS),
+    InitialVelocity(),
+    StructureRotation(),
+    StructureDamping(),
+    StructureMassScaling(),
+    HourglassStiffness(),
+)
+
+
+def effects(problem: StructureProblem, added_mass: float, neglected_strain: float | None = None) -> dict[str, Decision]:
+    """Decide the effects of a structure, see ``MotionScene``."""
+    return decided(STRUCTURE_EFFECTS, MotionScene(problem, added_mass, neglected_strain))

@@ -1,15 +1,15 @@
-"""Which effects a reflow calls for: how much of the gaps warpage and the solder's force would change.
+"""The effects of heating on a reflow: how much of the gaps warpage and the solder's force would change.
 
 Estimates from the plate theory of the layers, on the safe side, in closed form: ``plan`` asks before there is a mesh.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import pi
-from typing import Any
 
+from reflowshock.effect import Decision, Effect, Switch, Toggle, decision
 from reflowshock.fem.materials.parameters import Material
-from reflowshock.fem.problem.thermal import Switch, Thermal
+from reflowshock.fem.problem.thermal import KELVIN, Thermal
 
 NEGLIGIBLE = 1e-3  # of the gap, or of the pad's radius across it: below it an effect is left out
 MARGIN = 1.25  # on the bow: a ring of substrate around the die, which the die holds back, bends it by up to that much
@@ -109,41 +109,117 @@ def solder_force_number(materials: Mapping[str, Material], sizes: PackageSizes, 
     return (bent_by + dents) / sizes.standoff
 
 
-def decide(
-    thermal: Thermal, materials: Mapping[str, Material], sizes: PackageSizes, surface_tension: float
-) -> dict[str, dict[str, Any]]:
-    """Decide which effects act between solder and structure.
+@dataclass(frozen=True, slots=True)
+class Heated:
+    """Board, package and liquid solder under a course of temperatures.
 
-    Args:
-        thermal: Course of temperatures, and what the user wants.
+    Attributes:
+        thermal: The course, and what the user wants.
         materials: Role -> its material.
         sizes: Of package and board.
         surface_tension: [N/m].
-
-    Returns:
-        ``flexible``, ``solder_force``, ``residual_stress`` -> on, why.
+        temperatures: Of the load steps with liquid solder [K].
     """
-    warped = warpage_number(thermal, materials, sizes)
-    forced = solder_force_number(materials, sizes, surface_tension)
-    force = _switched(
-        thermal.effects.solder_force, forced, f"the solder's pull bends package and board by {forced:.3g} of the gap"
-    )
-    larger, why = max(
-        (warped, f"heating changes gaps or places of pads by {warped:.3g} of their size"), (forced, force["why"])
-    )
-    flexible = _switched(thermal.effects.flexible, larger, why)
-    flexible["influence"] = larger
-    residual = thermal.effects.residual_stress
-    rigid = {"on": False, "why": "board and package are rigid"}
-    return {
-        "flexible": flexible,
-        "solder_force": force | {"influence": forced} if flexible["on"] else rigid,
-        "residual_stress": {"on": residual == "on", "why": f"thermal.effects.residual_stress = {residual}"},
-    }
+
+    thermal: Thermal
+    materials: Mapping[str, Material]
+    sizes: PackageSizes
+    surface_tension: float
+    temperatures: Sequence[float]
+
+    def by_solder(self) -> tuple[float, Decision]:
+        """Return by how much of the gaps the solder's force bends, and whether it would act if plates bend."""
+        number = solder_force_number(self.materials, self.sizes, self.surface_tension)
+        what = f"the solder's pull bends package and board by {number:.3g} of the gap"
+        return number, _switched(self.thermal.effects.solder_force, number, what)
 
 
-def _switched(switch: Switch, number: float, what: str) -> dict[str, Any]:
+class Heating(Effect[Heated]):
+    """Temperature of board and package."""
+
+    name, stage = "thermal", "reflow"
+    adds = "temperature of board and package in load steps, T(t)"
+    influence = "that of flexible"
+    place = "reflowshock.workflow.reflow.forecast.LoadStep"
+    switch = "[thermal], there or not"
+    source = "J-STD-020"
+
+    def decide(self, heated: Heated) -> Decision:
+        """Say at which temperatures solder is liquid."""
+        low, high, reference = min(heated.temperatures), max(heated.temperatures), heated.thermal.reference
+        span = f"{len(heated.temperatures)} load steps from {low - KELVIN:.4g} to {high - KELVIN:.4g} °C"
+        why = f"solder is liquid in {span}, all is flat at {reference - KELVIN:.4g} °C"
+        return decision(high > low or high != reference, why)
+
+
+class Flexible(Effect[Heated]):
+    """Board and package that bend."""
+
+    name, stage = "flexible", "reflow"
+    adds = "div C : (eps - alpha dT) = 0 in board and package"
+    number = "bow / standoff or shift of pads / their radius, the larger one"
+    threshold = NEGLIGIBLE
+    influence = "the number, of the gap or pad"
+    place = "reflowshock.fem.statics.structure.ThermalStructure"
+    switch = "thermal.effects.flexible = auto, on, off"
+    source = "Timoshenko, JOSA 11, 1925, two layers"
+
+    def decide(self, heated: Heated) -> Decision:
+        """By heating or by the solder's force, whichever changes more."""
+        warped = warpage_number(heated.thermal, heated.materials, heated.sizes)
+        forced, force = heated.by_solder()
+        what = f"heating changes gaps or places of pads by {warped:.3g} of their size"
+        number, why = max((warped, what), (forced, force["why"]))
+        return _switched(heated.thermal.effects.flexible, number, why)
+
+
+class SolderForce(Effect[Heated]):
+    """What the solder does to plates that bend."""
+
+    name, stage = "solder_force", "reflow"
+    adds = "the joints' wrenches on the plates that bend"
+    number = "(bending under 2 pi a gamma a joint + dents) / standoff"
+    threshold = NEGLIGIBLE
+    influence = "the number, of the gap"
+    place = "reflowshock.fem.statics.pads.Pads"
+    switch = "thermal.effects.solder_force = auto, on, off"
+    source = "Timoshenko & Woinowsky-Krieger 1959, art. 16"
+    toggle = Toggle("thermal.effects.solder_force", "on", "off")
+
+    def decide(self, heated: Heated) -> Decision:
+        """By its own number, where plates bend."""
+        flexible = Flexible().decide(heated)["on"]
+        return heated.by_solder()[1] if flexible else decision(False, "board and package are rigid")
+
+
+class ResidualStress(Effect[Heated]):
+    """Stress of cooling in which the shock begins."""
+
+    name = "residual_stress"
+    adds = "sigma_0 of cooling, div C : (eps - alpha dT) = 0, as initial state"
+    influence = "not predicted: solder at room temperature relaxes"
+    place = "reflowshock.fem.statics.initial_state.InitialState"
+    switch = "thermal.effects.residual_stress = on, off"
+    source = "upper bound, no creep"
+    toggle = Toggle("thermal.effects.residual_stress", "on", "off")
+
+    def decide(self, heated: Heated) -> Decision:
+        """As the case says."""
+        return self.wanted(heated.thermal)
+
+    @staticmethod
+    def wanted(thermal: Thermal, of_cooling: str = "") -> Decision:
+        """As the case says, with a word on the cooling where there is a shock."""
+        on = thermal.effects.residual_stress == "on"
+        why = f"thermal.effects.residual_stress = {thermal.effects.residual_stress}"
+        return decision(on, why + of_cooling if on else why)
+
+
+HEATED_EFFECTS: tuple[Effect[Heated], ...] = (Heating(), Flexible(), SolderForce(), ResidualStress())
+
+
+def _switched(switch: Switch, number: float, what: str) -> Decision:
     """Follow the user's switch, or else the number."""
     if switch != "auto":
-        return {"on": switch == "on", "why": f"{what}, switched {switch}"}
-    return {"on": number > NEGLIGIBLE, "why": f"{what} ({'>' if number > NEGLIGIBLE else '<='} {NEGLIGIBLE:g})"}
+        return decision(switch == "on", f"{what}, switched {switch}", number)
+    return decision(number > NEGLIGIBLE, f"{what} ({'>' if number > NEGLIGIBLE else '<='} {NEGLIGIBLE:g})", number)

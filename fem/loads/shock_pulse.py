@@ -5,7 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from reflowshock.fem.estimates.effects import Effect, weight
+from reflowshock.effect import Decision
+from reflowshock.fem.estimates.drop_effects import WeightEffect
 from reflowshock.fem.loads.pulse import STANDARD_GRAVITY, HalfSine, Pulse, Tabulated, service_condition
 from reflowshock.fem.loads.pulse_table import read_pulse
 from reflowshock.fem.problem.shock import Shock
@@ -18,12 +19,12 @@ class ShockPulse:
     Attributes:
         pulse: Upward acceleration of the table [m/s^2].
         source: Where it comes from, in words.
-        gravity: Whether weight acts, and why, as an effect.
+        gravity: Whether weight acts, and why.
     """
 
     pulse: Pulse
     source: str
-    gravity: Effect
+    gravity: Decision
 
 
 def shock_pulse(shock: Shock) -> ShockPulse:
@@ -34,7 +35,7 @@ def shock_pulse(shock: Shock) -> ShockPulse:
     """
     pulse, source = input_pulse(shock)
     peak = float(np.abs(pulse.values).max()) if isinstance(pulse, Tabulated) else pulse.peak
-    return ShockPulse(pulse, source, weight(shock.gravity, peak, STANDARD_GRAVITY))
+    return ShockPulse(pulse, source, WeightEffect.beside(shock.gravity, peak, STANDARD_GRAVITY))
 
 
 def input_pulse(shock: Shock) -> tuple[HalfSine | Tabulated, str]:

@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 
 from reflowshock.fem.division.tables import JointTables
 from reflowshock.fem.dynamics.history import History
-from reflowshock.fem.estimates.material_effects import material_effects
+from reflowshock.fem.estimates.drop_effects import DropRun, told
 from reflowshock.fem.loads.shock_pulse import shock_pulse
-from reflowshock.fem.materials.kinematics import finite_rotation
 from reflowshock.fem.output.result import Outcome, Timings, health, model_summary, peak_memory, quantity, sizes
 from reflowshock.fem.output.watch_joints import FLOW_LAYERS, LAYERS
 from reflowshock.fem.parallel.communicators import Communicators
@@ -134,27 +133,15 @@ def flow_metrics(arrays: Mapping[str, NDArray]) -> dict[str, Any]:
 
 def effects(request: RunInput, summary: dict[str, Any], neglected_strain: float) -> dict[str, Any]:
     """Return which effects the run simulated, and why."""
-    finite, why = finite_rotation("shock.numerics", request.shock.numerics.decided_kinematics, neglected_strain)
-    scaled, tied = request.shock.numerics.mass_scaled, summary["tied_nodes"]
-    ratio = f"step ratio m = {summary['substeps']}"
-    pulse, damping = shock_pulse(request.shock), request.shock.damping.coefficients
+    tied, ratio = summary["tied_nodes"], f"step ratio m = {summary['substeps']}"
+    shock, pulse = request.shock, shock_pulse(request.shock)
     return {
         "two_scale": {"on": request.mode == "two_scale", "why": f"mode {request.mode}; {ratio}"},
         "tie": {"on": tied > 0, "why": f"{tied} joint nodes lie on facets that do not match them"},
-        "mass_scaling": {
-            "on": summary["added_mass"] > 0.0,
-            "why": f"shock.numerics.mass_scaled = {list(scaled)}; adds {summary['added_mass']:.3e} kg",
-        },
         "input_g": {
             "on": True,
-            "why": f"{pulse.source}, {METHODS[request.shock.method]}; package facing down: the board is pushed along +z"
+            "why": f"{pulse.source}, {METHODS[shock.method]}; package facing down: the board is pushed along +z"
             " of the table's frame",
         },
-        "gravity": pulse.gravity,
-        "damping": {
-            "on": any(damping),
-            "why": f"Rayleigh damping, alpha = {damping[0]:.4g} 1/s, beta = {damping[1]:.4g} s",
-        },
-        "finite_rotation": {"on": finite, "why": why},
-        **material_effects(request.materials.by_role),
+        **told(DropRun(shock, request.materials.by_role, pulse.gravity, summary["added_mass"], neglected_strain)),
     }

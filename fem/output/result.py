@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from reflowshock.fem.division.tables import Tables, TablesT_co
 from reflowshock.fem.dynamics.history import History
 from reflowshock.fem.elements.hexahedron import HEXAHEDRON
-from reflowshock.fem.estimates.effects import ADDED_MASS_LIMIT
+from reflowshock.fem.estimates.drop_effects import ADDED_MASS_LIMIT
 from reflowshock.fem.model.factorisation import FactorCost
 from reflowshock.fem.model.steps import Steps
 from reflowshock.fem.output.structure_modes import ModeTable

@@ -9,13 +9,13 @@ from typing import Annotated, Literal
 from pydantic import Field, ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
 
+from reflowshock.effect import Switch
 from reflowshock.fem.materials.parameters import Material, Temperature
 from reflowshock.parameters import Parameters
 from reflowshock.problem import Problem
 from reflowshock.quantity import Quantity
 
 KELVIN = 273.15
-Switch = Literal["auto", "on", "off"]
 
 
 class ThermalEffects(Parameters):

@@ -1,10 +1,11 @@
-"""Which effects a reflow calls for, decided from dimensionless numbers. No numerical library is loaded here."""
+"""The effects of a reflow, decided from dimensionless numbers. No numerical library is loaded here."""
 
+from abc import abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import exp, pi, sqrt
-from typing import Any, NotRequired, TypedDict
 
+from reflowshock.effect import Decision, Effect, decided, decision
 from reflowshock.particles.core.geometry import JointGeometry
 from reflowshock.particles.parameters.solder import Solder
 
@@ -16,20 +17,6 @@ NEGLIGIBLE_SHAPE_CHANGE = 1e-3
 PROCESS_TIME_RATIO = 20.0
 # Below this Bond number surface tension decides the shape; above 100 it is a boundary layer of gravity.
 LARGEST_BOND = 100.0
-
-
-class Decision(TypedDict):
-    """Whether an effect acts, why, and how much of the answer it is expected to change (or would)."""
-
-    on: bool
-    why: str
-    influence: NotRequired[float]
-
-
-NO_WALL: dict[str, Decision] = {
-    "gravity": {"on": False, "why": "no wall: the drop falls as a whole, which does not change its shape"},
-    "wall_adhesion": {"on": False, "why": "no wall"},
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,6 +58,224 @@ def _numbers(solder: Solder, length: float, area: float) -> Numbers:
     )
 
 
+@dataclass(frozen=True, slots=True)
+class LiquidScene:
+    """Solder in a scene.
+
+    Attributes:
+        numbers: its dimensionless numbers.
+        solder: its properties and process.
+        has_wall: whether it touches one.
+        swings: whether it is a drop that oscillates.
+    """
+
+    numbers: Numbers
+    solder: Solder
+    has_wall: bool = True
+    swings: bool = False
+
+    @property
+    def rival(self) -> float:
+        """Bond number of the weight that rivals surface tension: none where the liquid falls as a whole."""
+        return self.numbers.bond if self.has_wall and self.solder.effects.gravity != "off" else 0.0
+
+    @property
+    def shaped(self) -> float:
+        """Share of the size that surface tension shapes: gravity makes a puddle as deep as the capillary length."""
+        return 1.0 / sqrt(1.0 + self.rival)
+
+    @property
+    def slowest_time(self) -> float:
+        """Time [s] in which the slowest motion dies out."""
+        return max(self.numbers.capillary_time, self.numbers.viscous_time)
+
+    @property
+    def is_transient(self) -> bool:
+        """Whether the process ends before the motion has died out."""
+        return self.solder.process_time / self.slowest_time < PROCESS_TIME_RATIO
+
+
+class LiquidEffect(Effect[LiquidScene]):
+    """An effect of the reflow; its `place` is an `Acting` of `physics/physics.py`, its switch in `SolderEffects`.
+
+    Attributes:
+        of_motion: whether it does nothing at rest.
+        is_measured: whether `benchmarks/effects.py` measures what a step costs with it and without it.
+    """
+
+    stage = "reflow"
+    of_motion = False
+    is_measured = False
+
+    @abstractmethod
+    def auto(self, liquid: LiquidScene) -> Decision:
+        """Decide from the numbers alone."""
+
+    def decide(self, liquid: LiquidScene) -> Decision:
+        """Follow the user's switch, else the numbers."""
+        auto, switch = self.auto(liquid), getattr(liquid.solder.effects, self.name)
+        if switch == "auto":
+            return auto
+        return auto | decision(switch == "on", f"set to {switch} by the user ({auto['why']})")
+
+
+class GravityEffect(LiquidEffect):
+    """Weight, which flattens what rests on a wall."""
+
+    name = "gravity"
+    adds = "f = -rho g z dV/dx on the free surface"
+    number = f"{SHAPE_CHANGE_BY_BOND:g} Bo, Bo = rho g L H / gamma"
+    threshold = NEGLIGIBLE_SHAPE_CHANGE
+    influence = f"{SHAPE_CHANGE_BY_BOND:g} Bo of the shape, up to (large contact angles)"
+    place = "reflowshock.particles.physics.forces.Gravity"
+    switch = "solder.effects.gravity (of a scene: gravity) = auto, on, off"
+    source = "Bashforth & Adams 1883, heights of sessile drops"
+    is_measured = True
+
+    def auto(self, liquid: LiquidScene) -> Decision:
+        """By the change of the height."""
+        change = SHAPE_CHANGE_BY_BOND * liquid.numbers.bond
+        why = f"Bond number {liquid.numbers.bond:.3g}: changes the shape by about {100 * change:.3g} %"
+        return decision(change > NEGLIGIBLE_SHAPE_CHANGE, why, min(change, 1.0))
+
+    def decide(self, liquid: LiquidScene) -> Decision:
+        """Nothing without a wall, whatever the switch."""
+        if not liquid.has_wall:
+            return decision(False, "no wall: the drop falls as a whole, which does not change its shape")
+        return super().decide(liquid)
+
+
+class MotionEffect(LiquidEffect):
+    """An effect of the motion, which matters where the process is short."""
+
+    threshold = PROCESS_TIME_RATIO
+    acts = "below"
+    of_motion = True
+    is_measured = True
+
+    def auto(self, liquid: LiquidScene) -> Decision:
+        """By process time over slowest time."""
+        ratio = liquid.solder.process_time / liquid.slowest_time
+        times = f"process time {liquid.solder.process_time:.3g} s is {ratio:.3g} times the slowest time"
+        rest = "the motion matters" if liquid.is_transient else "quasi-static, only the shape at rest matters"
+        return decision(liquid.is_transient, f"{times} {liquid.slowest_time:.3g} s: {rest}", exp(-ratio))
+
+
+class InertiaEffect(MotionEffect):
+    """Momentum of the liquid."""
+
+    name = "inertia"
+    adds = "rho Dv/Dt"
+    number = "T / max(sqrt(rho L^3 / gamma), rho L^2 / (5 mu)), process over slowest time"
+    influence = "exp(-T / slowest time): what is left of the motion"
+    place = "reflowshock.particles.physics.operators.Inertia"
+    switch = "solder.effects.inertia = auto, on, off"
+    source = "Lamb 1932, art. 355, decay of mode 2"
+
+    def decide(self, liquid: LiquidScene) -> Decision:
+        """Always where a drop swings."""
+        return decision(True, "a drop swings by its inertia") if liquid.swings else super().decide(liquid)
+
+
+class ViscosityEffect(MotionEffect):
+    """Newtonian viscosity, and what walls do by it."""
+
+    name = "viscosity"
+    adds = "-div(2 mu D(v))"
+    number = "as inertia; Oh = mu / sqrt(rho gamma L) is given"
+    influence = "exp(-T / slowest time): at rest it does nothing"
+    place = "reflowshock.particles.physics.operators.Viscosity"
+    switch = "solder.effects.viscosity = auto, on, off"
+    source = "Lamb 1932, art. 355"
+
+    def auto(self, liquid: LiquidScene) -> Decision:
+        """As all motion, with its own number."""
+        found = super().auto(liquid)
+        return found | decision(found["on"], f"Ohnesorge number {liquid.numbers.ohnesorge:.3g}; {found['why']}")
+
+    def decide(self, liquid: LiquidScene) -> Decision:
+        """Always where a drop swings."""
+        if liquid.swings:
+            return decision(True, f"Ohnesorge number {liquid.numbers.ohnesorge:.3g}: the swing decays")
+        return super().decide(liquid)
+
+
+class SurfaceTensionEffect(LiquidEffect):
+    """Tension of the free surface."""
+
+    name = "surface_tension"
+    adds = "f = -gamma dA/dx, implicit: dt gamma K v"
+    number = "Bo = rho g L H / gamma"
+    threshold = LARGEST_BOND
+    acts = "below"
+    influence = "1 / sqrt(1 + Bo) of the shape: the capillary length over the size"
+    place = "reflowshock.particles.physics.forces.SurfaceTension"
+    switch = "solder.effects.surface_tension = auto, on, off"
+    source = "de Gennes, Brochard-Wyart & Quere 2004, 2.1"
+
+    def auto(self, liquid: LiquidScene) -> Decision:
+        """By the Bond number of the weight that acts."""
+        rival = liquid.rival
+        why = f"Bond number {rival:.3g} (off above {LARGEST_BOND:g})" if rival > 0.0 else "no gravity rivals it"
+        return decision(rival < LARGEST_BOND, why, liquid.shaped)
+
+
+class WallAdhesionEffect(LiquidEffect):
+    """Contact angles."""
+
+    name = "wall_adhesion"
+    adds = "f = gamma cos(theta) dA_wet/dx, contact lines that edges pin"
+    number = "Bo = rho g L H / gamma"
+    threshold = LARGEST_BOND
+    acts = "below"
+    influence = "1 / sqrt(1 + Bo) of the shape, unless theta = 90 deg"
+    place = "reflowshock.particles.physics.forces.Wetting"
+    switch = "solder.effects.wall_adhesion = auto, on, off"
+    source = "Young 1805; Brakke 1992"
+
+    def auto(self, liquid: LiquidScene) -> Decision:
+        """As surface tension."""
+        why = "contact angles of pad and mask hold or move the contact lines wherever surface tension acts"
+        return decision(liquid.rival < LARGEST_BOND, why, liquid.shaped)
+
+    def decide(self, liquid: LiquidScene) -> Decision:
+        """Nothing without a wall, whatever the switch."""
+        return super().decide(liquid) if liquid.has_wall else decision(False, "no wall")
+
+
+# In the order in which they join what acts: wall adhesion needs all other forces on the surface.
+LIQUID_EFFECTS: tuple[LiquidEffect, ...] = (
+    SurfaceTensionEffect(),
+    GravityEffect(),
+    WallAdhesionEffect(),
+    ViscosityEffect(),
+    InertiaEffect(),
+)
+AT_REST = {
+    effect.name: False for effect in LIQUID_EFFECTS if effect.of_motion
+}  # switched off where only the shape matters
+
+
+def decide(numbers: Numbers, solder: Solder) -> dict[str, Decision]:
+    """Decide each effect of a reflow; return name to on or off, and the reason with its number."""
+    return decided(LIQUID_EFFECTS, LiquidScene(numbers, solder))
+
+
+def decide_effects(geometry: JointGeometry, solder: Solder) -> dict[str, Decision]:
+    """Decide each effect of a joint's reflow."""
+    return decide(dimensionless_numbers(geometry, solder), solder)
+
+
+def decide_drop(solder: Solder, is_free: bool) -> dict[str, Decision]:
+    """Decide each effect of a drop; what needs a wall is off where a drop is free."""
+    return decided(LIQUID_EFFECTS, LiquidScene(drop_numbers(solder), solder, has_wall=not is_free))
+
+
+def decide_oscillation(solder: Solder) -> dict[str, Decision]:
+    """Decide each effect of a free drop that swings."""
+    return decided(LIQUID_EFFECTS, LiquidScene(drop_numbers(solder), solder, has_wall=False, swings=True))
+
+
 def switched(effects: Mapping[str, Decision]) -> dict[str, bool]:
     """Which effects act: name to on or off."""
     return {name: decision["on"] for name, decision in effects.items()}
@@ -79,131 +284,3 @@ def switched(effects: Mapping[str, Decision]) -> dict[str, bool]:
 def acting_weight(solder: Solder, effects: Mapping[str, Decision]) -> float:
     """Weight of the unit volume that acts [N/m^3]."""
     return solder.density * solder.gravity if effects["gravity"]["on"] else 0.0
-
-
-def _by_switch(switch: str, auto: Decision) -> Decision:
-    if switch == "auto":
-        return auto
-    set_by_user: Decision = {"on": switch == "on", "why": f"set to {switch} by the user ({auto['why']})"}
-    return auto | set_by_user
-
-
-def decide_effects(geometry: JointGeometry, solder: Solder) -> dict[str, Decision]:
-    """Decide each effect of a joint's reflow: `decide` with its numbers."""
-    return decide(dimensionless_numbers(geometry, solder), solder)
-
-
-def decide_drop(solder: Solder, is_free: bool) -> dict[str, Decision]:
-    """Decide each effect of a drop: `decide` with its numbers; what needs a wall is off where a drop is free."""
-    numbers = drop_numbers(solder)
-    return decide(replace(numbers, bond=0.0), solder) | NO_WALL if is_free else decide(numbers, solder)
-
-
-def decide_oscillation(solder: Solder) -> dict[str, Decision]:
-    """Decide each effect of a free drop that swings."""
-    ohnesorge = drop_numbers(solder).ohnesorge
-    motion: dict[str, Decision] = {
-        "inertia": {"on": True, "why": "a drop swings by its inertia"},
-        "viscosity": {"on": True, "why": f"Ohnesorge number {ohnesorge:.3g}: the swing decays"},
-    }
-    return decide_drop(solder, is_free=True) | motion
-
-
-def decide(numbers: Numbers, solder: Solder) -> dict[str, Decision]:
-    """Decide each effect of a reflow.
-
-    Returns:
-        For gravity, inertia, viscosity, surface_tension and wall_adhesion: on or off, and the reason with its number.
-    """
-    change = SHAPE_CHANGE_BY_BOND * numbers.bond
-    rival = 0.0 if solder.effects.gravity == "off" else numbers.bond
-    slowest = max(numbers.capillary_time, numbers.viscous_time)
-    ratio = solder.process_time / slowest
-    transient = ratio < PROCESS_TIME_RATIO
-    times = f"process time {solder.process_time:.3g} s is {ratio:.3g} times the slowest time {slowest:.3g} s"
-    moving = exp(-ratio)
-    shaped = 1.0 / sqrt(1.0 + rival)  # of the size, where gravity makes a puddle as deep as the capillary length
-    rest = f"{times}: " + ("the motion matters" if transient else "quasi-static, only the shape at rest matters")
-    auto: dict[str, Decision] = {
-        "gravity": {
-            "on": change > NEGLIGIBLE_SHAPE_CHANGE,
-            "why": f"Bond number {numbers.bond:.3g}: changes the shape by about {100 * change:.3g} %",
-            "influence": min(change, 1.0),
-        },
-        "inertia": {"on": transient, "why": rest, "influence": moving},
-        "viscosity": {
-            "on": transient,
-            "why": f"Ohnesorge number {numbers.ohnesorge:.3g}; {rest}",
-            "influence": moving,
-        },
-        "surface_tension": {
-            "on": rival < LARGEST_BOND,
-            "why": f"Bond number {rival:.3g} (off above {LARGEST_BOND:g})" if rival > 0.0 else "no gravity rivals it",
-            "influence": shaped,
-        },
-        "wall_adhesion": {
-            "on": rival < LARGEST_BOND,
-            "why": "contact angles of pad and mask hold or move the contact lines wherever surface tension acts",
-            "influence": shaped,
-        },
-    }
-    switches = solder.effects.model_dump()
-    return {name: _by_switch(switches[name], decision) for name, decision in auto.items()}
-
-
-ENTRIES: tuple[dict[str, Any], ...] = (
-    {
-        "name": "gravity",
-        "adds": "f = -rho g z dV/dx on the free surface",
-        "number": f"{SHAPE_CHANGE_BY_BOND:g} Bo, Bo = rho g L H / gamma",
-        "threshold": NEGLIGIBLE_SHAPE_CHANGE,
-        "influence": f"{SHAPE_CHANGE_BY_BOND:g} Bo of the shape, up to (large contact angles)",
-        "place": "reflowshock.particles.physics.forces.Gravity",
-        "switch": "solder.effects.gravity (of a scene: gravity) = auto, on, off",
-        "source": "Bashforth & Adams 1883, heights of sessile drops",
-    },
-    {
-        "name": "inertia",
-        "adds": "rho Dv/Dt",
-        "number": "T / max(sqrt(rho L^3 / gamma), rho L^2 / (5 mu)), process over slowest time",
-        "threshold": PROCESS_TIME_RATIO,
-        "acts": "below",
-        "influence": "exp(-T / slowest time): what is left of the motion",
-        "place": "reflowshock.particles.physics.operators.Inertia",
-        "switch": "solder.effects.inertia = auto, on, off",
-        "source": "Lamb 1932, art. 355, decay of mode 2",
-    },
-    {
-        "name": "viscosity",
-        "adds": "-div(2 mu D(v))",
-        "number": "as inertia; Oh = mu / sqrt(rho gamma L) is given",
-        "threshold": PROCESS_TIME_RATIO,
-        "acts": "below",
-        "influence": "exp(-T / slowest time): at rest it does nothing",
-        "place": "reflowshock.particles.physics.operators.Viscosity",
-        "switch": "solder.effects.viscosity = auto, on, off",
-        "source": "Lamb 1932, art. 355",
-    },
-    {
-        "name": "surface_tension",
-        "adds": "f = -gamma dA/dx, implicit: dt gamma K v",
-        "number": "Bo = rho g L H / gamma",
-        "threshold": LARGEST_BOND,
-        "acts": "below",
-        "influence": "1 / sqrt(1 + Bo) of the shape: the capillary length over the size",
-        "place": "reflowshock.particles.physics.forces.SurfaceTension",
-        "switch": "solder.effects.surface_tension = auto, on, off",
-        "source": "de Gennes, Brochard-Wyart & Quere 2004, 2.1",
-    },
-    {
-        "name": "wall_adhesion",
-        "adds": "f = gamma cos(theta) dA_wet/dx, contact lines that edges pin",
-        "number": "Bo = rho g L H / gamma",
-        "threshold": LARGEST_BOND,
-        "acts": "below",
-        "influence": "1 / sqrt(1 + Bo) of the shape, unless theta = 90 deg",
-        "place": "reflowshock.particles.physics.forces.Wetting",
-        "switch": "solder.effects.wall_adhesion = auto, on, off",
-        "source": "Young 1805; Brakke 1992",
-    },
-)

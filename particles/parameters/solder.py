@@ -8,10 +8,9 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from reflowshock.effect import Switch
 from reflowshock.parameters import Parameters
 from reflowshock.quantity import Quantity
-
-Switch = Literal["auto", "on", "off"]
 
 
 class FlowNumerics(Parameters):

@@ -5,7 +5,7 @@ area.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numba import njit
@@ -16,7 +16,8 @@ from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.surface_measure import area_vector, cotangent_laplacian, surface_area, wall_corners
 from reflowshock.particles.core.symmetry import fold
 from reflowshock.particles.discretisation.discretisation import Discretisation
-from reflowshock.particles.physics.physics import Force
+from reflowshock.particles.parameters.solder import Solder
+from reflowshock.particles.physics.physics import Force, Physics
 from reflowshock.particles.surface.contact_line import ContactLine
 
 
@@ -29,6 +30,12 @@ class SurfaceTension:
     """
 
     coefficient: float
+
+    @classmethod
+    def added_to(cls, physics: Physics, solder: Solder) -> Physics:
+        """Pull on the surface, at the end of the step."""
+        tension = cls(solder.surface_tension)
+        return replace(physics, forces=(*physics.forces, tension), operators=(*physics.operators, tension))
 
     def energy(self, body: Body) -> float:
         """Surface energy [J]."""
@@ -57,6 +64,11 @@ class Gravity:
     """
 
     weight: float
+
+    @classmethod
+    def added_to(cls, physics: Physics, solder: Solder) -> Physics:
+        """Push on the surface."""
+        return replace(physics, forces=(*physics.forces, cls(solder.density * solder.gravity)))
 
     def energy(self, body: Body) -> float:
         """Potential energy rho g times the integral of z over the body [J], by the divergence theorem.
@@ -124,6 +136,12 @@ class Wetting:
     coefficient: float
     lines: Sequence[ContactLine]
     others: Sequence[Force]
+
+    @classmethod
+    def added_to(cls, physics: Physics, solder: Solder) -> Physics:
+        """Pull on the contact lines and let them go; all other forces act already."""
+        wetting = cls(solder.surface_tension, physics.lines, physics.forces)
+        return replace(physics, forces=(*physics.forces, wetting), events=(*physics.events, wetting))
 
     def energy(self, body: Body) -> float:
         """Energy of the walls [J], that of a line at the edges of the pads being zero."""

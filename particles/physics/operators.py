@@ -6,7 +6,7 @@ which the flow, continued linearly, would rest. Contact lines stay mobile withou
 that moves would be infinite (Huh & Scriven 1971).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,8 @@ from scipy import sparse
 from reflowshock.arrays import Floats
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.discretisation.discretisation import Discretisation
+from reflowshock.particles.parameters.solder import Solder
+from reflowshock.particles.physics.physics import Physics
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +44,11 @@ class Inertia:
 
     density: float
 
+    @classmethod
+    def added_to(cls, physics: Physics, solder: Solder) -> Physics:
+        """Carry momentum from step to step."""
+        return replace(physics, momenta=(*physics.momenta, cls(solder.density)))
+
     def load(self, body: Body, space: Discretisation, time_step: float) -> Floats:
         """M v_n / dt, `(n, 3)` [N]."""
         return self.density / time_step * (space.mass @ body.velocity)
@@ -56,6 +63,16 @@ class Viscosity:
     """
 
     coefficient: float
+
+    @classmethod
+    def added_to(cls, physics: Physics, solder: Solder) -> Physics:
+        """Share momentum in the liquid and, where it does not slide freely, with the walls."""
+        acting = replace(physics, operators=(*physics.operators, cls(solder.viscosity)))
+        if solder.wall == "slip" and solder.slip_length is not None:
+            return replace(acting, frictions=(*acting.frictions, NavierSlip(solder.viscosity / solder.slip_length)))
+        if solder.wall == "no-slip":
+            return replace(acting, holds=(*acting.holds, NoSlip()))
+        return acting
 
     def matrix(self, _body: Body, space: Discretisation, _time_step: float) -> sparse.csr_matrix:
         """Matrix of the virtual power, `(3 n, 3 n)` [kg/s], components one after the other.

@@ -13,6 +13,7 @@ from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.plate import slide
 from reflowshock.particles.core.symmetry import fold
 from reflowshock.particles.discretisation.discretisation import Discretisation
+from reflowshock.particles.parameters.solder import Solder
 from reflowshock.particles.physics.plate_motion import PlateMotion
 from reflowshock.particles.surface.contact_line import ContactLine
 
@@ -102,6 +103,14 @@ class Physics:
         """The part of a displacement `(n, 3)` that resting plates, symmetry (free slip) and edges (none) allow."""
         along = fold(body.cloud, slide(body.plates, body.cloud.wall, field))
         return np.where(self.pinned(body)[:, None], 0.0, along)
+
+
+class Acting(Protocol):
+    """The object of an effect, `place` in `parameters/effects.py`: a class that joins what acts."""
+
+    @classmethod
+    def added_to(cls, physics: Physics, solder: Solder) -> Physics:
+        """The lists with an object of it for a solder."""
 
 
 def plate_wrench(body: Body, others: Sequence[Force], wall: int) -> Floats:

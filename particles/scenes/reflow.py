@@ -8,6 +8,7 @@ wet it; flatter puddles do not.
 
 from collections.abc import Callable
 from dataclasses import replace
+from pkgutil import resolve_name
 
 import numpy as np
 
@@ -18,11 +19,10 @@ from reflowshock.particles.core.geometry import JointGeometry
 from reflowshock.particles.core.plate import Pad
 from reflowshock.particles.core.symmetry import whole_line
 from reflowshock.particles.ispg.gripc_step import GripcStep
-from reflowshock.particles.parameters.effects import decide_effects, switched
+from reflowshock.particles.parameters.effects import AT_REST, LIQUID_EFFECTS, decide_effects, switched
 from reflowshock.particles.parameters.solder import Solder
-from reflowshock.particles.physics.forces import Gravity, SurfaceTension, Wetting
-from reflowshock.particles.physics.operators import Inertia, Mass, NavierSlip, NoSlip, Viscosity
-from reflowshock.particles.physics.physics import Event, Force, Hold, Momentum, Operator, Physics
+from reflowshock.particles.physics.operators import Mass
+from reflowshock.particles.physics.physics import Acting, Physics
 from reflowshock.particles.scenes.metrics import Metrics, joint_metrics, open_metrics, particle_pressure, verdict
 from reflowshock.particles.scenes.rebuild import parted_shape, split_to_rest
 from reflowshock.particles.steps.flow import LiquidFlow
@@ -78,7 +78,7 @@ def solve_joint(
 
 def parted(geometry: JointGeometry, solder: Solder, flow: LiquidFlow, shape: JointShape) -> JointShape:
     """The shape of a joint whose neck has collapsed: a drop at rest on each pad; where that cannot be, as it is."""
-    effects = switched(decide_effects(geometry, solder)) | {"inertia": False, "viscosity": False}
+    effects = switched(decide_effects(geometry, solder)) | AT_REST
 
     def start(body: Body) -> LiquidFlow:
         return start_flow(body.cloud, solder, effects, pad_lines(body.cloud, solder))
@@ -149,7 +149,7 @@ def step_solver(solder: Solder, effects: dict[str, bool]) -> StepSolver:
     """How steps are solved: as the paper does, on tetrahedra where momentum is carried or shared, else towards rest."""
     if solder.numerics.scheme == "gripc":
         return GripcStep(solder.numerics.basis)
-    if effects["inertia"] or effects["viscosity"]:
+    if any(effects[name] for name in AT_REST):
         return InertialStep(solder.density)
     return Relaxation(solder.density)
 
@@ -169,32 +169,12 @@ def build_physics(solder: Solder, effects: dict[str, bool], lines: tuple[Contact
         effects: name to on or off, as `decide_effects` decides.
         lines: contact lines.
     """
-    forces: list[Force] = []
-    operators: list[Operator] = [Mass(solder.density)]
-    momenta: list[Momentum] = []
-    events: list[Event] = []
-    if effects["surface_tension"]:
-        tension = SurfaceTension(solder.surface_tension)
-        forces.append(tension)
-        operators.append(tension)
-    if effects["gravity"]:
-        forces.append(Gravity(solder.density * solder.gravity))
-    if effects["wall_adhesion"]:
-        wetting = Wetting(solder.surface_tension, lines, tuple(forces))
-        forces.append(wetting)
-        events.append(wetting)
-    frictions: list[Operator] = []
-    holds: list[Hold] = []
-    if effects["viscosity"]:
-        operators.append(Viscosity(solder.viscosity))
-        if solder.wall == "slip" and solder.slip_length is not None:
-            frictions.append(NavierSlip(solder.viscosity / solder.slip_length))
-        if solder.wall == "no-slip":
-            holds.append(NoSlip())
-    if effects["inertia"]:
-        momenta.append(Inertia(solder.density))
-    lists = (tuple(forces), tuple(operators), tuple(momenta), tuple(events))
-    return Physics(*lists, lines, frictions=tuple(frictions), holds=tuple(holds))
+    physics = Physics((), (Mass(solder.density),), (), (), lines)
+    for effect in LIQUID_EFFECTS:
+        if effects[effect.name]:
+            acting: type[Acting] = resolve_name(effect.place)
+            physics = acting.added_to(physics, solder)
+    return physics
 
 
 def joint_shape(geometry: JointGeometry, solder: Solder, flow: LiquidFlow, run: Run) -> JointShape:

@@ -14,8 +14,14 @@ from mpi4py import MPI
 from reflowshock.cases.hard.trials.grids import grid, mesh_of
 from reflowshock.fem.coupling.one_way import OneWay
 from reflowshock.fem.coupling.scheme import scheme_of
-from reflowshock.fem.estimates.effects import NEGLIGIBLE_STIFFENING, NEGLIGIBLE_WEIGHT, called_for, damping, weight
-from reflowshock.fem.estimates.material_effects import failure_effect
+from reflowshock.fem.estimates.drop_effects import (
+    NEGLIGIBLE_STIFFENING,
+    NEGLIGIBLE_WEIGHT,
+    Failing,
+    RayleighEffect,
+    WeightEffect,
+    called_for,
+)
 from reflowshock.fem.forces.force import force_terms
 from reflowshock.fem.forces.force_nonlinear import NonlinearElements
 from reflowshock.fem.kernels.plasticity import plastic_constants
@@ -281,7 +287,7 @@ def _(effect, _folder):
 @on("gravity_in_the_shock")
 def _(_effect, _folder):
     body, step = scene.strip()
-    left_out = weight("auto", 1500 * G, G)
+    left_out = WeightEffect.beside("auto", 1500 * G, G)
     assert not left_out["on"] and left_out["influence"] < NEGLIGIBLE_WEIGHT
     both = [scene.moved(body, step, scene.loads_of(body, scene.shock(gravity=g)), 3e-4)[1] for g in ("off", "on")]
     assert 0.0 < both[1] / both[0] - 1.0 < 1.2 * left_out["influence"]
@@ -291,8 +297,9 @@ def _(_effect, _folder):
 def _(_effect, _folder):
     body, step = scene.strip()
     duration, rate = 3e-4, 1.0
-    predicted = damping((rate, 0.0), 1.5e4, duration)["influence"]
     given = scene.shock(damping=Damping(mass_coefficient=rate))
+    drop = SimpleNamespace(shock=given.model_copy(update={"duration": duration}), expected=SimpleNamespace(omega=1.5e4))
+    predicted = RayleighEffect().decide(drop)["influence"]
     both = [scene.moved(body, step, scene.loads_of(body, item), duration)[1] for item in (scene.shock(), given)]
     assert abs(both[1] / both[0] - 1.0) < predicted < 1e-3
 
@@ -356,7 +363,7 @@ def _(_effect, _folder):
 
 @off("failure")
 def _(_effect, _folder):
-    assert not failure_effect(Failure())["failure"]["on"]
+    assert not Failing.by_limits(Failure())["on"]
 
 
 @on("failure")

@@ -1,27 +1,24 @@
 """How far the board of a drop will about deflect, from its parameters alone, and what small kinematics leave out."""
 
 import math
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from reflowshock.fem.estimates.effects import STIFFENING_OF_BOARD, called_for, effect, stiffened
+from reflowshock.effect import Decision
+from reflowshock.fem.estimates.drop_effects import Deflection, called_for
 
 if TYPE_CHECKING:
+    from reflowshock.fem.materials.parameters import Material
+    from reflowshock.fem.problem.shock import Shock
     from reflowshock.workflow.package.case import BoardDropCase
 
 SHARE = 4.0 / math.pi  # of the base's acceleration in the first mode of a pinned beam, at its middle
 SAMPLES, SAMPLES_A_PERIOD = 1000, 100
 MOST_PERIODS = 1000  # that are looked at: no pulse of a drop lasts longer
-
-
-class Deflection(NamedTuple):
-    """Largest deflection of a board's middle [m], of its slope, and the angular frequency of the mode [rad/s]."""
-
-    largest: float
-    slope: float
-    omega: float
 
 
 def expected_deflection(case: "BoardDropCase") -> Deflection:
@@ -77,32 +74,47 @@ def decided(case: "BoardDropCase") -> "BoardDropCase":
     return case.model_copy(update={"shock": case.shock.model_copy(update={"numerics": numerics})})
 
 
-def kinematics_effect(case: "BoardDropCase") -> dict:
-    """Return whether rotations are finite, why, and what small ones would leave out, as an effect of a plan."""
-    from reflowshock.fem.materials.kinematics import finite_rotation
+@dataclass(frozen=True)
+class DropScene:
+    """A case as effects see it, a ``Drop``; PulseError where a table of its pulse cannot be read."""
 
-    expected, kinematics = expected_deflection(case), case.shock.numerics.kinematics
-    ratio = expected.largest / case.board.thickness
-    wanted, reason = called_for(ratio)
-    taken = wanted if kinematics == "auto" else kinematics
-    finite, why = finite_rotation("shock.numerics", taken, 0.5 * expected.slope**2)
-    if kinematics == "auto":
-        why = f"shock.numerics.kinematics = auto: {reason}"
-    elif not finite:
-        why += "" if wanted == "small" else "; auto would choose finite"
-    why = f"the board is expected to deflect by about {ratio:.3g} times its thickness; {why}"
-    return {"finite_rotation": effect(finite, why, stiffened(ratio, STIFFENING_OF_BOARD))}
+    case: "BoardDropCase"
 
+    @property
+    def shock(self) -> "Shock":
+        """Its parameters."""
+        return self.case.shock
 
-def weight_effect(case: "BoardDropCase") -> dict:
-    """Return whether weight acts in the shock, why, and how far alone it bends the board, as an effect of a plan.
+    @property
+    def materials(self) -> "Mapping[str, Material]":
+        """Role -> material."""
+        return self.case.materials.by_role
 
-    It lasts, and a pulse does not: a board that is slow against the pulse feels it more than g over the peak says.
-    """
-    from reflowshock.fem.loads.pulse import STANDARD_GRAVITY
-    from reflowshock.fem.loads.shock_pulse import shock_pulse
+    @property
+    def thickness(self) -> float:
+        """Of the board [m]."""
+        return self.case.board.thickness
 
-    expected = expected_deflection(case)
-    alone = first_mode_peak(expected.omega, lambda time: STANDARD_GRAVITY * time, case.shock.duration)
-    influence = min(1.0, alone / expected.largest) if expected.largest > 0.0 else 1.0
-    return {"gravity_in_the_shock": shock_pulse(case.shock).gravity | {"influence": influence}}
+    @property
+    def symmetry(self) -> Literal["full", "quarter"]:
+        """Of the model."""
+        return self.case.board.symmetry
+
+    @property
+    def weight(self) -> Decision:
+        """Whether weight acts, from g over the peak acceleration."""
+        from reflowshock.fem.loads.shock_pulse import shock_pulse
+
+        return shock_pulse(self.case.shock).gravity
+
+    @cached_property
+    def expected(self) -> Deflection:
+        """How the shock bends the board."""
+        return expected_deflection(self.case)
+
+    @property
+    def bent_by_weight(self) -> float:
+        """Deflection of the board [m] by weight alone."""
+        from reflowshock.fem.loads.pulse import STANDARD_GRAVITY
+
+        return first_mode_peak(self.expected.omega, lambda time: STANDARD_GRAVITY * time, self.shock.duration)

@@ -5,12 +5,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from reflowshock.effect import Decision, Effect, Toggle, decision
 from reflowshock.problem import Problem
 from reflowshock.workflow.case.run import Findings, Run, metric
 from reflowshock.workflow.process.products import read_json
 
 if TYPE_CHECKING:
     from reflowshock.meshing.surface.truncated_sphere import TruncatedSphere
+    from reflowshock.workflow.board_drop.board_deflection import DropScene
     from reflowshock.workflow.package.case import BoardDropCase, PackageCase
 
 KEY, FOLDER = "shock.identical_joints", "identical"
@@ -25,13 +27,24 @@ def identical_sphere(case: "PackageCase") -> "TruncatedSphere":
     return TruncatedSphere.of_volume(case.solder.volume, board.wetted_radius, package.wetted_radius)
 
 
-def identical_joints_effect(case: "BoardDropCase") -> dict:
-    """Return whether the shock is repeated with identical joints, and why, as an effect."""
-    on = case.shock.identical_joints
-    why = f"{KEY} = {str(on).lower()}"
-    if on:
-        why += f": truncated spheres, {1e6 * identical_sphere(case).height:.4g} µm high, under a flat package"
-    return {"identical_joints": {"on": on, "why": why}}
+class IdenticalJoints(Effect["DropScene"]):
+    """The shock once more, with joints that are all alike."""
+
+    name = "identical_joints"
+    adds = "the shock once more, all joints alike"
+    influence = "none on the answer: a comparison beside it"
+    place = "reflowshock.workflow.board_drop.identical_joints.identical_sphere"
+    switch = "shock.identical_joints = true, false"
+    source = "truncated spheres"
+    toggle = Toggle(KEY, True, False)
+
+    def decide(self, drop: "DropScene") -> Decision:
+        """As the case says."""
+        on = drop.shock.identical_joints
+        why = f"{KEY} = {str(on).lower()}"
+        if on:
+            why += f": truncated spheres, {1e6 * identical_sphere(drop.case).height:.4g} µm high, under a flat package"
+        return decision(on, why)
 
 
 def problems(case: "BoardDropCase") -> Iterator[Problem]:

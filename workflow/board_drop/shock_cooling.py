@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from reflowshock.fem.estimates.thermal_effects import ResidualStress
 from reflowshock.problem import Problem
 from reflowshock.workflow.board_drop.shock_forecast import PartForecast, role_of
 from reflowshock.workflow.case.run import Findings, Run
@@ -100,13 +101,9 @@ def effect(case: BoardDropCase) -> dict:
     thermal = case.thermal
     if thermal is None:
         return {}
-    why = f"thermal.effects.residual_stress = {thermal.effects.residual_stress}"
-    if is_wanted(case):
-        why += (
-            f": cooling by {thermal.solidification - thermal.final:.4g} K; an upper bound: solder relaxes at room"
-            " temperature"
-        )
-    return {"residual_stress": {"on": is_wanted(case), "why": why}}
+    cooling = f": cooling by {thermal.solidification - thermal.final:.4g} K"
+    wanted = ResidualStress.wanted(thermal, f"{cooling}; an upper bound: solder relaxes at room temperature")
+    return {ResidualStress.name: wanted}
 
 
 def forecast(case: BoardDropCase, parts: Mapping[str, PartForecast]) -> tuple[dict, float]:

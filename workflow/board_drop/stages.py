@@ -39,16 +39,15 @@ def surface(run: Run[PackageCase], folder: Path) -> Findings:
 
 def solder_mesh(run: Run[PackageCase], folder: Path) -> Findings:
     """Put the package where the solder froze and mesh every joint in its place; once more if all were alike."""
-    from reflowshock.workflow.board_drop.fine_joints import coarse_joints_effect
     from reflowshock.workflow.board_drop.joint_meshes import mesh_identical_joints, mesh_real_joints
+    from reflowshock.workflow.board_drop.shock_effects import of_joint_meshes
 
     case, qualities = run.case, mesh_real_joints(run, folder)
     if not isinstance(case, BoardDropCase):
         return findings.of_solder_mesh(qualities, {})
     if case.shock.identical_joints:
         qualities |= mesh_identical_joints(run, folder)
-    effects = coarse_joints_effect(case.shock.coupling) | identical_joints.identical_joints_effect(case)
-    return findings.of_solder_mesh(qualities, effects)
+    return findings.of_solder_mesh(qualities, of_joint_meshes(case))
 
 
 def shock(run: Run[BoardDropCase], folder: Path) -> Findings:

@@ -1,19 +1,13 @@
-"""What forecasts of all kinds of case share: sizes, the limit of time steps, and effects switched the other way."""
+"""What forecasts of all kinds of case share: sizes, and the limit of time steps."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
-
-from pydantic import BaseModel
 
 from reflowshock.problem import Problem
 from reflowshock.workflow.case.text import short
 
 BYTES_OF_ELEMENT, BYTES_OF_PARTICLE = 5.0e3, 5.0e4
 STEPS_MOST = 1e10  # those of the smallest meshes take hours
-
-# From a case, and whether the effect acts in it, to the case in which it does not, or does.
-Toggle = Callable[[Any, bool], Any]
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,17 +17,6 @@ class Size:
     seconds: Mapping[str, float]
     joints: int
     memory: float
-
-
-def changed(model: BaseModel, key: str, value: object) -> Any:
-    """Return a model with another value at a dotted key; nothing is checked."""
-    name, _, rest = key.partition(".")
-    return model.model_copy(update={name: changed(getattr(model, name), rest, value) if rest else value})
-
-
-def between(key: str, on: object, off: object) -> Toggle:
-    """Return the toggle of an effect that a key switches."""
-    return lambda case, acts: changed(case, key, off if acts else on)
 
 
 def too_many_steps(key: str, duration: float, step: float, solver: str) -> Iterator[Problem]:

@@ -6,8 +6,9 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
+from reflowshock.effect import Effect
 from reflowshock.workflow.case.case import Case
-from reflowshock.workflow.effects.registry import Effect, registry
+from reflowshock.workflow.effects.registry import registry
 from reflowshock.workflow.effects.table import CAPTION, HEAD, MEASURED, measured, per_cent, rows
 from reflowshock.workflow.kinds import kind_of
 from reflowshock.workflow.process.terminal import new_table, styled

@@ -1,6 +1,6 @@
 """The effects of a case as rows of text: state, expected influence, why, and the predicted share of the cost.
 
-Their cost is predicted from forecasts with the effect switched the other way (``Kind.toggles``), or from ratios that
+Their cost is predicted from forecasts of the case the other way (``Effect.other_way``), or from ratios that
 ``benchmarks/effects.py`` measured (``costs.json``). The ``influence`` of a decision is the expected relative change of
 the result.
 """
@@ -48,10 +48,11 @@ def cost_shares(case: Case, effects: Mapping[str, Any]) -> dict[str, float]:
 
 def _other_way(case: Case, name: str, seconds: Mapping[str, float], acts: bool) -> float | None:
     """Return the predicted cost [s] of the case with an effect the other way; None where nothing tells it."""
-    toggles, total = kind_of(case).toggles(case), sum(seconds.values())
-    if name in toggles:
+    total, own = sum(seconds.values()), {effect.name: effect for effect in kind_of(case).effects}
+    switched = own[name].other_way(case, acts) if name in own else None
+    if switched is not None:
         try:
-            return sum(stage_seconds(toggles[name](case, acts)).values())
+            return sum(stage_seconds(switched).values())
         except CaseError:
             return None  # the case could not be run that way
     effect = effect_of(name, reflowed="reflow" in case.pipeline.names)

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from pathlib import Path
 
-from reflowshock.fem.estimates.material_effects import failure_effect
+from reflowshock.fem.estimates.drop_effects import Failing
 from reflowshock.workflow.case.run import metric
 from reflowshock.workflow.package import findings
 from reflowshock.workflow.package.case import BoardDropCase
@@ -28,7 +28,7 @@ def conclude(run_folder: Path, case: BoardDropCase, summary: dict, known: Discre
     if not histories or critical is None:
         return
     main = next(iter(histories))
-    summary["effects"] |= failure_effect(case.shock.failure)
+    summary["effects"][Failing.name] = Failing.by_limits(case.shock.failure)
     coarse = _coarse(results[main], histories[main]["joints"])
     verdict = verdict_of(case.shock.failure, histories[main], critical["value"], coarse)
     if PEEL in known.errors:

@@ -1,5 +1,6 @@
 """What is between board and package when the solder is liquid: a structure that bends, or rigid plates, and why."""
 
+from collections.abc import Sequence
 from contextlib import AbstractContextManager, nullcontext
 from math import hypot
 from pathlib import Path
@@ -7,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from reflowshock.effect import Decision, decided
 from reflowshock.fem.problem.thermal import Thermal
 
 if TYPE_CHECKING:
@@ -15,9 +17,9 @@ if TYPE_CHECKING:
     from reflowshock.workflow.package.case import PackageCase
 
 
-def thermal_effects(case: "PackageCase", thermal: Thermal) -> dict:
-    """Decide which effects act between solder and structure; see `fem.estimates.thermal_effects.decide`."""
-    from reflowshock.fem.estimates.thermal_effects import PackageSizes, decide
+def thermal_effects(case: "PackageCase", thermal: Thermal, temperatures: Sequence[float]) -> dict[str, Decision]:
+    """Decide which effects act between solder and structure, at temperatures [K] with liquid solder."""
+    from reflowshock.fem.estimates.thermal_effects import HEATED_EFFECTS, Heated, PackageSizes
     from reflowshock.meshing.board.pads import corner_axis
 
     package, board = case.package, case.board
@@ -31,8 +33,8 @@ def thermal_effects(case: "PackageCase", thermal: Thermal) -> dict:
         pad_radius=package.package_pad.wetted_radius,
         standoff=package.standoff,
     )
-    found = decide(thermal, case.materials.by_role, sizes, case.solder.surface_tension)
-    return {name: {**effect, "on": bool(effect["on"])} for name, effect in found.items()}
+    heated = Heated(thermal, case.materials.by_role, sizes, case.solder.surface_tension, temperatures)
+    return decided(HEATED_EFFECTS, heated)
 
 
 def open_structure(

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from reflowshock.fem.problem.thermal import KELVIN, Thermal
+from reflowshock.fem.problem.thermal import Thermal
 from reflowshock.particles.parameters.solder import Solder
 from reflowshock.problem import Problem
 from reflowshock.workflow.reflow.between import thermal_effects
@@ -60,18 +60,11 @@ class HeatedForecast:
 
 def forecast_heated(case: "PackageCase", thermal: Thermal) -> HeatedForecast:
     """Predict load steps, exchanges and effects."""
-    steps, effects = load_steps(thermal), thermal_effects(case, thermal)
+    steps = load_steps(thermal)
+    effects = thermal_effects(case, thermal, [step.temperature for step in steps])
     each = EXCHANGES_TO_BEND if effects["solder_force"]["on"] else EXCHANGES_ONE_WAY
     each = EXCHANGES_TO_FLOAT if thermal.package == "floating" else each
-    return HeatedForecast({"thermal": thermal_effect(thermal, steps)} | effects, steps, each * len(steps))
-
-
-def thermal_effect(thermal: Thermal, steps: list[LoadStep]) -> dict:
-    """Say at which temperatures solder is liquid, as an effect."""
-    low, high = (extreme(step.temperature for step in steps) for extreme in (min, max))
-    reference = thermal.reference - KELVIN
-    why = f"solder is liquid in {len(steps)} load steps from {low - KELVIN:.4g} to {high - KELVIN:.4g} °C"
-    return {"on": bool(high > low or high != thermal.reference), "why": f"{why}, all is flat at {reference:.4g} °C"}
+    return HeatedForecast(effects, steps, each * len(steps))
 
 
 def problems(
@@ -103,10 +96,10 @@ def _no_room(solder: Solder, gap: float, thermal: Thermal, pitch: float) -> Iter
 
 def _no_time(solder: Solder, geometries: "Mapping[str, JointGeometry]") -> Iterator[Problem]:
     """Find a motion that matters where load steps have no time."""
-    from reflowshock.particles.parameters.effects import decide_effects
+    from reflowshock.particles.parameters.effects import AT_REST, decide_effects
 
     for geometry in list(geometries.values())[:1]:
-        for name in ("inertia", "viscosity"):
+        for name in AT_REST:
             effect = decide_effects(geometry, solder)[name]
             if effect["on"]:
                 key = "solder.process_time" if getattr(solder.effects, name) == "auto" else f"solder.effects.{name}"

@@ -16,7 +16,7 @@ from reflowshock.workflow.process.terminal import ProgressBar, progress_bar
 from reflowshock.workflow.reflow.array import JointArray, Left, Source
 from reflowshock.workflow.reflow.between import frozen_displacement, open_structure, thermal_effects
 from reflowshock.workflow.reflow.coupling import Coupled, Coupling, Exchange, placed, scale_of, start
-from reflowshock.workflow.reflow.forecast import LoadStep, load_steps, thermal_effect
+from reflowshock.workflow.reflow.forecast import LoadStep, load_steps
 from reflowshock.workflow.reflow.joints import Alike, joint_geometries
 from reflowshock.workflow.reflow.pool import Shares
 from reflowshock.workflow.reflow.processes import open_pool
@@ -71,7 +71,7 @@ def reflow_heated(run: Run[PackageCase], thermal: Thermal, pads: "list[PadSite]"
         ReflowError: the reflow of a joint failed; it is named.
     """
     case, drawn, steps = run.case, joint_geometries(pads), load_steps(thermal)
-    effects = thermal_effects(case, thermal)
+    effects = thermal_effects(case, thermal, [step.temperature for step in steps])
     flexible, bends = (effects[name]["on"] for name in ("flexible", "solder_force"))
     with (
         open_structure(case, thermal, mesh, pads, flexible) as structure,
@@ -100,7 +100,7 @@ def reflow_heated(run: Run[PackageCase], thermal: Thermal, pads: "list[PadSite]"
                 "displacement": frozen_displacement(case, structure, coupled.state.displacement),
                 "package": structure.package,
             },
-            effects={"thermal": thermal_effect(thermal, steps), **effects},
+            effects=dict(effects),
             metrics=metrics | {"distinct_joints_computed": metric(len(joints.left))},
             health=health,
             continued=f"exchange {begun + 1}" if begun else "",

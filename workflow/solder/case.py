@@ -2,8 +2,9 @@
 
 from pydantic import Field
 
+from reflowshock.effect import Switch
 from reflowshock.particles.parameters.scenes import Drop, Drops, Fluid, Joint, Liquid, Oscillation
-from reflowshock.particles.parameters.solder import Solder, Switch
+from reflowshock.particles.parameters.solder import Solder
 from reflowshock.problem import Problem
 from reflowshock.workflow.case.case import Case
 from reflowshock.workflow.case.stage import Pipeline, Stage, report_of

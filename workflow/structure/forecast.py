@@ -6,7 +6,7 @@ from math import ceil
 from typing import TYPE_CHECKING, Any
 
 from reflowshock.problem import Problem
-from reflowshock.workflow.case.forecast import BYTES_OF_ELEMENT, Size, Toggle, between, too_many_steps
+from reflowshock.workflow.case.forecast import BYTES_OF_ELEMENT, Size, too_many_steps
 from reflowshock.workflow.case.text import short
 from reflowshock.workflow.structure.case import StructureCase
 
@@ -202,11 +202,6 @@ def structure_size(case: StructureCase) -> Size:
     elements = sum(layer.elements for layer in outlook.layers.values())
     implicit = outlook.solvers.implicit.memory if "implicit" in case.dynamics.solvers else 0.0
     return Size(outlook.seconds, 1, BYTES_OF_ELEMENT * elements + outlook.solvers.explicit.memory + implicit)
-
-
-def toggles(case: StructureCase) -> dict[str, Toggle]:
-    """Return the toggles of the effects whose cost the forecast knows."""
-    return {"finite_rotation": between("dynamics.kinematics", "finite", "small")}
 
 
 def structure_tables(case: StructureCase, outlook: StructureForecast) -> Iterator[RenderableType]:

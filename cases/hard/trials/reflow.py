@@ -6,9 +6,10 @@ import numpy as np
 from pydantic import Field
 
 from reflowshock.cases.hard.trial import Measured, Refused, Trial
+from reflowshock.effect import Switch
 from reflowshock.parameters import Parameters
 from reflowshock.particles.parameters.scenes import Drop, Drops, Fluid, Joint, Liquid, Oscillation
-from reflowshock.particles.parameters.solder import Solder, Switch
+from reflowshock.particles.parameters.solder import Solder
 
 if TYPE_CHECKING:
     from reflowshock.particles.steps.shape import JointShape

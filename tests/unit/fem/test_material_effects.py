@@ -1,18 +1,22 @@
 """Effects say which materials or limits call for them; a law of life has its scatter."""
 
+from types import SimpleNamespace
+
 import pytest
 
-from reflowshock.fem.estimates.material_effects import failure_effect, material_effects
+from reflowshock.effect import decided
+from reflowshock.fem.estimates.drop_effects import Failing
+from reflowshock.fem.estimates.material_effects import MATERIAL_EFFECTS
 from reflowshock.fem.materials.library import SAC305, SILICON, SNPB
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.problem.failure import Failure, Life
 
 
 def test_joints_are_judged_where_there_is_a_limit():
-    off = failure_effect(Failure())["failure"]
+    off = Failing.by_limits(Failure())
     assert (off["on"], off["why"]) == (False, "shock.failure gives no limit")
     limits = {name: {"limit": 1e7, "source": "a test"} for name in ("peel_stress", "layer_von_mises")}
-    on = failure_effect(Failure.model_validate(limits))["failure"]
+    on = Failing.by_limits(Failure.model_validate(limits))
     assert (on["on"], on["why"]) == (True, "limits of peel stress and layer von mises")
 
 
@@ -23,10 +27,10 @@ def test_life_follows_the_law_within_its_scatter():
 
 
 def test_effects_name_the_materials_that_call_for_them():
-    off = material_effects(Materials().by_role)
+    off = decided(MATERIAL_EFFECTS, SimpleNamespace(materials=Materials().by_role))
     assert not any(effect["on"] for effect in off.values())
     hot = SNPB.model_copy(update={"temperature": 398.15})
-    on = material_effects({"solder": hot, "bump": SAC305, "die": SILICON})
+    on = decided(MATERIAL_EFFECTS, SimpleNamespace(materials={"solder": hot, "bump": SAC305, "die": SILICON}))
     assert all(effect["on"] for effect in on.values())
     assert on["plasticity"]["why"].startswith("solder yields from 18 MPa on, hardening 55 MPa p^0.55; bump yields")
     assert on["thermal_softening"]["why"] == f"solder: yield stress times {1 - (100 / 158) ** 1.4:.3g}"

@@ -9,10 +9,12 @@ from mpi4py import MPI
 
 from reflowshock.cases.hard.trials.grids import GAP
 from reflowshock.cases.hard.trials.packages import MM, board, package
+from reflowshock.effect import decided
 from reflowshock.fem.estimates.thermal_effects import (
+    HEATED_EFFECTS,
     NEGLIGIBLE,
+    Heated,
     PackageSizes,
-    decide,
     solder_force_number,
     warpage_number,
 )
@@ -80,19 +82,24 @@ def test_bending_by_the_solder_stays_below_its_number(tmp_path, tension, acts):
 
 def test_switches_are_followed_and_rigid_plates_take_no_force():
     roles = Materials().by_role
-    auto = decide(Thermal(), roles, SIZES, 0.5)
+
+    def decide(thermal: Thermal, surface_tension: float) -> dict:
+        return decided(HEATED_EFFECTS, Heated(thermal, roles, SIZES, surface_tension, [thermal.peak]))
+
+    auto = decide(Thermal(), 0.5)
     assert {name: effect["on"] for name, effect in auto.items()} == {
+        "thermal": True,
         "flexible": True,
         "solder_force": False,
         "residual_stress": False,
     }
     assert "<= 0.001" in auto["solder_force"]["why"]
-    off = decide(Thermal.model_validate({"effects": {"flexible": "off", "solder_force": "on"}}), roles, SIZES, 0.5)
+    off = decide(Thermal.model_validate({"effects": {"flexible": "off", "solder_force": "on"}}), 0.5)
     assert not off["flexible"]["on"]
     assert off["solder_force"] == {"on": False, "why": "board and package are rigid"}
     cold = Thermal.model_validate(dict.fromkeys(("peak", "melting", "solidification"), 298.15))
-    assert not decide(cold, roles, SIZES, 0.5)["flexible"]["on"]
-    assert decide(cold, roles, SIZES, 500.0)["flexible"]["on"]
+    assert not decide(cold, 0.5)["flexible"]["on"]
+    assert decide(cold, 500.0)["flexible"]["on"]
 
 
 def test_rigid_plates_have_the_motions_and_weights_of_elastic_ones(tmp_path):

@@ -9,7 +9,6 @@ from reflowshock.workflow.board_drop.board_deflection import (
     SHARE,
     expected_deflection,
     first_mode_peak,
-    kinematics_effect,
 )
 from reflowshock.workflow.board_drop.shock_effects import shock_effects
 from reflowshock.workflow.pipeline.reader import read_case
@@ -37,11 +36,11 @@ def test_the_default_board_deflects_about_as_far_as_its_run_found():
 
 
 def test_a_plan_says_what_small_kinematics_would_leave_out():
-    effect = kinematics_effect(read_case(CASE, (), True))["finite_rotation"]
+    effect = shock_effects(read_case(CASE, (), True))["finite_rotation"]
     assert not effect["on"]
     assert "times its thickness" in effect["why"] and "shock.numerics.kinematics = finite" in effect["why"]
     finite = read_case(CASE, ["shock.numerics.kinematics=finite", "shock.coupling.scheme=held_velocity"], True)
-    assert kinematics_effect(finite)["finite_rotation"]["on"]
+    assert shock_effects(finite)["finite_rotation"]["on"]
 
 
 def test_weight_bends_a_slow_board_by_more_than_g_over_the_peak():

@@ -7,7 +7,7 @@ import pytest
 from rich.console import Console
 from typer.testing import CliRunner
 
-from reflowshock.fem.estimates.effects import (
+from reflowshock.fem.estimates.drop_effects import (
     NEGLIGIBLE_STIFFENING,
     STIFFENING_BOUND,
     STIFFENING_OF_BOARD,

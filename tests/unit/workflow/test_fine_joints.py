@@ -3,14 +3,15 @@
 import numpy as np
 import pytest
 
+from reflowshock.parameters import changed
 from reflowshock.workflow.board_drop.fine_joints import (
     FineJoints,
-    coarse_joints_effect,
     most_stressed,
     needs_coarse_joints,
     read_fine_joints,
     write_fine_joints,
 )
+from reflowshock.workflow.board_drop.shock_effects import of_joint_meshes
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.pipeline.reader import read_case
 from reflowshock.workflow.pipeline.template import case_text
@@ -62,9 +63,10 @@ def test_a_new_case_shows_what_the_keys_take():
 )
 def test_coarse_joints_are_an_effect_of_what_is_not_fine(chosen, direction, needed):
     given = {"fine_joints": chosen, "direction": direction}
-    coupling = read_case(SMALL_CASE).shock.coupling.model_copy(update=given)
+    case = read_case(SMALL_CASE)
+    coupling = case.shock.coupling.model_copy(update=given)
     assert needs_coarse_joints(coupling) is needed
-    effect = coarse_joints_effect(coupling)["coarse_joints"]
+    effect = of_joint_meshes(changed(case, "shock.coupling", coupling))["coarse_joints"]
     assert effect["on"] is needed
     assert effect["why"]
 

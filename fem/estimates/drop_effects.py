@@ -1,0 +1,327 @@
+"""The effects of a board's drop, from dimensionless numbers: for ``plan`` and the run itself."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal, NamedTuple, Protocol
+
+from reflowshock.effect import Decision, Effect, Switch, Toggle, decision
+from reflowshock.fem.estimates.material_effects import MATERIAL_EFFECTS, MaterialEffect
+from reflowshock.fem.materials.kinematics import finite_rotation
+from reflowshock.fem.materials.parameters import Material
+from reflowshock.fem.problem.failure import Failure
+from reflowshock.fem.problem.shock import Shock
+
+NEGLIGIBLE_WEIGHT = 1e-3  # of the peak acceleration: weight below it is left out
+# A strip between ends that do not approach each other: w deflects it against k w (1 + 3 (w / t)^2), since its tension
+# E A / (4 L^2) (pi w)^2 adds N (pi / L)^2 to the bending stiffness (Woinowsky-Krieger, J. Appl. Mech. 17, 1950).
+STIFFENING_BOUND = 3.0
+# The same of boards held at four holes, whose edges draw in: from runs 0.11 (cases/jedec_board, 5.0 instead of 7.7
+# thicknesses), 0.35 (bare board of cases/bga_drop, 4.8 instead of 10.9) and 0.73 (the same at 150 G, 0.95 instead of
+# 1.09), so that what it predicts is right within a factor of two.
+STIFFENING_OF_BOARD = 0.35
+NEGLIGIBLE_STIFFENING = 1e-2  # of the deflection, by the bound
+ADDED_MASS_LIMIT = 0.05  # of the mass of the model, by mass scaling
+
+
+class Deflection(NamedTuple):
+    """Largest deflection of a board's middle [m], of its slope, and the angular frequency of the mode [rad/s]."""
+
+    largest: float
+    slope: float
+    omega: float
+
+
+class Drop(Protocol):
+    """A drop before it runs."""
+
+    @property
+    def shock(self) -> Shock:
+        """Its parameters."""
+
+    @property
+    def materials(self) -> Mapping[str, Material]:
+        """Role -> material."""
+
+    @property
+    def thickness(self) -> float:
+        """Of the board [m]."""
+
+    @property
+    def symmetry(self) -> Literal["full", "quarter"]:
+        """Of the model."""
+
+    @property
+    def weight(self) -> Decision:
+        """Whether weight acts, from g over the peak acceleration."""
+
+    @property
+    def expected(self) -> Deflection:
+        """How the shock bends the board."""
+
+    @property
+    def bent_by_weight(self) -> float:
+        """Deflection of the board [m] by weight alone."""
+
+
+@dataclass(frozen=True, slots=True)
+class DropRun:
+    """A drop that has ended.
+
+    Attributes:
+        shock: Its parameters.
+        materials: Role -> material.
+        weight: Whether weight acted.
+        added_mass: Mass that scaling has added [kg].
+        neglected_strain: Largest strain that small kinematics have left out.
+    """
+
+    shock: Shock
+    materials: Mapping[str, Material]
+    weight: Decision
+    added_mass: float
+    neglected_strain: float
+
+
+class DropEffect(Effect[Drop]):
+    """An effect of a drop."""
+
+    def tell(self, run: DropRun) -> Decision | None:
+        """Return what a run that has ended says of it; None where it says nothing."""
+        return None
+
+
+class WeightEffect(DropEffect):
+    """Gravity beside the shock: all is linear in their sum."""
+
+    name = "gravity_in_the_shock"
+    adds = "f = M g"
+    number = "g / peak acceleration"
+    threshold = NEGLIGIBLE_WEIGHT
+    influence = "what g alone deflects the board by, over the deflection of the shock"
+    place = "reflowshock.fem.loads.load.BodyAcceleration"
+    switch = "shock.gravity = auto, on, off"
+    source = "linear in the load"
+
+    @staticmethod
+    def beside(switch: Switch, peak: float, gravity: float) -> Decision:
+        """Decide whether weight acts beside a shock of a peak acceleration [m/s^2]."""
+        ratio = gravity / peak if peak > 0.0 else math.inf
+        reason = f"1 G is {ratio:.3g} of the peak acceleration"
+        if switch != "auto":
+            return decision(switch == "on", f"shock.gravity = {switch}; {reason}", min(ratio, 1.0))
+        on = ratio >= NEGLIGIBLE_WEIGHT
+        return decision(on, f"{reason}, {'at least' if on else 'below'} {NEGLIGIBLE_WEIGHT:g}", min(ratio, 1.0))
+
+    def decide(self, drop: Drop) -> Decision:
+        """Tell how far it bends the board alone.
+
+        It lasts, and a pulse does not: a board that is slow against the pulse feels it more than g over the peak says.
+        """
+        largest = drop.expected.largest
+        influence = min(1.0, drop.bent_by_weight / largest) if largest > 0.0 else 1.0
+        return decision(drop.weight["on"], drop.weight["why"], influence)
+
+    def tell(self, run: DropRun) -> Decision:
+        """Tell what was decided."""
+        return run.weight
+
+
+def stiffened(ratio: float, coefficient: float) -> float:
+    """Return by how much of itself a deflection shrinks when stretching is counted.
+
+    The energy that a shock brings bends a linear plate by w0, and one that stiffens by w:
+    w0^2 = w^2 + c w^4 / (2 t^2).
+
+    Args:
+        ratio: w0 / t, linear deflection over thickness.
+        coefficient: c.
+    """
+    if ratio == 0.0:
+        return 0.0
+    share = 0.5 * coefficient * ratio**2
+    return 1.0 - math.sqrt(2.0 / (1.0 + math.sqrt(1.0 + 4.0 * share)))
+
+
+def called_for(ratio: float) -> tuple[Literal["small", "finite"], str]:
+    """Decide kinematics from a board's deflection over its thickness, and say why."""
+    bound = stiffened(ratio, STIFFENING_BOUND)
+    finite = bound > NEGLIGIBLE_STIFFENING
+    relation = f"{'>' if finite else '<='} {100.0 * NEGLIGIBLE_STIFFENING:g} %"
+    return (
+        "finite" if finite else "small",
+        f"stretching changes deflections by up to {100.0 * bound:.3g} % ({relation})",
+    )
+
+
+class FiniteRotation(DropEffect):
+    """Rotations that are finite: what stretches where it bends is stiffer."""
+
+    name = "finite_rotation"
+    adds = "F = R U, P = R s U^-1 instead of eps = sym grad u"
+    number = f"1 - w / w0, w0^2 = w^2 + c w^4 / (2 t^2), c = {STIFFENING_BOUND:g}: ends held apart"
+    threshold = NEGLIGIBLE_STIFFENING
+    influence = f"1 - w / w0 of the deflection, c = {STIFFENING_OF_BOARD:g} of boards on four holes"
+    place = "reflowshock.fem.kernels.nonlinear.Path"
+    switch = "shock.numerics.kinematics = auto, small, finite"
+    source = "Woinowsky-Krieger 1950"
+    toggle = Toggle("shock.numerics.kinematics", "finite", "small")
+
+    def decide(self, drop: Drop) -> Decision:
+        """By the deflection that is expected, and what small rotations would leave out."""
+        kinematics, ratio = drop.shock.numerics.kinematics, drop.expected.largest / drop.thickness
+        wanted, reason = called_for(ratio)
+        taken = wanted if kinematics == "auto" else kinematics
+        finite, why = finite_rotation("shock.numerics", taken, 0.5 * drop.expected.slope**2)
+        if kinematics == "auto":
+            why = f"shock.numerics.kinematics = auto: {reason}"
+        elif not finite:
+            why += "" if wanted == "small" else "; auto would choose finite"
+        why = f"the board is expected to deflect by about {ratio:.3g} times its thickness; {why}"
+        return decision(finite, why, stiffened(ratio, STIFFENING_OF_BOARD))
+
+    def tell(self, run: DropRun) -> Decision:
+        """Tell the strain that was left out."""
+        kinematics = run.shock.numerics.decided_kinematics
+        return decision(*finite_rotation("shock.numerics", kinematics, run.neglected_strain))
+
+
+class RayleighEffect(DropEffect):
+    """Rayleigh damping."""
+
+    name = "damping"
+    adds = "f = -(alpha M + beta K) v"
+    number = "xi omega T, xi = (alpha / omega + beta omega) / 2"
+    influence = "1 - exp(-xi omega T) of the first mode"
+    place = "reflowshock.fem.loads.damping.RayleighDamping"
+    switch = "shock.damping.* of a case, or none"
+    source = "Rayleigh"
+
+    def decide(self, drop: Drop) -> Decision:
+        """Tell what it takes from the board's first mode."""
+        (alpha, beta), omega = drop.shock.damping.coefficients, drop.expected.omega
+        if not (alpha or beta):
+            return decision(False, "shock.damping gives none", 0.0)
+        ratio = 0.5 * (alpha / omega + beta * omega)
+        taken = -math.expm1(-ratio * omega * drop.shock.duration)
+        return decision(True, f"{100.0 * ratio:.3g} % of critical damping in the board's first mode", taken)
+
+    def tell(self, run: DropRun) -> Decision:
+        """Tell the coefficients."""
+        alpha, beta = run.shock.damping.coefficients
+        return decision(bool(alpha or beta), f"Rayleigh damping, alpha = {alpha:.4g} 1/s, beta = {beta:.4g} s")
+
+
+class Failing(DropEffect):
+    """Joints that are judged by limits."""
+
+    name = "failure"
+    adds = "peel stress, von Mises stress and plastic work at each pad against limits"
+    number = "value / limit"
+    threshold = 1.0
+    influence = "none: joints are judged, not broken"
+    place = "reflowshock.workflow.package.verdict.verdict_of"
+    switch = "shock.failure.*.limit, each with its source, or none"
+    source = "JESD22-B111"
+
+    @staticmethod
+    def by_limits(failure: Failure) -> Decision:
+        """Decide whether joints are judged: where a measure has a limit. Judging changes no result."""
+        why = "limits of " + " and ".join(name.replace("_", " ") for name in failure.limits)
+        return decision(bool(failure.limits), why if failure.limits else "shock.failure gives no limit", 0.0)
+
+    def decide(self, drop: Drop) -> Decision:
+        """By the limits of the case."""
+        return self.by_limits(drop.shock.failure)
+
+
+class DrivenJoints(DropEffect):
+    """A coarse model that drives the joints, which do not act on it."""
+
+    name = "one_way"
+    adds = "nothing: F_G += N^T F_L is left out, a coarse model drives"
+    influence = "not predicted: fine joints' stiffness less the coarse ones', over the board's"
+    place = "reflowshock.fem.coupling.one_way.OneWay"
+    switch = "shock.coupling.direction = two_way, one_way"
+    source = "submodel"
+    toggle = Toggle("shock.coupling.direction", "one_way", "two_way")
+
+    def decide(self, drop: Drop) -> Decision:
+        """As the case says, where there are two models."""
+        coupled = "two_scale" in drop.shock.numerics.modes
+        one_way = coupled and drop.shock.coupling.direction == "one_way"
+        why = f"shock.coupling.direction = {drop.shock.coupling.direction}" if coupled else "one model"
+        return decision(one_way, why, None if one_way else 0.0)
+
+
+class MassScaling(DropEffect):
+    """Mass added to small elements, for longer steps."""
+
+    name = "mass_scaling"
+    adds = "rho times (dt_target / dt)^2 in small elements"
+    number = "added mass / mass of the model"
+    threshold = ADDED_MASS_LIMIT
+    influence = "half of the added share, of frequencies; of its own part more"
+    place = "reflowshock.fem.model.steps.mass_factor"
+    switch = "shock.numerics.mass_scaled = list of roles"
+    source = "Rayleigh quotient"
+    toggle = Toggle("shock.numerics.mass_scaled", ("copper",), ())
+
+    def decide(self, drop: Drop) -> Decision:
+        """As the case says."""
+        scaled = drop.shock.numerics.mass_scaled
+        return decision(bool(scaled), f"shock.numerics.mass_scaled = {list(scaled)}")
+
+    def tell(self, run: DropRun) -> Decision:
+        """Tell the mass."""
+        why = f"shock.numerics.mass_scaled = {list(run.shock.numerics.mass_scaled)}; adds {run.added_mass:.3e} kg"
+        return decision(run.added_mass > 0.0, why)
+
+
+class ByLargeMass(DropEffect):
+    """Input-G by a large mass at the holes."""
+
+    name = "large_mass"
+    adds = "a mass at the holes, pushed: M_L (x'' - a(t)) = 0"
+    influence = "none beyond mass of the model / M_L"
+    place = "reflowshock.fem.loads.large_mass.LargeMass"
+    switch = "shock.method = direct, large_mass"
+    source = "H 4.4"
+
+    def decide(self, drop: Drop) -> Decision:
+        """As the case says."""
+        return decision(drop.shock.method == "large_mass", f"shock.method = {drop.shock.method}", 0.0)
+
+
+class Symmetry(DropEffect):
+    """A quarter of the board for the whole."""
+
+    name = "symmetry"
+    adds = "u_n = 0 on x = 0 and y = 0: a quarter of the elements"
+    influence = "none where model and load are symmetric"
+    place = "reflowshock.fem.mesh.supports.held_components"
+    switch = "board.symmetry = quarter, full"
+    source = "symmetry"
+
+    def decide(self, drop: Drop) -> Decision:
+        """As the case says."""
+        return decision(drop.symmetry == "quarter", f"board.symmetry = {drop.symmetry}", 0.0)
+
+
+DROP_EFFECTS: tuple[DropEffect | MaterialEffect, ...] = (
+    WeightEffect(),
+    FiniteRotation(),
+    RayleighEffect(),
+    *MATERIAL_EFFECTS,
+    Failing(),
+    DrivenJoints(),
+    MassScaling(),
+    ByLargeMass(),
+    Symmetry(),
+)
+
+
+def told(run: DropRun) -> dict[str, Decision]:
+    """Return what a run that has ended says of its effects; gravity under its short name."""
+    found = {effect.name.removesuffix("_in_the_shock"): effect.tell(run) for effect in DROP_EFFECTS}
+    return {name: decision for name, decision in found.items() if decision is not None}
