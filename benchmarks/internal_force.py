@@ -5,7 +5,7 @@
 All act on a cube of 40^3 hexahedra, sides in turns, medians of processor seconds. dolfinx assembles the plain trilinear
 form of linear elasticity with 2 x 2 x 2 Gauss points and the best flags of its compiler; ours have incompatible modes,
 which do not lock in bending: equal work for a user, not equal numbers.
-- ``congruent`` knows that the elements are boxes of one shape.
+- ``congruent`` knows that the elements are boxes of one shape; ``turning`` are the same in corotational kinematics.
 - ``assembled`` and ``petsc_baij`` multiply by the matrix of a cube whose inner nodes were moved by up to 20 % of an
   edge.
 - ``yielding`` returns to the yield surface of a rate-dependent solder at nearly every point in every call, at a strain
@@ -56,6 +56,15 @@ def linear(elements: Elements) -> Callable[[], object]:
     """Return a call of the force of linear elements."""
     term, displacement = only_term(elements), random_displacement(elements.points)
     force = np.zeros_like(displacement)
+    return lambda: term.add(displacement, force)
+
+
+def turning(elements: Elements) -> Callable[[], object]:
+    """Return a call of the force of elastic boxes that are strained by 1e-3 and turned by 0.1."""
+    (term,) = force_terms(elements, [STEEL], "corotational")
+    turn = np.array([[np.cos(0.1), -np.sin(0.1), 0.0], [np.sin(0.1), np.cos(0.1), 0.0], [0.0, 0.0, 1.0]])
+    moved = elements.points + random_displacement(elements.points, 1e-3)
+    displacement, force = moved @ turn.T - elements.points, np.zeros_like(moved)
     return lambda: term.add(displacement, force)
 
 
@@ -141,6 +150,7 @@ def sides() -> tuple[dict[str, Callable[[], object]], dict[str, int]]:
     }
     plastic_elements = {kind: elements_of(boxes, kind, SOLDER) for kind in KINDS}
     works = {name: linear(elements) for name, elements in linear_elements.items()}
+    works["turning"] = turning(linear_elements["congruent"])
     counts = {name: len(elements.cells) for name, elements in linear_elements.items()}
     for kind, elements in plastic_elements.items():
         for kinematics in ("small", "finite"):

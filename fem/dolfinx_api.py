@@ -17,9 +17,11 @@ import ufl
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from reflowshock.fem.cell_shape import shape_of
+from reflowshock.fem.cell_shape import SHAPES
 
 OLD = tuple(int(part) for part in dolfinx.__version__.split(".")[:2]) < (0, 8)
+# Cell and degree of the geometry by the number of nodes; the program's own shapes, and quadratic hexahedra for oracles.
+GEOMETRIES = {shape.nodes: (shape.cell, shape.degree) for shape in SHAPES.values()} | {27: ("hexahedron", 2)}
 
 
 def make_mesh(
@@ -36,19 +38,19 @@ def make_mesh(
         cells: ``(ne, k)`` input node numbers; k is the same on all ranks and says which shape the cells have.
         ranks: ``(ne,)`` rank that gets each of these cells; None on all ranks for DOLFINx's own partition.
     """
-    cells, shape = np.ascontiguousarray(cells, np.int64), shape_of(cells)
+    cells, geometry = np.ascontiguousarray(cells, np.int64), GEOMETRIES[cells.shape[1]]
     ghosts = dolfinx.mesh.GhostMode.none
 
     def partitioner(*_: object) -> dolfinx.cpp.graph.AdjacencyList_int32:
         return dolfinx.cpp.graph.AdjacencyList_int32(ranks, np.arange(len(cells) + 1, dtype=np.int32))
 
     if OLD:
-        domain = ufl.Mesh(ufl.VectorElement("Lagrange", shape.cell, shape.degree))
+        domain = ufl.Mesh(ufl.VectorElement("Lagrange", *geometry))
         chosen = dolfinx.cpp.mesh.create_cell_partitioner() if ranks is None else partitioner
         return dolfinx.mesh.create_mesh(comm, cells, points, domain, ghost_mode=ghosts, partitioner=chosen)
     import basix.ufl
 
-    domain = ufl.Mesh(basix.ufl.element("Lagrange", shape.cell, shape.degree, shape=(3,)))
+    domain = ufl.Mesh(basix.ufl.element("Lagrange", *geometry, shape=(3,)))
     chosen = dolfinx.mesh.create_cell_partitioner(ghosts) if ranks is None else partitioner
     return dolfinx.mesh.create_mesh(comm, cells, points, domain, partitioner=chosen)
 
@@ -63,7 +65,7 @@ def cell_nodes(mesh: dolfinx.mesh.Mesh) -> NDArray[np.int32]:
 
 def degree(mesh: dolfinx.mesh.Mesh) -> int:
     """Return the polynomial degree of the geometry."""
-    return shape_of(cell_nodes(mesh)).degree
+    return GEOMETRIES[cell_nodes(mesh).shape[1]][1]
 
 
 def input_nodes(mesh: dolfinx.mesh.Mesh) -> NDArray[np.int64]:
@@ -111,7 +113,8 @@ def at_quadrature_points(
     mesh: dolfinx.mesh.Mesh, expression: ufl.core.expr.Expr, degree: int
 ) -> Callable[[], NDArray[np.float64]]:
     """Return what evaluates an expression of UFL at the integration points of all cells, ``(ne, points * size)``."""
-    points, _ = basix.make_quadrature(getattr(basix.CellType, shape_of(cell_nodes(mesh)).cell), degree)
+    cell, _ = GEOMETRIES[cell_nodes(mesh).shape[1]]
+    points, _ = basix.make_quadrature(getattr(basix.CellType, cell), degree)
     compiled = dolfinx.fem.Expression(expression, points)
     cells = np.arange(mesh.topology.index_map(3).size_local, dtype=np.int32)
     evaluate = methodcaller("eval", cells) if OLD else methodcaller("eval", mesh, cells)  # compiled code, no text

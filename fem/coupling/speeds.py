@@ -1,8 +1,8 @@
 """What an update of an element costs each rank: the program's own force terms, timed on samples of the mesh.
 
-Elements are of three families, which ``force.force_terms`` computes in three ways: boxes that share stiffnesses, other
-linear ones whose matrices are assembled, and those with a path. A step costs a fixed part (calls) and one per element
-(force, and update of its nodes); two samples of different size tell them apart.
+Elements are of four families, which ``force.force_terms`` computes in four ways: boxes that share stiffnesses, other
+linear ones whose matrices are assembled, those with a path, and boxes that share stiffnesses and turn. A step costs a
+fixed part (calls) and one per element (force, and update of its nodes); two samples of different size tell them apart.
 """
 
 import time
@@ -14,13 +14,14 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from reflowshock.fem.elements.mesh_elements import elements_of
-from reflowshock.fem.forces.force import ForceTerm, Kinematics, force_terms
+from reflowshock.fem.forces.force import ForceTerm, force_terms
 from reflowshock.fem.forces.force_congruent import is_box
 from reflowshock.fem.kernels.motion import advance
+from reflowshock.fem.materials.kinematics import Kinematics
 from reflowshock.fem.materials.parameters import Material
 from reflowshock.fem.mesh.mesh import MeshData, without_unused_nodes
 
-FAMILIES = ("box", "assembled", "path")
+FAMILIES = ("box", "assembled", "path", "turning")
 LARGE, SMALL = 8192, 128  # elements of a sample; the large one is no larger than a rank's share
 BATCHES, BATCH_SECONDS = 24, 0.001  # short: some fall between two turns of another program on the core
 ALIKE = 1.2  # ratio of two speeds below which they may be one, measured twice
@@ -46,7 +47,7 @@ class Kind:
 
 @dataclass(frozen=True, slots=True)
 class StepCost:
-    """Seconds of a step, by family, of one rank ``(3,)`` or of all of them ``(ranks, 3)``.
+    """Seconds of a step, by family, of one rank ``(4,)`` or of all of them ``(ranks, 4)``.
 
     Attributes:
         fixed: Of one step, however many elements.
@@ -61,7 +62,9 @@ def families(mesh: MeshData, kind: Kind) -> NDArray[np.int8]:
     """Return the family ``(ne,)`` of each element."""
     elastic = np.array([material.plasticity is None for material in kind.materials])[mesh.part]
     linear = elastic & (kind.kinematics == "small")
-    return np.where(linear, np.where(is_box(mesh.points[mesh.cells]), 0, 1), 2).astype(np.int8)
+    box = is_box(mesh.points[mesh.cells])
+    turning = elastic & box & (kind.kinematics == "corotational")
+    return np.select([linear & box, linear, turning], [0, 1, 3], 2).astype(np.int8)
 
 
 def samples(mesh: MeshData, family: NDArray[np.int8], ranks: int) -> dict[int, tuple[MeshData, MeshData]]:
@@ -85,7 +88,7 @@ def measured_costs(world: MPI.Comm, found: Mapping[int, tuple[MeshData, MeshData
     """Time a small and a large sample of each family on all ranks at the same time, as a run would be; collective.
 
     Returns:
-        ``(ranks, 3)``; zero for families without a sample.
+        ``(ranks, 4)``; zero for families without a sample.
     """
     fixed, element = np.zeros(len(FAMILIES)), np.zeros(len(FAMILIES))
     for number, (small, large, kind) in found.items():

@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reflowshock.fem.errors import MeshError
+from reflowshock.fem.mesh.column import COPY
 from reflowshock.fem.mesh.mesh import MeshData, append, select
 from reflowshock.fem.mesh.mesh_file import read_mesh, read_meshes
 from reflowshock.fem.mesh.watch_table import joint_names
 from reflowshock.fem.problem.inputs import PackageInput
 from reflowshock.names import nearest
 
-COPY = "_coarse@"
 KEY = "shock.coupling.fine_joints"
 
 

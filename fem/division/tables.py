@@ -11,12 +11,14 @@ from reflowshock.fem.division.division import Division
 from reflowshock.fem.division.split import Part, interface_between, part_of
 from reflowshock.fem.division.whole import Whole
 from reflowshock.fem.estimates.placement import Role
+from reflowshock.fem.mesh.column import with_columns
 from reflowshock.fem.mesh.coupling_interface import find_interface
 from reflowshock.fem.mesh.joint_interface import JointInterfaceTable, whole_joint_interface
 from reflowshock.fem.mesh.mesh import MeshData, merge_nodes
 from reflowshock.fem.mesh.supports import HELD, held_components
 from reflowshock.fem.mesh.tie import Tie, tie_joints
 from reflowshock.fem.mesh.watch_table import WatchTable, whole_watch
+from reflowshock.fem.problem.shock import JOINT_LAYER
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,13 +102,13 @@ class JointTables(Tables):
     joint_interface: JointInterfaceTable
 
     @classmethod
-    def of(cls, whole: Whole, rules: Mapping[str, Sequence[int]]) -> Self:
-        """Find out what is held, as ``rules`` say, and watched."""
+    def of(cls, whole: Whole, rules: Mapping[str, Sequence[int]], layer: float) -> Self:
+        """Find out what is held, as ``rules`` say, and watched: joints with a ``layer`` [m] of solder at the pads."""
         mesh = whole.mesh
         return cls.undivided(
             whole,
             held_components(mesh, rules),
-            watch=whole_watch(mesh),
+            watch=whole_watch(mesh, layer),
             shaken=mesh.facet_nodes("mounting_holes"),
             joint_interface=whole_joint_interface(mesh),
         )
@@ -114,7 +116,7 @@ class JointTables(Tables):
     def counted(self, part: Part, node: NDArray[np.int32], cell: NDArray[np.int32]) -> dict[str, Any]:
         """Return watch points, shaken nodes and interfaces of joints."""
         return {
-            "watch": self.watch.within(node, cell),
+            "watch": self.watch.within(node, cell, part.number),
             "shaken": present(node[self.shaken]),
             "joint_interface": self.joint_interface.within(cell),
         }
@@ -134,13 +136,13 @@ class ModelInput(Generic[TablesT_co]):
 
 
 def joined(data: MeshData) -> Whole:
-    """Let board and patch share their nodes, and tie the joints.
+    """Let board and patch share their nodes, give columns their place, and tie the joints.
 
     Raises:
-        CouplingError, TieError: They do not fit.
+        CouplingError, MeshError, TieError: They do not fit.
     """
     macro_nodes, meso_nodes = find_interface(data)
-    return Whole(*tie_joints(merge_nodes(data, meso_nodes, macro_nodes)[0]))
+    return Whole(*tie_joints(with_columns(merge_nodes(data, meso_nodes, macro_nodes)[0])))
 
 
 def prepare(
@@ -151,17 +153,20 @@ def prepare(
 
 
 def model_inputs(
-    whole: Whole, division: Division | Literal["dns"], rules: Mapping[str, Sequence[int]] = HELD
+    whole: Whole,
+    division: Division | Literal["dns"],
+    rules: Mapping[str, Sequence[int]] = HELD,
+    layer: float = JOINT_LAYER,
 ) -> dict[Role, ModelInput[JointTables]]:
-    """Split a package on a board into its models; ``rules`` say what is held, as ``supports.HELD``.
+    """Split a package on a board into its models; arguments as ``JointTables.of``.
 
     Returns:
         ``macro`` and ``meso``, or ``dns``: all of it.
 
     Raises:
-        MeshError: A pad has no solder.
+        MeshError: A pad has no solder, or the layer is thicker than a joint.
     """
-    tables = JointTables.of(whole, rules)
+    tables = JointTables.of(whole, rules, layer)
     if division != "dns":
         return split(whole, tables, division)
     part = part_of(whole, np.ones(len(whole.mesh.cells), dtype=bool))

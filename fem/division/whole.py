@@ -11,10 +11,10 @@ from reflowshock.fem.elements.hexahedron import HEXAHEDRON
 from reflowshock.fem.elements.mesh_elements import elements_of
 from reflowshock.fem.errors import StepError
 from reflowshock.fem.estimates.estimate import BOARD_ADVANTAGE, UPDATES_PER_SECOND
-from reflowshock.fem.estimates.solver_cost import NONLINEAR_RATE
-from reflowshock.fem.forces.force import Kinematics
+from reflowshock.fem.estimates.solver_cost import COROTATIONAL_RATE, NONLINEAR_RATE
 from reflowshock.fem.forces.force_congruent import is_box
 from reflowshock.fem.materials.elasticity import materials_of_parts
+from reflowshock.fem.materials.kinematics import Kinematics
 from reflowshock.fem.materials.parameters import Material
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.mesh import MeshData
@@ -86,13 +86,15 @@ def survey(mesh: MeshData, materials: Materials | Mapping[str, Material], treatm
     linear = elastic & (treatment.kinematics == "small")
     path_cost = UPDATES_PER_SECOND / NONLINEAR_RATE[elements.kind.name]
     box = is_box(mesh.points[mesh.cells])
+    turning = elastic & box & (treatment.kinematics == "corotational")
+    by_path = np.where(turning, UPDATES_PER_SECOND / COROTATIONAL_RATE, path_cost)
     return Survey(
         role=role,
         plain_step=step,
         factor=mass_factors(role, step, treatment.mass_scaled),
         mass=elements.density * geometry.volume,
         linear=linear,
-        cost=np.where(linear, np.where(box, 1.0, BOARD_ADVANTAGE), BOARD_ADVANTAGE * path_cost),
+        cost=np.where(linear, np.where(box, 1.0, BOARD_ADVANTAGE), BOARD_ADVANTAGE * by_path),
     )
 
 

@@ -1,6 +1,6 @@
 """History samples: ranks of all models combine their parts, rank 0 of the run keeps them."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -91,8 +91,10 @@ class History:
         HERE.go_on()
         return result
 
-    def arrays(self) -> dict[str, NDArray]:
-        """Return all samples as arrays, by name; on rank 0."""
+    def arrays(self, names: Collection[str] | None = None) -> dict[str, NDArray]:
+        """Return all samples as arrays, by name, or the arrays of these names alone; on rank 0."""
+        if names is not None:
+            return columns([{name: row[name] for name in names} for row in self._rows])
         return columns(self._rows) | self._watch.labels
 
     def write(self, directory: Path) -> None:

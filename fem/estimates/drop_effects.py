@@ -7,7 +7,7 @@ from typing import Literal, NamedTuple, Protocol
 
 from reflowshock.effect import Decision, Effect, Switch, Toggle, decision
 from reflowshock.fem.estimates.material_effects import MATERIAL_EFFECTS, MaterialEffect
-from reflowshock.fem.materials.kinematics import finite_rotation
+from reflowshock.fem.materials.kinematics import Kinematics, finite_rotation
 from reflowshock.fem.materials.parameters import Material
 from reflowshock.fem.problem.failure import Failure
 from reflowshock.fem.problem.shock import Shock
@@ -54,6 +54,14 @@ class Drop(Protocol):
     @property
     def weight(self) -> Decision:
         """Whether weight acts, from g over the peak acceleration."""
+
+    @property
+    def cooled(self) -> bool:
+        """Whether it begins with the stress of cooling."""
+
+    @property
+    def duration(self) -> float:
+        """How long it is followed, at most [s]."""
 
     @property
     def expected(self) -> Deflection:
@@ -143,15 +151,20 @@ def stiffened(ratio: float, coefficient: float) -> float:
     return 1.0 - math.sqrt(2.0 / (1.0 + math.sqrt(1.0 + 4.0 * share)))
 
 
-def called_for(ratio: float) -> tuple[Literal["small", "finite"], str]:
-    """Decide kinematics from a board's deflection over its thickness, and say why."""
+def called_for(ratio: float, cooled: bool) -> tuple[Kinematics, str]:
+    """Decide kinematics from a board's deflection over its thickness, and say why.
+
+    Args:
+        ratio: Deflection over thickness.
+        cooled: Whether a shock begins with the stress of cooling, which takes a path in all elements that turn.
+    """
     bound = stiffened(ratio, STIFFENING_BOUND)
-    finite = bound > NEGLIGIBLE_STIFFENING
-    relation = f"{'>' if finite else '<='} {100.0 * NEGLIGIBLE_STIFFENING:g} %"
-    return (
-        "finite" if finite else "small",
-        f"stretching changes deflections by up to {100.0 * bound:.3g} % ({relation})",
-    )
+    turns = bound > NEGLIGIBLE_STIFFENING
+    relation = f"{'>' if turns else '<='} {100.0 * NEGLIGIBLE_STIFFENING:g} %"
+    why = f"stretching changes deflections by up to {100.0 * bound:.3g} % ({relation})"
+    if not turns:
+        return "small", why
+    return ("finite", f"{why}; the stress of cooling takes a path") if cooled else ("corotational", why)
 
 
 class FiniteRotation(DropEffect):
@@ -163,20 +176,20 @@ class FiniteRotation(DropEffect):
     threshold = NEGLIGIBLE_STIFFENING
     influence = f"1 - w / w0 of the deflection, c = {STIFFENING_OF_BOARD:g} of boards on four holes"
     place = "reflowshock.fem.kernels.nonlinear.Path"
-    switch = "shock.numerics.kinematics = auto, small, finite"
+    switch = "shock.numerics.kinematics = auto, small, corotational, finite"
     source = "Woinowsky-Krieger 1950"
-    toggle = Toggle("shock.numerics.kinematics", "finite", "small")
+    toggle = Toggle("shock.numerics.kinematics", "corotational", "small")
 
     def decide(self, drop: Drop) -> Decision:
         """By the deflection that is expected, and what small rotations would leave out."""
         kinematics, ratio = drop.shock.numerics.kinematics, drop.expected.largest / drop.thickness
-        wanted, reason = called_for(ratio)
+        wanted, reason = called_for(ratio, drop.cooled)
         taken = wanted if kinematics == "auto" else kinematics
         finite, why = finite_rotation("shock.numerics", taken, 0.5 * drop.expected.slope**2)
         if kinematics == "auto":
             why = f"shock.numerics.kinematics = auto: {reason}"
         elif not finite:
-            why += "" if wanted == "small" else "; auto would choose finite"
+            why += "" if wanted == "small" else f"; auto would choose {wanted}"
         why = f"the board is expected to deflect by about {ratio:.3g} times its thickness; {why}"
         return decision(finite, why, stiffened(ratio, STIFFENING_OF_BOARD))
 
@@ -203,7 +216,7 @@ class RayleighEffect(DropEffect):
         if not (alpha or beta):
             return decision(False, "shock.damping gives none", 0.0)
         ratio = 0.5 * (alpha / omega + beta * omega)
-        taken = -math.expm1(-ratio * omega * drop.shock.duration)
+        taken = -math.expm1(-ratio * omega * drop.duration)
         return decision(True, f"{100.0 * ratio:.3g} % of critical damping in the board's first mode", taken)
 
     def tell(self, run: DropRun) -> Decision:

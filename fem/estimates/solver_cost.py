@@ -32,6 +32,7 @@ NONLINEAR_RATE = {
     "tetrahedron": 1.3e7,
     "tetrahedron_quadratic": 4.5e6,
 }
+COROTATIONAL_RATE = 1.7e7  # of elastic boxes that turn (benchmarks/internal_force.py)
 FACTOR_RATE = 3.0e9  # operations per second of the factorisation
 SOLVE_RATE = 6.0e8  # entries of the factor per second of a solution
 ASSEMBLY_SECONDS = 2.0e-5  # [s] an equation
@@ -146,7 +147,7 @@ def nonlinearities(problem: StructureProblem) -> tuple[str, ...]:
     """Return what makes a problem nonlinear, in words."""
     plastic = ", ".join(plastic_laws(problem.layer_materials))
     reasons = [f"plasticity (layers {plastic})"] if plastic else []
-    finite = problem.dynamics.kinematics == "finite"
+    finite = problem.dynamics.kinematics != "small"
     return tuple(reasons + (["finite rotations (dynamics.kinematics)"] if finite else []))
 
 

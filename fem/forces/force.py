@@ -2,12 +2,13 @@
 
 A term is linear unless its material yields or the kinematics are finite. Linear boxes of equal shape and material share
 one stiffness and are computed in rows along lines of nodes (``force_congruent``); other linear elements are assembled
-into blocks of 3 x 3 (``force_assembled``).
+into blocks of 3 x 3 (``force_assembled``). Boxes that stay elastic turn by any angle at a quarter of the linear speed
+(``force_corotational``).
 """
 
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Literal, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,17 +16,17 @@ from numpy.typing import NDArray
 from reflowshock.fem.elements.element import Elements
 from reflowshock.fem.forces.energy import Energy
 from reflowshock.fem.forces.force_assembled import AssembledElements
-from reflowshock.fem.forces.force_congruent import CongruentElements, in_rows
+from reflowshock.fem.forces.force_congruent import CongruentElements, in_rows, is_box
+from reflowshock.fem.forces.force_corotational import CorotationalBoxes
 from reflowshock.fem.forces.force_nonlinear import NonlinearElements
 from reflowshock.fem.kernels.nonlinear import Path
 from reflowshock.fem.kernels.plasticity import FIRST_YIELD, plastic_constants
+from reflowshock.fem.materials.kinematics import Kinematics
 from reflowshock.fem.materials.parameters import Material
 from reflowshock.fem.parallel.portable import Rows
 
 if TYPE_CHECKING:
     from reflowshock.fem.forces.force_ufl import Law
-
-Kinematics = Literal["small", "finite"]
 
 
 class ForceTerm(Protocol):
@@ -68,17 +69,22 @@ def force_terms(
     Args:
         elements: The elements.
         materials: Material of each index of ``elements.elasticity``.
-        kinematics: Whether rotations and strains are small.
+        kinematics: Small, corotational or finite.
         step: dt [s], of laws that depend on the rate; infinity stands for slow.
         laws: Index of ``elements.elasticity`` -> law in UFL that stands in the place of this material.
     """
     own = ~np.isin(elements.material, list(laws))
     plastic = np.array([plastic_constants(material) for material in materials])
-    finite = kinematics == "finite"
-    nonlinear = own & (np.isfinite(plastic[elements.material, FIRST_YIELD]) | finite)
-    terms = linear_terms(elements.subset(own & ~nonlinear))
-    if nonlinear.any():
-        terms.append(NonlinearElements.build(elements, np.flatnonzero(nonlinear), plastic, Path(finite, step)))
+    elastic = own & ~np.isfinite(plastic[elements.material, FIRST_YIELD])
+    linear = elastic if kinematics == "small" else np.zeros_like(elastic)
+    turning = elastic & is_box(elements.points[elements.cells]) if kinematics == "corotational" else ~own & own
+    path = own & ~linear & ~turning
+    terms = linear_terms(elements.subset(linear))
+    if turning.any():
+        terms.append(CorotationalBoxes.build(elements, np.flatnonzero(turning)))
+    if path.any():
+        finite = kinematics != "small"
+        terms.append(NonlinearElements.build(elements, np.flatnonzero(path), plastic, Path(finite, step)))
     return terms + ufl_terms(elements, laws)
 
 

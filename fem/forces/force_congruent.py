@@ -50,12 +50,7 @@ class CongruentElements:
     @classmethod
     def build(cls, elements: Elements) -> "CongruentElements":
         """Group boxes (``is_box``) into classes and rows, and diagonalise the stiffness of each class."""
-        first, shape = classes(replace(aligned(elements), density=np.zeros(len(elements.cells))))
-        candidates = []
-        for axes in TURNS:
-            ahead = aligned(turned(elements, axes))
-            candidates.append((ahead, axes, BoxRows.find(ahead.points, ahead.cells, shape)))
-        ahead, axes, found = min(candidates, key=lambda candidate: len(candidate[2].rows))
+        ahead, axes, found, first = arranged(elements)
         blocks = parity_blocks(element_stiffness(ahead.subset(first)))
         lines = np.zeros((2, 3, len(found.nodes) + PAD))
         return cls(np.array(axes), found.nodes, found.rows, blocks, lines, MeanStrain.of(elements))
@@ -69,6 +64,16 @@ class CongruentElements:
     def energy(self, displacement: NDArray[np.float64]) -> Energy:
         """Return the strain energy."""
         return linear_energy(self, displacement, self.mean)
+
+
+def arranged(elements: Elements) -> tuple[Elements, tuple[int, int, int], BoxRows, NDArray[np.int64]]:
+    """Return boxes in the frame in which their rows are longest, its axes, the rows, and a box of each shape."""
+    first, shape = classes(replace(aligned(elements), density=np.zeros(len(elements.cells))))
+    candidates = []
+    for axes in TURNS:
+        ahead = aligned(turned(elements, axes))
+        candidates.append((ahead, axes, BoxRows.find(ahead.points, ahead.cells, shape)))
+    return *min(candidates, key=lambda candidate: len(candidate[2].rows)), first
 
 
 def turned(elements: Elements, axes: tuple[int, int, int]) -> Elements:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from reflowshock.fem.elements.element import Elements
 from reflowshock.fem.elements.hexahedron import HEXAHEDRON
+from reflowshock.fem.elements.stress import symmetric
 from reflowshock.fem.errors import InvertedElementError
 from reflowshock.fem.forces.energy import Energy
 from reflowshock.fem.forces.nonlinear_blocks import Lanes, arrange, gradient_blocks, hexahedron_blocks
@@ -24,7 +25,10 @@ from reflowshock.fem.kernels.lanes import LANES
 from reflowshock.fem.kernels.nonlinear import Path
 from reflowshock.fem.kernels.nonlinear_gradient import FINE, Blocks, add_gradient_force
 from reflowshock.fem.kernels.nonlinear_hexahedron import HexahedronBlocks, add_hexahedron_force
+from reflowshock.fem.kernels.plasticity import NEVER_YIELDS
 from reflowshock.fem.parallel.portable import Rows
+
+RIGID = 1e30  # factor on the stiffness of incompatible modes that are to stay
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,18 +112,46 @@ class NonlinearElements:
         for name, values in self.history.items():
             by_lane(values)[...] = state[name][row[self.lanes.element]]
 
-    def means(self, places: NDArray[np.integer]) -> "Means":
-        """Return mean values over some elements; ``places (k,)`` are positions among this term's elements."""
+    def located(self, places: NDArray[np.integer]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Return block and lane of some elements; ``places (k,)`` are positions among this term's elements."""
         block, lane = np.nonzero(self.lanes.valid)
         row = np.empty(len(self.numbers), np.int64)
         row[self.lanes.element[block, lane]] = np.arange(len(block))
-        block, lane = block[row[places]], lane[row[places]]
+        return block[row[places]], lane[row[places]]
+
+    def points(self, block: NDArray[np.int64], lane: NDArray[np.int64]) -> "Points":
+        """Return the values at the integration points of elements found by ``located``."""
         blocks = self.blocks
         points = blocks.state.shape[1]
         state = blocks.state.reshape(len(blocks.state), points, -1, LANES)[block, :, :, lane]
         weight = blocks.weight[blocks.pattern[block]].reshape(-1, points, LANES)[np.arange(len(block)), :, lane]
-        mean = np.einsum("km,kmc->kc", weight, state) / weight.sum(axis=1)[:, None]
-        return Means(mean[:, :6], mean[:, 12], blocks.plastic_work[block, lane] / weight.sum(axis=1))
+        work = blocks.plastic_work[block, lane] / weight.sum(axis=1)
+        volume = np.linalg.det(symmetric(state[..., 6:12].reshape(-1, 6))).reshape(weight.shape) if self.finite else 1.0
+        return Points(weight, state[..., :6], state[..., 12], work, np.broadcast_to(volume, weight.shape))
+
+    def means(self, places: NDArray[np.integer]) -> "Means":
+        """Return mean values over some elements; ``places (k,)`` as in ``located``."""
+        found = self.points(*self.located(places))
+        share = found.weight / found.weight.sum(axis=1)[:, None]
+        stress = np.einsum("km,kmc->kc", share, found.stress)
+        return Means(stress, np.einsum("km,km->k", share, found.plastic_strain), found.plastic_work)
+
+    def frozen(self, places: NDArray[np.integer]) -> "NonlinearElements":
+        """Return a term of some elements whose force at the displacement of the latest ``add`` is what it was there.
+
+        It does not flow, and its modes stay; ``take_path`` gives it their state.
+        """
+        plastic = np.tile(NEVER_YIELDS, (len(self.elements.elasticity), 1))
+        made = NonlinearElements.build(self.elements, places.astype(np.int64), plastic, Path(self.finite, np.inf))
+        if isinstance(made.blocks, HexahedronBlocks):
+            made.blocks.coupling[...] *= RIGID
+        return made
+
+    def take_path(self, other: "NonlinearElements", block: NDArray[np.int64], lane: NDArray[np.int64]) -> None:
+        """Take the history of the elements of another term, found by its ``located``, in the order of this one's."""
+        order = self.lanes.element
+        for name, values in self.history.items():
+            by_lane(values)[...] = by_lane(other.history[name])[block[order], lane[order]]
 
     def _inverted(self, places: NDArray[np.int64], displacement: NDArray[np.float64]) -> InvertedElementError:
         """Return the error that names the worst of some elements."""
@@ -133,6 +165,25 @@ class NonlinearElements:
             f"element {self.numbers[places[worst]]}, at first near ({place}) m, is turned inside out (lowest Jacobian"
             f" determinant {lowest[worst]:.3e} m^3{modes if lowest[worst] > 0.0 else ''})"
         )
+
+
+@dataclass(frozen=True, slots=True)
+class Points:
+    """Values at the m integration points of elements.
+
+    Attributes:
+        weight: ``(k, m)`` [m^3].
+        stress: ``(k, m, 6)`` [Pa] Kirchhoff stress in the frame that turns with the body.
+        plastic_strain: ``(k, m)`` equivalent plastic strain.
+        plastic_work: ``(k,)`` [J/m^3] of whole elements.
+        volume: ``(k, m)`` volume over that at the beginning; 1 where strains are small.
+    """
+
+    weight: NDArray[np.float64]
+    stress: NDArray[np.float64]
+    plastic_strain: NDArray[np.float64]
+    plastic_work: NDArray[np.float64]
+    volume: NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from reflowshock.fem.materials.parameters import Isotropic, Material
 
+NEVER_YIELDS = np.array([1.0, np.inf, 0.0, 1.0, 0.0, 1.0])  # ``plastic_constants`` of what stays elastic
 FIRST_YIELD = 1  # column of the yield stress at no plastic strain, infinite where a material never yields
 ITERATIONS = 100  # far more than any admissible constants need; typical are 2
 CONVERGED = 1e-7  # relative correction after which the error, at most half its square, is below 1e-14
@@ -30,7 +31,7 @@ def plastic_constants(material: Material) -> NDArray[np.float64]:
         where a material never yields.
     """
     if not isinstance(material, Isotropic) or material.plasticity is None:
-        return np.array([1.0, np.inf, 0.0, 1.0, 0.0, 1.0])
+        return NEVER_YIELDS.copy()
     law, softening = material.plasticity, material.softening
     shear = 3.0 * material.shear_modulus
     return np.array([shear, law.A * softening, law.B * softening, law.n, law.C, law.reference_rate])

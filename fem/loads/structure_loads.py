@@ -24,7 +24,7 @@ def structure_loads(
     made: list[Load] = []
     for name, load in problem.loads.items():
         pulse = pulses[name]
-        if isinstance(load, Pressure) and problem.dynamics.kinematics == "finite":
+        if isinstance(load, Pressure) and problem.dynamics.kinematics != "small":
             made.append(FollowerPressure.build(body, tables.pressed[load.on], pulse))
         elif isinstance(load, Pressure):
             nodes, areas = tables.areas[load.on]

@@ -5,9 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from reflowshock.fem.elements.element import element_geometry
 from reflowshock.fem.errors import MeshError
 from reflowshock.fem.mesh.mesh import MeshData, cells_of_facets
+from reflowshock.fem.mesh.pad_faces import PadFaces, pad_faces
+from reflowshock.fem.mesh.pad_layer import PadLayer, octant_volumes
+
+SLIVER = 1e-9  # of a layer's volume: less of an element inside it is rounding
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,11 +20,9 @@ class WatchTable:
     Attributes:
         joints: Names of the joints, the same for all models of a run.
         centres: ``(2,)`` node of the board's and of the die's centre, -1 where another model has it.
-        layer_cells: ``(k,)`` solder elements at the pads.
-        layer_end: ``(k,)`` 0 at the board, 1 at the package.
-        layer_joint: ``(k,)`` joint of each.
-        layer_volume: ``(k,)`` share of the layer's volume.
-        layer_area: ``(k,)`` share of the layer's pad area.
+        faces: Where pads hold the solder.
+        layer: Solder near the pads.
+        thickness: Of that layer [m].
         solder_cells: ``(s,)`` all solder elements.
         solder_joint: ``(s,)`` joint of each.
         strain_facets: ``(f, 4)`` nodes of the board's lower face around the package.
@@ -30,31 +31,31 @@ class WatchTable:
 
     joints: tuple[str, ...]
     centres: NDArray[np.integer]
-    layer_cells: NDArray[np.integer]
-    layer_end: NDArray[np.int64]
-    layer_joint: NDArray[np.int64]
-    layer_volume: NDArray[np.float64]
-    layer_area: NDArray[np.float64]
+    faces: PadFaces
+    layer: PadLayer
+    thickness: float
     solder_cells: NDArray[np.integer]
     solder_joint: NDArray[np.int64]
     strain_facets: NDArray[np.int32]
     strain_cells: NDArray[np.integer]
 
-    def within(self, node_number: NDArray[np.int32], cell_number: NDArray[np.int32]) -> "WatchTable":
-        """Return the part of a model, in its numbers of nodes ``(n,)`` and cells ``(ne,)``: -1 for what it has not."""
-        layer, solder = cell_number[self.layer_cells], cell_number[self.solder_cells]
-        strain = cell_number[self.strain_cells]
+    def within(
+        self, node_number: NDArray[np.int32], cell_number: NDArray[np.int32], every_node: NDArray[np.int32]
+    ) -> "WatchTable":
+        """Return the part of a model, in its numbers of nodes ``(n,)`` and cells ``(ne,)``: -1 for what it has not.
+
+        A node at the interface counts in one model; ``every_node (n,)`` has it in both, for the facets of their cells.
+        """
+        solder, strain = cell_number[self.solder_cells], cell_number[self.strain_cells]
         return WatchTable(
             joints=self.joints,
             centres=np.where(self.centres >= 0, node_number[self.centres], -1),
-            layer_cells=layer[layer >= 0],
-            layer_end=self.layer_end[layer >= 0],
-            layer_joint=self.layer_joint[layer >= 0],
-            layer_volume=self.layer_volume[layer >= 0],
-            layer_area=self.layer_area[layer >= 0],
+            faces=self.faces.within(every_node, cell_number),
+            layer=self.layer.within(cell_number),
+            thickness=self.thickness,
             solder_cells=solder[solder >= 0],
             solder_joint=self.solder_joint[solder >= 0],
-            strain_facets=node_number[self.strain_facets[strain >= 0]],
+            strain_facets=every_node[self.strain_facets[strain >= 0]],
             strain_cells=strain[strain >= 0],
         )
 
@@ -86,47 +87,55 @@ def nearest_to_axis(points: NDArray[np.float64], nodes: NDArray[np.integer]) -> 
     return int(nodes[np.argmin(np.sum(points[nodes, :2] ** 2, axis=1))]) if len(nodes) else -1
 
 
-def whole_watch(mesh: MeshData) -> WatchTable:
+def whole_watch(mesh: MeshData, thickness: float) -> WatchTable:
     """Return the table of all that is watched in a mesh, before it is divided.
 
+    Args:
+        mesh: Whole.
+        thickness: Of the layer of solder at the pads over which stress and flow are averaged [m].
+
     Raises:
-        MeshError: A pad of a joint has no solder element.
+        MeshError: A pad of a joint has no solder element, or the layer is thicker than a joint.
     """
     joints = joint_names(mesh)
     solder = [mesh.in_parts(f"solder@{name}".__eq__).nonzero()[0] for name in joints]
-    layers = [pad_layer(mesh, joint, cells, end) for joint, cells in zip(joints, solder, strict=True) for end in (0, 1)]
+    faces = pad_faces(mesh, joints, solder)
     facets = mesh.facets_of("board_bottom")
     low, high = footprint(mesh)
     facets = facets[((mesh.points[facets][:, :, :2] >= low) & (mesh.points[facets][:, :, :2] <= high)).all(axis=(1, 2))]
-    empty, lengths = np.empty(0, np.int64), [len(layer[0]) for layer in layers]
-    number = np.arange(len(joints))
     return WatchTable(
         joints=joints,
         centres=centre_nodes(mesh),
-        layer_cells=np.concatenate([layer[0] for layer in layers] or [empty]),
-        layer_end=np.repeat(np.tile([0, 1], len(joints)), lengths),
-        layer_joint=np.repeat(np.repeat(number, 2), lengths),
-        layer_volume=np.concatenate([layer[1] for layer in layers] or [np.empty(0)]),
-        layer_area=np.concatenate([layer[2] for layer in layers] or [np.empty(0)]),
-        solder_cells=np.concatenate([*solder, empty]),
-        solder_joint=np.repeat(number, [len(cells) for cells in solder]),
+        faces=faces,
+        layer=pad_layers(mesh, joints, solder, faces, thickness),
+        thickness=thickness,
+        solder_cells=np.concatenate([*solder, np.empty(0, np.int64)]),
+        solder_joint=np.repeat(np.arange(len(joints)), [len(cells) for cells in solder]),
         strain_facets=facets,
         strain_cells=cells_of_facets(mesh.cells, facets),
     )
 
 
-def pad_layer(
-    mesh: MeshData, joint: str, solder: NDArray[np.int64], end: int
-) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
-    """Return the solder elements at one pad of a joint with their shares of the layer's volume and pad area."""
-    name = (f"pad_board@{joint}", f"pad_package@{joint}")[end]
-    facets = mesh.facets_of(name)
-    owner = cells_of_facets(mesh.cells[solder], facets)
-    if not len(facets) or (owner < 0).any():
-        raise MeshError(f"{name}: {np.sum(owner < 0)} of {len(facets)} facets belong to no element of solder@{joint}")
-    corners = mesh.points[facets]
-    area = 0.5 * np.linalg.norm(np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]), axis=1)
-    cells, index = np.unique(solder[owner], return_inverse=True)
-    area = np.bincount(index.reshape(-1), area)
-    volume = element_geometry(mesh.points, mesh.cells[cells]).volume
-    return cells, volume / volume.sum(), area / area.sum()
+def pad_layers(
+    mesh: MeshData, joints: tuple[str, ...], solder: list[NDArray[np.intp]], faces: PadFaces, thickness: float
+) -> PadLayer:
+    """Return the solder within a thickness of the pads; errors as ``whole_watch``."""
+    height = np.einsum("ji,ji->j", np.subtract(*faces.centre.reshape(2, -1, 3)[::-1]), faces.frame[: len(joints), 2])
+    for name, own in zip(joints, height, strict=True):
+        if thickness > own:
+            raise MeshError(
+                f"shock.joint_layer = {1e6 * thickness:.4g} um is thicker than the solder of joint {name},"
+                f" {1e6 * own:.4g} um from pad to pad; allowed: up to {1e6 * height.min():.4g} um"
+            )
+    cells, slots, weights = [np.empty(0, np.int64)], [np.empty(0, np.int64)], [np.empty((0, 8))]
+    for k, centre in enumerate(faces.centre):
+        own = solder[k % len(joints)]
+        inward = faces.frame[k, 2] * (1.0 if k < len(joints) else -1.0)
+        weight = octant_volumes(mesh.points[mesh.cells[own]], centre, inward, thickness)
+        inside = weight.sum(axis=1) > SLIVER * weight.sum()
+        cells.append(own[inside])
+        slots.append(np.full(np.sum(inside), k))
+        weights.append(weight[inside])
+    slot, weight = np.concatenate(slots), np.concatenate(weights)
+    volume = np.bincount(slot, weight.sum(axis=1), len(faces.centre)).astype(float)
+    return PadLayer(np.concatenate(cells), slot, weight, volume)

@@ -14,9 +14,10 @@ from reflowshock.fem.elements.hexahedron import HEXAHEDRON
 from reflowshock.fem.elements.kind import Geometry
 from reflowshock.fem.elements.mesh_elements import elements_of
 from reflowshock.fem.errors import LevelError, MassError, RankError
-from reflowshock.fem.forces.force import ForceTerm, Kinematics, force_terms, linear_terms
+from reflowshock.fem.forces.force import ForceTerm, force_terms, linear_terms
 from reflowshock.fem.forces.force_ufl import Law, tangent_at_rest
 from reflowshock.fem.materials.elasticity import materials_of_parts
+from reflowshock.fem.materials.kinematics import Kinematics
 from reflowshock.fem.materials.parameters import Material
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.tie import Tie

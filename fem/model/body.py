@@ -1,5 +1,6 @@
 """One model on one rank: elements, masses, force terms, tie. All that a substep needs."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,6 +9,7 @@ from numpy.typing import NDArray
 from reflowshock.fem.elements.element import Elements
 from reflowshock.fem.elements.kind import Geometry
 from reflowshock.fem.forces.force import ForceTerm
+from reflowshock.fem.forces.force_nonlinear import NonlinearElements
 from reflowshock.fem.mesh.tie import Tie
 from reflowshock.fem.parallel.exchange import SharedNodes
 from reflowshock.fem.parallel.local_mesh import LocalMesh
@@ -28,6 +30,7 @@ class Body:
         mass: ``(n,)`` [kg] lumped mass, of slaves moved to their masters.
         free: ``(n, 3)`` whether a displacement component follows from forces.
         initial_stress: ``(ne, 6)`` [Pa] mean stress of linear elements at no displacement; None where there is none.
+        begin: Gives elements with a path, on the nodes of the body, the stress in which it begins.
     """
 
     local: LocalMesh
@@ -40,3 +43,4 @@ class Body:
     mass: NDArray[np.float64]
     free: NDArray[np.bool_]
     initial_stress: NDArray[np.float64] | None = None
+    begin: Callable[[NonlinearElements], None] | None = None

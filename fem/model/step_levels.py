@@ -24,10 +24,11 @@ from reflowshock.fem.division.chebyshev import Substeps
 from reflowshock.fem.elements.element import Elements
 from reflowshock.fem.errors import LevelError
 from reflowshock.fem.forces.energy import Energy, InternalForce, linear_energy
-from reflowshock.fem.forces.force import ForceTerm, Kinematics, linear_terms
+from reflowshock.fem.forces.force import ForceTerm, linear_terms
 from reflowshock.fem.forces.force_assembled import AssembledElements
 from reflowshock.fem.forces.force_congruent import CongruentElements, in_rows
 from reflowshock.fem.kernels.levels import begin_substeps, end_substeps, run_levels, take_substep
+from reflowshock.fem.materials.kinematics import Kinematics
 from reflowshock.fem.materials.parameters import Material
 from reflowshock.fem.mesh.tie import Tie
 from reflowshock.fem.model.body import Body
@@ -155,6 +156,30 @@ class SubsteppedElements:
         end_substeps(self.rows, self.foreign, self.state, force)
         return force
 
+    def means(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return what elements of each level feel on average over the step, of linear forces the mean; collective.
+
+        Args:
+            values: ``(m, 3)`` displacements, or velocities, of the level around.
+
+        Returns:
+            ``(levels, m, 3)``, of this level and those inside it; in each the nodes of its elements count.
+        """
+        steps, place, pull = self.substeps, self.state[0], self.state[1]
+        begin_substeps(self.rows, values, self.state)
+        total = np.zeros(())
+        for coefficients in zip(steps.memory, steps.rate, steps.weight, strict=True):
+            inner = [level.means(place) for level in levels_of(self.terms)]
+            total = total + coefficients[2] * np.concatenate([place[None], *inner])
+            for term in self.terms:
+                term.add(place, pull)
+            self.shared.add(pull)
+            take_substep(coefficients, self.inverse, self.change, self.state)
+        self.state[2] = 0.0
+        result = np.repeat(values[None], len(total), axis=0)
+        result[:, self.rows] = total
+        return result
+
     def energy(self, displacement: NDArray[np.float64]) -> Energy:
         """Return u . K_eff u / 2, of which hourglass modes have what they have without levels; collective."""
         hourglass = sum(term.energy(displacement).hourglass for term in self.plain)
@@ -173,8 +198,8 @@ def check_elastic(materials: Sequence[Material], kinematics: Kinematics, ratios:
         LevelError: With what is not linear elastic.
     """
     yielding = [material for material in materials if material.plasticity is not None]
-    if yielding or kinematics == "finite":
-        cause = f"{len(yielding)} of the materials yield" if yielding else "kinematics = finite"
+    if yielding or kinematics != "small":
+        cause = f"{len(yielding)} of the materials yield" if yielding else f"kinematics = {kinematics}"
         raise LevelError(
             f"local steps (ratios {', '.join(map(str, ratios))}) need linear elastic elements at small strains, but"
             f" {cause}; scheme = held_velocity or gravouil_combescure is for them"

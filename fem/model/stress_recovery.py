@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reflowshock.fem.elements.stress import element_stress, mean_strain, symmetric, voigt
+from reflowshock.fem.forces.force_corotational import CorotationalBoxes
 from reflowshock.fem.forces.force_nonlinear import NonlinearElements
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.parallel.local_mesh import positions
@@ -24,13 +25,16 @@ class StressRecovery:
         self._elasticity = elements.elasticity[elements.material]
         self._initial = 0.0 if body.initial_stress is None else body.initial_stress[chosen]
         self._stored: list[tuple[NonlinearElements, NDArray[np.int64], NDArray[np.int32]]] = []
-        self._finite = np.zeros(len(chosen), dtype=bool)
+        self._finite, self._turning = np.zeros((2, len(chosen)), dtype=bool)
         for term in body.terms:
             if isinstance(term, NonlinearElements):
                 place = positions(term.numbers, chosen)
                 rows = np.flatnonzero(place >= 0)
                 self._stored.append((term, rows, place[rows]))
                 self._finite[rows] = term.finite
+            elif isinstance(term, CorotationalBoxes):
+                self._turning |= positions(term.numbers, chosen) >= 0
+        self._finite |= self._turning
 
     def stress(self, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the stresses ``(k, 6)`` [Pa] at a displacement ``(n, 3)`` [m]."""
@@ -41,7 +45,8 @@ class StressRecovery:
         finite = self._finite
         if finite.any():
             deformation = np.eye(3) + self._displacement_gradient(displacement, finite)
-            rotation, _ = polar(deformation)
+            rotation, stretch = polar(deformation)
+            result[self._turning] = self._corotational_stress(stretch[self._turning[finite]])
             turned = rotation @ symmetric(result[finite]) @ rotation.transpose(0, 2, 1)
             result[finite] = voigt(turned / np.linalg.det(deformation)[:, None, None])
         return result
@@ -61,14 +66,24 @@ class StressRecovery:
         """Return the largest strain ``(k,)`` that small kinematics leaves out, zero where kinematics are finite.
 
         It is the greatest eigenvalue of h^T h / 2, the part of Green's strain that is quadratic in the displacement
-        gradient h: what a rotation would stretch a body whose ends are held.
+        gradient h: what a rotation would stretch a body whose ends are held. Of corotational boxes, whose stress is
+        linear in the stretch U - 1, it is half the largest square of that.
         """
         result = np.zeros(len(self._cells))
-        small = ~self._finite
+        small, turning = ~self._finite, self._turning
         if small.any():
             gradient = self._displacement_gradient(displacement, small)
             result[small] = 0.5 * np.linalg.eigvalsh(gradient.transpose(0, 2, 1) @ gradient)[:, -1]
+        if turning.any():
+            stretches = np.linalg.svd(np.eye(3) + self._displacement_gradient(displacement, turning), compute_uv=False)
+            result[turning] = 0.5 * np.abs(stretches - 1.0).max(axis=1) ** 2
         return result
+
+    def _corotational_stress(self, stretch: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the stresses ``(r, 6)`` [Pa] of corotational boxes with stretches ``(r, 3, 3)``, before they turn."""
+        strain = voigt(stretch - np.eye(3)) * [1.0, 1.0, 1.0, 2.0, 2.0, 2.0]
+        elastic = np.einsum("kij,kj->ki", self._elasticity[self._turning], strain)
+        return np.asarray(elastic + np.broadcast_to(self._initial, (len(self._cells), 6))[self._turning])
 
     def _displacement_gradient(self, displacement: NDArray[np.float64], rows: NDArray[np.bool_]) -> NDArray[np.float64]:
         """Return the mean displacement gradients ``(r, 3, 3)`` of some elements."""

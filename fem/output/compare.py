@@ -6,6 +6,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from reflowshock.fem.output.ranking import ENDS, PEEL, PLASTIC_WORK, VON_MISES, Measure, critical_joint
+
 COMPARED = {"die_displacement": "die_centre", "board_displacement": "board_centre", "board_strain": "board_strain"}
 
 
@@ -24,8 +26,9 @@ def compare_histories(two_scale: Path, dns: Path, fine: Collection[str] | None =
         fine: Joints that the two-scale run has fine; None if all.
 
     Returns:
-        ``critical_joint`` (largest interface-averaged von Mises of the DNS); relative L2 errors:
-        ``critical_joint_stress_error`` (its board and package side), ``worst_joint_stress_error`` (of the fine ones),
+        ``critical_joint`` (of the DNS, see ``ranking``); relative L2 errors: ``critical_joint_stress_error`` (von Mises
+        of the layers at its board and package side), ``worst_joint_stress_error`` (of the fine ones),
+        ``critical_joint_peel_error``, with flow ``critical_joint_work_error``,
         ``die_displacement_error`` and ``board_displacement_error`` (their centres), ``board_strain_error``; with
         ``fine`` also ``critical_joint_coarse``: 1 if the critical joint is not among them; of a DNS that ends early
         ``compared_duration`` [s].
@@ -55,19 +58,25 @@ def compare_histories(two_scale: Path, dns: Path, fine: Collection[str] | None =
 def joint_errors(
     ours: dict[str, NDArray], reference: dict[str, NDArray], fine: Collection[str] | None
 ) -> dict[str, float | str]:
-    """Return the errors of the joints' interface-averaged von Mises histories."""
-    layers = ("von_mises_board", "von_mises_package")
-    values = np.stack([ours[name] for name in layers])
-    exact = np.stack([reference[name] for name in layers])
-    count = exact.shape[1]
-    longest = exact if count == values.shape[1] else values
-    critical = int(np.argmax(longest.max(axis=(0, 1))))
-    errors = [relative_error(values[:, :count, j], exact[:, :, j]) for j in range(exact.shape[2])]
+    """Return the errors of the joints' histories, both ends together."""
+    count = len(reference["time"])
+    critical = critical_joint(reference if count == len(ours["time"]) else ours)
+
+    def error(measure: Measure, joint: int) -> float:
+        names = [f"{measure.history}_{end}" for end in ENDS]
+        values, exact = (np.stack([arrays[name][:count, joint] for name in names]) for arrays in (ours, reference))
+        return relative_error(values, exact)
+
     names = [str(name) for name in reference["joints"]]
-    compared = [error for name, error in zip(names, errors, strict=True) if fine is None or name in fine]
+    errors = [error(VON_MISES, joint) for joint in range(len(names))]
+    flow = {"critical_joint_work_error": error(PLASTIC_WORK, critical)} if "plastic_work_board" in reference else {}
     return {
         "critical_joint": names[critical],
         "critical_joint_stress_error": errors[critical],
-        "worst_joint_stress_error": max(compared),
+        "worst_joint_stress_error": max(
+            value for name, value in zip(names, errors, strict=True) if fine is None or name in fine
+        ),
+        "critical_joint_peel_error": error(PEEL, critical),
+        **flow,
         **({} if fine is None else {"critical_joint_coarse": float(names[critical] not in fine)}),
     }

@@ -18,13 +18,12 @@ from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.stress_recovery import StressRecovery
 from reflowshock.fem.output.result import checked, quantity
-from reflowshock.fem.output.watch_joints import LAYERS, JointWatch
+from reflowshock.fem.output.watch_joints import STRESSES, JointWatch
 from reflowshock.fem.problem.inputs import CoolingInput
 from reflowshock.fem.statics.equilibrium import CONVERGED
 from reflowshock.fem.statics.initial_state import Cooling
 
 UNBALANCED_LIMIT = 1e-8  # of the shock's own force terms, over the forces that hold expansion back
-STRESSES = LAYERS[:2]
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +83,7 @@ def write_cooling(
 
 def joint_row(world: MPI.Comm, body: Body, tables: JointTables, yields: bool) -> dict[str, NDArray]:
     """Return names of joints, and the stresses [Pa] and plastic strain of each; collective."""
-    watch = JointWatch(tables.watch, body, yields)
+    watch = JointWatch(tables, body, yields)
     sums, maxima = watch.sample(explicit_motion(body, [], 1.0))
     total, most = np.empty_like(sums), np.empty_like(maxima)
     world.Allreduce(sums, total)

@@ -12,12 +12,23 @@ from reflowshock.fem.division.tables import JointTables
 from reflowshock.fem.dynamics.history import History
 from reflowshock.fem.estimates.drop_effects import DropRun, told
 from reflowshock.fem.loads.shock_pulse import shock_pulse
+from reflowshock.fem.output.ranking import (
+    ENDS,
+    OUTER_FIBRE,
+    PEEL,
+    PLASTIC_STRAIN,
+    PLASTIC_WORK,
+    VON_MISES,
+    Measure,
+    critical_joint,
+    ranking_measure,
+)
 from reflowshock.fem.output.result import Outcome, Timings, health, model_summary, peak_memory, quantity, sizes
-from reflowshock.fem.output.watch_joints import FLOW_LAYERS, LAYERS
 from reflowshock.fem.parallel.communicators import Communicators
 from reflowshock.fem.problem.inputs import RunInput
 
 FORCE_RESIDUAL_LIMIT = 1e-10
+SECTION_RESIDUAL_LIMIT = 1e-6
 METHODS = {"direct": "direct acceleration input", "large_mass": "large mass at the mounting holes"}
 
 
@@ -49,13 +60,16 @@ class PackageReport:
     ) -> dict[str, Any]:
         """Return metrics, health, effects and the coupling."""
         coupling = coupling_of(self.request, outcome.coupling)
-        residual = outcome.history.balance.force_residual, FORCE_RESIDUAL_LIMIT
+        checks = {
+            "interface_force_residual": (outcome.history.balance.force_residual, FORCE_RESIDUAL_LIMIT),
+            "section_force_residual": (section_residual(arrays), SECTION_RESIDUAL_LIMIT),
+        }
         return {
             "metrics": cost_metrics(summary, updates_a_window(summary, coupling), timings)
             | health_metrics(outcome.history, arrays)
             | shock_metrics(arrays)
             | {"peak_neglected_strain": quantity(outcome.neglected_strain)},
-            "health": health(self.request, outcome, {"interface_force_residual": residual}),
+            "health": health(self.request, outcome, checks),
             "effects": effects(self.request, summary, outcome.neglected_strain),
             "coupling": coupling | {"placement": timings.balance},
         }
@@ -100,35 +114,65 @@ def health_metrics(history: History, arrays: Mapping[str, NDArray]) -> dict[str,
 def shock_metrics(arrays: Mapping[str, NDArray]) -> dict[str, Any]:
     """Return peaks of the histories."""
     metrics = {
+        "simulated_time": quantity(float(arrays["time"][-1]), "s"),
         "peak_board_strain": quantity(float(arrays["board_strain"].max())),
         "peak_board_displacement": quantity(float(np.abs(arrays["board_centre"][:, 2]).max()), "m"),
     }
-    joints = arrays["joints"]
-    if not len(joints):
-        return metrics
-    peak = np.maximum(arrays["von_mises_board"], arrays["von_mises_package"]).max(axis=0)
-    peel = np.maximum(arrays["peel_board"], arrays["peel_package"]).max(axis=0)
-    critical = int(np.argmax(peak))
-    start = max(float(arrays[name][0, critical]) for name in LAYERS[:2])
-    return metrics | {
-        "critical_joint": quantity(str(joints[critical])),
-        "peak_von_mises": quantity(float(peak[critical]), "Pa"),
-        "peak_peel_stress": quantity(float(peel[critical]), "Pa"),
-        "peak_element_stress": quantity(float(arrays["von_mises_max"].max()), "Pa"),
+    return metrics | joint_metrics(arrays) if len(arrays["joints"]) else metrics
+
+
+def joint_metrics(arrays: Mapping[str, NDArray]) -> dict[str, Any]:
+    """Return peaks over time: of the critical joint's worse pad, of any joint, and mesh-dependent ones last."""
+    critical = critical_joint(arrays)
+    sections = np.stack([arrays[f"section_{end}"][:, critical] for end in ENDS])
+    layer = VON_MISES.worse(arrays)
+    start = float(layer[0, critical])
+    found = {
+        "critical_joint": quantity(str(arrays["joints"][critical])),
+        "critical_end": quantity(ranking_measure(arrays).worse_end(arrays, critical)),
+        "peel_stress": quantity(float(PEEL.peaks(arrays)[critical]), "Pa"),
+        "layer_von_mises": quantity(float(layer[:, critical].max()), "Pa"),
+        **{name: quantity(float(item.peaks(arrays)[critical]), item.unit) for name, item in flows(arrays).items()},
+        "section_axial_force": quantity(float(sections[..., 0].max()), "N"),
+        "section_shear_force": quantity(float(np.hypot(sections[..., 1], sections[..., 2]).max()), "N"),
+        "section_torsion_moment": quantity(float(np.abs(sections[..., 3]).max()), "N m"),
+        "section_bending_moment": quantity(float(np.hypot(sections[..., 4], sections[..., 5]).max()), "N m"),
+        "outer_fibre_stress": quantity(float(OUTER_FIBRE.peaks(arrays)[critical]), "Pa"),
+        "joint_layer": quantity(float(arrays["joint_layer"]), "m"),
+        "peak_peel_stress": quantity(float(PEEL.peaks(arrays).max()), "Pa"),
+        "peak_von_mises": quantity(float(layer.max()), "Pa"),
         **({"residual_stress_critical_joint": quantity(start, "Pa")} if start > 0.0 else {}),
-        **flow_metrics(arrays),
+        "peak_element_stress": quantity(float(arrays["von_mises_max"].max()), "Pa"),
     }
+    return found | flow_metrics(arrays)
+
+
+def flows(arrays: Mapping[str, NDArray]) -> dict[str, Measure]:
+    """Return the measures of flow in the layer by the names of their metrics, where solder yields."""
+    return {"layer_plastic_strain": PLASTIC_STRAIN, "layer_plastic_work": PLASTIC_WORK} if has_flow(arrays) else {}
+
+
+def has_flow(arrays: Mapping[str, NDArray]) -> bool:
+    """Return whether solder may yield in a run."""
+    return "plastic_strain_max" in arrays
 
 
 def flow_metrics(arrays: Mapping[str, NDArray]) -> dict[str, Any]:
-    """Return how far the solder has flowed, where it yields."""
-    if "plastic_strain_max" not in arrays:
+    """Return how far the solder of any joint has flowed, where it yields."""
+    if not has_flow(arrays):
         return {}
-    work = max(float(arrays[name].max()) for name in FLOW_LAYERS)
     return {
+        "peak_plastic_work_density": quantity(float(PLASTIC_WORK.peaks(arrays).max()), "J/m^3"),
         "peak_plastic_strain": quantity(float(arrays["plastic_strain_max"].max())),
-        "peak_plastic_work_density": quantity(work, "J/m^3"),
     }
+
+
+def section_residual(arrays: Mapping[str, NDArray]) -> float:
+    """Return by how much both sections of a joint miss its inertia at most, over the largest section force."""
+    if not len(arrays["joints"]):
+        return 0.0
+    largest = max(float(np.abs(arrays[f"section_{end}"][..., :3]).max()) for end in ENDS)
+    return float(arrays["section_imbalance"].max()) / largest if largest > 0.0 else 0.0
 
 
 def effects(request: RunInput, summary: dict[str, Any], neglected_strain: float) -> dict[str, Any]:

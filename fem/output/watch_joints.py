@@ -3,76 +3,92 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from reflowshock.fem.division.tables import JointTables
 from reflowshock.fem.dynamics.motion import Motion
 from reflowshock.fem.elements.stress import principal_strain, von_mises
-from reflowshock.fem.mesh.watch_table import WatchTable
 from reflowshock.fem.model.body import Body
+from reflowshock.fem.model.joint_elements import JointElements
 from reflowshock.fem.model.stress_recovery import StressRecovery
+from reflowshock.fem.output.joint_sections import JointSections, section_values
 from reflowshock.fem.parallel.local_mesh import positions
 
-LAYERS = ("von_mises_board", "von_mises_package", "peel_board", "peel_package")
-FLOW_LAYERS = ("plastic_work_board", "plastic_work_package")
+STRESSES = ("von_mises_board", "von_mises_package")
+FLOWS = ("plastic_strain_board", "plastic_strain_package", "plastic_work_board", "plastic_work_package")
 
 
 class JointWatch:
     """Centres of board and die, joints and board strain on one rank; a ``watch.Watch``."""
 
-    def __init__(self, table: WatchTable, body: Body, yields: bool) -> None:
-        """Find this rank's share of the table; ``yields`` says whether solder flows, in all models of a run alike."""
-        self._yields = yields
-        local = body.local
+    def __init__(
+        self, tables: JointTables, body: Body, yields: bool, damping: tuple[float, float] = (0.0, 0.0)
+    ) -> None:
+        """Find this rank's share of the tables.
+
+        Args:
+            tables: Of the model.
+            body: The model.
+            yields: Whether solder flows, in all models of a run alike.
+            damping: alpha [1/s] and beta [s] of Rayleigh damping.
+        """
+        self._yields, self._table = yields, tables.watch
+        table, local = tables.watch, body.local
         self.joints = table.joints
-        self.labels: dict[str, NDArray] = {"joints": np.array(table.joints, dtype=str)}
+        self.labels: dict[str, NDArray] = {
+            "joints": np.array(table.joints, dtype=str),
+            "joint_layer": np.array(table.thickness),
+        }
         centres = local.locate(table.centres)
         self._centres = [(k, int(node)) for k, node in enumerate(centres) if node >= 0 and body.shared.owned[node]]
         solder = local.locate_cells(table.solder_cells)
         self._joint, solder = table.solder_joint[solder >= 0], solder[solder >= 0]
         self._recovery = StressRecovery(body, solder)
-        layer = local.locate_cells(table.layer_cells)
+        layer, bearing = local.locate_cells(table.layer.cells), local.locate_cells(table.faces.cells)
         here = layer >= 0
-        self._layer = positions(solder.astype(np.int64), layer[here])
-        self._slot = (table.layer_end * len(table.joints) + table.layer_joint)[here]
-        self._volume, self._area = table.layer_volume[here], table.layer_area[here]
+        chosen = np.unique(np.concatenate([layer[here], bearing[bearing >= 0]]))
+        self._elements = JointElements(body, chosen, tables.level[local.cell_numbers])
+        self._sections = JointSections(tables, body, self._elements, damping)
+        end, joint = np.divmod(table.layer.slot[here], max(len(table.joints), 1))
+        row = positions(chosen, layer[here])
+        self._weight, self._layer_joint = np.zeros((2, len(chosen), 8)), np.zeros(len(chosen), np.int64)
+        self._weight[end, row], self._layer_joint[row] = table.layer.weight[here], joint
         facets = table.strain_facets[local.locate_cells(table.strain_cells) >= 0]
         self._facets = local.locate(facets.ravel()).reshape(-1, 4)
         self._corners = local.points[self._facets][:, :, :2]
 
     def sample(self, motion: Motion) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return this rank's parts.
+        """Return this rank's parts; collective where a body has levels.
 
         Returns:
-            Sums: centres (6) [m], then von Mises, peel [Pa], plastic work density [J/m^3] per end and joint. Maxima:
-            von Mises [Pa], plastic strain per joint, largest and minus smallest strain of the board.
+            Sums: centres (6) [m], those of ``JointSections``, then integrals over the layers of von Mises stress [N m],
+            plastic strain [m^3], plastic work [J] per end and joint. Maxima: von Mises [Pa], plastic strain per joint,
+            largest and minus smallest strain of the board.
         """
         displacement = motion.displacement - motion.base_displacement()
-        stress = self._recovery.stress(displacement)
-        return self._sums(displacement, stress), self._maxima(displacement, stress)
+        centres = np.zeros((2, 3))
+        for k, node in self._centres:
+            centres[k] = displacement[node]
+        sections = self._sections.sums(motion)
+        integrals = self._elements.integrals(self._weight)[: 3 if self._yields else 1]
+        joints = [np.bincount(self._layer_joint, values, len(self.joints)) for part in integrals for values in part]
+        return np.concatenate([centres.ravel(), sections, *joints]), self._maxima(displacement)
 
     def row(self, sums: NDArray[np.float64], maxima: NDArray[np.float64]) -> dict[str, NDArray[np.float64] | float]:
         """Name the parts that all ranks have combined."""
-        layers = LAYERS + FLOW_LAYERS if self._yields else LAYERS
-        joints = ("von_mises_max", "plastic_strain_max") if self._yields else ("von_mises_max",)
+        layers = STRESSES + FLOWS if self._yields else STRESSES
+        largest = ("von_mises_max", "plastic_strain_max") if self._yields else ("von_mises_max",)
+        sections, integrals = np.split(sums[6:], [len(sums) - 6 - len(layers) * len(self.joints)])
+        means = integrals.reshape(-1, 2 * len(self.joints)) / self._table.layer.volume
         return {
             "board_centre": sums[:3],
             "die_centre": sums[3:6],
             "board_strain": max(maxima[-2:]),
-            **dict(zip(joints, maxima[:-2].reshape(len(joints), -1), strict=True)),
-            **dict(zip(layers, sums[6:].reshape(len(layers), -1), strict=True)),
+            **dict(zip(largest, maxima[:-2].reshape(len(largest), -1), strict=True)),
+            **dict(zip(layers, means.reshape(len(layers), -1), strict=True)),
+            **section_values(sections, self._table.faces),
         }
 
-    def _sums(self, displacement: NDArray[np.float64], stress: NDArray[np.float64]) -> NDArray[np.float64]:
-        centres = np.zeros((2, 3))
-        for k, node in self._centres:
-            centres[k] = displacement[node]
-        layer = stress[self._layer]
-        values = [self._volume * von_mises(layer), self._area * layer[:, 2]]
-        if self._yields:
-            values.append(self._volume * self._recovery.plastic_work()[self._layer])
-        slots = 2 * len(self.joints)
-        return np.concatenate([centres.ravel(), *(np.bincount(self._slot, value, slots) for value in values)])
-
-    def _maxima(self, displacement: NDArray[np.float64], stress: NDArray[np.float64]) -> NDArray[np.float64]:
-        values = [von_mises(stress)]
+    def _maxima(self, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
+        values = [von_mises(self._recovery.stress(displacement))]
         if self._yields:
             values.append(self._recovery.plastic_strain())
         joints = np.zeros((len(values), len(self.joints)))

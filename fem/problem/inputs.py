@@ -5,6 +5,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, TypeAdapter
 
+from reflowshock.fem.materials.kinematics import Kinematics
 from reflowshock.fem.materials.parameters import Material
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.problem.shock import Ranks, Shock, ShockNumerics
@@ -52,10 +53,13 @@ class CoolingInput(PackageInput):
 class RunInput(PackageInput):
     """A package on a board, dropped.
 
-    ``checkpoints`` is a folder from which a run continues, ``cooling`` the file of the state in which it begins.
+    ``checkpoints`` is a folder from which a run continues, ``cooling`` the file of the state in which it begins. A run
+    ends at ``end`` [s], or before the end of its shock when ``output.settled`` says so, if it ``settles``.
     """
 
     mode: Literal["two_scale", "dns"]
+    settles: bool = False
+    end: float | None = Field(None, gt=0)
     checkpoints: Path | None = None
     cooling: Path | None = None
 
@@ -75,7 +79,7 @@ class RunInput(PackageInput):
         return self.shock.numerics.formulation
 
     @property
-    def kinematics(self) -> Literal["small", "finite"]:
+    def kinematics(self) -> Kinematics:
         """Return whether rotations and strains are small."""
         return self.shock.numerics.decided_kinematics
 
@@ -90,8 +94,8 @@ class RunInput(PackageInput):
 
     @property
     def computed(self) -> str:
-        """Return all that results depend on: not where they go, which ranks compute them, nor how they are judged."""
-        shock: Any = {"ranks": True, "failure": True, "numerics": UNRELATED}
+        """Return all that results depend on: not where they go, nor which ranks compute them."""
+        shock: Any = {"ranks": True, "numerics": UNRELATED}
         return self.model_dump_json(exclude={"output": True, "checkpoints": True, "cooling": True, "shock": shock})
 
     @property
@@ -166,7 +170,7 @@ class StructureInput(StructureProblem):
         return self.structure.formulation
 
     @property
-    def kinematics(self) -> Literal["small", "finite"]:
+    def kinematics(self) -> Kinematics:
         """Return whether rotations and strains are small."""
         return self.dynamics.kinematics
 

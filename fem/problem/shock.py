@@ -9,12 +9,14 @@ from typing import Annotated, Literal
 from pydantic import Field, ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
 
+from reflowshock.fem.materials.kinematics import TURNING, Kinematics
 from reflowshock.fem.problem.failure import Failure
 from reflowshock.parameters import Parameters
 from reflowshock.quantity import Quantity
 
 MOST_RANKS = 100_000  # of one run
 MOST_LEVELS = 4  # below the window, that "auto" tries
+JOINT_LAYER = 25e-6  # [m] of fatigue practice (Darveaux, ECTC 2000); thickness conventions differ
 ServiceCondition = Literal["A", "B", "C", "D", "E", "F", "G", "H"]
 
 
@@ -108,7 +110,7 @@ class ShockNumerics(Parameters):
 
     ``kinematics`` and ``formulation`` of hexahedra as for a structure. Elastic hexahedra are the same in both
     formulations; those that yield are seven to eight times cheaper with one point, a few per cent stronger in bending.
-    Kinematics that are ``auto`` are finite where the board's deflection calls for it.
+    Kinematics that are ``auto`` are corotational where the board's deflection calls for it.
     ``mass_scaled`` are roles, such as copper, whose density is raised to the step of the others; the added mass is a
     metric with a limit.
     ``dns_duration`` ends the DNS before the shock does: the modes are compared over the time that both have.
@@ -119,7 +121,7 @@ class ShockNumerics(Parameters):
     dns_duration: Annotated[float | None, Quantity("ms")] = Field(None, gt=0)
     step_fraction: float = Field(0.9, gt=0, le=0.95)
     critical_step: Literal["element", "power_iteration"] = "element"
-    kinematics: Literal["auto", "small", "finite"] = "small"
+    kinematics: Literal["auto"] | Kinematics = "small"
     formulation: Literal["incompatible_modes", "one_point"] = "incompatible_modes"
     mass_scaled: tuple[Literal["board", "substrate", "die", "copper", "solder"], ...] = ()
     history_samples: int = Field(600, ge=2)
@@ -131,7 +133,7 @@ class ShockNumerics(Parameters):
     @field_validator("kinematics")
     @classmethod
     def _fit_the_solver(cls, value: str, info: ValidationInfo) -> str:
-        if value == "finite" and info.data.get("dns_solver") == "implicit":
+        if value in TURNING and info.data.get("dns_solver") == "implicit":
             allowed = "small, or dns_solver = explicit"
             raise PydanticCustomError(
                 "inadmissible", "is not for implicit steps, which are linear", {"allowed": allowed}
@@ -139,7 +141,7 @@ class ShockNumerics(Parameters):
         return value
 
     @property
-    def decided_kinematics(self) -> Literal["small", "finite"]:
+    def decided_kinematics(self) -> Kinematics:
         """Return the kinematics of a run, which only a case decides that are ``auto``; ValueError until it has."""
         if self.kinematics == "auto":
             raise ValueError("shock.numerics.kinematics = auto is decided by the case, before a run")
@@ -152,16 +154,20 @@ class Shock(Parameters):
     The pulse is that of a JEDEC service condition, or a half sine of ``peak_acceleration`` and ``pulse_duration``, or a
     table of times and accelerations (CSV). ``method`` gives it to the board as body acceleration, its holes held, or
     to a large mass at the holes. Gravity is left out by ``auto`` where it is less than a thousandth of the peak. The
-    stress at the joints' upper interface is kept at ``picture_times``. ``identical_joints`` repeats the shock under a
+    stress at the joints' upper interface is kept at ``picture_times``. ``joint_layer`` is the thickness of the solder
+    at either pad over which stress and plastic work are averaged. ``identical_joints`` repeats the shock under a
     flat package on truncated spheres of the solder's volume: what the joints' own shapes change is the difference.
+    A ``duration`` that is ``auto`` ends when the joints' first peak has passed and half a swing of the board brought no
+    higher one, at the latest a period of the board after the pulse.
     """
 
     service_condition: ServiceCondition | None = None
     peak_acceleration: Annotated[float | None, Quantity("G")] = Field(None, gt=0)
     pulse_duration: Annotated[float | None, Quantity("ms")] = Field(None, gt=0)
     table: str | None = None
-    duration: Annotated[float, Quantity("ms")] = Field(gt=0)
+    duration: Annotated[float, Quantity("ms"), Field(gt=0)] | Literal["auto"]
     picture_times: Annotated[tuple[Annotated[float, Field(ge=0)], ...], Quantity("ms")] = ()
+    joint_layer: Annotated[float, Quantity("um")] = Field(JOINT_LAYER, gt=0, le=1e-3)
     identical_joints: bool = False
     method: Literal["direct", "large_mass"] = "direct"
     gravity: Literal["auto", "on", "off"] = "auto"
@@ -170,3 +176,10 @@ class Shock(Parameters):
     ranks: Ranks = Ranks()
     coupling: JointCoupling = JointCoupling()
     numerics: ShockNumerics = ShockNumerics()
+
+    @property
+    def decided_duration(self) -> float:
+        """Return the duration of a run [s], the longest where it is ``auto``, which a case decides; else ValueError."""
+        if self.duration == "auto":
+            raise ValueError("shock.duration = auto is decided by the case, before a run")
+        return self.duration

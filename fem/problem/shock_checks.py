@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 
+from reflowshock.fem.materials.kinematics import TURNING
 from reflowshock.fem.problem.shock import Damping, JointCoupling, Shock
 from reflowshock.problem import Problem
 
@@ -45,7 +46,9 @@ def _damping(damping: Damping) -> Iterator[Problem]:
 
 
 def _beyond_the_end(shock: Shock) -> Iterator[Problem]:
-    """Find times after the end of the shock."""
+    """Find times after the end of the shock, where that is given."""
+    if shock.duration == "auto":
+        return
     ends = {"shock.numerics.dns_duration": shock.numerics.dns_duration, "shock.picture_times": shock.picture_times}
     for key, given in ends.items():
         latest = max(given, default=0.0) if isinstance(given, tuple) else given or 0.0
@@ -65,16 +68,16 @@ def _large_mass(shock: Shock) -> Iterator[Problem]:
 
 def _finite(shock: Shock) -> Iterator[Problem]:
     """Find what is linear: stiffness-proportional damping, which would brake what turns, and implicit steps."""
-    if shock.numerics.kinematics == "finite" and shock.damping.coefficients[1]:
+    if shock.numerics.kinematics in TURNING and shock.damping.coefficients[1]:
         yield Problem(
             "shock.numerics.kinematics",
             "does not go with stiffness-proportional damping, whose stiffness does not turn",
-            "finite",
+            shock.numerics.kinematics,
             "small, or mass-proportional damping",
         )
-    if shock.numerics.kinematics == "finite" and shock.numerics.dns_solver == "implicit":
+    if shock.numerics.kinematics in TURNING and shock.numerics.dns_solver == "implicit":
         what = "is not for implicit steps, which are linear"
-        yield Problem("shock.numerics.kinematics", what, "finite", "small, or dns_solver = explicit")
+        yield Problem("shock.numerics.kinematics", what, shock.numerics.kinematics, "small, or dns_solver = explicit")
 
 
 def _coupling(coupling: JointCoupling) -> Iterator[Problem]:

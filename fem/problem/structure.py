@@ -10,6 +10,7 @@ from typing import Annotated, ClassVar, Literal, get_args
 
 from pydantic import Field
 
+from reflowshock.fem.materials.kinematics import Kinematics
 from reflowshock.fem.materials.library import LIBRARY
 from reflowshock.fem.materials.parameters import Material
 from reflowshock.fem.problem.shock import MOST_RANKS, Coupling, Damping, ServiceCondition
@@ -180,7 +181,10 @@ class InputG(OnBody):
 
 
 class Pressure(OnAreas):
-    """Pressure on a facet set, positive where it pushes into the body; it follows the surface in finite kinematics."""
+    """Pressure on a facet set, positive where it pushes into the body.
+
+    It follows the surface unless kinematics are small.
+    """
 
     effect: ClassVar = "pressure"
     quantity: ClassVar = "pressure"
@@ -275,7 +279,7 @@ class Dynamics(Parameters):
 
     duration: Annotated[float, Quantity("ms")] = Field(gt=0)
     solver: Literal["explicit", "implicit", "both", "dns"] = "explicit"
-    kinematics: Literal["small", "finite"] = "small"
+    kinematics: Kinematics = "small"
     initial_velocity: Annotated[tuple[float, float, float], Quantity("m/s")] = (0.0, 0.0, 0.0)
     damping: Damping = Damping()
     modes: int = Field(0, ge=0, le=200)

@@ -242,15 +242,17 @@ def _yielding(problem: StructureProblem) -> Iterator[tuple[str, str]]:
 def _nonlinear_damping(problem: StructureProblem) -> Iterator[Problem]:
     """Stiffness-proportional damping takes the elastic stiffness, which must not turn."""
     key = "dynamics.damping.stiffness_" + ("ratio" if problem.dynamics.damping.stiffness_ratio else "coefficient")
-    if problem.dynamics.kinematics == "finite":
-        yield Problem(key, "needs a constant stiffness, dynamics.kinematics = finite has none", None, "mass_ratio")
+    if problem.dynamics.kinematics != "small":
+        message = f"needs a constant stiffness, dynamics.kinematics = {problem.dynamics.kinematics} has none"
+        yield Problem(key, message, None, "mass_ratio")
 
 
 def _dynamics(problem: StructureProblem) -> Iterator[Problem]:
     dynamics = problem.dynamics
     damping = dynamics.damping
-    if "implicit" in dynamics.solvers and dynamics.kinematics == "finite":
-        yield Problem("dynamics.kinematics", "the implicit solver is linear", "finite", "small, or solver = explicit")
+    if "implicit" in dynamics.solvers and dynamics.kinematics != "small":
+        message = "the implicit solver is linear"
+        yield Problem("dynamics.kinematics", message, dynamics.kinematics, "small, or solver = explicit")
     if "implicit" in dynamics.solvers:
         yield from (
             Problem(key, f"yields, the solver {dynamics.solver} is linear", material, "dynamics.solver = explicit")
@@ -314,8 +316,9 @@ def _scheme(coupling: LayerCoupling, problem: StructureProblem) -> Iterator[Prob
         yield Problem(f"{COUPLING}.direction", message, "one_way", "two_way")
     materials = {name: problem.known_materials.get(layer.material) for name, layer in problem.structure.layers.items()}
     plastic = [name for name, material in materials.items() if material and material.plasticity is not None]
-    if coupling.scheme == "local_steps" and (plastic or problem.dynamics.kinematics == "finite"):
-        why = f"layers that yield: {', '.join(plastic)}" if plastic else "dynamics.kinematics = finite"
+    if coupling.scheme == "local_steps" and (plastic or problem.dynamics.kinematics != "small"):
+        kinematics = f"dynamics.kinematics = {problem.dynamics.kinematics}"
+        why = f"layers that yield: {', '.join(plastic)}" if plastic else kinematics
         message = f"needs elastic layers at small strains, there are {why}"
         yield Problem(f"{COUPLING}.scheme", message, "local_steps", "held_velocity, impulse, gravouil_combescure, auto")
 

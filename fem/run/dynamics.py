@@ -1,7 +1,8 @@
 """One run of a package or a structure, from its meshes to its results: what every rank does, in order."""
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -75,6 +76,10 @@ class DynamicProblem(Protocol):
     def pictures(self, world: MPI.Comm, models: Models, steps: Steps) -> Sequence[Pictures]:
         """Return what is taken at windows of its own."""
 
+    @property
+    def is_over(self) -> Callable[[History], bool] | None:
+        """Return what says of the history so far whether the run is over before its end; None where nothing does."""
+
     def find_modes(self, comms: Communicators, models: Models, steps: Steps) -> ModeTable | None:
         """Return the natural modes, if the run is asked for them."""
 
@@ -96,7 +101,8 @@ def run_dynamics(world: MPI.Comm, problem: DynamicProblem) -> None:
         outputs = make_outputs(comms, problem, models, steps)
         stopwatch = Stopwatch({role: model.body.shared.clock for role, model in models.items()}, clocks)
         ready = time.perf_counter()
-        output_seconds = run_time_loop(comms.world, participants, outputs, stopwatch)
+        windows, output_seconds = run_time_loop(comms.world, participants, outputs, stopwatch)
+        steps = replace(steps, plan=replace(steps.plan, windows=windows))
         seconds = time.perf_counter() - ready - output_seconds
         first = outputs.checkpoints.continued or 0
         balance = plan.summary | stopwatch.summary(comms.world, steps.plan.windows - first)
@@ -165,6 +171,7 @@ def make_outputs(comms: Communicators, problem: DynamicProblem, models: Models, 
         field_samples=numerics.field_samples,
         checkpoints=Checkpoints(comms.world, request.checkpoints, inputs, numerics.checkpoint_seconds),
         pictures=problem.pictures(comms.world, models, steps),
+        is_over=problem.is_over,
     )
 
 

@@ -1,6 +1,6 @@
 """A package on a board under input-G: what a run of it has of its own."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from reflowshock.fem.coupling.planner import Plan
 from reflowshock.fem.division.checks import check_pulses
 from reflowshock.fem.division.tables import JointTables
-from reflowshock.fem.dynamics.history import Signal
+from reflowshock.fem.dynamics.history import History, Signal
 from reflowshock.fem.estimates.estimate import implicit_plan, largest_implicit_step, shortened
 from reflowshock.fem.estimates.placement import check_size
 from reflowshock.fem.loads.load import Load
@@ -21,6 +21,7 @@ from reflowshock.fem.loads.structure_pulses import pulse_durations
 from reflowshock.fem.model.steps import Steps
 from reflowshock.fem.output.joint_interface import JointInterfaceStress, picture_windows
 from reflowshock.fem.output.package_result import PackageReport
+from reflowshock.fem.output.settled import WATCHED, is_settled
 from reflowshock.fem.output.watch_joints import JointWatch
 from reflowshock.fem.parallel.agreement import agreed
 from reflowshock.fem.parallel.communicators import Communicators, Role
@@ -68,11 +69,13 @@ class PackageDrop:
     ) -> tuple[dict[Role, Model[JointTables]], Steps]:
         """Return the models, and steps that may be implicit or end early."""
         models, steps = build_package(comms, self.divided, self.request, cells)
-        numerics = self.request.numerics
-        if self.request.mode == "dns" and numerics.dns_duration is not None:
-            steps = replace(steps, plan=shortened(steps.plan, numerics.dns_duration))
-        if self.request.implicit:
-            largest = largest_implicit_step(self.request.shock.duration, pulse_durations({"drop": self.pulse}))
+        request, shock = self.request, self.request.shock
+        ends = [request.end, shock.numerics.dns_duration if request.mode == "dns" else None]
+        end = min((end for end in ends if end is not None), default=shock.decided_duration)
+        if end < shock.decided_duration:
+            steps = replace(steps, plan=shortened(steps.plan, end))
+        if request.implicit:
+            largest = largest_implicit_step(shock.decided_duration, pulse_durations({"drop": self.pulse}))
             steps = replace(steps, plan=implicit_plan(steps.plan, largest))
         return models, steps
 
@@ -82,11 +85,12 @@ class PackageDrop:
 
     def watch(self, model: Model[JointTables]) -> JointWatch:
         """Return the watch points of a model."""
-        return JointWatch(model.tables.watch, model.body, self.request.materials.solder.plasticity is not None)
+        yields, damping = self.request.materials.solder.plasticity is not None, self.request.shock.damping.coefficients
+        return JointWatch(model.tables, model.body, yields, damping)
 
     def trivial_energy(self, steps: Steps) -> float:
         """Return a small part of the energy [J] that the pulse gives a free body."""
-        times = np.linspace(0.0, self.request.shock.duration, SPEEDS)
+        times = np.linspace(0.0, self.request.shock.decided_duration, SPEEDS)
         speed = max(abs(self.pulse.integral(time)) for time in times)
         return NON_TRIVIAL * 0.5 * steps.moved_mass * speed**2
 
@@ -97,6 +101,11 @@ class PackageDrop:
         times = self.request.shock.picture_times
         tables = {role: (model.tables.joint_interface, model.body) for role, model in models.items()}
         return [JointInterfaceStress(world, tables, picture_windows(times, steps.plan))] if times else []
+
+    @property
+    def is_over(self) -> Callable[[History], bool] | None:
+        """Return what says whether the shock is over before its end."""
+        return (lambda history: is_settled(history.arrays(WATCHED))) if self.request.settles else None
 
     def find_modes(self, comms: Communicators, models: Mapping[Role, Model[JointTables]], steps: Steps) -> None:
         """Find none."""

@@ -84,6 +84,10 @@ class StructureDynamics:
         """Return none."""
         return ()
 
+    @property
+    def is_over(self) -> None:
+        """Return None: a structure moves to its end."""
+
     def find_modes(self, comms: Communicators, models: Mapping[Role, StructureModel], steps: Steps) -> ModeTable | None:
         """Return the natural modes, if the run is asked for them."""
         if not self.request.finds_modes:

@@ -1,8 +1,12 @@
-"""The time loop: all models through their windows, with samples, fields, checkpoints, progress."""
+"""The time loop: all models through their windows, with samples, fields, checkpoints, progress.
+
+``shock.duration = "auto"`` becomes the longest duration before a run, which ends at a sample when ``output.settled``
+says so. Rank 0 decides from its samples, which a restart restores. Later modes end when the first one did.
+"""
 
 import json
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
@@ -59,6 +63,7 @@ class Outputs:
         field_samples: How many times each of them is written.
         checkpoints: From which the run continues, and to which it writes.
         pictures: What else is taken, at windows of its own.
+        is_over: Says of the samples so far whether the run is over before its last window; None where nothing does.
     """
 
     history: History
@@ -66,10 +71,16 @@ class Outputs:
     field_samples: int
     checkpoints: Checkpoints
     pictures: Sequence[Pictures] = ()
+    is_over: Callable[[History], bool] | None = None
 
 
-def run_time_loop(world: MPI.Comm, participants: Participants, outputs: Outputs, stopwatch: Stopwatch) -> float:
-    """Run all windows, from the latest checkpoint where there is one; return the seconds spent on fields. Collective.
+def run_time_loop(
+    world: MPI.Comm, participants: Participants, outputs: Outputs, stopwatch: Stopwatch
+) -> tuple[int, float]:
+    """Run all windows, from the latest checkpoint where there is one, or until the run is over. Collective.
+
+    Returns:
+        The number of windows, and the seconds spent on fields.
 
     Raises:
         EnergyError: On every rank, see ``EnergyBalance.judge``.
@@ -88,9 +99,12 @@ def run_time_loop(world: MPI.Comm, participants: Participants, outputs: Outputs,
         if window:
             run_window(participants, stopwatch)
         sampled = watch(participants, outputs, window)
-        if window in field_windows:
+        over = window == plan.windows or (sampled and is_over(world, outputs))
+        if over or window in field_windows:
             output_seconds += write_fields(participants, outputs, window)
-        if sampled and window < plan.windows and outputs.checkpoints.is_due():
+        if over:
+            break
+        if sampled and outputs.checkpoints.is_due():
             save(participants, outputs, window)
         if world.rank == 0 and time.perf_counter() - reported > PROGRESS_INTERVAL:
             reported = time.perf_counter()
@@ -98,7 +112,17 @@ def run_time_loop(world: MPI.Comm, participants: Participants, outputs: Outputs,
     HERE.slow = "writes the results"
     for file in outputs.fields.values():
         file.close()
-    return output_seconds
+    return window, output_seconds
+
+
+def is_over(world: MPI.Comm, outputs: Outputs) -> bool:
+    """Return whether the samples say that the run is over; collective, rank 0 decides: it has them, also restored."""
+    if outputs.is_over is None:
+        return False
+    HERE.wait_for("rank 0 to say whether the run is over")
+    over = bool(world.bcast(outputs.is_over(outputs.history) if world.rank == 0 else None))
+    HERE.go_on()
+    return over
 
 
 def watch(participants: Participants, outputs: Outputs, window: int) -> bool:

@@ -12,7 +12,7 @@ from reflowshock.fem import dolfinx_api
 from reflowshock.fem.division.division import Rules, SchemeName
 from reflowshock.fem.division.tables import Tables, TablesT_co
 from reflowshock.fem.division.whole import Treatment
-from reflowshock.fem.forces.force import Kinematics
+from reflowshock.fem.materials.kinematics import Kinematics
 from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.model.assembly import ForceOptions, Pieces, make_body, make_pieces
 from reflowshock.fem.model.body import Body

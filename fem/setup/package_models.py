@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from reflowshock.fem.division.checks import check_division
 from reflowshock.fem.division.divide import divide
 from reflowshock.fem.division.division import Rules
-from reflowshock.fem.division.fine_joints import copied_joints, read_package
+from reflowshock.fem.division.fine_joints import copied_joints, joint_of, read_package
 from reflowshock.fem.division.record import coupling_record
 from reflowshock.fem.division.tables import JointTables, joined, model_inputs
 from reflowshock.fem.division.whole import survey
@@ -23,7 +23,7 @@ from reflowshock.fem.problem.inputs import RunInput
 from reflowshock.fem.setup.models import Divided, Model, assembled, distributed, divided_on_root, treatment_of
 from reflowshock.fem.statics.initial_state import Cooling, InitialState
 
-COARSE = "board"  # role of what velocities are held in
+COARSE = "board"  # role of the boxes that velocities are held in
 
 
 def divided_package(world: MPI.Comm, request: RunInput) -> Divided[JointTables]:
@@ -42,10 +42,10 @@ def divided_on_one_rank(request: RunInput) -> Divided[JointTables]:
     found = survey(whole.mesh, request.materials, treatment_of(request))
     rules = Rules(
         coupling=shock.coupling,
-        coarse=whole.mesh.in_parts(lambda name: role_of_part(name) == COARSE),
+        coarse=whole.mesh.in_parts(lambda name: role_of_part(name) == COARSE and not joint_of(name)),
         fraction=numerics.step_fraction,
         stiffness=shock.damping.coefficients[1],
-        duration=shock.duration,
+        duration=shock.decided_duration,
         samples=numerics.history_samples,
         **(dict(zip(("copied", "copy"), copied_joints(whole.mesh), strict=True)) if request.one_way else {}),
     )
@@ -54,10 +54,10 @@ def divided_on_one_rank(request: RunInput) -> Divided[JointTables]:
     held = HELD if shock.method == "direct" else SYMMETRY
     if request.mode == "dns":
         steps = undivided(steps, float(found.step.min()), rules)
-        inputs = model_inputs(whole, "dns", held)
+        inputs = model_inputs(whole, "dns", held, shock.joint_layer)
     else:
         check_division(whole, found, division, rules)
-        inputs = model_inputs(whole, division, held)
+        inputs = model_inputs(whole, division, held, shock.joint_layer)
     check_shaken([item.tables for item in inputs.values()], shock)
     first = next(iter(inputs.values()))
     return Divided(

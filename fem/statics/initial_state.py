@@ -7,6 +7,7 @@ model leaves out what its forces at the interface add up to: the other model's a
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -118,7 +119,8 @@ def begun(
         path: Whether elements of any model yield or turn.
     """
     initial = mean_stress(body, materials, displacement, change)
-    body = replace(body, initial_stress=initial)
+    begin = partial(begin_path, materials=materials, displacement=displacement, change=change)
+    body = replace(body, initial_stress=initial, begin=begin)
     return with_forces(body, materials, displacement, change) if path else body
 
 

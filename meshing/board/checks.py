@@ -1,6 +1,7 @@
 """Parameters of package, board and warpage that are each allowed but make no assembly together. Pure Python."""
 
 import difflib
+import math
 from collections.abc import Iterator
 
 from reflowshock.meshing.board.pads import joint_name, lift, pad_table
@@ -8,6 +9,8 @@ from reflowshock.meshing.board.parameters import Board, Package, Pad, Warpage
 from reflowshock.meshing.board.plan import WIDEST_SQUARE, square_around, uniform
 from reflowshock.problem import Problem
 
+LEAST_ROOM = 1.1  # side of a column over the diameter of its pad
+ROUNDING = 1.0e-9
 SMALLEST_INSET = 0.75  # of a hole's diameter: leaves a quarter of it as a wall between hole and edge
 WIDE_HOLE = 0.25  # of a side of the board: a wider hole is probably the mistake, not the board
 SMALLEST_ROOM = SMALLEST_INSET * (1.0 + 0.5 * WIDEST_SQUARE)  # of a hole's diameter: from the edge to its block's end
@@ -30,6 +33,7 @@ def problems(package: Package, board: Board, warpage: Warpage) -> list[Problem]:
         *_holes(package, board),
         *_gaps(package, board, warpage),
         *_numerics(board),
+        *_imprint(package),
     ]
 
 
@@ -155,6 +159,23 @@ def _numerics(board: Board) -> Iterator[Problem]:
     if numerics.coarse_size < numerics.element_size:
         allowed = f">= {_mm(numerics.element_size)}, the element size"
         yield Problem("board.numerics.coarse_size", "finer than the fine elements", _mm(numerics.coarse_size), allowed)
+
+
+def _imprint(package: Package) -> Iterator[Problem]:
+    """Columns lie apart, inside the substrate, around their pads; their joints are swept between copper pads."""
+    size = package.column_size
+    if size is None:
+        return
+    if package.copper.layout == "plate":
+        message = "pads are imprinted where joints have pads of their own"
+        yield Problem("package.copper.layout", message, "plate", "pads, or no package.imprint")
+    key, pad = "package.imprint.size", max(package.board_pad.diameter, package.package_pad.diameter)
+    sides = (package.substrate.length - (package.columns - 1) * package.pitch,
+             package.substrate.width - (package.rows - 1) * package.pitch)  # fmt: skip
+    largest = min(package.pitch if package.rows * package.columns > 1 else math.inf, *sides) * (1.0 + ROUNDING)
+    if not LEAST_ROOM * pad <= size <= largest:
+        message = "the column of a joint does not fit between its pad, its neighbours and the edge of the substrate"
+        yield Problem(key, message, _mm(size), f"{_mm(LEAST_ROOM * pad)} to {_mm(largest)}")
 
 
 def _mm(length: float) -> str:

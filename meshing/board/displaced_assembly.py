@@ -54,8 +54,9 @@ def write_displaced_assembly(source: Path, displacement: Displacement, path: Pat
         check_elements("displaced assembly")
         write_msh(path)
         below = np.isin(tags, _nodes([groups["package_side"]])[0])
+        through = below if "copper_package" in groups else np.isin(tags, _nodes([groups["substrate"]])[0])
     _check_room(points[below] + moves[below])
-    return PackageSide.of_nodes(points[below], moves[below])
+    return PackageSide.of_nodes(points[through], moves[through])
 
 
 def _nodes(groups: list[tuple[int, int]]) -> tuple[np.ndarray, np.ndarray]:

@@ -1,15 +1,18 @@
 """Element counts and smallest lengths of the meshes, from parameters alone (for ``plan``)."""
 
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from reflowshock.meshing.board.pads import has_rim, pad_table
-from reflowshock.meshing.board.parameters import Board, JointNumerics, Package, Warpage
+from reflowshock.meshing.board.parameters import Board, JointNumerics, Package, Pad, Warpage
 from reflowshock.meshing.board.plan import (
     Interval,
     Plan,
     blocks_within,
     board_plan,
+    column_levels,
     footprint,
     hole_rings,
     package_plan,
@@ -42,6 +45,7 @@ def count_elements(
     gap = min((site.gap for site in joints), default=package.standoff)
     of_joints = _joint_estimates(package, count, gap) | _coarse_estimates(package, len(joints) - count, gap)
     parts = _board_estimates(package, board) | _package_estimates(package, board) | of_joints
+    parts |= _column_estimates(package, board, parts, count)
     return {name: part for name, part in parts.items() if part.elements}
 
 
@@ -77,18 +81,59 @@ def _package_estimates(package: Package, board: Board) -> dict[str, PartEstimate
 
 def _joint_estimates(package: Package, joints: int, gap: float) -> dict[str, PartEstimate]:
     numerics = package.joint_numerics
-    pads, edge = (package.board_pad, package.package_pad), _edge(package, numerics)
+    pads, edge = (package.board_pad, package.package_pad), element_edge(package, numerics)
     cells = joints * _section(numerics) * numerics.layers
-    parts = {"solder": PartEstimate(cells, (edge, edge, gap / numerics.layers))}
+    lowest = gap / numerics.layers if numerics.pad_layer is None else numerics.pad_layer / numerics.pad_layers
+    parts = {"solder": PartEstimate(cells, (edge, edge, lowest))}
     if package.copper.layout == "pads":
-        rims = sum(has_rim(0.5 * pad.diameter, pad.wetted_radius) for pad in pads)
-        cells = joints * (2 * _section(numerics) + rims * 4 * numerics.core)
-        parts["copper"] = PartEstimate(cells, (edge, edge, package.copper.thickness))
+        rims, layers = sum(rim_count(pad, edge) for pad in pads), numerics.copper_layers
+        cells = joints * (2 * _section(numerics) + rims * 4 * numerics.core) * layers
+        parts["copper"] = PartEstimate(cells, (edge, edge, package.copper.thickness / layers))
     return parts
 
 
+def _column_estimates(
+    package: Package, board: Board, parts: dict[str, PartEstimate], joints: int
+) -> dict[str, PartEstimate]:
+    """Count the columns of fine joints, and the boxes that are left beside them."""
+    imprint, numerics = package.imprint, package.joint_numerics
+    if imprint is None or package.column_size is None:
+        return {}
+    edge = element_edge(package, numerics)
+    layers = {
+        "board": (board.thickness, board.numerics.layers, board_plan(package, board), package.board_pad),
+        "substrate": (
+            package.substrate.thickness,
+            package.substrate.elements,
+            package_plan(package, board),
+            package.package_pad,
+        ),
+    }
+    found = {}
+    for name, (thickness, boxes, plan, pad) in layers.items():
+        levels = column_levels(thickness, boxes, imprint)
+        section = _section(numerics) + 4 * numerics.core * (rim_count(pad, edge) + imprint.rings)
+        cells = joints * section * (len(levels) - 1)
+        found[f"{name}_column"] = PartEstimate(cells, (edge, edge, float(np.diff(levels).min())))
+        site = pad_table(package, board, FLAT)[0]
+        place = [_cells_between(axis, at, package.column_size) for axis, at in ((plan.x, site.x), (plan.y, site.y))]
+        taken = joints * place[0] * place[1] * boxes
+        patch_layers = min(boxes, board.numerics.patch_layers)
+        upper = taken * patch_layers // boxes if name == "board" else 0
+        found[name] = replace(parts[name], elements=parts[name].elements - taken + upper)
+        if name == "board":
+            own = parts["board_patch"]
+            found["board_patch"] = replace(own, elements=own.elements - upper)
+    return found
+
+
+def _cells_between(axis: tuple[Interval, ...], centre: float, size: float) -> int:
+    """Return the cells of an axis in a joint's column."""
+    return sum(part.cells for part in axis if abs(0.5 * (part.start + part.end) - centre) < 0.5 * size)
+
+
 def _coarse_estimates(package: Package, joints: int, gap: float) -> dict[str, PartEstimate]:
-    numerics, edge = package.coarse_joint_numerics, _edge(package, package.coarse_joint_numerics)
+    numerics, edge = package.coarse_joint_numerics, element_edge(package, package.coarse_joint_numerics)
     height = gap + 2.0 * package.copper.thickness if package.copper.layout == "pads" else gap
     cells = joints * _section(numerics) * numerics.layers
     return {"solder_coarse": PartEstimate(cells, (edge, edge, height / numerics.layers))}
@@ -99,10 +144,17 @@ def _section(numerics: JointNumerics) -> int:
     return numerics.core**2 + 4 * numerics.core * numerics.rings
 
 
-def _edge(package: Package, numerics: JointNumerics) -> float:
+def element_edge(package: Package, numerics: JointNumerics) -> float:
     """Edge length in the cross-section of a joint [m]."""
     wetted = min(pad.wetted_radius for pad in (package.board_pad, package.package_pad))
     return wetted / (0.5 * numerics.core + numerics.rings)
+
+
+def rim_count(pad: Pad, edge: float) -> int:
+    """Return the circles of elements of copper beyond the wetted disc of a pad, as long as ``edge`` [m] each."""
+    if not has_rim(0.5 * pad.diameter, pad.wetted_radius):
+        return 0
+    return max(1, round((0.5 * pad.diameter - pad.wetted_radius) / edge))
 
 
 def _plate(package: Package, plan: Plan, blocks: Collection[tuple[int, int]]) -> PartEstimate:

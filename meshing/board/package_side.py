@@ -81,23 +81,30 @@ class PackageSide:
     Attributes:
         level: its height over the board's top face where it is not displaced [m].
         displacement: (m, n, 3) of its nodes, relative to the board's top face [m].
+        above: the same of the planes of nodes in the substrate, upwards.
     """
 
     level: float
     displacement: StructuredFace
+    above: tuple[tuple[float, StructuredFace], ...] = ()
 
     @classmethod
     def of_nodes(cls, points: np.ndarray, displacement: np.ndarray) -> "PackageSide":
-        """Make it of the nodes of its facets.
+        """Make it of the nodes of its facets, or of all of the substrate.
 
         Args:
             points: (k, 3) before they are displaced [m].
             displacement: (k, 3) [m].
 
         Raises:
-            NotStructuredError: the nodes are no grid.
+            NotStructuredError: the nodes of a plane are no grid.
         """
-        return cls(float(points[:, 2].mean()), StructuredFace.of_nodes(points, displacement))
+        levels, plane = np.unique(np.round(points[:, 2] / MERGE), return_inverse=True)
+        planes = [plane == number for number in range(len(levels))]
+        faces = [
+            (float(points[own, 2].mean()), StructuredFace.of_nodes(points[own], displacement[own])) for own in planes
+        ]
+        return cls(*faces[0], tuple(faces[1:]))
 
     @classmethod
     def prescribed(cls, package: Package, board: Board, warpage: Warpage) -> "PackageSide":
@@ -106,10 +113,17 @@ class PackageSide:
         x, y = _lines(plan.x), _lines(plan.y)
         displacement = np.zeros((len(x), len(y), 3))
         displacement[:, :, 2] = lift(package, warpage, x[:, None], y[None, :])
-        return cls(underside(package), StructuredFace(x, y, displacement))
+        face, level, substrate = StructuredFace(x, y, displacement), underside(package), package.substrate
+        planes = level + substrate.thickness * np.arange(1, substrate.elements + 1) / substrate.elements
+        return cls(level, face, tuple((float(plane), face) for plane in planes))
 
     def height(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Return the height (k,) over the board's top face at points (k,), (k,) [m].
+        """Return the height (k,) over the board's top face at points (k,), (k,) [m]; errors as ``origin``."""
+        origin = self.origin(x, y)
+        return self.level + self.displacement(origin[:, 0], origin[:, 1])[:, 2]
+
+    def origin(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """Return the points (k, 2) of the underside that were displaced to (k,), (k,) [m].
 
         Each facet is the bilinear image of a rectangle: the point X that was displaced to (x, y) is found by
         X <- (x, y) - u(X), which contracts by the strain.
@@ -124,7 +138,20 @@ class PackageSide:
             before, origin = origin, place - found[:, :2]
             if np.abs(origin - before).max() < EXACT:
                 break
-        return self.level + found[:, 2]
+        return origin
+
+    def displaced(self, points: np.ndarray) -> np.ndarray:
+        """Return where points (k, 3) of the substrate are after its displacement, linear between its nodes [m].
+
+        Raises:
+            NotStructuredError: a point lies beyond the package.
+        """
+        faces = ((self.level, self.displacement), *self.above)
+        levels = np.array([level for level, _ in faces])
+        (layer, share), x, y = _cell(levels, points[:, 2], "z"), points[:, 0], points[:, 1]
+        moves = np.array([face(x, y) for _, face in faces])
+        each, share = np.arange(len(points)), share[:, None]
+        return points + (1.0 - share) * moves[layer, each] + share * moves[layer + 1, each]
 
 
 def underside(package: Package) -> float:

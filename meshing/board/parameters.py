@@ -53,11 +53,32 @@ class PackageNumerics(Parameters):
 
 
 class JointNumerics(Parameters):
-    """How a joint is meshed: butterfly cross-section swept from pad to pad."""
+    """How a joint is meshed: butterfly cross-section swept from pad to pad.
+
+    With ``pad_layer``, the thickness over which stress and plastic work are averaged, ``pad_layers`` of the ``layers``
+    divide it equally at either pad; the others grow from there to the middle by one ratio. Without, all are alike.
+    """
 
     core: int = Field(2, ge=1, le=16)
     rings: int = Field(1, ge=0, le=16)
     layers: int = Field(6, ge=2, le=64)
+    pad_layer: Length | None = Field(None, gt=0)
+    pad_layers: int = Field(2, ge=1, le=16)
+    copper_layers: int = Field(1, ge=1, le=8)
+
+
+class Imprint(Parameters):
+    """Pads imprinted in the faces of board and substrate: each fine joint stands in a square column of its own.
+
+    The column goes through board and substrate. From the pad's edge ``rings`` of elements reach out to a square of side
+    ``size`` (the pitch, if none is given). Its layers are as high as ``first_layer`` at the pad and grow with the depth
+    z, h = first_layer + (growth - 1) z. Outside are the structured boxes, to which its sides are tied.
+    """
+
+    size: Length | None = Field(None, gt=0)
+    rings: int = Field(4, ge=1, le=32)
+    first_layer: Length = Field(3.0e-5, gt=0)
+    growth: float = Field(1.5, ge=1.01, le=3.0)
 
 
 class Package(Parameters):
@@ -65,6 +86,7 @@ class Package(Parameters):
 
     ``surfaces`` are files (STL, PLY, VTU; lengths in ``surface_unit``) of joints whose shape is given, by their names.
     ``coarse_joint_numerics`` is for joints of a shock that are not fine: solder alone, also in place of their copper.
+    ``imprint`` is for the fine ones: without, they are tied to boxes of board and substrate that ignore the pads.
     """
 
     rows: int = Field(ge=1, le=100)
@@ -80,8 +102,14 @@ class Package(Parameters):
     numerics: PackageNumerics = PackageNumerics()
     joint_numerics: JointNumerics = JointNumerics()
     coarse_joint_numerics: JointNumerics = JointNumerics(core=2, rings=0, layers=2)
+    imprint: Imprint | None = None
     surfaces: dict[str, str] = Field(default_factory=dict)
     surface_unit: Literal["um", "mm", "m"] = "mm"
+
+    @property
+    def column_size(self) -> float | None:
+        """Side of the square in which a fine joint stands [m]; none where pads are not imprinted."""
+        return (self.imprint.size or self.pitch) if self.imprint else None
 
 
 class Holes(Parameters):

@@ -2,12 +2,14 @@
 
 import math
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
-from reflowshock.meshing.board.parameters import Board, BoardNumerics, Package
+from reflowshock.meshing.board.parameters import Board, BoardNumerics, Imprint, Package
 
 MOST_LINES = 100_000
+SAME = 1.0e-6  # of a column: distance of lines that are one
 WIDEST_SQUARE = 1.6  # of a hole's distance from the edge: the side of the square around it
 
 
@@ -58,8 +60,9 @@ def board_plan(package: Package, board: Board) -> Plan:
     ends = (0.5 * board.length, 0.5 * board.width)
     insets = (holes.inset_x, holes.inset_y)
     axes = []
-    for footprint, end, inset in zip(half, ends, insets, strict=True):
-        axes.append(_board_axis(footprint, end, end - inset, hole_square(board), numerics))
+    for footprint, count, end, inset in zip(half, _joints(package), ends, insets, strict=True):
+        inner = _under_joints(package, count, (footprint,), numerics.element_size)
+        axes.append(_board_axis(inner, end, end - inset, hole_square(board), numerics))
     x, y = (tuple(axis) for axis in axes)
     plan = Plan(x, y, frozenset({len(x) - 2}), frozenset({len(y) - 2}))
     return plan if board.symmetry == "quarter" else _mirrored(plan)
@@ -74,10 +77,12 @@ def package_plan(package: Package, board: Board) -> Plan:
 def package_axes(package: Package) -> tuple[tuple[Interval, ...], tuple[Interval, ...]]:
     """Cut the positive halves of the package's axes: under the die, and what of the substrate it leaves free."""
     size, die, substrate = package.numerics.element_size, package.die, package.substrate
-    return (
-        _package_axis(0.5 * die.length, 0.5 * substrate.length, size),
-        _package_axis(0.5 * die.width, 0.5 * substrate.width, size),
+    edges = (
+        _distinct(0.5 * die.length, 0.5 * substrate.length),
+        _distinct(0.5 * die.width, 0.5 * substrate.width),
     )
+    x, y = (tuple(_under_joints(package, *axis, size)) for axis in zip(_joints(package), edges, strict=True))
+    return x, y
 
 
 def hole_square(board: Board) -> float:
@@ -99,6 +104,21 @@ def hole_rings(board: Board) -> int:
     """Number of cells between a mounting hole and the edge of its square."""
     ring = 0.5 * (hole_square(board) - board.holes.diameter)
     return max(1, round(ring / board.numerics.coarse_size))
+
+
+def column_levels(thickness: float, boxes: int, imprint: Imprint) -> np.ndarray:
+    """Return depths (layers + 1,) [m] from a pad's face at which a column's layers meet, with the planes of the boxes.
+
+    The height h of a layer at depth z is first_layer + (growth - 1) z, less what makes the layers of a box fit.
+    """
+    slope = imprint.growth - 1.0
+    depths = [0.0]
+    for low, high in pairwise((thickness * np.arange(boxes + 1) / boxes).tolist()):
+        start, end = (math.log(imprint.first_layer + slope * depth) for depth in (low, high))
+        count = max(1, math.ceil((end - start) / slope - SAME))
+        inner = np.exp(start + (end - start) * np.arange(1, count) / count)
+        depths += [*((inner - imprint.first_layer) / slope).tolist(), high]
+    return np.array(depths)
 
 
 def blocks_within(plan: Plan, length: float, width: float) -> set[tuple[int, int]]:
@@ -128,17 +148,34 @@ def _widened(indices: set[int]) -> range:
     return range(max(min(indices) - 1, 0), max(indices) + 2)
 
 
-def _package_axis(die: float, substrate: float, size: float) -> tuple[Interval, ...]:
-    if math.isclose(die, substrate, rel_tol=1.0e-9):  # what rounding leaves between their edges is no block
-        return (uniform(0.0, substrate, size),)
-    return uniform(0.0, die, size), uniform(die, substrate, size)
+def _distinct(die: float, substrate: float) -> tuple[float, ...]:
+    """Return the edges of die and substrate; what rounding leaves between them is no block."""
+    return (substrate,) if math.isclose(die, substrate, rel_tol=1.0e-9) else (die, substrate)
 
 
-def _board_axis(footprint: float, end: float, hole: float, square: float, numerics: BoardNumerics) -> list[Interval]:
-    inner = uniform(0.0, footprint, numerics.element_size)
-    size = footprint / inner.cells
+def _joints(package: Package) -> tuple[int, int]:
+    return package.columns, package.rows
+
+
+def _under_joints(package: Package, count: int, edges: tuple[float, ...], size: float) -> list[Interval]:
+    """Cut the positive half of an axis at the edges of parts, and of the columns of its ``count`` joints, if any."""
+    breaks, column = {0.0, *edges}, package.column_size
+    if column is not None:
+        centres = package.pitch * (np.arange(count) - 0.5 * (count - 1))
+        beside = np.concatenate([centres - 0.5 * column, centres + 0.5 * column])
+        for place in beside[(beside > 0.0) & (beside < edges[-1])].tolist():
+            if min(abs(place - other) for other in breaks) > SAME * column:
+                breaks.add(place)
+    return [uniform(start, end, size) for start, end in pairwise(sorted(breaks))]
+
+
+def _board_axis(
+    inner: list[Interval], end: float, hole: float, square: float, numerics: BoardNumerics
+) -> list[Interval]:
+    last, footprint = inner[-1], inner[-1].end
+    size = (last.end - last.start) / last.cells
     margin = Interval(footprint, footprint + numerics.patch_margin * size, numerics.patch_margin)
-    axis = [inner, margin, *_outward(margin.end, hole - 0.5 * square, size, numerics)]
+    axis = [*inner, margin, *_outward(margin.end, hole - 0.5 * square, size, numerics)]
     axis.append(uniform(hole - 0.5 * square, hole + 0.5 * square, numerics.coarse_size))
     axis[-1] = replace(axis[-1], cells=max(2, axis[-1].cells))
     axis.append(uniform(hole + 0.5 * square, end, numerics.coarse_size))

@@ -6,6 +6,7 @@ Its place is that of its pad on the board, its head laid on the package's unders
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from typing import Any, Protocol
 
 import numpy as np
@@ -14,6 +15,7 @@ from reflowshock.meshing.board.pad_planes import PadPlanes
 from reflowshock.meshing.board.pads import PadSite, has_rim
 from reflowshock.meshing.core.hexahedra import quad_areas, scaled_jacobian, shortest_lengths, volumes
 from reflowshock.meshing.core.quadratic_tetrahedra import QuadraticTetrahedra, tetrahedra_quality
+from reflowshock.meshing.joint.column import Column, grow_column
 from reflowshock.meshing.joint.solder import Solder, WettedFace
 from reflowshock.meshing.surface.closed_surface import ClosedSurface, pad_planes
 
@@ -96,11 +98,11 @@ class JointMesh:
 
 @dataclass(frozen=True, slots=True)
 class _Pad:
-    """A copper pad: name of its joint, radius [m], and the nodes of its edge where it is wider than its solder."""
+    """A copper pad: name of its joint, radius [m], nodes (k, r) of circles outwards beyond its solder, if any."""
 
     name: str
     radius: float
-    rim: np.ndarray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+    rims: np.ndarray = field(default_factory=lambda: np.empty((0, 0), dtype=np.int64))
 
 
 @dataclass(slots=True)
@@ -112,24 +114,43 @@ class _Parts:
     facets: dict[str, np.ndarray]
 
 
-def build_joint(solder: Solder, sites: Sequence[PadSite], copper: float | None, place: JointPlace) -> JointMesh:
+@dataclass(frozen=True, slots=True)
+class CopperPads:
+    """Copper pads on the wetted faces of a joint, and what continues them.
+
+    Attributes:
+        thickness: of each [m].
+        layers: of elements.
+        edge: wanted length of elements beyond the solder [m].
+        columns: of board and substrate, where swept solder stands in some.
+    """
+
+    thickness: float
+    layers: int = 1
+    edge: float = math.inf
+    columns: tuple[Column, ...] = ()
+
+
+def build_joint(solder: Solder, sites: Sequence[PadSite], copper: CopperPads | None, place: JointPlace) -> JointMesh:
     """Put a body of solder in its place and copper pads on its wetted faces.
 
     Args:
         solder: in its own frame.
         sites: of the joints whose pads it wets: a face lies on the pad that is nearest.
-        copper: thickness of the pads [m]; none where solder sits on plates, or fills the place of copper.
+        copper: the pads; none where solder sits on plates, or fills the place of copper.
         place: from the own frame to the assembly.
 
     Raises:
         JointMeshError: a scaled Jacobian is too small.
     """
+    if copper and solder.tetrahedra:
+        copper = replace(copper, columns=())
     own, pads = solder.points, []
     for face in solder.faces:
         pad = _pad_of(solder, face, sites, place)
-        rim = np.empty((0, 3)) if copper is None else _rim(solder, face, pad.radius)
-        pads.append(replace(pad, rim=np.arange(len(own), len(own) + len(rim))))
-        own = np.vstack([own, rim])
+        rim = np.empty((0, 0, 3)) if copper is None else _rim(solder, face, pad.radius, copper.edge)
+        pads.append(replace(pad, rims=len(own) + np.arange(rim.size // 3).reshape(rim.shape[:2])))
+        own = np.vstack([own, rim.reshape(-1, 3)])
     name = place.site.name
     parts = _Parts(place(own), {f"solder@{name}": solder.cells}, {})
     for face, pad in zip(solder.faces, pads, strict=True):
@@ -192,34 +213,64 @@ def _pad_of(solder: Solder, face: WettedFace, sites: Sequence[PadSite], place: J
     return _Pad(site.name, site.pad_radius_board if face.side == "board" else site.pad_radius_package)
 
 
-def _rim(solder: Solder, face: WettedFace, pad_radius: float) -> np.ndarray:
-    """Return the nodes (r, 3) of a copper pad's edge in its plane, none where the solder covers the pad."""
+def _rim(solder: Solder, face: WettedFace, pad_radius: float, edge: float) -> np.ndarray:
+    """Return circles of nodes (k, r, 3) out to a copper pad's edge in its plane, none where the solder covers it."""
     wetted_radius = math.sqrt(quad_areas(solder.points, face.quads).sum() / math.pi)
     if not has_rim(pad_radius, wetted_radius):
-        return np.empty((0, 3))
+        return np.empty((0, 0, 3))
     outline = solder.points[face.rim]
     centre = outline.mean(axis=0)
-    rim = centre + pad_radius / wetted_radius * (outline - centre)
-    rim[:, 2] = 0.0 if face.side == "board" else solder.planes.height(rim[:, 0], rim[:, 1])
-    return rim
+    count = max(1, round((pad_radius - wetted_radius) / edge))
+    radii = np.linspace(wetted_radius, pad_radius, count + 1)[1:]
+    rims = centre + radii[:, None, None] / wetted_radius * (outline - centre)
+    rims[..., 2] = 0.0 if face.side == "board" else solder.planes.height(rims[..., 0], rims[..., 1])
+    return rims
 
 
-def _add_pad(parts: _Parts, face: WettedFace, pad: _Pad, copper: float | None) -> None:
-    """Name a wetted face, and put copper on it as wide as its rim reaches."""
-    board, quads = face.side == "board", face.quads
+def _add_pad(parts: _Parts, face: WettedFace, pad: _Pad, copper: CopperPads | None) -> None:
+    """Name a wetted face; put copper on it as wide as its rims reach, and the column that continues it."""
+    board, quads, rim = face.side == "board", face.quads, face.rim
     end = "foot" if board else "head"
     facets = {f"pad_{face.side}@{pad.name}": quads, f"{end}@{pad.name}": quads}
     if copper is not None:
-        if len(pad.rim):
-            around = np.column_stack([face.rim, pad.rim, np.roll(pad.rim, -1), np.roll(face.rim, -1)])
-            quads = np.vstack([quads, around])
-        nodes, local = np.unique(quads, return_inverse=True)
-        beyond = len(parts.points) + local.reshape(quads.shape)
-        step = [0.0, 0.0, -copper if board else copper]
-        parts.points = np.vstack([parts.points, parts.points[nodes] + step])
-        parts.cells[f"copper_{face.side}@{pad.name}"] = np.hstack([beyond, quads] if board else [quads, beyond])
+        for circle in pad.rims:
+            around = np.column_stack([rim, circle, np.roll(circle, -1), np.roll(rim, -1)])
+            quads, rim = np.vstack([quads, around]), circle
+        step = np.array([0.0, 0.0, -copper.thickness if board else copper.thickness])
+        beyond, rim = _add_copper(parts, f"copper_{face.side}@{pad.name}", (quads, rim), (step, copper.layers))
         facets[f"{end}@{pad.name}"] = beyond
+        for column in copper.columns:
+            if column.side == face.side:
+                del facets[f"{end}@{pad.name}"]
+                _add_column(parts, column, pad.name, (beyond, rim))
     parts.facets |= {name: faces[:, ::-1] if board else faces for name, faces in facets.items()}
+
+
+def _add_copper(
+    parts: _Parts, name: str, face: tuple[np.ndarray, np.ndarray], layers: tuple[np.ndarray, int]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Sweep a face, its quads and its outline, along a step [m] in so many layers; return the face at the other end."""
+    (quads, rim), (step, count) = face, layers
+    nodes, local = np.unique(quads, return_inverse=True)
+    levels = [nodes, *(len(parts.points) + len(nodes) * layer + np.arange(len(nodes)) for layer in range(count))]
+    shares = np.arange(1, count + 1)[:, None, None] / count
+    parts.points = np.vstack([parts.points, (parts.points[nodes] + shares * step).reshape(-1, 3)])
+    order = levels if step[2] > 0.0 else levels[::-1]
+    local = local.reshape(quads.shape)
+    parts.cells[name] = np.vstack([np.hstack([low[local], high[local]]) for low, high in pairwise(order)])
+    return levels[-1][local], levels[-1][np.searchsorted(nodes, rim)]
+
+
+def _add_column(parts: _Parts, column: Column, name: str, face: tuple[np.ndarray, np.ndarray]) -> None:
+    """Continue the outer face of a pad, its quads and its outline; what may be tied is ``column_<side>@<joint>``."""
+    mesh = grow_column(column, parts.points, *face)
+    parts.points = np.vstack([parts.points, mesh.points])
+    parts.cells[f"{column.part}@{name}"] = mesh.cells
+    free = f"board_bottom@{name}" if column.side == "board" else None
+    tied = [mesh.sides] if free else [mesh.sides, mesh.end]
+    parts.facets[f"column_{column.side}@{name}"] = np.vstack(tied)
+    if free:
+        parts.facets[free] = mesh.end
 
 
 def _check_quality(points: np.ndarray, cells: dict[str, np.ndarray]) -> None:

@@ -12,10 +12,13 @@ from functools import partial
 
 import numpy as np
 
+from reflowshock.meshing.board.estimate import element_edge
 from reflowshock.meshing.board.pads import PadSite
 from reflowshock.meshing.board.parameters import Package
 from reflowshock.meshing.joint.attempts import attempts, first_good
+from reflowshock.meshing.joint.column import Column
 from reflowshock.meshing.joint.joint_mesh import (
+    CopperPads,
     JointMesh,
     JointMeshError,
     JointPlace,
@@ -40,7 +43,9 @@ GAP_TOLERANCE = 1.0e-3
 HEAD_TOLERANCE = 0.03  # of the gap: mean distance of the solder's upper face from the package's pad
 
 
-def mesh_joint(surface: ClosedSurface, site: PadSite, package: Package, side: Underside) -> JointMesh:
+def mesh_joint(
+    surface: ClosedSurface, site: PadSite, package: Package, side: Underside, columns: tuple[Column, ...] = ()
+) -> JointMesh:
     """Mesh a joint and put it in its place.
 
     Args:
@@ -48,12 +53,13 @@ def mesh_joint(surface: ClosedSurface, site: PadSite, package: Package, side: Un
         site: where it sits.
         package: copper and numerics.
         side: the package's underside, which the joint's head follows.
+        columns: of board and substrate that continue its pads.
 
     Raises:
         JointMeshError: the surface spans another gap, or one in which the package is not, or no mesh of it meets its
             bars; tells what each of them missed.
     """
-    return _mesh(surface, site, [site], (package, side))
+    return _mesh(surface, site, [site], (package, side, columns))
 
 
 def mesh_bridge(surface: ClosedSurface, sites: Sequence[PadSite], package: Package, side: Underside) -> JointMesh:
@@ -79,7 +85,7 @@ def mesh_bridge(surface: ClosedSurface, sites: Sequence[PadSite], package: Packa
         y=0.5 * (first.y + second.y),
         gap=0.5 * (first.gap + second.gap),
     )
-    return _mesh(replace(surface, points=turned), middle, sites, (package, side))
+    return _mesh(replace(surface, points=turned), middle, sites, (package, side, ()))
 
 
 def mesh_coarse_joint(surface: ClosedSurface, site: PadSite, package: Package, side: Underside) -> JointMesh:
@@ -116,15 +122,27 @@ def mesh_coarse_or_fine(
 
 
 def _mesh(
-    surface: ClosedSurface, site: PadSite, sites: Sequence[PadSite], above: tuple[Package, Underside]
+    surface: ClosedSurface,
+    site: PadSite,
+    sites: Sequence[PadSite],
+    above: tuple[Package, Underside, tuple[Column, ...]],
 ) -> JointMesh:
     """Mesh a body whose own frame is at a site, on the pads of its sites."""
-    package, side = above
-    copper = package.copper.thickness if package.copper.layout == "pads" else None
-    place = JointPlace.of(surface, site, side, copper or 0.0)
+    package, side, columns = above
+    copper = _copper_pads(package, columns)
+    place = JointPlace.of(surface, site, side, copper.thickness if copper else 0.0)
     _check_place(surface, place)
     ways = attempts(surface, package.joint_numerics, place)
     return first_good(surface, ways, site.name, partial(build_joint, sites=sites, copper=copper, place=place))
+
+
+def _copper_pads(package: Package, columns: tuple[Column, ...]) -> CopperPads | None:
+    """Return the pads of fine joints, none where copper is a plate."""
+    if package.copper.layout == "plate":
+        return None
+    numerics = package.joint_numerics
+    edge = element_edge(package, numerics)
+    return CopperPads(package.copper.thickness, numerics.copper_layers, edge, columns)
 
 
 def _check_distance(surface: ClosedSurface, first: PadSite, second: PadSite) -> None:

@@ -1,10 +1,12 @@
 """Swept solder: butterfly (O-grid) sections of a body, stacked from the board's pad to the package's."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from scipy.optimize import brentq
 
 from reflowshock.meshing.board.parameters import JointNumerics
 from reflowshock.meshing.core.facets import cut_segments, radius_by_angle, section_area, section_centroid
@@ -18,6 +20,7 @@ END = 1.0e-9  # of the height: how far inside the end sections are cut, where th
 LARGEST_CORRECTION = 0.1
 VOLUME_TOLERANCE = 1.0e-12
 SECANT_STEPS = 20
+LARGEST_GROWTH = 2.2  # of neighbouring layers
 Placing = Callable[[np.ndarray], np.ndarray]
 
 
@@ -90,7 +93,7 @@ class Levels:
 def swept_solder(surface: ClosedSurface, numerics: JointNumerics, place: Placing, overhang: float = 0.0) -> Solder:
     """Sweep hexahedra through a body; arguments and errors as ``solder_levels``."""
     section = butterfly(numerics.core, numerics.rings)
-    levels = solder_levels(surface, section, numerics.layers, place, overhang)
+    levels = solder_levels(surface, section, numerics, place, overhang)
     count = len(section.points)
     top = numerics.layers * count
     faces = (
@@ -104,11 +107,11 @@ def swept_solder(surface: ClosedSurface, numerics: JointNumerics, place: Placing
 def solder_levels(
     surface: ClosedSurface,
     section: Butterfly,
-    layers: int,
+    numerics: JointNumerics,
     place: Placing,
     overhang: float = 0.0,
 ) -> Levels:
-    """Cut a body into sections of equal distance and lay the butterfly into each.
+    """Cut a body into sections and lay the butterfly into each.
 
     The body is made straight between its pads first, and put back. A polygon of few sides encloses less than the
     section that it follows, and straight layers less than a bulge: each outline is scaled to its section's area, then
@@ -117,17 +120,17 @@ def solder_levels(
     Args:
         surface: the body in its own frame.
         section: the butterfly.
-        layers: number of layers.
+        numerics: its layers.
         place: moves points (n, 3) [m] to where the joint will be, where its volume is kept: a curved package makes a
             joint higher here, lower there, and its mean gap another than that on its axis.
         overhang: height [m] by which each end face is drawn out as a prism, which belongs to the body.
 
     Raises:
-        ValueError: a section is not star-shaped, or the layers are too few to keep the volume.
+        ValueError: a section is not star-shaped, or the layers are too few to keep the volume or to grow smoothly.
     """
-    planes = pad_planes(surface)
+    planes, layers = pad_planes(surface), numerics.layers
     straight = planes.straighten(surface.points)
-    heights = np.linspace(-overhang, planes.gap + overhang, layers + 1)
+    heights = layer_levels(planes.gap + 2.0 * overhang, numerics) - overhang
     cuts = np.clip(heights, END * planes.gap, (1.0 - END) * planes.gap)
     points = np.empty((layers + 1, len(section.points), 3))
     for level, cut in enumerate(cuts):
@@ -145,6 +148,32 @@ def solder_levels(
     volume = enclosed_volume(surface) + overhang * ends
     scale = volume_keeping_scale(swept_volume, volume)
     return Levels(restored(scale).reshape(points.shape), scale, volume)
+
+
+def layer_levels(height: float, numerics: JointNumerics) -> np.ndarray:
+    """Return the levels of the layers of a joint of some height, from 0 upwards, (layers + 1,) [m].
+
+    Raises:
+        ValueError: no smooth growth fits between the layers at the pads.
+    """
+    if numerics.pad_layer is None:
+        return np.linspace(0.0, height, numerics.layers + 1)
+    first, between = numerics.pad_layer / numerics.pad_layers, numerics.layers - 2 * numerics.pad_layers
+    steps = 1 + np.minimum(np.arange(between), np.arange(between)[::-1])
+    rest = (height - 2.0 * numerics.pad_layer) / first
+
+    def missing(logarithm: float) -> float:
+        return float(np.exp(logarithm * steps).sum()) - rest
+
+    limits = -math.log(LARGEST_GROWTH), math.log(LARGEST_GROWTH)
+    if between < 1 or not missing(limits[0]) <= 0.0 <= missing(limits[1]):
+        raise ValueError(
+            f"{numerics.layers} layers, of which {numerics.pad_layers} in {numerics.pad_layer:.3g} m at either pad, do"
+            f" not fill {height:.3g} m: each next one may be {LARGEST_GROWTH:g} times as high or low as the one before"
+        )
+    inner = first * np.exp(brentq(missing, *limits, xtol=1.0e-14) * steps)
+    pad = np.full(numerics.pad_layers, first)
+    return height * np.concatenate([[0.0], (total := np.concatenate([pad, inner, pad]).cumsum()) / total[-1]])
 
 
 def layer_cells(quads: np.ndarray, nodes: int, layers: int) -> np.ndarray:

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from reflowshock.cases.hard.trials.surfaces import truncated_sphere
+from reflowshock.meshing.board.parameters import JointNumerics
 from reflowshock.meshing.core.hexahedra import volumes
 from reflowshock.meshing.joint.swept import butterfly, layer_cells, solder_levels
 from reflowshock.meshing.surface.closed_surface import close_surface, enclosed_volume, measure
@@ -27,7 +28,9 @@ def test_correction_of_the_sections_vanishes_at_second_order():
     """Chords over n layers cut off 2 pi h^2 H / 12 of a sphere's volume, h = H / n."""
     surface = close_surface(*truncated_sphere(RADIUS, HALF_GAP, 192, 97)[0])
     section = butterfly(4, 2)
-    corrections = [solder_levels(surface, section, layers, np.asarray).scale - 1.0 for layers in (4, 8, 16)]
+    corrections = [
+        solder_levels(surface, section, JointNumerics(layers=layers), np.asarray).scale - 1.0 for layers in (4, 8, 16)
+    ]
     assert np.log2(corrections[0] / corrections[1]) == pytest.approx(2.0, abs=0.2)
     assert np.log2(corrections[1] / corrections[2]) == pytest.approx(2.0, abs=0.2)
 
@@ -36,7 +39,7 @@ def test_correction_of_the_sections_vanishes_at_second_order():
 def test_volume_and_end_areas_are_exact_at_any_resolution(layers):
     surface = close_surface(*truncated_sphere(RADIUS, HALF_GAP, 48, 25)[0])
     section = butterfly(2, 1)
-    levels = solder_levels(surface, section, layers, np.asarray).points
+    levels = solder_levels(surface, section, JointNumerics(layers=layers), np.asarray).points
     cells = layer_cells(section.quads, levels.shape[1], layers)
     assert volumes(levels.reshape(-1, 3), cells).sum() == pytest.approx(enclosed_volume(surface), rel=1e-12)
     x, y = levels[0, section.rim, 0], levels[0, section.rim, 1]
@@ -48,7 +51,7 @@ def test_width_of_the_mesh_is_that_of_the_sphere():
     """An even number of layers has a level at the equator, whose octagon has the area of its circle."""
     surface = close_surface(*truncated_sphere(RADIUS, HALF_GAP, 96, 49)[0])
     section = butterfly(2, 1)
-    middle = solder_levels(surface, section, 6, np.asarray).points[3]
+    middle = solder_levels(surface, section, JointNumerics(layers=6), np.asarray).points[3]
     x, y = middle[section.rim, 0], middle[section.rim, 1]
     area = 0.5 * np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)
     assert 2.0 * np.sqrt(area / np.pi) == pytest.approx(2.0 * RADIUS, rel=5e-3)

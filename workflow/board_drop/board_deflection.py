@@ -4,12 +4,14 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from reflowshock.effect import Decision
 from reflowshock.fem.estimates.drop_effects import Deflection, called_for
+from reflowshock.fem.materials.kinematics import Kinematics
+from reflowshock.workflow.board_drop import shock_cooling
 
 if TYPE_CHECKING:
     from reflowshock.fem.materials.parameters import Material
@@ -29,14 +31,34 @@ def expected_deflection(case: "BoardDropCase") -> Deflection:
     """
     from reflowshock.fem.loads.shock_pulse import shock_pulse
 
+    length, omega = first_mode(case)
+    deflection = first_mode_peak(omega, shock_pulse(case.shock).pulse.integral, longest_duration(case))
+    return Deflection(deflection, math.pi / length * deflection, omega)
+
+
+def first_mode(case: "BoardDropCase") -> tuple[float, float]:
+    """Return length [m] and angular frequency [rad/s] of the board as a beam that is pinned at its holes."""
     board, (young_x, young_y, _) = case.board, case.materials.board.engineering_constants.young
     holes = board.holes
     spans = ((board.length - 2.0 * holes.inset_x, young_x), (board.width - 2.0 * holes.inset_y, young_y))
     length, young = max(spans)
     stiffness = young * board.thickness * board.thickness / 12.0 / case.materials.board.density
-    omega = (math.pi / length) ** 2 * math.sqrt(stiffness)
-    deflection = first_mode_peak(omega, shock_pulse(case.shock).pulse.integral, case.shock.duration)
-    return Deflection(deflection, math.pi / length * deflection, omega)
+    return length, (math.pi / length) ** 2 * math.sqrt(stiffness)
+
+
+def longest_duration(case: "BoardDropCase") -> float:
+    """Return the time [s] that a shock is followed: if it is ``auto``, at most, a period after its pulse.
+
+    Screws hold a board more firmly than pins, so its own period is shorter. Errors as ``expected_deflection``.
+    """
+    from reflowshock.fem.loads.pulse import Tabulated
+    from reflowshock.fem.loads.shock_pulse import input_pulse
+
+    if case.shock.duration != "auto":
+        return case.shock.duration
+    pulse, _ = input_pulse(case.shock)
+    end = float(pulse.times[-1]) if isinstance(pulse, Tabulated) else pulse.duration
+    return end + math.tau / first_mode(case)[1]
 
 
 def first_mode_peak(omega: float, velocity: Callable[[float], float], duration: float) -> float:
@@ -57,21 +79,21 @@ def first_mode_peak(omega: float, velocity: Callable[[float], float], duration: 
     return float(np.abs(swing).max()) / omega
 
 
-def decide_kinematics(case: "BoardDropCase") -> tuple[Literal["small", "finite"], str]:
+def decide_kinematics(case: "BoardDropCase") -> tuple[Kinematics, str]:
     """Return the kinematics that the deflection of the board calls for, and why; errors as ``expected_deflection``."""
-    return called_for(expected_deflection(case).largest / case.board.thickness)
+    return called_for(expected_deflection(case).largest / case.board.thickness, shock_cooling.is_wanted(case))
 
 
 def decided(case: "BoardDropCase") -> "BoardDropCase":
-    """Return the case with kinematics that are small or finite, as its board's deflection calls for.
+    """Return the case with the kinematics and the duration that its scene calls for.
 
     Raises:
         PulseError: the table of the pulse cannot be read.
     """
-    if case.shock.numerics.kinematics != "auto":
-        return case
-    numerics = case.shock.numerics.model_copy(update={"kinematics": decide_kinematics(case)[0]})
-    return case.model_copy(update={"shock": case.shock.model_copy(update={"numerics": numerics})})
+    update: dict[str, Any] = {"duration": longest_duration(case)}
+    if case.shock.numerics.kinematics == "auto":
+        update["numerics"] = case.shock.numerics.model_copy(update={"kinematics": decide_kinematics(case)[0]})
+    return case.model_copy(update={"shock": case.shock.model_copy(update=update)})
 
 
 @dataclass(frozen=True)
@@ -107,6 +129,16 @@ class DropScene:
 
         return shock_pulse(self.case.shock).gravity
 
+    @property
+    def cooled(self) -> bool:
+        """Whether the shock begins with the stress of cooling."""
+        return shock_cooling.is_wanted(self.case)
+
+    @property
+    def duration(self) -> float:
+        """How long it is followed, at most [s]."""
+        return longest_duration(self.case)
+
     @cached_property
     def expected(self) -> Deflection:
         """How the shock bends the board."""
@@ -117,4 +149,4 @@ class DropScene:
         """Deflection of the board [m] by weight alone."""
         from reflowshock.fem.loads.pulse import STANDARD_GRAVITY
 
-        return first_mode_peak(self.expected.omega, lambda time: STANDARD_GRAVITY * time, self.shock.duration)
+        return first_mode_peak(self.expected.omega, lambda time: STANDARD_GRAVITY * time, self.duration)

@@ -8,7 +8,7 @@ from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.problem.thermal import Thermal
 from reflowshock.problem import Problem
 from reflowshock.workflow.board_drop import shock_cooling
-from reflowshock.workflow.board_drop.board_deflection import decided
+from reflowshock.workflow.board_drop.board_deflection import decided, longest_duration
 from reflowshock.workflow.board_drop.shock_effects import shock_effects
 from reflowshock.workflow.board_drop.shock_forecast import (
     PartForecast,
@@ -118,7 +118,7 @@ def step_problems(case: BoardDropCase) -> Iterator[Problem]:
     with np.errstate(all="ignore"):
         steps = [part.critical_step for part in forecast_parts(case).values() if not part.mass_scaled]
         step = damped_critical_step(min(steps), case.shock.damping.coefficients[1]) if steps else math.inf
-    yield from (found := list(too_many_steps("shock.duration", case.shock.duration, step, "explicit")))
+    yield from (found := list(too_many_steps("shock.duration", longest_duration(case), step, "explicit")))
     if not found and "two_scale" in case.shock.numerics.modes:
         yield from shorter_than_window(case)
 

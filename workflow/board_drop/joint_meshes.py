@@ -144,9 +144,13 @@ def mesh_array(
     Returns:
         Kind of joint mesh, which begins the names of its metrics -> joint -> quality.
     """
+    from reflowshock.meshing.joint.column import columns_of
     from reflowshock.meshing.joint.solder_mesh import mesh_coarse_or_fine, mesh_joint
 
-    fine = [mesh_joint(surface, site, case.package, side) for surface, site in bodies]
+    fine = [
+        mesh_joint(surface, site, case.package, side, columns_of(site, case.package, case.board, side))
+        for surface, site in bodies
+    ]
     kinds = {prefix: fine}
     if isinstance(case, BoardDropCase) and needs_coarse_joints(case.shock.coupling):
         kinds[f"{prefix}coarse_"] = [

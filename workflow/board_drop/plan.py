@@ -5,12 +5,15 @@ from collections.abc import Iterator
 from rich.console import RenderableType
 from rich.table import Table
 
+from reflowshock.workflow.board_drop.board_deflection import longest_duration
 from reflowshock.workflow.board_drop.forecast import PackageForecast
 from reflowshock.workflow.board_drop.shock_forecast import ShockForecast
 from reflowshock.workflow.case.text import duration, short
 from reflowshock.workflow.package.case import BoardDropCase, PackageCase
 from reflowshock.workflow.process.environment import available_cores
 from reflowshock.workflow.process.terminal import REFLOW_SPEED, new_table, styled
+
+SETTLES = "ends when the joints' first peak has passed and half a swing of the board has brought no higher one"
 
 
 def package_tables(case: PackageCase, outlook: PackageForecast) -> Iterator[RenderableType]:
@@ -55,6 +58,8 @@ def _shock(case: BoardDropCase, shock: ShockForecast) -> Table:
     scheme, why = shock.scheme
     table.add_row("scheme", scheme.replace("_", " "), why)
     table.add_row("fine joints", *_fine_joints(case))
+    if case.shock.duration == "auto":
+        table.add_row("duration", f"at most {short(longest_duration(case))}", SETTLES)
     table.add_row("window", short(shock.window), f"step of the macro model, {shock.windows} windows")
     table.add_row("steps per window", *_levels(shock))
     table.add_row("step ratio m", f"{shock.substeps}", f"step of the DNS {short(shock.window / shock.substeps)}")
@@ -66,7 +71,7 @@ def _shock(case: BoardDropCase, shock: ShockForecast) -> Table:
         table.add_row(
             "identical joints", f"about {duration(again)}", "the first mode again, to see what the real shapes change"
         )
-    part = f"; the first {short(shock.dns_share * case.shock.duration)}" if shock.dns_share < 1.0 else ""
+    part = f"; the first {short(shock.dns_share * longest_duration(case))}" if shock.dns_share < 1.0 else ""
     dns = f"all {every} ranks on one model{part}" + _absent("dns", case)
     table.add_row("DNS", f"about {duration(shock.dns)}", dns)
     table.add_row(

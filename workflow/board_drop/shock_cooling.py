@@ -32,6 +32,9 @@ def is_wanted(case: BoardDropCase) -> bool:
 
 def problems(case: BoardDropCase) -> Iterator[Problem]:
     """Find shocks that cannot begin with the stress of cooling."""
+    if is_wanted(case) and case.shock.numerics.kinematics == "corotational":
+        message = "cannot be combined with thermal.effects.residual_stress = on, which needs a path"
+        yield Problem("shock.numerics.kinematics", message, "corotational", "finite, auto")
     if is_wanted(case) and case.shock.coupling.direction == "one_way" and "two_scale" in case.shock.numerics.modes:
         message = "cannot be combined with thermal.effects.residual_stress = on: the macro model has its joints twice"
         yield Problem("shock.coupling.direction", message, "one_way", "two_way")

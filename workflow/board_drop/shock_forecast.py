@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from reflowshock.fem.materials.parameters import Material
 from reflowshock.problem import Problem
+from reflowshock.workflow.board_drop.board_deflection import longest_duration
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.case.text import short
 
@@ -14,6 +15,8 @@ if TYPE_CHECKING:
     from reflowshock.workflow.package.case import BoardDropCase
 
 MACRO = "board"  # role of the parts whose elements the window follows
+BOXES = ("board", "substrate", "die")  # roles whose elements are boxes
+COLUMN = "_column"  # ends the names of parts of board and substrate around fine joints
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +114,9 @@ def _driven_parts(case: "BoardDropCase") -> dict[str, PartForecast]:
     from reflowshock.meshing.board.estimate import count_elements
 
     estimates = count_elements(case.package, case.board, case.warpage, fine_joint_count(case))
-    return _forecasts(case, {name: part for name, part in estimates.items() if name in ("solder", "copper")})
+    return _forecasts(
+        case, {name: part for name, part in estimates.items() if name in ("solder", "copper") or name.endswith(COLUMN)}
+    )
 
 
 def fine_joint_count(case: "BoardDropCase") -> int | None:
@@ -153,10 +158,10 @@ def forecast_shock(case: "BoardDropCase", parts: Parts) -> ShockForecast:
     scheme, levels, seconds = _coupled(case, two_scale_parts(case))
     search = _coupled(case, coarse_parts(case))[2] if shock.coupling.fine_joints == "critical" else 0.0
     plan, dns = _direct(case, parts)
-    direct = shortened(plan, shock.numerics.dns_duration or shock.duration)
+    direct = shortened(plan, shock.numerics.dns_duration or longest_duration(case))
     share = direct.windows / plan.windows
     pulses = [shock.pulse_duration] if shock.pulse_duration else []
-    slow = implicit_plan(direct, largest_implicit_step(shock.duration, pulses))
+    slow = implicit_plan(direct, largest_implicit_step(longest_duration(case), pulses))
     elements = sum(part.elements for part in parts.values())
     implicit = implicit_cost(plate_nodes(elements), slow.windows * slow.substeps).seconds
     return ShockForecast(
@@ -190,7 +195,7 @@ def is_linear(parts: Parts) -> bool:
 def _slow(case: "BoardDropCase", parts: Parts) -> frozenset[str]:
     """Return the parts that the window follows: the board, or all that drives."""
     driving = coarse_parts(case) if case.shock.coupling.direction == "one_way" else ()
-    return frozenset(driving or (name for name in parts if role_of(name) == MACRO))
+    return frozenset(driving or (name for name in parts if is_box(name)))
 
 
 def _plan(case: "BoardDropCase", parts: Parts):
@@ -202,7 +207,7 @@ def _plan(case: "BoardDropCase", parts: Parts):
     limiting = [part.critical_step for part in parts.values() if not part.mass_scaled]
     meso = min(limiting, default=macro)
     macro, meso = (damped_critical_step(step, shock.damping.coefficients[1]) for step in (macro, meso))
-    return window_plan(macro, meso, numerics.step_fraction, shock.duration, numerics.history_samples)
+    return window_plan(macro, meso, numerics.step_fraction, longest_duration(case), numerics.history_samples)
 
 
 def shorter_than_window(case: "BoardDropCase") -> Iterator[Problem]:
@@ -213,7 +218,7 @@ def shorter_than_window(case: "BoardDropCase") -> Iterator[Problem]:
     slowest = min(parts[name].critical_step for name in _slow(case, parts) & parts.keys())
     longest = shock.numerics.step_fraction * damped_critical_step(slowest, shock.damping.coefficients[1])
     for key, duration, window in (
-        ("shock.duration", shock.duration, longest),
+        ("shock.duration", longest_duration(case), longest),
         ("shock.pulse_duration", shock.pulse_duration, min(longest, _plan(case, parts).window)),
     ):
         if duration is not None and duration < window:
@@ -248,7 +253,7 @@ def _coupled(case: "BoardDropCase", parts: Parts) -> tuple[tuple[str, str], tupl
         cost = sum(part.elements * part.cost for part in here.values())
         levels.append(LevelForecast(tuple(here), plan.window / count, count, elements, cost))
     work = [(level.cost, level.count) for level in levels[1:]]
-    boxes = sum(parts[name].elements * (1.0 if role_of(name) == MACRO else BOARD_ADVANTAGE) for name in levels[0].parts)
+    boxes = sum(parts[name].elements * (1.0 if is_box(name) else BOARD_ADVANTAGE) for name in levels[0].parts)
     return scheme, tuple(levels), predict_seconds(boxes, work, plan, case.shock.ranks)[0]
 
 
@@ -281,7 +286,7 @@ def _levels(case: "BoardDropCase", parts: Parts, window: float) -> tuple[tuple[i
 
     scaled_to = min(part.critical_step for part in parts.values() if not part.mass_scaled)
     steps = np.array([scaled_to if part.mass_scaled else part.critical_step for part in parts.values()])
-    box = np.array([role_of(name) == MACRO for name in parts])
+    box = np.array([is_box(name) for name in parts])
     cost = np.array([part.elements * part.cost for part in parts.values()]) * np.where(box, 1.0, BOARD_ADVANTAGE)
     coupling = case.shock.coupling
     pace = Pace(steps, cost, window, case.shock.numerics.step_fraction)
@@ -299,16 +304,25 @@ def _levels(case: "BoardDropCase", parts: Parts, window: float) -> tuple[tuple[i
 def relative_cost(case: "BoardDropCase", part: str) -> float:
     """Return the cost of an element of a part over that of an elastic one: what yields or turns has a path."""
     from reflowshock.fem.estimates.estimate import UPDATES_PER_SECOND
-    from reflowshock.fem.estimates.solver_cost import NONLINEAR_RATE
+    from reflowshock.fem.estimates.solver_cost import COROTATIONAL_RATE, NONLINEAR_RATE
 
     numerics = case.shock.numerics
-    has_path = material_of(case, part).plasticity is not None or numerics.kinematics == "finite"
-    return UPDATES_PER_SECOND / NONLINEAR_RATE[numerics.formulation] if has_path else 1.0
+    elastic = material_of(case, part).plasticity is None
+    if elastic and numerics.kinematics == "small":
+        return 1.0
+    if elastic and numerics.kinematics == "corotational" and role_of(part) in BOXES and not part.endswith(COLUMN):
+        return UPDATES_PER_SECOND / COROTATIONAL_RATE
+    return UPDATES_PER_SECOND / NONLINEAR_RATE[numerics.formulation]
 
 
 def role_of(part: str) -> str:
     """Return the material role of a part: its name up to "@", then up to "_"."""
     return part.split("@")[0].split("_")[0]
+
+
+def is_box(part: str) -> bool:
+    """Whether a part is of the board's boxes: a column in their place has smaller elements."""
+    return role_of(part) == MACRO and not part.endswith(COLUMN)
 
 
 def material_of(case: "BoardDropCase", part: str) -> Material:

@@ -16,6 +16,7 @@ from reflowshock.workflow.board_drop.shock_cooling import begun
 from reflowshock.workflow.case.run import Run
 from reflowshock.workflow.package.case import BoardDropCase
 from reflowshock.workflow.process.fem_launch import run_fem
+from reflowshock.workflow.process.products import read_json
 
 MODES = {"two_scale": "two-scale", "dns": "DNS"}
 IDENTICAL_TITLE = "identical joints"
@@ -32,6 +33,7 @@ def find_fine_joints(run: Run[BoardDropCase], folder: Path) -> FineJoints:
     all_coarse = coupling.model_copy(update={"fine_joints": "all", "direction": "two_way"})
     request = _request(run, "two_scale", ("assembly", "coarse_joints"), all_coarse)
     request["checkpoints"] = str(run.checkpoints("shock").resolve() / "coarse")
+    request["settles"] = run.case.shock.duration == "auto"
     run_fem(run, folder / "coarse", request, "shock, coarse joints")
     fine = most_stressed(folder / "coarse/history.npz", coupling.critical_joints)
     write_fine_joints(folder, fine)
@@ -54,11 +56,23 @@ def run_mode(run: Run[BoardDropCase], folder: Path, mode: str, fine: FineJoints,
     chosen = fine.names if mode == "two_scale" else "all"
     coupling = run.case.shock.coupling.model_copy(update={"fine_joints": chosen})
     request = _request(run, mode, (f"{prefix}assembly", f"{prefix}joints"), coupling)
+    request |= _end_of_first(run, folder.parent)
     if mode == "two_scale" and needs_coarse_joints(coupling):
         request["coarse_joints"] = _mesh(run, f"{prefix}coarse_joints")
     request["checkpoints"] = str(run.checkpoints("shock").resolve() / folder.name)
     request = begun(run, folder.parent, request, prefix)
     run_fem(run, folder, request, f"shock, {MODES[mode]}" + (f", {IDENTICAL_TITLE}" if prefix else ""))
+
+
+def _end_of_first(run: Run[BoardDropCase], folder: Path) -> dict:
+    """Return when a run ends, where the case does not say it: with the first mode, which ends when it has settled."""
+    if run.case.shock.duration != "auto":
+        return {}
+    result = folder / run.case.shock.numerics.modes[0] / "result.json"
+    if not result.exists():
+        return {"settles": True}
+    model = read_json(result)["model"]
+    return {"end": model["window"] * model["windows"]}
 
 
 def _mesh(run: Run[BoardDropCase], name: str) -> str:
@@ -71,7 +85,7 @@ def _request(run: Run[BoardDropCase], mode: str, meshes: tuple[str, ...], coupli
     return {
         "mode": mode,
         "meshes": [_mesh(run, name) for name in meshes],
-        "shock": shock.model_dump(mode="json"),
+        "shock": shock.model_dump(mode="json", exclude={"failure"}),
         "materials": run.case.materials.model_dump(mode="json"),
     }
 

@@ -121,7 +121,7 @@ def _to_si_value(field: FieldInfo, value: object, key: str, problems: list[Probl
     quantity = quantity_of(field)
     if quantity is not None and isinstance(value, list):
         return tuple(_converted(quantity, field, key, item, problems) for item in value)
-    if quantity is not None:
+    if quantity is not None and not any(value in literal_names(kind) for kind in alternatives(field)):
         return _converted(quantity, field, key, value, problems)
     if isinstance(value, dict) and holds_named_tables(field):
         problems += [wrong_name(key, name) for name in value if not is_name(name)]

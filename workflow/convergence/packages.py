@@ -7,6 +7,7 @@ from typing import Any
 
 from reflowshock.meshing.board.pads import pad_table
 from reflowshock.units import from_si
+from reflowshock.workflow.board_drop.board_deflection import longest_duration
 from reflowshock.workflow.board_drop.shock_forecast import implicit_seconds
 from reflowshock.workflow.board_drop.shock_launch import MODES
 from reflowshock.workflow.convergence.series import ConvergenceStudy, Parameter, Quantity, StudyRun, at_same_times
@@ -58,6 +59,10 @@ def _dropped(case: BoardDropCase) -> ConvergenceStudy:
     ]
     parameters = (_mesh(case, whole), _critical(case), *(parameter for parameter, _ in parts))
     choices = (*(finest for _, finest in parts), *_couplings(case))
+    if case.shock.duration == "auto":  # runs are compared over the same time
+        given = {"shock.duration": from_si(longest_duration(case), "ms", digits=6)}
+        parameters = tuple(parameter.under(given) for parameter in parameters)
+        choices = tuple(run.under(given) for run in choices)
     return ConvergenceStudy("shock", ("shock",), ERRORS, _motion, parameters, choices)
 
 
@@ -77,7 +82,7 @@ def _motion(case: Any, run_folder: Path) -> dict[str, Quantity]:
     result = read_json(folder / "result.json")
     joint = list(history["joints"]).index(result["metrics"]["critical_joint"]["value"])
     stress = {"time": history["time"], **{side: history[side][:, joint] for side in SIDES}}
-    duration, count = case.shock.duration, case.shock.numerics.history_samples + 1
+    duration, count = case.shock.decided_duration, case.shock.numerics.history_samples + 1
     peak = max(float(stress[side].max()) for side in SIDES)
     return {
         "stress_history": Quantity(at_same_times(stress, SIDES, duration, count)),
@@ -174,10 +179,27 @@ def _of_board(case: BoardDropCase, size: float) -> dict[str, str]:
 def _of_joints(case: BoardDropCase, size: float) -> dict[str, str]:
     """Elements of fine joints that are so many times as large."""
     own, key = case.package.joint_numerics, "package.joint_numerics"
-    return {
+    settings = {
         f"{key}.core": f"{_count(own.core, size)}",
         f"{key}.rings": f"{_count(own.rings, size)}" if own.rings else "0",
         f"{key}.layers": f"{max(2, _count(own.layers, size))}",
+    }
+    if own.copper_layers > 1:
+        settings |= {f"{key}.copper_layers": f"{_count(own.copper_layers, size)}"}
+    if own.pad_layer is not None:
+        settings |= {f"{key}.pad_layers": f"{_count(own.pad_layers, size)}"}
+    return settings | _of_columns(case, size)
+
+
+def _of_columns(case: BoardDropCase, size: float) -> dict[str, str]:
+    """Elements of the columns of fine joints that are so many times as large, where there are columns."""
+    imprint, key = case.package.imprint, "package.imprint"
+    if imprint is None:
+        return {}
+    return {
+        f"{key}.rings": f"{_count(imprint.rings, size)}",
+        f"{key}.first_layer": _length(size * imprint.first_layer),
+        f"{key}.growth": f"{1.0 + size * (imprint.growth - 1.0):.4g}",
     }
 
 

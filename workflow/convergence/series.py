@@ -53,6 +53,10 @@ class StudyRun:
     value: float | None = None
     against: str = ""
 
+    def under(self, settings: Mapping[str, str]) -> "StudyRun":
+        """Return it under settings that hold for all runs, unless it has its own."""
+        return replace(self, settings={**settings, **self.settings})
+
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
@@ -76,6 +80,10 @@ class Parameter:
     def runs(self) -> tuple[StudyRun, ...]:
         """What is measured of it."""
         return tuple(self.at(value) for value in self.values)
+
+    def under(self, settings: Mapping[str, str]) -> "Parameter":
+        """Return it with all its runs under settings."""
+        return replace(self, at=lambda value: self.at(value).under(settings))
 
     def apart(self, finest: float) -> tuple["Parameter", StudyRun]:
         """Return it by itself, and its finest run: the others are compared with that, so no other error is in theirs.

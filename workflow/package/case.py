@@ -31,11 +31,14 @@ GIVEN = ("package.surfaces", "package.surface_unit")
 JOINT_MESHES = (
     "package.joint_numerics",
     "package.coarse_joint_numerics",
+    "package.imprint",
     "shock.coupling.fine_joints",
     "shock.coupling.direction",
     "shock.identical_joints",
 )
-DRAWN_MESH = (*DRAWN, "package.copper", "package.substrate", "package.die", "package.numerics", "board")
+DRAWN_MESH = (
+    *DRAWN, "package.copper", "package.substrate", "package.die", "package.numerics", "package.imprint", "board",
+)  # fmt: skip
 HEATED = tuple(
     f"thermal.{name}"
     for name in (

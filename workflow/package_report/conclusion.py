@@ -4,12 +4,13 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from reflowshock.fem.estimates.drop_effects import Failing
+from reflowshock.workflow.board_drop.board_deflection import longest_duration
 from reflowshock.workflow.case.run import metric
 from reflowshock.workflow.package import findings
 from reflowshock.workflow.package.case import BoardDropCase
 from reflowshock.workflow.package.verdict import answer, verdict_of
 from reflowshock.workflow.report.errors import Discretisation
-from reflowshock.workflow.report.histories import late_peak, read_modes
+from reflowshock.workflow.report.histories import Arrays, late_peak, read_modes, unsettled
 
 PEEL = "peel_stress"
 
@@ -36,9 +37,16 @@ def conclude(run_folder: Path, case: BoardDropCase, summary: dict, known: Discre
     deciding = verdict["joints"][verdict["joint"]]["criterion"]
     summary |= {
         "verdict": verdict,
-        "warnings": [warning for warning in (late_peak(histories[main]),) if warning],
+        "warnings": [warning for warning in _warnings(case, histories[main]) if warning],
         "answer": answer(verdict, known.errors.get(deciding)),
     }
+
+
+def _warnings(case: BoardDropCase, history: Arrays) -> tuple[str, ...]:
+    """Say that the stress may rise beyond the end of the run."""
+    if case.shock.duration == "auto":
+        return (unsettled(history, longest_duration(case)),)
+    return (late_peak(history),)
 
 
 def _coarse(result: Mapping, joints) -> list[str]:

@@ -7,6 +7,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
+from reflowshock.quantity import Quantity
 from reflowshock.workflow.case.case import Case
 from reflowshock.workflow.case.fields import allowed, display, holds_named_tables, models_of, quantity_of
 from reflowshock.workflow.case.names import NAME
@@ -60,8 +61,8 @@ def _kind_schema(kind: type[Case]) -> dict:
     for model in set(_reachable(kind)):
         properties = schema if model is kind else schema["$defs"][model.__name__]
         for name, field in model.model_fields.items():
-            if quantity_of(field) is not None:
-                _add_range_and_default(properties["properties"][name], field)
+            if (quantity := quantity_of(field)) is not None:
+                _add_range_and_default(properties["properties"][name], quantity, field)
             if holds_named_tables(field):
                 properties["properties"][name]["propertyNames"] = {"pattern": NAME}
     # Defaults of whole tables would be repeated in SI floats; each field has its own.
@@ -69,9 +70,9 @@ def _kind_schema(kind: type[Case]) -> dict:
     return schema
 
 
-def _add_range_and_default(schema: dict, field: FieldInfo) -> None:
+def _add_range_and_default(schema: dict, quantity: Quantity, field: FieldInfo) -> None:
     """Add to the schema of a quantity what its annotation does not know: which values it may have, and has."""
-    schema["description"] += f"; {allowed(field)}"
+    schema["description"] = f"{quantity.described}; {allowed(field)}"
     if field.default in (PydanticUndefined, None):
         schema.pop("default", None)
     else:

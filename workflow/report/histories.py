@@ -7,6 +7,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from reflowshock.fem.output.settled import is_settled
+
 Arrays = Mapping[str, NDArray]
 
 MODES = ("two_scale", "dns")
@@ -37,6 +39,16 @@ def joint_stress(history: Arrays, joint: str) -> NDArray[np.float64]:
 def peaks(history: Arrays) -> dict[str, float]:
     """Peak of the same by joint [Pa]."""
     return dict(zip(map(str, history["joints"]), at_pads(history).max(axis=0).tolist(), strict=True))
+
+
+def unsettled(history: Arrays, longest: float) -> str:
+    """A warning if a shock of automatic duration ended at its longest time [s] before it had settled; else empty."""
+    if is_settled(history):
+        return ""
+    return (
+        f"The run ended at the longest automatic duration ({1e3 * longest:.3g} ms) before half a swing of the board had"
+        " passed since the largest stress: give a longer shock.duration."
+    )
 
 
 def late_peak(history: Arrays) -> str:

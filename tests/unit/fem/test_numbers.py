@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import trapezoid
 
+from reflowshock.cases.hard.trials.grids import COPPER as PAD
 from reflowshock.fem.dynamics.energy_balance import SUMS, EnergyBalance
 from reflowshock.fem.elements.stress import principal_strain, von_mises
 from reflowshock.fem.errors import EnergyError
@@ -160,6 +161,8 @@ def write_history(path: Path, scale: float, joints: tuple[str, ...] = ("A1", "A2
         board_strain=base[:, 0],
         von_mises_board=base * [1, 3],
         von_mises_package=base * [2, 1],
+        peel_board=base * [1, 2],
+        peel_package=base * [1, 1],
     )
     return path
 
@@ -168,7 +171,13 @@ def test_comparison_is_relative_to_the_dns(tmp_path):
     ours, reference = write_history(tmp_path / "a.npz", 1.1), write_history(tmp_path / "b.npz", 1.0)
     found = compare_histories(ours, reference)
     assert found["critical_joint"] == "A2"
-    for name in ("critical_joint_stress", "die_displacement", "board_displacement", "worst_joint_stress"):
+    for name in (
+        "critical_joint_stress",
+        "critical_joint_peel",
+        "die_displacement",
+        "board_displacement",
+        "worst_joint_stress",
+    ):
         assert found[f"{name}_error"] == pytest.approx(0.1)
 
 
@@ -192,10 +201,11 @@ def test_watch_table_of_the_small_assembly():
     centres = centre_nodes(mesh)
     assert mesh.points[centres[0]] == pytest.approx([0, 0, -BOARD_Z])
     assert mesh.points[centres[1], :2] == pytest.approx([0, 0])
-    table = whole_watch(mesh)
+    table = whole_watch(mesh, 25e-6)
     assert set(table.joints) == {"A2", "A3", "B2", "B3"}
-    assert len(table.layer_cells) == 4 * 2 * 9
-    assert table.layer_volume.sum() == pytest.approx(8.0)
-    assert table.layer_area.sum() == pytest.approx(8.0)
+    assert len(table.layer.cells) == len(table.faces.cells) == 4 * 2 * 9
+    assert table.layer.volume == pytest.approx(25e-6 * 0.4e-3**2)
+    assert table.faces.area == pytest.approx(0.4e-3**2)
+    assert table.faces.centre[:4, 2] == pytest.approx(PAD)
     assert len(table.strain_facets) == 7 * 7
     assert (table.strain_cells >= 0).all()

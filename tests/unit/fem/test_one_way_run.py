@@ -32,7 +32,9 @@ def files(tmp_path_factory) -> Path:
     coarse = []
     for name, place in SITES.items():
         mesh = joint_mesh(name, *place, layers=2, edges=1)
-        coarse.append(replace(mesh, part=0 * mesh.part, part_names=(f"solder@{name}",)))
+        facets = {f"pad_board@{name}": mesh.facets[f"foot@{name}"], f"pad_package@{name}": mesh.facets[f"head@{name}"]}
+        facets = mesh.facets | facets
+        coarse.append(replace(mesh, part=0 * mesh.part, part_names=(f"solder@{name}",), facets=facets))
     write_msh(append(coarse), directory / "coarse.msh")
     return directory
 

@@ -107,17 +107,18 @@ def test_stretching_is_bounded_and_grows_with_the_deflection():
     assert stiffened(0.01, STIFFENING_BOUND) == pytest.approx(0.25 * STIFFENING_BOUND * 1e-4, rel=1e-3)
     for measured_change, ratio in ((1.0 - 5.0 / 7.7, 7.7), (1.0 - 4.83 / 10.94, 10.94), (1.0 - 0.949 / 1.094, 1.094)):
         assert 0.5 < measured_change / stiffened(ratio, STIFFENING_OF_BOARD) < 2.0
-    assert called_for(0.05)[0] == "small" and called_for(1.0)[0] == "finite"
+    assert called_for(0.05, False)[0] == "small"
+    assert called_for(1.0, False)[0] == "corotational" and called_for(1.0, True)[0] == "finite"
     assert stiffened(0.1, STIFFENING_BOUND) < NEGLIGIBLE_STIFFENING < stiffened(0.15, STIFFENING_BOUND)
 
 
 def test_auto_kinematics_follow_the_deflection():
     auto = "shock.numerics.kinematics=auto"
     hard, soft = (read_case(SMALL_CASE, [auto, *more], True) for more in ([], [SLOW]))
-    assert decided(hard).shock.numerics.kinematics == ("finite" if _ratio(hard) > 0.12 else "small")
+    assert decided(hard).shock.numerics.kinematics == ("corotational" if _ratio(hard) > 0.12 else "small")
     assert decided(soft).shock.numerics.kinematics == "small"
     far = read_case(CASES / "bga_drop/case.toml", [auto], True)
-    assert decided(far).shock.numerics.kinematics == "finite"
+    assert decided(far).shock.numerics.kinematics == "corotational"
     told = kind_of(far).forecast(far).effects["finite_rotation"]
     assert told["on"] and "auto" in told["why"] and told["influence"] > 0.3
     with pytest.raises(ValueError, match="decided by the case"):

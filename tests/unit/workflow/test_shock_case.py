@@ -2,9 +2,12 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from reflowshock.workflow.board_drop.board_deflection import decided, expected_deflection, longest_duration
 from reflowshock.workflow.case.problems import CaseError
+from reflowshock.workflow.convergence.packages import package_study
 from reflowshock.workflow.pipeline.reader import read_case
 from tests.support.workflow_command import SMALL_CASE
 
@@ -81,3 +84,27 @@ def test_local_steps_along_a_path_are_refused(setting, why):
     ):
         read_case(SMALL_CASE, [local, setting])
     assert read_case(SMALL_CASE, [local]).shock.coupling.scheme == "local_steps"
+
+
+def test_an_automatic_duration_is_at_most_a_period_after_the_pulse():
+    case = read_case(SMALL_CASE, ["shock.duration=auto"])
+    period = 2.0 * np.pi / expected_deflection(case).omega
+    assert longest_duration(case) == pytest.approx(case.shock.pulse_duration + period)
+    assert decided(case).shock.duration == longest_duration(case)
+    with pytest.raises(ValueError, match="decided by the case"):
+        _ = case.shock.decided_duration
+    given = read_case(SMALL_CASE, ["shock.duration=0.2 ms"])
+    assert longest_duration(given) == given.shock.decided_duration == 2e-4
+
+
+@pytest.mark.parametrize("text", ["automatic", "0 ms", "3", '"-1 ms"'])
+def test_a_duration_is_a_time_or_auto(text):
+    with pytest.raises(CaseError, match=r"shock.duration.*\n?.*(> 0 ms|auto)"):
+        read_case(SMALL_CASE, [f"shock.duration={text}"])
+
+
+def test_meshes_are_compared_over_the_same_time():
+    case = read_case(SMALL_CASE, ["shock.duration=auto"])
+    runs = package_study(case).runs
+    assert {run.settings["shock.duration"] for run in runs} == {f"{1e3 * longest_duration(case):.6g} ms"}
+    assert "shock.duration" not in package_study(read_case(SMALL_CASE)).runs[0].settings

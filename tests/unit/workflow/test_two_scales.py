@@ -105,6 +105,7 @@ def test_coupling_and_comparison_become_metrics(tmp_path):
         np.savez(
             tmp_path / mode / "history.npz", time=np.arange(5.0), joints=np.array(["A3", "A4", "B3"]), die_centre=wave,
             board_centre=wave, board_strain=wave, von_mises_board=stress, von_mises_package=stress,
+            peel_board=stress, peel_package=stress,
         )  # fmt: skip
     found = of_shock({"two_scale": result | {"coupling": COUPLING}, "dns": result}, tmp_path, 1e-3)
     metrics = {name: metric["value"] for name, metric in found.metrics.items()}

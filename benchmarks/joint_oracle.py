@@ -1,0 +1,130 @@
+"""One joint between patches of board and substrate: the program's elements and ties against an independent oracle.
+
+    PYTHONPATH=. python benchmarks/joint_oracle.py [TABLE ...]  (one core; writes results/joint_oracle.json)
+
+``tests/support/joint_patch.py`` describes the scene, ``joint_oracle.py`` beside it the oracle: quadratic hexahedra in
+DOLFINx forms, Newton's method, HHT steps. Tables, each with the processor seconds of its rows:
+``elastic``  at rest: the oracle on three meshes, the program with imprinted pads and tied to boxes (2 minutes)
+``yielding`` at rest: the oracle on two meshes (5 minutes)
+``blow``     there and back in 20 us, elastic: the oracle in 80 and 160 steps, the program in explicit ones (2 minutes)
+``slow``     there and back in 0.2 ms, yielding: the oracle in 40 and 80 steps, the program (15 minutes)
+A row has its differences to the first row of its table: at rest of the measure itself, in motion of its largest
+absolute value. Plastic measures are those of the solder within 25 um of either pad unless they say otherwise.
+"""
+
+import argparse
+import json
+import os
+from collections.abc import Callable
+from pathlib import Path
+from time import process_time
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+from tests.support.joint_oracle import Patch, equilibrium, haversine, steps_in_time
+from tests.support.joint_patch import QUADRATIC, TRILINEAR, UM, JointPatch, mesh_patch
+from tests.support.joint_program import Course, ProgramPatch, box_mesh, matching_mesh
+
+RESULTS = Path(__file__).parent / "results" / "joint_oracle.json"
+PATCH = JointPatch()
+BLOW, SLOW = 20e-6, 0.2e-3
+BOXES = (500 * UM, 250 * UM, 125 * UM)
+SCALED = ("copper", "solder")  # at 0.2 ms their added inertia is 0.4 % of the axial force
+PRINTED = ("axial@foot", "shear@foot", "moment@foot", "moment@head", "von_mises@foot:25um", "plastic_work@foot:25um")
+Measures = dict[str, float]
+
+
+def oracle(mesh: str, yields: bool) -> Patch:
+    """Return the oracle's patch on one of its meshes."""
+    return Patch(PATCH, mesh_patch(PATCH, QUADRATIC[mesh], 2), yields)
+
+
+def program(mesh: str | float, course: Course) -> ProgramPatch:
+    """Return the program's patch: pads imprinted on one of its meshes, or boxes of a size [m]."""
+    imprinted = isinstance(mesh, str)
+    data = matching_mesh(PATCH, TRILINEAR[mesh]) if imprinted else box_mesh(PATCH, TRILINEAR["middle"], mesh, (8, 4))
+    return ProgramPatch(PATCH, data, course)
+
+
+def peaks(found: list[Measures]) -> Measures:
+    """Return the value of each measure where its absolute value is largest."""
+    return {name: max((row[name] for row in found), key=abs) for name in found[0] if name != "time"}
+
+
+def elastic() -> dict[str, Callable[[], Measures]]:
+    """Return the rows of the elastic patch at rest."""
+    rows = {f"oracle, {mesh}": lambda mesh=mesh: equilibrium(oracle(mesh, False))[-1] for mesh in reversed(QUADRATIC)}
+    meshes = {f"program, imprinted, {mesh}": mesh for mesh in TRILINEAR}
+    meshes |= {f"program, boxes of {size / UM:g} um": size for size in BOXES}
+    return rows | {name: lambda mesh=mesh: program(mesh, Course()).at_rest() for name, mesh in meshes.items()}
+
+
+def yielding() -> dict[str, Callable[[], Measures]]:
+    """Return the rows of the yielding patch at rest."""
+    settings = [("middle", 5), ("coarse", 10), ("coarse", 5)]
+    return {
+        f"oracle, {mesh}, {steps} steps": lambda mesh=mesh, steps=steps: equilibrium(oracle(mesh, True), steps)[-1]
+        for mesh, steps in settings
+    }
+
+
+def blow() -> dict[str, Callable[[], Measures]]:
+    """Return the rows of the elastic patch in 20 us."""
+    return {
+        f"oracle, {mesh}, {steps} steps": lambda mesh=mesh, steps=steps: peaks(
+            steps_in_time(oracle(mesh, False), haversine(BLOW), BLOW / steps, steps)
+        )
+        for mesh, steps in [("middle", 160), ("middle", 80), ("coarse", 160)]
+    } | {
+        f"program, imprinted, {mesh}": lambda mesh=mesh: peaks(program(mesh, Course(BLOW)).run(100))
+        for mesh in ("coarse", "middle")
+    }
+
+
+def slow() -> dict[str, Callable[[], Measures]]:
+    """Return the rows of the yielding patch in 0.2 ms."""
+    return {
+        f"oracle, coarse, {steps} steps": lambda steps=steps: peaks(
+            steps_in_time(oracle("coarse", True), haversine(SLOW), SLOW / steps, steps)
+        )
+        for steps in (80, 40)
+    } | {
+        f"program, imprinted, {mesh}": lambda mesh=mesh: peaks(program(mesh, Course(SLOW, True, SCALED)).run(100))
+        for mesh in ("coarse", "middle")
+    }
+
+
+TABLES = {"elastic": elastic, "yielding": yielding, "blow": blow, "slow": slow}
+
+
+def measured(rows: dict[str, Callable[[], Measures]]) -> dict[str, dict]:
+    """Compute the rows of a table, with differences to the first."""
+    table: dict[str, dict] = {}
+    for name, compute in rows.items():
+        begin = process_time()
+        values = compute()
+        seconds = process_time() - begin
+        first = next(iter(table.values()))["values"] if table else values
+        differences = {key: value / first[key] - 1.0 for key, value in values.items() if first.get(key)}
+        table[name] = {"seconds": seconds, "values": values, "differences": differences}
+        told = "  ".join(
+            f"{key} {values[key]:.4g} ({differences[key]:+.1%})" for key in PRINTED if differences.get(key) is not None
+        )
+        print(f"{name:32} {seconds:6.1f} s  {told}", flush=True)
+    return table
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("tables", nargs="*", metavar="TABLE", help=f"of {', '.join(TABLES)}; all without")
+    chosen = parser.parse_args().tables or list(TABLES)
+    RESULTS.parent.mkdir(exist_ok=True)
+    found = json.loads(RESULTS.read_text()) if RESULTS.exists() else {}
+    for name in chosen:
+        print(name)
+        found[name] = measured(TABLES[name]())
+        RESULTS.write_text(json.dumps(found, indent=1))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,270 @@
+"""Numba kernels of rows of equal elastic boxes that turn by any angle and strain little.
+
+The mean deformation of a box, F = R U, has the stretch U = 1 + E. The higher modes q_k of its eight nodes are seen from
+the frame that turns with it, q^_k = R^T q_k. In this frame the strain energy is that of the linear box,
+V E : C E / 2 + sum over k, l of q^_k . H_kl q^_l / 2, and the force is its exact derivative. With T = V C : E,
+Q^ = H q^ and M = T U,
+
+    P = R (T - [w]x),    (tr(U) 1 - U) w = axial(M - M^T) + sum over k of q^_k x Q^_k
+
+is the force on F, R Q^_k the force on q_k; [w]x is the matrix of the cross product. It is there because a change of F
+turns the frame by omega, (tr(U) 1 - U) omega = axial(R^T dF - dF^T R). Energy and both momenta are kept.
+
+Rows, lines and faces are those of ``kernels.box_rows``, modes those of ``force_congruent``. Sixteen boxes of a row
+stand side by side as in ``kernels.lanes``. Slots of the workspace ``w``, in units of lanes: component c of the mode of
+parity p at 3 p + c, then F and R.
+"""
+
+import numpy as np
+from numba import njit
+
+from reflowshock.fem.kernels.box_rows import COLUMNS, FIRST, add_transform, transform_lines
+from reflowshock.fem.kernels.lanes import (
+    LANE_OPTIONS,
+    LANES,
+    applied,
+    cofactor,
+    cofactor_symmetric,
+    determinant,
+    full,
+    nine,
+    put_nine,
+    put_three,
+    three,
+    times,
+    transposed,
+)
+from reflowshock.fem.kernels.nonlinear import stretch
+
+DEFORMATION, ROTATION, TURNED_SLOTS = (LANES * k for k in (24, 33, 42))
+WIDTH = COLUMNS + LANES
+UPRIGHT = -1  # no box is turned inside out
+X, Y, Z, XY, XZ, YZ, XYZ = (3 * LANES * p for p in (1, 2, 4, 3, 5, 6, 7))  # slots of the modes, by their parity
+NEWTON_STEPS = 40  # stretches of 1e6 need 25
+NEWTON_CONVERGED = 1e-13  # squared size of a step, after which the next one is below 1e-13 (quadratic convergence)
+
+
+@njit(**LANE_OPTIONS)
+def read_modes(faces, start, w):
+    """Write the modes of sixteen boxes of a row from the face values ``(3, 4, COLUMNS)`` at its nodes."""
+    for c in range(3):
+        for k in range(4):
+            values = faces[c, k, FIRST + start : FIRST + start + LANES + 1]
+            even, odd = w[LANES * (6 * k + c) :], w[LANES * (6 * k + 3 + c) :]
+            for lane in range(LANES):
+                even[lane] = values[lane] + values[lane + 1]
+                odd[lane] = values[lane] - values[lane + 1]
+
+
+@njit(**LANE_OPTIONS)
+def add_faces(w, start, count, faces):
+    """Add the forces of the first ``count`` boxes to the face values at a row's nodes."""
+    for c in range(3):
+        for k in range(4):
+            values = faces[c, k, FIRST + start : FIRST + start + LANES + 1]
+            even, odd = w[LANES * (6 * k + c) :], w[LANES * (6 * k + 3 + c) :]
+            for lane in range(count):
+                values[lane] += even[lane] + odd[lane]
+            for lane in range(count):
+                values[lane + 1] += even[lane] - odd[lane]
+
+
+@njit(**LANE_OPTIONS)
+def write_deformation(w, scale):
+    """Write F, also as the first guess of R; return how many boxes are turned inside out.
+
+    ``scale (3,)`` [1/m] turns modes into gradients, -1 / (4 h) along each direction.
+    """
+    inverted = 0.0
+    for lane in range(LANES):
+        x, y, z = three(w, X + lane), three(w, Y + lane), three(w, Z + lane)
+        f = (
+            1.0 + scale[0] * x[0], scale[1] * y[0], scale[2] * z[0],
+            scale[0] * x[1], 1.0 + scale[1] * y[1], scale[2] * z[1],
+            scale[0] * x[2], scale[1] * y[2], 1.0 + scale[2] * z[2],
+        )  # fmt: skip
+        put_nine(w, DEFORMATION + lane, f)
+        put_nine(w, ROTATION + lane, f)
+        inverted += 0.0 if determinant(f, cofactor(f)) > 0.0 else 1.0
+    return inverted
+
+
+@njit(**LANE_OPTIONS)
+def improve_rotation(w):
+    """Take one Newton step X -> (X + X^-T) / 2 towards R (Higham 1986); return its squared size over all lanes."""
+    change = 0.0
+    for lane in range(LANES):
+        x = nine(w, ROTATION + lane)
+        c = cofactor(x)
+        s = 0.5 / determinant(x, c)
+        d = (
+            s * c[0] - 0.5 * x[0], s * c[1] - 0.5 * x[1], s * c[2] - 0.5 * x[2],
+            s * c[3] - 0.5 * x[3], s * c[4] - 0.5 * x[4], s * c[5] - 0.5 * x[5],
+            s * c[6] - 0.5 * x[6], s * c[7] - 0.5 * x[7], s * c[8] - 0.5 * x[8],
+        )  # fmt: skip
+        change += d[0] * d[0] + d[1] * d[1] + d[2] * d[2]
+        change += d[3] * d[3] + d[4] * d[4] + d[5] * d[5]
+        change += d[6] * d[6] + d[7] * d[7] + d[8] * d[8]
+        new = (
+            x[0] + d[0], x[1] + d[1], x[2] + d[2], x[3] + d[3], x[4] + d[4], x[5] + d[5],
+            x[6] + d[6], x[7] + d[7], x[8] + d[8],
+        )  # fmt: skip
+        put_nine(w, ROTATION + lane, new)
+    return change
+
+
+@njit(**LANE_OPTIONS)
+def stress(k, u):
+    """Return T = V C : (U - 1), six entries; ``k`` begins with C_xx, C_yy, C_zz, C_xy, C_yz, C_xz, G_xy, G_yz, G_xz."""
+    x, y, z = u[0] - 1.0, u[1] - 1.0, u[2] - 1.0
+    return (
+        k[0] * x + k[3] * y + k[5] * z,
+        k[3] * x + k[1] * y + k[4] * z,
+        k[5] * x + k[4] * y + k[2] * z,
+        2.0 * k[6] * u[3],
+        2.0 * k[7] * u[4],
+        2.0 * k[8] * u[5],
+    )
+
+
+@njit(**LANE_OPTIONS)
+def resistance(k, a, b, c, d):
+    """Return Q^ of the modes xy, xz, yz, xyz; ``k`` from entry 9 on as ``box_constants``."""
+    return (
+        (k[18] * a[0] + k[19] * c[2], k[15] * a[1] + k[16] * b[2], k[11] * c[0] + k[13] * b[1] + k[14] * a[2]),
+        (k[21] * b[0] + k[22] * c[1], k[10] * c[0] + k[12] * b[1] + k[13] * a[2], k[16] * a[1] + k[17] * b[2]),
+        (k[9] * c[0] + k[10] * b[1] + k[11] * a[2], k[22] * b[0] + k[23] * c[1], k[19] * a[0] + k[20] * c[2]),
+        (k[24] * d[0], k[25] * d[1], k[26] * d[2]),
+    )
+
+
+@njit(**LANE_OPTIONS)
+def add_cross(m, a, b):
+    """Return m + a x b."""
+    return (
+        m[0] + a[1] * b[2] - a[2] * b[1],
+        m[1] + a[2] * b[0] - a[0] * b[2],
+        m[2] + a[0] * b[1] - a[1] * b[0],
+    )
+
+
+@njit(**LANE_OPTIONS)
+def spin(u, moment):
+    """Return w of (tr(U) 1 - U) w = moment."""
+    t = u[1] + u[2], u[0] + u[2], u[0] + u[1], -u[3], -u[4], -u[5]
+    c = cofactor_symmetric(t)
+    s = 1.0 / (t[0] * c[0] + t[3] * c[3] + t[5] * c[5])
+    return applied(full(c), (s * moment[0], s * moment[1], s * moment[2]))
+
+
+@njit(**LANE_OPTIONS)
+def replace_by_forces(w, scale, k):
+    """Replace the modes of sixteen boxes by the forces on them, given F and R."""
+    for lane in range(LANES):
+        r = nine(w, ROTATION + lane)
+        back = transposed(r)
+        u = stretch(r, nine(w, DEFORMATION + lane))
+        t = full(stress(k, u))
+        a, b = applied(back, three(w, XY + lane)), applied(back, three(w, XZ + lane))
+        c, d = applied(back, three(w, YZ + lane)), applied(back, three(w, XYZ + lane))
+        fa, fb, fc, fd = resistance(k, a, b, c, d)
+        m = times(t, full(u))
+        moment = add_cross(add_cross((m[7] - m[5], m[2] - m[6], m[3] - m[1]), a, fa), b, fb)
+        x, y, z = spin(u, add_cross(add_cross(moment, c, fc), d, fd))
+        p = times(r, (t[0], t[1] + z, t[2] - y, t[3] - z, t[4], t[5] + x, t[6] + y, t[7] - x, t[8]))
+        put_three(w, X + lane, (scale[0] * p[0], scale[0] * p[3], scale[0] * p[6]))
+        put_three(w, Y + lane, (scale[1] * p[1], scale[1] * p[4], scale[1] * p[7]))
+        put_three(w, Z + lane, (scale[2] * p[2], scale[2] * p[5], scale[2] * p[8]))
+        put_three(w, XY + lane, applied(r, fa))
+        put_three(w, XZ + lane, applied(r, fb))
+        put_three(w, YZ + lane, applied(r, fc))
+        put_three(w, XYZ + lane, applied(r, fd))
+        put_three(w, lane, (0.0, 0.0, 0.0))
+
+
+@njit(cache=True)
+def box_energies(w, k, count):
+    """Return the energies [J] of the mean strains and of the higher modes of the first ``count`` boxes."""
+    mean = higher = 0.0
+    for lane in range(count):
+        r = nine(w, ROTATION + lane)
+        u, back = stretch(r, nine(w, DEFORMATION + lane)), transposed(r)
+        t = stress(k, u)
+        mean += 0.5 * (t[0] * (u[0] - 1.0) + t[1] * (u[1] - 1.0) + t[2] * (u[2] - 1.0))
+        mean += t[3] * u[3] + t[4] * u[4] + t[5] * u[5]
+        a, b = applied(back, three(w, XY + lane)), applied(back, three(w, XZ + lane))
+        c, d = applied(back, three(w, YZ + lane)), applied(back, three(w, XYZ + lane))
+        fa, fb, fc, fd = resistance(k, a, b, c, d)
+        for i in range(3):
+            higher += 0.5 * (a[i] * fa[i] + b[i] * fb[i] + c[i] * fc[i] + d[i] * fd[i])
+    return mean, higher
+
+
+@njit(cache=True)
+def repeat_last(w, count):
+    """Let the lanes past the first ``count`` repeat the last of these."""
+    for slot in range(0, DEFORMATION, LANES):
+        for lane in range(count, LANES):
+            w[slot + lane] = w[slot + count - 1]
+
+
+@njit(cache=True)
+def rotate(w, scale):
+    """Write F and R of F = R U; return whether no box is turned inside out."""
+    if write_deformation(w, scale) > 0.0:
+        return False
+    for _ in range(NEWTON_STEPS):
+        if improve_rotation(w) < NEWTON_CONVERGED:
+            break
+    return True
+
+
+@njit(cache=True)
+def add_turned_row_forces(rows, scales, constants, displacement, force):
+    """Add the internal force of rows of boxes.
+
+    Args:
+        rows: ``(nr, 6)`` int32 as in ``kernels.box_rows.add_row_forces``.
+        scales: ``(ns, 3)`` [1/m] per shape, -1 / (4 h) along each direction.
+        constants: ``(ns, 27)`` per shape, see ``force_corotational.box_constants``.
+        displacement: ``(3, >= p + PAD)`` [m] at the positions.
+        force: The same [N], added to.
+
+    Returns:
+        ``UPRIGHT``, or the first row with a box that is turned inside out; then the force is not complete.
+    """
+    faces, forces, w = np.zeros((3, 4, WIDTH)), np.zeros((3, 4, WIDTH)), np.zeros(TURNED_SLOTS)
+    for r in range(len(rows)):
+        starts, count, shape = rows[r, :4], rows[r, 4], rows[r, 5]
+        for c in range(3):
+            transform_lines(displacement[c], starts, count + 1, faces[c])
+        forces[:, :, FIRST : FIRST + count + 1] = 0.0
+        for start in range(0, count, LANES):
+            read_modes(faces, start, w)
+            repeat_last(w, count - start)
+            if not rotate(w, scales[shape]):
+                return r
+            replace_by_forces(w, scales[shape], constants[shape])
+            add_faces(w, start, min(LANES, count - start), forces)
+        for c in range(3):
+            add_transform(forces[c], starts, count + 1, force[c])
+    return UPRIGHT
+
+
+@njit(cache=True)
+def row_energies(rows, scales, constants, displacement):
+    """Return the energies [J] of the mean strains and of the higher modes; arguments as above, no box inside out."""
+    faces, w = np.zeros((3, 4, WIDTH)), np.zeros(TURNED_SLOTS)
+    mean = higher = 0.0
+    for r in range(len(rows)):
+        starts, count, shape = rows[r, :4], rows[r, 4], rows[r, 5]
+        for c in range(3):
+            transform_lines(displacement[c], starts, count + 1, faces[c])
+        for start in range(0, count, LANES):
+            read_modes(faces, start, w)
+            repeat_last(w, count - start)
+            rotate(w, scales[shape])
+            energies = box_energies(w, constants[shape], min(LANES, count - start))
+            mean += energies[0]
+            higher += energies[1]
+    return mean, higher

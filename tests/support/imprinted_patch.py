@@ -1,0 +1,262 @@
+"""One joint between patches of board and substrate, tied to boxes or in columns, and its static equilibrium.
+
+The patches are 3 x 3 mm, the board 1 mm, the substrate 0.4 mm thick; a cylinder of solder of radius 0.24 and height
+0.30 mm stands between two copper discs. The substrate is held at its sides x = -+1.5 mm, the board at x = -1.5 mm; its
+other side moves 6 um outwards and 6 um away.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+import scipy.sparse
+from mpi4py import MPI
+from numpy.typing import NDArray
+from petsc4py import PETSc
+
+from reflowshock.cases.hard.trials.packages import MM, board, package
+from reflowshock.cases.hard.trials.surfaces import barrel
+from reflowshock.fem.cell_shape import HEXAHEDRON
+from reflowshock.fem.division.split import part_of
+from reflowshock.fem.division.tables import joined
+from reflowshock.fem.division.whole import Whole
+from reflowshock.fem.elements.element import element_geometry
+from reflowshock.fem.elements.mesh_elements import elements_of
+from reflowshock.fem.elements.stress import von_mises
+from reflowshock.fem.forces.force_assembled import AssembledElements
+from reflowshock.fem.materials.elasticity import role_of_part
+from reflowshock.fem.materials.library import COPPER, FR4
+from reflowshock.fem.materials.parameters import Isotropic, JohnsonCook, Material
+from reflowshock.fem.mesh.mesh import MeshData, append
+from reflowshock.fem.model.factorisation import Factorisation
+from reflowshock.fem.statics.hencky import HenckyElements
+from reflowshock.meshing.board.package_side import PackageSide, StructuredFace, underside
+from reflowshock.meshing.board.pads import pad_table
+from reflowshock.meshing.board.parameters import Warpage
+from reflowshock.meshing.joint.column import columns_of
+from reflowshock.meshing.joint.joint_mesh import JointMesh
+from reflowshock.meshing.joint.solder_mesh import mesh_joint
+
+Floats = NDArray[np.float64]
+SIDE, STRETCH, LIFT = 3.0 * MM, 6.0e-6, 6.0e-6
+LAYER = 25.0e-6
+SAME = 1e-9  # m
+HARDENING = JohnsonCook(A=40e6, B=1e9, n=1.0)
+SOLDER = Isotropic(density=7440.0, young_modulus=44.6e9, poisson_ratio=0.40)
+CONVERGED = 1e-9
+JOINT = "A1"
+TODAY = {"core": 3, "rings": 1, "layers": 6}
+CHEAPEST = {"core": 4, "rings": 2, "layers": 10, "pad_layer": LAYER, "copper_layers": 2}
+PADS = {"diameter": 0.48 * MM, "mask_opening": 0.58 * MM, "definition": "NSMD"}
+
+
+@dataclass(frozen=True, slots=True)
+class Mesh:
+    """How the patch is meshed: boxes as long as ``box`` [m], shifted; fields of ``package``."""
+
+    box: float
+    joint: dict
+    imprint: dict | None = None
+    layers: tuple[int, int] = (4, 2)
+    shift: float = 0.0
+
+    def halved(self) -> "Mesh":
+        """Halve every element."""
+        own, imprint = self.joint, self.imprint
+        names = [name for name in ("core", "rings", "layers", "copper_layers") if name in own]
+        finer = own | {name: 2 * own[name] for name in names}
+        finer |= {"pad_layers": 2 * own.get("pad_layers", 2)} if "pad_layer" in own else {}
+        if imprint is not None:
+            growth = 1.0 + 0.5 * (imprint.get("growth", 1.5) - 1.0)
+            first = 0.5 * imprint.get("first_layer", 3.0e-5)
+            imprint = imprint | {"rings": 2 * imprint.get("rings", 4), "growth": growth, "first_layer": first}
+        return replace(self, box=0.5 * self.box, joint=finer, imprint=imprint, layers=tuple(2 * n for n in self.layers))
+
+
+def patch(mesh: Mesh) -> tuple[Whole, JointMesh]:
+    """Mesh the patches, and the joint between them."""
+    numerics = {"element_size": mesh.box}
+    layer = {"length": SIDE, "width": SIDE, "thickness": 0.4 * MM, "elements": mesh.layers[1]}
+    own = package(
+        rows=1, columns=1, standoff=0.30 * MM, board_pad=PADS, package_pad=PADS, joint_numerics=mesh.joint,
+        imprint=mesh.imprint, substrate=layer, numerics=numerics,
+    )  # fmt: skip
+    below = board(symmetry="full", numerics={"layers": mesh.layers[0], "patch_layers": 1})
+    lines = box_lines(mesh)
+    levels = underside(own) + layer["thickness"] * np.arange(mesh.layers[1] + 1) / mesh.layers[1]
+    at_rest = StructuredFace(lines, lines, np.zeros((len(lines), len(lines), 3)))
+    side = PackageSide(float(levels[0]), at_rest, tuple((float(level), at_rest) for level in levels[1:]))
+    site = pad_table(own, below, Warpage())[0]
+    joint = mesh_joint(barrel(site.gap, 0.0), site, own, side, columns_of(site, own, below, side))
+    depths = below.thickness * (np.arange(mesh.layers[0] + 1) / mesh.layers[0] - 1.0)
+    pieces = [boxes("board", lines, depths), boxes("substrate", lines, levels), data_of(joint)]
+    return joined(append(pieces)), joint
+
+
+def box_lines(mesh: Mesh) -> Floats:
+    """Return the lines of the boxes along x and y [m]; the shift moves all but the sides and the column's edges."""
+    count = round(SIDE / mesh.box)
+    lines = SIDE * (np.arange(count + 1) / count - 0.5)
+    if not mesh.shift:
+        return lines
+    edges = 0.5 * np.array([mesh.imprint["size"] if mesh.imprint else SIDE, SIDE])
+    moved = np.concatenate([lines[:-1] + mesh.shift * mesh.box, edges, -edges])
+    return np.unique(np.round(moved, 12))
+
+
+def boxes(name: str, x: Floats, levels: Floats, y: Floats | None = None) -> MeshData:
+    """Return a block of boxes between lines [m]; its face towards the joint is a side that ``tie_joints`` knows."""
+    lines = levels, x if y is None else y, x
+    points = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1)[..., ::-1].reshape(-1, 3)
+    number = np.arange(len(points)).reshape([len(line) for line in lines])
+    corners = [
+        number[tuple(slice(side, side - 1 or None) for side in sides)].ravel() for sides in product((0, 1), repeat=3)
+    ]  # bit d of a corner's place is its side along x, y, z
+    face = number[-1] if name == "board" else number[0]
+    around = [face[:-1, :-1], face[:-1, 1:], face[1:, 1:], face[1:, :-1]]
+    quads = np.column_stack([some.ravel() for some in around]).astype(np.int32)
+    cells = np.column_stack(corners).astype(np.int32)
+    facets = {"board_side" if name == "board" else "package_side": quads}
+    return MeshData(np.ascontiguousarray(points), cells, np.zeros(len(cells), np.int32), (name,), facets)
+
+
+def data_of(joint: JointMesh) -> MeshData:
+    """Return a joint as ``fem`` reads it."""
+    parts = [np.full(len(cells), number, np.int32) for number, cells in enumerate(joint.cells.values())]
+    cells = np.concatenate(list(joint.cells.values()))[:, HEXAHEDRON.order]
+    return MeshData(joint.points, cells, np.concatenate(parts), tuple(joint.cells), joint.facets)
+
+
+class Problem:
+    """The static problem of a mesh with its prescribed motion."""
+
+    def __init__(self, whole: Whole, yields: bool, known: dict[str, Material] | None = None) -> None:
+        """Number the equations; solder yields or does not, unless the materials of all roles are given."""
+        mesh = whole.mesh
+        solder = SOLDER.model_copy(update={"plasticity": HARDENING}) if yields else SOLDER
+        known = known or {"board": FR4, "substrate": FR4, "copper": COPPER, "solder": solder}
+        materials = [known[role_of_part(name)] for name in mesh.part_names]
+        self.whole = whole
+        self.elements = elements_of(mesh.points, mesh.cells, mesh.part, materials)
+        self.hencky = HenckyElements.build(self.elements, materials, np.zeros((len(materials), 3)))
+        count = len(mesh.points)
+        self.tie = scipy.sparse.kron(whole.tie.matrix(count), scipy.sparse.identity(3), format="csr")
+        self.motion, held = prescribed(mesh)
+        free = ~held
+        free[whole.tie.slave] = False
+        self.free = np.flatnonzero(free.ravel())
+
+    def solve(self) -> Floats:
+        """Find the displacement ``(n, 3)`` [m] by Newton's method."""
+        place, scale = self._spread(self.motion), None
+        for _ in range(30):
+            force, tangent = self.hencky.linearised(place)
+            rest = (self.tie.T @ force.ravel())[self.free]
+            size = float(np.linalg.norm(rest))
+            scale = scale or size
+            if size <= CONVERGED * scale:
+                return place
+            step = np.zeros(place.size)
+            step[self.free] = -solution(self._reduced(tangent), rest)
+            place = place + self._spread(step.reshape(-1, 3))
+        raise RuntimeError(f"forces out of balance by {size / scale:.1e}")
+
+    def _spread(self, values: Floats) -> Floats:
+        return (self.tie @ values.ravel()).reshape(-1, 3)
+
+    def _reduced(self, tangent: AssembledElements) -> scipy.sparse.csr_matrix:
+        size = self.tie.shape[0]
+        half = scipy.sparse.bsr_matrix((tangent.blocks, tangent.columns, tangent.pointer), shape=(size, size))
+        half = (self.tie.T @ half.tocsr() @ self.tie).tocsr()
+        return (half + half.T)[self.free][:, self.free].tocsr()
+
+
+def solution(matrix: scipy.sparse.csr_matrix, right: Floats) -> Floats:
+    """Solve with MUMPS."""
+    csr = (matrix.indptr.astype(np.int32), matrix.indices.astype(np.int32), matrix.data)
+    petsc = PETSc.Mat().createAIJ(matrix.shape, csr=csr, comm=MPI.COMM_SELF)
+    petsc.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+    factor, (place, vector) = Factorisation(petsc), petsc.createVecs()
+    vector.array = right
+    factor.solve(vector, place)
+    factor.free()
+    return np.array(place.array)
+
+
+def prescribed(mesh: MeshData) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Return the motion ``(n, 3)`` [m] of what is held, and which components are."""
+    held = np.abs(np.abs(mesh.points[:, 0]) - 0.5 * SIDE) < SAME
+    on_board = held & (mesh.points[:, 2] <= SAME) & (mesh.points[:, 0] > 0.0)
+    motion = np.zeros_like(mesh.points)
+    motion[on_board] = [STRETCH, 0.0, -LIFT]
+    components = np.repeat(held[:, None], 3, axis=1)
+    if is_half(mesh):
+        components[:, 1] |= mesh.points[:, 1] < SAME
+    return motion, components
+
+
+def half_of(whole: Whole) -> Whole:
+    """Return what lies at y >= 0 of a mesh with a line of nodes there: all is symmetric."""
+    tie, each = whole.tie, np.arange(len(whole.tie.slave))
+    heaviest = tie.master[each, tie.weight.argmax(axis=1)][:, None]
+    on_plane = replace(tie, master=np.where(tie.weight < SAME, heaviest, tie.master))  # some at y < 0 weigh nothing
+    part = part_of(replace(whole, tie=on_plane), whole.mesh.points[whole.mesh.cells].mean(axis=1)[:, 1] > 0.0)
+    return Whole(part.mesh, part.tie, whole.moved)
+
+
+def is_half(mesh: MeshData) -> bool:
+    """Whether a mesh ends at y = 0."""
+    return bool(mesh.points[:, 1].min() > -SAME)
+
+
+def ends(problem: Problem, place: Floats) -> Iterator[tuple[str, dict[str, float]]]:
+    """Yield the measures of both ends: section forces [N, N m], averages over the layer [Pa, J/m^3]."""
+    mesh = problem.whole.mesh
+    cells = mesh.in_parts(f"solder@{JOINT}".__eq__)
+    solder = replace(problem.hencky, elements=problem.elements.subset(cells))
+    response = solder.respond(place)
+    force = np.zeros_like(mesh.points)
+    np.add.at(force, mesh.cells[cells], response.force.reshape(-1, 8, 3))
+    if is_half(mesh):
+        force *= [2.0, 0.0, 2.0]
+    state, corners = solder.points(place), mesh.points[mesh.cells[cells]]
+    octants = gauss_places(corners)
+    weight = np.repeat(element_geometry(mesh.points, mesh.cells[cells]).volume[:, None] / 8.0, 8, axis=1)
+    stress = von_mises(state.stress.reshape(-1, 6)).reshape(weight.shape)
+    plastic = state.plastic_strain
+    work = HARDENING.A * plastic + HARDENING.B * plastic ** (1.0 + HARDENING.n) / (1.0 + HARDENING.n)
+    for name in ("board", "package"):
+        nodes = mesh.facet_nodes(f"pad_{name}@{JOINT}")
+        level = mesh.points[nodes, 2].mean()
+        on_pad = force[nodes]
+        arm = mesh.points[nodes] - [0.0, 0.0, level]
+        moment = np.cross(arm * [1.0, 0.0, 1.0] if is_half(mesh) else arm, on_pad).sum(axis=0)
+        near = np.where(np.abs(octants[..., 2] - level) < LAYER, weight, 0.0)
+        yield (
+            name,
+            {
+                "axial_force": abs(float(on_pad[:, 2].sum())),
+                "shear_force": float(np.linalg.norm(on_pad[:, :2].sum(axis=0))),
+                "bending_moment": float(np.linalg.norm(moment[:2])),
+                "layer_von_mises": float((near * stress).sum() / near.sum()),
+                "layer_plastic_work": float((near * work).sum() / near.sum()),
+            },
+        )
+
+
+def gauss_places(corners: Floats) -> Floats:
+    """Return the places ``(m, 8, 3)`` [m] of the integration points of hexahedra, as ``HenckyElements`` orders them."""
+    signs = np.array([[i, j, k] for k in (-1, 1) for j in (-1, 1) for i in (-1, 1)], dtype=float)
+    shapes = 0.125 * np.prod(1.0 + signs[:, None, :] * signs[None, :, :] / np.sqrt(3.0), axis=2)
+    return np.einsum("ga,mai->mgi", shapes, corners)
+
+
+IMPRINTED = Mesh(0.25 * MM, CHEAPEST, {"size": 1.0 * MM})
+TIED = Mesh(0.5 * MM, TODAY)
+MESHES = {
+    "tied, 0.5 mm": TIED,
+    "tied, 0.25 mm": replace(TIED, box=0.25 * MM),
+    "imprinted": IMPRINTED,
+    "imprinted, boxes shifted": replace(IMPRINTED, shift=0.5),
+}

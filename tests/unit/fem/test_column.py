@@ -1,0 +1,88 @@
+import re
+
+import numpy as np
+import pytest
+
+from reflowshock.fem.division.tables import joined
+from reflowshock.fem.errors import MeshError
+from reflowshock.fem.materials.library import FR4
+from reflowshock.fem.mesh.mesh import append, boundary_facets
+from tests.support.imprinted_patch import IMPRINTED, Mesh, Problem, boxes, data_of, patch
+from tests.unit.meshing.test_column import MM, standing
+
+GRADIENT = 1e-3 * np.array([[1.0, -0.4, 0.7], [0.3, -0.8, 0.2], [-0.6, 0.9, 0.5]])
+
+
+@pytest.fixture(scope="module")
+def whole():
+    return patch(IMPRINTED)[0]
+
+
+def test_columns_take_the_place_of_boxes(whole):
+    mesh = whole.mesh
+    counts = {name: int(np.sum(mesh.part == number)) for number, name in enumerate(mesh.part_names)}
+    assert (counts["board"], counts["substrate"]) == (4 * (144 - 16), 2 * (144 - 16))
+    assert whole.moved < 1e-15
+    assert len(mesh.facets_of("board_bottom")) == 112
+    assert not any(name.startswith(("column_", "board_bottom@")) for name in mesh.facets)
+
+
+def test_a_constant_strain_passes_the_ties_of_a_column(whole):
+    """Where lines of boxes are lines of the column, no force is left on a node inside."""
+    one = Problem(whole, False, dict.fromkeys(("board", "substrate", "copper", "solder"), FR4))
+    place = whole.mesh.points @ GRADIENT.T
+    force = (one.tie.T @ one.hencky.linearised(place)[0].ravel()).reshape(-1, 3)
+    points = whole.mesh.points
+    lateral = np.abs(points[:, :2]).max(axis=1) > 1.5 * MM - 1e-9
+    tied = np.zeros(len(points), bool)
+    tied[whole.tie.master] = True
+    around = tied & ~lateral & (np.abs(points[:, 2] + 0.5 * MM) < 0.4 * MM)
+    assert around.sum() > 20
+    scale = np.abs(one.hencky.linearised(place)[0][around]).max()
+    assert np.abs(force[around]).max() < 1e-10 * scale
+
+
+def test_boxes_that_leave_no_room_for_a_column_are_refused():
+    mesh = Mesh(0.3 * MM, IMPRINTED.joint, IMPRINTED.imprint)
+    told = "board_column@A1 fills 1e-09 m^3, the boxes in its place 1.44e-09 m^3: the lines of board and package"
+    with pytest.raises(MeshError, match=re.escape(told)):
+        patch(mesh)
+
+
+def neighbours(first=-2.5):
+    """Two joints side by side between boxes of board and of a bowed substrate, from y = first [mm] on."""
+    joints, side = [], None
+    for name in ("A4", "B4"):
+        mesh, side = standing(name)
+        joints.append(data_of(mesh))
+    lines = np.linspace(-2.5, 2.5, 21) * MM
+    levels = (0.34 + np.array([0.0, 0.2, 0.4])) * MM
+    along = lines[lines > first * MM - 1e-12]
+    above = boxes("substrate", lines, levels, along)
+    above.points[:] = side.displaced(above.points)
+    return append([boxes("board", lines, np.linspace(-1.0, 0.0, 5) * MM, along), above, *joints])
+
+
+def test_neighbouring_columns_share_their_face():
+    mesh = neighbours()
+    whole = joined(mesh)
+    number = {name: k for k, name in enumerate(whole.mesh.part_names)}
+    for part, shared in (("board_column", 5 * 9), ("substrate_column", 5 * 6)):
+        nodes = [np.unique(whole.mesh.cells[whole.mesh.part == number[f"{part}@{joint}"]]) for joint in ("A4", "B4")]
+        assert len(np.intersect1d(*nodes)) == shared
+    inside = np.abs(whole.mesh.points[whole.tie.slave, 1] - 1.0 * MM) < 1e-9
+    x = whole.mesh.points[whole.tie.slave[inside], 0] / MM
+    assert np.abs(x - 1.5).min() > 0.4  # of the common face only its ends are tied
+    assert whole.moved < 1e-9
+
+
+def test_faces_on_a_plane_of_symmetry_are_held_there():
+    """The lower column reaches down to y = 0, where a quarter model ends."""
+    mesh = neighbours(first=0.0)
+    facets = boundary_facets(mesh.cells[mesh.in_parts(lambda name: "@" not in name)])
+    mesh.facets["symmetry_y"] = facets[(mesh.points[facets, 1] < 1e-12).all(axis=1)]
+    whole = joined(mesh)
+    held = whole.mesh.facets["symmetry_y"]
+    column = np.unique(whole.mesh.cells[whole.mesh.in_parts("board_column@B4".__eq__)])
+    assert np.sum(np.isin(held, column).all(axis=1)) == 4 * 8
+    assert (np.abs(whole.mesh.points[held, 1]) < 1e-12).all()

@@ -1,0 +1,137 @@
+"""Boxes that turn: against the linear element, against a plain twin of the formula, and as an energy."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from reflowshock.cases.hard.trials.grids import grid
+from reflowshock.fem.elements.element import Elements, element_kind, element_stiffness
+from reflowshock.fem.errors import InvertedElementError
+from reflowshock.fem.forces.force import force_terms
+from reflowshock.fem.forces.force_congruent import CongruentElements
+from reflowshock.fem.forces.force_corotational import CorotationalBoxes
+from reflowshock.fem.forces.force_nonlinear import NonlinearElements
+from reflowshock.fem.kernels.hexahedron import CENTRE_DERIVATIVES
+from reflowshock.fem.materials.elasticity import elasticity_matrix
+from reflowshock.fem.materials.library import COPPER, FR4, SAC405
+from reflowshock.fem.model.stress_recovery import polar
+
+MATERIALS = np.array([elasticity_matrix(FR4), elasticity_matrix(COPPER)])
+TURN = Rotation.from_rotvec([0.7, -1.1, 2.0]).as_matrix()
+FORMULATIONS = ("incompatible_modes", "one_point")
+
+
+def boxes(counts: tuple[int, int, int], formulation: str = "incompatible_modes", share: float = 1.0) -> Elements:
+    """Return boxes of different sizes and two materials, some of them left out."""
+    points, cells = grid(*(np.cumsum([0.0, *np.linspace(1, 3, count)]) * 1e-4 for count in counts))
+    random = np.random.default_rng(len(cells))
+    kept = random.uniform(size=len(cells)) < share
+    kept[0] = True
+    material = random.integers(0, 2, kept.sum()).astype(np.int32)
+    return Elements(points, cells[kept], material, MATERIALS, np.ones(kept.sum()), element_kind(8, formulation))
+
+
+def term_of(elements: Elements) -> CorotationalBoxes:
+    return CorotationalBoxes.build(elements, np.arange(len(elements.cells)))
+
+
+def force_of(term, displacement: np.ndarray) -> np.ndarray:
+    force = np.zeros_like(displacement)
+    term.add(displacement, force)
+    return force
+
+
+def turned(points: np.ndarray, displacement: np.ndarray) -> np.ndarray:
+    """Return the displacement of a body that is displaced, then turned."""
+    return (points + displacement) @ TURN.T - points
+
+
+def local_energy(elements: Elements, displacement: np.ndarray) -> float:
+    """Return the sum of d . K d / 2, d the displacement seen from the frame of each element's mean rotation."""
+    total = 0.0
+    for nodes, stiffness in zip(elements.cells, element_stiffness(elements), strict=True):
+        start, moved = elements.points[nodes], (elements.points + displacement)[nodes]
+        start, moved = start - start.mean(axis=0), moved - moved.mean(axis=0)
+        deformation = moved.T @ CENTRE_DERIVATIVES @ np.linalg.inv(start.T @ CENTRE_DERIVATIVES)
+        rotation, _ = polar(deformation[None])
+        local = (moved @ rotation[0] - start).ravel()
+        total += 0.5 * local @ stiffness @ local
+    return total
+
+
+def gently(elements: Elements, size: float, seed: int = 0) -> np.ndarray:
+    return size * 1e-4 * np.random.default_rng(seed).uniform(-1, 1, elements.points.shape)
+
+
+@pytest.mark.parametrize("counts", [(1, 1, 1), (9, 2, 3), (2, 17, 3), (3, 2, 33), (16, 1, 1)])
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+def test_energy_and_its_derivative(counts, formulation):
+    elements = boxes(counts, formulation, share=0.8)
+    term, displacement = term_of(elements), turned(elements.points, gently(elements, 0.02))
+    energy = term.energy(displacement)
+    exact = local_energy(elements, displacement)
+    assert energy.total == pytest.approx(exact, rel=1e-10)
+    assert (energy.hourglass > 0.0) == (formulation == "one_point")
+    force, step = force_of(term, displacement), 1e-10
+    for seed in range(3):
+        along = np.random.default_rng(10 + seed).uniform(-1, 1, displacement.shape)
+        ahead, behind = (local_energy(elements, displacement + side * step * along) for side in (1, -1))
+        change = ahead - behind
+        assert change / (2 * step) == pytest.approx(-np.vdot(force, along), rel=1e-5)
+
+
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+def test_small_motions_are_linear_and_large_turns_are_free(formulation):
+    elements = boxes((7, 3, 2), formulation)
+    term, linear, displacement = term_of(elements), CongruentElements.build(elements), gently(elements, 1e-7)
+    exact = force_of(linear, displacement)
+    assert np.abs(force_of(term, displacement) - exact).max() < 1e-6 * np.abs(exact).max()
+    scale = np.abs(force_of(linear, gently(elements, 1.0))).max()
+    assert np.abs(force_of(term, turned(elements.points, 0.0 * displacement))).max() < 1e-12 * scale
+
+
+def test_a_turned_body_has_turned_forces_without_net_force_or_moment():
+    elements = boxes((5, 4, 3))
+    term, displacement = term_of(elements), gently(elements, 0.05)
+    force, other = force_of(term, displacement), force_of(term, turned(elements.points, displacement))
+    scale = np.abs(force).max()
+    assert np.abs(other - force @ TURN.T).max() < 1e-10 * scale
+    arms = np.cross(elements.points + turned(elements.points, displacement), other)
+    assert np.abs(other.sum(axis=0)).max() < 1e-12 * scale
+    assert np.abs(arms.sum(axis=0)).max() < 1e-12 * np.abs(arms).max()
+
+
+def test_error_against_finite_strain_falls_with_the_square_of_the_strain():
+    elements = boxes((4, 3, 2), "one_point")
+    errors = []
+    for size in (1e-2, 2.5e-3):
+        displacement = turned(elements.points, gently(elements, size))
+        (path,) = force_terms(elements, [FR4, COPPER], "finite")
+        assert isinstance(path, NonlinearElements)
+        for share in np.linspace(0.1, 1.0, 10):
+            finite = force_of(path, turned(elements.points, share * gently(elements, size)))
+        errors.append(np.abs(finite - force_of(term_of(elements), displacement)).max())
+    assert np.log(errors[0] / errors[1]) / np.log(4.0) > 1.8
+
+
+def test_what_is_inside_out_is_told():
+    elements = boxes((3, 2, 2))
+    displacement = np.zeros_like(elements.points)
+    displacement[:, 0] = -2.0 * elements.points[:, 0]
+    with pytest.raises(InvertedElementError, match="turned inside out"):
+        force_of(term_of(elements), displacement)
+
+
+def test_only_elastic_boxes_turn_without_a_path():
+    elements = boxes((4, 3, 2), "one_point")
+    materials = [FR4, SAC405]
+    terms = force_terms(elements, materials, "corotational")
+    assert [type(term) for term in terms] == [CorotationalBoxes, NonlinearElements]
+    numbers = np.concatenate([term.numbers for term in terms])
+    np.testing.assert_array_equal(np.sort(numbers), np.arange(len(elements.cells)))
+    assert not np.isin(elements.material[terms[0].numbers], 1).any()
+    distorted = elements.points + gently(elements, 0.1)
+    (path,) = force_terms(replace(elements, points=distorted), [FR4, COPPER], "corotational")
+    assert isinstance(path, NonlinearElements)

@@ -1,0 +1,66 @@
+"""A shock is over when half a swing of the board after the joints' peak has brought no higher one."""
+
+import numpy as np
+import pytest
+
+from reflowshock.fem.output.settled import HISTORIES, half_swing, is_settled
+
+PERIOD = 4e-3
+
+
+def history(end: float, stress, deflection=None) -> dict[str, np.ndarray]:
+    time = np.linspace(0.0, end, 401)
+    swing = np.sin(2.0 * np.pi * time / PERIOD) if deflection is None else deflection(time)
+    side = np.outer(stress(time), [1.0, 0.5])
+    centre = np.outer(swing, [0.0, 0.0, 1e-3])
+    return {"time": time, "board_centre": centre, **dict(zip(HISTORIES, (side, 0.4 * side, side, side), strict=True))}
+
+
+def swinging(time):
+    """Peaks at a quarter and three quarters of the period; the second one is lower."""
+    return 1e7 * np.abs(np.sin(2.0 * np.pi * time / PERIOD)) * np.exp(-100.0 * time)
+
+
+def test_half_a_swing_is_the_time_of_the_first_return():
+    time = np.linspace(0.0, PERIOD, 401)
+    assert half_swing(time, np.sin(2.0 * np.pi * time / PERIOD)) == pytest.approx(0.5 * PERIOD, rel=0.01)
+    assert half_swing(time, time) is None
+
+
+def test_a_trembling_before_the_swing_is_no_return():
+    time = np.linspace(0.0, PERIOD, 401)
+    swing = np.sin(2.0 * np.pi * time / PERIOD)
+    swing[1:5] *= -1.0
+    assert half_swing(time, swing) == pytest.approx(0.5 * PERIOD, rel=0.01)
+
+
+@pytest.mark.parametrize(("share", "over"), [(0.4, False), (0.7, False), (0.76, True), (1.0, True)])
+def test_it_is_over_half_a_swing_after_the_peak(share, over):
+    assert is_settled(history(share * PERIOD, swinging)) is over
+
+
+def test_a_higher_second_peak_makes_it_longer():
+    def growing(time):
+        return swinging(time) * np.exp(300.0 * time)
+
+    assert not is_settled(history(1.0 * PERIOD, growing))
+
+
+def test_a_peak_that_is_only_reached_again_is_not_higher():
+    def creeping(time):
+        return 1e7 * np.abs(np.sin(2.0 * np.pi * time / PERIOD)) * (1.0 + 0.5 * time)
+
+    assert is_settled(history(0.9 * PERIOD, creeping))
+
+
+def test_every_stress_has_to_settle():
+    late = history(PERIOD, swinging)
+    late["peel_package"] = np.outer(late["time"], [1e11, 0.0])
+    assert not is_settled(late)
+
+
+def test_without_joints_or_a_return_it_goes_on():
+    bare = history(PERIOD, swinging)
+    bare |= {name: bare[name][:, :0] for name in HISTORIES}
+    assert not is_settled(bare)
+    assert not is_settled(history(PERIOD, swinging, deflection=lambda time: time))

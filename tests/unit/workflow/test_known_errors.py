@@ -1,0 +1,121 @@
+"""Errors beside figures: from the case's own convergence study of the same inputs, else they are not known."""
+
+from dataclasses import replace
+
+import pytest
+
+from reflowshock.workflow.convergence.errors import Error, errors_of
+from reflowshock.workflow.convergence.known import COARSEST, STALE, discretisation, own_accuracy
+from reflowshock.workflow.convergence.measured import Accuracy, Host, Measurement, StageCost, write_accuracy
+from reflowshock.workflow.convergence.page import section_for
+from reflowshock.workflow.convergence.series import Quantity, StudyRun
+from reflowshock.workflow.package_report.headline import headline
+from reflowshock.workflow.pipeline.reader import read_case
+from reflowshock.workflow.report.errors import Discretisation, left_out, scheme_error
+from reflowshock.workflow.store.keys import product_keys
+from tests.support.workflow_command import SMALL_CASE
+
+COST = {"shock": StageCost(1.0, 1.0, None)}
+ORDER = Error(0.04, "Richardson, order 1.6", 1.6)
+NO_ORDER = Error(0.05, "finest run, all x 0.4")
+
+
+def measurement(size: float, against: str = "", **errors: Error) -> Measurement:
+    return Measurement(f"all x {size}", "element size", size, {}, "", COST, errors, against=against)
+
+
+@pytest.fixture
+def study(tmp_path):
+    """The case, its run folder and a study beside it whose middle mesh is the case's own."""
+    case = read_case(SMALL_CASE)
+    runs = (measurement(2.0, peel_stress=Error(0.4, "")), measurement(1.0, peel_stress=ORDER, deflection=NO_ORDER))
+    errors = {"peel_stress": "peel", "deflection": "deflection"}
+    key = product_keys(case)["shock"]
+    accuracy = Accuracy(case.case.name, case.kind, "reflowshock accuracy", Host("none", 1), errors, runs, {}, key=key)
+    write_accuracy(tmp_path / "small-accuracy", accuracy)
+    return case, tmp_path / "small", accuracy
+
+
+def test_the_case_s_own_mesh_has_a_grid_convergence_index(study):
+    case, folder, _ = study
+    known = discretisation(folder, case)
+    assert known.errors == {"peel_stress": pytest.approx(1.25 * 0.04), "deflection": pytest.approx(3.0 * 0.05)}
+    assert known.text("peel_stress") == "±5 % (Richardson, order 1.6)"
+    assert known.text("peak_board_strain") == "not known"
+
+
+def test_a_report_in_its_store_finds_what_was_measured_of_the_case(study):
+    case, folder, accuracy = study
+    work = folder / ".store/work/report-0123"
+    work.mkdir(parents=True)
+    assert own_accuracy(work, case) == accuracy
+    assert not section_for(work, case)["stale"]
+
+
+def test_errors_of_other_inputs_are_not_shown_as_valid(study):
+    _, folder, _ = study
+    changed = read_case(SMALL_CASE, ["shock.peak_acceleration=1000 G"])
+    assert discretisation(folder, changed) == Discretisation(unknown=STALE)
+    assert section_for(folder, changed)["stale"]
+
+
+def test_other_limits_leave_the_errors_valid(study):
+    _, folder, _ = study
+    judged = read_case(SMALL_CASE, ['shock.failure.peel_stress={ limit = "80 MPa", source = "a test" }'])
+    assert "peel_stress" in discretisation(folder, judged).errors
+
+
+def test_errors_that_were_not_measured_say_what_to_do(study, tmp_path):
+    case, folder, accuracy = study
+    assert "accuracy measures it" in discretisation(tmp_path / "elsewhere/small", case).unknown
+    alone = (measurement(1.0, against="all x 0.5", peel_stress=ORDER), measurement(2.0, peel_stress=ORDER))
+    write_accuracy(tmp_path / "small-accuracy", replace(accuracy, measurements=alone))
+    assert discretisation(folder, case).unknown == COARSEST
+
+
+def test_errors_keep_the_order_of_the_limit_that_they_are_from():
+    runs = [StudyRun(f"{size}", "size", {}, size) for size in (4.0, 2.0, 1.0)]
+    answers = {run.name: {"peel": Quantity(1.0 + 0.01 * run.value**2)} for run in runs}
+    found = errors_of(answers, runs, runs, None)
+    assert found["1.0"]["peel"].value == pytest.approx(0.01) and found["1.0"]["peel"].order == pytest.approx(2.0)
+    wavy = {run.name: {"peel": Quantity(1.0 + 0.01 * (-1.0) ** place)} for place, run in enumerate(runs)}
+    assert errors_of(wavy, runs, runs, None)["2.0"]["peel"].order is None
+
+
+def result(windows: int = 100, **metrics: float | str) -> dict:
+    found = {name: {"value": value, "unit": ""} for name, value in metrics.items()}
+    return {"metrics": found, "model": {"window": 1e-5, "windows": windows}}
+
+
+def test_the_error_of_two_scales_is_the_difference_from_one_model():
+    both = {
+        "two_scale": result(peel_stress=6.3e7, critical_joint="A1"),
+        "dns": result(peel_stress=6e7, critical_joint="A2"),
+    }
+    assert scheme_error("peel_stress", both) == "5 %"
+    assert scheme_error("critical_joint", both) == "A2 in the DNS"
+    assert scheme_error("peak_board_strain", both) == "not known"
+    assert scheme_error("peel_stress", both | {"dns": result(50)}) == "not known: the DNS ends at 0.5 ms"
+    assert scheme_error("peel_stress", {"two_scale": result()}).startswith("not known: no DNS")
+    assert scheme_error("peel_stress", {"dns": result()}) == "none: one model"
+
+
+def test_what_is_left_out_stands_with_its_influence_the_largest_first():
+    effects = {
+        "damping": {"on": False, "influence": 0.02}, "finite_rotation": {"on": False, "influence": 0.47},
+        "gravity": {"on": False, "influence": 1e-3}, "plasticity": {"on": True, "influence": 0.5},
+        "symmetry": {"on": False},
+    }  # fmt: skip
+    assert left_out(effects) == "finite rotation 47 %, damping 2 %"
+    assert left_out({}) == "nothing whose expected influence is above 1 %"
+
+
+@pytest.mark.parametrize(
+    "known", [Discretisation(), Discretisation({"peel_stress": 0.04}, {"peel_stress": "Richardson"})]
+)
+def test_the_first_table_has_the_error_of_every_figure_or_says_that_it_is_not_known(known):
+    metrics = {"critical_joint": {"value": "A1", "unit": ""}, "peel_stress": {"value": 6e7, "unit": "Pa"}}
+    table = headline(metrics, known, {"effects": {}}, {"dns": {"metrics": metrics, **result()}})
+    assert [row[1] for row in table["rows"]] == ["A1", "60 MPa"]
+    assert [row[2] for row in table["rows"]] == ["–", known.text("peel_stress")]
+    assert ("accuracy measures it" in table["note"]) is not bool(known.errors)
