@@ -310,9 +310,9 @@ def _(_effect, _folder):
     duration, rate = 3e-4, 1.0
     given = scene.shock(damping=Damping(mass_coefficient=rate))
     drop = SimpleNamespace(shock=given.model_copy(update={"duration": duration}), expected=SimpleNamespace(omega=1.5e4))
-    foreseen = RayleighEffect().decide(drop)["influence"]
+    predicted = RayleighEffect().decide(drop)["influence"]
     both = [scene.moved(body, step, scene.loads_of(body, item), duration)[1] for item in (scene.shock(), given)]
-    assert abs(both[1] / both[0] - 1.0) < foreseen < 1e-3
+    assert abs(both[1] / both[0] - 1.0) < predicted < 1e-3
 
 
 @off("finite_rotation")

@@ -80,7 +80,7 @@ class _Reference:
         values = [answers[one.name][quantity].value for one in known]
         limit = richardson([one.value or 0.0 for one in known[-3:]], values[-3:], order)
         if limit is not None:
-            return cls(limit[0], f"Richardson, order {limit[1]:.2g}", order=limit[1])
+            return cls(limit[0], f"Richardson, order {limit[1]:.3g}", order=limit[1])
         return cls(values[-1], f"finest run, {known[-1].name}", known[-1].name)
 
 
