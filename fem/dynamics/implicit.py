@@ -7,6 +7,8 @@
 Second order and stable at any step for -1/3 <= alpha <= 0. alpha = 0 is the trapezoidal rule, which keeps the energy of
 a linear model to the last digits whatever the step: the default, because an oracle's balance then shows every mistake.
 Negative alpha damps what the step does not resolve, for loads that start with a jump.
+
+It is the reference of explicit runs: same body, loads and force terms, linear elastic only.
 """
 
 from collections.abc import Mapping, Sequence
@@ -282,8 +284,8 @@ class ImplicitMotion(Motion):
         rows = {name: Rows(nodes, value) for name, value in (nodal | {"older": self._older}).items()}
         at_slaves = Shares(nodes[tie.slave], self.slave_force, self.body.shared.owned[tie.slave])
         loads = {str(k): load.state(self.body) for k, load in enumerate(self._loads)}
-        told: State = {"time": Same(self.time), "works": Sum(self._works)}
-        return {**rows, **told, "slave_force": at_slaves, "loads": loads}
+        scalars: State = {"time": Same(self.time), "works": Sum(self._works)}
+        return {**rows, **scalars, "slave_force": at_slaves, "loads": loads}
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """Continue from the values of what ``state`` returned, in a motion that was built alike."""

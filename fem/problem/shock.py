@@ -112,6 +112,8 @@ class ShockNumerics(Parameters):
     ``kinematics`` and ``formulation`` of hexahedra as for a structure. Elastic hexahedra are the same in both
     formulations; those that yield are seven to eight times cheaper with one point, a few per cent stronger in bending.
     Kinematics that are ``auto`` are corotational where the board's deflection calls for it.
+    ``mass_scaled`` are roles, such as copper, whose density is raised to the step of the others; the added mass is a
+    metric with a limit.
     ``dns_duration`` ends the DNS before the shock does: the modes are compared over the time that both have.
     """
 

@@ -1,4 +1,7 @@
-"""From the mesh of a structure to its models on each rank: one, or fine layers apart from the others."""
+"""From the mesh of a structure to its models on each rank: one, or fine layers apart from the others.
+
+Layers whose ``in_plane`` differs are meshed apart and tied; the finer face is the slave.
+"""
 
 from collections.abc import Mapping
 from dataclasses import replace

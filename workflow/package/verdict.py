@@ -1,4 +1,8 @@
-"""The verdict on a package that is dropped: does each joint hold, by how much, and how many drops will it bear?"""
+"""The verdict on a package that is dropped: does each joint hold, by how much, and how many drops will it bear?
+
+The report judges the joints from the histories, so that the limits are inputs of the report alone (``Stage.without``).
+No solder of the library has a limit: none of the sources at hand gives one.
+"""
 
 from collections.abc import Collection
 

@@ -98,7 +98,7 @@ def ranked_joints(
                 mega(history["von_mises_max"][:, column].max()),
             ]
         )
-    layer = f"{micro(float(history['joint_layer']))} µm"
+    layer = f"{1e6 * float(history['joint_layer']):.4g} µm"
     head = [
         "joint",
         "peel stress [MPa]",

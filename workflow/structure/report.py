@@ -1,4 +1,8 @@
-"""Report of a structure: what moved how, against what, at what cost."""
+"""Report of a structure: what moved how, against what, at what cost.
+
+It has the largest deformation, natural modes, histories, reactions, the energy balance, and the comparison with
+references.
+"""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -225,7 +229,7 @@ def reaction_curves(histories: Histories, supports: list[str]) -> str:
 
 
 def energy_curves(histories: Histories) -> str:
-    """Draw all terms of each solver's ledger that are not zero, and its balance relative to the largest energy."""
+    """Draw the nonzero terms of each solver's energy balance, and the balance relative to the largest energy."""
     with pyplot.rc_context(STYLE):
         figure, axes = pyplot.subplots(
             len(histories), 2, figsize=(9.2, 3.0 * len(histories)), squeeze=False, constrained_layout=True

@@ -1,4 +1,4 @@
-"""Structures as cases: units in named tables and lists, refused with key, value, range and nearest name, foreseen."""
+"""Structures as cases: units in named tables and lists, refused with key, value, range and nearest name; forecasts."""
 
 import tomllib
 from pathlib import Path
