@@ -77,21 +77,21 @@ def cost_of_a_step(rows: list[dict]) -> dict:
 
 
 def main() -> None:
-    """Run the ladders and write the table."""
+    """Run the series and write the table."""
     joint(0.31, SolderNumerics(spacing=0.1 * MM))
     for basis in SUPPORT:
         derivative_errors(basis, 8)
-    ladder = [joint(0.31, SolderNumerics(spacing=spacing * MM)) for spacing in SPACINGS]
+    by_spacing = [joint(0.31, SolderNumerics(spacing=spacing * MM)) for spacing in SPACINGS]
     steps = [joint(0.31, SolderNumerics(time_step_limit=limit)) for limit in TIME_STEP_LIMITS]
     gaps = [joint(gap, SolderNumerics()) for gap in GAPS]
     result = {
         "machine": platform.processor() or platform.machine(),
-        "spacing": ladder,
+        "spacing": by_spacing,
         "time_step": steps,
         "gaps": gaps,
         "seconds_of_all_gaps": sum(row["seconds"] for row in gaps),
         "derivatives": [derivative_errors(basis, count) for basis in SUPPORT for count in PER_EDGE],
-        "cost_of_a_step": cost_of_a_step(ladder),
+        "cost_of_a_step": cost_of_a_step(by_spacing),
     }
     RESULTS.parent.mkdir(exist_ok=True)
     RESULTS.write_text(json.dumps(result, indent=1))

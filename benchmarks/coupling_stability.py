@@ -3,7 +3,7 @@
     PYTHONPATH=. python benchmarks/coupling_stability.py [--quick]  (half an hour, one core)
 
 A board of orthotropic FR4 and a block tied to it off its grid: m from 1 to 40, impedances from a tenth to ten times the
-board's, mesh ratios from 1 to 8, flat, distorted and curved interfaces, cuts below the block and beside it. The
+board's, mesh ratios from 1 to 8, flat, distorted and curved interfaces, interfaces below the block and beside it. The
 amplification matrix of a window is made of the program's own operators at the steps that the program chooses, step
 fractions 0.9 and the largest that is allowed, 0.95; its spectral radius must be at most 1 + 1e-8. The paper's scheme
 (fine elements at the interface, internal force only, no interface mass) is in the same table.

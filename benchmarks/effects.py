@@ -38,7 +38,7 @@ BOARD = dns_body(
 )
 
 LIQUID = [effect.name for effect in LIQUID_EFFECTS if effect.is_measured]
-# Effect -> what is told of the measurement, the name of the side with it, that of the side without.
+# Effect -> how the measurement is described, the name of the side with it, that of the side without.
 PAIRS = {
     name: (f"a step of {PER_EDGE**3} particles", f"reflow_{name}", f"reflow_without_{name}") for name in LIQUID
 } | {

@@ -65,7 +65,7 @@ SIDE, THICKNESS = 0.1, 0.002  # [m] of the square plate
 
 
 @dataclass(frozen=True, slots=True)
-class Ladder:
+class Refinement:
     """Sizes of one problem, cells along and across; errors are against the finest hexahedra."""
 
     problem: str
@@ -75,12 +75,12 @@ class Ladder:
 
 
 QUICK = (
-    Ladder("cantilever", 0.3, ((10, 1), (20, 2)), (80, 8)),
-    Ladder("plate", 0.3, ((4, 1), (8, 1)), (16, 2)),
+    Refinement("cantilever", 0.3, ((10, 1), (20, 2)), (80, 8)),
+    Refinement("plate", 0.3, ((4, 1), (8, 1)), (16, 2)),
 )
 FULL = (
-    *(Ladder("cantilever", nu, ((10, 1), (20, 2), (40, 4), (80, 8)), (240, 24)) for nu in (0.3, 0.499)),
-    Ladder("plate", 0.3, ((4, 1), (8, 1), (16, 2), (24, 2)), (48, 4)),
+    *(Refinement("cantilever", nu, ((10, 1), (20, 2), (40, 4), (80, 8)), (240, 24)) for nu in (0.3, 0.499)),
+    Refinement("plate", 0.3, ((4, 1), (8, 1), (16, 2), (24, 2)), (48, 4)),
 )
 
 
@@ -208,32 +208,37 @@ def mindlin_frequency(poisson: float) -> float:
     return float(np.sqrt(squared) / (2 * np.pi))
 
 
-def measure(ladder: Ladder) -> Iterator[dict]:
-    """Rows of one ladder: every kind at every size, against the finest hexahedra."""
-    exact = answers(Problem(ladder.problem, ladder.poisson, ladder.finest, "incompatible_modes").body())
+def measure(refinement: Refinement) -> Iterator[dict]:
+    """Rows of one refinement: every kind at every size, against the finest hexahedra."""
+    exact = answers(Problem(refinement.problem, refinement.poisson, refinement.finest, "incompatible_modes").body())
     for kind in NAMES:
-        for cells in ladder.cells:
-            body = Problem(ladder.problem, ladder.poisson, cells, kind).body()
+        for cells in refinement.cells:
+            body = Problem(refinement.problem, refinement.poisson, cells, kind).body()
             errors = {f"{name}_error": value / exact[name] - 1.0 for name, value in answers(body).items()}
-            row = {"problem": ladder.problem, "poisson_ratio": ladder.poisson, "kind": kind, "cells": list(cells)}
+            row = {
+                "problem": refinement.problem,
+                "poisson_ratio": refinement.poisson,
+                "kind": kind,
+                "cells": list(cells),
+            }
             yield row | errors | costs(body, 1.0 / exact["frequency"])
 
 
-def reference_check(ladders: tuple[Ladder, ...]) -> dict:
+def reference_check(refinements: tuple[Refinement, ...]) -> dict:
     """How far the finest plate is from Mindlin's frequency."""
-    plate = next(ladder for ladder in ladders if ladder.problem == "plate")
+    plate = next(refinement for refinement in refinements if refinement.problem == "plate")
     found = answers(Problem("plate", plate.poisson, plate.finest, "incompatible_modes").body())["frequency"]
     return {"finest_plate_over_mindlin": found / mindlin_frequency(plate.poisson) - 1.0}
 
 
-def run_all(ladders: tuple[Ladder, ...]) -> dict:
-    """Measure the ladders; what is measured is on disk after each row."""
-    next(measure(Ladder("plate", 0.3, ((2, 1),), (3, 1))))  # compiles what all rows use
-    speed = speeds(ladders[-1].cells[-1])
-    result = {"machine": platform.machine(), "rows": [], "speeds": speed, **reference_check(ladders)}
+def run_all(refinements: tuple[Refinement, ...]) -> dict:
+    """Measure the refinements; what is measured is on disk after each row."""
+    next(measure(Refinement("plate", 0.3, ((2, 1),), (3, 1))))  # compiles what all rows use
+    speed = speeds(refinements[-1].cells[-1])
+    result = {"machine": platform.machine(), "rows": [], "speeds": speed, **reference_check(refinements)}
     RESULTS.parent.mkdir(exist_ok=True)
-    for ladder in ladders:
-        for row in measure(ladder):
+    for refinement in refinements:
+        for row in measure(refinement):
             result["rows"].append(row)
             RESULTS.write_text(json.dumps(result, indent=1) + "\n")
             print(" | ".join(cells_of(row)), flush=True)

@@ -26,7 +26,7 @@ from benchmarks.support import turns
 from benchmarks.support.drop_scene import DropScene
 from benchmarks.support.program_run import ProgramRun
 from reflowshock.fem.output.compare import compare_histories
-from reflowshock.workflow.board_drop.board_deflection import longest_duration
+from reflowshock.workflow.board_drop.duration import longest_duration
 
 CRITICAL = ("A10", "A9", "B10")
 SETTINGS: dict[str, dict] = {

@@ -1,4 +1,4 @@
-"""``python -m reflowshock`` is the command; what happens while the program loads is told, too."""
+"""``python -m reflowshock`` is the command; errors while the program loads are reported, too."""
 
 from reflowshock.workflow.process.last_word import heed_signals, last_word
 

@@ -1,4 +1,4 @@
-"""One mistake in what the program is given, as the user is told it: the same record for all packages."""
+"""One mistake in what the program is given, as the user reads it: the same record for all packages."""
 
 import json
 from collections.abc import Iterable, Iterator

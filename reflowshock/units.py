@@ -124,6 +124,7 @@ KINDS = {
     "temperature": "K",
     "thermal expansion": "ppm/K",
     "mass": "kg",
+    "stiffness per area": "N/m^3",
     "force": "N",
     "frequency": "Hz",
 }

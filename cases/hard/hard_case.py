@@ -198,7 +198,7 @@ def _combinations(head: HardCaseFile, problems: list[Problem]) -> Iterator[tuple
 
 
 def _parameters(trial: Trial, table: dict, folder: Path, problems: list[Problem]) -> BaseModel | None:
-    """Convert and check the parameters of a trial; None, and problems told, where that cannot be."""
+    """Convert and check the parameters of a trial; None, and problems added, where that cannot be."""
     found: list[Problem] = []
     values = trial.located(fields.to_si_table(trial.parameters, table, "", found), folder)
     parameters = None

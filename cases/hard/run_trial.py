@@ -37,7 +37,7 @@ class RunParameters(Parameters):
         try:
             read_case(Path(self.case), self.overrides)
         except CaseError as error:
-            raise PydanticCustomError("case", "{told}", {"told": "; ".join(error.lines())}) from None
+            raise PydanticCustomError("case", "{problems}", {"problems": "; ".join(error.lines())}) from None
         return self
 
 

@@ -74,8 +74,8 @@ class Verdict:
         """Say how it ended: the closest of its checks, or why there is none; where it missed, all that it missed."""
         if self.message:
             return ("refused: " if self.is_refused else "") + self.message
-        told: list[Check | None] = [check for check in self.checks if not check.holds] or [self.closest]
-        return "; ".join(f"{check}, margin {check.margin_text}" for check in told if check is not None)
+        shown: list[Check | None] = [check for check in self.checks if not check.holds] or [self.closest]
+        return "; ".join(f"{check}, margin {check.margin_text}" for check in shown if check is not None)
 
     def record(self) -> dict[str, Any]:
         """Return all but the case, to be sent from one process to another."""

@@ -35,7 +35,7 @@ class OneWay:
 
 
 class Driver(Alone):
-    """The whole structure: one step a window, whose velocity at the interface is told."""
+    """The whole structure: one step a window, whose velocity at the interface is sent."""
 
     def __init__(self, body: Body, loads: list[Load], plan: WindowPlan, channels: InterfaceChannels) -> None:
         """Start at rest."""

@@ -130,8 +130,8 @@ def plan_ranks(
     plan = plan_from(loads, family, ranks, (measured, scheme not in ALTERNATING)) if world.rank == 0 else None
     if plan:
         print(words(plan), flush=True)
-    told = world.bcast((plan.placement, plan.summary) if plan else None)
-    return plan or Plan(told[0], {}, told[1])
+    shared = world.bcast((plan.placement, plan.summary) if plan else None)
+    return plan or Plan(shared[0], {}, shared[1])
 
 
 def measure(world: MPI.Comm, loads: Mapping[Role, ModelWork], family: Mapping[Role, NDArray[np.int8]]) -> Measured:
@@ -240,5 +240,5 @@ def words(plan: Plan) -> str:
         for name, seconds in plan.summary["alternatives"].items()
         if name != plan.summary["chosen"]
     ]
-    told = f"placement: {plan.summary['chosen']}, {1e3 * plan.summary['predicted_window_seconds']:.3g} ms a window"
-    return f"{told} predicted" + (f"; {', '.join(others)}" if others else "")
+    line = f"placement: {plan.summary['chosen']}, {1e3 * plan.summary['predicted_window_seconds']:.3g} ms a window"
+    return f"{line} predicted" + (f"; {', '.join(others)}" if others else "")

@@ -28,7 +28,7 @@ class SelfCheck:
         rigid: Largest error of a rigid motion at slaves and interface, of its size.
         linear: The same of a linear field.
         tie: Net force and moment that ties lose, of the sum of magnitudes.
-        cut: The same of the coupling interface.
+        interface: The same of the coupling interface.
         macro_mass: Mass of the macro model [kg].
         interface_mass: Mass that the meso model gives to the nodes of the interface [kg].
         meso_mass: Its other mass [kg].
@@ -38,7 +38,7 @@ class SelfCheck:
     rigid: float
     linear: float
     tie: float
-    cut: float
+    interface: float
     macro_mass: float
     interface_mass: float
     meso_mass: float
@@ -49,8 +49,8 @@ class SelfCheck:
         """Return it in a line."""
         return (
             f"self-check: rigid motion {self.rigid:.1e}, linear field {self.linear:.1e}, net force and moment through"
-            f" tie {self.tie:.1e} and interface {self.cut:.1e}; mass {self.macro_mass:.6e} + {self.interface_mass:.6e}"
-            f" (interface) + {self.meso_mass:.6e} = {self.volume_mass:.6e} kg"
+            f" tie {self.tie:.1e} and interface {self.interface:.1e}; mass {self.macro_mass:.6e} +"
+            f" {self.interface_mass:.6e} (interface) + {self.meso_mass:.6e} = {self.volume_mass:.6e} kg"
         )
 
     def judge(self) -> None:
@@ -60,7 +60,7 @@ class SelfCheck:
             AgreedError: A residual above 1e-12, or masses that do not add up.
         """
         sums = self.macro_mass + self.interface_mass + self.meso_mass
-        exact = max(self.rigid, self.linear, self.tie, self.cut) <= EXACT  # false for what is no number
+        exact = max(self.rigid, self.linear, self.tie, self.interface) <= EXACT  # false for what is no number
         if not exact or not abs(sums - self.volume_mass) <= MASS_TOLERANCE * self.volume_mass:
             raise AgreedError(f"{self.words}; residuals must be at most {EXACT:g}, masses equal to {MASS_TOLERANCE:g}")
 

@@ -71,7 +71,7 @@ def stabilisation(level: int, damping: float = 0.0) -> float:
     if damping > LARGEST_DAMPING * (1.0 + ROUNDING):
         raise LevelError(
             f"damping.stiffness_coefficient is {damping:.3g} times the window, too strong for levels, which bear"
-            f" {LARGEST_DAMPING:g} times it: at most {LARGEST_DAMPING / damping:.2g} of it, or scheme = held_velocity"
+            f" {LARGEST_DAMPING:g} times it: at most {LARGEST_DAMPING / damping:.3g} of it, or scheme = held_velocity"
         )
     largest = (2.0 + 2.0 / np.cosh(np.sqrt(2.0 * FIRST))) / (1.0 + 2.0 * damping)
     return float(0.5 * np.arccosh(2.0 / (largest - 2.0)) ** 2) * GROWTH ** (level - 1)

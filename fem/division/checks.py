@@ -135,7 +135,7 @@ def check_pulses(durations: Iterable[float], window: float, fraction: float) -> 
     if shortest < window:
         raise PulseError(
             f"a pulse of {shortest:.4g} s is shorter than a window of {window:.4g} s, the time between two exchanges of"
-            f" the models: a step_fraction below {fraction * shortest / window:.2g}, or one model (dns), resolves it"
+            f" the models: a step_fraction below {fraction * shortest / window:.3g}, or one model (dns), resolves it"
         )
 
 

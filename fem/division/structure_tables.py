@@ -40,6 +40,8 @@ class StructureTables(Tables):
         pressed: Name -> the same facet set, for a pressure that follows it.
         pushed: Name of a force at a point -> nodes and their shares in it; on planes of symmetry they add up to the
             part that the meshed body bears.
+        bedded: Name of an elastic support -> its facets.
+        masses: Nodes and what they bear of lumped masses [kg].
         watch: Watch points and supports.
     """
 
@@ -47,6 +49,8 @@ class StructureTables(Tables):
     areas: dict[str, tuple[NDArray[np.integer], NDArray[np.float64]]]
     pressed: dict[str, OutwardFacets]
     pushed: dict[str, Shares]
+    bedded: dict[str, OutwardFacets]
+    masses: Shares
     watch: PointTable
 
     def counted(self, part: Part, node: NDArray[np.int32], cell: NDArray[np.int32]) -> dict[str, Any]:
@@ -66,6 +70,11 @@ class StructureTables(Tables):
             "pushed": {
                 name: (present(node[nodes]), share[node[nodes] >= 0]) for name, (nodes, share) in self.pushed.items()
             },
+            "bedded": {
+                name: replace(item, facets=part.number[item.facets], cells=cell[item.cells])
+                for name, item in self.bedded.items()
+            },
+            "masses": (present(node[self.masses[0]]), self.masses[1][node[self.masses[0]] >= 0]),
             "watch": replace(self.watch, nodes=node[self.watch.nodes], cells=cell[self.watch.cells], supports=supports),
         }
 
@@ -109,6 +118,10 @@ def structure_tables(whole: Whole, problem: StructureProblem) -> StructureTables
         areas={name: outward_areas(mesh, name) for name in sorted(pressed)},
         pressed={name: outward_facets(mesh, name) for name in sorted(pressed)},
         pushed=pushed_nodes(mesh, problem),
+        bedded={
+            name: outward_facets(mesh, support.on) for name, support in problem.supports.items() if support.bedding
+        },
+        masses=lumped_masses(mesh, problem),
         watch=point_table(mesh, points, supports, yields=bool(plastic_laws(problem.layer_materials))),
     )
 
@@ -121,6 +134,21 @@ def pushed_nodes(mesh: MeshData, problem: StructureProblem) -> dict[str, Shares]
             nodes, shares = point_shares(mesh, f"loads.{name}.at", load.at)
             found[name] = nodes, shares * 0.5 ** len(problem.structure.planes_at(load.at))
     return found
+
+
+def lumped_masses(mesh: MeshData, problem: StructureProblem) -> Shares:
+    """Return the nodes that bear lumped masses and what each bears [kg], see ``StructureTables``; errors likewise."""
+    nodes, shares = [np.empty(0, np.int64)], [np.empty(0)]
+    for name, item in problem.masses.items():
+        places = problem.structure.meshed_places(item.at, item.footprint)
+        for place, part in places:
+            found, share = point_shares(mesh, f"masses.{name}.at", place)
+            nodes.append(found)
+            shares.append(item.mass * part * share)
+    numbers, where = np.unique(np.concatenate(nodes), return_inverse=True)
+    total = np.zeros(len(numbers))
+    np.add.at(total, where.reshape(-1), np.concatenate(shares))
+    return numbers, total
 
 
 def check_layers(mesh: MeshData, problem: StructureProblem) -> None:
@@ -179,5 +207,7 @@ def held_by_supports(mesh: MeshData, problem: StructureProblem) -> NDArray[np.bo
     rules += [(f"{axis}_min", (axis,)) for axis in problem.structure.symmetry]
     held = np.zeros((len(mesh.points), 3), dtype=bool)
     for name, components in rules:
-        held[np.ix_(np.unique(facet_set(mesh, name)), np.array([AXES.index(axis) for axis in components]))] = True
+        held[np.ix_(np.unique(facet_set(mesh, name)), np.array([AXES.index(axis) for axis in components], np.intp))] = (
+            True
+        )
     return held

@@ -175,8 +175,8 @@ class ExplicitMotion(Motion):
         at_slaves = Shares(local.nodes[tie.slave], self.slave_force, self.body.shared.owned[tie.slave])
         loads = {str(k): load.state(self.body) for k, load in enumerate(self._loads)}
         paths = {str(k): term.state(local.cell_numbers) for k, term in enumerate(self._terms_with_path())}
-        told: State = {"gravity": Same(self.gravity), "time": Same(self.time), "body_work": Sum(self._body_work)}
-        return {**rows, **told, "slave_force": at_slaves, "paths": paths, "loads": loads}
+        scalars: State = {"gravity": Same(self.gravity), "time": Same(self.time), "body_work": Sum(self._body_work)}
+        return {**rows, **scalars, "slave_force": at_slaves, "paths": paths, "loads": loads}
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """Continue from the values of what ``state`` returned, in a motion that was built alike."""

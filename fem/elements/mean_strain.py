@@ -1,4 +1,7 @@
-"""Energy of the mean strains of elements: what is left of the strain energy is the hourglass control's."""
+"""Energy of the mean strains of elements: what is left of the strain energy is the hourglass control's.
+
+The hourglass energy in the balance is what the mean strains do not hold.
+"""
 
 from dataclasses import dataclass
 

@@ -115,7 +115,7 @@ class WeightEffect(DropEffect):
     def beside(switch: Switch, peak: float, gravity: float) -> Decision:
         """Decide whether weight acts beside a shock of a peak acceleration [m/s^2]."""
         ratio = gravity / peak if peak > 0.0 else math.inf
-        reason = f"1 G is {ratio:.2g} of the peak acceleration"
+        reason = f"1 G is {ratio:.3g} of the peak acceleration"
         if switch != "auto":
             return decision(switch == "on", f"shock.gravity = {switch}; {reason}", min(ratio, 1.0))
         on = ratio >= NEGLIGIBLE_WEIGHT
@@ -161,7 +161,7 @@ def called_for(ratio: float, cooled: bool) -> tuple[Kinematics, str]:
     bound = stiffened(ratio, STIFFENING_BOUND)
     turns = bound > NEGLIGIBLE_STIFFENING
     relation = f"{'>' if turns else '<='} {100.0 * NEGLIGIBLE_STIFFENING:g} %"
-    why = f"stretching changes deflections by up to {100.0 * bound:.2g} % ({relation})"
+    why = f"stretching changes deflections by up to {100.0 * bound:.3g} % ({relation})"
     if not turns:
         return "small", why
     return ("finite", f"{why}; the stress of cooling takes a path") if cooled else ("corotational", why)
@@ -190,7 +190,7 @@ class FiniteRotation(DropEffect):
             why = f"shock.numerics.kinematics = auto: {reason}"
         elif not finite:
             why += "" if wanted == "small" else f"; auto would choose {wanted}"
-        why = f"the board is expected to deflect by about {ratio:.2g} times its thickness; {why}"
+        why = f"the board is expected to deflect by about {ratio:.3g} times its thickness; {why}"
         return decision(finite, why, stiffened(ratio, STIFFENING_OF_BOARD))
 
     def tell(self, run: DropRun) -> Decision:
@@ -217,7 +217,7 @@ class RayleighEffect(DropEffect):
             return decision(False, "shock.damping gives none", 0.0)
         ratio = 0.5 * (alpha / omega + beta * omega)
         taken = -math.expm1(-ratio * omega * drop.duration)
-        return decision(True, f"{100.0 * ratio:.2g} % of critical damping in the board's first mode", taken)
+        return decision(True, f"{100.0 * ratio:.3g} % of critical damping in the board's first mode", taken)
 
     def tell(self, run: DropRun) -> Decision:
         """Tell the coefficients."""

@@ -82,7 +82,7 @@ class SolverForecast:
             return f"Only the explicit solver does {', '.join(self.only_explicit)}."
         costs = {"explicit": self.explicit.seconds, "implicit": self.implicit.seconds}
         ratio = max(costs.values()) / min(costs.values())
-        chosen = f"{self.cheaper.capitalize()} steps are {ratio:.2g} times cheaper here"
+        chosen = f"{self.cheaper.capitalize()} steps are {ratio:.3g} times cheaper here"
         return f"{chosen}; yielding, finite rotations and two-scale runs need explicit ones."
 
 

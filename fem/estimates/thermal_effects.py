@@ -130,7 +130,7 @@ class Heated:
     def by_solder(self) -> tuple[float, Decision]:
         """Return by how much of the gaps the solder's force bends, and whether it would act if plates bend."""
         number = solder_force_number(self.materials, self.sizes, self.surface_tension)
-        what = f"the solder's pull bends package and board by {number:.2g} of the gap"
+        what = f"the solder's pull bends package and board by {number:.3g} of the gap"
         return number, _switched(self.thermal.effects.solder_force, number, what)
 
 
@@ -168,7 +168,7 @@ class Flexible(Effect[Heated]):
         """By heating or by the solder's force, whichever changes more."""
         warped = warpage_number(heated.thermal, heated.materials, heated.sizes)
         forced, force = heated.by_solder()
-        what = f"heating changes gaps or places of pads by {warped:.2g} of their size"
+        what = f"heating changes gaps or places of pads by {warped:.3g} of their size"
         number, why = max((warped, what), (forced, force["why"]))
         return _switched(heated.thermal.effects.flexible, number, why)
 

@@ -12,7 +12,7 @@ s = dev s + p 1 the Kirchhoff stress and c = (J' / det F)^(1/3): on the modes, w
     P = c R (dev s + p / c^3 1) U'^-1,  P_c = P + (Pr(p / J') - p / J') cof F_c.
 
 Modes follow each step by one Newton correction with the elastic operator: exact while elastic; what plastic flow leaves
-over is corrected in the next step, and its work on the modes told as hourglass energy. Elastic strains must stay small,
+over is corrected in the next step, its work on the modes counts as hourglass energy. Elastic strains must stay small,
 as those of metals do: in compression above 7 to 20 %, by their shape, the modes grow without load at any step, known of
 all enhanced strains (Wriggers & Reese, CMAME 135, 1996); take the one-point element there.
 """

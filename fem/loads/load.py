@@ -70,7 +70,7 @@ class Loaded(ABC):
         return sum((load.acceleration(time) for load in self._loads), np.zeros(3))
 
     def base_displacement(self) -> NDArray[np.float64]:
-        """Return the displacement ``(3,)`` [m] of the frame in which results are told; zero but with a large mass."""
+        """Return the displacement ``(3,)`` [m] of the frame in which results are given; zero but with a large mass."""
         return sum((load.base_displacement() for load in self._loads), np.zeros(3))
 
     def base_velocity(self) -> NDArray[np.float64]:
@@ -100,11 +100,11 @@ class Load:
         return np.zeros(3)
 
     def base_displacement(self) -> NDArray[np.float64]:
-        """Return the displacement ``(3,)`` [m] of the frame in which results are told."""
+        """Return the displacement ``(3,)`` [m] of the frame in which results are given."""
         return np.zeros(3)
 
     def base_velocity(self) -> NDArray[np.float64]:
-        """Return the velocity ``(3,)`` [m/s] of the frame in which results are told."""
+        """Return the velocity ``(3,)`` [m/s] of the frame in which results are given."""
         return np.zeros(3)
 
     def begin(self, motion: Loaded) -> None:

@@ -41,7 +41,7 @@ def shock_pulse(shock: Shock) -> ShockPulse:
 def input_pulse(shock: Shock) -> tuple[HalfSine | Tabulated, str]:
     """Return the acceleration of the drop table [m/s^2], and where it comes from; errors as ``shock_pulse``."""
     if shock.table is not None:
-        return read_pulse(Path(shock.table), "acceleration"), f"table {Path(shock.table).name}"
+        return read_pulse(Path(shock.table), "acceleration", shock.table_column), f"table {Path(shock.table).name}"
     if shock.service_condition is not None:
         return service_condition(shock.service_condition), f"JEDEC service condition {shock.service_condition}"
     if shock.peak_acceleration is None or shock.pulse_duration is None:

@@ -24,7 +24,7 @@ def pulses_of(loads: Mapping[str, StructureLoad]) -> dict[str, Pulse]:
 def pulse_of(load: StructureLoad) -> Pulse:
     """Return the pulse of a load, in its own unit; errors as ``pulses_of``."""
     if load.table is not None:
-        return read_pulse(Path(load.table), load.quantity)
+        return read_pulse(Path(load.table), load.quantity, load.table_column)
     if isinstance(load, InputG) and load.service_condition is not None:
         return service_condition(load.service_condition)
     if load.peak is None:

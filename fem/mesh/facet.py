@@ -40,7 +40,14 @@ def quadratic_triangle() -> FacetRule:
     return FacetRule(values, np.concatenate([vertices, edges], axis=1), np.full(3, 1.0 / 6.0))
 
 
+def middles_of_edges() -> FacetRule:
+    """Return the middles of a triangle's edges: exact for products of its shape functions."""
+    at = 0.5 * (np.eye(3) + np.roll(np.eye(3), 1, axis=1))
+    return FacetRule(at, np.tile(BARYCENTRIC, (3, 1, 1)), np.full(3, 1.0 / 6.0))
+
+
 RULES = {4: quadrilateral(), 3: triangle(), 6: quadratic_triangle()}
+PRODUCTS = RULES | {3: middles_of_edges()}
 
 
 def area_vectors(corners: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -53,6 +60,17 @@ def area_vectors(corners: NDArray[np.float64]) -> NDArray[np.float64]:
             rule.
     """
     rule = RULES[corners.shape[1]]
+    return np.einsum("q,qa,fqi->fai", rule.weights, rule.values, normals(corners, rule))
+
+
+def bedding_matrices(corners: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the integral of products of two shape functions: ``(nf, m, m)`` [m^2], that of springs of one N/m^3."""
+    rule = PRODUCTS[corners.shape[1]]
+    area = np.linalg.norm(normals(corners, rule), axis=2)
+    return np.einsum("q,qa,qb,fq->fab", rule.weights, rule.values, rule.values, area)
+
+
+def normals(corners: NDArray[np.float64], rule: FacetRule) -> NDArray[np.float64]:
+    """Return the normals ``(nf, q, 3)`` [m^2] at the points of a rule, as long as the area of its reference facet."""
     tangent = np.einsum("fai,qad->fqid", corners, rule.derivatives)
-    normal = np.cross(tangent[..., 0], tangent[..., 1])
-    return np.einsum("q,qa,fqi->fai", rule.weights, rule.values, normal)
+    return np.cross(tangent[..., 0], tangent[..., 1])

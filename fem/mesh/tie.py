@@ -13,7 +13,6 @@ from scipy.spatial import cKDTree
 
 from reflowshock.fem.cell_shape import HEXAHEDRON
 from reflowshock.fem.errors import TieError
-from reflowshock.fem.kernels.motion import gather_from_slaves, spread_to_slaves
 from reflowshock.fem.mesh.mesh import MeshData
 
 CORNERS = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
@@ -38,10 +37,14 @@ class Tie:
 
     def spread(self, values: NDArray[np.float64]) -> None:
         """Overwrite the slaves' rows of ``values (n, 3)`` with N times the masters' rows."""
+        from reflowshock.fem.kernels.motion import spread_to_slaves  # a plan loads no compiled kernels
+
         spread_to_slaves(self.slave, self.master, self.weight, values)
 
     def gather(self, values: NDArray[np.float64]) -> None:
         """Move the slaves' rows of ``values (n, 3)`` to the masters: add N^T of them, then zero them."""
+        from reflowshock.fem.kernels.motion import gather_from_slaves
+
         gather_from_slaves(self.slave, self.master, self.weight, values)
 
     def matrix(self, count: int) -> scipy.sparse.csr_matrix:

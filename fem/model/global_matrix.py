@@ -8,6 +8,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
+from reflowshock.fem.forces.bedding import BeddedFacets
 from reflowshock.fem.forces.force_assembled import AssembledElements
 from reflowshock.fem.model.body import Body
 
@@ -98,10 +99,13 @@ class Equations:
 
 
 def tied_stiffness(body: Body) -> scipy.sparse.csr_matrix:
-    """Return T^T K T of this rank's elements ``(3 n, 3 n)`` [N/m], components of all nodes; the slaves' are zero."""
+    """Return T^T K T of this rank's elements and elastic supports ``(3 n, 3 n)`` [N/m]; zero for slaves."""
     upper = AssembledElements.build(body.elements)
     size = 3 * len(body.mass)
     half = scipy.sparse.bsr_matrix((upper.blocks, upper.columns, upper.pointer), shape=(size, size))
+    for term in body.terms:
+        if isinstance(term, BeddedFacets):
+            half = half + 0.5 * term.stiffness_matrix(len(body.mass))
     if len(body.tie.slave):
         tie = scipy.sparse.kron(body.tie.matrix(len(body.mass)), scipy.sparse.identity(3), format="csr")
         half = tie.T @ half @ tie

@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reflowshock.fem.elements.hexahedron import HEXAHEDRON
-from reflowshock.fem.elements.stress import von_mises
 from reflowshock.fem.forces.force_nonlinear import NonlinearElements, Points
 from reflowshock.fem.kernels.nonlinear import Path
 from reflowshock.fem.kernels.plasticity import NEVER_YIELDS
@@ -120,7 +119,7 @@ class JointElements:
             found, own = elements.points(), weight[:, rows]
             if found.weight.shape[1] == 1:
                 own = own.sum(axis=2, keepdims=True)
-            mises = von_mises(found.stress.reshape(-1, 6)).reshape(found.weight.shape) / found.volume
+            mises = found.mises
             work = np.broadcast_to(found.plastic_work[:, None], mises.shape)
             for k, values in enumerate((mises, found.plastic_strain, work)):
                 result[k, :, rows] = np.einsum("pkm,km->kp", own, values)

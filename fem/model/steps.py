@@ -1,4 +1,9 @@
-"""Time steps of a run, and how they follow from the critical steps of its elements."""
+"""Time steps of a run, and how they follow from the critical steps of its elements.
+
+The critical step is the smallest of all elements, or Lanczos' estimate on the assembled, tied model
+(``power_iteration``). All steps are those of the undeformed body: with finite kinematics, elements that are pressed to
+a fraction of their thickness need about that fraction of the step (``step_fraction``).
+"""
 
 import math
 from collections.abc import Iterable, Sequence

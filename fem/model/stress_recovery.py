@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from reflowshock.fem.elements.stress import element_stress, mean_strain, symmetric, voigt
+from reflowshock.fem.elements.stress import element_stress, mean_strain, symmetric, voigt, von_mises
 from reflowshock.fem.forces.force_corotational import CorotationalBoxes
 from reflowshock.fem.forces.force_nonlinear import NonlinearElements
 from reflowshock.fem.model.body import Body
@@ -38,17 +38,27 @@ class StressRecovery:
 
     def stress(self, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the stresses ``(k, 6)`` [Pa] at a displacement ``(n, 3)`` [m]."""
-        local = displacement[self._cells]
-        result = element_stress(self._gradient, self._elasticity, local) + self._initial
-        for term, rows, places in self._stored:
-            result[rows] = term.means(places).stress
-        finite = self._finite
+        result, finite = self._unturned(displacement), self._finite
         if finite.any():
             deformation = np.eye(3) + self._displacement_gradient(displacement, finite)
             rotation, stretch = polar(deformation)
             result[self._turning] = self._corotational_stress(stretch[self._turning[finite]])
             turned = rotation @ symmetric(result[finite]) @ rotation.transpose(0, 2, 1)
             result[finite] = voigt(turned / np.linalg.det(deformation)[:, None, None])
+        return result
+
+    def mises(self, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the von Mises stresses ``(k,)`` [Pa] at a displacement ``(n, 3)`` [m]: no rotation changes them."""
+        result, finite = von_mises(self._unturned(displacement)), self._finite
+        if finite.any():
+            result[finite] /= np.linalg.det(np.eye(3) + self._displacement_gradient(displacement, finite))
+        return result
+
+    def _unturned(self, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the stresses ``(k, 6)`` [Pa], of elements that turn the Kirchhoff stresses in their own frames."""
+        result = element_stress(self._gradient, self._elasticity, displacement[self._cells]) + self._initial
+        for term, rows, places in self._stored:
+            result[rows] = term.means(places).stress
         return result
 
     def strain(self, displacement: NDArray[np.float64]) -> NDArray[np.float64]:

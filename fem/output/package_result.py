@@ -12,6 +12,7 @@ from reflowshock.fem.division.tables import JointTables
 from reflowshock.fem.dynamics.history import History
 from reflowshock.fem.estimates.drop_effects import DropRun, told
 from reflowshock.fem.loads.shock_pulse import shock_pulse
+from reflowshock.fem.output.acceleration import package_acceleration
 from reflowshock.fem.output.ranking import (
     ENDS,
     OUTER_FIBRE,
@@ -68,6 +69,7 @@ class PackageReport:
             "metrics": cost_metrics(summary, updates_a_window(summary, coupling), timings)
             | health_metrics(outcome.history, arrays)
             | shock_metrics(arrays)
+            | acceleration_metrics(arrays, self.request)
             | {"peak_neglected_strain": quantity(outcome.neglected_strain)},
             "health": health(self.request, outcome, checks),
             "effects": effects(self.request, summary, outcome.neglected_strain),
@@ -155,6 +157,16 @@ def flows(arrays: Mapping[str, NDArray]) -> dict[str, Measure]:
 def has_flow(arrays: Mapping[str, NDArray]) -> bool:
     """Return whether solder may yield in a run."""
     return "plastic_strain_max" in arrays
+
+
+def acceleration_metrics(arrays: Mapping[str, NDArray], request: RunInput) -> dict[str, Any]:
+    """Return the peaks of the package's acceleration after the filter; none of a board without a package."""
+    chosen = shock_pulse(request.shock)
+    found = package_acceleration(arrays, chosen.pulse, request.shock.filter) if arrays["die_centre"].any() else None
+    if found is None:
+        return {}
+    peaks = {name: quantity(value, "G") for name, value in found.peaks_in_g("package").items()}
+    return peaks | {"acceleration_filter": quantity(request.shock.filter.label)}
 
 
 def flow_metrics(arrays: Mapping[str, NDArray]) -> dict[str, Any]:

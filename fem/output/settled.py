@@ -1,13 +1,11 @@
 """When a shock is over: its joints' largest stress has passed, and half a swing of the board brought no larger one."""
 
-from collections.abc import Mapping
-
 import numpy as np
 from numpy.typing import NDArray
 
-Arrays = Mapping[str, NDArray]
+from reflowshock.fem.output.ranking import ENDS, PEEL, VON_MISES, Arrays
 
-HISTORIES = ("peel_board", "peel_package", "von_mises_board", "von_mises_package")
+HISTORIES = tuple(f"{measure.history}_{end}" for measure in (PEEL, VON_MISES) for end in ENDS)
 WATCHED = ("time", "board_centre", *HISTORIES)
 SAME = 0.99  # of the largest stress: what reaches it later is not a higher peak
 SMALL = 0.1  # of the largest deflection: a return to zero from less is no swing

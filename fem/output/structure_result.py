@@ -10,8 +10,10 @@ from numpy.typing import NDArray
 from reflowshock.fem.division.structure_tables import StructureTables
 from reflowshock.fem.elements.stress import principal_strains, von_mises
 from reflowshock.fem.estimates.structure_effects import effects
+from reflowshock.fem.loads.structure_pulses import pulses_of
 from reflowshock.fem.mesh.point_table import PointTable
 from reflowshock.fem.model.factorisation import FactorCost
+from reflowshock.fem.output.acceleration import watch_accelerations
 from reflowshock.fem.output.result import Outcome, Timings, health, model_summary, quantity, sizes
 from reflowshock.fem.output.structure_modes import ModeTable
 from reflowshock.fem.parallel.communicators import Communicators
@@ -63,6 +65,7 @@ class StructureReport:
             | {"energy_balance_error": quantity(outcome.history.balance.balance_error)}
             | energy_metrics(arrays)
             | point_metrics(arrays)
+            | acceleration_metrics(arrays, self.request)
             | layer_metrics(outcome.peaks)
             | mode_metrics(outcome.modes),
             "health": health(self.request, outcome),
@@ -132,6 +135,16 @@ def point_metrics(arrays: Mapping[str, NDArray]) -> dict[str, Any]:
     return metrics
 
 
+def acceleration_metrics(arrays: Mapping[str, NDArray], request: StructureInput) -> dict[str, Any]:
+    """Return the peaks of the accelerations of watch points after the filter."""
+    found = watch_accelerations(arrays, request, pulses_of(request.loads))
+    if not found:
+        return {}
+    peaks = [course.peaks_in_g(name) for name, course in found.items()]
+    metrics = {metric: quantity(value, "G") for point in peaks for metric, value in point.items()}
+    return metrics | {"acceleration_filter": quantity(request.dynamics.filter.label)}
+
+
 def layer_metrics(peaks: dict[str, dict[str, float]]) -> dict[str, Any]:
     """Return the largest element values of each layer at the times of the fields."""
     names = {
@@ -147,5 +160,7 @@ def layer_metrics(peaks: dict[str, dict[str, float]]) -> dict[str, Any]:
 
 
 def mode_metrics(modes: ModeTable | None) -> dict[str, Any]:
-    """Return the first natural frequency, if modes were found."""
-    return {} if modes is None else {"first_frequency": quantity(float(modes.frequency[0]), "Hz")}
+    """Return the first four natural frequencies, or as many as were found."""
+    found = [] if modes is None else modes.frequency.tolist()
+    names = ("first", "second", "third", "fourth")
+    return {f"{name}_frequency": quantity(value, "Hz") for name, value in zip(names, found, strict=False)}

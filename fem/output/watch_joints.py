@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from reflowshock.fem.division.tables import JointTables
 from reflowshock.fem.dynamics.motion import Motion
-from reflowshock.fem.elements.stress import principal_strain, von_mises
+from reflowshock.fem.elements.stress import principal_strain
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.joint_elements import JointElements
 from reflowshock.fem.model.stress_recovery import StressRecovery
@@ -88,7 +88,7 @@ class JointWatch:
         }
 
     def _maxima(self, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
-        values = [von_mises(self._recovery.stress(displacement))]
+        values = [self._recovery.mises(displacement)]
         if self._yields:
             values.append(self._recovery.plastic_strain())
         joints = np.zeros((len(values), len(self.joints)))

@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reflowshock.fem.dynamics.motion import Motion
+from reflowshock.fem.forces.bedding import BeddedFacets
 from reflowshock.fem.mesh.point_table import COMPONENTS, PointTable
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.stress_recovery import StressRecovery
@@ -30,12 +31,17 @@ class PointWatch:
         self._recovery = StressRecovery(body, cells)
         supports = [(body.local.locate(nodes), held) for nodes, held in table.supports.values()]
         self._supports = [(nodes[(nodes >= 0) & body.shared.owned[nodes]], held) for nodes, held in supports]
+        beddings = [term for term in body.terms if isinstance(term, BeddedFacets)]
+        self._beddings = [[term for term in beddings if term.name == name] for name in table.supports]
 
     def sample(self, motion: Motion) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return this rank's parts of the sums: the values of all points by quantity, then the reactions [N]."""
         parts = [self._value(quantity, motion).ravel() for quantity in self._table.quantities]
         reaction = motion.reaction()  # of all supports: their nodes are shared where facet sets meet
-        sums = (held * reaction[nodes].sum(axis=0) for nodes, held in self._supports)
+        sums = [held * reaction[nodes].sum(axis=0) for nodes, held in self._supports]
+        for total, beddings in zip(sums, self._beddings, strict=True):
+            for bedding in beddings:
+                total += bedding.force(motion.displacement).sum(axis=0)
         return np.concatenate([*parts, *sums]), np.empty(0)
 
     def _value(self, quantity: str, motion: Motion) -> NDArray[np.float64]:

@@ -5,6 +5,8 @@ continues from the latest window of which all files are whole: to the same bits 
 what the files of all ranks together say (``portable``); its first own checkpoint then replaces those. The other
 generation is there for a kill between two ranks' files, and for files that are broken. All are data (``data_file``):
 nothing in them is executed, whoever has written them.
+
+A broken or foreign checkpoint is reported, and the run begins anew or from the older generation.
 """
 
 import hashlib

@@ -1,4 +1,4 @@
-"""What the ranks of a run do, told to each other through a file: one line of fixed length for each of them."""
+"""What the ranks of a run do, shared through a file: one line of fixed length for each of them."""
 
 import json
 import os
@@ -67,7 +67,7 @@ class Status:
             return "gone"
         return stat.rpartition(")")[2].split()[0]
 
-    def told(self, silence: float) -> str:
+    def describe(self, silence: float) -> str:
         """Return in words what it does; a rank not heard of for ``silence`` seconds may be stopped."""
         silent = time.time() - self.seen
         if silent > silence:
@@ -87,7 +87,7 @@ class StatusBoard:
     def __init__(self, path: Path) -> None:
         """Open the file, whoever comes first makes it."""
         self.path = path
-        self._told = path.with_name(path.name + ".told")
+        self._claimed = path.with_name(path.name + ".claimed")
         self._file = os.open(path, os.O_RDWR | os.O_CREAT, 0o600)
 
     def write(self, status: Status) -> None:
@@ -107,9 +107,9 @@ class StatusBoard:
         return found
 
     def claim(self) -> bool:
-        """Return whether this rank is the first to speak about the end of the run."""
+        """Return whether this rank is the first to report the end of the run."""
         try:
-            os.close(os.open(self._told, os.O_CREAT | os.O_EXCL, 0o600))
+            os.close(os.open(self._claimed, os.O_CREAT | os.O_EXCL, 0o600))
         except FileExistsError:
             return False
         return True
@@ -118,5 +118,5 @@ class StatusBoard:
         """Close the file, and remove it for all."""
         os.close(self._file)
         if remove:
-            for path in (self.path, self._told):
+            for path in (self.path, self._claimed):
                 path.unlink(missing_ok=True)

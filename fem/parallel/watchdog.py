@@ -3,6 +3,8 @@
 MPI's waits let other threads of Python run, so the thread sees how long its own rank has been in one wait
 (``whereabouts``). What the others do it reads from a file in which each of them says so (``status_board``). It also
 hears the signal by which the launcher ends the ranks that are left when one has died, and says which one that was.
+
+It cannot see inside PETSc's solves, nor anything before the first window is done.
 """
 
 import os
@@ -113,7 +115,7 @@ class Watchdog:
 
     def _who_waits(self) -> str:
         """Return in words what all ranks do, a line each."""
-        lines = [status.told(2.0 * self._tick + 0.1 * self._limit) for status in self._board.read()]
+        lines = [status.describe(2.0 * self._tick + 0.1 * self._limit) for status in self._board.read()]
         return "".join(f"\n  {line}" for line in lines)
 
     def _who_died(self) -> str:

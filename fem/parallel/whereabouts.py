@@ -15,7 +15,7 @@ class Whereabouts:
     """What a process is doing.
 
     Attributes:
-        world: All ranks of the run, whose numbers are told.
+        world: All ranks of the run, whose numbers are written.
         models: The models that it carries.
         window: The window that it is in, -1 before the first.
         waiting: What it waits for and from whom; empty while it does not.

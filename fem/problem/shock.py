@@ -11,6 +11,7 @@ from pydantic_core import PydanticCustomError
 
 from reflowshock.fem.materials.kinematics import TURNING, Kinematics
 from reflowshock.fem.problem.failure import Failure
+from reflowshock.fem.problem.filters import LowPass
 from reflowshock.parameters import Parameters
 from reflowshock.quantity import Quantity
 
@@ -111,6 +112,8 @@ class ShockNumerics(Parameters):
     ``kinematics`` and ``formulation`` of hexahedra as for a structure. Elastic hexahedra are the same in both
     formulations; those that yield are seven to eight times cheaper with one point, a few per cent stronger in bending.
     Kinematics that are ``auto`` are corotational where the board's deflection calls for it.
+    ``mass_scaled`` are roles, such as copper, whose density is raised to the step of the others; the added mass is a
+    metric with a limit.
     ``dns_duration`` ends the DNS before the shock does: the modes are compared over the time that both have.
     """
 
@@ -150,19 +153,21 @@ class Shock(Parameters):
     """Input-G at the mounting holes, package facing down (JESD22-B111; H 4.4).
 
     The pulse is that of a JEDEC service condition, or a half sine of ``peak_acceleration`` and ``pulse_duration``, or a
-    table of times and accelerations (CSV). ``method`` gives it to the board as body acceleration, its holes held, or
-    to a large mass at the holes. Gravity is left out by ``auto`` where it is less than a thousandth of the peak. The
-    stress at the joints' upper interface is kept at ``picture_times``. ``joint_layer`` is the thickness of the solder
-    at either pad over which stress and plastic work are averaged. ``identical_joints`` repeats the shock under a
-    flat package on truncated spheres of the solder's volume: what the joints' own shapes change is the difference.
-    A ``duration`` that is ``auto`` ends when the joints' first peak has passed and half a swing of the board brought no
-    higher one, at the latest a period of the board after the pulse.
+    table of times and accelerations (CSV; ``table_column`` is the title of one of several columns). ``method`` gives it
+    to the board as body acceleration, its holes held, or to a large mass at the holes. Gravity is left out by ``auto``
+    where it is less than a thousandth of the peak. The stress at the joints' upper interface is kept at
+    ``picture_times``. ``joint_layer`` is the thickness of the solder at either pad over which stress and plastic work
+    are averaged. ``identical_joints`` repeats the shock under a flat package on truncated spheres of the solder's
+    volume: what the joints' own shapes change is the difference. A ``duration`` that is ``auto`` ends when the joints'
+    first peak has passed and half a swing of the board brought no higher one, at the latest a period of the board after
+    the pulse. ``filter`` is that of the package's acceleration.
     """
 
     service_condition: ServiceCondition | None = None
     peak_acceleration: Annotated[float | None, Quantity("G")] = Field(None, gt=0)
     pulse_duration: Annotated[float | None, Quantity("ms")] = Field(None, gt=0)
     table: str | None = None
+    table_column: str | None = None
     duration: Annotated[float, Quantity("ms"), Field(gt=0)] | Literal["auto"]
     picture_times: Annotated[tuple[Annotated[float, Field(ge=0)], ...], Quantity("ms")] = ()
     joint_layer: Annotated[float, Quantity("um")] = Field(JOINT_LAYER, gt=0, le=1e-3)
@@ -170,6 +175,7 @@ class Shock(Parameters):
     method: Literal["direct", "large_mass"] = "direct"
     gravity: Literal["auto", "on", "off"] = "auto"
     damping: Damping = Damping()
+    filter: LowPass = LowPass()
     failure: Failure = Failure()
     ranks: Ranks = Ranks()
     coupling: JointCoupling = JointCoupling()

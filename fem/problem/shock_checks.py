@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 
 from reflowshock.fem.materials.kinematics import TURNING
+from reflowshock.fem.problem.attachment_checks import filter_problems
 from reflowshock.fem.problem.shock import Damping, JointCoupling, Shock
 from reflowshock.problem import Problem
 
@@ -16,6 +17,7 @@ def problems(shock: Shock) -> list[Problem]:
         *_large_mass(shock),
         *_finite(shock),
         *_coupling(shock.coupling),
+        *_filter(shock),
     ]
 
 
@@ -43,6 +45,12 @@ def _damping(damping: Damping) -> Iterator[Problem]:
     used = [name for name, value in ratios.items() if value]
     if used and damping.frequency is None:
         yield Problem("shock.damping.frequency", f"is missing: at which {' and '.join(used)} is meant", None, "> 0 Hz")
+
+
+def _filter(shock: Shock) -> Iterator[Problem]:
+    if "filter" in shock.model_fields_set:
+        duration = 0.0 if shock.duration == "auto" else shock.duration
+        yield from filter_problems("shock", shock.filter, duration, shock.numerics.history_samples)
 
 
 def _beyond_the_end(shock: Shock) -> Iterator[Problem]:

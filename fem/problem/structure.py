@@ -13,6 +13,7 @@ from pydantic import Field
 from reflowshock.fem.materials.kinematics import Kinematics
 from reflowshock.fem.materials.library import LIBRARY
 from reflowshock.fem.materials.parameters import Material
+from reflowshock.fem.problem.filters import LowPass
 from reflowshock.fem.problem.shock import MOST_RANKS, Coupling, Damping, ServiceCondition
 from reflowshock.parameters import Parameters
 from reflowshock.quantity import Quantity
@@ -24,6 +25,9 @@ Axis = Literal["x", "y", "z"]
 Direction = tuple[float, float, float]
 SolverName = Literal["explicit", "implicit", "dns"]
 Cells = Annotated[int, Field(ge=1, le=2000)]
+SAMPLED = 8  # masses along either side of a footprint; even, so that none lies on its middle
+Place = tuple[float, float, float]
+PositiveLength = Annotated[float, Field(gt=0)]
 
 
 class Layer(Parameters):
@@ -105,6 +109,19 @@ class Structure(Parameters):
         """Return the planes of symmetry on which a place [m] lies."""
         return tuple(axis for axis in dict.fromkeys(self.symmetry) if abs(place[AXES.index(axis)]) <= self.margin)
 
+    def meshed_places(self, at: Place, footprint: tuple[float, float] | None) -> list[tuple[Place, float]]:
+        """Return where a mass at a place [m], or spread over a footprint [m], bears on the mesh, and its part there.
+
+        The footprint is a grid of equal masses; those beyond a plane of symmetry are on the part that is not meshed.
+        """
+        if footprint is None:
+            return [(at, 0.5 ** len(self.planes_at(at)))]
+        offsets = [(k + 0.5) / SAMPLED - 0.5 for k in range(SAMPLED)]
+        places = [(at[0] + a * footprint[0], at[1] + b * footprint[1], at[2]) for a in offsets for b in offsets]
+        low = self.corners[0]
+        meshed = [x for x in places if all(x[AXES.index(axis)] > low[AXES.index(axis)] for axis in self.symmetry)]
+        return [(place, 1.0 / len(places)) for place in meshed]
+
 
 def _each(factor: float, counts: tuple[int, int]) -> tuple[int, int]:
     return _times(factor, counts[0]), _times(factor, counts[1])
@@ -115,18 +132,48 @@ def _times(factor: float, count: int) -> int:
     return max(1, math.floor(factor * count + 0.5))
 
 
+class Bedding(Parameters):
+    """Stiffness per area of an elastic support, by component; zero leaves a component free.
+
+    Over an area A with the second moment I it is a total stiffness of k A and a rotational one of k I.
+    """
+
+    x: Annotated[float, Quantity("N/m^3")] = Field(0.0, ge=0)
+    y: Annotated[float, Quantity("N/m^3")] = Field(0.0, ge=0)
+    z: Annotated[float, Quantity("N/m^3")] = Field(0.0, ge=0)
+
+
 class Support(Parameters):
-    """Displacement components held at zero on a facet set, in the frame of the drop table."""
+    """What holds a facet set in the frame of the drop table: components at zero, others on a bedding of springs."""
 
     on: str
-    hold: tuple[Axis, ...]
+    hold: tuple[Axis, ...] = ()
+    bedding: Bedding | None = None
+
+    @property
+    def stiffness(self) -> tuple[float, float, float]:
+        """Return the stiffness per area [N/m^3] along x, y, z."""
+        springs = self.bedding or Bedding()
+        return springs.x, springs.y, springs.z
+
+
+class PointMass(Parameters):
+    """A component that is heavy and not stiff: at a place, or spread evenly over ``footprint`` along x and y.
+
+    With a plane of symmetry its mirror image is there as well; of one on that plane each half bears half.
+    """
+
+    mass: Annotated[float, Quantity("g")] = Field(gt=0)
+    at: Annotated[tuple[float, float, float], Quantity("mm")]
+    footprint: Annotated[tuple[PositiveLength, PositiveLength], Quantity("mm")] | None = None
 
 
 class Pulsed(Parameters):
     """A load whose value is its peak times a pulse of unit height, or the values of a table.
 
     ``half_sine`` and ``haversine``, its square, act for ``duration``; ``constant`` from the start, for ``duration`` or
-    to the end. ``table`` is a CSV file of times and values and stands instead of peak and pulse.
+    to the end. ``table`` is a CSV file of times and values and stands instead of peak and pulse; ``table_column``
+    is the title of the values where it has several columns. A record that begins at a negative time is moved to zero.
 
     Attributes:
         effect: Its name among the effects of a run.
@@ -138,6 +185,7 @@ class Pulsed(Parameters):
     pulse: Literal["half_sine", "haversine", "constant"] = "half_sine"
     duration: Annotated[float | None, Quantity("ms")] = Field(None, gt=0)
     table: str | None = None
+    table_column: str | None = None
 
 
 class OnBody(Pulsed):
@@ -232,9 +280,13 @@ KINDS: tuple[type[Pulsed], ...] = get_args(AnyLoad)
 
 
 class WatchPoint(Parameters):
-    """A point whose displacement, velocity, strain and stress are recorded."""
+    """A point whose displacement, velocity, strain and stress are recorded.
+
+    ``direction`` is that of its accelerometer; without it, that of the input-G, else the axis of its largest motion.
+    """
 
     at: Annotated[tuple[float, float, float], Quantity("mm")]
+    direction: Direction | None = None
 
 
 class LayerCoupling(Coupling):
@@ -274,6 +326,7 @@ class DynamicsNumerics(Parameters):
 class Dynamics(Parameters):
     """What of the motion is wanted; ``modes`` is how many natural frequencies, the lowest ones.
 
+    ``filter`` is that of the accelerations at watch points.
     ``dns`` is, where there is a coupling, one model at the smallest step instead of two.
     """
 
@@ -282,6 +335,7 @@ class Dynamics(Parameters):
     kinematics: Kinematics = "small"
     initial_velocity: Annotated[tuple[float, float, float], Quantity("m/s")] = (0.0, 0.0, 0.0)
     damping: Damping = Damping()
+    filter: LowPass = LowPass()
     modes: int = Field(0, ge=0, le=200)
     ranks: int = Field(1, ge=1, le=MOST_RANKS)
     coupling: LayerCoupling | None = None
@@ -301,6 +355,7 @@ class StructureProblem(Parameters):
     structure: Structure
     materials: dict[str, Material] = Field(default_factory=dict)
     supports: dict[str, Support] = Field(default_factory=dict)
+    masses: dict[str, PointMass] = Field(default_factory=dict)
     loads: dict[str, StructureLoad] = Field(default_factory=dict)
     watch: dict[str, WatchPoint] = Field(default_factory=dict)
     dynamics: Dynamics

@@ -1,8 +1,9 @@
 """Parameters of a structure that are each allowed but do not fit together. Loads neither numba nor DOLFINx."""
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 
+from reflowshock.fem.problem.attachment_checks import attachment_problems, filter_problems, in_hole, inside
 from reflowshock.fem.problem.structure import (
     AXES,
     AtPoint,
@@ -25,7 +26,7 @@ def problems(problem: StructureProblem) -> list[Problem]:
     """Find what cannot work before anything is meshed or computed."""
     return [
         *_structure(problem),
-        *_supports(problem),
+        *attachment_problems(problem),
         *(found for name, load in problem.loads.items() for found in _load(f"loads.{name}", load, problem)),
         *_large_mass(problem),
         *_symmetry(problem),
@@ -59,19 +60,12 @@ def _structure(problem: StructureProblem) -> Iterator[Problem]:
         yield Problem("structure.formulation", message, structure.formulation, "incompatible_modes (the default)")
 
 
-def _supports(problem: StructureProblem) -> Iterator[Problem]:
-    for name, support in problem.supports.items():
-        yield from unknown_name(f"supports.{name}.on", support.on, problem.structure.facet_sets, "facet set")
-        if not support.hold:
-            yield Problem(f"supports.{name}.hold", "holds nothing", "[]", "any of x, y, z")
-
-
 def _load(key: str, load: StructureLoad, problem: StructureProblem) -> Iterator[Problem]:
     if isinstance(load, OnNodes | OnAreas):
         yield from unknown_name(f"{key}.on", load.on, problem.structure.facet_sets, "facet set")
     if isinstance(load, AtPoint):
-        yield from _inside(f"{key}.at", load.at, problem)
-        yield from _in_hole(f"{key}.at", load.at, problem)
+        yield from inside(f"{key}.at", load.at, problem.structure)
+        yield from in_hole(f"{key}.at", load.at, problem.structure)
     if isinstance(load, OnBody | AtPoint) and not math.hypot(*load.direction) > 0.0:
         yield Problem(f"{key}.direction", "has no length", list(load.direction), "any vector but zero")
     if isinstance(load, InputG) and load.method == "direct" and not _is_held(problem):
@@ -203,32 +197,9 @@ def _pulse(key: str, load: StructureLoad) -> Iterator[Problem]:
 
 def _watch(problem: StructureProblem) -> Iterator[Problem]:
     for name, point in problem.watch.items():
-        yield from _inside(f"watch.{name}.at", point.at, problem)
-
-
-def _inside(key: str, place: tuple[float, float, float], problem: StructureProblem) -> Iterator[Problem]:
-    """Yield a place [m] outside the box."""
-    low, high = problem.structure.corners
-    nearest = [min(max(x, a), b) for x, a, b in zip(place, low, high, strict=True)]
-    distance = math.dist(place, nearest)
-    if distance > problem.structure.margin:
-        message = f"lies {distance:.3g} m outside the meshed body; the nearest point of it is {_metres(nearest)}"
-        yield Problem(key, message, _metres(place), f"{_metres(low)} to {_metres(high)}")
-
-
-def _in_hole(key: str, place: tuple[float, float, float], problem: StructureProblem) -> Iterator[Problem]:
-    """Yield a place [m] inside a mounting hole."""
-    holes = problem.structure.holes
-    if holes is None:
-        return
-    radius = math.hypot(*(abs(x) - 0.5 * spacing for x, spacing in zip(place, holes.spacing, strict=False)))
-    if radius < 0.5 * holes.diameter - problem.structure.margin:
-        allowed = f">= {0.5 * holes.diameter:.6g} m from the axis of the hole"
-        yield Problem(key, f"lies in a mounting hole, {radius:.3g} m from its axis", _metres(place), allowed)
-
-
-def _metres(point: Iterable[float]) -> str:
-    return "(" + ", ".join(f"{value:.6g}" for value in point) + ") m"
+        yield from inside(f"watch.{name}.at", point.at, problem.structure)
+        if point.direction is not None and not math.hypot(*point.direction) > 0.0:
+            yield Problem(f"watch.{name}.direction", "has no length", list(point.direction), "any vector but zero")
 
 
 def _yielding(problem: StructureProblem) -> Iterator[tuple[str, str]]:
@@ -264,6 +235,8 @@ def _dynamics(problem: StructureProblem) -> Iterator[Problem]:
         yield from _nonlinear_damping(problem)
     for name in dynamics.numerics.mass_scaled:
         yield from unknown_name("dynamics.numerics.mass_scaled", name, problem.structure.layers, "layer")
+    if "filter" in dynamics.model_fields_set:
+        yield from filter_problems("dynamics", dynamics.filter, dynamics.duration, dynamics.numerics.history_samples)
     yield from _numerics(problem)
     if not problem.loads and not any(dynamics.initial_velocity):
         yield Problem(

@@ -1,4 +1,8 @@
-"""The time loop: all models through their windows, with samples, fields, checkpoints, progress."""
+"""The time loop: all models through their windows, with samples, fields, checkpoints, progress.
+
+``shock.duration = "auto"`` becomes the longest duration before a run, which ends at a sample when ``output.settled``
+says so. Rank 0 decides from its samples, which a restart restores. Later modes end when the first one did.
+"""
 
 import json
 import time
@@ -83,7 +87,7 @@ def run_time_loop(
     """
     plan = next(iter(participants.values())).plan
     field_windows = set(np.linspace(0, plan.windows, outputs.field_samples).round().astype(int).tolist())
-    told, output_seconds, first = time.perf_counter(), 0.0, 0
+    reported, output_seconds, first = time.perf_counter(), 0.0, 0
     state = outputs.checkpoints.read(state_of(participants, outputs))
     if state is not None and outputs.checkpoints.continued is not None:
         first = outputs.checkpoints.continued + 1
@@ -102,8 +106,8 @@ def run_time_loop(
             break
         if sampled and outputs.checkpoints.is_due():
             save(participants, outputs, window)
-        if world.rank == 0 and time.perf_counter() - told > PROGRESS_INTERVAL:
-            told = time.perf_counter()
+        if world.rank == 0 and time.perf_counter() - reported > PROGRESS_INTERVAL:
+            reported = time.perf_counter()
             print(json.dumps({"progress": window / plan.windows, "time": time_of(participants)}), flush=True)
     HERE.slow = "writes the results"
     for file in outputs.fields.values():

@@ -65,8 +65,8 @@ def treatment_of(request: RunInput | StructureInput) -> Treatment:
 def divided_on_root(world: MPI.Comm, divided: Callable[[], Divided[TablesT_co]]) -> Divided[TablesT_co]:
     """Divide on rank 0, and tell the other ranks all but the meshes; collective, errors of rank 0 on every rank."""
     found = agreed(world, lambda: divided() if world.rank == 0 else None)
-    told: Divided[TablesT_co] = world.bcast(replace(found, meshes={}) if found else None)
-    return found or told
+    shared: Divided[TablesT_co] = world.bcast(replace(found, meshes={}) if found else None)
+    return found or shared
 
 
 def distributed(

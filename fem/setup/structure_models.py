@@ -1,6 +1,10 @@
-"""From the mesh of a structure to its models on each rank: one, or fine layers apart from the others."""
+"""From the mesh of a structure to its models on each rank: one, or fine layers apart from the others.
+
+Layers whose ``in_plane`` differs are meshed apart and tied; the finer face is the slave.
+"""
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 from mpi4py import MPI
@@ -15,11 +19,13 @@ from reflowshock.fem.division.tables import split
 from reflowshock.fem.division.whole import Survey, Whole, survey
 from reflowshock.fem.errors import CouplingError, StepError
 from reflowshock.fem.estimates.placement import Role
+from reflowshock.fem.forces.bedding import BeddedFacets
 from reflowshock.fem.forces.force import linear_terms
 from reflowshock.fem.loads.structure_pulses import pulse_durations, pulses_of
 from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.mesh.mesh_file import read_mesh
 from reflowshock.fem.model.assembly import ForceOptions, Pieces, make_body, make_pieces
+from reflowshock.fem.model.attachments import attached, bedded_steps
 from reflowshock.fem.model.power_iteration import highest_frequency
 from reflowshock.fem.model.steps import (
     Steps,
@@ -53,24 +59,39 @@ def build_structure(comm: MPI.Comm, request: StructureInput, pulses: list[float]
     mesh, tables = read_structure(comm, request)
     local = distribute(comm, mesh)
     pieces = agreed(comm, lambda: make_pieces(local, tables, request.part_materials, request.formulation))
+    beddings = [
+        BeddedFacets.build(name, pieces.local, found, request.supports[name].stiffness)
+        for name, found in tables.bedded.items()
+    ]
+    for bedding in beddings:
+        pieces = bedded_steps(pieces, bedding)
     steps = choose_steps(comm, pieces, request, pulses)
-    model = assemble(comm, pieces, tables, steps, request)
+    steps = replace(steps, model_mass=steps.model_mass + float(tables.masses[1].sum()))
+    model = assemble(comm, pieces, (tables, beddings), steps, request)
     if request.implicit:
         return model, steps
     if request.numerics.critical_step == "power_iteration":
-        found = highest_frequency(comm, model.body, linear_terms(model.body.elements), model.body.mass)
+        terms = [*linear_terms(model.body.elements), *beddings]
+        found = highest_frequency(comm, model.body, terms, model.body.mass)
         steps = with_critical(steps, found.critical_step, request.dynamics)
-        model = assemble(comm, pieces, tables, steps, request)  # made anew: a law that depends on the rate has the step
+        model = assemble(
+            comm, pieces, (tables, beddings), steps, request
+        )  # made anew: a law that depends on the rate has the step
     check_step(request.dynamics, steps.smallest)
     return model, steps
 
 
 def assemble(
-    comm: MPI.Comm, pieces: Pieces, tables: StructureTables, steps: Steps, request: StructureInput
+    comm: MPI.Comm,
+    pieces: Pieces,
+    given: tuple[StructureTables, list[BeddedFacets]],
+    steps: Steps,
+    request: StructureInput,
 ) -> StructureModel:
-    """Return the model that moves by given steps; collective."""
-    options = ForceOptions(request.kinematics, steps.plan.step)
-    return Model(tables, make_body(comm, pieces, tables, steps.mass_factors[0], options))
+    """Return the model of given tables and elastic supports that moves by given steps; collective."""
+    tables, beddings = given
+    body = make_body(comm, pieces, tables, steps.mass_factors[0], ForceOptions(request.kinematics, steps.plan.step))
+    return Model(tables, attached(body, tables.masses, beddings))
 
 
 def read_structure(comm: MPI.Comm, request: StructureInput) -> tuple[MeshData | None, StructureTables]:

@@ -1,7 +1,7 @@
 """Mean motion of pads, and its transpose: the solder's wrench on a pad as forces at nodes.
 
 The motion of a pad is the mean displacement over its wetted disc and the rotation that fits best in the mean square,
-told at the pad's centre, which lies the copper's thickness off the face. Both are linear in the displacement, rigid
+given at the pad's centre, which lies the copper's thickness off the face. Both are linear in the displacement, rigid
 motions come out exactly, and forces from the transpose do the work of the wrench, whatever the mesh:
 w . (P u) = (P^T w) . u.
 """

@@ -1,4 +1,11 @@
-"""Columns of board and substrate that continue a joint's pads: rings out to a square, swept through their layers."""
+"""Columns of board and substrate that continue a joint's pads: rings out to a square, swept through their layers.
+
+With ``package.imprint`` a fine joint stands in such a column. The boxes beside have lines on the square's edges
+(``board.plan``). Copper and column share the pad's nodes; ``fem`` takes out the boxes and ties the column's sides to
+those beside it. Where the boxes' lines divide the column's, constant stress passes; where they do not, measures change
+by about 1 %. Free-form joints are tied to boxes as without. ``joint_numerics.pad_layer`` is the thickness over which
+stress and plastic work are averaged, ``pad_layers`` the elements through it.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -1,4 +1,8 @@
-"""Solder of any shape as hexahedra: tetrahedra in its surface, each split into four, volume and wetted areas kept."""
+"""Solder of any shape as hexahedra: tetrahedra in its surface, each split into four, volume and wetted areas kept.
+
+New nodes go to the surface, and nodes slide until the corners are good (``core.hexahedra``). Outlines are scaled to the
+areas of their sections, and what is free by one factor (``section_scale``), which is reported.
+"""
 
 from collections.abc import Callable
 from dataclasses import replace

@@ -82,7 +82,7 @@ class JointMesh:
         section_scale: factor by which free outlines were scaled to keep the volume.
         head_mismatch: largest distance by which its head was sheared to lie on the package's underside [m].
         tetrahedra: of which it was made, in its place, if it is free-form.
-        record: what else is told of it: how it was made, its errors against the given surface.
+        record: what else is recorded of it: how it was made, its errors against the given surface.
     """
 
     name: str

@@ -1,4 +1,9 @@
-"""Joint meshes: the closed surface of a joint, or of two that are bridged, as hexahedra in its place."""
+"""Joint meshes: the closed surface of a joint, or of two that are bridged, as hexahedra in its place.
+
+A coarse joint (``package.coarse_joint_numerics``) is solder alone, also in place of its copper: eight hexahedra, tied
+by the same facet sets. In bga_drop its step is nine times that of copper and nearly three times that of fine solder. A
+joint that few hexahedra cannot follow keeps its fine mesh; ``fine_instead`` in ``coarse_quality.json`` says why.
+"""
 
 import math
 from collections.abc import Sequence
@@ -146,8 +151,8 @@ def _check_distance(surface: ClosedSurface, first: PadSite, second: PadSite) -> 
     between, distance = float(np.ptp(lower[:, 0])), math.dist((first.x, first.y), (second.x, second.y))
     widest = distance + 4.0 * max(first.pad_radius_board, second.pad_radius_board)
     if not distance < between < widest:
-        told = f"its pads span {between:.4g} m, allowed {distance:.4g} to {widest:.4g} m"
-        raise JointMeshError(f"joints {first.name} and {second.name}: {told}; an image of one may be meant")
+        distances = f"its pads span {between:.4g} m, allowed {distance:.4g} to {widest:.4g} m"
+        raise JointMeshError(f"joints {first.name} and {second.name}: {distances}; an image of one may be meant")
 
 
 def _check_place(surface: ClosedSurface, place: JointPlace) -> None:

@@ -1,4 +1,8 @@
-"""Tetrahedra in any closed surface by Gmsh: surface remeshed to a size, edges of pads kept."""
+"""Tetrahedra in any closed surface by Gmsh: surface remeshed to a size, edges of pads kept.
+
+Gmsh runs in a process of its own (``fill_apart``), because it may crash and keeps state. Stages never load Gmsh and
+DOLFINx together: on Debian 13 the PETSc inside Gmsh's wheel does not start beside DOLFINx, and Gmsh aborts.
+"""
 
 import math
 from collections.abc import Callable

@@ -24,8 +24,8 @@ def check_triangulation(points: np.ndarray, triangles: np.ndarray, unit: float) 
     """
     fault = next(_faults(points, triangles), None)
     if fault is not None:
-        told, place = fault
-        raise SurfaceError(f"{told} at ({', '.join(f'{value / unit:.4g}' for value in place)})")
+        message, place = fault
+        raise SurfaceError(f"{message} at ({', '.join(f'{value / unit:.4g}' for value in place)})")
 
 
 def _faults(points: np.ndarray, triangles: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
@@ -39,10 +39,13 @@ def _edge_faults(points: np.ndarray, triangles: np.ndarray) -> Iterator[tuple[st
     edges = np.concatenate([triangles[:, [k, (k + 1) % 3]] for k in range(3)])
     _, label, count = np.unique(edge_numbers(np.sort(edges, axis=1)), return_inverse=True, return_counts=True)
     own = count[label]
-    for wrong, told in ((own == 1, "open edge: a hole"), (own > 2, "edge of more than two triangles: a double shell")):
+    for wrong, message in (
+        (own == 1, "open edge: a hole"),
+        (own > 2, "edge of more than two triangles: a double shell"),
+    ):
         if wrong.any():
             where = points[edges[np.argmax(wrong)]].mean(axis=0)
-            yield f"{told} ({len(np.unique(label[wrong]))} such edges, allowed 0), first", where
+            yield f"{message} ({len(np.unique(label[wrong]))} such edges, allowed 0), first", where
     _, first, twice = np.unique(edge_numbers(edges), return_index=True, return_counts=True)
     if (twice > 1).any():
         where = points[edges[first[np.argmax(twice > 1)]]].mean(axis=0)

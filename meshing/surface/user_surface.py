@@ -138,8 +138,8 @@ def _check_extent(points: np.ndarray) -> None:
     """Refuse vertices (n, 3) [m] far away from all others, beside which these would be one point."""
     distance = np.abs(points - np.median(points, axis=0)).max(axis=1)
     if distance.max() > LARGEST:
-        told = f"vertex {int(distance.argmax())} lies {distance.max():.3g} m away from the others"
-        raise SurfaceError(f"{told}, allowed up to {LARGEST:g} m")
+        message = f"vertex {int(distance.argmax())} lies {distance.max():.3g} m away from the others"
+        raise SurfaceError(f"{message}, allowed up to {LARGEST:g} m")
 
 
 def _welded(points: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -163,9 +163,9 @@ def _check_height(points: np.ndarray, unit: Unit, site: PadSite) -> None:
     height, (least, most) = float(np.ptp(points[:, 2])), (0.5 * site.gap, 2.0 * site.gap)
     if least < height < most:
         return
-    told = f"height {height:.4g} m with lengths in {unit}, allowed {least:.4g} to {most:.4g} m"
+    message = f"height {height:.4g} m with lengths in {unit}, allowed {least:.4g} to {most:.4g} m"
     better = [name for name, value in UNITS.items() if least < height * value / UNITS[unit] < most]
-    raise SurfaceError(told + (f"; is it in {better[0]}?" if better else ""))
+    raise SurfaceError(message + (f"; is it in {better[0]}?" if better else ""))
 
 
 def _between_pads(points: np.ndarray, triangles: np.ndarray, site: PadSite) -> ClosedSurface:

@@ -2,6 +2,9 @@
 
 Such a plane is a wall that is slid on freely and wetted at 90 degrees, where adhesion gives no force. It goes through
 the origin, so that its part of the volume integral of x . n vanishes.
+
+Clouds are cut there, what is on a plane stays on it, and contact lines are completed by their images. Results are those
+of the whole body.
 """
 
 from collections.abc import Sequence

@@ -135,7 +135,7 @@ class GravityEffect(LiquidEffect):
     def auto(self, liquid: LiquidScene) -> Decision:
         """By the change of the height."""
         change = SHAPE_CHANGE_BY_BOND * liquid.numbers.bond
-        why = f"Bond number {liquid.numbers.bond:.3g}: changes the shape by about {100 * change:.2g} %"
+        why = f"Bond number {liquid.numbers.bond:.3g}: changes the shape by about {100 * change:.3g} %"
         return decision(change > NEGLIGIBLE_SHAPE_CHANGE, why, min(change, 1.0))
 
     def decide(self, liquid: LiquidScene) -> Decision:
@@ -182,21 +182,21 @@ class ViscosityEffect(MotionEffect):
 
     name = "viscosity"
     adds = "-div(2 mu D(v))"
-    number = "as inertia; Oh = mu / sqrt(rho gamma L) is told"
+    number = "as inertia; Oh = mu / sqrt(rho gamma L) is given"
     influence = "exp(-T / slowest time): at rest it does nothing"
     place = "reflowshock.particles.physics.operators.Viscosity"
     switch = "solder.effects.viscosity = auto, on, off"
     source = "Lamb 1932, art. 355"
 
     def auto(self, liquid: LiquidScene) -> Decision:
-        """As all motion, with its own number told."""
+        """As all motion, with its own number."""
         found = super().auto(liquid)
-        return found | decision(found["on"], f"Ohnesorge number {liquid.numbers.ohnesorge:.2g}; {found['why']}")
+        return found | decision(found["on"], f"Ohnesorge number {liquid.numbers.ohnesorge:.3g}; {found['why']}")
 
     def decide(self, liquid: LiquidScene) -> Decision:
         """Always where a drop swings."""
         if liquid.swings:
-            return decision(True, f"Ohnesorge number {liquid.numbers.ohnesorge:.2g}: the swing decays")
+            return decision(True, f"Ohnesorge number {liquid.numbers.ohnesorge:.3g}: the swing decays")
         return super().decide(liquid)
 
 

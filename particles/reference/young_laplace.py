@@ -9,8 +9,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.integrate import solve_bvp, solve_ivp
-from scipy.optimize import brentq
 
 from reflowshock.arrays import Floats
 
@@ -133,6 +131,7 @@ class _State:
 
 def _solve_joint_meridian(guess: _State, ends: tuple[_End, _End], target: float, bond: float) -> _State:
     """Solve the boundary value problem: two ends, the gap, and the volume fix the length and the pressure."""
+    from scipy.integrate import solve_bvp  # plans that need no meridian start without it
 
     def slopes(_: Floats, y: Floats, unknown: Floats) -> Floats:
         length, pressure = unknown
@@ -184,6 +183,8 @@ def sessile_meridian(volume: float, contact_angle: float, surface_tension: float
         surface_tension: gamma [N/m].
         weight: rho g [N/m^3].
     """
+    from scipy.optimize import brentq
+
     length = np.cbrt(volume)
     bond = weight * length**2 / surface_tension
 
@@ -230,6 +231,7 @@ def pad_meridian(
         weight: rho g [N/m^3].
         angle_limits: contact angles of pad and mask [rad].
     """
+    from scipy.optimize import brentq
 
     def drop(angle: float) -> Meridian:
         return sessile_meridian(volume, angle, surface_tension, weight)
@@ -246,6 +248,7 @@ def pad_meridian(
 
 def _from_apex(curvature: float, bond: float, contact_angle: float) -> Floats:
     """Radius, depth below the apex and volume along the meridian, `(3, k)`, in lengths of V^(1/3)."""
+    from scipy.integrate import solve_ivp
 
     def slopes(_: float, y: Floats) -> list[float]:
         r, depth, psi, _volume = y

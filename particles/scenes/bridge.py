@@ -1,4 +1,9 @@
-"""Joints of an array that touch: wider at rest than their distance, so two of them flow into one body on four pads."""
+"""Joints of an array that touch: wider at rest than their distance, so two of them flow into one body on four pads.
+
+Each joint of an array flows alone. Two touch where their mean width reaches the distance of their axes: both are then
+``bridged``, and the pair that overlaps most is flowed on as one body for the report. A joint that never spans its gap
+ends as a drop on the board, one whose neck collapses as a drop on each pad (``rebuild``): both are ``open``.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -1,4 +1,7 @@
-"""Several drops: each flows by itself until it is at rest; two that touch become one, collapsed ones are rebuilt."""
+"""Several drops: each flows by itself until it is at rest; two that touch become one, collapsed ones are rebuilt.
+
+Drops that overlap before anything has flowed are an error.
+"""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field

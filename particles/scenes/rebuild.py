@@ -1,6 +1,8 @@
 """Bodies made anew: two that touch become one, one whose triangles have collapsed gets even ones, a joint is split.
 
 A joint whose neck has collapsed becomes two drops, one on each pad.
+
+Volume and momentum are kept. A body on walls is closed by its mirror image behind each of them.
 """
 
 from collections.abc import Callable, Sequence

@@ -1,4 +1,10 @@
-"""Reflow of one joint: from the wetted discs, the gap and the solder to the shape at rest."""
+"""Reflow of one joint: from the wetted discs, the gap and the solder to the shape at rest.
+
+It starts from a shape far from rest and keeps the volume by one global constraint. It is quasi-static unless the
+process is short against the slowest time of the body. Solder on the mask moves its wetted disc off the pad; the gap
+stays that of the pads' centres. Drops on a wall come to rest up to Bond numbers of about 15, or 10 where they hardly
+wet it; flatter puddles do not.
+"""
 
 from collections.abc import Callable
 from dataclasses import replace

@@ -3,6 +3,8 @@
 Forces and operators are taken at the predicted positions x* = x_base + dt_eff v_n. The implicit surface tension then
 acts on v - v_n only: an added mass of order dt^2, not a damping of order dt. The tetrahedra travel with their particles
 until these are shifted, the surface changes or they are worn out: then they are made anew.
+
+Moving least squares was tried first; its transpose scatters the force of the surface into noise.
 """
 
 from collections.abc import Mapping

@@ -7,6 +7,13 @@ Without inertia and viscosity a step is no physical motion; all that counts is t
 with A the mass over the time step and the implicit surface tension, both of the surface's particles, and the pressure p
 of the body, one unknown. At rest f = -p a makes the discrete energy stationary. The flux of the surface's motion drives
 a potential flow inside, which keeps the particles evenly spread; its pressure vanishes at rest.
+
+No step raises the energy of the triangles, and the volume is exact (``descent``). At rest the forces balance but for
+what evening out undoes. Where a contact line leaves the edge of a pad at a sharp corner, this energy would fall further
+as the triangles there become uneven; evening out undoes each such step, so that it is not the least there. The load of
+gravity is the gradient of its energy to second order. Evening out would shift a free body, so its centre is moved back.
+A motion that stays the same from step to step is taken for many steps at once. The cost grows with the number of
+particles; the number of iterations does not.
 """
 
 from collections.abc import Mapping

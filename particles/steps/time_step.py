@@ -47,7 +47,7 @@ class TimeStep:
         displacement = speed * self.size
         if displacement <= LARGEST_DISPLACEMENT * self.spacing:
             return True
-        moves = f"the fastest particle still moves {displacement / self.spacing:.2g} spacings in it"
+        moves = f"the fastest particle still moves {displacement / self.spacing:.3g} spacings in it"
         self._cut(max(0.25, SAFETY * LARGEST_DISPLACEMENT * self.spacing / displacement), "displacement", moves)
         return False
 
@@ -62,8 +62,8 @@ class TimeStep:
     def _cut(self, share: float, binding: str, trouble: str) -> None:
         if not self.size > SMALLEST_SHARE * self.largest:
             raise StepCollapsed(
-                f"the time step was cut to {self.size:.2e} s, {SMALLEST_SHARE:g} of its upper bound, and {trouble}: "
-                "the flow is unstable"
+                f"the time step was reduced to {self.size:.2e} s, {SMALLEST_SHARE:g} of its upper bound, and {trouble}:"
+                " the flow is unstable"
             )
         self.size, self.binding = share * self.size, binding
 

@@ -1,6 +1,8 @@
 """Contact lines: each vertex is pinned at the edge of a pad, or free on a pad, or free on the mask between pads.
 
 On a uniform wall with hysteresis a line advances at one contact angle, recedes at a smaller one, and else stands.
+
+Each has its own plate and knows all pads of its wall. Contact angles do not depend on the speed of the line.
 """
 
 from collections.abc import Mapping, Sequence

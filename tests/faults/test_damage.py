@@ -2,8 +2,8 @@
 
 import json
 import random
-import shutil
 from collections.abc import Callable
+from itertools import product
 from pathlib import Path
 
 import pytest
@@ -46,8 +46,8 @@ def test_damage_of_any_file_is_noticed(tmp_path, case, way):
     make(store, point, point.case.pipeline.names)
     show_products(store, point)
     for stage in point.case.pipeline.stages:
-        product = store.product(point, stage.name)
-        for path in [path for path in product.rglob("*") if path.is_file()]:
+        folder = store.product(point, stage.name)
+        for path in [path for path in folder.rglob("*") if path.is_file()]:
             kept = path.read_bytes()
             WAYS[way](path)
             state = examine(store, point)[stage.name]
@@ -57,19 +57,12 @@ def test_damage_of_any_file_is_noticed(tmp_path, case, way):
     assert not any(state.stale for state in examine(store, point).values())
 
 
-@pytest.fixture(scope="module")
-def undisturbed(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("undisturbed") / "run"
-    assert run_drop(folder).returncode == 0
-    return folder
-
-
 @pytest.mark.parametrize("way", [way if way == "flip" else pytest.param(way, marks=pytest.mark.long) for way in WAYS])
-def test_damage_heals(undisturbed, tmp_path, way):
-    folder = tmp_path / "run"
-    shutil.copytree(undisturbed, folder)
-    (product,) = folder.glob(".store/products/reflow-*")
-    for path in product.iterdir():
+def test_damage_heals(drop_folder, way):
+    folder = drop_folder
+    expected, shape = answers(folder), (folder / "reflow/shape.h5").read_bytes()
+    (damaged,) = folder.glob(".store/products/reflow-*")
+    for path in damaged.iterdir():
         WAYS[way](path)
     for path in (folder / "reflow").iterdir():
         path.unlink()
@@ -83,18 +76,25 @@ def test_damage_heals(undisturbed, tmp_path, way):
     assert "product reflow is damaged" in healed.stderr
     assert "ok     reflow" in healed.stdout and "ok     report" not in healed.stdout  # the same bits: the report stays
     assert run_drop(folder, "verify").returncode == 0
-    assert answers(folder) == answers(undisturbed)
-    assert (folder / "reflow/shape.h5").read_bytes() == (undisturbed / "reflow/shape.h5").read_bytes()
+    assert answers(folder) == expected
+    assert (folder / "reflow/shape.h5").read_bytes() == shape
 
 
-@pytest.mark.parametrize("name", ["inputs/case.json", ".reflowshock.json", ".store/views/run.json"])
-@pytest.mark.parametrize("way", WAYS)
-def test_damage_of_what_is_beside_the_products_heals(undisturbed, tmp_path, name, way):
-    folder = tmp_path / "run"
-    shutil.copytree(undisturbed, folder)
-    WAYS[way](folder / name)
-    result = run_drop(folder, "run", "--force")
+BESIDE = ("inputs/case.json", ".reflowshock.json", ".store/views/run.json")
+EACH_ONCE = {("delete", BESIDE[2]), ("empty", BESIDE[1]), ("truncate", BESIDE[0]), ("flip", BESIDE[1])}
+
+
+@pytest.mark.parametrize(
+    ("way", "name"),
+    [
+        pytest.param(way, name, marks=[] if (way, name) in EACH_ONCE else pytest.mark.long)
+        for way, name in product(WAYS, BESIDE)
+    ],
+)
+def test_damage_of_what_is_beside_the_products_heals(drop_folder, way, name):
+    WAYS[way](drop_folder / name)
+    result = run_drop(drop_folder, "run", "--force")
     assert result.returncode == 0, result.stderr
-    assert run_drop(folder, "verify").returncode == 0
-    assert not list(folder.rglob("*.kept-*"))
-    assert json.loads((folder / "summary.json").read_text())["case"] == "sessile_drop"
+    assert run_drop(drop_folder, "verify").returncode == 0
+    assert not list(drop_folder.rglob("*.kept-*"))
+    assert json.loads((drop_folder / "summary.json").read_text())["case"] == "sessile_drop"

@@ -9,6 +9,7 @@ import pytest
 
 from reflowshock.workflow.jobs.engine import SNAKEFILE
 from tests.support.faults import DROP, SMALL_DROP, run_drop
+from tests.support.warm_start import warm_command
 from tests.support.workflow_command import wait_until
 
 ODD = "Drop test #3: a\n\"b' {c} [/x] $(touch pwned) %d *é;\\ -e"
@@ -28,14 +29,13 @@ def test_a_folder_of_any_name_will_do(tmp_path):
     assert not folder.exists()
 
 
-def test_products_of_another_time_are_products(tmp_path):
+def test_products_of_another_time_are_products(drop_folder):
     """Times of files do not matter: neither those that lie in the future nor those of a copy."""
-    folder = tmp_path / "run"
-    assert run_drop(folder).returncode == 0
+    folder = drop_folder
     for path in (folder / ".store/products").rglob("*"):
         os.utime(path, (4e9, 4e9))
     assert "nothing to do" in run_drop(folder).stdout
-    other = run_drop(folder, "run", "--set", "drop.contact_angle=70 deg")
+    other = run_drop(folder, "run", "--until", "reflow", "--set", "drop.contact_angle=70 deg")
     assert other.returncode == 0, other.stderr
     assert "ok     reflow" in other.stdout
 
@@ -82,17 +82,15 @@ def test_names_do_not_lead_out_of_a_folder(tmp_path, name):
     text = f'[scales."{name}"]\n'.replace("\n", "\\n", name.count("\n"))
     case = tmp_path / "case.toml"
     case.write_text(DROP.read_text() + "\n" + text + '"drop.particles_per_edge" = 5\n')
-    line = [sys.executable, "-m", "reflowshock", "run", str(case), "--set", f"scale={name}", *SMALL_DROP]
-    result = subprocess.run(line, capture_output=True, text=True, timeout=60, check=False, cwd=tmp_path)
+    result = warm_command("run", str(case), "--set", f"scale={name}", *SMALL_DROP, cwd=tmp_path)
     assert result.returncode == 2, result.stdout + result.stderr
     assert len(result.stderr) < 2000
     assert [path.name for path in tmp_path.iterdir()] == ["case.toml"]
 
 
 @pytest.mark.long
-def test_plain_snakemake_holds_the_folder_and_shows_no_old_report(tmp_path):
-    folder = tmp_path / "run"
-    assert run_drop(folder).returncode == 0
+def test_plain_snakemake_holds_the_folder_and_shows_no_old_report(drop_folder, tmp_path):
+    folder = drop_folder
     line = [sys.executable, "-m", "snakemake", "-s", str(SNAKEFILE), "--cores", "1", "--config", f"case={DROP}"]
     line += [f"out={folder}", 'set=["drop.particles_per_edge=5", "solder.numerics.max_steps=1"]']
     dry = subprocess.run([*line, "-n"], capture_output=True, text=True, timeout=60, check=False, cwd=tmp_path)

@@ -60,7 +60,7 @@ def moved(scheme):
         pattern = np.cos(2e3 * motion.body.local.points[owned] @ [0.3, -0.8, 1.0])
         sums[:3] += pattern @ motion.displacement[owned]
         sums[3] += np.abs(motion.displacement[owned]).sum()
-    exact = max(found.rigid, found.linear, found.tie, found.cut)
+    exact = max(found.rigid, found.linear, found.tie, found.interface)
     return world.allreduce(sums).tolist(), world.allreduce(int(any(at_corner))), exact
 
 

@@ -19,7 +19,7 @@ ROOT = Path(__file__).resolve().parents[2]
 RATIOS, WINDOWS = (4, 3, 3), 20
 
 
-def march(comm: MPI.Comm) -> tuple[np.ndarray, np.ndarray]:
+def moved(comm: MPI.Comm) -> tuple[np.ndarray, np.ndarray]:
     """Return input numbers of this rank's nodes and their displacements after some windows under loads at many."""
     model = levelled(joint_on_board(), Materials(), RATIOS, comm=comm)
     body = model.body
@@ -38,7 +38,7 @@ def march(comm: MPI.Comm) -> tuple[np.ndarray, np.ndarray]:
 def write_march(path: str) -> None:
     """Compare the copies of all nodes bit by bit, and write one of each."""
     comm = MPI.COMM_WORLD
-    nodes, displacement = (comm.gather(values) for values in march(comm))
+    nodes, displacement = (comm.gather(values) for values in moved(comm))
     if comm.rank == 0:
         found: dict[int, np.ndarray] = {}
         for number, value in zip(np.concatenate(nodes), np.concatenate(displacement), strict=True):
@@ -48,13 +48,13 @@ def write_march(path: str) -> None:
 
 @pytest.fixture(scope="module")
 def alone() -> np.ndarray:
-    nodes, displacement = march(MPI.COMM_SELF)
+    nodes, displacement = moved(MPI.COMM_SELF)
     return displacement[np.argsort(nodes)]
 
 
 @pytest.mark.parametrize("ranks", [2, 4])
 def test_displacements_are_the_same_on_more_ranks(alone, tmp_path, ranks):
-    path = tmp_path / "march.npy"
+    path = tmp_path / "moved.npy"
     code = f"from tests.mpi.test_fem_level_ranks import write_march; write_march({str(path)!r})"
     done = subprocess.run(
         ["mpirun", "--allow-run-as-root", "--oversubscribe", "-n", str(ranks), sys.executable, "-c", code],

@@ -95,7 +95,11 @@ def errors_of(directory: Path, checkpoints: Path, what: str, where: str) -> str:
     [
         ("raise", "ZeroDivisionError: broken rank"),
         ("invert", "error: rank 1: element 7"),
-        ("exit", r"error: rank 1 \((macro|meso)\) has died, all ranks are ended in window 2"),
+        pytest.param(
+            "exit",
+            r"error: rank 1 \((macro|meso)\) has died, all ranks are ended in window 2",
+            marks=pytest.mark.long,
+        ),
         ("SIGKILL", r"error: rank 1 \((macro|meso)\) has died, all ranks are ended in window 2"),
         (
             "SIGSTOP",

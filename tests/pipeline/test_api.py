@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import reflowshock
-from tests.support.workflow_command import SMALL_CASE
+from tests.support.workflow_command import SMALL_CASE, times
 
 JOINTS = ["A3", "A4", "B3", "B4"]
 
@@ -69,14 +69,16 @@ def test_plan_and_run_of_what_is_there(run_folder):
     assert "shock.duration: 0.03 ms -> 0.02 ms" in changed.stages["shock"].why
 
 
-def test_command_runs_beside_modules_of_a_users_own(run_folder, tmp_path, monkeypatch):
+def test_a_change_runs_what_depends_on_it_beside_modules_of_a_users_own(run_folder, tmp_path, monkeypatch):
     """Files that are named as rooms of the program, or as modules of former versions, are not taken for them."""
+    before = times(run_folder)
     for name in ("workflow", "fem", "meshing", "particles", "cases", "api"):
         (tmp_path / f"{name}.py").write_text("raise SystemExit('a module of the user was imported')\n")
     shutil.copy(SMALL_CASE, tmp_path / "small.toml")
     monkeypatch.chdir(tmp_path)
     case = reflowshock.Case.load(Path("small.toml"), {"shock.duration": "0.02 ms"})
     assert case.run(run_folder, force=True).history
+    assert {name for name, time in times(run_folder).items() if time != before[name]} == {"shock", "report"}
 
 
 def test_a_run_that_fails_says_why(tmp_path):

@@ -1,8 +1,6 @@
 """A package that warps as it is heated, from its table of temperatures to joints in their places: one short run."""
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import meshio
@@ -13,6 +11,7 @@ from reflowshock.meshing.board.displaced_assembly import read_computed
 from reflowshock.meshing.board.package_side import PackageSide
 from reflowshock.meshing.board.pads import read_pads
 from tests.support.mesh_file import MeshFile
+from tests.support.warm_start import warm_command
 
 CASE = Path(__file__).resolve().parents[2] / "cases/hu_bga_reflow/case.toml"
 SHORT = (
@@ -27,8 +26,7 @@ def heated_run(tmp_path_factory) -> Path:
     """Example 4.3 of Hu et al. with 4 joints and few particles, to its report."""
     folder = tmp_path_factory.mktemp("heated") / "run"
     settings = [word for setting in SHORT for word in ("--set", setting)]
-    line = [sys.executable, "-m", "reflowshock", "run", str(CASE), "--out", str(folder), *settings]
-    result = subprocess.run(line, capture_output=True, text=True, timeout=240, check=False)
+    result = warm_command("run", str(CASE), "--out", str(folder), *settings)
     assert result.returncode == 0, result.stdout + result.stderr
     return folder
 

@@ -1,4 +1,4 @@
-"""Solder that yields, through the whole pipeline: both modes, energy ledger, verdict, report."""
+"""Solder that yields, through the whole pipeline: both modes, energy balance, verdict, report."""
 
 import json
 import shutil

@@ -42,7 +42,7 @@ def test_a_study_is_computed_once_and_survives_a_kill(tmp_path):
     wait_until(reflow.exists)
     children = psutil.Process(process.pid).children(recursive=True)
     process.send_signal(signal.SIGKILL)
-    assert psutil.wait_procs([process, *children], timeout=15)[1] == []
+    assert psutil.wait_procs([process, *children], timeout=60)[1] == []
 
     kept = reflow.stat().st_mtime_ns
     assert not run_study(study, store, Machine(cores=2))

@@ -12,8 +12,11 @@ import pytest
 from reflowshock.particles.scenes.drop_at_rest import drop_to_rest
 from reflowshock.particles.scenes.products import read_body
 from reflowshock.particles.scenes.reflow import solve_joint
+from reflowshock.workflow.case.run import Findings, Run
 from reflowshock.workflow.pipeline.reader import read_case
 from reflowshock.workflow.solder.case import DropCase, JointCase
+from reflowshock.workflow.stages import stage_function
+from tests.support.warm_start import warm_command
 from tests.support.workflow_command import break_off
 
 CASES = Path(__file__).resolve().parents[2] / "cases"
@@ -33,8 +36,7 @@ def command(name: str, folder: Path, *settings: str) -> list[str]:
 
 
 def run(name: str, folder: Path, *settings: str) -> subprocess.CompletedProcess:
-    line = command(name, folder, *settings)
-    return subprocess.run(line, capture_output=True, text=True, timeout=240, check=False)
+    return warm_command(*command(name, folder, *settings)[3:])
 
 
 @pytest.mark.parametrize(
@@ -91,32 +93,36 @@ def test_an_oscillation_from_case_file_to_report(tmp_path):
 MOVED = ("joint.spacing=0.07 mm", "solder.numerics.time_step_limit=100")
 
 
+def reflow_here(folder: Path, *settings: str) -> Findings:
+    """Run the reflow of the solder joint in this process; it holds its health checks."""
+    case = read_case(CASES / "solder_joint" / "case.toml", settings)
+    (folder / "reflow").mkdir()
+    found = stage_function(case, "reflow")(Run(folder, case, 1), folder / "reflow")
+    assert all(check["ok"] for check in found.health.values()), found.health
+    return found
+
+
 def test_a_package_floats_to_its_collapse_height_and_centres_itself(tmp_path):
     """Offset by 0.3 radius, under a load: where the Young-Laplace force carries it."""
-    result = run("solder_joint", tmp_path, *MOVED, "joint.offset=0.072 mm", "joint.package.load=0.1 mN")
-    assert result.returncode == 0, result.stdout + result.stderr
-    summary = json.loads((tmp_path / "summary.json").read_text())
-    assert summary["metrics"]["offset"]["value"] < 0.01 * 0.24e-3
-    assert set(summary["health"]) >= {"collapse_height_error", "force_balance_error", "max_width_error"}
+    found = reflow_here(tmp_path, *MOVED, "joint.offset=0.072 mm", "joint.package.load=0.1 mN")
+    assert found.metrics["offset"]["value"] < 0.01 * 0.24e-3
+    assert set(found.health) >= {"collapse_height_error", "force_balance_error", "max_width_error"}
 
 
 def test_a_package_is_moved_along_a_path(tmp_path):
-    result = run("solder_joint", tmp_path, *MOVED, "joint.path.standoff=0.42 mm", "joint.path.steps=2")
-    assert result.returncode == 0, result.stdout + result.stderr
+    found = reflow_here(tmp_path, *MOVED, "joint.path.standoff=0.42 mm", "joint.path.steps=2")
     places = json.loads((tmp_path / "reflow" / "path.json").read_text())
     assert [place["standoff"] for place in places] == pytest.approx([0.35e-3, 0.385e-3, 0.42e-3])
     pull = np.pi * 0.24e-3 * 0.4985
     for place in places:
         assert place["axial_force"] == pytest.approx(place["axial_force_exact"], abs=0.02 * pull)
-    assert json.loads((tmp_path / "summary.json").read_text())["metrics"]["places"]["value"] == 3
+    assert found.metrics["places"]["value"] == 3
 
 
 def test_an_offset_joint_has_no_meridian(tmp_path):
-    result = run("solder_joint", tmp_path, COARSE_JOINT, "joint.offset=0.07 mm")
-    assert result.returncode == 0, result.stdout + result.stderr
-    summary = json.loads((tmp_path / "summary.json").read_text())
-    assert "max_width_error" not in summary["metrics"]
-    assert "volume_drift" in summary["health"]
+    found = reflow_here(tmp_path, COARSE_JOINT, "joint.offset=0.07 mm")
+    assert "max_width_error" not in found.metrics
+    assert "volume_drift" in found.health
 
 
 def short_steps(limit: float) -> tuple[str, str]:

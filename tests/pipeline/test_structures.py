@@ -2,10 +2,11 @@
 
 import json
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+
+from tests.support.warm_start import warm_command
 
 CASES = Path(__file__).resolve().parents[2] / "cases"
 COARSE_BOARD = (
@@ -23,10 +24,10 @@ ERRORS = {
 
 
 def command(what: str, name: str, folder: Path, *settings: str, until: str = "") -> subprocess.CompletedProcess:
-    line = [sys.executable, "-m", "reflowshock", what, str(CASES / name / "case.toml"), "--out", str(folder)]
+    line = [what, str(CASES / name / "case.toml"), "--out", str(folder)]
     line += ["--until", until] if until else []
     line += [item for setting in settings for item in ("--set", setting)]
-    return subprocess.run(line, capture_output=True, text=True, timeout=240, check=False)
+    return warm_command(*line)
 
 
 def test_both_solvers_of_a_board_from_case_file_to_report(tmp_path):

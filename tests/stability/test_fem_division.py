@@ -5,7 +5,7 @@ import pytest
 from mpi4py import MPI
 
 from reflowshock.cases.hard.trials.coupled import Coupled, models_of, surveyed
-from reflowshock.cases.hard.trials.layouts import board, copper_cut, corner, joint, overhang, two_regions
+from reflowshock.cases.hard.trials.layouts import board, copper_interface, corner, joint, overhang, two_regions
 from reflowshock.fem.coupling.scheme import scheme_of
 from reflowshock.fem.coupling.self_check import self_check
 from reflowshock.fem.division.checks import check_division
@@ -24,7 +24,7 @@ def radius(mesh: MeshData, scheme: str) -> float:
 
 
 def test_cut_through_copper_and_board_is_stable_in_local_steps():
-    mesh = copper_cut()
+    mesh = copper_interface()
     scene = surveyed(mesh, coupling=Coupling(scheme="local_steps", levels=1))
     division = divide(*scene)
     at_interface = touching(mesh.cells, cut_nodes(mesh.cells, division.meso, len(mesh.points)))
@@ -75,7 +75,7 @@ def test_points_a_little_outside_the_interface_are_tied_exactly(off):
     )
     checked = self_check(MPI.COMM_SELF, bodies, channels)
     checked.judge()
-    assert max(checked.rigid, checked.linear, checked.tie, checked.cut) < 1e-12
+    assert max(checked.rigid, checked.linear, checked.tie, checked.interface) < 1e-12
     assert checked.interface_mass > 0.0
 
 

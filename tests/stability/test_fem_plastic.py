@@ -5,7 +5,7 @@ import pytest
 
 from reflowshock.cases.hard.trials.bodies import SOLDER
 from reflowshock.cases.hard.trials.grids import grid, mesh_of, on
-from reflowshock.cases.hard.trials.motion import explicit, imbalance, march, rod
+from reflowshock.cases.hard.trials.motion import energies_of, explicit, imbalance, rod
 from reflowshock.fem.errors import InvertedElementError
 from reflowshock.fem.materials.library import FR4
 from reflowshock.fem.materials.parameters import Isotropic, JohnsonCook
@@ -19,7 +19,7 @@ def test_bar_pulled_at_ten_thousand_a_second_balances(formulation):
     """To 10 % of strain with hardening, rate dependence and waves of the initial velocity field."""
     body, motion = explicit(rod(10e-3, 2e-3, (20, 2)), SOLDER, "finite", formulation, 0.6)
     motion.velocity[:, 0] = np.where(body.free[:, 0], 1e4 * body.local.points[:, 0], 0.0)
-    energies = march(motion, round(2e-5 / motion.step))
+    energies = energies_of(motion, round(2e-5 / motion.step))
     assert imbalance(energies) < 1e-3
     assert np.all(np.diff(energies[:, 2]) >= 0)
     stretch = np.ptp(body.local.points[:, 0] + motion.displacement[:, 0]) / 10e-3
@@ -39,7 +39,7 @@ def test_elastic_plastic_impact_balances(formulation):
             rod(6e-3, 1e-3, (18, 3), skew), SOLDER, "finite" if finite else "small", formulation, 0.6
         )
         motion.velocity[:, 0] = np.where(body.free[:, 0], -60.0, 0.0)
-        energies = march(motion, 400)
+        energies = energies_of(motion, 400)
         assert imbalance(energies) < 1e-3
         assert energies[-1, 2] > 0.05 * energies[0].sum()
 
@@ -74,7 +74,7 @@ def test_element_that_turns_inside_out_ends_the_run_with_its_name():
     tip = body.local.points[:, 0] > 3.9e-3
     motion.velocity[tip, 0] = -1.2e-3 / motion.step
     with pytest.raises(InvertedElementError, match=r"element \d+, at first near"):
-        march(motion, 2)
+        energies_of(motion, 2)
 
 
 def taylor_mesh(radius: float, length: float, across: int, along: int) -> MeshData:

@@ -75,7 +75,7 @@ def test_energy_stays_for_1e5_steps_at_99_percent(name, estimate):
 
 
 def steps_until_stopped(body: Body, step: float, loads: list[Load], critical: float) -> tuple[int, str]:
-    """March as a run does, with a look at the ledger now and then; return when it was stopped, and why."""
+    """Take steps as a run does, with a look at the energies now and then; return when it was stopped, and why."""
     participant = Alone(explicit_motion(body, loads, step), WindowPlan(50 * step, 50, 20, 1))
     balance = EnergyBalance(limit=0.02, trivial=0.0, step=step, critical=critical)
     balance.judge(energy_sums(participant, 0.0), 0.0)

@@ -2,9 +2,10 @@
 
 import json
 import os
-import subprocess
-import sys
 from pathlib import Path
+from subprocess import CompletedProcess
+
+from tests.support.warm_start import warm_command
 
 DROP = Path(__file__).resolve().parents[2] / "cases/sessile_drop/case.toml"
 SMALL_DROP = ("--set", "drop.particles_per_edge=5")
@@ -13,10 +14,9 @@ SEED = int(os.environ.get("REFLOWSHOCK_SEED", "15"))  # of whatever is random; p
 TIMES = ("seconds", "per_second", "memory", "wall", "setup", "time_ratio", "core_ratio", "overhead", "busy_share")
 
 
-def run_drop(folder: Path, command: str = "run", *options: str, **more: object) -> subprocess.CompletedProcess:
+def run_drop(folder: Path, command: str = "run", *options: str, cwd: Path | None = None) -> CompletedProcess:
     """Run a command on a drop of 125 particles to its end."""
-    line = [sys.executable, "-m", "reflowshock", command, str(DROP), *SMALL_DROP, "--out", str(folder), *options]
-    return subprocess.run(line, capture_output=True, text=True, timeout=240, check=False, **more)
+    return warm_command(command, str(DROP), *SMALL_DROP, "--out", str(folder), *options, cwd=cwd)
 
 
 def answers(folder: Path) -> dict[str, object]:

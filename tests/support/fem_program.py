@@ -15,6 +15,29 @@ def run_program(path: Path, ranks: int) -> subprocess.CompletedProcess:
     return run_python(["-m", "reflowshock.fem", str(path)], ranks)
 
 
+# Runs inputs one after the other, each on the first ranks; the others sleep meanwhile.
+IN_TURN = """
+import sys, time
+from mpi4py import MPI
+from reflowshock.fem.run.program import main
+world = MPI.COMM_WORLD
+for count, path in zip(map(int, sys.argv[1::2]), sys.argv[2::2]):
+    comm = world.Split(0 if world.rank < count else MPI.UNDEFINED)
+    if comm != MPI.COMM_NULL and main(comm, [path]):
+        world.Abort(1)
+    done = world.Ibarrier()
+    while not done.Test():
+        time.sleep(0.02)
+"""
+
+
+def run_programs(inputs: list[tuple[int, Path]]) -> None:
+    """Run the fem program on several inputs, each with its number of ranks, in one start of all ranks."""
+    words = [str(word) for one in inputs for word in one]
+    done = run_python(["-c", IN_TURN, *words], max(ranks for ranks, _ in inputs), timeout=400.0)
+    assert done.returncode == 0, done.stderr
+
+
 def run_script(text: str, directory: Path, ranks: int) -> dict:
     """Run a script that is given the directory and prints its results as JSON."""
     script = directory / "script.py"

@@ -25,7 +25,7 @@ def test_import_is_light():
 
 
 def test_loading_and_planning_is_light():
-    light = HEAVY - {"scipy", "numba"}  # of which the forecast of a shock needs a root, and the critical step
+    light = HEAVY - {"scipy"}  # of which the forecast of a shock needs a root
     text = f"import sys, reflowshock; reflowshock.Case.load({str(BGA)!r}).plan(); print({light} & set(sys.modules))"
     done = run_python(text)
     assert done.stdout.strip() == "set()", done.stderr

@@ -1,4 +1,4 @@
-"""A pressure that follows its surface: normal to it, in balance on a closed one, its work exact in the ledger."""
+"""A pressure that follows its surface: normal to it, in balance on a closed one, its work exactly balanced."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Loads and damping against exact solutions; their work in the ledger is exact to round-off."""
+"""Loads and damping against exact solutions; their work in the energy balance is exact to round-off."""
 
 import numpy as np
 import pytest

@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from reflowshock.cases.hard.trials.bodies import LINEAR_HARDENING, motion_of, nonlinear_body
 from reflowshock.cases.hard.trials.grids import grid, mesh_of
-from reflowshock.fem.elements.stress import symmetric
+from reflowshock.fem.elements.stress import symmetric, von_mises
 from reflowshock.fem.materials.elasticity import elasticity_matrix
 from reflowshock.fem.materials.library import FR4
 from reflowshock.fem.materials.parameters import Isotropic
@@ -38,6 +38,7 @@ def test_cauchy_stress_and_stretch_of_a_body_that_turns(formulation):
     kirchhoff = np.diag(elasticity_matrix(ELASTIC)[:3, :3] @ logarithm)
     exact = matrix @ kirchhoff @ matrix.T / np.exp(logarithm.sum())
     assert np.abs(symmetric(recovery.stress(displacement)) - exact).max() < 1e-4 * np.abs(exact).max()
+    assert recovery.mises(displacement) == pytest.approx(von_mises(recovery.stress(displacement)), rel=1e-12)
     strain = recovery.strain(displacement)
     assert np.allclose(strain[:, :3], np.exp(logarithm) - 1, atol=1e-12)
     assert np.abs(strain[:, 3:]).max() < 1e-12

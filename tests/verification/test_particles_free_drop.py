@@ -78,6 +78,7 @@ def test_laplace_pressure_converges():
     assert -np.polyfit(np.log(shells), np.log(errors), 1)[0] > 1.8, errors
 
 
+@pytest.mark.long
 def test_second_mode_of_solder_at_a_tenth_of_the_radius():
     """The acceptance case: period within 1 % and decay within 10 % of Reid's, 1.9 % below Lamb's decay.
 

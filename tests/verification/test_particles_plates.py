@@ -32,7 +32,9 @@ def at_rest(geometry, volume=BALL, spacing=7e-5):
     return flow.body, run.records[-1].energy, plate_wrench(flow.body, others, 1)
 
 
-@pytest.mark.parametrize("gap", [0.30e-3, 0.35e-3, 0.40e-3, 0.50e-3])
+@pytest.mark.parametrize(
+    "gap", [0.30e-3, *(pytest.param(gap, marks=pytest.mark.long) for gap in (0.35e-3, 0.40e-3)), 0.50e-3]
+)
 def test_axial_force_between_bulge_and_hourglass(gap):
     """V = pi 0.24^2 0.4 mm^3: width and waist <= 0.5 %, axial force <= 2 % of pi a gamma."""
     volume = np.pi * 0.24**2 * 0.4e-9
@@ -62,7 +64,7 @@ def test_force_on_the_plate_is_the_slope_of_the_energy(which, component):
     assert wrench[component] < 0.0
 
 
-@pytest.mark.parametrize("degrees", [3.0, 20.0])
+@pytest.mark.parametrize("degrees", [3.0, pytest.param(20.0, marks=pytest.mark.long)])
 def test_a_pad_may_sit_anywhere_on_the_sphere(degrees):
     """Two discs cut from a sphere, the upper one tilted about the sphere's centre: the sphere is at rest.
 
@@ -91,7 +93,7 @@ def test_energy_of_a_small_tilt_is_half_stiffness_times_its_square():
     assert energies[2] - energies[0] == pytest.approx(4.0 * (energies[1] - energies[0]), rel=0.02)
 
 
-@pytest.mark.parametrize("load", [0.0, -1e-4, 2e-4])
+@pytest.mark.parametrize("load", [0.0, pytest.param(-1e-4, marks=pytest.mark.long), 2e-4])
 def test_collapse_height_under_a_load(load):
     """A plate that floats comes to rest where the Young-Laplace force carries the load."""
     plate = Floating(1, LIFT, np.array([0.0, 0.0, load]))

@@ -19,7 +19,9 @@ def error(found, expected):
     return found / expected - 1.0
 
 
-@pytest.mark.parametrize("gap", [0.28e-3, 0.31e-3, 0.34e-3, 0.42e-3])
+@pytest.mark.parametrize(
+    "gap", [0.28e-3, *(pytest.param(gap, marks=pytest.mark.long) for gap in (0.31e-3, 0.34e-3)), 0.42e-3]
+)
 def test_default_joints(gap):
     """Bulges and hourglasses at the default resolution: width within 0.5 %, volume within 0.1 %."""
     shape = solve_joint(JointGeometry(gap, RADIUS, RADIUS), Solder(volume=BALL))
@@ -51,7 +53,7 @@ def test_width_converges_with_the_spacing():
     assert order > 1.5, errors
 
 
-@pytest.mark.parametrize("degrees", [60, 90, 120])
+@pytest.mark.parametrize("degrees", [60, pytest.param(90, marks=pytest.mark.long), 120])
 def test_a_cube_becomes_a_spherical_cap(degrees):
     """Hu et al. 4.1 (their errors: 0.9-3.3 %) with 343 particles; free contact line, quasi-static."""
     numerics = SolderNumerics(time_step_limit=100)
@@ -76,11 +78,11 @@ def test_a_heavy_drop_sags():
 @pytest.mark.parametrize(
     ("volume", "height", "width", "degrees"),
     [
-        (0.0141, 0.178, 0.400, 83),
-        (0.0564, 0.393, 0.495, 126),
+        pytest.param(0.0141, 0.178, 0.400, 83, marks=pytest.mark.long),
+        pytest.param(0.0564, 0.393, 0.495, 126, marks=pytest.mark.long),
         (0.1077, 0.523, 0.599, 138),
-        (0.1218, 0.550, 0.623, 140),
-        (0.2298, 0.707, 0.764, 148),
+        pytest.param(0.1218, 0.550, 0.623, 140, marks=pytest.mark.long),
+        pytest.param(0.2298, 0.707, 0.764, 148, marks=pytest.mark.long),
     ],
 )
 def test_five_volumes_on_a_pad(volume, height, width, degrees):

@@ -14,7 +14,14 @@ REFERENCE = json.loads((Path(__file__).parent / "references" / "surface_evolver.
 MM, GAMMA = 1e-3, 0.4985
 
 
-@pytest.mark.parametrize("evolver", REFERENCE["drops"], ids=lambda row: f"{row['volume']}")
+SMALLEST, *BETWEEN, LARGEST = REFERENCE["drops"]
+
+
+@pytest.mark.parametrize(
+    "evolver",
+    [SMALLEST, *(pytest.param(row, marks=pytest.mark.long) for row in BETWEEN), LARGEST],
+    ids=lambda row: f"{row['volume']}",
+)
 def test_five_volumes_on_a_pad(evolver):
     """Hu et al. 4.2: pad 5 deg, mask 148 deg, pinned at the pad's edge; 343 particles."""
     drop = Drop(

@@ -272,11 +272,11 @@ def _own_size(request: AccuracyRequest, accuracy: Accuracy) -> list[str]:
     """Say what the case costs at its own size, as it is and with the recommended settings."""
     own = {key: value for key, value in request.settings.items() if key != "scale"}
     known, chosen = calibration(one.stages for one in accuracy.measurements), accuracy.recommended
-    told = [f"{duration(total(known, _case(request.case, own)))} as it is"]
+    times = [f"{duration(total(known, _case(request.case, own)))} as it is"]
     if chosen is not None and own != request.settings:
-        told.append(f"{duration(total(known, _case(request.case, own | dict(chosen.run.settings))))} as recommended")
+        times.append(f"{duration(total(known, _case(request.case, own | dict(chosen.run.settings))))} as recommended")
     how = f"corrected by the measured time of the nearest of {known.points} runs" if known.points else "not measured"
-    return [f"Wall time of the case at full size: about {', '.join(told)} (forecast, {how})."]
+    return [f"Wall time of the case at full size: about {', '.join(times)} (forecast, {how})."]
 
 
 def _case(path: Path, settings: Mapping[str, str]) -> Case:
@@ -298,9 +298,9 @@ def _show_choice(accuracy: Accuracy, console: Console) -> None:
     for line in tables.as_lines(chosen.run.settings):
         console.print(f"    {line}")
     console.print(f"\nor {tables.as_options(chosen.run.settings)}", soft_wrap=True)
-    told = tables.prediction(accuracy)
-    if told is not None:
-        console.print(table(told, ""))
+    rows = tables.prediction(accuracy)
+    if rows is not None:
+        console.print(table(rows, ""))
 
 
 def table(texts: dict, title: str) -> Table:

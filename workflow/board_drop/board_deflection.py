@@ -11,6 +11,7 @@ import numpy as np
 from reflowshock.effect import Decision
 from reflowshock.fem.estimates.drop_effects import Deflection, called_for
 from reflowshock.fem.materials.kinematics import Kinematics
+from reflowshock.workflow.board_drop.duration import first_mode, longest_duration
 
 if TYPE_CHECKING:
     from reflowshock.fem.materials.parameters import Material
@@ -33,31 +34,6 @@ def expected_deflection(case: "BoardDropCase") -> Deflection:
     length, omega = first_mode(case)
     deflection = first_mode_peak(omega, shock_pulse(case.shock).pulse.integral, longest_duration(case))
     return Deflection(deflection, math.pi / length * deflection, omega)
-
-
-def first_mode(case: "BoardDropCase") -> tuple[float, float]:
-    """Return length [m] and angular frequency [rad/s] of the board as a beam that is pinned at its holes."""
-    board, (young_x, young_y, _) = case.board, case.materials.board.engineering_constants.young
-    holes = board.holes
-    spans = ((board.length - 2.0 * holes.inset_x, young_x), (board.width - 2.0 * holes.inset_y, young_y))
-    length, young = max(spans)
-    stiffness = young * board.thickness * board.thickness / 12.0 / case.materials.board.density
-    return length, (math.pi / length) ** 2 * math.sqrt(stiffness)
-
-
-def longest_duration(case: "BoardDropCase") -> float:
-    """Return the time [s] that a shock is followed: if it is ``auto``, at most, a period after its pulse.
-
-    Screws hold a board more firmly than pins, so its own period is shorter. Errors as ``expected_deflection``.
-    """
-    from reflowshock.fem.loads.pulse import Tabulated
-    from reflowshock.fem.loads.shock_pulse import input_pulse
-
-    if case.shock.duration != "auto":
-        return case.shock.duration
-    pulse, _ = input_pulse(case.shock)
-    end = float(pulse.times[-1]) if isinstance(pulse, Tabulated) else pulse.duration
-    return end + math.tau / first_mode(case)[1]
 
 
 def first_mode_peak(omega: float, velocity: Callable[[float], float], duration: float) -> float:

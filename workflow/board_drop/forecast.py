@@ -8,7 +8,8 @@ from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.problem.thermal import Thermal
 from reflowshock.problem import Problem
 from reflowshock.workflow.board_drop import shock_cooling
-from reflowshock.workflow.board_drop.board_deflection import decided, longest_duration
+from reflowshock.workflow.board_drop.board_deflection import decided
+from reflowshock.workflow.board_drop.duration import longest_duration
 from reflowshock.workflow.board_drop.shock_effects import shock_effects
 from reflowshock.workflow.board_drop.shock_forecast import (
     PartForecast,

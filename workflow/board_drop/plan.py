@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from rich.console import RenderableType
 from rich.table import Table
 
-from reflowshock.workflow.board_drop.board_deflection import longest_duration
+from reflowshock.workflow.board_drop.duration import longest_duration
 from reflowshock.workflow.board_drop.forecast import PackageForecast
 from reflowshock.workflow.board_drop.shock_forecast import ShockForecast
 from reflowshock.workflow.case.text import duration, short

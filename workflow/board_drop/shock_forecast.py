@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from reflowshock.fem.materials.parameters import Material
 from reflowshock.problem import Problem
-from reflowshock.workflow.board_drop.board_deflection import longest_duration
+from reflowshock.workflow.board_drop.duration import longest_duration
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.case.text import short
 

@@ -67,8 +67,8 @@ class Case(Parameters):
         return table
 
     @property
-    def pulse_tables(self) -> dict[str, tuple[Path, str]]:
-        """Those of its files that are tables of a pulse, by key, and which quantity each has."""
+    def pulse_tables(self) -> dict[str, tuple[Path, str, str | None]]:
+        """Those of its files that are tables of a pulse, by key, which quantity each has, and in which column."""
         return {}
 
     @property

@@ -38,6 +38,8 @@ BY_DIMENSION = {
     "viscosity": Range("1 uPa*s", "10 kPa*s"),
     "temperature": Range("1 K", "5000 K"),
     "thermal expansion": Range("1e-3 ppm/K", "1e4 ppm/K"),
+    "mass": Range("1 pg", "1000 kg"),
+    "stiffness per area": Range("1 N/m^3", "1e20 N/m^3"),
     "force": Range("1 pN", "1 MN"),
     "frequency": Range("1e-6 Hz", "1e12 Hz"),
     "angle": Range("1e-9 rad", "1 turn"),

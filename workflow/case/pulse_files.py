@@ -5,21 +5,21 @@ from pathlib import Path
 
 from reflowshock.problem import Problem
 
-Tables = Mapping[str, tuple[Path, str]]
+Tables = Mapping[str, tuple[Path, str, str | None]]
 
 
 def unreadable_pulses(tables: Tables) -> Iterator[Problem]:
     """Find tables that cannot be read.
 
     Args:
-        tables: key -> file, and the quantity of its second column.
+        tables: key -> file, what it holds, and the title of the column where it has several.
     """
     from reflowshock.fem.errors import PulseError
     from reflowshock.fem.loads.pulse_table import read_pulse
 
-    for key, (path, quantity) in tables.items():
+    for key, (path, quantity, column) in tables.items():
         try:
-            read_pulse(path, quantity)
+            read_pulse(path, quantity, column)
         except PulseError as error:
             message = str(error).removeprefix(str(path)).lstrip(":, ")
             yield Problem(key, message, str(path))
@@ -30,9 +30,9 @@ def largest_values(tables: Tables) -> Iterator[tuple[str, str, float]]:
     from reflowshock.fem.errors import PulseError
     from reflowshock.fem.loads.pulse_table import QUANTITIES, read_pulse
 
-    for key, (path, quantity) in tables.items():
+    for key, (path, quantity, column) in tables.items():
         try:
-            pulse = read_pulse(path, quantity)
+            pulse = read_pulse(path, quantity, column)
         except PulseError:
             continue
         yield key, "s", float(pulse.times[-1])

@@ -9,7 +9,7 @@ CHECK_UNITS = {
 LONGEST_IN_MS = 0.1
 SHOWN = {
     "Pa": (1e-6, "MPa"), "m": (1e3, "mm"), "m^3": (1e9, "mm^3"), "J": (1e3, "mJ"), "J/m^3": (1e-3, "kJ/m^3"),
-    "N": (1e3, "mN"), "kg": (1e6, "mg"), "B": (1e-9, "GB"),
+    "N": (1e3, "mN"), "N m": (1e3, "N mm"), "kg": (1e6, "mg"), "B": (1e-9, "GB"),
 }  # fmt: skip
 
 
@@ -39,20 +39,25 @@ def nano(seconds: float | None) -> str:
 
 
 def micro(value: float) -> str:
-    """Metres as micrometres."""
-    return f"{1e6 * value:.1f}"
+    """Metres as micrometres, four digits."""
+    return _four_digits(1e6 * value)
 
 
 def mega(value: float) -> str:
-    """Pascals as megapascals."""
-    return f"{1e-6 * value:.1f}" if abs(value) >= 1e6 or value == 0.0 else f"{1e-6 * value:.2g}"
+    """Pascals as megapascals, four digits."""
+    return _four_digits(1e-6 * value)
+
+
+def _four_digits(value: float) -> str:
+    """Write a figure of a column: with the zeros at its end."""
+    return f"{value:.0f}" if abs(value) >= 999.95 else f"{value:#.4g}"
 
 
 def percent(value: float) -> str:
-    """A fraction as per cent, two digits."""
+    """A fraction as per cent, three digits."""
     if abs(value) < 1.0e-6:
         return "< 0.0001 %"
-    return f"{100.0 * value:.2g} %" if abs(value) < 1.0 else f"{100.0 * value:.0f} %"
+    return f"{100.0 * value:.3g} %" if abs(value) < 10.0 else f"{100.0 * value:.0f} %"
 
 
 def against_limit(name: str, check: dict) -> tuple[str, str]:

@@ -5,7 +5,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import brentq
 
 from reflowshock.workflow.convergence.series import Quantity, StudyRun, Values
 
@@ -81,7 +80,7 @@ class _Reference:
         values = [answers[one.name][quantity].value for one in known]
         limit = richardson([one.value or 0.0 for one in known[-3:]], values[-3:], order)
         if limit is not None:
-            return cls(limit[0], f"Richardson, order {limit[1]:.2g}", order=limit[1])
+            return cls(limit[0], f"Richardson, order {limit[1]:.3g}", order=limit[1])
         return cls(values[-1], f"finest run, {known[-1].name}", known[-1].name)
 
 
@@ -130,6 +129,8 @@ def richardson(sizes: Sequence[float], values: Sequence[Values], order: float | 
 
     if excess(ORDER_MARGIN) * excess(LARGEST_ORDER) > 0.0:
         return None
+    from scipy.optimize import brentq  # reports and plans start without it
+
     observed = float(brentq(excess, ORDER_MARGIN, LARGEST_ORDER))
     if order is not None and abs(observed - order) > ORDER_MARGIN:
         return None

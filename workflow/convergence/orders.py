@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import minimize_scalar, nnls
 
 STEEPEST_COST = 9.0
 
@@ -79,6 +78,8 @@ def fit_cost(values: Sequence[float], costs: Sequence[float]) -> CostFit | None:
     """
     if len(values) < 4 or min(costs) <= 0.0:
         return None
+    from scipy.optimize import minimize_scalar, nnls
+
     measured = np.asarray(costs, dtype=float)
 
     def solve(exponent: float) -> tuple[np.ndarray, float]:

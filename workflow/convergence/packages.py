@@ -8,7 +8,7 @@ from typing import Any
 
 from reflowshock.meshing.board.pads import pad_table
 from reflowshock.units import from_si
-from reflowshock.workflow.board_drop.board_deflection import longest_duration
+from reflowshock.workflow.board_drop.duration import longest_duration
 from reflowshock.workflow.board_drop.shock_forecast import implicit_seconds
 from reflowshock.workflow.board_drop.shock_launch import MODES
 from reflowshock.workflow.convergence.series import ConvergenceStudy, Parameter, Quantity, StudyRun, at_same_times

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
 from reflowshock.workflow.case.case import Case
 
@@ -145,6 +144,8 @@ def at_same_times(history: Arrays, names: Iterable[str], duration: float, count:
     Returns:
         All values, one array after the other, each in the order of times.
     """
+    from scipy.interpolate import CubicSpline
+
     times = common_times(duration, count)
     return np.concatenate([CubicSpline(history["time"], history[name])(times).ravel() for name in names])
 

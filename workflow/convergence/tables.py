@@ -111,7 +111,7 @@ def _growth(fit: Fit) -> str:
     if fit.cost is None:
         return ""
     cost = fit.cost
-    return f"{cost.start:.2g} + {number(cost.constant)} h^-{cost.exponent:.2f}, within {100.0 * cost.scatter:.2g} %"
+    return f"{cost.start:.3g} + {number(cost.constant)} h^-{cost.exponent:.2f}, within {100.0 * cost.scatter:.3g} %"
 
 
 def prediction(accuracy: Accuracy) -> dict | None:

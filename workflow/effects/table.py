@@ -1,4 +1,9 @@
-"""The effects of a case as rows of text: state, expected influence, why, and the predicted share of the cost."""
+"""The effects of a case as rows of text: state, expected influence, why, and the predicted share of the cost.
+
+Their cost is predicted from forecasts of the case the other way (``Effect.other_way``), or from ratios that
+``benchmarks/effects.py`` measured (``costs.json``). The ``influence`` of a decision is the expected relative change of
+the result.
+"""
 
 import json
 from collections.abc import Iterator, Mapping
@@ -9,6 +14,7 @@ from typing import Any
 from reflowshock.fem.errors import PulseError
 from reflowshock.workflow.case.case import Case
 from reflowshock.workflow.case.problems import CaseError
+from reflowshock.workflow.case.text import percent
 from reflowshock.workflow.effects.registry import effect_of
 from reflowshock.workflow.kinds import kind_of, stage_seconds
 
@@ -79,13 +85,12 @@ def rows(case: Case, effects: Mapping[str, Any]) -> Iterator[tuple[str, bool, st
 
 
 def per_cent(share: float) -> str:
-    """Write a share with two digits; nothing smaller than is worth telling."""
+    """Write a share, which may be negative."""
     if share == 0.0:
         return "0 %"
     if abs(share) < 1e-6:
         return "0.0001 %" if share < 0.0 else "< 0.0001 %"
-    digits = f"{100.0 * share:.2g}"
-    return f"{float(digits):.0f} %" if abs(share) >= 0.1 else f"{digits} %"
+    return percent(share)
 
 
 def report_table(case: Case, effects: Mapping[str, Any]) -> dict:

@@ -12,8 +12,6 @@ from reflowshock.workflow.jobs.executor import Executor
 from reflowshock.workflow.process.terminal import console
 from reflowshock.workflow.store.folders import RunFolderBusy
 
-# Options of env: Open MPI would take a stage that is a step of Slurm for one of the ranks that srun starts.
-OWN_STEP = "-u SLURM_STEPID -u SLURM_STEP_ID"
 # How Snakemake says that a job failed: its message ends where the command, advice or the next entry begins.
 FAILED = re.compile(r"^Error in (?:rule|group) .*?(?=^Error in |^\[|\Z)", re.MULTILINE | re.DOTALL)
 MESSAGE = re.compile(

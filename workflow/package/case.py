@@ -158,12 +158,13 @@ class BoardDropCase(PackageCase):
     @property
     def files(self) -> dict[str, Path]:
         """Surfaces of joints, and the shock's table."""
-        return super().files | {key: path for key, (path, _) in self.pulse_tables.items()}
+        return super().files | {key: path for key, (path, *_) in self.pulse_tables.items()}
 
     @property
-    def pulse_tables(self) -> dict[str, tuple[Path, str]]:
+    def pulse_tables(self) -> dict[str, tuple[Path, str, str | None]]:
         """The shock's table, if it has one."""
-        return {} if self.shock.table is None else {"shock.table": (Path(self.shock.table), "acceleration")}
+        shock = self.shock
+        return {} if shock.table is None else {"shock.table": (Path(shock.table), "acceleration", shock.table_column)}
 
     @property
     def ranks(self) -> int:

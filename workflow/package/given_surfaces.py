@@ -39,6 +39,8 @@ def problems(package: "Package", pads: "Sequence[PadSite]", heated: bool) -> Ite
         pads: the pad table, as drawn.
         heated: whether pads move before the joints freeze: how high a joint is then, only the reflow finds.
     """
+    if not package.surfaces:
+        return
     from reflowshock.meshing.surface.closed_surface import SurfaceError
     from reflowshock.meshing.surface.user_surface import SUFFIXES, closed_triangles, load_surface
 

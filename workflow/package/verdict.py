@@ -1,38 +1,20 @@
-"""The verdict on a package that is dropped: does each joint hold, by how much, and how many drops will it bear?"""
+"""The verdict on a package that is dropped: does each joint hold, by how much, and how many drops will it bear?
 
-from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+The report judges the joints from the histories, so that the limits are inputs of the report alone (``Stage.without``).
+No solder of the library has a limit: none of the sources at hand gives one.
+"""
+
+from collections.abc import Collection
 
 import numpy as np
-from numpy.typing import NDArray
 
+from reflowshock.fem.output.ranking import PEEL, PLASTIC_WORK, VON_MISES, Arrays, Measure
 from reflowshock.fem.problem.failure import Failure, Life
 from reflowshock.workflow.case.text import SHOWN, number, quantity
 
-Arrays = Mapping[str, NDArray]
-
 PASS, FAIL, NO_LIMIT = "PASS", "FAIL", "NO LIMIT"
-ENDS = ("board", "package")
-
-
-@dataclass(frozen=True, slots=True)
-class Measured:
-    """A measure of joints: its histories at both pads, its SI unit, and what it is called."""
-
-    histories: str
-    unit: str
-    word: str
-
-    def peaks(self, history: Arrays) -> NDArray[np.float64]:
-        """Return the largest value of each joint ``(joints,)``, at any time and at either pad."""
-        return np.maximum(*(history[f"{self.histories}_{end}"].max(axis=0) for end in ENDS))
-
-
-MEASURES = {
-    "peel_stress": Measured("peel", "Pa", "peel"),
-    "layer_von_mises": Measured("von_mises", "Pa", "von Mises"),
-    "layer_plastic_work": Measured("plastic_work", "J/m^3", "plastic work"),
-}
+MEASURES: dict[str, Measure] = {"peel_stress": PEEL, "layer_von_mises": VON_MISES, "layer_plastic_work": PLASTIC_WORK}
+WORDS = {"peel_stress": "peel", "layer_von_mises": "von Mises", "layer_plastic_work": "plastic work"}
 
 
 def verdict_of(failure: Failure, history: Arrays, critical: str, coarse: Collection[str] = ()) -> dict:
@@ -106,9 +88,9 @@ def against_limit(joint: dict) -> str:
     measure = MEASURES[joint["criterion"]]
     value, unit = _text(joint["value"], measure.unit)
     if joint["limit"] is None:
-        return f"{measure.word} {value} {unit}"
+        return f"{WORDS[joint['criterion']]} {value} {unit}"
     margin = "" if joint["margin"] is None else f" (margin {joint['margin']:.2g})"
-    return f"{measure.word} {value} {unit} of {_text(joint['limit'], measure.unit)[0]}{margin}"
+    return f"{WORDS[joint['criterion']]} {value} {unit} of {_text(joint['limit'], measure.unit)[0]}{margin}"
 
 
 def in_drops(life: dict) -> str:

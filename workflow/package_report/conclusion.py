@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from reflowshock.fem.estimates.drop_effects import Failing
-from reflowshock.workflow.board_drop.board_deflection import longest_duration
+from reflowshock.workflow.board_drop.duration import longest_duration
 from reflowshock.workflow.case.run import metric
 from reflowshock.workflow.package import findings
 from reflowshock.workflow.package.case import BoardDropCase

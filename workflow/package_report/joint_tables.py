@@ -8,7 +8,7 @@ import numpy as np
 
 from reflowshock.fem.output.ranking import ENDS, OUTER_FIBRE, PEEL, PLASTIC_WORK, VON_MISES, ranked, ranking_measure
 from reflowshock.workflow.case.text import mega, micro, nano, number, percent
-from reflowshock.workflow.package.verdict import MEASURES
+from reflowshock.workflow.package.verdict import WORDS
 from reflowshock.workflow.package_report.joint_records import Column, Record, by_shape, record_table
 from reflowshock.workflow.process.products import read_json
 
@@ -98,7 +98,7 @@ def ranked_joints(
                 mega(history["von_mises_max"][:, column].max()),
             ]
         )
-    layer = f"{micro(float(history['joint_layer']))} µm"
+    layer = f"{1e6 * float(history['joint_layer']):.4g} µm"
     head = [
         "joint",
         "peel stress [MPa]",
@@ -130,7 +130,7 @@ def verdict_cells(judged: Mapping[str, Any]) -> list[str]:
     """Verdict and margin of a joint, with the criterion of least margin."""
     if judged["margin"] is None:
         return [judged["verdict"], "–"]
-    return [judged["verdict"], f"{judged['margin']:.3g} by {MEASURES[judged['criterion']].word}"]
+    return [judged["verdict"], f"{judged['margin']:.3g} by {WORDS[judged['criterion']]}"]
 
 
 def meshes(joints: Sequence[Record]) -> dict | None:

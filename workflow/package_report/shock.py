@@ -70,7 +70,7 @@ def kinematics_note(metrics: dict, kinematics: str) -> str:
     ratio = metrics["deflection_over_thickness"]["value"]
     strain = tables.named_quantity(metrics, "peak_board_strain")
     return (
-        f"The board deflects by {ratio:.2g} times its thickness. Small kinematics leave out the strain that goes with"
+        f"The board deflects by {ratio:.3g} times its thickness. Small kinematics leave out the strain that goes with"
         f" its rotation, up to {1e6 * left_out:.0f} µm/m; the largest board strain under the package is {strain}."
         ' A real board stiffens and deflects less: shock.numerics.kinematics = "auto" takes that into account.'
     )

@@ -97,8 +97,8 @@ def load_steps(structure: Mapping[str, NDArray]) -> dict:
         ("corner motion [µm]", structure["corner_displacement"] / MICRO, "+.2f"),
         *((f"gap change, {name} [µm]", change / MICRO, "+.2f") for name, change in _extremes(structure)),
         ("exchanges", structure["iterations"], ".0f"),
-        ("forces change by", structure["force_residual"], ".1e"),
-        ("package out of balance by", structure["rigid_residual"], ".1e"),
+        ("forces change by", structure["force_residual"], ".2e"),
+        ("package out of balance by", structure["rigid_residual"], ".2e"),
     ]
     used = [column for column in columns if np.any(column[1])]
     rows = [

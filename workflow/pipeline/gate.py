@@ -1,4 +1,9 @@
-"""The gate: what is checked of a case before anything is computed, and asked before anything that takes long."""
+"""The gate: what is checked of a case before anything is computed, and asked before anything that takes long.
+
+Every file that a case names is read before anything runs. Values that are not plausible need ``--force``, more ranks
+than cores ``--oversubscribe``, more than a predicted hour ``--yes`` in scripts. A case that does not fit into memory is
+refused.
+"""
 
 import resource
 import sys

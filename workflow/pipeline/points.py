@@ -34,7 +34,7 @@ class PointsError(CaseError):
 
     def _told(self, places: Sequence[int]) -> str:
         others = f" and {len(places) - 1} more" if len(places) > 1 else ""
-        return f"{self.source}: point {places[0] + 1} ({told(self.settings[places[0]])}){others}"
+        return f"{self.source}: point {places[0] + 1} ({settings_text(self.settings[places[0]])}){others}"
 
 
 def read_possible_points(
@@ -66,7 +66,7 @@ def overrides(settings: Mapping[str, str]) -> list[str]:
     return [f"{key}={value}" for key, value in settings.items()]
 
 
-def told(settings: Mapping[str, str]) -> str:
+def settings_text(settings: Mapping[str, str]) -> str:
     """Write settings for a reader."""
     return ", ".join(f"{key} = {value}" for key, value in settings.items()) or "the case as it is"
 

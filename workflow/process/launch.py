@@ -26,12 +26,12 @@ class StoppedProcesses:
     """Looks, while its block lasts, whether a process or one of its descendants is stopped; kills those that stay so.
 
     Attributes:
-        told: which it was and how long, in words; empty before that.
+        message: which it was and how long, in words; empty before that.
     """
 
     def __init__(self, process: int, patience: float = PATIENCE) -> None:
         """Take the process id, and how long one may be stopped [s]."""
-        self.told = ""
+        self.message = ""
         self._process, self._patience = process, patience
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._watch, daemon=True)
@@ -54,7 +54,7 @@ class StoppedProcesses:
             late = [process for process, count in looks.items() if count * tick > self._patience]
             if late:
                 names = " and ".join(name(process) for process in late)
-                self.told = f"{names} had been stopped (SIGSTOP) for {self._patience:g} s, so the run was ended"
+                self.message = f"{names} had been stopped (SIGSTOP) for {self._patience:g} s, so the run was ended"
                 for process in late:
                     with suppress(OSError):
                         os.kill(process, signal.SIGKILL)
@@ -106,6 +106,8 @@ QUIET = ("--mca", "orte_execute_quiet", "1")  # of Open MPI 4; 5 has no option -
 # In front of a command: the system sends the signal when the process that starts it ends, however that happens.
 END_WITH_PARENT = ("setpriv", "--pdeathsig", "TERM")
 DIE_WITH_PARENT = ("setpriv", "--pdeathsig", "KILL")
+# Options of env: Open MPI would take a stage that is a step of Slurm for one of the ranks that srun starts.
+OWN_STEP = "-u SLURM_STEPID -u SLURM_STEP_ID"
 ENDINGS: dict[int, str] = {
     signal.SIGKILL: "was killed, probably because memory ran out",
     signal.SIGXFSZ: "was ended because a file exceeded the largest allowed size (ulimit -f)",
@@ -176,9 +178,9 @@ def launch(command: Sequence[str], on_line: Callable[[str], None], log: Path, pa
     if code != 0:
         lines = _read(log) + _read(log.with_name(ERROR))
         words = "\n".join(lines[-LAST_LINES:]) or "it wrote no message"
-        said, words = (without_traceback(text, log) for text in (told(lines), words))
-        if watch.told:
-            raise LaunchError(f"{watch.told}; {said}".removesuffix("; "))
+        said, words = (without_traceback(text, log) for text in (error_of(lines), words))
+        if watch.message:
+            raise LaunchError(f"{watch.message}; {said}".removesuffix("; "))
         raise LaunchError(said or f"{program} {ending(code)}: {words}")
 
 
@@ -186,7 +188,7 @@ def _read(path: Path) -> list[str]:
     return path.read_text(encoding="utf-8", errors="replace").strip().splitlines() if path.is_file() else []
 
 
-def told(lines: Sequence[str]) -> str:
+def error_of(lines: Sequence[str]) -> str:
     """Return what a program says of an error that it knows, from the last line that begins so; nothing without one."""
     begins = [k for k, line in enumerate(lines) if line.startswith(TOLD)]
     return "\n".join(lines[begins[-1] :]).removeprefix(TOLD) if begins else ""

@@ -83,7 +83,7 @@ def difference_curves(histories: dict[str, dict], critical_joint: str) -> str:
 
 
 def energy_curves(history: dict) -> str:
-    """Draw the energy ledger of one run: its terms, and the balance relative to the largest energy."""
+    """Draw the energy balance of one run: its terms, and the balance relative to the largest energy."""
     time = history["time"] / MILLI
     with pyplot.rc_context(STYLE):
         figure, (left, right) = pyplot.subplots(1, 2, figsize=(9.2, 3.1), constrained_layout=True)

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from reflowshock.fem.output.ranking import PEEL, VON_MISES
 from reflowshock.fem.output.settled import is_settled
 
 Arrays = Mapping[str, NDArray]
@@ -53,8 +54,7 @@ def unsettled(history: Arrays, longest: float) -> str:
 
 def late_peak(history: Arrays) -> str:
     """A warning if the largest peel or von Mises stress of all joints stands at the end of the run; empty if not."""
-    peel = np.maximum(history["peel_board"], history["peel_package"])
-    largest = {"peel": peel.max(axis=1), "von Mises": at_pads(history).max(axis=1)}
+    largest = {"peel": PEEL.worse(history).max(axis=1), "von Mises": VON_MISES.worse(history).max(axis=1)}
     late = [name for name, stress in largest.items() if np.argmax(stress) >= len(stress) - max(2, len(stress) // 50)]
     if not late:
         return ""

@@ -92,7 +92,7 @@ def comparison(metrics: dict) -> dict | None:
 
 
 def energies(histories: dict[str, dict]) -> dict:
-    """Largest value of every term of the ledger, each mode a column."""
+    """Largest value of every term of the energy balance, each mode a column."""
     terms = ("kinetic", "internal", "plastic", "hourglass", "damping", "external", "interface", "balance")
     largest = {
         term: [float(np.max(np.abs(history[term]))) for history in histories.values()]

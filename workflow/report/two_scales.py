@@ -18,7 +18,7 @@ SELF_CHECK = {
     "rigid": "rigid motion through tie and interface, error",
     "linear": "linear field through tie and interface, error",
     "tie": "net force and moment lost at the tie",
-    "cut": "net force and moment lost at the interface",
+    "interface": "net force and moment lost at the interface",
     "macro_mass": "mass of the macro model",
     "interface_mass": "mass of the meso model at the interface",
     "meso_mass": "mass of the rest of the meso model",
@@ -105,4 +105,4 @@ def _number(value: int | None) -> str:
 
 
 def _checked(name: str, value: float) -> str:
-    return quantity({"value": value, "unit": "kg"}) if name.endswith("_mass") else f"{value:.1e}"
+    return quantity({"value": value, "unit": "kg"}) if name.endswith("_mass") else f"{value:.2e}"

@@ -45,13 +45,13 @@ def write_results(folder: Path, verdicts: Sequence[Verdict], samples: Sequence[S
             path.parent.mkdir(exist_ok=True)
             path.write_text(hard_case_text(sample.simplest), encoding="utf-8")
     draw_margins(folder / "stress_test.png", verdicts, samples)
-    told = {
+    results = {
         "version": __version__,
         "seed": seed,
         "fixed": [_record(verdict) for verdict in verdicts],
         "random": [_sample_record(sample) for sample in samples],
     }
-    (folder / "stress_test.json").write_text(json.dumps(told, indent=1), encoding="utf-8")
+    (folder / "stress_test.json").write_text(json.dumps(results, indent=1), encoding="utf-8")
     (folder / "stress_test.html").write_text(_page(folder, verdicts, samples, seed), encoding="utf-8")
 
 

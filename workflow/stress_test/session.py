@@ -1,4 +1,7 @@
-"""A session of pytest that tries hard cases in several processes; one that hangs or dies is replaced."""
+"""A session of pytest that tries hard cases in several processes; one that hangs or dies is replaced.
+
+It runs apart from what a user has configured for tests of his own.
+"""
 
 import os
 import signal

@@ -13,8 +13,8 @@ from reflowshock.workflow.stress_test.sample import MOST_REFUSED, Sample
 
 def show_verdict(verdict: Verdict) -> None:
     """Print one verdict: what was tried, the closest bound, what was measured, the margin."""
-    told = styled(" {}  {}  {} s", named(verdict), str(verdict), f"{verdict.seconds:.1f}")
-    console.print(_mark(verdict.ok) + told, soft_wrap=True)
+    line = styled(" {}  {}  {} s", named(verdict), str(verdict), f"{verdict.seconds:.1f}")
+    console.print(_mark(verdict.ok) + line, soft_wrap=True)
 
 
 def _mark(ok: bool) -> Text:
@@ -29,8 +29,8 @@ def named(verdict: Verdict) -> str:
 def show_sample(sample: Sample) -> None:
     """Print how the random cases of a trial ended, and what was missed."""
     seconds = f"{sum(verdict.seconds for verdict in sample.verdicts):.1f}"
-    told = styled(" {}  {}  {} s", sample.name, sample_said(sample), seconds)
-    console.print(_mark(sample.ok) + told, soft_wrap=True)
+    line = styled(" {}  {}  {} s", sample.name, sample_said(sample), seconds)
+    console.print(_mark(sample.ok) + line, soft_wrap=True)
     for verdict in sample.missed:
         console.print(f"     {named(verdict)}  {verdict!s}", soft_wrap=True)
 

@@ -9,9 +9,10 @@ from reflowshock.meshing.board.box_plan import Box, BoxHoles, BoxLayer
 from reflowshock.workflow.case.case import Case
 from reflowshock.workflow.case.stage import Pipeline, Stage, report_of
 from reflowshock.workflow.case.toml_file import beside
-from reflowshock.workflow.structure.references import AnyReference
+from reflowshock.workflow.structure.references import AnyReference, Record
 
 MESHED = ("length", "width", "cells", "refine", "symmetry", "element", "layers", "holes")
+MOVED = ("structure", "materials", "supports", "masses", "loads", "watch", "dynamics")
 STRUCTURE = Pipeline(
     (
         Stage(
@@ -20,7 +21,9 @@ STRUCTURE = Pipeline(
             (),
             ("geometry/structure.msh", "geometry/preview.png"),
         ),
-        Stage("shock", ("structure", "materials", "supports", "loads", "watch", "dynamics"), ("geometry",), ()),
+        Stage(
+            "shock", ("structure", "materials", "supports", "masses", "loads", "watch", "dynamics"), ("geometry",), ()
+        ),
         Stage("comparison", ("references",), ("shock",), ("comparison/comparison.json",)),
         report_of("geometry", "shock", "comparison"),
     )
@@ -38,26 +41,31 @@ class StructureCase(StructureProblem, Case):
 
     @classmethod
     def located(cls, table: dict, folder: Path) -> dict:
-        """Take the tables of loads as relative to the folder of the case file."""
-        loads = table.get("loads")
-        for load in loads.values() if isinstance(loads, dict) else ():
-            if isinstance(load, dict) and isinstance(load.get("table"), str):
-                load["table"] = beside(folder, load["table"])
+        """Take the tables of loads and records as relative to the folder of the case file."""
+        named = [group for key in ("loads", "references") if isinstance(group := table.get(key), dict)]
+        for item in (item for group in named for item in group.values()):
+            if isinstance(item, dict) and isinstance(item.get("table"), str):
+                item["table"] = beside(folder, item["table"])
         return table
 
     @property
-    def pulse_tables(self) -> dict[str, tuple[Path, str]]:
-        """Tables of loads."""
-        return {
-            f"loads.{name}.table": (Path(load.table), load.quantity)
+    def pulse_tables(self) -> dict[str, tuple[Path, str, str | None]]:
+        """Tables of loads and records."""
+        loads = {
+            f"loads.{name}.table": (Path(load.table), load.quantity, load.table_column)
             for name, load in self.loads.items()
             if load.table is not None
+        }
+        return loads | {
+            f"references.{name}.table": (Path(record.table), "acceleration", record.table_column)
+            for name, record in self.references.items()
+            if isinstance(record, Record)
         }
 
     @property
     def files(self) -> dict[str, Path]:
-        """Tables of loads."""
-        return {key: path for key, (path, _) in self.pulse_tables.items()}
+        """Tables of loads and records."""
+        return {key: path for key, (path, *_) in self.pulse_tables.items()}
 
     @property
     def problem(self) -> StructureProblem:

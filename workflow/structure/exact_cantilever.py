@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize_scalar
 
 from reflowshock.workflow.structure.exact_bar import with_errors
 
@@ -58,6 +57,8 @@ def measure(strip: Strip, time: NDArray[np.float64], tip: NDArray[np.float64]) -
     Returns:
         tip_deflection [m], swing_frequency [Hz], exact values and errors.
     """
+    from scipy.optimize import minimize_scalar
+
     ratios = (ROOTS / ROOTS[0]) ** 2
 
     def swings(frequency: float) -> NDArray[np.float64]:

@@ -13,7 +13,8 @@ from reflowshock.workflow.case.run import Findings, at_least, at_most, in_words_
 from reflowshock.workflow.case.text import short
 from reflowshock.workflow.structure import exact_bar, exact_cantilever, exact_layers
 from reflowshock.workflow.structure.case import StructureCase
-from reflowshock.workflow.structure.references import BarWave, Cantilever, FrequencyRange, LayeredBar
+from reflowshock.workflow.structure.records import compared_with_record
+from reflowshock.workflow.structure.references import BarWave, Cantilever, FrequencyRange, LayeredBar, Record
 
 SOLVER_DIFFERENCE = 0.01  # of the histories of watch points, explicit against implicit, relative L2
 JUDGED = ("displacement_difference", "strain_difference")
@@ -136,6 +137,8 @@ def compared_with_references(case: StructureCase, motion: Motion) -> tuple[dict,
         else:
             if isinstance(reference, FrequencyRange) and motion.modes:
                 health |= _in_range(reference, motion.modes)
+            elif isinstance(reference, Record):
+                metrics |= compared_with_record(case, reference, motion.history)
             continue
         metrics |= {name: metric(value, UNITS.get(name.removesuffix("_exact"), "")) for name, value in found.items()}
         health |= {name: at_most(abs(found[name]), limit) for name, limit in limits.items()}

@@ -73,7 +73,18 @@ class Published(Reference):
     source: str
 
 
-AnyReference = Annotated[BarWave | LayeredBar | Cantilever | FrequencyRange | Published, Field(discriminator="kind")]
+class Record(Reference):
+    """A recorded acceleration at a watch point, a CSV file as those of loads, through the filter of the run."""
+
+    kind: Literal["record"] = "record"
+    watch: str
+    table: str
+    table_column: str | None = None
+
+
+AnyReference = Annotated[
+    BarWave | LayeredBar | Cantilever | FrequencyRange | Published | Record, Field(discriminator="kind")
+]
 
 
 def reference_problems(references: dict[str, AnyReference], problem: StructureProblem) -> Iterator[Problem]:
@@ -91,6 +102,8 @@ def reference_problems(references: dict[str, AnyReference], problem: StructurePr
             yield from _pressure(f"{key}.load", reference.load, problem, "constant")
             yield from _known(f"{key}.tip", reference.tip, problem.watch, "watch point")
             yield from _layers(key, 1, problem)
+        elif isinstance(reference, Record):
+            yield from _known(f"{key}.watch", reference.watch, problem.watch, "watch point")
         elif isinstance(reference, FrequencyRange) and reference.mode > problem.dynamics.modes:
             allowed = f"<= {problem.dynamics.modes}, or more dynamics.modes"
             yield Problem(f"{key}.mode", "is not computed", reference.mode, allowed)

@@ -1,4 +1,8 @@
-"""Report of a structure: what moved how, against what, at what cost."""
+"""Report of a structure: what moved how, against what, at what cost.
+
+It has the largest deformation, natural modes, histories, reactions, the energy balance, and the comparison with
+references.
+"""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -15,6 +19,7 @@ from reflowshock.workflow.report.curves import ENERGIES, MILLI, STYLE, svg
 from reflowshock.workflow.report.tables import costs
 from reflowshock.workflow.structure.case import StructureCase
 from reflowshock.workflow.structure.findings import read_history, read_modes
+from reflowshock.workflow.structure.record_curves import acceleration_curves, spectrum_curves
 from reflowshock.workflow.structure.references import Published
 from reflowshock.workflow.structure.stages import read_results
 
@@ -31,10 +36,10 @@ Histories = Mapping[str, Mapping[str, NDArray]]
 
 
 HEADLINE = (
-    "first_frequency", "peak_displacement", "displacement_range", "peak_strain", "displacement_difference",
-    "strain_difference", "two_scale_dns_time_ratio", "two_scale_displacement_error", "wave_speed_error",
-    "transmitted_velocity_error", "reflected_velocity_error", "tip_deflection_error", "swing_frequency_error",
-    "energy_balance_error",
+    "first_frequency", "peak_acceleration", "second_peak_acceleration", "peak_displacement", "displacement_range",
+    "peak_strain", "displacement_difference", "strain_difference", "two_scale_dns_time_ratio",
+    "two_scale_displacement_error", "wave_speed_error", "transmitted_velocity_error", "reflected_velocity_error",
+    "tip_deflection_error", "swing_frequency_error", "energy_balance_error",
 )  # fmt: skip
 FRACTIONS = ("_error", "_difference", "_fraction")
 SHORTEST_IN_MM = 1e-5  # m
@@ -63,6 +68,9 @@ def add_structure(run_folder: Path, case: StructureCase, context: dict, metrics:
     context["meshed"] = meshed_part(case)
     context["points"] = [{"name": name, "curve": point_curves(histories, name)} for name in case.watch]
     context["curves"]["energies"] = energy_curves(histories)
+    context["curves"]["accelerations"] = acceleration_curves(case, histories, SOLVER_STYLE)
+    context["curves"]["spectrum"] = spectrum_curves(case)
+    context["filter"] = case.dynamics.filter.label
     if case.supports:
         context["curves"]["reactions"] = reaction_curves(histories, list(case.supports))
     context["tables"] |= {
@@ -221,7 +229,7 @@ def reaction_curves(histories: Histories, supports: list[str]) -> str:
 
 
 def energy_curves(histories: Histories) -> str:
-    """Draw all terms of each solver's ledger that are not zero, and its balance relative to the largest energy."""
+    """Draw the nonzero terms of each solver's energy balance, and the balance relative to the largest energy."""
     with pyplot.rc_context(STYLE):
         figure, axes = pyplot.subplots(
             len(histories), 2, figsize=(9.2, 3.0 * len(histories)), squeeze=False, constrained_layout=True

@@ -123,8 +123,8 @@ def run_study(points: Points, store: Store, machine: Machine, *, force: bool = F
         jobs = missing(store, every, LAST)
         if jobs:
             with progress_bar(f"{about.name}: {len(jobs)} products to compute") as bar:
-                told = teller(store, every, jobs, bar, partial(warn_of_metrics, points, store))
-                watched = replace(machine, each_second=told)
+                report = teller(store, every, jobs, bar, partial(warn_of_metrics, points, store))
+                watched = replace(machine, each_second=report)
                 failed = run_points(store, every, LAST, watched, lock)
         else:
             console.print(f"nothing to compute: {store.folder} has all {len(every)} points")
@@ -168,9 +168,9 @@ def warn_of_metrics(points: Points, store: Store, first: Point) -> None:
     for name in points.study.metrics:
         if name not in known:
             hint = nearest(name, sorted(known))
-            told = f"; did you mean {hint}?" if hint else ""
+            suggestion = f"; did you mean {hint}?" if hint else "."
             print_error(
-                f"the first point has no numeric metric {name}{told} Ctrl-C stops the study and keeps finished results"
+                f"the first point has no numeric metric {name}{suggestion} Ctrl-C stops the study and keeps results"
             )
 
 

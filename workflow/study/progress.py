@@ -33,7 +33,7 @@ def teller(
     """
     begin = time.monotonic()
     first = [at_first]
-    waiting, seconds, told = list(jobs), dict[str, list[float]](), [""]
+    waiting, seconds, shown = list(jobs), dict[str, list[float]](), [""]
 
     def tell() -> None:
         for job in [job for job in waiting if store.has(job.point, job.stage)]:
@@ -50,9 +50,9 @@ def teller(
         words = f"{len(done)} of {len(points)} points done, {failed} failed"
         line = words if left is None else f"{words}, about {duration(left)} left"
         bar(1.0 - len(waiting) / len(jobs), line)
-        if not console.is_terminal and words != told[0]:
+        if not console.is_terminal and words != shown[0]:
             console.print(f"       {line}")
-        told[0] = words
+        shown[0] = words
 
     return tell
 

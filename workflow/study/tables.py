@@ -49,7 +49,7 @@ def effect_table(found: Sequence[tuple[str, str, Sequence[MainEffect]]]) -> dict
                 metric.replace("_", " "),
                 quantity({"value": effect.size, "unit": unit}),
                 "–" if effect.rank_correlation is None else f"{effect.rank_correlation:+.2f}",
-                "–" if effect.probability is None else f"{effect.probability:.2g}",
+                "–" if effect.probability is None else f"{effect.probability:.3g}",
             ]
             for metric, unit, own in found
             for effect in sorted(own, key=lambda effect: -effect.size)

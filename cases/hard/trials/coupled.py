@@ -134,7 +134,7 @@ class Coupled:
             motion.velocity[:] = np.where(motion.mobility > 0.0, np.outer(wave, speed), 0.0)
 
     def energies(self) -> dict[str, float]:
-        """Return the ledger's energies of both models."""
+        """Return the energies of both models."""
         return dict(zip(ENERGIES, self.sums().tolist(), strict=False))
 
     def drift(self, windows: int, samples: int, look: Callable[[], None] = lambda: None) -> tuple[float, float]:
@@ -159,7 +159,7 @@ class Coupled:
         return energies["kinetic"] + energies["internal"]
 
     def sums(self) -> np.ndarray:
-        """Return the ledger's sums of both models."""
+        """Return the sums of both models."""
         return energy_sums(self.macro, 1.0) + energy_sums(self.meso, -1.0)
 
     def momentum(self) -> np.ndarray:
@@ -201,7 +201,7 @@ class Coupled:
         self._complete(np.zeros((len(self.meso.motion.body.interface), 3)))
 
     def _complete(self, link: np.ndarray) -> None:
-        """Let all that follows from displacements and link follow: slaves, the held cut, forces."""
+        """Let all that follows from displacements and link follow: slaves, the held interface, forces."""
         macro, meso = self.macro.motion, self.meso.motion
         pushed = isinstance(self._scheme, Impulse)
         if pushed:

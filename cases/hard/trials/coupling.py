@@ -69,15 +69,15 @@ class Reflection(Parameters):
 class Layout(Parameters):
     """A board with joints that is hard to divide.
 
-    ``copper_cut``: the cut goes through copper and board; ``overhang``: a plate thinner than its elements are long
-    hangs over a joint; ``corner``: joint in a corner of the board; ``two_regions``: joints far apart.
+    ``copper_interface``: the interface goes through copper and board; ``overhang``: a plate thinner than its elements
+    are long hangs over a joint; ``corner``: joint in a corner of the board; ``two_regions``: joints far apart.
     """
 
-    layout: Literal["copper_cut", "overhang", "corner", "two_regions"] = "corner"
+    layout: Literal["copper_interface", "overhang", "corner", "two_regions"] = "corner"
     scheme: Literal["held_velocity", "impulse", "gravouil_combescure", "local_steps"] = "local_steps"
 
 
-TRANSFER = "rigid_error linear_error tie_error cut_error mass_error"
+TRANSFER = "rigid_error linear_error tie_error interface_error mass_error"
 TRIALS = {
     "window": pure_trial(PairTrial, "windows:window", "growth substeps"),
     "windows": pure_trial(PairRun, "windows:run", "energy_drift interface_energy energy_error momentum_error"),

@@ -16,7 +16,7 @@ SIZE, LAYER = 0.5e-3, 0.25e-3  # of an element of board [m]
 
 
 def layout(given: Layout) -> dict[str, float]:
-    """Return the growth of a window, and what tie and cut do to fields, forces and masses.
+    """Return the growth of a window, and what tie and interface do to fields, forces and masses.
 
     Raises:
         CouplingError: The layout cannot be divided in this way.
@@ -52,8 +52,8 @@ def overhang() -> MeshData:
     return append([board(), joint(0.5 * SIZE, 0.5 * SIZE, held_above=True), plate])
 
 
-def copper_cut() -> MeshData:
-    """A joint on thick copper on board of thin layers: both are at the cut of local steps."""
+def copper_interface() -> MeshData:
+    """A joint on thick copper on board of thin layers: both are at the interface of local steps."""
     return append([board(4, 2, copper=0.5e-3, layer=0.15e-3), joint(0.7e-3, 0.7e-3, z=0.5e-3)])
 
 
@@ -71,4 +71,4 @@ def two_regions() -> MeshData:
     return append([board(7, 4), joint(0.25e-3, 0.25e-3), second])
 
 
-LAYOUTS = {"copper_cut": copper_cut, "overhang": overhang, "corner": corner, "two_regions": two_regions}
+LAYOUTS = {"copper_interface": copper_interface, "overhang": overhang, "corner": corner, "two_regions": two_regions}

@@ -32,8 +32,8 @@ from reflowshock.fem.parallel.local_mesh import distribute
 
 HEIGHT = 1e-3  # of a box [m]
 SPEED = np.array([1.0, -2.0, 3.0])  # of the body as a whole [m/s]
-LOOK = 50  # steps between two looks at the ledger: what doubles in each is then still a number
-BALANCE = 0.02  # of the ledger, the program's default
+LOOK = 50  # steps between two looks at the energies: what doubles in each is then still a number
+BALANCE = 0.02  # of the energy balance, the program's default
 
 
 def flight(given: Flight) -> dict[str, float]:
@@ -96,7 +96,7 @@ def random_start(motion: ExplicitMotion, seed: int) -> None:
 
 
 def watched(motion: ExplicitMotion, given: Flight, balance: EnergyBalance) -> dict[str, float]:
-    """Take the steps with looks at the ledger; return errors; errors as ``flight``."""
+    """Take the steps with looks at the energies; return errors; errors as ``flight``."""
     steps = min(LOOK, given.steps)
     looks = given.steps // steps
     participant = Alone(motion, WindowPlan(steps * motion.step, steps, looks, 1))
@@ -185,7 +185,7 @@ def impact(given: Impact) -> dict[str, float]:
     mesh = rod(6e-3, 1e-3, (18, 3), skew)
     body, motion = explicit(mesh, SOLDER, given.kinematics, given.element, given.step_fraction)
     motion.velocity[:, 0] = np.where(body.free[:, 0], -given.speed, 0.0)
-    energies = march(motion, given.steps)
+    energies = energies_of(motion, given.steps)
     first = energies[0].sum()
     return {
         "energy_error": imbalance(energies),
@@ -216,7 +216,7 @@ def explicit(
     return body, motion_of(body, fraction * critical)
 
 
-def march(motion: ExplicitMotion, steps: int) -> np.ndarray:
+def energies_of(motion: ExplicitMotion, steps: int) -> np.ndarray:
     """Take steps; return kinetic, strain, plastic and hourglass energy at each: (steps + 1, 4)."""
     energies = []
     for _ in range(steps + 1):

@@ -131,7 +131,7 @@ class Printed(HeldVelocity):
     """The paper's scheme as printed: the block alone is meso, only its internal force goes to the board, no mass."""
 
     def macro(self, body: Body, loads: list[Load], plan: WindowPlan, channels: InterfaceChannels) -> HeldVelocityMacro:
-        """Return the macro model's participant, which is told the interface mass and leaves it out."""
+        """Return the macro model's participant, which gets the interface mass and leaves it out."""
         return PrintedMacro(body, loads, plan, channels)
 
 

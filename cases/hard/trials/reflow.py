@@ -61,8 +61,8 @@ class MoltenScene(Parameters):
         """
         if self.rest and shape.verdict != "open" and not shape.metrics["at_rest"][0]:
             raise ArithmeticError(f"not at rest after {shape.metrics['steps'][0]:.0f} steps")
-        told = {name: Measured(value, unit) for name, (value, unit) in shape.metrics.items()}
-        return told | _energy(shape.history["energy"])
+        metrics = {name: Measured(value, unit) for name, (value, unit) in shape.metrics.items()}
+        return metrics | _energy(shape.history["energy"])
 
 
 class DropTrial(MoltenScene):

@@ -76,7 +76,7 @@ def momentum_error(coupling: Coupling, fraction: float) -> float:
 
 
 def transfer(given: PairTransfer) -> dict[str, float]:
-    """Return what tie and cut do to rigid motions, linear fields, forces and masses: nothing, exactly."""
+    """Return what tie and interface do to rigid motions, linear fields, forces and masses: nothing, exactly."""
     pair = pair_of(given)
     mesh = pair.mesh()
     block = mesh.cells[~mesh.in_parts("board".__eq__)]
@@ -96,7 +96,7 @@ def through(models: Models) -> dict[str, float]:
         "rigid_error": found.rigid,
         "linear_error": found.linear,
         "tie_error": found.tie,
-        "cut_error": found.cut,
+        "interface_error": found.interface,
         "mass_error": masses / found.volume_mass - 1.0,
     }
 

@@ -1,4 +1,4 @@
-"""Critical steps foreseen for a box: the closed form of hexahedra, the elements' own bound for tetrahedra."""
+"""Critical steps predicted for a box: the closed form of hexahedra, the elements' own bound for tetrahedra."""
 
 import numpy as np
 import pytest

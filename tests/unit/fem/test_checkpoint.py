@@ -27,7 +27,7 @@ def state(window: int) -> dict:
     points = np.full((3, 3), float(window))
     return {
         "macro": {"displacement": Rows(NODES, points), "force": Shares(NODES, points, NODES > 4), "work": Sum(0.5)},
-        "history": {"ledger": Same({"limit": 0.01}), "rows": Log({"time": np.arange(window)})},
+        "history": {"balance": Same({"limit": 0.01}), "rows": Log({"time": np.arange(window)})},
     }
 
 
@@ -59,7 +59,7 @@ def test_a_state_comes_back_as_it_was(tmp_path):
     files = checkpoints(tmp_path)
     found = files.read(state(0))
     assert files.continued == 5
-    assert found["history"]["ledger"] == {"limit": 0.01}
+    assert found["history"]["balance"] == {"limit": 0.01}
     assert (found["macro"]["displacement"] == 5.0).all()
     assert found["macro"]["work"] == 0.5
     assert files.kept("macro-3", {"macro": {"time": Same(None)}}) == {"macro": {"time": 3}}

@@ -70,14 +70,47 @@ FAULTS = {
     "time [ms],acceleration [G]\n0,0\n0.5,one\n": "line 3: two numbers are needed, found 0.5, one",
     "time [ms],acceleration [G]\n0,0\n0.5\n": "line 3: two numbers are needed",
     "time [ms],acceleration [G]\n0,0\n0.5,nan\n": "line 3: 0.5, nan is not finite",
-    "time [ms],acceleration [G]\n-1,0\n0.5,1\n": "line 2: time -0.001 s is before the start",
-    "time [ms],acceleration [g]\n0,0\n0.5,1\n": r"line 1: column 'acceleration \[g\]' needs its unit in brackets",
+    "time [ms],acceleration [Gs]\n0,0\n0.5,1\n": r"line 1: column 'acceleration \[Gs\]' needs its unit in brackets",
     "time [msec],acceleration [G]\n0,0\n0.5,1\n": r"did you mean \[ms\]",
     "time,acceleration\n0,0\n0.5,1\n": "column 'time' needs its unit in brackets, one of s, ms, us, ns",
     "0,0\n0.5,1\n1,0\n": "column '0' needs its unit",
-    "time [ms],x [mm],acceleration [G]\n0,0,0\n1,1,1\n": "must name two columns, found 3",
+    "time [ms]\n0\n1\n": "line 1: the header must name a column of times and one of values",
+    "time_ms,x_mm,a_G\n0,0,0\n1,1,1\n": "line 1: has several columns of values, x_mm, a_G: name one",
     "": "a header and at least two rows are needed, found 0 lines",
 }
+
+
+RECORD = "time_s,input_g,board_g\n-0.5,1,7\n-0.25,2,8\n0.0,4,9\n"
+
+
+@pytest.mark.parametrize(("column", "first"), [("input_g", 1.0), ("input", 1.0), ("board", 7.0)])
+def test_column_of_a_record_that_begins_before_its_trigger(tmp_path, column, first):
+    path = tmp_path / "record.csv"
+    path.write_text(RECORD)
+    pulse = read_pulse(path, "acceleration", column)
+    assert pulse.times == pytest.approx([0.0, 0.25, 0.5])
+    assert pulse.value(0.0) == pytest.approx(first * 9.80665)
+
+
+RECORD_FAULTS = {
+    "inputs_g": "line 1: 0 columns are titled 'inputs_g'; titles are input_g, board_g; did you mean 'input_g'",
+    "time_s": "0 columns are titled 'time_s'",
+}
+
+
+@pytest.mark.parametrize("column", RECORD_FAULTS)
+def test_column_that_is_not_there(tmp_path, column):
+    path = tmp_path / "record.csv"
+    path.write_text(RECORD)
+    with pytest.raises(PulseError, match=RECORD_FAULTS[column]):
+        read_pulse(path, "acceleration", column)
+
+
+def test_row_of_a_record_with_a_missing_cell(tmp_path):
+    path = tmp_path / "record.csv"
+    path.write_text(RECORD + "0.25,5\n")
+    with pytest.raises(PulseError, match=r"line 5: 3 numbers are needed, found 0\.25, 5"):
+        read_pulse(path, "acceleration", "input")
 
 
 @pytest.mark.parametrize("text", FAULTS)

@@ -144,7 +144,7 @@ def test_within_a_budget_nothing_is_started_that_does_not_fit(tmp_path):
     assert not nothing.measurements and nothing.recommended is None and not keeps_promise(nothing)
 
 
-def test_without_a_budget_long_runs_of_the_ladder_are_left_out(tmp_path, monkeypatch):
+def test_without_a_budget_long_runs_of_the_study_are_left_out(tmp_path, monkeypatch):
     monkeypatch.setattr(command, "LONGEST", 20.0)
     accuracy, runner = measure(request(), tmp_path, Fake())
     assert "27 per edge" in runner.left_out and "11 per edge" not in runner.left_out
@@ -255,7 +255,7 @@ def test_a_wish_is_read():
 @pytest.mark.parametrize(
     "name", ["sessile_drop", "bga_ball", "laplace_drop", "solder_joint", "coalescence", "oscillating_drop"]
 )
-def test_every_rung_of_solder_alone_is_a_case(name):
+def test_every_run_of_solder_alone_is_a_case(name):
     path = CASE.parents[1] / name / "case.toml"
     case = read_case(path)
     study = kind_of(case).study(case)

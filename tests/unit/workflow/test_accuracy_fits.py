@@ -47,7 +47,9 @@ def test_an_exact_answer_is_compared_with():
 
 def test_without_it_three_runs_are_extrapolated():
     errors = errors_of(answers(None), RUNS, RUNS, 2.0)
-    assert errors["size 0.05"]["height"] == Error(pytest.approx(0.005 / 3.0), "Richardson, order 2")
+    assert errors["size 0.05"]["height"] == Error(
+        pytest.approx(0.005 / 3.0), "Richardson, order 2", order=pytest.approx(2.0)
+    )
 
 
 def test_samples_are_extrapolated_each():
@@ -65,7 +67,7 @@ def test_runs_without_the_order_of_theory_are_not_extrapolated():
     assert errors["size 0.1"]["height"].against == "finest run, size 0.05"
 
 
-def test_a_rung_may_name_what_it_is_compared_with():
+def test_a_run_may_name_what_it_is_compared_with():
     scheme = StudyRun("one way", "scheme", {}, against="size 0.1")
     found = answers(3.0) | {"one way": {"height": Quantity(3.02 * 1.01, 3.0)}}
     errors = errors_of(found, [*RUNS, scheme], RUNS, 2.0)

@@ -41,7 +41,7 @@ def test_warpage_is_told_in_words_and_by_load_step(structure):
     table = warpage.load_steps(structure)
     assert table["head"][:3] == ["load step", "temperature [degC]", "gap change, B3 [µm]"]  # no corner is moved
     assert table["rows"][-1][1:4] == ["217.0", f"{gaps.min():+.2f}", f"{gaps.max():+.2f}"]
-    assert table["rows"][-1][-2:] == ["4", "6.0e-04"]
+    assert table["rows"][-1][-2:] == ["4", "6.00e-04"]
 
 
 def test_warpage_is_drawn(structure):
@@ -73,7 +73,7 @@ def test_stresses_of_both_modes_differ_by_their_factor():
     assert section.areas(ours, "A3").sum() == pytest.approx((0.34 * MILLI) ** 2)
     table = section.table(both)
     assert [row[0] for row in table["rows"]] == ["0.5", "1"]
-    assert table["rows"][1][1:3] == ["6.6", "A4"]
+    assert table["rows"][1][1:3] == ["6.575", "A4"]
     assert table["rows"][1][-1] == "1 %"
     assert section.interface_maps(both).startswith("<svg")
 
@@ -90,7 +90,7 @@ def test_times_are_compared_by_time_and_not_by_place_in_the_file():
     reference = interface(NAMES, X, Y, np.array([0.5e-3, 0.50004e-3, 1.0e-3]))
     ours = interface(NAMES, X, Y, np.array([0.50002e-3, 1.00002e-3]))
     rows = section.table({"two_scale": ours, "dns": reference})["rows"]
-    assert rows[2][1] == rows[2][4] == "6.5"  # both at 1 ms
+    assert rows[2][1] == rows[2][4] == "6.510"  # both at 1 ms
     assert section.row_at(ours, 0.7e-3) is None
 
 
@@ -116,7 +116,7 @@ def test_the_shape_effect_is_that_of_the_critical_joint():
     words = shape_effect.in_words(real, flat)
     assert "raise the peak stress of A4 by 20 %: 90 MPa instead of 75 MPa" in words
     assert "there B4 would be the critical one" in words
-    assert shape_effect.table(real, flat, joints)["rows"][0] == ["A4", "90.0", "75.0", "+20.00 %", "300.0"]
+    assert shape_effect.table(real, flat, joints)["rows"][0] == ["A4", "90.00", "75.00", "+20.00 %", "300.0"]
     assert shape_effect.curves(real, flat).startswith("<svg")
 
 
@@ -134,7 +134,7 @@ def test_of_joints_that_share_a_shape_the_worst_mesh_is_told():
     table = mesh_tables.meshes(joints)
     assert table["head"] == ["joints", "method", "volume error", "largest deviation [µm]", "min. scaled Jacobian"]
     assert table["rows"] == [
-        ["A4 A3", "swept", "-0.2 %", "3.0", "0.50"],
+        ["A4 A3", "swept", "-0.2 %", "3.000", "0.50"],
         ["B4", "free-form", "< 0.0001 %", "–", "0.25"],
     ]
     assert mesh_tables.meshes([record("A4")]) is None
@@ -199,7 +199,7 @@ def test_residual_stress_is_ranked_by_the_worse_pad():
     joints = {"joints": ["A3", "A4"], "von_mises_board": [20e6, 10e6], "von_mises_package": [15e6, 30e6],
               "von_mises_max": [40e6, 50e6], "plastic_strain_max": [1e-3, 2e-3]}  # fmt: skip
     table = residual.table(joints)
-    assert table["rows"] == [["A4", "10.0", "30.0", "50.0", "0.2 %"], ["A3", "20.0", "15.0", "40.0", "0.1 %"]]
+    assert table["rows"] == [["A4", "10.00", "30.00", "50.00", "0.2 %"], ["A3", "20.00", "15.00", "40.00", "0.1 %"]]
     assert len(residual.table({key: joints[key] for key in list(joints)[:4]})["head"]) == 4
     metrics = {
         "solidified_warpage": {"value": 8e-5, "unit": "m"},
@@ -207,4 +207,4 @@ def test_residual_stress_is_ranked_by_the_worse_pad():
         "residual_stress_joint": {"value": "A4", "unit": ""},
         "residual_stress_largest": {"value": 30e6, "unit": "Pa"},
     }
-    assert "from 80.0 µm to 20.0 µm and leaves 30 MPa at the pads of A4" in residual.in_words(metrics)
+    assert "from 80.00 µm to 20.00 µm and leaves 30 MPa at the pads of A4" in residual.in_words(metrics)

@@ -5,7 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from reflowshock.workflow.board_drop.board_deflection import decided, expected_deflection, longest_duration
+from reflowshock.workflow.board_drop.board_deflection import decided, expected_deflection
+from reflowshock.workflow.board_drop.duration import longest_duration
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.convergence.packages import package_study
 from reflowshock.workflow.pipeline.reader import read_case

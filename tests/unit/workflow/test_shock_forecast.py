@@ -15,7 +15,7 @@ from reflowshock.workflow.pipeline.reader import read_case
 from tests.support.workflow_command import SMALL_CASE
 
 
-def foreseen(*settings: str):
+def predicted(*settings: str):
     case = read_case(SMALL_CASE, settings, oversubscribe=True)
     return forecast_shock(case, forecast_parts(case))
 
@@ -31,7 +31,7 @@ def test_joints_that_are_not_fine_have_the_coarse_mesh():
 
 
 def test_linear_elements_take_local_steps_from_the_window_down():
-    levels = foreseen().levels
+    levels = predicted().levels
     assert levels[0].count == 1
     assert levels[0].parts == ("board", "board_patch")
     assert all(finer.count % coarser.count == 0 for coarser, finer in pairwise(levels))
@@ -41,26 +41,26 @@ def test_linear_elements_take_local_steps_from_the_window_down():
 
 
 def test_copper_at_its_true_mass_takes_a_level_of_its_own():
-    shock = foreseen("shock.numerics.mass_scaled=[]")
+    shock = predicted("shock.numerics.mass_scaled=[]")
     assert shock.scheme[0] == "local_steps"
     assert shock.levels[-1].parts == ("copper",)
     assert shock.levels[-1].step <= 0.9 * forecast_parts(read_case(SMALL_CASE))["copper"].critical_step
 
 
 def test_one_level_is_one_ratio():
-    assert len(foreseen("shock.numerics.mass_scaled=[]", "shock.coupling.levels=1").levels) == 2
+    assert len(predicted("shock.numerics.mass_scaled=[]", "shock.coupling.levels=1").levels) == 2
 
 
 @pytest.mark.parametrize("setting", ["materials.solder=SAC405", "shock.numerics.kinematics=finite"])
 def test_what_has_a_path_is_driven_by_held_velocity(setting):
-    shock = foreseen(setting)
+    shock = predicted(setting)
     assert shock.scheme[0] == "held_velocity"
     assert [level.count for level in shock.levels] == [1, shock.substeps]
     assert implicit_seconds(read_case(SMALL_CASE, [setting])) is None
 
 
 def test_the_wanted_scheme_is_taken():
-    assert foreseen("shock.coupling.scheme=held_velocity").scheme[0] == "held_velocity"
+    assert predicted("shock.coupling.scheme=held_velocity").scheme[0] == "held_velocity"
 
 
 def test_an_elastic_drop_has_an_implicit_cost_to_compare_with():
@@ -71,9 +71,9 @@ def test_an_elastic_drop_has_an_implicit_cost_to_compare_with():
 
 
 def test_one_way_the_coarse_model_takes_the_window_of_all_its_parts():
-    shock = foreseen("shock.coupling.direction=one_way", "shock.coupling.fine_joints=['A4']")
+    shock = predicted("shock.coupling.direction=one_way", "shock.coupling.fine_joints=['A4']")
     macro, meso = shock.levels
     assert shock.scheme[0] == "held_velocity"
     assert "die" in macro.parts
     assert meso.parts == ("solder", "copper")
-    assert macro.step < foreseen().window
+    assert macro.step < predicted().window

@@ -75,7 +75,7 @@ def test_no_measure_hides_nan(monkeypatch):
     told = {name: found.value for name, found in reflow._energy(energies).items()}
     monkeypatch.setattr(fields, "force_of", lambda term, displacement: np.full_like(displacement, math.nan))
     told["force_error"] = fields.turns(Turns(turns=1, cells=1))["force_error"]
-    monkeypatch.setattr(motion, "march", lambda *_: np.outer(energies, np.ones(4)))
+    monkeypatch.setattr(motion, "energies_of", lambda *_: np.outer(energies, np.ones(4)))
     told |= motion.impact(Impact())
     assert all(math.isnan(told[name]) for name in told if name != "plastic_share"), told
 

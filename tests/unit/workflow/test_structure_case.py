@@ -1,4 +1,4 @@
-"""Structures as cases: units in named tables and lists, refused with key, value, range and nearest name, foreseen."""
+"""Structures as cases: units in named tables and lists, refused with key, value, range and nearest name; forecasts."""
 
 import tomllib
 from pathlib import Path
@@ -47,6 +47,34 @@ BAD_VALUES = {
     "force without course": (f"loads.poke={{{POKE}}}", ["loads.poke: is given by nothing", "peak, or table"]),
     "force without place": ("loads.poke={kind='point_force',peak='1 N'}", ["loads.poke.at: is missing"]),
     "force outside": (f"loads.poke={{{POKE},peak='1 N',duration='1 ms'}}", ["loads.poke.at", "outside the meshed"]),
+    "support that holds nothing": ("supports.edge.on=x_min", ["supports.edge.hold", "any of x, y, z, or a bedding"]),
+    "springs of what is held": (
+        "supports.holes.bedding.x=1e12 N/m^3",
+        ["supports.holes.bedding.x", "is held by supports.holes.hold"],
+    ),
+    "bedding of another dimension": ("supports.holes.bedding.x=3 N/m", ["bedding.x", "expected a stiffness per area"]),
+    "negative bedding": ("supports.holes.bedding.x=-3 N/m^3", ["bedding.x", ">= 0"]),
+    "mass outside": (
+        "masses.lid={mass='1 g',at=['20 mm','0 mm','0 mm']}",
+        ["masses.lid.at", "outside the meshed body"],
+    ),
+    "mass in a hole": ("masses.lid={mass='1 g',at=['12 mm','7 mm','0 mm']}", ["masses.lid.at", "mounting hole"]),
+    "no mass": ("masses.lid={mass='0 g',at=['0 mm','0 mm','0 mm']}", ["masses.lid.mass", "> 0 g"]),
+    "footprint outside": (
+        "masses.lid={mass='1 g',at=['12 mm','0 mm','0 mm'],footprint=['8 mm','2 mm']}",
+        ["masses.lid.footprint", "outside the meshed body"],
+    ),
+    "footprint across a plane of symmetry": (
+        "masses.lid={mass='1 g',at=['0 mm','1 mm','0 mm'],footprint=['8 mm','4 mm']}",
+        ["masses.lid.footprint", "crosses the plane of symmetry y = 0"],
+    ),
+    "footprint of no length": (
+        "masses.lid={mass='1 g',at=['0 mm','0 mm','0 mm'],footprint=['0 mm','4 mm']}",
+        ["masses.lid.footprint", "> 0 mm"],
+    ),
+    "accelerometer without direction": ("watch.centre.direction=[0,0,0]", ["watch.centre.direction", "no length"]),
+    "filter without corner": ("dynamics.filter.kind=butterworth", ["dynamics.filter.corner", "is missing"]),
+    "samples too far apart": ("dynamics.filter.channel_class=1e5", ["history_samples = 50", ">= 167"]),
     "unknown solver": ("dynamics.solver=implict", ["dynamics.solver", "did you mean implicit?"]),
     "too many ranks": ("dynamics.ranks=4096", ["dynamics.ranks", "4096 MPI ranks", "--oversubscribe"]),
     "other case": ("structure.layers.cover.material=fr4", ["did you mean FR4?"]),

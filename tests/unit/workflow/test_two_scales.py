@@ -43,7 +43,7 @@ def test_the_section_tells_scheme_joints_and_checks():
     assert rows["fine joints"] == "A4 B4"
     assert rows["how they were chosen"] == "the most stressed"
     assert rows["meso share f of the elements"] == "40 %"
-    assert rows["rigid motion through tie and interface, error"] == "2.0e-16"
+    assert rows["rigid motion through tie and interface, error"] == "2.00e-16"
     assert rows["mass of the macro model"] == "1000 mg"
 
 

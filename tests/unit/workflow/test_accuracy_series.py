@@ -48,7 +48,7 @@ def test_a_structure_of_which_nothing_could_be_compared_has_no_study():
 
 
 @pytest.mark.parametrize("name", ["two_scale_bar", "cantilever"])
-def test_rungs_of_a_structure_can_be_run(name):
+def test_runs_of_a_structure_can_be_run(name):
     study = structure_study(case_of(name))
     for run in study.runs:
         case = case_of(name, *(f"{key}={value}" for key, value in run.settings.items()))
@@ -66,7 +66,7 @@ def test_elements_between_the_measured_ones_are_chosen_the_finer_way(bar):
     assert parameter.at(parameter.values[0]).name == parameter.runs[0].name
 
 
-def test_one_model_is_on_the_ladder_of_two_and_implicit_steps_on_that_of_one(bar):
+def test_one_model_is_in_the_series_of_two_and_implicit_steps_in_that_of_one(bar):
     assert "element size, one model" in [one.name for one in structure_study(bar).parameters]
     assert "element size, implicit" in [
         parameter.name for parameter in structure_study(case_of("cantilever")).parameters
@@ -103,7 +103,7 @@ def test_exact_waves_have_no_error_and_late_ones_as_much_as_they_are_late(bar, t
     assert errors[0] == pytest.approx(2.0 * errors[1], rel=0.02)
 
 
-def test_rungs_of_a_package_can_be_run(package):
+def test_runs_of_a_package_can_be_run(package):
     study = package_study(package)
     names = {run.name for run in study.runs}
     assert {run.against for run in study.runs if run.against} <= names

@@ -1,0 +1,101 @@
+"""Supports, lumped masses and the filter of a structure that do not fit it, and places outside of it."""
+
+import math
+from collections.abc import Iterable, Iterator
+
+from reflowshock.fem.problem.filters import LowPass
+from reflowshock.fem.problem.structure import AXES, InputG, PointMass, Structure, StructureProblem, Support
+from reflowshock.problem import Problem, unknown_name
+
+SAMPLES = 10  # in a period of the filter's corner
+
+
+def attachment_problems(problem: StructureProblem) -> Iterator[Problem]:
+    """Find supports and lumped masses that cannot be."""
+    for name, support in problem.supports.items():
+        yield from unknown_name(f"supports.{name}.on", support.on, problem.structure.facet_sets, "facet set")
+        yield from _support(f"supports.{name}", support)
+    for name, mass in problem.masses.items():
+        yield from _mass(f"masses.{name}", mass, problem.structure)
+    yield from _elastic(problem)
+
+
+def filter_problems(table: str, low_pass: LowPass, duration: float, samples: int) -> Iterator[Problem]:
+    """Find a filter that is not said, or whose corner is too high for so many samples over a duration [s]."""
+    if low_pass.kind == "butterworth" and low_pass.corner is None:
+        yield Problem(f"{table}.filter.corner", "is missing: the -3 dB of a Butterworth filter", None, "> 0 Hz")
+    elif low_pass.kind == "cfc" and low_pass.corner is not None:
+        message = "is that of a Butterworth filter, a CFC filter has a channel_class"
+        yield Problem(f"{table}.filter.corner", message, f"{low_pass.corner:g} Hz", "kind = butterworth")
+    else:
+        needed = math.ceil(SAMPLES * low_pass.frequency * duration * (1.0 - 1e-9))
+        if samples < needed:
+            message = f"are too few for the filter, {low_pass.label}: it needs {SAMPLES} in a period of its corner"
+            yield Problem(f"{table}.numerics.history_samples", message, samples, f">= {needed}")
+
+
+def _support(key: str, support: Support) -> Iterator[Problem]:
+    sprung = [axis for axis, stiffness in zip(AXES, support.stiffness, strict=True) if stiffness]
+    if not support.hold and not sprung:
+        yield Problem(f"{key}.hold", "holds nothing", "[]", "any of x, y, z, or a bedding")
+    for axis in sprung:
+        if axis in support.hold:
+            message = f"is held by {key}.hold, so that its springs never move"
+            yield Problem(f"{key}.bedding.{axis}", message, axis, f"0, or hold without {axis}")
+
+
+def _elastic(problem: StructureProblem) -> Iterator[Problem]:
+    """Yield what does not go with elastic supports and lumped masses."""
+    key = next((f"supports.{name}.bedding" for name, support in problem.supports.items() if support.bedding), None)
+    for name, load in problem.loads.items():
+        if key and isinstance(load, InputG) and load.method == "large_mass":
+            message = f"moves only supports that hold x, y and z, not those of {key}"
+            yield Problem(f"loads.{name}.method", message, "large_mass", "direct")
+    attached = key or next((f"masses.{name}" for name in problem.masses), None)
+    if attached and problem.dynamics.coupling is not None:
+        yield Problem(attached, "is for one model, dynamics.coupling makes two", None, "no dynamics.coupling")
+
+
+def _mass(key: str, mass: PointMass, structure: Structure) -> Iterator[Problem]:
+    whole = structure.model_copy(update={"symmetry": ()})
+    if mass.footprint is None:
+        yield from inside(f"{key}.at", mass.at, structure)
+        yield from in_hole(f"{key}.at", mass.at, structure)
+        return
+    half = [0.5 * side for side in mass.footprint]
+    outside = list(inside(f"{key}.at", mass.at, structure))
+    yield from outside
+    for signs in ((-1, -1), (1, 1)):
+        corner = (mass.at[0] + signs[0] * half[0], mass.at[1] + signs[1] * half[1], mass.at[2])
+        if not outside:
+            yield from inside(f"{key}.footprint", corner, whole)
+    for axis in structure.symmetry:
+        k = AXES.index(axis)
+        if axis not in structure.planes_at(mass.at) and mass.at[k] < half[k]:
+            message = f"crosses the plane of symmetry {axis} = 0, where it would overlap its mirror image"
+            yield Problem(f"{key}.footprint", message, _metres(mass.footprint), f"at {axis} = 0, or on one side of it")
+
+
+def inside(key: str, place: tuple[float, float, float], structure: Structure) -> Iterator[Problem]:
+    """Yield a place [m] outside the box."""
+    low, high = structure.corners
+    nearest = [min(max(x, a), b) for x, a, b in zip(place, low, high, strict=True)]
+    distance = math.dist(place, nearest)
+    if distance > structure.margin:
+        message = f"lies {distance:.3g} m outside the meshed body; the nearest point of it is {_metres(nearest)}"
+        yield Problem(key, message, _metres(place), f"{_metres(low)} to {_metres(high)}")
+
+
+def in_hole(key: str, place: tuple[float, float, float], structure: Structure) -> Iterator[Problem]:
+    """Yield a place [m] inside a mounting hole."""
+    holes = structure.holes
+    if holes is None:
+        return
+    radius = math.hypot(*(abs(x) - 0.5 * spacing for x, spacing in zip(place, holes.spacing, strict=False)))
+    if radius < 0.5 * holes.diameter - structure.margin:
+        allowed = f">= {0.5 * holes.diameter:.6g} m from the axis of the hole"
+        yield Problem(key, f"lies in a mounting hole, {radius:.3g} m from its axis", _metres(place), allowed)
+
+
+def _metres(point: Iterable[float]) -> str:
+    return "(" + ", ".join(f"{value:.6g}" for value in point) + ") m"

@@ -1,0 +1,32 @@
+"""How long a drop is followed: the time that the case gives, or at most a period of its board after the pulse."""
+
+import math
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from reflowshock.workflow.package.case import BoardDropCase
+
+
+def longest_duration(case: "BoardDropCase") -> float:
+    """Return the time [s] that a shock is followed: if it is ``auto``, at most, a period after its pulse.
+
+    Screws hold a board more firmly than pins, so its own period is shorter. Errors as ``expected_deflection``.
+    """
+    from reflowshock.fem.loads.pulse import Tabulated
+    from reflowshock.fem.loads.shock_pulse import input_pulse
+
+    if case.shock.duration != "auto":
+        return case.shock.duration
+    pulse, _ = input_pulse(case.shock)
+    end = float(pulse.times[-1]) if isinstance(pulse, Tabulated) else pulse.duration
+    return end + math.tau / first_mode(case)[1]
+
+
+def first_mode(case: "BoardDropCase") -> tuple[float, float]:
+    """Return length [m] and angular frequency [rad/s] of the board as a beam that is pinned at its holes."""
+    board, (young_x, young_y, _) = case.board, case.materials.board.engineering_constants.young
+    holes = board.holes
+    spans = ((board.length - 2.0 * holes.inset_x, young_x), (board.width - 2.0 * holes.inset_y, young_y))
+    length, young = max(spans)
+    stiffness = young * board.thickness * board.thickness / 12.0 / case.materials.board.density
+    return length, (math.pi / length) ** 2 * math.sqrt(stiffness)

@@ -1,0 +1,39 @@
+"""Records of accelerometers beside computed accelerations."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reflowshock.workflow.case.run import metric
+from reflowshock.workflow.structure.case import StructureCase
+from reflowshock.workflow.structure.references import Record
+
+
+def recorded(case: StructureCase, reference: Record, end: float):
+    """Return the recorded acceleration (an ``Acceleration``) up to the end [s] of a run, after its filter."""
+    from reflowshock.fem.loads.pulse_table import read_pulse
+    from reflowshock.fem.output.acceleration import Acceleration, low_passed
+
+    pulse = read_pulse(Path(reference.table), "acceleration", reference.table_column)
+    step = float(np.diff(pulse.times).min())
+    times = np.arange(int(pulse.times[-1] / step) + 1) * step
+    values = np.interp(times, pulse.times, pulse.values)
+    within = times <= end
+    return Acceleration(times[within], values[within], low_passed(values, step, case.dynamics.filter)[within])
+
+
+def compared_with_record(case: StructureCase, reference: Record, history: Mapping[str, NDArray]) -> dict[str, Any]:
+    """Return the record's peaks and by how much the computed ones differ from them."""
+    from reflowshock.fem.loads.structure_pulses import pulses_of
+    from reflowshock.fem.output.acceleration import watch_accelerations
+
+    computed = watch_accelerations(history, case.problem, pulses_of(case.loads)).get(reference.watch)
+    measured = recorded(case, reference, float(history["time"][-1])).peaks_in_g(reference.watch)
+    found = {f"measured_{name}": metric(value, "G") for name, value in measured.items()}
+    for name, value in computed.peaks_in_g(reference.watch).items() if computed else ():
+        what, _, where = name.partition("@")
+        found[f"{what}_difference@{where}"] = metric(value / measured[name] - 1.0)
+    return found
