@@ -78,7 +78,10 @@ def test_processes_end_with_their_parent(how, tmp_path):
     script = tmp_path / "parent.py"
     script.write_text(PARENT)
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
-    parent = subprocess.Popen([sys.executable, str(script), str(tmp_path)], env=environment, stderr=subprocess.PIPE)
+    heed = ("env", "--default-signal=INT")  # a job in the background of a shell ignores it
+    parent = subprocess.Popen(
+        [*heed, sys.executable, str(script), str(tmp_path)], env=environment, stderr=subprocess.PIPE
+    )
     workers = [psutil.Process(pid(tmp_path / f"{k}.pid")) for k in range(2)]
     parent.send_signal(how)
     _, said = parent.communicate(timeout=60)
