@@ -119,14 +119,14 @@ class NonlinearElements:
         row[self.lanes.element[block, lane]] = np.arange(len(block))
         return block[row[places]], lane[row[places]]
 
-    def points(self, block: NDArray[np.int64], lane: NDArray[np.int64]) -> "Points":
+    def points(self, block: NDArray[np.int64], lane: NDArray[np.int64]) -> "PointValues":
         """Return the values at the integration points of elements found by ``located``."""
         blocks = self.blocks
         points = blocks.state.shape[1]
         state = blocks.state.reshape(len(blocks.state), points, -1, LANES)[block, :, :, lane]
         weight = blocks.weight[blocks.pattern[block]].reshape(-1, points, LANES)[np.arange(len(block)), :, lane]
         work = blocks.plastic_work[block, lane] / weight.sum(axis=1)
-        return Points(weight, state[..., :6], state[..., 12], work, state[..., 6:12] if self.finite else None)
+        return PointValues(weight, state[..., :6], state[..., 12], work, state[..., 6:12] if self.finite else None)
 
     def means(self, places: NDArray[np.integer]) -> "Means":
         """Return mean values over some elements; ``places (k,)`` as in ``located``."""
@@ -167,7 +167,7 @@ class NonlinearElements:
 
 
 @dataclass(frozen=True, slots=True)
-class Points:
+class PointValues:
     """Values at the m integration points of elements.
 
     Attributes:

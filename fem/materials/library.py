@@ -85,5 +85,6 @@ LIBRARY: dict[str, Material] = {
     "NiAu": NIAU,
     "SAC305": SAC305,
     "SAC405": SAC405,
+    "SAC405_elastic": SAC405.elastic,  # the solder of H, which does not yield
     "SnPb": SNPB,
 }

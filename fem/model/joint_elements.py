@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reflowshock.fem.elements.hexahedron import HEXAHEDRON
-from reflowshock.fem.forces.force_nonlinear import NonlinearElements, Points
+from reflowshock.fem.forces.force_nonlinear import NonlinearElements, PointValues
 from reflowshock.fem.kernels.nonlinear import Path
 from reflowshock.fem.kernels.plasticity import NEVER_YIELDS
 from reflowshock.fem.model.body import Body
@@ -33,7 +33,7 @@ class ElasticHexahedra:
             values[...] = self._start[name]
         self._term.add(displacement, force)
 
-    def points(self) -> Points:
+    def points(self) -> PointValues:
         """Return the values at the points at the latest displacement."""
         return self._term.points(*self._place)
 
@@ -50,7 +50,7 @@ class FollowingElements:
         self._frozen.take_path(self._own, *self._place)
         self._frozen.add(displacement, force)
 
-    def points(self) -> Points:
+    def points(self) -> PointValues:
         """Return the values at the points now."""
         return self._own.points(*self._place)
 

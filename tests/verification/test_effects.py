@@ -309,7 +309,7 @@ def _(_effect, _folder):
     body, step = scene.strip()
     duration, rate = 3e-4, 1.0
     given = scene.shock(damping=Damping(mass_coefficient=rate))
-    drop = SimpleNamespace(shock=given.model_copy(update={"duration": duration}), expected=SimpleNamespace(omega=1.5e4))
+    drop = SimpleNamespace(shock=given, duration=duration, expected=SimpleNamespace(omega=1.5e4))
     predicted = RayleighEffect().decide(drop)["influence"]
     both = [scene.moved(body, step, scene.loads_of(body, item), duration)[1] for item in (scene.shock(), given)]
     assert abs(both[1] / both[0] - 1.0) < predicted < 1e-3

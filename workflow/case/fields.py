@@ -189,10 +189,11 @@ def _choice(field: FieldInfo) -> str:
 def _metadata(field: FieldInfo) -> Iterator[object]:
     """Yield quantities and bounds of a field, or of the items of its list, which may be absent."""
     yield from field.metadata
-    outer = typing.get_args(field.annotation)[:1]
-    for item in (*outer, *(inner for kind in outer for inner in typing.get_args(kind)[:1])):
-        for extra in getattr(item, "__metadata__", ()):
+    inner = typing.get_args(field.annotation)[:1]
+    while inner:
+        for extra in getattr(inner[0], "__metadata__", ()):
             yield from extra.metadata if isinstance(extra, FieldInfo) else (extra,)
+        inner = typing.get_args(inner[0])[:1]
 
 
 def _bare(annotation: object) -> object:
