@@ -28,7 +28,7 @@ def test_the_report_tells_warpage_shape_effect_and_interface(run_folder):
                 "Stress at the package", "Two scales", "Energy balance", "Cost")  # fmt: skip
     places = [page.index(f"<h2>{section}</h2>") for section in sections]
     assert places == sorted(places)
-    assert "The real shapes lower the peak stress" in page
+    assert "The real shapes lower the peak peel stress" in page
     assert "published: two-scale" in page and "0.285" in page
     assert len(page) < 15e6
 

@@ -48,11 +48,12 @@ def test_what_the_shapes_change_is_told(identical_run):
     peaks = {}
     for run in ("two_scale", "identical"):
         with np.load(identical_run / f"shock/{run}/history.npz") as history:
-            stress = np.maximum(history["von_mises_board"], history["von_mises_package"]).max(axis=0)
+            stress = np.maximum(history["peel_board"], history["peel_package"]).max(axis=0)
             peaks[run] = dict(zip(history["joints"].tolist(), stress.tolist(), strict=True))
     critical = metrics["critical_joint"]
     change = peaks["two_scale"][critical] / peaks["identical"][critical] - 1.0
     assert metrics["shape_effect_on_peak_stress"] == pytest.approx(change)
+    assert metrics["peel_stress"] == peaks["two_scale"][critical]
     assert 0.001 < abs(change) < 0.2
     assert metrics["identical_critical_joint"] in peaks["identical"]
     assert summary["effects"]["identical_joints"]["on"]

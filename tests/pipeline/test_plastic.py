@@ -38,7 +38,10 @@ def test_a_joint_that_breaks_is_the_verdict_of_a_healthy_run(plastic_run):
     assert result.stdout.splitlines()[-1] == summary["answer"]
     assert f"{verdict['joint']}: plastic work " in summary["answer"] and ", FAIL; discretisation" in summary["answer"]
     page = (folder / "report.html").read_text()
-    assert "some break" in page and "plastic work at pad" in page
+    assert "some break" in page and "plastic work density of the solder layer there" in page
+    failed = [name for name, joint in verdict["joints"].items() if joint["verdict"] == "FAIL"]
+    told = page[page.index(f"{len(failed)} of 4 joints in the model fail") :].split("</p>")[0]
+    assert all(name in told for name in failed) and verdict["joint"] in failed
 
 
 def test_a_verdict_ends_a_run_with_3_where_that_is_asked_for(plastic_run, tmp_path):

@@ -77,5 +77,5 @@ def add_chain(run: Path) -> None:
     shutil.copy(run / f"shock/{modes[0]}/result.json", identical)
     with np.load(run / f"shock/{modes[0]}/history.npz") as arrays:
         history = dict(arrays)
-    history |= {name: 1.1 * history[name] for name in ("von_mises_board", "von_mises_package")}
+    history |= {name: 1.1 * history[name] for name in ("peel_board", "peel_package")}
     np.savez(identical / "history.npz", **history)

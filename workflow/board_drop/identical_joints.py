@@ -58,8 +58,13 @@ def problems(case: "BoardDropCase") -> Iterator[Problem]:
         yield Problem(KEY, message, True, f"false, or a package.pitch > {1e3 * width:.4g} mm")
 
 
+def shape_effect(real: float, identical: float) -> float | None:
+    """Return by what fraction real shapes change a peak of stress; None where identical joints are only pressed."""
+    return real / identical - 1.0 if identical > 0.0 else None
+
+
 def compared(found: Findings, run: "Run[BoardDropCase]", folder: Path, mode: str) -> Findings:
-    """Add what real shapes change in the critical joint's peak stress to what a shock has found.
+    """Add what real shapes change in the critical joint's peak peel stress to what a shock has found.
 
     Args:
         found: metrics, health and effects of the shock with the real joints.
@@ -70,14 +75,15 @@ def compared(found: Findings, run: "Run[BoardDropCase]", folder: Path, mode: str
     from reflowshock.meshing.board.pads import read_pads
 
     real, flat = (_peaks(folder / name / "history.npz") for name in (mode, FOLDER))
-    critical = max(real, key=real.__getitem__)
+    critical = next(iter(real))
+    effect = shape_effect(real[critical], flat[critical])
     gaps = {site.name: site.gap for site in read_pads(run.folder / "reflow/pads.json")}
     metrics = {
-        "shape_effect_on_peak_stress": metric(real[critical] / flat[critical] - 1.0),
+        **({} if effect is None else {"shape_effect_on_peak_stress": metric(effect)}),
         "critical_joint_standoff": metric(gaps[critical], "m"),
         "identical_joint_standoff": metric(identical_sphere(run.case).height, "m"),
-        "identical_critical_joint": metric(max(flat, key=flat.__getitem__)),
-        "identical_peak_von_mises": metric(flat[critical], "Pa"),
+        "identical_critical_joint": metric(next(iter(flat))),
+        "identical_peel_stress": metric(flat[critical], "Pa"),
     }
     result = read_json(folder / FOLDER / "result.json")
     health = {f"{FOLDER}_{name}": check for name, check in result["health"].items()}
@@ -87,7 +93,7 @@ def compared(found: Findings, run: "Run[BoardDropCase]", folder: Path, mode: str
 def _peaks(history: Path) -> dict[str, float]:
     import numpy as np
 
-    from reflowshock.workflow.report.histories import peaks
+    from reflowshock.workflow.report.histories import peel_peaks
 
     with np.load(history) as arrays:
-        return peaks(dict(arrays))
+        return peel_peaks(dict(arrays))

@@ -13,6 +13,7 @@ from reflowshock.fem.problem.failure import Failure, Life
 from reflowshock.workflow.case.text import SHOWN, number, quantity
 
 PASS, FAIL, NO_LIMIT = "PASS", "FAIL", "NO LIMIT"
+NAMED = 12  # joints that fail, in one sentence
 MEASURES: dict[str, Measure] = {"peel_stress": PEEL, "layer_von_mises": VON_MISES, "layer_plastic_work": PLASTIC_WORK}
 WORDS = {"peel_stress": "peel", "layer_von_mises": "von Mises", "layer_plastic_work": "plastic work"}
 
@@ -81,6 +82,17 @@ def answer(verdict: dict, error: float | None) -> str:
     known = "not known, run reflowshock accuracy" if error is None else f"±{100.0 * error:.2g} %"
     life = f"; {in_drops(verdict['life'])}" if "life" in verdict else ""
     return f"{verdict['joint']}: {against_limit(joint)}, {joint['verdict']}{life}; discretisation {known}"
+
+
+def failing(verdict: dict) -> str:
+    """Say which joints fail, the one of least margin first; empty where none does."""
+    joints = verdict["joints"]
+    failed = sorted((name for name in joints if joints[name]["verdict"] == FAIL), key=lambda k: joints[k]["margin"])
+    if not failed:
+        return ""
+    more = [f"and {len(failed) - NAMED} more"] if len(failed) > NAMED else []
+    count = f"{len(failed)} of {len(joints)} joints in the model {'fails' if len(failed) == 1 else 'fail'}"
+    return f"{count}: {', '.join(failed[:NAMED] + more)}."
 
 
 def against_limit(joint: dict) -> str:

@@ -9,7 +9,7 @@ from typing import Any
 from reflowshock.workflow.case.text import mega, micro, number, quantity
 from reflowshock.workflow.package import findings
 from reflowshock.workflow.package.case import BoardDropCase
-from reflowshock.workflow.package.verdict import limits_table
+from reflowshock.workflow.package.verdict import failing, limits_table
 from reflowshock.workflow.package_report import joint_tables
 from reflowshock.workflow.package_report.headline import headline
 from reflowshock.workflow.package_report.joint_records import joint_records
@@ -37,6 +37,7 @@ def add_shock(run_folder: Path, case: BoardDropCase, context: dict, summary: dic
     context["headline"] = tables.headline(metrics) + context["headline"]
     context["figures"] = headline(metrics, context["discretisation"], summary, results)
     context |= {"verdict": summary["verdict"], "answer": summary["answer"]}
+    context["failing"] = failing(summary["verdict"])
     context["kinematics"] = kinematics_note(metrics, case.shock.numerics.kinematics)
     context["curves"] |= {
         "histories": history_curves(histories, critical),

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from reflowshock.fem.output.ranking import PEEL, VON_MISES
+from reflowshock.fem.output.ranking import PEEL, VON_MISES, Measure, ranked
 from reflowshock.fem.output.settled import is_settled
 
 Arrays = Mapping[str, NDArray]
@@ -27,19 +27,15 @@ def read_modes(shock: Path, modes: tuple[str, ...] = MODES) -> tuple[dict[str, d
     return histories, results
 
 
-def at_pads(history: Arrays) -> NDArray[np.float64]:
-    """Von Mises stress `(k, joints)` [Pa] at the worse of each joint's pads, averaged over the solder there."""
-    return np.maximum(history["von_mises_board"], history["von_mises_package"])
+def joint_stress(history: Arrays, joint: str, measure: Measure = VON_MISES) -> NDArray[np.float64]:
+    """Stress of a joint `(k,)` [Pa] at the worse of its pads."""
+    return measure.worse(history)[:, list(map(str, history["joints"])).index(joint)]
 
 
-def joint_stress(history: Arrays, joint: str) -> NDArray[np.float64]:
-    """The same of one joint `(k,)` [Pa]."""
-    return at_pads(history)[:, list(map(str, history["joints"])).index(joint)]
-
-
-def peaks(history: Arrays) -> dict[str, float]:
-    """Peak of the same by joint [Pa]."""
-    return dict(zip(map(str, history["joints"]), at_pads(history).max(axis=0).tolist(), strict=True))
+def peel_peaks(history: Arrays) -> dict[str, float]:
+    """Peak peel stress by joint [Pa], the critical joint first."""
+    peaks = PEEL.peaks(history)
+    return {str(history["joints"][column]): float(peaks[column]) for column in ranked(history)}
 
 
 def unsettled(history: Arrays, longest: float) -> str:

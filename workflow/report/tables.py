@@ -8,7 +8,7 @@ from reflowshock.workflow.case.text import against_limit, nano, number, percent,
 
 SHAPE_EFFECT = "shape_effect_on_peak_stress"
 HEADLINE = (
-    (SHAPE_EFFECT, "change of the peak stress due to the real joint shapes"),
+    (SHAPE_EFFECT, "change of the peak peel stress due to the real joint shapes"),
     ("critical_joint_stress_error", "stress history, two-scale against DNS"),
     ("two_scale_dns_time_ratio", "wall time, two-scale over DNS"),
     ("energy_balance_error", "largest energy imbalance"),

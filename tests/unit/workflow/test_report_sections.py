@@ -106,17 +106,19 @@ def test_joints_with_other_faces_are_not_compared():
 def history_of(*peaks: float) -> dict[str, np.ndarray]:
     wave = np.sin(np.linspace(0.0, np.pi, 21))
     stress = np.outer(wave, peaks)
-    return {"time": np.linspace(0.0, 1e-3, 21), "joints": np.array(NAMES), "von_mises_board": stress,
-            "von_mises_package": 0.5 * stress}  # fmt: skip
+    return {"time": np.linspace(0.0, 1e-3, 21), "joints": np.array(NAMES), "peel_board": stress,
+            "peel_package": 0.5 * stress}  # fmt: skip
 
 
 def test_the_shape_effect_is_that_of_the_critical_joint():
     real, flat = history_of(40e6, 90e6, 50e6, 60e6), history_of(40e6, 75e6, 50e6, 80e6)
     joints = [{"name": name, "standoff": 0.3e-3} for name in NAMES]
     words = shape_effect.in_words(real, flat)
-    assert "raise the peak stress of A4 by 20 %: 90 MPa instead of 75 MPa" in words
+    assert "raise the peak peel stress of A4 by 20 %: 90 MPa instead of 75 MPa" in words
     assert "there B4 would be the critical one" in words
     assert shape_effect.table(real, flat, joints)["rows"][0] == ["A4", "90.00", "75.00", "+20.00 %", "300.0"]
+    pressed = shape_effect.in_words(real, history_of(0.0, 0.0, 0.0, 0.0))
+    assert "raise the peak peel stress of A4: 90 MPa instead of 0 MPa" in pressed
     assert shape_effect.curves(real, flat).startswith("<svg")
 
 

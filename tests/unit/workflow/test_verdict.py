@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from reflowshock.fem.problem.failure import Failure
-from reflowshock.workflow.package.verdict import FAIL, NO_LIMIT, PASS, answer, limits_table, verdict_of
+from reflowshock.workflow.package.verdict import FAIL, NO_LIMIT, PASS, answer, failing, limits_table, verdict_of
 
 HISTORY = {
     "joints": np.array(["A1", "A2"]),
@@ -64,6 +64,14 @@ def test_a_joint_that_is_only_pressed_holds_without_a_margin():
         "criterion": "peel_stress", "value": 0.0, "limit": 1e6, "margin": None, "verdict": PASS, "source": "a test"
     }  # fmt: skip
     assert answer(found, None).startswith("A1: peel 0 MPa of 1, PASS;")
+
+
+def test_joints_that_fail_are_named_the_worst_first():
+    assert failing(judged(peel_stress=7e6)) == "1 of 2 joints in the model fails: A2."
+    assert failing(judged(peel_stress=1e6)) == "2 of 2 joints in the model fail: A2, A1."
+    assert failing(judged(peel_stress=1e9)) == failing(judged()) == ""
+    many = {f"A{k}": {"verdict": FAIL, "margin": k / 20} for k in range(1, 16)}
+    assert failing({"joints": many}).endswith(" A11, A12, and 3 more.")
 
 
 def test_values_of_coarse_joints_are_marked():
