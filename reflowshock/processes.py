@@ -37,8 +37,7 @@ class ProcessPool(ProcessPoolExecutor):
     def ending(self) -> str:
         """Say how the processes of a broken pool have ended."""
         processes = self._own()
-        for process in processes:
-            process.join()
+        self.shutdown()  # its thread reaps them: whoever also waits for one may be told no exit code
         # The pool itself terminates the others.
         code = next((one.exitcode for one in processes if one.exitcode not in (0, -signal.SIGTERM)), None)
         killed = ": it was killed, as the system does when memory is short" if code == -signal.SIGKILL else ""
