@@ -12,7 +12,7 @@ turns the frame by omega, (tr(U) 1 - U) omega = axial(R^T dF - dF^T R). Energy a
 
 Rows, lines and faces are those of ``kernels.box_rows``, modes those of ``force_congruent``. Sixteen boxes of a row
 stand side by side as in ``kernels.lanes``. Slots of the workspace ``w``, in units of lanes: component c of the mode of
-parity p at 3 p + c, then F and R.
+parity p at 3 p + c, then F and R as ``kernels.nonlinear.rotate`` has them.
 """
 
 import numpy as np
@@ -23,9 +23,7 @@ from reflowshock.fem.kernels.lanes import (
     LANE_OPTIONS,
     LANES,
     applied,
-    cofactor,
     cofactor_symmetric,
-    determinant,
     full,
     nine,
     put_nine,
@@ -34,14 +32,12 @@ from reflowshock.fem.kernels.lanes import (
     times,
     transposed,
 )
-from reflowshock.fem.kernels.nonlinear import stretch
+from reflowshock.fem.kernels.nonlinear import rotate, stretch
 
 DEFORMATION, ROTATION, TURNED_SLOTS = (LANES * k for k in (24, 33, 42))
 WIDTH = COLUMNS + LANES
 UPRIGHT = -1  # no box is turned inside out
 X, Y, Z, XY, XZ, YZ, XYZ = (3 * LANES * p for p in (1, 2, 4, 3, 5, 6, 7))  # slots of the modes, by their parity
-NEWTON_STEPS = 40  # stretches of 1e6 need 25
-NEWTON_CONVERGED = 1e-13  # squared size of a step, after which the next one is below 1e-13 (quadratic convergence)
 
 
 @njit(**LANE_OPTIONS)
@@ -71,11 +67,7 @@ def add_faces(w, start, count, faces):
 
 @njit(**LANE_OPTIONS)
 def write_deformation(w, scale):
-    """Write F, also as the first guess of R; return how many boxes are turned inside out.
-
-    ``scale (3,)`` [1/m] turns modes into gradients, -1 / (4 h) along each direction.
-    """
-    inverted = 0.0
+    """Write F; ``scale (3,)`` [1/m] turns modes into gradients, -1 / (4 h) along each direction."""
     for lane in range(LANES):
         x, y, z = three(w, X + lane), three(w, Y + lane), three(w, Z + lane)
         f = (
@@ -84,33 +76,6 @@ def write_deformation(w, scale):
             scale[0] * x[2], scale[1] * y[2], 1.0 + scale[2] * z[2],
         )  # fmt: skip
         put_nine(w, DEFORMATION + lane, f)
-        put_nine(w, ROTATION + lane, f)
-        inverted += 0.0 if determinant(f, cofactor(f)) > 0.0 else 1.0
-    return inverted
-
-
-@njit(**LANE_OPTIONS)
-def improve_rotation(w):
-    """Take one Newton step X -> (X + X^-T) / 2 towards R (Higham 1986); return its squared size over all lanes."""
-    change = 0.0
-    for lane in range(LANES):
-        x = nine(w, ROTATION + lane)
-        c = cofactor(x)
-        s = 0.5 / determinant(x, c)
-        d = (
-            s * c[0] - 0.5 * x[0], s * c[1] - 0.5 * x[1], s * c[2] - 0.5 * x[2],
-            s * c[3] - 0.5 * x[3], s * c[4] - 0.5 * x[4], s * c[5] - 0.5 * x[5],
-            s * c[6] - 0.5 * x[6], s * c[7] - 0.5 * x[7], s * c[8] - 0.5 * x[8],
-        )  # fmt: skip
-        change += d[0] * d[0] + d[1] * d[1] + d[2] * d[2]
-        change += d[3] * d[3] + d[4] * d[4] + d[5] * d[5]
-        change += d[6] * d[6] + d[7] * d[7] + d[8] * d[8]
-        new = (
-            x[0] + d[0], x[1] + d[1], x[2] + d[2], x[3] + d[3], x[4] + d[4], x[5] + d[5],
-            x[6] + d[6], x[7] + d[7], x[8] + d[8],
-        )  # fmt: skip
-        put_nine(w, ROTATION + lane, new)
-    return change
 
 
 @njit(**LANE_OPTIONS)
@@ -209,17 +174,6 @@ def repeat_last(w, count):
 
 
 @njit(cache=True)
-def rotate(w, scale):
-    """Write F and R of F = R U; return whether no box is turned inside out."""
-    if write_deformation(w, scale) > 0.0:
-        return False
-    for _ in range(NEWTON_STEPS):
-        if improve_rotation(w) < NEWTON_CONVERGED:
-            break
-    return True
-
-
-@njit(cache=True)
 def add_turned_row_forces(rows, scales, constants, displacement, force):
     """Add the internal force of rows of boxes.
 
@@ -242,7 +196,8 @@ def add_turned_row_forces(rows, scales, constants, displacement, force):
         for start in range(0, count, LANES):
             read_modes(faces, start, w)
             repeat_last(w, count - start)
-            if not rotate(w, scales[shape]):
+            write_deformation(w, scales[shape])
+            if not rotate(w[DEFORMATION:]):
                 return r
             replace_by_forces(w, scales[shape], constants[shape])
             add_faces(w, start, min(LANES, count - start), forces)
@@ -263,7 +218,8 @@ def row_energies(rows, scales, constants, displacement):
         for start in range(0, count, LANES):
             read_modes(faces, start, w)
             repeat_last(w, count - start)
-            rotate(w, scales[shape])
+            write_deformation(w, scales[shape])
+            rotate(w[DEFORMATION:])
             energies = box_energies(w, constants[shape], min(LANES, count - start))
             mean += energies[0]
             higher += energies[1]
