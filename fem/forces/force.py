@@ -2,7 +2,7 @@
 
 A term is linear unless its material yields or the kinematics are finite. Linear boxes of equal shape and material share
 one stiffness and are computed in rows along lines of nodes (``force_congruent``); other linear elements are assembled
-into blocks of 3 x 3 (``force_assembled``). Boxes that stay elastic turn by any angle at a quarter of the linear speed
+into blocks of 3 x 3 (``force_assembled``). Boxes that stay elastic turn by any angle at a fifth of the linear speed
 (``force_corotational``).
 """
 
