@@ -216,7 +216,7 @@ class SolderPlasticity(DropEffect):
     """Solder that yields and hardens."""
 
     name, adds, place, source = Plasticity.name, Plasticity.adds, Plasticity.place, Plasticity.source
-    number = "expected peel stress / sigma_y, peel = K sqrt(k E t^3 / 12) pitch^2 / A: the board bends by K on springs k"
+    number = "expected peel stress / sigma_y, peel = K sqrt(k E t^3 / 12) pitch^2 / A, board bent by K on springs k"
     threshold = YIELDS_FROM
     influence = Plasticity.influence
     switch = "shock.numerics.plasticity = auto, on, off; materials.solder = SAC405 …"

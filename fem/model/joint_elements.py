@@ -121,8 +121,8 @@ class JointElements:
             self._body.tie.spread(values)
         for level, _, elements in self._linear:
             elements.add(felt[level], force)
-        for _, elements in self._nonlinear:
-            elements.add(displacement, force)
+        for _, nonlinear in self._nonlinear:
+            nonlinear.add(displacement, force)
         if damping is not None and self._damped is not None:
             self._damped.add(damping, force)
         return force

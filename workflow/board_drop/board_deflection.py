@@ -65,9 +65,10 @@ def expected_peel(case: "BoardDropCase") -> float:
     package, materials, deflection = case.package, case.materials, expected_deflection(case)
     diameter = 2.0 * min(package.board_pad.wetted_radius, package.package_pad.wetted_radius)
     area = math.pi / 4.0 * diameter**2
-    board, substrate = (material.engineering_constants.young[0] for material in (materials.board, materials.substrate))
+    parts = materials.board, materials.substrate, materials.solder
+    board, substrate, solder = (material.engineering_constants.young[0] for material in parts)
     springs = (diameter * young / (1.0 - HALF_SPACE**2) for young in (board, substrate))
-    compliance = package.standoff / (materials.solder.young_modulus * area) + sum(1.0 / spring for spring in springs)
+    compliance = package.standoff / (solder * area) + sum(1.0 / spring for spring in springs)
     curvature = deflection.slope**2 / deflection.largest if deflection.largest > 0.0 else 0.0
     bending = board * case.board.thickness**3 / 12.0
     return curvature * math.sqrt(bending / compliance) * package.pitch / area
