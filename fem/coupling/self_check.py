@@ -140,7 +140,7 @@ def load_errors(
 
 
 def masses(bodies: Mapping[Role, Body]) -> NDArray[np.float64]:
-    """Return this rank's masses ``(4,)`` [kg]: macro model, interface, rest of the meso model; of volumes and lumped."""
+    """Return this rank's masses ``(4,)`` [kg]: macro model, interface, rest of the meso model, volumes and lumped."""
     found = np.zeros(4)
     for role, body in bodies.items():
         own = np.where(body.shared.owned, body.mass, 0.0)

@@ -13,12 +13,12 @@ from reflowshock.fem.elements.mesh_elements import elements_of
 from reflowshock.fem.errors import StepError
 from reflowshock.fem.estimates.estimate import BOARD_ADVANTAGE, UPDATES_PER_SECOND
 from reflowshock.fem.estimates.solver_cost import COROTATIONAL_RATE, NONLINEAR_RATE
-from reflowshock.fem.forces.bedding import spring_rates
 from reflowshock.fem.forces.force_congruent import is_box
 from reflowshock.fem.materials.elasticity import materials_of_parts
 from reflowshock.fem.materials.kinematics import Kinematics
 from reflowshock.fem.materials.parameters import Material
 from reflowshock.fem.materials.roles import Materials
+from reflowshock.fem.mesh.facet import spring_rates
 from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.mesh.tie import Tie
 from reflowshock.fem.problem.fittings import Support

@@ -68,27 +68,3 @@ class BeddedFacets:
             (np.ones(len(self.nodes)), (self.nodes, np.arange(len(self.nodes)))), shape=(count, len(self.nodes))
         )
         return scipy.sparse.kron(spread @ self.matrix @ spread.T, scipy.sparse.diags(self.stiffness), format="csr")
-
-
-def spring_rates(
-    cells: NDArray[np.integer],
-    facets: NDArray[np.integer],
-    mass: NDArray[np.float64],
-    corners: NDArray[np.float64],
-    stiffness: NDArray[np.float64],
-) -> NDArray[np.float64]:
-    """Return by how much springs raise the largest omega^2 of their elements at most: ``(nf,)`` [1/s^2].
-
-    A facet's springs count in its element alone, as stiff as their row sums: no mode is then faster than the fastest
-    element, whose omega^2 = 4 / dt^2 grows by at most the largest ratio of spring and mass at its nodes.
-
-    Args:
-        cells: ``(nf, k)`` nodes of the element of each facet.
-        facets: ``(nf, m)`` nodes of the facets.
-        mass: ``(nf, k)`` [kg] of the element at each of its nodes.
-        corners: ``(nf, m, 3)`` [m] of the facets.
-        stiffness: ``(3,)`` [N/m^3].
-    """
-    at_facet = (cells[:, None, :] == facets[:, :, None]).argmax(axis=2)
-    largest = bedding_matrices(corners).sum(axis=2)
-    return np.asarray(stiffness.max() * (largest / np.take_along_axis(mass, at_facet, axis=1)).max(axis=1))

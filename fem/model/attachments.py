@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reflowshock.fem.division.fitted import FittedTable
-from reflowshock.fem.forces.bedding import BeddedFacets, spring_rates
+from reflowshock.fem.forces.bedding import BeddedFacets
+from reflowshock.fem.mesh.facet import spring_rates
 from reflowshock.fem.model.assembly import Pieces
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.parallel.local_mesh import LocalMesh
