@@ -84,13 +84,14 @@ def _mesh(run: Run[BoardDropCase], name: str) -> str:
 
 def _request(run: Run[BoardDropCase], mode: str, meshes: tuple[str, ...], coupling: JointCoupling) -> dict:
     """Return what the package fem reads as input of a run, but for its folders and natural modes."""
-    shock = decided(run.case).shock.model_copy(update={"coupling": coupling, "modes": 0})
+    case = decided(run.case)
+    shock = case.shock.model_copy(update={"coupling": coupling, "modes": 0})
     return {
         "mode": mode,
         "meshes": [_mesh(run, name) for name in meshes],
         "shock": shock.model_dump(mode="json", exclude={"failure"}),
-        "materials": run.case.materials.model_dump(mode="json"),
-        **fittings.given(run.case),
+        "materials": case.materials.model_dump(mode="json"),
+        **fittings.given(case),
     }
 
 
