@@ -141,6 +141,18 @@ def test_solder_that_yields_has_no_implicit_steps_nor_local_ones():
     assert not any(run.settings.get("shock.coupling.scheme") == "local_steps" for run in runs)
 
 
+def test_meshes_of_what_yields_are_varied_by_two_models():
+    """One model takes small steps everywhere; it is a choice, to the end of the shock also where it is cut short."""
+    study = package_study(case_of("jedec_bga", "scale=quick"))
+    runs = {run.name: run for run in study.runs}
+    assert all(run.settings["shock.coupling.critical_joints"] == "1" for run in study.parameters[0].runs)
+    assert len({tuple(sorted(run.settings.items())) for run in study.parameters[0].runs}) == len(study.parameters[0].runs)
+    assert "1 fine" not in runs
+    assert runs["one model: alone"].against == SAME_MESH
+    assert runs["one model"].settings["shock.numerics.dns_duration"] == "0.4 ms"
+    assert all(run.settings["shock.numerics.modes"] == '["two_scale"]' for run in study.parameters[0].runs)
+
+
 def test_a_package_is_judged_by_its_critical_joint(package, tmp_path):
     own = tmp_path / "shock" / "two_scale"
     own.mkdir(parents=True)
