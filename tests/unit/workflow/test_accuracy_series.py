@@ -126,13 +126,13 @@ def test_elements_of_imprinted_pads_follow_their_size():
     imprinted = case_of("bga_drop", "scale=quick", *settings, "package.imprint={}")
     (half,) = (run for run in package_study(imprinted).runs if run.name == "all x 0.5")
     wanted = {"joint_numerics.core": "8", "joint_numerics.layers": "20", "joint_numerics.pad_layers": "4",
-              "joint_numerics.copper_layers": "4", "imprint.rings": "8", "imprint.first_layer": "0.015 mm",
-              "imprint.growth": "1.25"}  # fmt: skip
+              "joint_numerics.copper_layers": "4", "imprint.rings": "10", "imprint.first_layer": "0.0075 mm",
+              "imprint.growth": "1.325"}  # fmt: skip
     assert {key: half.settings[f"package.{key}"] for key in wanted} == wanted
     case = case_of(
         "bga_drop", "scale=quick", *settings, "package.imprint={}", *(f"{k}={v}" for k, v in half.settings.items())
     )
-    assert case.package.imprint.growth == 1.25
+    assert case.package.imprint.growth == 1.325
 
 
 def test_solder_that_yields_has_no_implicit_steps_nor_local_ones():
