@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 from pydantic import Field, ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
 
+from reflowshock.effect import Switch
 from reflowshock.fem.materials.kinematics import TURNING, Kinematics
 from reflowshock.fem.problem.failure import Failure
 from reflowshock.fem.problem.filters import LowPass
@@ -111,7 +112,8 @@ class ShockNumerics(Parameters):
 
     ``kinematics`` and ``formulation`` of hexahedra as for a structure. Elastic hexahedra are the same in both
     formulations; those that yield are seven to eight times cheaper with one point, a few per cent stronger in bending.
-    Kinematics that are ``auto`` are corotational where the board's deflection calls for it.
+    Kinematics that are ``auto`` are corotational where the board's deflection calls for it. Solder whose material can
+    yield does so if ``plasticity`` is on, and if it is ``auto`` where half its yield stress is expected.
     ``mass_scaled`` are roles, such as copper, whose density is raised to the step of the others; the added mass is a
     metric with a limit.
     ``dns_duration`` ends the DNS before the shock does: the modes are compared over the time that both have.
@@ -123,6 +125,7 @@ class ShockNumerics(Parameters):
     step_fraction: float = Field(0.9, gt=0, le=0.95)
     critical_step: Literal["element", "power_iteration"] = "element"
     kinematics: Literal["auto"] | Kinematics = "small"
+    plasticity: Switch = "on"
     formulation: Literal["incompatible_modes", "one_point"] = "incompatible_modes"
     mass_scaled: tuple[Literal["board", "substrate", "die", "copper", "solder"], ...] = ()
     history_samples: int = Field(600, ge=2)

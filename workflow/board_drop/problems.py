@@ -65,8 +65,8 @@ def _in_words(case: PackageCase, found: Iterable[Problem]) -> list[Problem]:
 
 
 def _yielding(case: BoardDropCase) -> list[str]:
-    """Return the parts whose material yields."""
-    return [role for role, material in case.materials.by_role.items() if material.plasticity is not None]
+    """Return the parts whose material yields there."""
+    return [role for role, material in decided(case).materials.by_role.items() if material.plasticity is not None]
 
 
 def _of_flow(case: BoardDropCase) -> Iterator[Problem]:

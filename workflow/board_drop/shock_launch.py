@@ -81,12 +81,13 @@ def _mesh(run: Run[BoardDropCase], name: str) -> str:
 
 def _request(run: Run[BoardDropCase], mode: str, meshes: tuple[str, ...], coupling: JointCoupling) -> dict:
     """Return what the package fem reads as input of a run, but for its folders."""
-    shock = decided(run.case).shock.model_copy(update={"coupling": coupling})
+    case = decided(run.case)
+    shock = case.shock.model_copy(update={"coupling": coupling})
     return {
         "mode": mode,
         "meshes": [_mesh(run, name) for name in meshes],
         "shock": shock.model_dump(mode="json", exclude={"failure"}),
-        "materials": run.case.materials.model_dump(mode="json"),
+        "materials": case.materials.model_dump(mode="json"),
     }
 
 
