@@ -13,7 +13,6 @@ import os
 import tempfile
 from math import hypot
 from pathlib import Path
-from time import process_time
 
 os.environ["OMP_NUM_THREADS"] = os.environ["NUMBA_NUM_THREADS"] = "1"
 

@@ -12,7 +12,6 @@ plasticity, which is what J2 gives under a load in proportion), by the program's
 import argparse
 import json
 import os
-from collections.abc import Callable
 from math import hypot, radians
 from pathlib import Path
 from time import process_time
@@ -72,7 +71,7 @@ def halved() -> dict:
     """
     result = {}
     for name, yields in (("elastic", False), ("yielding", True)):
-        rows = {f"{size:.3g}": _timed(lambda size=size: solved(IMPRINTED.times(size), yields)) for size in SIZES}
+        rows = {f"{size:.3g}": _timed(size, yields) for size in SIZES}
         values = [row["values"] for row in rows.values()]
         limits = {key: richardson(SIZES, [row[key] for row in values], None) for key in values[0]}
         result[name] = rows | {
@@ -97,9 +96,9 @@ def turned() -> dict:
     return result
 
 
-def _timed(compute: Callable[[], Measures]) -> dict:
+def _timed(size: float, yields: bool) -> dict:
     begin = process_time()
-    values = compute()
+    values = solved(IMPRINTED.times(size), yields)
     return {"seconds": process_time() - begin, "values": values}
 
 

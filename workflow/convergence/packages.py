@@ -110,7 +110,7 @@ def _is_linear(case: BoardDropCase) -> bool:
 
 
 def _one_model(case: BoardDropCase, solver: str = "") -> Settings:
-    """One model with all joints fine, to the end; in implicit steps with copper at its true mass, where all is linear."""
+    """One model with all joints fine, to the end; where all is linear, in implicit steps, copper at its true mass."""
     implicit = _is_linear(case)
     settings = {
         "shock.numerics.modes": '["dns"]',
