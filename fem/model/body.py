@@ -31,6 +31,7 @@ class Body:
         mass: ``(n,)`` [kg] lumped mass, of slaves moved to their masters.
         free: ``(n, 3)`` whether a displacement component follows from forces.
         initial_stress: ``(ne, 6)`` [Pa] mean stress of linear elements at no displacement; None where there is none.
+        lumped: Lumped masses at the nodes that this rank counts [kg].
         begin: Gives elements with a path, on the nodes of the body, the stress in which it begins.
     """
 
@@ -44,6 +45,7 @@ class Body:
     mass: NDArray[np.float64]
     free: NDArray[np.bool_]
     initial_stress: NDArray[np.float64] | None = None
+    lumped: float = 0.0
     begin: Callable[[NonlinearElements], None] | None = None
 
     @property

@@ -163,7 +163,8 @@ class Shock(Parameters):
     are averaged. ``identical_joints`` repeats the shock under a flat package on truncated spheres of the solder's
     volume: what the joints' own shapes change is the difference. A ``duration`` that is ``auto`` ends when the joints'
     first peak has passed and half a swing of the board brought no higher one, at the latest a period of the board after
-    the pulse. ``filter`` is that of the package's acceleration.
+    the pulse. ``filter`` is that of accelerations and strain rates. ``modes`` is how many natural frequencies of the
+    board are wanted, the lowest ones; of a quarter those that are symmetric.
     """
 
     service_condition: ServiceCondition | None = None
@@ -175,6 +176,7 @@ class Shock(Parameters):
     picture_times: Annotated[tuple[Annotated[float, Field(ge=0)], ...], Quantity("ms")] = ()
     joint_layer: Annotated[float, Quantity("um")] = Field(JOINT_LAYER, gt=0, le=1e-3)
     identical_joints: bool = False
+    modes: int = Field(0, ge=0, le=200)
     method: Literal["direct", "large_mass"] = "direct"
     gravity: Literal["auto", "on", "off"] = "auto"
     damping: Damping = Damping()
