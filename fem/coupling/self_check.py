@@ -32,7 +32,7 @@ class SelfCheck:
         macro_mass: Mass of the macro model [kg].
         interface_mass: Mass that the meso model gives to the nodes of the interface [kg].
         meso_mass: Its other mass [kg].
-        volume_mass: Density times volume of both [kg].
+        volume_mass: Density times volume of both, and lumped masses [kg].
     """
 
     rigid: float
@@ -140,11 +140,11 @@ def load_errors(
 
 
 def masses(bodies: Mapping[Role, Body]) -> NDArray[np.float64]:
-    """Return this rank's masses ``(4,)`` [kg]: macro model, interface, rest of the meso model, density times volume."""
+    """Return this rank's masses ``(4,)`` [kg]: macro model, interface, rest of the meso model, volumes and lumped."""
     found = np.zeros(4)
     for role, body in bodies.items():
         own = np.where(body.shared.owned, body.mass, 0.0)
         at_interface = float(own[body.interface[body.interface >= 0]].sum())
         found[:3] += [own.sum(), 0.0, 0.0] if role == "macro" else [0.0, at_interface, own.sum() - at_interface]
-        found[3] += float(body.elements.density @ body.geometry.volume)
+        found[3] += float(body.elements.density @ body.geometry.volume) + body.lumped
     return found

@@ -11,7 +11,7 @@ from reflowshock.fem.division.chebyshev import LARGEST_DAMPING
 from reflowshock.fem.division.choose_levels import SUBSTEP_COST, Pace, choose_levels
 from reflowshock.fem.division.division import Choice, Division, Rules, SchemeName, choose_scheme
 from reflowshock.fem.division.whole import Survey, Whole
-from reflowshock.fem.errors import LevelError
+from reflowshock.fem.errors import CouplingError, LevelError
 from reflowshock.fem.estimates.estimate import (
     BOARD_ADVANTAGE,
     UPDATES_PER_SECOND,
@@ -44,8 +44,16 @@ def divide(whole: Whole, survey: Survey, rules: Rules) -> Division:
 
 
 def scheme_for(whole: Whole, survey: Survey, rules: Rules) -> Choice:
-    """Return the scheme that the user wants, or that the problem calls for, and why."""
+    """Return the scheme that the user wants, or that the problem calls for, and why.
+
+    Raises:
+        CouplingError: Local steps are wanted, and supports have springs.
+    """
     wanted = rules.coupling.scheme
+    if wanted == "local_steps" and rules.sprung:
+        raise CouplingError(
+            "coupling.scheme = local_steps is for supports without springs, which take no smaller steps"
+        )
     if rules.copied is not None:
         return Choice("held_velocity", "coupling.direction = one_way: nothing comes back that could grow")
     if wanted != "auto":
@@ -53,7 +61,9 @@ def scheme_for(whole: Whole, survey: Survey, rules: Rules) -> Choice:
     coarse_step = float(survey.step[rules.coarse].min(initial=np.inf))
     light = rules.stiffness <= LARGEST_DAMPING * rules.fraction * coarse_step
     linear = bool(survey.linear.all())
-    choice = choose_scheme(linear and light, bool(by_buffer(whole, survey, rules).macro.any()))
+    choice = choose_scheme(linear and light and not rules.sprung, bool(by_buffer(whole, survey, rules).macro.any()))
+    if linear and rules.sprung:
+        return Choice(choice.scheme, "springs of supports take no local steps")
     if linear and not light:
         return Choice(choice.scheme, f"stiffness-proportional damping of {rules.stiffness:.3g} s leaves no local steps")
     return choice

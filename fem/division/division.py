@@ -26,6 +26,7 @@ class Rules:
         samples: History samples wanted.
         copied: One way, ``(ne,)`` fine cells of which the driving model has a coarse copy.
         copy: These copies.
+        sprung: Whether supports have springs.
     """
 
     coupling: Coupling
@@ -36,6 +37,7 @@ class Rules:
     samples: int
     copied: NDArray[np.bool_] | None = None
     copy: NDArray[np.bool_] | None = None
+    sprung: bool = False
 
     def plan(self, macro_step: float, meso_step: float) -> WindowPlan:
         """Return the windows that follow from two critical steps [s]."""

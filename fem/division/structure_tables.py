@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from reflowshock.fem.division.fitted import FittedTable, Shares, fitted
 from reflowshock.fem.division.split import Part
 from reflowshock.fem.division.tables import Tables, present
 from reflowshock.fem.division.whole import Whole
@@ -14,10 +15,9 @@ from reflowshock.fem.estimates.material_effects import plastic_laws
 from reflowshock.fem.mesh.facet_areas import OutwardFacets, facet_set, outward_areas, outward_facets
 from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.mesh.point_shares import point_shares
-from reflowshock.fem.mesh.point_table import PointTable, Support, point_table
 from reflowshock.fem.mesh.tie import tie_joints
+from reflowshock.fem.problem.fittings import AXES
 from reflowshock.fem.problem.structure import (
-    AXES,
     AtPoint,
     InputG,
     OnAreas,
@@ -26,7 +26,6 @@ from reflowshock.fem.problem.structure import (
     StructureProblem,
 )
 
-Shares = tuple[NDArray[np.integer], NDArray[np.float64]]
 NODES = {"hexahedron": 8, "tetrahedron": 4, "tetrahedron_quadratic": 10}
 
 
@@ -40,24 +39,17 @@ class StructureTables(Tables):
         pressed: Name -> the same facet set, for a pressure that follows it.
         pushed: Name of a force at a point -> nodes and their shares in it; on planes of symmetry they add up to the
             part that the meshed body bears.
-        bedded: Name of an elastic support -> its facets.
-        masses: Nodes and what they bear of lumped masses [kg].
-        watch: Watch points and supports.
+        fitted: Watch points, gauges, supports and lumped masses.
     """
 
     nodes_of: dict[str, NDArray[np.integer]]
     areas: dict[str, tuple[NDArray[np.integer], NDArray[np.float64]]]
     pressed: dict[str, OutwardFacets]
     pushed: dict[str, Shares]
-    bedded: dict[str, OutwardFacets]
-    masses: Shares
-    watch: PointTable
+    fitted: FittedTable
 
     def counted(self, part: Part, node: NDArray[np.int32], cell: NDArray[np.int32]) -> dict[str, Any]:
-        """Return facet sets, watch points and supports."""
-        supports: dict[str, Support] = {
-            name: (present(node[nodes]), held) for name, (nodes, held) in self.watch.supports.items()
-        }
+        """Return facet sets and what is fitted."""
         return {
             "nodes_of": {name: present(node[nodes]) for name, nodes in self.nodes_of.items()},
             "areas": {
@@ -70,12 +62,7 @@ class StructureTables(Tables):
             "pushed": {
                 name: (present(node[nodes]), share[node[nodes] >= 0]) for name, (nodes, share) in self.pushed.items()
             },
-            "bedded": {
-                name: replace(item, facets=part.number[item.facets], cells=cell[item.cells])
-                for name, item in self.bedded.items()
-            },
-            "masses": (present(node[self.masses[0]]), self.masses[1][node[self.masses[0]] >= 0]),
-            "watch": replace(self.watch, nodes=node[self.watch.nodes], cells=cell[self.watch.cells], supports=supports),
+            "fitted": self.fitted.within(node, cell, part.number),
         }
 
 
@@ -94,8 +81,7 @@ def structure_tables(whole: Whole, problem: StructureProblem) -> StructureTables
     """Build the tables of a structure.
 
     Raises:
-        MeshError: Watch points outside.
-        LoadError: A facet set without facets, a force outside, or a prescribed motion of what is held.
+        MeshError, LoadError: As ``fitted``; a force outside, or a prescribed motion of what is held.
     """
     mesh, tie = whole.mesh, whole.tie
     moved = [load.on for load in problem.loads.values() if isinstance(load, OnNodes)]
@@ -107,10 +93,7 @@ def structure_tables(whole: Whole, problem: StructureProblem) -> StructureTables
     held = held_by_supports(mesh, problem)
     check_motions(problem, nodes_of, held)
     check_shaken(problem, nodes_of, held)
-    points = {name: point.at for name, point in problem.watch.items()}
-    supports = {
-        name: (nodes_of[support.on], np.isin(list(AXES), support.hold)) for name, support in problem.supports.items()
-    }
+    yields = bool(plastic_laws(problem.layer_materials))
     return StructureTables.undivided(
         whole,
         held,
@@ -118,11 +101,7 @@ def structure_tables(whole: Whole, problem: StructureProblem) -> StructureTables
         areas={name: outward_areas(mesh, name) for name in sorted(pressed)},
         pressed={name: outward_facets(mesh, name) for name in sorted(pressed)},
         pushed=pushed_nodes(mesh, problem),
-        bedded={
-            name: outward_facets(mesh, support.on) for name, support in problem.supports.items() if support.bedding
-        },
-        masses=lumped_masses(mesh, problem),
-        watch=point_table(mesh, points, supports, yields=bool(plastic_laws(problem.layer_materials))),
+        fitted=fitted(mesh, problem.fittings, problem.structure.symmetry, tie.slave, yields),
     )
 
 
@@ -134,21 +113,6 @@ def pushed_nodes(mesh: MeshData, problem: StructureProblem) -> dict[str, Shares]
             nodes, shares = point_shares(mesh, f"loads.{name}.at", load.at)
             found[name] = nodes, shares * 0.5 ** len(problem.structure.planes_at(load.at))
     return found
-
-
-def lumped_masses(mesh: MeshData, problem: StructureProblem) -> Shares:
-    """Return the nodes that bear lumped masses and what each bears [kg], see ``StructureTables``; errors likewise."""
-    nodes, shares = [np.empty(0, np.int64)], [np.empty(0)]
-    for name, item in problem.masses.items():
-        places = problem.structure.meshed_places(item.at, item.footprint)
-        for place, part in places:
-            found, share = point_shares(mesh, f"masses.{name}.at", place)
-            nodes.append(found)
-            shares.append(item.mass * part * share)
-    numbers, where = np.unique(np.concatenate(nodes), return_inverse=True)
-    total = np.zeros(len(numbers))
-    np.add.at(total, where.reshape(-1), np.concatenate(shares))
-    return numbers, total
 
 
 def check_layers(mesh: MeshData, problem: StructureProblem) -> None:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reflowshock.fem.division.division import Division
+from reflowshock.fem.division.fitted import FittedTable, fitted
 from reflowshock.fem.division.split import Part, interface_between, part_of
 from reflowshock.fem.division.whole import Whole
 from reflowshock.fem.estimates.placement import Role
@@ -18,6 +19,7 @@ from reflowshock.fem.mesh.mesh import MeshData, merge_nodes
 from reflowshock.fem.mesh.supports import HELD, held_components
 from reflowshock.fem.mesh.tie import Tie, tie_joints
 from reflowshock.fem.mesh.watch_table import WatchTable, whole_watch
+from reflowshock.fem.problem.fittings import Fittings
 from reflowshock.fem.problem.shock import JOINT_LAYER
 
 
@@ -95,15 +97,26 @@ class JointTables(Tables):
         watch: Its watch points.
         shaken: ``(k,)`` nodes of the mounting holes.
         interface: Where its joints meet the package.
+        fitted: Watch points, gauges, supports and lumped masses of the board.
     """
 
     watch: WatchTable
     shaken: NDArray[np.int32]
     joint_interface: JointInterfaceTable
+    fitted: FittedTable
 
     @classmethod
-    def of(cls, whole: Whole, rules: Mapping[str, Sequence[int]], layer: float) -> Self:
-        """Find out what is held, as ``rules`` say, and watched: joints with a ``layer`` [m] of solder at the pads."""
+    def of(
+        cls, whole: Whole, rules: Mapping[str, Sequence[int]], layer: float, given: FittedTable | None = None
+    ) -> Self:
+        """Find out what is held and watched.
+
+        Args:
+            whole: The mesh.
+            rules: What is held, as ``HELD``.
+            layer: Thickness of the solder at the pads over which stress is averaged [m].
+            given: What is fitted to the board, if anything is.
+        """
         mesh = whole.mesh
         return cls.undivided(
             whole,
@@ -111,14 +124,16 @@ class JointTables(Tables):
             watch=whole_watch(mesh, layer),
             shaken=mesh.facet_nodes("mounting_holes"),
             joint_interface=whole_joint_interface(mesh),
+            fitted=given or fitted(mesh, Fittings(), (), whole.tie.slave, yields=False),
         )
 
     def counted(self, part: Part, node: NDArray[np.int32], cell: NDArray[np.int32]) -> dict[str, Any]:
-        """Return watch points, shaken nodes and interfaces of joints."""
+        """Return watch points, shaken nodes, interfaces of joints, and what is fitted to the board."""
         return {
             "watch": self.watch.within(node, cell, part.number),
             "shaken": present(node[self.shaken]),
             "joint_interface": self.joint_interface.within(cell),
+            "fitted": self.fitted.within(node, cell, part.number),
         }
 
 
@@ -157,6 +172,7 @@ def model_inputs(
     division: Division | Literal["dns"],
     rules: Mapping[str, Sequence[int]] = HELD,
     layer: float = JOINT_LAYER,
+    given: FittedTable | None = None,
 ) -> dict[Role, ModelInput[JointTables]]:
     """Split a package on a board into its models; arguments as ``JointTables.of``.
 
@@ -166,7 +182,7 @@ def model_inputs(
     Raises:
         MeshError: A pad has no solder, or the layer is thicker than a joint.
     """
-    tables = JointTables.of(whole, rules, layer)
+    tables = JointTables.of(whole, rules, layer, given)
     if division != "dns":
         return split(whole, tables, division)
     part = part_of(whole, np.ones(len(whole.mesh.cells), dtype=bool))

@@ -1,11 +1,12 @@
 """The whole mesh of a run before it is divided: its ties, and what each of its elements is like."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from reflowshock.fem.division.fitted import FittedTable
 from reflowshock.fem.elements.element import critical_steps, element_geometry
 from reflowshock.fem.elements.hexahedron import HEXAHEDRON
 from reflowshock.fem.elements.mesh_elements import elements_of
@@ -17,8 +18,10 @@ from reflowshock.fem.materials.elasticity import materials_of_parts
 from reflowshock.fem.materials.kinematics import Kinematics
 from reflowshock.fem.materials.parameters import Material
 from reflowshock.fem.materials.roles import Materials
+from reflowshock.fem.mesh.facet import spring_rates
 from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.mesh.tie import Tie
+from reflowshock.fem.problem.fittings import Support
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,6 +99,18 @@ def survey(mesh: MeshData, materials: Materials | Mapping[str, Material], treatm
         linear=linear,
         cost=np.where(linear, np.where(box, 1.0, BOARD_ADVANTAGE), BOARD_ADVANTAGE * by_path),
     )
+
+
+def on_springs(survey: Survey, mesh: MeshData, table: FittedTable | None, supports: Mapping[str, Support]) -> Survey:
+    """Return a survey with the critical steps that elements have on their elastic supports."""
+    faster = np.zeros(len(survey.plain_step))
+    for name, found in table.bedded.items() if table else ():
+        cells, corners = mesh.cells[found.cells], mesh.points[found.facets]
+        geometry = element_geometry(mesh.points, cells)
+        mass = (survey.mass[found.cells] / geometry.volume)[:, None] * geometry.nodal_volume
+        rates = spring_rates(cells, found.facets, mass, corners, np.array(supports[name].stiffness))
+        np.add.at(faster, found.cells, rates)
+    return replace(survey, plain_step=2.0 / np.sqrt((2.0 / survey.plain_step) ** 2 + faster))
 
 
 def mass_factors(role: NDArray[np.str_], step: NDArray[np.float64], scaled: Sequence[str]) -> NDArray[np.float64]:

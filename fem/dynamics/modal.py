@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from reflowshock.fem.errors import AgreedError
-from reflowshock.fem.model.factorisation import make_direct
+from reflowshock.fem.model.factorisation import Factorisation, make_direct
 from reflowshock.fem.model.global_matrix import Equations
 
 try:
@@ -108,12 +108,22 @@ def diagonal_matrix(diagonal: PETSc.Vec) -> PETSc.Mat:
 def scipy_modes(
     stiffness: PETSc.Mat, mass: PETSc.Vec, shift: float, count: int
 ) -> tuple[NDArray[np.float64], list[PETSc.Vec]]:
-    """Return the same with ARPACK and SuperLU, on one rank; slower, and with several times the fill."""
+    """Return the same with ARPACK, on one rank."""
     if stiffness.comm.size > 1:
         raise ValueError("modes on several ranks need SLEPc (package python3-slepc4py-real)")
+    shifted, right, solution = stiffness.copy(), mass.duplicate(), mass.duplicate()
+    shifted.setDiagonal(stiffness.getDiagonal() - shift * mass)
+    factor = Factorisation(shifted)
+
+    def solve(values: NDArray[np.float64]) -> NDArray[np.float64]:
+        right.array = values
+        factor.solve(right, solution)
+        return solution.array.copy()
+
     matrix = scipy.sparse.csr_matrix(stiffness.getValuesCSR()[::-1], shape=stiffness.size)
-    diagonal = scipy.sparse.diags(mass.array, format="csc")
-    values, columns = scipy.sparse.linalg.eigsh(matrix.tocsc(), count, diagonal, sigma=shift, tol=TOLERANCE)
+    diagonal, inverse = scipy.sparse.diags(mass.array), scipy.sparse.linalg.LinearOperator(matrix.shape, solve)
+    values, columns = scipy.sparse.linalg.eigsh(matrix, count, diagonal, sigma=shift, OPinv=inverse, tol=TOLERANCE)
+    factor.free()
     vectors = [mass.duplicate() for _ in range(count)]
     for vector, column in zip(vectors, columns.T, strict=True):
         vector.array = column

@@ -3,14 +3,22 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal, NamedTuple, Protocol
+from typing import Any, Literal, NamedTuple, Protocol
 
 from reflowshock.effect import Decision, Effect, Switch, Toggle, decision
-from reflowshock.fem.estimates.material_effects import MATERIAL_EFFECTS, MaterialEffect
+from reflowshock.fem.estimates.material_effects import (
+    OF_YIELD_STRESS,
+    MaterialEffect,
+    Plasticity,
+    plastic_laws,
+    yields,
+)
 from reflowshock.fem.materials.kinematics import Kinematics, finite_rotation
+from reflowshock.fem.materials.library import SAC405
 from reflowshock.fem.materials.parameters import Material
 from reflowshock.fem.problem.failure import Failure
 from reflowshock.fem.problem.shock import Shock
+from reflowshock.parameters import changed
 
 NEGLIGIBLE_WEIGHT = 1e-3  # of the peak acceleration: weight below it is left out
 # A strip between ends that do not approach each other: w deflects it against k w (1 + 3 (w / t)^2), since its tension
@@ -21,6 +29,7 @@ STIFFENING_BOUND = 3.0
 # 1.09), so that what it predicts is right within a factor of two.
 STIFFENING_OF_BOARD = 0.35
 NEGLIGIBLE_STIFFENING = 1e-2  # of the deflection, by the bound
+YIELDS_FROM = 0.5  # of the yield stress, by the peel stress of a pad: von Mises stress is up to 1.6 times that
 ADDED_MASS_LIMIT = 0.05  # of the mass of the model, by mass scaling
 
 
@@ -54,6 +63,10 @@ class Drop(Protocol):
     @property
     def weight(self) -> Decision:
         """Whether weight acts, from g over the peak acceleration."""
+
+    @property
+    def yielding(self) -> Decision:
+        """Whether solder yields that can, from the expected peel stress over its yield stress."""
 
     @property
     def cooled(self) -> bool:
@@ -199,6 +212,47 @@ class FiniteRotation(DropEffect):
         return decision(*finite_rotation("shock.numerics", kinematics, run.neglected_strain))
 
 
+class SolderPlasticity(DropEffect):
+    """Solder that yields and hardens."""
+
+    name, adds, place, source = Plasticity.name, Plasticity.adds, Plasticity.place, Plasticity.source
+    number = "expected peel stress / sigma_y, peel = K sqrt(k E t^3 / 12) pitch^2 / A, board bent by K on springs k"
+    threshold = YIELDS_FROM
+    influence = Plasticity.influence
+    switch = "shock.numerics.plasticity = auto, on, off; materials.solder = SAC405 …"
+
+    @staticmethod
+    def called_for(switch: Switch, materials: Mapping[str, Material], stress: float, cooled: bool) -> Decision:
+        """Decide whether solder yields that bears an expected peel stress [Pa], or cools down before."""
+        law = materials["solder"].plasticity
+        if law is None:
+            return decision(False, "the solder is elastic")
+        told = f"shock.numerics.plasticity = {switch}; {yields('solder', law)}"
+        if switch != "auto":
+            return decision(switch == "on", told)
+        ratio = stress / law.A
+        told += f"; a peel stress of {1e-6 * stress:.3g} MPa is expected, {ratio:.3g} of that"
+        if cooled:
+            return decision(True, f"{told}; it yields while it cools")
+        on = ratio >= YIELDS_FROM
+        return decision(on, f"{told}, {'at least' if on else 'below'} {YIELDS_FROM:g}")
+
+    def decide(self, drop: Drop) -> Decision:
+        """By the stress that is expected."""
+        return drop.yielding
+
+    def tell(self, run: DropRun) -> Decision:
+        """Tell the laws that acted."""
+        laws = plastic_laws(run.materials)
+        why = f"shock.numerics.plasticity = {run.shock.numerics.plasticity}"
+        return decision(bool(laws), "; ".join([why, *(yields(name, law) for name, law in laws.items())]))
+
+    def other_way(self, case: Any, acts: bool) -> Any:
+        """Return a package's case with solder that stays elastic, or that yields."""
+        able = case if acts or case.materials.solder.plasticity else changed(case, "materials.solder", SAC405)
+        return changed(able, "shock.numerics.plasticity", "off" if acts else "on")
+
+
 class RayleighEffect(DropEffect):
     """Rayleigh damping."""
 
@@ -325,7 +379,8 @@ DROP_EFFECTS: tuple[DropEffect | MaterialEffect, ...] = (
     WeightEffect(),
     FiniteRotation(),
     RayleighEffect(),
-    *MATERIAL_EFFECTS,
+    SolderPlasticity(),
+    *OF_YIELD_STRESS,
     Failing(),
     DrivenJoints(),
     MassScaling(),

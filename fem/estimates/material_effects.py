@@ -2,13 +2,10 @@
 
 from collections.abc import Mapping
 from math import log
-from typing import Any, Protocol
+from typing import Protocol
 
 from reflowshock.effect import Decision, Effect, decision
-from reflowshock.fem.materials.library import SAC405
 from reflowshock.fem.materials.parameters import Isotropic, JohnsonCook, Material
-from reflowshock.fem.materials.roles import Materials
-from reflowshock.parameters import changed
 
 RATE_OF_DROPS = 100.0  # [1/s] of solder: cases/bga_drop finds up to 50
 
@@ -56,16 +53,6 @@ class Plasticity(MaterialEffect):
         """Say from which stress on each yields."""
         return decision(True, "; ".join(yields(name, law) for name, law in laws.items()))
 
-    def other_way(self, case: Any, acts: bool) -> Any | None:
-        """Return a package's case with elastic materials, or with solder that yields."""
-        if not isinstance(case.materials, Materials):
-            return None
-        if not acts:
-            return changed(case, "materials.solder", SAC405)
-        roles = {role: material for role, material in case.materials.by_role.items() if material.plasticity is not None}
-        elastic = {role: material.model_copy(update={"plasticity": None}) for role, material in roles.items()}
-        return changed(case, "materials", case.materials.model_copy(update=elastic))
-
 
 class StrainRate(MaterialEffect):
     """Yield stress that rises with the rate."""
@@ -109,7 +96,8 @@ class ThermalSoftening(MaterialEffect):
         return decision(bool(soft), why, 1.0 - min(soft.values(), default=1.0))
 
 
-MATERIAL_EFFECTS: tuple[MaterialEffect, ...] = (Plasticity(), StrainRate(), ThermalSoftening())
+OF_YIELD_STRESS: tuple[MaterialEffect, ...] = (StrainRate(), ThermalSoftening())
+MATERIAL_EFFECTS: tuple[MaterialEffect, ...] = (Plasticity(), *OF_YIELD_STRESS)
 
 
 def plastic_laws(materials: Mapping[str, Material]) -> dict[str, JohnsonCook]:

@@ -20,7 +20,6 @@ class BeddedFacets:
         name: Of the support.
         stiffness: ``(3,)`` [N/m^3] along x, y, z.
         cells: ``(nf,)`` local cell of each facet.
-        largest: ``(nf, m)`` [m^2] row sums of the facets' matrices, which as diagonals are no softer.
         facets: ``(nf, m)`` local nodes.
         nodes: ``(k,)`` local nodes of all of them.
         matrix: ``(k, k)`` [m^2] integral of products of their shape functions.
@@ -31,7 +30,6 @@ class BeddedFacets:
     stiffness: NDArray[np.float64]
     cells: NDArray[np.integer]
     facets: NDArray[np.int32]
-    largest: NDArray[np.float64]
     nodes: NDArray[np.int32]
     matrix: scipy.sparse.csr_matrix
     history: dict[str, NDArray] = field(default_factory=dict)
@@ -50,7 +48,7 @@ class BeddedFacets:
         row, column = np.broadcast_to(place[:, :, None], blocks.shape), np.broadcast_to(place[:, None], blocks.shape)
         size = len(nodes), len(nodes)
         matrix = scipy.sparse.coo_matrix((blocks.ravel(), (row.ravel(), column.ravel())), shape=size).tocsr()
-        return cls(name, np.array(stiffness), cells[here], facets, blocks.sum(axis=2), nodes, matrix)
+        return cls(name, np.array(stiffness), cells[here], facets, nodes, matrix)
 
     def force(self, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the forces ``(k, 3)`` [N] on its nodes at a displacement ``(n, 3)`` [m] of all nodes."""

@@ -46,11 +46,11 @@ class RayleighDamping(Load):
     def build(cls, body: Body, coefficients: tuple[float, float]) -> "RayleighDamping":
         """Make the damping of a body from alpha [1/s] and beta [s]; K is that of its elastic elements.
 
-        The terms of the body serve for it unless they have a path.
+        The terms of the body serve for it where they are linear.
         """
-        paths = any(term.history for term in body.terms)
+        nonlinear = body.turns or any(term.history for term in body.terms)
         linear = [term for term in body.terms if not isinstance(term, Pretension)]
-        return cls(*coefficients, linear_terms(body.elements) if paths and coefficients[1] else linear)
+        return cls(*coefficients, linear_terms(body.elements) if nonlinear and coefficients[1] else linear)
 
     def begin(self, motion: Loaded) -> None:
         """Make room."""

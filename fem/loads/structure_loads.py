@@ -13,8 +13,9 @@ from reflowshock.fem.loads.large_mass import LargeMass
 from reflowshock.fem.loads.load import BodyAcceleration, Load, NodalForces, PrescribedVelocity
 from reflowshock.fem.loads.pulse import Pulse
 from reflowshock.fem.model.body import Body
+from reflowshock.fem.problem.fittings import AXES
 from reflowshock.fem.problem.shock import Damping
-from reflowshock.fem.problem.structure import AXES, Gravity, InputG, PointForce, Pressure, StructureProblem
+from reflowshock.fem.problem.structure import Gravity, InputG, PointForce, Pressure, StructureProblem
 
 
 def structure_loads(

@@ -70,6 +70,30 @@ def bedding_matrices(corners: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.einsum("q,qa,qb,fq->fab", rule.weights, rule.values, rule.values, area)
 
 
+def spring_rates(
+    cells: NDArray[np.integer],
+    facets: NDArray[np.integer],
+    mass: NDArray[np.float64],
+    corners: NDArray[np.float64],
+    stiffness: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Return by how much springs raise the largest omega^2 of their elements at most: ``(nf,)`` [1/s^2].
+
+    A facet's springs count in its element alone, as stiff as their row sums: no mode is then faster than the fastest
+    element, whose omega^2 = 4 / dt^2 grows by at most the largest ratio of spring and mass at its nodes.
+
+    Args:
+        cells: ``(nf, k)`` nodes of the element of each facet.
+        facets: ``(nf, m)`` nodes of the facets.
+        mass: ``(nf, k)`` [kg] of the element at each of its nodes.
+        corners: ``(nf, m, 3)`` [m] of the facets.
+        stiffness: ``(3,)`` [N/m^3].
+    """
+    at_facet = (cells[:, None, :] == facets[:, :, None]).argmax(axis=2)
+    largest = bedding_matrices(corners).sum(axis=2)
+    return np.asarray(stiffness.max() * (largest / np.take_along_axis(mass, at_facet, axis=1)).max(axis=1))
+
+
 def normals(corners: NDArray[np.float64], rule: FacetRule) -> NDArray[np.float64]:
     """Return the normals ``(nf, q, 3)`` [m^2] at the points of a rule, as long as the area of its reference facet."""
     tangent = np.einsum("fai,qad->fqid", corners, rule.derivatives)

@@ -1,4 +1,4 @@
-"""Watch points of a structure and its supports in input numbers.
+"""Watch points, strain gauges and supports of a structure or a board in input numbers.
 
 Strain and stress at a point follow from a linear field fitted to the means of the elements around it, which are their
 best known values (superconvergent patch recovery: Zienkiewicz & Zhu, IJNME 33, 1992). Two rings of elements carry it to
@@ -7,12 +7,13 @@ value is that of the layer's middle.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from reflowshock.fem.errors import MeshError
+from reflowshock.fem.mesh.gauge_table import GaugeTable
 from reflowshock.fem.mesh.mesh import MeshData
 
 NEARNESS = 2.0  # in the weight exp(-2 d^2) of an element, d its distance in sizes of the nearest ones
@@ -26,7 +27,7 @@ COMPONENTS = {"displacement": 3, "velocity": 3, "strain": 6, "stress": 6, "plast
 
 @dataclass(frozen=True, slots=True)
 class PointTable:
-    """Watch points and supports in input numbers.
+    """Watch points, gauges and supports in input numbers.
 
     Attributes:
         names: Of the points.
@@ -39,6 +40,7 @@ class PointTable:
         supports: Name -> nodes of a support, and ``(3,)`` which components it holds.
         quantities: What is watched, of ``COMPONENTS``.
         extent: Of the mesh [m].
+        gauges: Strain gauges.
     """
 
     names: tuple[str, ...]
@@ -51,6 +53,15 @@ class PointTable:
     supports: dict[str, Support]
     quantities: tuple[str, ...]
     extent: float
+    gauges: GaugeTable = field(default_factory=GaugeTable.none)
+
+    def within(self, node: NDArray[np.integer], cell: NDArray[np.integer]) -> "PointTable":
+        """Return the part of a model, in its numbers of nodes ``(n,)`` and cells ``(ne,)``: -1 where another has it."""
+        supports: dict[str, Support] = {
+            name: (node[nodes][node[nodes] >= 0], held) for name, (nodes, held) in self.supports.items()
+        }
+        nodes, cells = node[self.nodes], cell[self.cells]
+        return replace(self, nodes=nodes, cells=cells, supports=supports, gauges=self.gauges.within(node))
 
     @property
     def displaced(self) -> list[str]:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from reflowshock.fem.elements.element import Elements
 from reflowshock.fem.elements.kind import Geometry
 from reflowshock.fem.forces.force import ForceTerm
+from reflowshock.fem.forces.force_corotational import CorotationalBoxes
 from reflowshock.fem.forces.force_nonlinear import NonlinearElements
 from reflowshock.fem.mesh.tie import Tie
 from reflowshock.fem.parallel.exchange import SharedNodes
@@ -30,6 +31,7 @@ class Body:
         mass: ``(n,)`` [kg] lumped mass, of slaves moved to their masters.
         free: ``(n, 3)`` whether a displacement component follows from forces.
         initial_stress: ``(ne, 6)`` [Pa] mean stress of linear elements at no displacement; None where there is none.
+        lumped: Lumped masses at the nodes that this rank counts [kg].
         begin: Gives elements with a path, on the nodes of the body, the stress in which it begins.
     """
 
@@ -43,4 +45,13 @@ class Body:
     mass: NDArray[np.float64]
     free: NDArray[np.bool_]
     initial_stress: NDArray[np.float64] | None = None
+    lumped: float = 0.0
     begin: Callable[[NonlinearElements], None] | None = None
+
+    @property
+    def turns(self) -> bool:
+        """Return whether rotations of elements on this rank are more than small."""
+        return any(
+            isinstance(term, CorotationalBoxes) or (isinstance(term, NonlinearElements) and term.finite)
+            for term in self.terms
+        )

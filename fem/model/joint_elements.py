@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reflowshock.fem.elements.hexahedron import HEXAHEDRON
+from reflowshock.fem.forces.force_corotational import CorotationalBoxes
 from reflowshock.fem.forces.force_nonlinear import NonlinearElements, PointValues
 from reflowshock.fem.kernels.nonlinear import Path
 from reflowshock.fem.kernels.plasticity import NEVER_YIELDS
@@ -15,13 +16,13 @@ from reflowshock.fem.parallel.local_mesh import positions
 
 
 class ElasticHexahedra:
-    """Linear elements, computed anew from rest as elements with points: the same element in either formulation."""
+    """Elastic elements, computed anew from rest as elements with points: the same element in either formulation."""
 
-    def __init__(self, body: Body, chosen: NDArray[np.integer]) -> None:
-        """Take elements ``chosen (k,)`` of a body with the stress in which it begins."""
+    def __init__(self, body: Body, chosen: NDArray[np.integer], finite: bool = False) -> None:
+        """Take elements ``chosen (k,)`` of a body with the stress in which it begins; ``finite`` ones turn."""
         plastic = np.tile(NEVER_YIELDS, (len(body.elements.elasticity), 1))
         elements = replace(body.elements, kind=HEXAHEDRON)
-        self._term = NonlinearElements.build(elements, np.asarray(chosen), plastic, Path(False, np.inf))
+        self._term = NonlinearElements.build(elements, np.asarray(chosen), plastic, Path(finite, np.inf))
         if body.begin is not None:
             body.begin(self._term)
         self._start = {name: values.copy() for name, values in self._term.history.items()}
@@ -36,6 +37,26 @@ class ElasticHexahedra:
     def points(self) -> PointValues:
         """Return the values at the points at the latest displacement."""
         return self._term.points(*self._place)
+
+
+class TurningBoxes:
+    """Boxes that turn and strain little: their own force; points as elements with finite strains have them."""
+
+    def __init__(self, body: Body, chosen: NDArray[np.integer]) -> None:
+        """Take elements ``chosen (k,)`` of a body, corotational boxes of it."""
+        self._boxes = CorotationalBoxes.build(body.elements, np.asarray(chosen))
+        self._points = ElasticHexahedra(body, chosen, finite=True)
+        self._displacement = np.zeros_like(body.local.points)
+
+    def add(self, displacement: NDArray[np.float64], force: NDArray[np.float64]) -> None:
+        """Subtract the internal force ``(n, 3)`` [N] at a displacement ``(n, 3)`` [m]."""
+        self._boxes.add(displacement, force)
+        self._displacement[...] = displacement
+
+    def points(self) -> PointValues:
+        """Return the values at the points at the latest displacement."""
+        self._points.add(self._displacement, np.zeros_like(self._displacement))
+        return self._points.points()
 
 
 class FollowingElements:
@@ -67,22 +88,23 @@ class JointElements:
         self._body, self._size = body, len(chosen)
         self._levels = levels_of(body.terms)
         left = np.ones(len(chosen), dtype=bool)
-        self._paths: list[tuple[NDArray[np.intp], FollowingElements]] = []
+        self._nonlinear: list[tuple[NDArray[np.intp], FollowingElements | TurningBoxes]] = []
         for term in body.terms:
-            if isinstance(term, NonlinearElements):
+            if isinstance(term, NonlinearElements | CorotationalBoxes):
                 place = positions(term.numbers, chosen)
                 rows = np.flatnonzero(place >= 0)
                 left[rows] = False
-                if len(rows):
-                    self._paths.append((rows, FollowingElements(term, place[rows])))
-        self._elastic = [
+                if len(rows) and isinstance(term, NonlinearElements):
+                    self._nonlinear.append((rows, FollowingElements(term, place[rows])))
+                elif len(rows):
+                    self._nonlinear.append((rows, TurningBoxes(body, chosen[rows])))
+        self._linear = [
             (k, rows, ElasticHexahedra(body, chosen[rows]))
             for k in np.unique(level[chosen])
             if len(rows := np.flatnonzero(left & (level[chosen] == k)))
         ]
-        yielding = np.flatnonzero(~left)
         plain = replace(body, begin=None)
-        self._damped = ElasticHexahedra(plain, chosen[yielding]) if len(yielding) else None
+        self._damped = None if left.all() else ElasticHexahedra(plain, chosen[~left])
 
     def forces(self, displacement: NDArray[np.float64], damping: NDArray[np.float64] | None) -> NDArray[np.float64]:
         """Return what the elements' nodes are pulled by ``(n, 3)`` [N]; collective where a body has levels.
@@ -97,10 +119,10 @@ class JointElements:
             felt += list(levels.means(felt[0]))
         for values in felt[1:]:
             self._body.tie.spread(values)
-        for level, _, elements in self._elastic:
+        for level, _, elements in self._linear:
             elements.add(felt[level], force)
-        for _, path in self._paths:
-            path.add(displacement, force)
+        for _, nonlinear in self._nonlinear:
+            nonlinear.add(displacement, force)
         if damping is not None and self._damped is not None:
             self._damped.add(damping, force)
         return force
@@ -115,7 +137,7 @@ class JointElements:
             ``(3, parts, k)``, at the displacement of the latest ``forces``.
         """
         result = np.zeros((3, *weight.shape[:2]))
-        for rows, elements in [(rows, item) for _, rows, item in self._elastic] + self._paths:
+        for rows, elements in [*((rows, item) for _, rows, item in self._linear), *self._nonlinear]:
             found, own = elements.points(), weight[:, rows]
             if found.weight.shape[1] == 1:
                 own = own.sum(axis=2, keepdims=True)

@@ -20,6 +20,7 @@ from reflowshock.fem.division.whole import Survey, Whole
 from reflowshock.fem.errors import StepError
 from reflowshock.fem.estimates.estimate import WindowPlan, damped_critical_step
 from reflowshock.fem.estimates.solver_cost import implicit_step
+from reflowshock.fem.forces.bedding import BeddedFacets
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.model.assembly import Pieces, make_body
 from reflowshock.fem.model.power_iteration import highest_frequency
@@ -89,14 +90,20 @@ def undivided(steps: Steps, critical: float, rules: Rules) -> Steps:
     return replace(steps, plan=replace(steps.plan, substeps=substeps), smallest=smallest)
 
 
-def assembled_step(comm: MPI.Comm, model: tuple[Pieces, Tables], mass_factor: NDArray[np.float64]) -> float:
+def assembled_step(
+    comm: MPI.Comm,
+    model: tuple[Pieces, Tables],
+    mass_factor: NDArray[np.float64],
+    beddings: Sequence[BeddedFacets] = (),
+) -> float:
     """Return the critical step [s] of a whole model from its highest frequency, elastic at small strains; collective.
 
     With the certainty of ``power_iteration`` it is not above the true one. It is not for the models of a window, whose
     stability rests on the steps of elements: at the assembled step of a meso model of one joint a window grew by 13 %.
+    ``beddings`` are its elastic supports on this rank.
     """
     body = make_body(comm, *model, mass_factor, None)
-    found = highest_frequency(comm, body, body.terms, body.mass)
+    found = highest_frequency(comm, body, [*body.terms, *beddings], body.mass)
     body.shared.free()
     return found.critical_step
 

@@ -8,6 +8,7 @@ less than 4 %.
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,8 +16,10 @@ from scipy.signal import butter, sosfiltfilt
 
 from reflowshock.fem.loads.pulse import STANDARD_GRAVITY, Pulse
 from reflowshock.fem.problem.filters import LowPass
+from reflowshock.fem.problem.fittings import WatchPoint
 from reflowshock.fem.problem.structure import InputG, StructureProblem
 
+TABLE = (0.0, 0.0, -1.0)  # direction in which the table of a drop is accelerated: the package faces down
 RATE = 10.0  # samples in a period of the filter's corner that are needed
 
 
@@ -79,6 +82,16 @@ def acceleration(time: NDArray[np.float64], displacement: NDArray[np.float64], l
     return Acceleration(time[1:-1], raw, low_passed(raw, step, low_pass))
 
 
+def peaks_of(found: Mapping[str, Acceleration], low_pass: LowPass) -> dict[str, dict[str, Any]]:
+    """Return the peaks [G] of some accelerations as metrics, with their filter; nothing of none."""
+    peaks = {
+        metric: {"value": value, "unit": "G"}
+        for name, course in found.items()
+        for metric, value in course.peaks_in_g(name).items()
+    }
+    return peaks | {"acceleration_filter": {"value": low_pass.label, "unit": ""}} if found else {}
+
+
 def base_displacement(
     time: NDArray[np.float64], problem: StructureProblem, pulses: Mapping[str, Pulse]
 ) -> NDArray[np.float64]:
@@ -115,16 +128,25 @@ def watch_accelerations(
     return found
 
 
-def package_acceleration(arrays: Mapping[str, NDArray], pulse: Pulse, low_pass: LowPass) -> Acceleration | None:
-    """Return that of the package's centre in space along the table's motion, None where samples are too far apart.
+def drop_accelerations(
+    arrays: Mapping[str, NDArray], pulse: Pulse, low_pass: LowPass, watch: Mapping[str, WatchPoint]
+) -> dict[str, Acceleration]:
+    """Return that of the package's centre and of each watch point in space, none where samples are too far apart.
 
     Args:
         arrays: Of the history of a drop: displacements relative to the table, along z against its acceleration.
         pulse: Acceleration of the table [m/s^2].
         low_pass: The filter.
+        watch: Points whose accelerometer may have a direction, else that of the table's motion.
     """
     time = arrays["time"]
     if not is_sampled(time, low_pass):
-        return None
-    table = np.array([pulse.double_integral(one) for one in time])
-    return acceleration(time, table - arrays["die_centre"][:, 2], low_pass)
+        return {}
+    table = np.outer([pulse.double_integral(one) for one in time], TABLE)
+    places = {"package": arrays["die_centre"]} if arrays["die_centre"].any() else {}
+    places |= {name: arrays[f"displacement@{name}"] for name in watch}
+    found = {}
+    for name, place in places.items():
+        along = np.array((watch[name].direction if name in watch else None) or TABLE)
+        found[name] = acceleration(time, (table + place) @ along / np.linalg.norm(along), low_pass)
+    return found

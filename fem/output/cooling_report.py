@@ -90,7 +90,8 @@ def joint_row(world: MPI.Comm, body: Body, tables: JointTables, yields: bool) ->
     world.Allreduce(maxima, most, MPI.MAX)
     row = watch.row(total, most)
     kept = (*STRESSES, "von_mises_max", *(("plastic_strain_max",) if yields else ()))
-    return watch.labels | {name: np.asarray(row[name]) for name in kept}
+    labels = {name: watch.labels[name] for name in ("joints", "joint_layer")}
+    return labels | {name: np.asarray(row[name]) for name in kept}
 
 
 def cell_fields(body: Body, yields: bool) -> dict[str, NDArray[np.float64]]:

@@ -2,8 +2,8 @@
 
 At the nodes of a pad's face the solder gets F_n = f_n + m_n (a_n - g + alpha v_n): f the internal forces of its own
 elements (with those of stiffness-proportional damping), m their mass. The sum over both faces is exactly what all its
-mass needs, sum of m (a - g + alpha v), for force and moment: inner nodes obey the equation of motion. In finite
-kinematics places, area and normal are the present ones.
+mass needs, sum of m (a - g + alpha v), for force and moment: inner nodes obey the equation of motion. Where elements
+turn, places, area and normal are the present ones.
 """
 
 from dataclasses import dataclass
@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from reflowshock.fem.division.tables import JointTables
 from reflowshock.fem.dynamics.motion import Motion
-from reflowshock.fem.forces.force_nonlinear import NonlinearElements
 from reflowshock.fem.mesh.pad_faces import ENDS, PadFaces, facet_sums, section_frame
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.joint_elements import JointElements
@@ -51,7 +50,7 @@ class JointSections:
         self._faces, self._elements, self._tie, self._points = faces, elements, body.tie, local.points
         self._alpha, self._beta = damping
         self._joints = len(watch.joints)
-        self._finite = any(isinstance(term, NonlinearElements) and term.finite for term in body.terms)
+        self._finite = body.turns
         nodes, bearing = local.locate(faces.nodes), local.locate_cells(faces.cells)
         slot = np.full(len(local.points), -1)
         slot[nodes[nodes >= 0]] = faces.node_slot[nodes >= 0]

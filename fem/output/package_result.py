@@ -11,8 +11,10 @@ from numpy.typing import NDArray
 from reflowshock.fem.division.tables import JointTables
 from reflowshock.fem.dynamics.history import History
 from reflowshock.fem.estimates.drop_effects import DropRun, told
+from reflowshock.fem.loads.pulse import STANDARD_GRAVITY
 from reflowshock.fem.loads.shock_pulse import shock_pulse
-from reflowshock.fem.output.acceleration import package_acceleration
+from reflowshock.fem.output.acceleration import drop_accelerations, peaks_of
+from reflowshock.fem.output.point_metrics import gauge_lengths, gauge_metrics, mode_metrics, point_metrics
 from reflowshock.fem.output.ranking import (
     ENDS,
     OUTER_FIBRE,
@@ -24,12 +26,16 @@ from reflowshock.fem.output.ranking import (
     critical_joint,
     ranking_measure,
 )
+from reflowshock.fem.output.response_spectrum import response_spectrum
 from reflowshock.fem.output.result import Outcome, Timings, health, model_summary, peak_memory, quantity, sizes
+from reflowshock.fem.output.structure_modes import ModeTable
 from reflowshock.fem.parallel.communicators import Communicators
 from reflowshock.fem.problem.inputs import RunInput
+from reflowshock.fem.problem.shock import Shock
 
 FORCE_RESIDUAL_LIMIT = 1e-10
 SECTION_RESIDUAL_LIMIT = 1e-6
+SAMPLES = 4000  # of an input, for its spectrum
 METHODS = {"direct": "direct acceleration input", "large_mass": "large mass at the mounting holes"}
 
 
@@ -50,6 +56,7 @@ class PackageReport:
             "largest_tie_move": comms.world.allreduce(max(item.moved for item in tables), MPI.MAX),
             "cut_critical_step": outcome.steps.macro_critical,
             "memory": comms.world.allreduce(peak_memory()),
+            "gauge_lengths": gauge_lengths(tables[0].fitted.points),
         }
 
     def sections(
@@ -70,6 +77,10 @@ class PackageReport:
             | health_metrics(outcome.history, arrays)
             | shock_metrics(arrays)
             | acceleration_metrics(arrays, self.request)
+            | point_metrics(arrays)
+            | gauge_metrics(arrays, self.request.shock.filter)
+            | mode_metrics(outcome.modes)
+            | response_metrics(outcome.modes, self.request.shock, float(arrays["time"][-1]))
             | {"peak_neglected_strain": quantity(outcome.neglected_strain)},
             "health": health(self.request, outcome, checks),
             "effects": effects(self.request, summary, outcome.neglected_strain),
@@ -160,13 +171,19 @@ def has_flow(arrays: Mapping[str, NDArray]) -> bool:
 
 
 def acceleration_metrics(arrays: Mapping[str, NDArray], request: RunInput) -> dict[str, Any]:
-    """Return the peaks of the package's acceleration after the filter; none of a board without a package."""
-    chosen = shock_pulse(request.shock)
-    found = package_acceleration(arrays, chosen.pulse, request.shock.filter) if arrays["die_centre"].any() else None
-    if found is None:
+    """Return the peaks of the accelerations of package and watch points after the filter."""
+    pulse, low_pass = shock_pulse(request.shock).pulse, request.shock.filter
+    return peaks_of(drop_accelerations(arrays, pulse, low_pass, request.watch), low_pass)
+
+
+def response_metrics(modes: ModeTable | None, shock: Shock, end: float) -> dict[str, Any]:
+    """Return the response spectrum of the input, up to the end of the run [s], at the first frequency of the board."""
+    if modes is None:
         return {}
-    peaks = {name: quantity(value, "G") for name, value in found.peaks_in_g("package").items()}
-    return peaks | {"acceleration_filter": quantity(request.shock.filter.label)}
+    pulse, times = shock_pulse(shock).pulse, np.linspace(0.0, end, SAMPLES + 1)
+    values = np.array([pulse.value(time) for time in times.tolist()])
+    [response] = response_spectrum(values, end / SAMPLES, modes.frequency[:1])
+    return {"response_at_first_frequency": quantity(float(response) / STANDARD_GRAVITY, "G")}
 
 
 def flow_metrics(arrays: Mapping[str, NDArray]) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,8 +15,9 @@ from reflowshock.fem.errors import AgreedError
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.global_matrix import Equations
 from reflowshock.fem.output.fields import Fields
+from reflowshock.fem.problem.fittings import AXES
 from reflowshock.fem.problem.inputs import StructureInput
-from reflowshock.fem.problem.structure import AXES, PrescribedMotion
+from reflowshock.fem.problem.structure import PrescribedMotion
 from reflowshock.fem.setup.structure_models import StructureModel
 
 SHOWN = 0.05  # largest displacement of a shape in a field file, in lengths of the structure
@@ -53,7 +55,7 @@ def find_modes(comm: MPI.Comm, model: StructureModel, mass: float, request: Stru
         raise AgreedError(f"dynamics.modes: {error}") from error
     table = ModeTable(modes.frequency, modes.effective_mass / mass)
     if comm.rank == 0:
-        (request.output / "modes.json").write_text(json.dumps(mode_rows(table), indent=1), encoding="utf-8")
+        write_modes(request.output, table)
     write_shapes(comm, replace(model, body=body), request, modes)
     return table
 
@@ -67,6 +69,11 @@ def at_rest_supports(model: StructureModel, request: StructureInput) -> Body:
         nodes = model.body.local.locate(model.tables.nodes_of[on])
         free[nodes[nodes >= 0], components] = False
     return replace(model.body, free=free)
+
+
+def write_modes(folder: Path, table: ModeTable) -> None:
+    """Write ``modes.json``."""
+    (folder / "modes.json").write_text(json.dumps(mode_rows(table), indent=1), encoding="utf-8")
 
 
 def mode_rows(table: ModeTable) -> list[dict[str, Any]]:

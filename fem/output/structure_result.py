@@ -8,14 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reflowshock.fem.division.structure_tables import StructureTables
-from reflowshock.fem.elements.stress import principal_strains, von_mises
 from reflowshock.fem.estimates.structure_effects import effects
 from reflowshock.fem.loads.structure_pulses import pulses_of
 from reflowshock.fem.mesh.point_table import PointTable
 from reflowshock.fem.model.factorisation import FactorCost
-from reflowshock.fem.output.acceleration import watch_accelerations
+from reflowshock.fem.output.acceleration import peaks_of, watch_accelerations
+from reflowshock.fem.output.point_metrics import gauge_lengths, gauge_metrics, mode_metrics, point_metrics
 from reflowshock.fem.output.result import Outcome, Timings, health, model_summary, quantity, sizes
-from reflowshock.fem.output.structure_modes import ModeTable
 from reflowshock.fem.parallel.communicators import Communicators
 from reflowshock.fem.problem.inputs import StructureInput
 
@@ -30,6 +29,7 @@ class StructureReport:
         """Return sizes, steps, masses and where the watch points are; collective, complete on all ranks."""
         structure, steps = self.request.structure, outcome.steps
         tables = next(iter(outcome.models.values())).tables
+        watch = tables.fitted.points
         elements, nodes = sizes(comms, outcome.models)
         return model_summary(comms, steps, self.request.mode) | {
             "solver": self.request.solver,
@@ -42,11 +42,10 @@ class StructureReport:
             "samples": steps.plan.windows // steps.plan.stride,
             "watch": {
                 name: {"node_at": node.tolist(), "strain_at": strain.tolist()}
-                for name, node, strain in zip(
-                    tables.watch.names, tables.watch.points, tables.watch.strain_points, strict=True
-                )
+                for name, node, strain in zip(watch.names, watch.points, watch.strain_points, strict=True)
             },
             "models": elements,
+            "gauge_lengths": gauge_lengths(watch),
         }
 
     def sections(
@@ -65,12 +64,13 @@ class StructureReport:
             | {"energy_balance_error": quantity(outcome.history.balance.balance_error)}
             | energy_metrics(arrays)
             | point_metrics(arrays)
+            | gauge_metrics(arrays, self.request.dynamics.filter)
             | acceleration_metrics(arrays, self.request)
             | layer_metrics(outcome.peaks)
             | mode_metrics(outcome.modes),
             "health": health(self.request, outcome),
             "effects": effects(self.request, summary["added_mass"], outcome.neglected_strain)
-            | strain_effect(tables.watch),
+            | strain_effect(tables.fitted.points),
             "balance": timings.balance,
             **coupling,
         }
@@ -116,33 +116,9 @@ def energy_metrics(arrays: Mapping[str, NDArray]) -> dict[str, Any]:
     return {f"peak_{name}_energy": quantity(peak, "J") for name, peak in peaks.items() if peak > 0.0}
 
 
-def point_metrics(arrays: Mapping[str, NDArray]) -> dict[str, Any]:
-    """Return peaks at watch points and supports: ``<metric>@<name>``."""
-    metrics: dict[str, Any] = {}
-    for name in arrays["watch"]:
-        displacement, stress = arrays[f"displacement@{name}"], arrays[f"stress@{name}"]
-        metrics |= {
-            f"peak_displacement@{name}": quantity(float(np.linalg.norm(displacement, axis=1).max()), "m"),
-            f"displacement_range@{name}": quantity(float(np.ptp(displacement, axis=0).max()), "m"),
-            f"peak_strain@{name}": quantity(float(np.abs(principal_strains(arrays[f"strain@{name}"])).max())),
-            f"peak_von_mises@{name}": quantity(float(von_mises(stress).max()), "Pa"),
-        }
-        if f"plastic_strain@{name}" in arrays:
-            metrics[f"peak_plastic_strain@{name}"] = quantity(float(arrays[f"plastic_strain@{name}"].max()))
-    for name in arrays["supports"]:
-        reaction = np.linalg.norm(arrays[f"reaction@{name}"], axis=1)
-        metrics[f"peak_reaction@{name}"] = quantity(float(reaction.max()), "N")
-    return metrics
-
-
 def acceleration_metrics(arrays: Mapping[str, NDArray], request: StructureInput) -> dict[str, Any]:
     """Return the peaks of the accelerations of watch points after the filter."""
-    found = watch_accelerations(arrays, request, pulses_of(request.loads))
-    if not found:
-        return {}
-    peaks = [course.peaks_in_g(name) for name, course in found.items()]
-    metrics = {metric: quantity(value, "G") for point in peaks for metric, value in point.items()}
-    return metrics | {"acceleration_filter": quantity(request.dynamics.filter.label)}
+    return peaks_of(watch_accelerations(arrays, request, pulses_of(request.loads)), request.dynamics.filter)
 
 
 def layer_metrics(peaks: dict[str, dict[str, float]]) -> dict[str, Any]:
@@ -157,10 +133,3 @@ def layer_metrics(peaks: dict[str, dict[str, float]]) -> dict[str, Any]:
         for field, layers in peaks.items()
         for layer, peak in layers.items()
     }
-
-
-def mode_metrics(modes: ModeTable | None) -> dict[str, Any]:
-    """Return the first four natural frequencies, or as many as were found."""
-    found = [] if modes is None else modes.frequency.tolist()
-    names = ("first", "second", "third", "fourth")
-    return {f"{name}_frequency": quantity(value, "Hz") for name, value in zip(names, found, strict=False)}

@@ -1,4 +1,4 @@
-"""What is watched of a package on a board: centres, joints, board strain."""
+"""What is watched of a package on a board: centres, joints, board strain, watch points and gauges."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +10,7 @@ from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.joint_elements import JointElements
 from reflowshock.fem.model.stress_recovery import StressRecovery
 from reflowshock.fem.output.joint_sections import JointSections, section_values
+from reflowshock.fem.output.watch_points import PointWatch
 from reflowshock.fem.parallel.local_mesh import positions
 
 STRESSES = ("von_mises_board", "von_mises_package")
@@ -17,10 +18,15 @@ FLOWS = ("plastic_strain_board", "plastic_strain_package", "plastic_work_board",
 
 
 class JointWatch:
-    """Centres of board and die, joints and board strain on one rank; a ``watch.Watch``."""
+    """Centres of board and die, joints, board strain and what is fitted to it, on one rank; a ``watch.Watch``."""
 
     def __init__(
-        self, tables: JointTables, body: Body, yields: bool, damping: tuple[float, float] = (0.0, 0.0)
+        self,
+        tables: JointTables,
+        body: Body,
+        yields: bool,
+        damping: tuple[float, float] = (0.0, 0.0),
+        turning: bool = False,
     ) -> None:
         """Find this rank's share of the tables.
 
@@ -29,13 +35,16 @@ class JointWatch:
             body: The model.
             yields: Whether solder flows, in all models of a run alike.
             damping: alpha [1/s] and beta [s] of Rayleigh damping.
+            turning: Whether rotations are finite.
         """
         self._yields, self._table = yields, tables.watch
+        self._points = PointWatch(tables.fitted.points, body, turning)
         table, local = tables.watch, body.local
         self.joints = table.joints
         self.labels: dict[str, NDArray] = {
             "joints": np.array(table.joints, dtype=str),
             "joint_layer": np.array(table.thickness),
+            **self._points.labels,
         }
         centres = local.locate(table.centres)
         self._centres = [(k, int(node)) for k, node in enumerate(centres) if node >= 0 and body.shared.owned[node]]
@@ -59,9 +68,9 @@ class JointWatch:
         """Return this rank's parts; collective where a body has levels.
 
         Returns:
-            Sums: centres (6) [m], those of ``JointSections``, then integrals over the layers of von Mises stress [N m],
-            plastic strain [m^3], plastic work [J] per end and joint. Maxima: von Mises [Pa], plastic strain per joint,
-            largest and minus smallest strain of the board.
+            Sums: centres (6) [m], those of ``PointWatch`` and ``JointSections``, then integrals over the layers of von
+            Mises stress [N m], plastic strain [m^3], plastic work [J] per end and joint. Maxima: von Mises [Pa],
+            plastic strain per joint, largest and minus smallest strain of the board.
         """
         displacement = motion.displacement - motion.base_displacement()
         centres = np.zeros((2, 3))
@@ -70,21 +79,24 @@ class JointWatch:
         sections = self._sections.sums(motion)
         integrals = self._elements.integrals(self._weight)[: 3 if self._yields else 1]
         joints = [np.bincount(self._layer_joint, values, len(self.joints)) for part in integrals for values in part]
-        return np.concatenate([centres.ravel(), sections, *joints]), self._maxima(displacement)
+        points, _ = self._points.sample(motion)
+        return np.concatenate([centres.ravel(), points, sections, *joints]), self._maxima(displacement)
 
     def row(self, sums: NDArray[np.float64], maxima: NDArray[np.float64]) -> dict[str, NDArray[np.float64] | float]:
         """Name the parts that all ranks have combined."""
         layers = STRESSES + FLOWS if self._yields else STRESSES
         largest = ("von_mises_max", "plastic_strain_max") if self._yields else ("von_mises_max",)
-        sections, integrals = np.split(sums[6:], [len(sums) - 6 - len(layers) * len(self.joints)])
-        means = integrals.reshape(-1, 2 * len(self.joints)) / self._table.layer.volume
+        ends = [6, 6 + self._points.size, len(sums) - len(layers) * len(self.joints)]
+        centres, points, sections, integrals = np.split(sums, ends)
+        means = integrals.reshape(len(layers) // 2, -1) / self._table.layer.volume
         return {
-            "board_centre": sums[:3],
-            "die_centre": sums[3:6],
+            "board_centre": centres[:3],
+            "die_centre": centres[3:],
             "board_strain": max(maxima[-2:]),
             **dict(zip(largest, maxima[:-2].reshape(len(largest), -1), strict=True)),
             **dict(zip(layers, means.reshape(len(layers), -1), strict=True)),
             **section_values(sections, self._table.faces),
+            **self._points.row(points, maxima),
         }
 
     def _maxima(self, displacement: NDArray[np.float64]) -> NDArray[np.float64]:

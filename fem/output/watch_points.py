@@ -1,4 +1,4 @@
-"""Watch points of a structure: displacement, velocity, strain and stress at a node, and the reactions of supports."""
+"""Watch points: displacement, velocity, strain, stress at a node; strain gauges; reactions of supports."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,17 +11,21 @@ from reflowshock.fem.model.stress_recovery import StressRecovery
 
 
 class PointWatch:
-    """The watch points and supports of one rank; a ``watch.Watch``."""
+    """The watch points, gauges and supports of one rank; a ``watch.Watch``."""
 
-    def __init__(self, table: PointTable, body: Body) -> None:
-        """Find this rank's share of the table."""
-        self._table, self._tie = table, body.tie
+    def __init__(self, table: PointTable, body: Body, turning: bool) -> None:
+        """Find this rank's share of the table; ``turning`` is whether rotations are finite."""
+        self._table, self._tie, self._turning = table, body.tie, turning
         self.labels: dict[str, NDArray] = {
             "watch": np.array(table.names, dtype=str),
             "watch_points": table.points,
             "strain_points": table.strain_points,
             "supports": np.array(list(table.supports), dtype=str),
+            "gauges": np.array(table.gauges.names, dtype=str),
         }
+        ends = body.local.locate(table.gauges.nodes)
+        self._held_ends = np.flatnonzero((ends >= 0) & body.shared.owned[ends])
+        self._ends = ends[self._held_ends]
         local = body.local.locate(table.nodes)
         here = (local >= 0) & body.shared.owned[local]
         self._slots, self._nodes = np.flatnonzero(here), local[here]
@@ -35,14 +39,35 @@ class PointWatch:
         self._beddings = [[term for term in beddings if term.name == name] for name in table.supports]
 
     def sample(self, motion: Motion) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return this rank's parts of the sums: the values of all points by quantity, then the reactions [N]."""
+        """Return this rank's parts of the sums: values of all points by quantity, gauges, then reactions [N]."""
         parts = [self._value(quantity, motion).ravel() for quantity in self._table.quantities]
+        return np.concatenate([*parts, self._stretches(motion).ravel(), *self._reactions(motion)]), np.empty(0)
+
+    @property
+    def size(self) -> int:
+        """Return the number of the sums."""
+        table = self._table
+        values = len(table.names) * sum(COMPONENTS[quantity] for quantity in table.quantities)
+        return values + 3 * (len(table.gauges.names) + len(table.supports))
+
+    def _stretches(self, motion: Motion) -> NDArray[np.float64]:
+        """Return this rank's part of the stretches ``(g, 3)`` of all gauges."""
+        gauges = self._table.gauges
+        result = np.zeros((len(gauges.names), 3))
+        moved = gauges.weight[self._held_ends] * motion.displacement[self._ends]
+        np.add.at(result, gauges.gauge[self._held_ends], moved)
+        return result
+
+    def _reactions(self, motion: Motion) -> list[NDArray[np.float64]]:
+        """Return this rank's part of the reaction ``(3,)`` [N] of each support."""
+        if not self._supports:
+            return []
         reaction = motion.reaction()  # of all supports: their nodes are shared where facet sets meet
         sums = [held * reaction[nodes].sum(axis=0) for nodes, held in self._supports]
         for total, beddings in zip(sums, self._beddings, strict=True):
             for bedding in beddings:
                 total += bedding.force(motion.displacement).sum(axis=0)
-        return np.concatenate([*parts, *sums]), np.empty(0)
+        return sums
 
     def _value(self, quantity: str, motion: Motion) -> NDArray[np.float64]:
         """Return this rank's part of a quantity at all points."""
@@ -66,7 +91,7 @@ class PointWatch:
         return self._recovery.plastic_strain()[:, None]
 
     def row(self, sums: NDArray[np.float64], maxima: NDArray[np.float64]) -> dict[str, NDArray[np.float64] | float]:
-        """Name the parts that all ranks have combined: ``<quantity>@<point>`` and ``reaction@<support>``."""
+        """Name the parts that all ranks have combined: ``<quantity>@<point>``, ``gauge@..``, ``reaction@<support>``."""
         del maxima
         count, start = len(self._table.names), 0
         result: dict[str, NDArray[np.float64] | float] = {}
@@ -75,5 +100,8 @@ class PointWatch:
             values = sums[start : start + count * components].reshape(count, components)
             result |= {f"{quantity}@{name}": value for name, value in zip(self._table.names, values, strict=True)}
             start += count * components
-        reactions = sums[start:].reshape(-1, 3)
+        gauges = self._table.gauges
+        stretches, reactions = np.split(sums[start:].reshape(-1, 3), [len(gauges.names)])
+        strains = gauges.strains(stretches, self._turning).tolist()
+        result |= {f"gauge@{name}": strain for name, strain in zip(gauges.names, strains, strict=True)}
         return result | {f"reaction@{name}": value for name, value in zip(self._table.supports, reactions, strict=True)}

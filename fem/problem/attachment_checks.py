@@ -1,23 +1,36 @@
-"""Supports, lumped masses and the filter of a structure that do not fit it, and places outside of it."""
+"""Supports, lumped masses, watch points, gauges and the filter that do not fit a body, and places outside of it."""
 
 import math
 from collections.abc import Iterable, Iterator
 
 from reflowshock.fem.problem.filters import LowPass
-from reflowshock.fem.problem.structure import AXES, InputG, PointMass, Structure, StructureProblem, Support
+from reflowshock.fem.problem.fittings import AXES, Fittings, PointMass, StrainGauge, Support
+from reflowshock.fem.problem.structure import InputG, Structure, StructureProblem
 from reflowshock.problem import Problem, unknown_name
 
 SAMPLES = 10  # in a period of the filter's corner
 
 
 def attachment_problems(problem: StructureProblem) -> Iterator[Problem]:
-    """Find supports and lumped masses that cannot be."""
-    for name, support in problem.supports.items():
-        yield from unknown_name(f"supports.{name}.on", support.on, problem.structure.facet_sets, "facet set")
-        yield from _support(f"supports.{name}", support)
-    for name, mass in problem.masses.items():
-        yield from _mass(f"masses.{name}", mass, problem.structure)
+    """Find what cannot be fitted to a structure."""
+    yield from fitting_problems(problem.fittings, problem.structure)
     yield from _elastic(problem)
+
+
+def fitting_problems(given: Fittings, body: Structure) -> Iterator[Problem]:
+    """Find supports, lumped masses, watch points and gauges that cannot be."""
+    for name, support in given.supports.items():
+        yield from unknown_name(f"supports.{name}.on", support.on, body.facet_sets, "facet set")
+        yield from _support(f"supports.{name}", support)
+    for name, mass in given.masses.items():
+        yield from _mass(f"masses.{name}", mass, body)
+    for name, point in given.watch.items():
+        yield from inside(f"watch.{name}.at", point.at, body)
+        yield from _direction(f"watch.{name}.direction", point.direction)
+    for name, gauge in given.gauges.items():
+        yield from _gauge(f"gauges.{name}", gauge, body)
+        if name in given.watch:
+            yield Problem(f"gauges.{name}", "has the name of a watch point, whose strain is a metric, too", name)
 
 
 def filter_problems(table: str, low_pass: LowPass, duration: float, samples: int) -> Iterator[Problem]:
@@ -42,6 +55,27 @@ def _support(key: str, support: Support) -> Iterator[Problem]:
         if axis in support.hold:
             message = f"is held by {key}.hold, so that its springs never move"
             yield Problem(f"{key}.bedding.{axis}", message, axis, f"0, or hold without {axis}")
+
+
+def _direction(key: str, direction: tuple[float, ...] | None) -> Iterator[Problem]:
+    if direction is not None and not math.hypot(*direction) > 0.0:
+        yield Problem(key, "has no length", list(direction), "any vector but zero")
+
+
+def _gauge(key: str, gauge: StrainGauge, body: Structure) -> Iterator[Problem]:
+    """Yield a gauge whose middle or ends, or their images beyond planes of symmetry, are not on the face."""
+    low, high = body.corners
+    height = high[2] if gauge.face == "upper" else low[2]
+    found = [*_direction(f"{key}.direction", gauge.direction), *inside(f"{key}.at", (*gauge.at, height), body)]
+    yield from found
+    if found:
+        return
+    reach = 0.5 * gauge.length / math.hypot(*gauge.direction)
+    for side in (reach, -reach):
+        end = [x + side * along for x, along in zip(gauge.at, gauge.direction, strict=True)]
+        x, y = (abs(value) if axis in body.symmetry else value for axis, value in zip(AXES, end, strict=False))
+        yield from inside(f"{key}.length", (x, y, height), body)
+        yield from in_hole(f"{key}.length", (x, y, height), body)
 
 
 def _elastic(problem: StructureProblem) -> Iterator[Problem]:

@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 from pydantic import Field, ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
 
+from reflowshock.effect import Switch
 from reflowshock.fem.materials.kinematics import TURNING, Kinematics
 from reflowshock.fem.problem.failure import Failure
 from reflowshock.fem.problem.filters import LowPass
@@ -111,7 +112,8 @@ class ShockNumerics(Parameters):
 
     ``kinematics`` and ``formulation`` of hexahedra as for a structure. Elastic hexahedra are the same in both
     formulations; those that yield are seven to eight times cheaper with one point, a few per cent stronger in bending.
-    Kinematics that are ``auto`` are corotational where the board's deflection calls for it.
+    Kinematics that are ``auto`` are corotational where the board's deflection calls for it. Solder whose material can
+    yield does so if ``plasticity`` is on, and if it is ``auto`` where half its yield stress is expected.
     ``mass_scaled`` are roles, such as copper, whose density is raised to the step of the others; the added mass is a
     metric with a limit.
     ``dns_duration`` ends the DNS before the shock does: the modes are compared over the time that both have.
@@ -123,6 +125,7 @@ class ShockNumerics(Parameters):
     step_fraction: float = Field(0.9, gt=0, le=0.95)
     critical_step: Literal["element", "power_iteration"] = "element"
     kinematics: Literal["auto"] | Kinematics = "small"
+    plasticity: Switch = "on"
     formulation: Literal["incompatible_modes", "one_point"] = "incompatible_modes"
     mass_scaled: tuple[Literal["board", "substrate", "die", "copper", "solder"], ...] = ()
     history_samples: int = Field(600, ge=2)
@@ -160,7 +163,8 @@ class Shock(Parameters):
     are averaged. ``identical_joints`` repeats the shock under a flat package on truncated spheres of the solder's
     volume: what the joints' own shapes change is the difference. A ``duration`` that is ``auto`` ends when the joints'
     first peak has passed and half a swing of the board brought no higher one, at the latest a period of the board after
-    the pulse. ``filter`` is that of the package's acceleration.
+    the pulse. ``filter`` is that of accelerations and strain rates. ``modes`` is how many natural frequencies of the
+    board are wanted, the lowest ones; of a quarter those that are symmetric.
     """
 
     service_condition: ServiceCondition | None = None
@@ -172,6 +176,7 @@ class Shock(Parameters):
     picture_times: Annotated[tuple[Annotated[float, Field(ge=0)], ...], Quantity("ms")] = ()
     joint_layer: Annotated[float, Quantity("um")] = Field(JOINT_LAYER, gt=0, le=1e-3)
     identical_joints: bool = False
+    modes: int = Field(0, ge=0, le=200)
     method: Literal["direct", "large_mass"] = "direct"
     gravity: Literal["auto", "on", "off"] = "auto"
     damping: Damping = Damping()

@@ -14,20 +14,24 @@ from reflowshock.fem.materials.kinematics import Kinematics
 from reflowshock.fem.materials.library import LIBRARY
 from reflowshock.fem.materials.parameters import Material
 from reflowshock.fem.problem.filters import LowPass
+from reflowshock.fem.problem.fittings import (
+    AXES,
+    Axis,
+    Direction,
+    Fittings,
+    PointMass,
+    StrainGauge,
+    Support,
+    WatchPoint,
+)
 from reflowshock.fem.problem.shock import MOST_RANKS, Coupling, Damping, ServiceCondition
 from reflowshock.parameters import Parameters
 from reflowshock.quantity import Quantity
 
-AXES = "xyz"
 ROUNDING = 1e-9  # of the box: closer than that is the same place
 SMALLER = 0.5  # of the longest step of a layer: below it a layer is fine, unless the user names those that are
-Axis = Literal["x", "y", "z"]
-Direction = tuple[float, float, float]
 SolverName = Literal["explicit", "implicit", "dns"]
 Cells = Annotated[int, Field(ge=1, le=2000)]
-SAMPLED = 8  # masses along either side of a footprint; even, so that none lies on its middle
-Place = tuple[float, float, float]
-PositiveLength = Annotated[float, Field(gt=0)]
 
 
 class Layer(Parameters):
@@ -109,19 +113,6 @@ class Structure(Parameters):
         """Return the planes of symmetry on which a place [m] lies."""
         return tuple(axis for axis in dict.fromkeys(self.symmetry) if abs(place[AXES.index(axis)]) <= self.margin)
 
-    def meshed_places(self, at: Place, footprint: tuple[float, float] | None) -> list[tuple[Place, float]]:
-        """Return where a mass at a place [m], or spread over a footprint [m], bears on the mesh, and its part there.
-
-        The footprint is a grid of equal masses; those beyond a plane of symmetry are on the part that is not meshed.
-        """
-        if footprint is None:
-            return [(at, 0.5 ** len(self.planes_at(at)))]
-        offsets = [(k + 0.5) / SAMPLED - 0.5 for k in range(SAMPLED)]
-        places = [(at[0] + a * footprint[0], at[1] + b * footprint[1], at[2]) for a in offsets for b in offsets]
-        low = self.corners[0]
-        meshed = [x for x in places if all(x[AXES.index(axis)] > low[AXES.index(axis)] for axis in self.symmetry)]
-        return [(place, 1.0 / len(places)) for place in meshed]
-
 
 def _each(factor: float, counts: tuple[int, int]) -> tuple[int, int]:
     return _times(factor, counts[0]), _times(factor, counts[1])
@@ -130,42 +121,6 @@ def _each(factor: float, counts: tuple[int, int]) -> tuple[int, int]:
 def _times(factor: float, count: int) -> int:
     """Multiply a number of elements; halves go up, so that meshes of like proportions stay so."""
     return max(1, math.floor(factor * count + 0.5))
-
-
-class Bedding(Parameters):
-    """Stiffness per area of an elastic support, by component; zero leaves a component free.
-
-    Over an area A with the second moment I it is a total stiffness of k A and a rotational one of k I.
-    """
-
-    x: Annotated[float, Quantity("N/m^3")] = Field(0.0, ge=0)
-    y: Annotated[float, Quantity("N/m^3")] = Field(0.0, ge=0)
-    z: Annotated[float, Quantity("N/m^3")] = Field(0.0, ge=0)
-
-
-class Support(Parameters):
-    """What holds a facet set in the frame of the drop table: components at zero, others on a bedding of springs."""
-
-    on: str
-    hold: tuple[Axis, ...] = ()
-    bedding: Bedding | None = None
-
-    @property
-    def stiffness(self) -> tuple[float, float, float]:
-        """Return the stiffness per area [N/m^3] along x, y, z."""
-        springs = self.bedding or Bedding()
-        return springs.x, springs.y, springs.z
-
-
-class PointMass(Parameters):
-    """A component that is heavy and not stiff: at a place, or spread evenly over ``footprint`` along x and y.
-
-    With a plane of symmetry its mirror image is there as well; of one on that plane each half bears half.
-    """
-
-    mass: Annotated[float, Quantity("g")] = Field(gt=0)
-    at: Annotated[tuple[float, float, float], Quantity("mm")]
-    footprint: Annotated[tuple[PositiveLength, PositiveLength], Quantity("mm")] | None = None
 
 
 class Pulsed(Parameters):
@@ -279,16 +234,6 @@ StructureLoad = Annotated[AnyLoad, Field(discriminator="kind")]
 KINDS: tuple[type[Pulsed], ...] = get_args(AnyLoad)
 
 
-class WatchPoint(Parameters):
-    """A point whose displacement, velocity, strain and stress are recorded.
-
-    ``direction`` is that of its accelerometer; without it, that of the input-G, else the axis of its largest motion.
-    """
-
-    at: Annotated[tuple[float, float, float], Quantity("mm")]
-    direction: Direction | None = None
-
-
 class LayerCoupling(Coupling):
     """Two models of a structure: fine layers, each at its own steps, and the others at the window's.
 
@@ -358,7 +303,13 @@ class StructureProblem(Parameters):
     masses: dict[str, PointMass] = Field(default_factory=dict)
     loads: dict[str, StructureLoad] = Field(default_factory=dict)
     watch: dict[str, WatchPoint] = Field(default_factory=dict)
+    gauges: dict[str, StrainGauge] = Field(default_factory=dict)
     dynamics: Dynamics
+
+    @property
+    def fittings(self) -> Fittings:
+        """Return supports, masses, watch points and gauges."""
+        return Fittings(**{name: getattr(self, name) for name in Fittings.model_fields})
 
     @property
     def known_materials(self) -> dict[str, Material]:

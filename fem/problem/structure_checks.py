@@ -4,8 +4,8 @@ import math
 from collections.abc import Iterator
 
 from reflowshock.fem.problem.attachment_checks import attachment_problems, filter_problems, in_hole, inside
+from reflowshock.fem.problem.fittings import AXES
 from reflowshock.fem.problem.structure import (
-    AXES,
     AtPoint,
     Gravity,
     InputG,
@@ -30,7 +30,6 @@ def problems(problem: StructureProblem) -> list[Problem]:
         *(found for name, load in problem.loads.items() for found in _load(f"loads.{name}", load, problem)),
         *_large_mass(problem),
         *_symmetry(problem),
-        *_watch(problem),
         *_dynamics(problem),
         *coupling_problems(problem),
     ]
@@ -193,13 +192,6 @@ def _pulse(key: str, load: StructureLoad) -> Iterator[Problem]:
             yield Problem(f"{key}.duration", f"is missing, a {load.pulse.replace('_', ' ')} needs it", None, "> 0")
     elif load.duration is not None and (condition or load.table):
         yield Problem(f"{key}.duration", f"is already given by {given[0]}", f"{load.duration:g} s")
-
-
-def _watch(problem: StructureProblem) -> Iterator[Problem]:
-    for name, point in problem.watch.items():
-        yield from inside(f"watch.{name}.at", point.at, problem.structure)
-        if point.direction is not None and not math.hypot(*point.direction) > 0.0:
-            yield Problem(f"watch.{name}.direction", "has no length", list(point.direction), "any vector but zero")
 
 
 def _yielding(problem: StructureProblem) -> Iterator[tuple[str, str]]:

@@ -11,6 +11,7 @@ from reflowshock.fem.coupling.planner import Plan
 from reflowshock.fem.division.checks import check_pulses
 from reflowshock.fem.division.tables import JointTables
 from reflowshock.fem.dynamics.history import History, Signal
+from reflowshock.fem.dynamics.modal import natural_modes
 from reflowshock.fem.estimates.estimate import implicit_plan, largest_implicit_step, shortened
 from reflowshock.fem.estimates.placement import check_size
 from reflowshock.fem.loads.load import Load
@@ -18,17 +19,21 @@ from reflowshock.fem.loads.pulse import Pulse
 from reflowshock.fem.loads.shock_loads import shock_loads
 from reflowshock.fem.loads.shock_pulse import shock_pulse
 from reflowshock.fem.loads.structure_pulses import pulse_durations
+from reflowshock.fem.materials.kinematics import TURNING
+from reflowshock.fem.model.global_matrix import Equations
 from reflowshock.fem.model.steps import Steps
 from reflowshock.fem.output.joint_interface import JointInterfaceStress, picture_windows
 from reflowshock.fem.output.package_result import PackageReport
 from reflowshock.fem.output.settled import WATCHED, is_settled
+from reflowshock.fem.output.structure_modes import ModeTable, write_modes
 from reflowshock.fem.output.watch_joints import JointWatch
 from reflowshock.fem.parallel.agreement import agreed
 from reflowshock.fem.parallel.communicators import Communicators, Role
+from reflowshock.fem.parallel.whereabouts import HERE
 from reflowshock.fem.problem.inputs import RunInput
 from reflowshock.fem.run.dynamics import place, run_dynamics
 from reflowshock.fem.setup.models import Divided, Model
-from reflowshock.fem.setup.package_models import build_package, divided_package
+from reflowshock.fem.setup.package_models import build_package, divided_package, elastic_package
 
 SPEEDS = 201  # times at which the largest velocity of the table is looked for
 NON_TRIVIAL = 1e-4  # of the energy that the pulse gives a free body: from there on the balance is judged
@@ -86,7 +91,8 @@ class PackageDrop:
     def watch(self, model: Model[JointTables]) -> JointWatch:
         """Return the watch points of a model."""
         yields, damping = self.request.materials.solder.plasticity is not None, self.request.shock.damping.coefficients
-        return JointWatch(model.tables, model.body, yields, damping)
+        turning = self.request.kinematics in TURNING
+        return JointWatch(model.tables, model.body, yields, damping, turning)
 
     def trivial_energy(self, steps: Steps) -> float:
         """Return a small part of the energy [J] that the pulse gives a free body."""
@@ -107,13 +113,36 @@ class PackageDrop:
         """Return what says whether the shock is over before its end."""
         return (lambda history: is_settled(history.arrays(WATCHED))) if self.request.settles else None
 
-    def find_modes(self, comms: Communicators, models: Mapping[Role, Model[JointTables]], steps: Steps) -> None:
-        """Find none."""
+    def find_modes(
+        self, comms: Communicators, models: Mapping[Role, Model[JointTables]], steps: Steps
+    ) -> ModeTable | None:
+        """Return the natural modes, if the run is asked for them: of one model, whatever those of the run are."""
+        if not self.request.shock.modes:
+            return None
+        with HERE.busy("finds natural modes"):
+            found = agreed(comms.world, lambda: modes_of(self.request) if comms.world.rank == 0 else None)
+        table: ModeTable = comms.world.bcast(found)
+        return table
 
 
 def run(world: MPI.Comm, request: RunInput) -> None:
     """Run one shock and write its results; collective over ``world``, errors as ``run_dynamics``."""
     run_dynamics(world, PackageDrop.read(world, request))
+
+
+def modes_of(request: RunInput) -> ModeTable:
+    """Find and write the natural modes of board and package, whose joints are coarse where there are coarse ones.
+
+    They are those of one linear elastic model with all supports at rest.
+
+    Raises:
+        ValueError: More modes are wanted than there are.
+    """
+    model, mass = elastic_package(request)
+    modes = natural_modes(Equations.of(MPI.COMM_SELF, model.body), request.shock.modes)
+    table = ModeTable(modes.frequency, modes.effective_mass / mass)
+    write_modes(request.output, table)
+    return table
 
 
 def pulse_of(request: RunInput, window: float) -> Pulse:

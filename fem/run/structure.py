@@ -15,6 +15,7 @@ from reflowshock.fem.loads.load import Load
 from reflowshock.fem.loads.pulse import Pulse
 from reflowshock.fem.loads.structure_loads import damping_loads, structure_loads
 from reflowshock.fem.loads.structure_pulses import pulse_durations, pulses_of
+from reflowshock.fem.materials.kinematics import TURNING
 from reflowshock.fem.model.steps import Steps
 from reflowshock.fem.output.structure_modes import ModeTable, find_modes
 from reflowshock.fem.output.structure_result import StructureReport
@@ -74,7 +75,7 @@ class StructureDynamics:
 
     def watch(self, model: StructureModel) -> PointWatch:
         """Return the watch points of a model."""
-        return PointWatch(model.tables.watch, model.body)
+        return PointWatch(model.tables.fitted.points, model.body, self.request.kinematics in TURNING)
 
     def trivial_energy(self, steps: Steps) -> float:
         """Return zero: the balance is exact at any step, so that no energy is too small to be judged."""

@@ -25,7 +25,7 @@ from reflowshock.fem.loads.structure_pulses import pulse_durations, pulses_of
 from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.mesh.mesh_file import read_mesh
 from reflowshock.fem.model.assembly import ForceOptions, Pieces, make_body, make_pieces
-from reflowshock.fem.model.attachments import attached, bedded_steps
+from reflowshock.fem.model.attachments import attached, bedded_steps, beddings_of
 from reflowshock.fem.model.power_iteration import highest_frequency
 from reflowshock.fem.model.steps import (
     Steps,
@@ -59,14 +59,11 @@ def build_structure(comm: MPI.Comm, request: StructureInput, pulses: list[float]
     mesh, tables = read_structure(comm, request)
     local = distribute(comm, mesh)
     pieces = agreed(comm, lambda: make_pieces(local, tables, request.part_materials, request.formulation))
-    beddings = [
-        BeddedFacets.build(name, pieces.local, found, request.supports[name].stiffness)
-        for name, found in tables.bedded.items()
-    ]
+    beddings = beddings_of(pieces.local, tables.fitted, request.supports)
     for bedding in beddings:
         pieces = bedded_steps(pieces, bedding)
     steps = choose_steps(comm, pieces, request, pulses)
-    steps = replace(steps, model_mass=steps.model_mass + float(tables.masses[1].sum()))
+    steps = replace(steps, model_mass=steps.model_mass + float(tables.fitted.masses[1].sum()))
     model = assemble(comm, pieces, (tables, beddings), steps, request)
     if request.implicit:
         return model, steps
@@ -91,7 +88,7 @@ def assemble(
     """Return the model of given tables and elastic supports that moves by given steps; collective."""
     tables, beddings = given
     body = make_body(comm, pieces, tables, steps.mass_factors[0], ForceOptions(request.kinematics, steps.plan.step))
-    return Model(tables, attached(body, tables.masses, beddings))
+    return Model(tables, attached(body, tables.fitted.masses, beddings))
 
 
 def read_structure(comm: MPI.Comm, request: StructureInput) -> tuple[MeshData | None, StructureTables]:

@@ -24,11 +24,21 @@ SHOCK = {
     "numerics": {"mass_scaled": ["copper"], "history_samples": 50, "field_samples": 2},
 }
 
+# A gauge across the models' interface, one whose middle lies on a plane of symmetry, and a mass on the board.
+FITTED = {
+    "watch": {"edge": {"at": [8e-3, 4e-3, 0.0]}},
+    "gauges": {
+        "near": {"at": [3.2e-3, 1e-3], "direction": [2.0, 1.0], "length": 3e-3},
+        "middle": {"at": [0.0, 6e-3], "face": "upper"},
+    },
+    "masses": {"coil": {"mass": 1e-5, "at": [7e-3, 0.0, 0.0], "footprint": [4e-3, 2e-3]}},
+}
+
 
 def write_input(path: Path, directory: Path, **changes) -> Path:
     """Write an input for the meshes of a directory; changes replace its keys."""
     meshes = [str(directory / "assembly.msh"), str(directory / "joints.msh")]
-    request = {"mode": "dns", "meshes": meshes, "shock": SHOCK, "output": str(directory / "out")} | changes
+    request = {"mode": "dns", "meshes": meshes, "shock": SHOCK, "output": str(directory / "out")} | FITTED | changes
     path.write_text(json.dumps(request))
     return path
 
@@ -112,7 +122,7 @@ def assembly(tmp_path_factory) -> Path:
 
 def assert_same(first: dict[str, np.ndarray], second: dict[str, np.ndarray]) -> None:
     pictures = [name for name in first if "@" in name]
-    assert len(pictures) == 12
+    assert len(pictures) == 12 + 4 + 2  # of the interface, of a watch point, of two gauges
     for name in (
         *pictures,
         "board_centre",

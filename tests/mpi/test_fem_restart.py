@@ -37,7 +37,9 @@ def assembly(tmp_path_factory) -> Path:
 
 def start(directory: Path, mode: str, output: Path) -> subprocess.Popen:
     meshes = [str(directory / "assembly.msh"), str(directory / "joints.msh")]
-    request = {"mode": mode, "meshes": meshes, "shock": SHOCK, "output": str(output)}
+    gauge, watch = {"at": [9e-3, 2e-3]}, {"at": [0.0, 0.0, -1e-3]}
+    fitted = {"gauges": {"far": gauge}, "watch": {"under": watch}}
+    request = {"mode": mode, "meshes": meshes, "shock": SHOCK, "output": str(output)} | fitted
     path = directory / f"{output.name}.json"
     path.write_text(json.dumps(request | {"checkpoints": str(directory / f"{mode}.checkpoints")}))
     command = ["mpirun", "--allow-run-as-root", "--oversubscribe", "-n", "2"]

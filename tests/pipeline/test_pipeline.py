@@ -56,7 +56,10 @@ def test_the_summary_has_what_scripts_read(first_run):
     assert metrics["critical_joint"] in {"A3", "A4", "B3", "B4"}
     assert set(metrics) >= {
         "critical_joint_stress_error", "two_scale_dns_time_ratio", "peak_board_strain", "peak_von_mises",
+        "peak_acceleration@edge", "second_peak_acceleration@edge", "peak_displacement@edge", "peak_strain@corner",
+        "peak_strain_rate@corner", "response_at_first_frequency",
     }  # fmt: skip
+    assert 1e3 < metrics["first_frequency"] < 1e4
     assert all(check["ok"] for check in summary["health"].values())
     assert set(summary["timings"]) == set(NAMES) - {"report"}
     assert len(summary["inputs_sha256"]) == 64

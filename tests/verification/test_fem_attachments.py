@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 from reflowshock.cases.hard.trials.grids import grid, mesh_of, on
 from reflowshock.fem.mesh.facet import bedding_matrices
 from reflowshock.fem.mesh.mesh import MeshData
-from reflowshock.fem.problem.structure import Structure
+from reflowshock.fem.problem.fittings import PointMass
 from reflowshock.fem.run.structure import run_structure
 from tests.support.fem_structures import STEEL, structure_input
 
@@ -159,16 +159,13 @@ def test_explicit_and_implicit_agree_on_springs(tmp_path):
 
 
 def test_half_a_structure_bears_half_of_a_mass():
-    structure = Structure(
-        length=1.0, width=1.0, cells=(2, 2), symmetry=("x",), layers={"a": {"material": "FR4", "thickness": 0.1}}
-    )
     for at, footprint, share in (
         ((0.0, 0.2, 0.0), None, 0.5),
         ((0.2, 0.0, 0.0), None, 1.0),
         ((0.0, 0.0, 0.0), (0.4, 0.2), 0.5),
         ((0.3, 0.0, 0.0), (0.4, 0.2), 1.0),
     ):
-        places = structure.meshed_places(at, footprint)
+        places = PointMass(mass=1.0, at=at, footprint=footprint).meshed_places(("x",), 1e-9)
         assert sum(part for _, part in places) == pytest.approx(share)
         assert all(place[0] >= 0.0 for place, _ in places)
 

@@ -198,6 +198,8 @@ def show(request: AccuracyRequest, out: Path | None, console: Console) -> bool:
         console.print(f"\n{remark}", soft_wrap=True)
     _show_choice(accuracy, console)
     console.print(f"\n{folder / PAGE}, {folder / PICTURE}, {folder / FILE}", soft_wrap=True)
+    again = f"reflowshock report {shlex.quote(str(request.case))} {tables.as_options(request.settings)}".rstrip()
+    console.print(f"`{again}` takes these errors into the report of a run.", soft_wrap=True, markup=False)
     return keeps_promise(accuracy)
 
 

@@ -1,4 +1,4 @@
-"""How far the board of a drop will about deflect, from its parameters alone, and what small kinematics leave out."""
+"""How far the board of a drop will about deflect, from its parameters alone, and what its scene then calls for."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from reflowshock.effect import Decision
-from reflowshock.fem.estimates.drop_effects import Deflection, called_for
+from reflowshock.fem.estimates.drop_effects import Deflection, SolderPlasticity, called_for
 from reflowshock.fem.materials.kinematics import Kinematics
 from reflowshock.workflow.board_drop.duration import first_mode, longest_duration
 
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from reflowshock.workflow.package.case import BoardDropCase
 
 SHARE = 4.0 / math.pi  # of the base's acceleration in the first mode of a pinned beam, at its middle
+HALF_SPACE = 0.3  # Poisson's ratio of laminates under a pad
 SAMPLES, SAMPLES_A_PERIOD = 1000, 100
 MOST_PERIODS = 1000  # that are looked at: no pulse of a drop lasts longer
 
@@ -54,13 +55,32 @@ def first_mode_peak(omega: float, velocity: Callable[[float], float], duration: 
     return float(np.abs(swing).max()) / omega
 
 
+def expected_peel(case: "BoardDropCase") -> float:
+    """Return about the peel stress of the outermost joints [Pa]: under a package much stiffer than the board.
+
+    A board bent by a curvature K under a stiff plate on springs, k a unit of area, is apart from it by d: with
+    D d^(4) + k d = 0, and d^(2) = K, d^(3) = 0 at the plate's edge, p = k d = K sqrt(k D) there. A joint's stiffness is
+    that of its solder in series with what its pads are pressed into, E d / (1 - nu^2) each, with their diameter d.
+    """
+    package, materials, deflection = case.package, case.materials, expected_deflection(case)
+    diameter = 2.0 * min(package.board_pad.wetted_radius, package.package_pad.wetted_radius)
+    area = math.pi / 4.0 * diameter**2
+    parts = materials.board, materials.substrate, materials.solder
+    board, substrate, solder = (material.engineering_constants.young[0] for material in parts)
+    springs = (diameter * young / (1.0 - HALF_SPACE**2) for young in (board, substrate))
+    compliance = package.standoff / (solder * area) + sum(1.0 / spring for spring in springs)
+    curvature = deflection.slope**2 / deflection.largest if deflection.largest > 0.0 else 0.0
+    bending = board * case.board.thickness**3 / 12.0
+    return curvature * math.sqrt(bending / compliance) * package.pitch / area
+
+
 def decide_kinematics(case: "BoardDropCase") -> tuple[Kinematics, str]:
     """Return the kinematics that the deflection of the board calls for, and why; errors as ``expected_deflection``."""
     return called_for(expected_deflection(case).largest / case.board.thickness, case.cooled)
 
 
 def decided(case: "BoardDropCase") -> "BoardDropCase":
-    """Return the case with the kinematics and the duration that its scene calls for.
+    """Return the case with the duration, the kinematics and the solder that its scene calls for.
 
     Raises:
         PulseError: the table of the pulse cannot be read.
@@ -68,7 +88,11 @@ def decided(case: "BoardDropCase") -> "BoardDropCase":
     update: dict[str, Any] = {"duration": longest_duration(case)}
     if case.shock.numerics.kinematics == "auto":
         update["numerics"] = case.shock.numerics.model_copy(update={"kinematics": decide_kinematics(case)[0]})
-    return case.model_copy(update={"shock": case.shock.model_copy(update=update)})
+    changes: dict[str, Any] = {"shock": case.shock.model_copy(update=update)}
+    if case.materials.solder.plasticity is not None and not DropScene(case).yielding["on"]:
+        elastic = case.materials.solder.model_copy(update={"plasticity": None})
+        changes["materials"] = case.materials.model_copy(update={"solder": elastic})
+    return case.model_copy(update=changes)
 
 
 @dataclass(frozen=True)
@@ -84,8 +108,8 @@ class DropScene:
 
     @property
     def materials(self) -> "Mapping[str, Material]":
-        """Role -> material."""
-        return self.case.materials.by_role
+        """Role -> material, as the scene calls for it."""
+        return decided(self.case).materials.by_role
 
     @property
     def thickness(self) -> float:
@@ -103,6 +127,13 @@ class DropScene:
         from reflowshock.fem.loads.shock_pulse import shock_pulse
 
         return shock_pulse(self.case.shock).gravity
+
+    @property
+    def yielding(self) -> Decision:
+        """Whether solder yields that can."""
+        switch, cooled = self.shock.numerics.plasticity, self.cooled
+        stress = expected_peel(self.case) if switch == "auto" else 0.0
+        return SolderPlasticity.called_for(switch, self.case.materials.by_role, stress, cooled)
 
     @property
     def cooled(self) -> bool:

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 from reflowshock.problem import Problem
-from reflowshock.workflow.board_drop import fine_joints, identical_joints, shock_cooling
+from reflowshock.workflow.board_drop import fine_joints, fittings, identical_joints, shock_cooling
 from reflowshock.workflow.board_drop.board_deflection import decided
 from reflowshock.workflow.board_drop.forecast import step_problems
 from reflowshock.workflow.case import fields
@@ -28,6 +28,7 @@ def board_drop_problems(case: BoardDropCase) -> list[Problem]:
         return found
     found = _of_joints(case) + _in_words(case, shock_checks.problems(case.shock)) + list(fine_joints.problems(case))
     found += unreadable_pulses(case.pulse_tables)
+    found += _in_words(case, fittings.problems(case))
     if case.shock.numerics.kinematics == "auto" and not found:
         found += _in_words(case, shock_checks.problems(decided(case).shock))
     if found:
@@ -65,8 +66,8 @@ def _in_words(case: PackageCase, found: Iterable[Problem]) -> list[Problem]:
 
 
 def _yielding(case: BoardDropCase) -> list[str]:
-    """Return the parts whose material yields."""
-    return [role for role, material in case.materials.by_role.items() if material.plasticity is not None]
+    """Return the parts whose material yields there."""
+    return [role for role, material in decided(case).materials.by_role.items() if material.plasticity is not None]
 
 
 def _of_flow(case: BoardDropCase) -> Iterator[Problem]:

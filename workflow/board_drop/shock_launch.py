@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 
 from reflowshock.fem.problem.shock import JointCoupling
+from reflowshock.workflow.board_drop import fittings
 from reflowshock.workflow.board_drop.board_deflection import decided
 from reflowshock.workflow.board_drop.fine_joints import (
     FineJoints,
@@ -56,6 +57,8 @@ def run_mode(run: Run[BoardDropCase], folder: Path, mode: str, fine: FineJoints,
     chosen = fine.names if mode == "two_scale" else "all"
     coupling = run.case.shock.coupling.model_copy(update={"fine_joints": chosen})
     request = _request(run, mode, (f"{prefix}assembly", f"{prefix}joints"), coupling)
+    if not prefix and mode == next(one for one in MODES if one in run.case.shock.numerics.modes):
+        request["shock"]["modes"] = run.case.shock.modes
     request |= _end_of_first(run, folder.parent)
     if mode == "two_scale" and needs_coarse_joints(coupling):
         request["coarse_joints"] = _mesh(run, f"{prefix}coarse_joints")
@@ -80,13 +83,15 @@ def _mesh(run: Run[BoardDropCase], name: str) -> str:
 
 
 def _request(run: Run[BoardDropCase], mode: str, meshes: tuple[str, ...], coupling: JointCoupling) -> dict:
-    """Return what the package fem reads as input of a run, but for its folders."""
-    shock = decided(run.case).shock.model_copy(update={"coupling": coupling})
+    """Return what the package fem reads as input of a run, but for its folders and natural modes."""
+    case = decided(run.case)
+    shock = case.shock.model_copy(update={"coupling": coupling, "modes": 0})
     return {
         "mode": mode,
         "meshes": [_mesh(run, name) for name in meshes],
         "shock": shock.model_dump(mode="json", exclude={"failure"}),
-        "materials": run.case.materials.model_dump(mode="json"),
+        "materials": case.materials.model_dump(mode="json"),
+        **fittings.given(case),
     }
 
 

@@ -11,6 +11,7 @@ from reflowshock.workflow.package import findings
 from reflowshock.workflow.package.case import BoardDropCase
 from reflowshock.workflow.package.verdict import failing, limits_table
 from reflowshock.workflow.package_report import joint_tables
+from reflowshock.workflow.package_report.board import add_board
 from reflowshock.workflow.package_report.headline import headline
 from reflowshock.workflow.package_report.joint_records import joint_records
 from reflowshock.workflow.process.products import read_json
@@ -53,6 +54,7 @@ def add_shock(run_folder: Path, case: BoardDropCase, context: dict, summary: dic
         limits=limits_table(case.shock.failure),
     )
     context["published_source"] = cost.PAPER
+    add_board(shock, case, histories, metrics, context)
     _add_ranks(histories, results, (joints, summary["verdict"]["joints"]), context)
     _add_shape_effect(shock, histories[main], (joints, metrics), context)
     _add_interface(shock, context)

@@ -4,6 +4,7 @@ from pathlib import Path
 
 from pydantic import Field
 
+from reflowshock.fem.problem.fittings import Fittings
 from reflowshock.fem.problem.structure import StructureProblem
 from reflowshock.meshing.board.box_plan import Box, BoxHoles, BoxLayer
 from reflowshock.workflow.case.case import Case
@@ -12,7 +13,7 @@ from reflowshock.workflow.case.toml_file import beside
 from reflowshock.workflow.structure.references import AnyReference, Record
 
 MESHED = ("length", "width", "cells", "refine", "symmetry", "element", "layers", "holes")
-MOVED = ("structure", "materials", "supports", "masses", "loads", "watch", "dynamics")
+MOVED = ("structure", "materials", *Fittings.model_fields, "loads", "dynamics")
 STRUCTURE = Pipeline(
     (
         Stage(
@@ -21,9 +22,7 @@ STRUCTURE = Pipeline(
             (),
             ("geometry/structure.msh", "geometry/preview.png"),
         ),
-        Stage(
-            "shock", ("structure", "materials", "supports", "masses", "loads", "watch", "dynamics"), ("geometry",), ()
-        ),
+        Stage("shock", MOVED, ("geometry",), ()),
         Stage("comparison", ("references",), ("shock",), ("comparison/comparison.json",)),
         report_of("geometry", "shock", "comparison"),
     )

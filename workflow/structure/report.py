@@ -16,10 +16,12 @@ from numpy.typing import NDArray
 from reflowshock.workflow.case.text import number, percent, quantity, short
 from reflowshock.workflow.report import two_scales
 from reflowshock.workflow.report.curves import ENERGIES, MILLI, STYLE, svg
+from reflowshock.workflow.report.fitted import gauge_curves, gauge_table
+from reflowshock.workflow.report.spectra import mode_table
 from reflowshock.workflow.report.tables import costs
 from reflowshock.workflow.structure.case import StructureCase
 from reflowshock.workflow.structure.findings import read_history, read_modes
-from reflowshock.workflow.structure.record_curves import acceleration_curves, spectrum_curves
+from reflowshock.workflow.structure.record_curves import acceleration_curves, input_spectra
 from reflowshock.workflow.structure.references import Published
 from reflowshock.workflow.structure.stages import read_results
 
@@ -69,7 +71,8 @@ def add_structure(run_folder: Path, case: StructureCase, context: dict, metrics:
     context["points"] = [{"name": name, "curve": point_curves(histories, name)} for name in case.watch]
     context["curves"]["energies"] = energy_curves(histories)
     context["curves"]["accelerations"] = acceleration_curves(case, histories, SOLVER_STYLE)
-    context["curves"]["spectrum"] = spectrum_curves(case)
+    context["curves"]["gauges"] = gauge_curves(histories, case.gauges, SOLVER_STYLE)
+    context["curves"]["spectrum"] = input_spectra(case)
     context["filter"] = case.dynamics.filter.label
     if case.supports:
         context["curves"]["reactions"] = reaction_curves(histories, list(case.supports))
@@ -81,6 +84,7 @@ def add_structure(run_folder: Path, case: StructureCase, context: dict, metrics:
         "cost": costs(results),
     }
     first = next(iter(results))
+    context["tables"]["gauges"] = gauge_table(case.gauges, metrics, results[first]["model"].get("gauge_lengths", {}))
     add_two_scales(results[first], context)
     _add_pictures(folder / first, case, histories[first], context)
 
@@ -166,19 +170,6 @@ def models(results: Mapping[str, dict]) -> dict:
         "head": ["model", *results],
         "rows": [[name, *(row(record) for record in records)] for name, row in MODEL_ROWS],
     }
-
-
-def mode_table(modes: list[dict]) -> dict:
-    """Natural frequencies, and how much of the mass moves with each mode when the supports are shaken."""
-    rows = [
-        [
-            f"{mode['mode']}",
-            f"{mode['frequency']:.2f}",
-            *(f"{100 * mode['mass_fraction'][axis]:.1f} %" for axis in "xyz"),
-        ]
-        for mode in modes
-    ]
-    return {"head": ["mode", "frequency [Hz]", "mass along x", "along y", "along z"], "rows": rows}
 
 
 def _add_pictures(folder: Path, case: StructureCase, history: Mapping[str, np.ndarray], context: dict) -> None:

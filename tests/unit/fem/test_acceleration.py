@@ -8,13 +8,14 @@ from reflowshock.fem.loads.pulse import STANDARD_GRAVITY, HalfSine
 from reflowshock.fem.output.acceleration import (
     Acceleration,
     acceleration,
+    drop_accelerations,
     is_sampled,
     low_passed,
-    package_acceleration,
     watch_accelerations,
 )
 from reflowshock.fem.problem.attachment_checks import filter_problems
 from reflowshock.fem.problem.filters import LowPass
+from reflowshock.fem.problem.fittings import WatchPoint
 from reflowshock.fem.problem.structure import StructureProblem
 from tests.support.fem_structures import structure_tables_of
 
@@ -114,13 +115,20 @@ def test_watch_point_at_rest_on_the_table_feels_the_table():
     assert watch_accelerations({"time": TIME[::100]}, problem, {}) == {}
 
 
-def test_package_at_rest_on_the_table_feels_the_table():
-    arrays = {"time": TIME, "die_centre": np.zeros((len(TIME), 3))}
-    found = package_acceleration(arrays, HalfSine(5000.0, 0.01), LowPass())
-    assert found is not None
-    assert found.raw.max() == pytest.approx(5000.0, rel=1e-5)
-    assert found.filtered.max() == pytest.approx(5000.0, rel=2e-3)
-    assert package_acceleration({"time": TIME[::100]}, HalfSine(1.0, 1.0), LowPass()) is None
+def test_package_and_board_at_rest_on_the_table_feel_the_table():
+    rest = np.zeros((len(TIME), 3))
+    watch = {
+        "foot": WatchPoint(at=(0.0, 0.0, 0.0)),
+        "aslant": WatchPoint(at=(0.0, 0.0, 0.0), direction=(3.0, 0.0, 4.0)),
+    }
+    arrays = {"time": TIME, "die_centre": rest + [1e-12, 0.0, 0.0]} | {f"displacement@{name}": rest for name in watch}
+    found = drop_accelerations(arrays, HalfSine(5000.0, 0.01), LowPass(), watch)
+    for name in ("package", "foot"):
+        assert found[name].raw.max() == pytest.approx(5000.0, rel=1e-5)
+        assert found[name].filtered.max() == pytest.approx(5000.0, rel=2e-3)
+    assert found["aslant"].raw.min() == pytest.approx(-0.8 * 5000.0, rel=1e-5)
+    assert list(drop_accelerations(arrays | {"die_centre": rest}, HalfSine(1.0, 1.0), LowPass(), watch)) == list(watch)
+    assert drop_accelerations({"time": TIME[::100]}, HalfSine(1.0, 1.0), LowPass(), {}) == {}
 
 
 def test_too_few_samples():

@@ -54,7 +54,7 @@ def test_fine_layers_are_those_of_small_steps_and_all_is_counted_once(tmp_path):
     for name, nodes in tables.nodes_of.items():
         assert sum(len(item.nodes_of[name]) for item in inputs) == len(nodes)
     for of_watch in ("nodes", "cells"):
-        here = np.array([getattr(item.watch, of_watch) >= 0 for item in inputs])
+        here = np.array([getattr(item.fitted.points, of_watch) >= 0 for item in inputs])
         assert np.all(here.sum(axis=0) == 1)
 
 

@@ -7,13 +7,16 @@ import pytest
 
 from reflowshock.workflow.board_drop.board_deflection import (
     SHARE,
+    decided,
     expected_deflection,
+    expected_peel,
     first_mode_peak,
 )
 from reflowshock.workflow.board_drop.shock_effects import shock_effects
 from reflowshock.workflow.pipeline.reader import read_case
 
-CASE = Path(__file__).parents[3] / "cases/bga_drop/case.toml"
+CASES = Path(__file__).parents[3] / "cases"
+CASE = CASES / "bga_drop/case.toml"
 
 
 @pytest.mark.parametrize("ratio", [0.05, 0.3, 0.45])
@@ -54,3 +57,27 @@ def test_weight_bends_a_slow_board_by_more_than_g_over_the_peak():
     assert not effect["on"]
     assert effect["influence"] == pytest.approx(bent / swing, rel=0.02)
     assert effect["influence"] > 2.0 * 9.80665 / shock.peak_acceleration
+
+
+def test_the_outermost_joints_bear_about_the_peel_stress_that_a_run_found():
+    assert expected_peel(read_case(CASE, (), True)) == pytest.approx(49.5e6, rel=0.3)  # cases/bga_drop
+
+
+@pytest.mark.parametrize(
+    ("solder", "switch", "pulse", "yields"),
+    [
+        ("SAC405", "auto", "B", True),
+        ("SAC405", "auto", "F", False),
+        ("SAC405", "off", "B", False),
+        ("SAC405", "on", "F", True),
+        ("SAC405_elastic", "on", "B", False),
+    ],
+)
+def test_solder_yields_where_half_its_yield_stress_is_expected(solder, switch, pulse, yields):
+    settings = [f"materials.solder={solder}", f"shock.numerics.plasticity={switch}", f"shock.service_condition={pulse}"]
+    case = read_case(CASES / "jedec_bga/case.toml", ["scale=quick", *settings], True)
+    effects = shock_effects(case)
+    assert effects["plasticity"]["on"] == yields == (decided(case).materials.solder.plasticity is not None)
+    assert effects["strain_rate"]["on"] == yields
+    if solder == "SAC405":
+        assert f"shock.numerics.plasticity = {switch}" in effects["plasticity"]["why"]

@@ -68,6 +68,41 @@ def test_impossible_shock_is_said(tmp_path, pulse):
     assert [word for word in FAULTS[pulse] if word not in text] == [], text
 
 
+FITTED = {
+    'watch.a.at=["21 mm", "0 mm", "0 mm"]': ["watch.a.at", "lies 0.001 m outside the meshed body"],
+    'watch.a={at=["0 mm", "0 mm", "0 mm"], direction=[0, 0, 0]}': ["watch.a.direction", "has no length"],
+    'watch.package.at=["0 mm", "0 mm", "0 mm"]': ["watch.package", "what is told of the package itself"],
+    'gauges.g.at=["19.5 mm", "5 mm"]': ["gauges.g.length", "outside the meshed body"],
+    'gauges.g.at=["13.8 mm", "11 mm"]': ["gauges.g.length", "lies in a mounting hole"],
+    'gauges.g={at=["5 mm", "5 mm"], face="top"}': ["gauges.g.face", "upper, lower"],
+    'masses.m={mass="1 g", at=["16 mm", "11 mm", "0 mm"]}': ["masses.m.at", "lies in a mounting hole"],
+    'supports.s={on="z_max", hold=["x"]}': ["supports.s.on", "no such facet set", "mounting_holes"],
+    'supports.s.on="mounting_holes"': ["supports.s.hold", "holds nothing"],
+}
+
+
+@pytest.mark.parametrize("setting", FITTED)
+def test_what_cannot_be_fitted_to_the_board_is_said(setting):
+    with pytest.raises(CaseError) as error:
+        read_case(SMALL_CASE, [setting])
+    text = "\n".join(str(problem) for problem in error.value.problems)
+    assert [word for word in FITTED[setting] if word not in text] == [], text
+
+
+@pytest.mark.parametrize(
+    ("setting", "message"),
+    [
+        ('shock.coupling.scheme="local_steps"', "springs take no local steps"),
+        ('shock.method="large_mass"', "moves holes that nothing else holds"),
+    ],
+)
+def test_what_does_not_go_with_elastic_screws_is_said(setting, message):
+    springs = 'supports.screws={on="mounting_holes", hold=["x", "y"], bedding={z="1e11 N/m^3"}}'
+    with pytest.raises(CaseError, match=message):
+        read_case(SMALL_CASE, [springs, setting])
+    assert read_case(SMALL_CASE, [springs]).supports["screws"].stiffness == (0.0, 0.0, 1e11)
+
+
 def test_a_shock_within_one_window_is_refused():
     with pytest.raises(CaseError, match=r'shock.duration = "10 ns": is shorter than one coupling window \(75.6 ns\)'):
         read_case(SMALL_CASE, ["shock.duration=10 ns"])

@@ -1,0 +1,132 @@
+"""From what is fitted to a board or a structure to tables: watch points, strain gauges, supports, lumped masses."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reflowshock.fem.mesh.facet_areas import OutwardFacets, facet_set, outward_facets
+from reflowshock.fem.mesh.gauge_table import GaugeTable
+from reflowshock.fem.mesh.mesh import MeshData, selected_cells
+from reflowshock.fem.mesh.point_shares import point_shares
+from reflowshock.fem.mesh.point_table import PointTable, Support, point_table
+from reflowshock.fem.problem.fittings import AXES, Fittings, PointMass, StrainGauge
+
+ROUNDING = 1e-9  # of the mesh: closer than that is the same place
+Shares = tuple[NDArray[np.integer], NDArray[np.float64]]
+Gauge = tuple[NDArray[np.float64], float, NDArray[np.int64], NDArray[np.float64]]
+
+
+@dataclass(frozen=True, slots=True)
+class FittedTable:
+    """What is fitted to a mesh, in input numbers.
+
+    Attributes:
+        points: Watch points, gauges and supports.
+        bedded: Name of an elastic support -> its facets.
+        masses: Nodes and what they bear of lumped masses [kg].
+    """
+
+    points: PointTable
+    bedded: dict[str, OutwardFacets]
+    masses: Shares
+
+    def within(
+        self, node: NDArray[np.integer], cell: NDArray[np.integer], every_node: NDArray[np.int32]
+    ) -> "FittedTable":
+        """Return the part of a model, in its numbers of nodes ``(n,)`` and cells ``(ne,)``: -1 where another has it.
+
+        A node at the interface counts in one model; ``every_node (n,)`` has it in both, for the facets of their cells.
+        """
+        nodes, masses = node[self.masses[0]], self.masses[1]
+        bedded = {
+            name: replace(item, facets=every_node[item.facets], cells=cell[item.cells])
+            for name, item in self.bedded.items()
+        }
+        return FittedTable(self.points.within(node, cell), bedded, (nodes[nodes >= 0], masses[nodes >= 0]))
+
+
+def fitted(mesh: MeshData, given: Fittings, symmetry: Sequence[str], slaves: NDArray, yields: bool) -> FittedTable:
+    """Find what is fitted to a mesh.
+
+    Args:
+        mesh: The whole body.
+        given: What is fitted to it.
+        symmetry: Axes whose planes through the origin are planes of symmetry.
+        slaves: Nodes that follow others.
+        yields: Whether plastic strain is watched, too.
+
+    Raises:
+        MeshError: A watch point lies outside.
+        LoadError: A facet set without facets; a mass or the end of a gauge outside.
+    """
+    supports: dict[str, Support] = {
+        name: (np.setdiff1d(facet_set(mesh, support.on), slaves), np.isin(list(AXES), support.hold))
+        for name, support in given.supports.items()
+    }
+    points = point_table(mesh, {name: point.at for name, point in given.watch.items()}, supports, yields)
+    return FittedTable(
+        points=replace(points, gauges=gauge_table(mesh, given.gauges, symmetry)),
+        bedded={name: outward_facets(mesh, one.on) for name, one in given.supports.items() if one.bedding},
+        masses=lumped_masses(mesh, given.masses, symmetry),
+    )
+
+
+def fitted_to(mesh: MeshData, chosen: NDArray[np.bool_], given: Fittings, yields: bool) -> FittedTable:
+    """Find what is fitted to some cells ``(ne,)`` of a mesh, the board of a drop; errors as ``fitted``."""
+    body, number = selected_cells(mesh, chosen)
+    symmetry = [axis for axis in AXES if len(body.facets_of(f"symmetry_{axis}"))]
+    nodes, cells = np.flatnonzero(number >= 0).astype(np.int32), np.flatnonzero(chosen)
+    return fitted(body, given, symmetry, np.empty(0, np.int32), yields).within(nodes, cells, nodes)
+
+
+def lumped_masses(mesh: MeshData, masses: Mapping[str, PointMass], symmetry: Sequence[str]) -> Shares:
+    """Return the nodes that bear lumped masses and what each bears [kg]; arguments and errors as ``fitted``."""
+    nodes, shares = [np.empty(0, np.int64)], [np.empty(0)]
+    margin = ROUNDING * float(np.ptp(mesh.points, axis=0).max())
+    for name, item in masses.items():
+        for place, part in item.meshed_places(symmetry, margin):
+            found, share = point_shares(mesh, f"masses.{name}.at", place)
+            nodes.append(found)
+            shares.append(item.mass * part * share)
+    numbers, where = np.unique(np.concatenate(nodes), return_inverse=True)
+    total = np.zeros(len(numbers))
+    np.add.at(total, where.reshape(-1), np.concatenate(shares))
+    return numbers, total
+
+
+def gauge_table(mesh: MeshData, gauges: Mapping[str, StrainGauge], symmetry: Sequence[str]) -> GaugeTable:
+    """Find the nodes around the ends of gauges; arguments and errors as ``fitted``."""
+    found = [find_gauge(mesh, name, one, symmetry) for name, one in gauges.items()]
+    if not found:
+        return GaugeTable.none()
+    directions, lengths, nodes, weights = zip(*found, strict=True)
+    return GaugeTable(
+        names=tuple(gauges),
+        direction=np.array(directions),
+        length=np.array(lengths),
+        nodes=np.concatenate(nodes),
+        gauge=np.repeat(np.arange(len(found)), [len(some) for some in nodes]),
+        weight=np.concatenate(weights),
+    )
+
+
+def find_gauge(mesh: MeshData, name: str, wanted: StrainGauge, symmetry: Sequence[str]) -> Gauge:
+    """Return direction ``(3,)``, length [m], nodes ``(k,)`` and weights ``(k, 3)`` of a gauge, see ``GaugeTable``.
+
+    An end beyond a plane of symmetry is the mirror image of a place on the mesh.
+    """
+    heights = mesh.points[mesh.cells][:, :, 2]
+    middle = np.array([*wanted.at, heights.max() if wanted.face == "upper" else heights.min()])
+    direction = np.array([*wanted.direction, 0.0]) / np.linalg.norm(wanted.direction)
+    around, _ = point_shares(mesh, f"gauges.{name}.at", tuple(middle.tolist()))
+    length = max(wanted.length, float(np.ptp(mesh.points[around] @ direction)))
+    nodes, weights = [], []
+    for side in (1.0, -1.0):
+        end = middle + 0.5 * side * length * direction
+        mirror = np.array([-1.0 if axis in symmetry and x < 0.0 else 1.0 for axis, x in zip(AXES, end, strict=True)])
+        near, share = point_shares(mesh, f"gauges.{name}: the end at", tuple((mirror * end).tolist()))
+        nodes.append(near)
+        weights.append(np.outer(side / length * share, mirror))
+    return direction, length, np.concatenate(nodes), np.concatenate(weights)

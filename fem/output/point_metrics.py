@@ -1,0 +1,64 @@
+"""Metrics of watch points, strain gauges and supports from a history, and of natural modes."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reflowshock.fem.elements.stress import principal_strains, von_mises
+from reflowshock.fem.mesh.point_table import PointTable
+from reflowshock.fem.output.acceleration import is_sampled, low_passed
+from reflowshock.fem.output.result import quantity
+from reflowshock.fem.output.structure_modes import ModeTable
+from reflowshock.fem.problem.filters import LowPass
+
+
+def point_metrics(arrays: Mapping[str, NDArray]) -> dict[str, Any]:
+    """Return peaks at watch points and supports: ``<metric>@<name>``."""
+    metrics: dict[str, Any] = {}
+    for name in arrays["watch"]:
+        displacement, stress = arrays[f"displacement@{name}"], arrays[f"stress@{name}"]
+        metrics |= {
+            f"peak_displacement@{name}": quantity(float(np.linalg.norm(displacement, axis=1).max()), "m"),
+            f"displacement_range@{name}": quantity(float(np.ptp(displacement, axis=0).max()), "m"),
+            f"peak_strain@{name}": quantity(float(np.abs(principal_strains(arrays[f"strain@{name}"])).max())),
+            f"peak_von_mises@{name}": quantity(float(von_mises(stress).max()), "Pa"),
+        }
+        if f"plastic_strain@{name}" in arrays:
+            metrics[f"peak_plastic_strain@{name}"] = quantity(float(arrays[f"plastic_strain@{name}"].max()))
+    for name in arrays["supports"]:
+        reaction = np.linalg.norm(arrays[f"reaction@{name}"], axis=1)
+        metrics[f"peak_reaction@{name}"] = quantity(float(reaction.max()), "N")
+    return metrics
+
+
+def gauge_lengths(table: PointTable) -> dict[str, float]:
+    """Return the length of each strain gauge [m]."""
+    return dict(zip(table.gauges.names, table.gauges.length.tolist(), strict=True))
+
+
+def strain_rate(time: NDArray[np.float64], strain: NDArray[np.float64], low_pass: LowPass) -> NDArray[np.float64]:
+    """Return the rate ``(n,)`` [1/s] of a strain at equal steps ``time (n,)`` [s], after a filter."""
+    step = float(time[-1] - time[0]) / (len(time) - 1)
+    return np.gradient(low_passed(strain, step, low_pass), step)
+
+
+def gauge_metrics(arrays: Mapping[str, NDArray], low_pass: LowPass) -> dict[str, Any]:
+    """Return the peak of each gauge's strain and, where samples are close enough for the filter, of its rate."""
+    metrics: dict[str, Any] = {}
+    sampled = is_sampled(arrays["time"], low_pass)
+    for name in arrays["gauges"]:
+        strain = arrays[f"gauge@{name}"]
+        metrics[f"peak_strain@{name}"] = quantity(float(np.abs(strain).max()))
+        if sampled:
+            rate = strain_rate(arrays["time"], strain, low_pass)
+            metrics[f"peak_strain_rate@{name}"] = quantity(float(np.abs(rate).max()), "1/s")
+    return metrics
+
+
+def mode_metrics(modes: ModeTable | None) -> dict[str, Any]:
+    """Return the first four natural frequencies, or as many as were found."""
+    found = [] if modes is None else modes.frequency.tolist()
+    names = ("first", "second", "third", "fourth")
+    return {f"{name}_frequency": quantity(value, "Hz") for name, value in zip(names, found, strict=False)}

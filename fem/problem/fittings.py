@@ -1,0 +1,105 @@
+"""What is fitted to a board or a structure: supports, lumped masses, watch points, strain gauges. SI floats."""
+
+from collections.abc import Sequence
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from reflowshock.parameters import Parameters
+from reflowshock.quantity import Quantity
+
+AXES = "xyz"
+SAMPLED = 8  # masses along either side of a footprint; even, so that none lies on its middle
+GAUGE = 2e-3  # [m] grid of usual foil gauges on boards
+Axis = Literal["x", "y", "z"]
+Direction = tuple[float, float, float]
+Place = tuple[float, float, float]
+PositiveLength = Annotated[float, Field(gt=0)]
+
+
+class Bedding(Parameters):
+    """Stiffness per area of an elastic support, by component; zero leaves a component free.
+
+    Over an area A with the second moment I it is a total stiffness of k A and a rotational one of k I.
+    """
+
+    x: Annotated[float, Quantity("N/m^3")] = Field(0.0, ge=0)
+    y: Annotated[float, Quantity("N/m^3")] = Field(0.0, ge=0)
+    z: Annotated[float, Quantity("N/m^3")] = Field(0.0, ge=0)
+
+
+class Support(Parameters):
+    """What holds a facet set in the frame of the drop table: components at zero, others on a bedding of springs."""
+
+    on: str
+    hold: tuple[Axis, ...] = ()
+    bedding: Bedding | None = None
+
+    @property
+    def stiffness(self) -> tuple[float, float, float]:
+        """Return the stiffness per area [N/m^3] along x, y, z."""
+        springs = self.bedding or Bedding()
+        return springs.x, springs.y, springs.z
+
+
+class PointMass(Parameters):
+    """A component that is heavy and not stiff: at a place, or spread evenly over ``footprint`` along x and y.
+
+    With a plane of symmetry its mirror image is there as well; of one on that plane each half bears half.
+    """
+
+    mass: Annotated[float, Quantity("g")] = Field(gt=0)
+    at: Annotated[Place, Quantity("mm")]
+    footprint: Annotated[tuple[PositiveLength, PositiveLength], Quantity("mm")] | None = None
+
+    def meshed_places(self, symmetry: Sequence[str], margin: float) -> list[tuple[Place, float]]:
+        """Return where it bears on the mesh, and its part there.
+
+        The footprint is a grid of equal masses; those beyond a plane of symmetry are on the part that is not meshed.
+
+        Args:
+            symmetry: Axes whose planes through the origin are planes of symmetry.
+            margin: Distance [m] below which the place is on such a plane.
+        """
+        planes = [AXES.index(axis) for axis in dict.fromkeys(symmetry)]
+        if self.footprint is None:
+            return [(self.at, 0.5 ** sum(abs(self.at[k]) <= margin for k in planes))]
+        offsets = [(k + 0.5) / SAMPLED - 0.5 for k in range(SAMPLED)]
+        (x, y, z), (length, width) = self.at, self.footprint
+        places = [(x + a * length, y + b * width, z) for a in offsets for b in offsets]
+        return [(place, 1.0 / len(places)) for place in places if all(place[k] > 0.0 for k in planes)]
+
+
+class WatchPoint(Parameters):
+    """A point whose displacement, velocity, strain and stress are recorded.
+
+    ``direction`` is that of its accelerometer; without it, that of the input-G, else the axis of its largest motion.
+    """
+
+    at: Annotated[Place, Quantity("mm")]
+    direction: Direction | None = None
+
+
+class StrainGauge(Parameters):
+    """A strain gauge on the upper or lower face: how much farther its ends are apart, over their distance.
+
+    ``at`` is its middle in x, y. It is as long as an element of the face where that is longer than ``length``.
+    """
+
+    at: Annotated[tuple[float, float], Quantity("mm")]
+    face: Literal["upper", "lower"] = "lower"
+    direction: tuple[float, float] = (1.0, 0.0)
+    length: Annotated[float, Quantity("mm")] = Field(GAUGE, gt=0)
+
+
+class Fittings(Parameters):
+    """Supports, lumped masses, watch points and strain gauges by name.
+
+    On the board of a drop z = 0 is its upper face, which has the package, and the only facet set is ``mounting_holes``,
+    whose walls are held where there are no ``supports``.
+    """
+
+    supports: dict[str, Support] = Field(default_factory=dict)
+    masses: dict[str, PointMass] = Field(default_factory=dict)
+    watch: dict[str, WatchPoint] = Field(default_factory=dict)
+    gauges: dict[str, StrainGauge] = Field(default_factory=dict)

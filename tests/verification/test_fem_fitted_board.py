@@ -1,0 +1,151 @@
+"""What is fitted to a board: gauges in exact fields; a drop against the same board as a structure."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+from pydantic import TypeAdapter
+
+from reflowshock.fem.division.fitted import fitted, fitted_to
+from reflowshock.fem.errors import LoadError
+from reflowshock.fem.mesh.mesh import MeshData
+from reflowshock.fem.problem.fittings import Fittings
+from reflowshock.fem.problem.inputs import INPUT
+from reflowshock.fem.run.package import run
+from reflowshock.fem.run.structure import run_structure
+from tests.support.fem_models import BOARD_X, BOARD_Y, BOARD_Z, board_mesh, write_msh
+from tests.support.fem_structures import STEEL, THICKNESS, strip_mesh
+
+CURVATURE = np.array([3.0, -1.0, 2.0])  # [1/m] of w in xx, yy, xy
+
+
+def bent(points: np.ndarray, middle: float) -> np.ndarray:
+    """Displacement of a plate that is bent to constant curvatures."""
+    x, y, z = points.T
+    xx, yy, xy = CURVATURE
+    slope = np.array([xx * x + xy * y, yy * y + xy * x])
+    return np.column_stack([*(-(z - middle) * slope), 0.5 * (xx * x**2 + yy * y**2) + xy * x * y])
+
+
+def strains_of(mesh: MeshData, displacement: np.ndarray, symmetry: tuple[str, ...] = (), **gauges) -> dict[str, float]:
+    given = TypeAdapter(Fittings).validate_python({"gauges": gauges})
+    table = fitted(mesh, given, symmetry, np.empty(0, np.int32), yields=False).points.gauges
+    stretches = np.zeros((len(table.names), 3))
+    np.add.at(stretches, table.gauge, table.weight * displacement[table.nodes])
+    found = [table.strains(stretches, turning).tolist() for turning in (False, True)]
+    return dict(zip(table.names, zip(*found, strict=True), strict=True))
+
+
+@pytest.mark.parametrize("slant", [0.0, 30.0, 90.0])
+@pytest.mark.parametrize("face", ["upper", "lower"])
+def test_gauge_on_a_bent_plate(face, slant):
+    """Either face has half the thickness times the curvature along the gauge; a long one reads its mean."""
+    along = np.array([np.cos(np.radians(slant)), np.sin(np.radians(slant))])
+    middle = 0.5 * THICKNESS
+    xx, yy, xy = CURVATURE
+    across = along @ np.array([[xx, xy], [xy, yy]]) @ along
+    exact = (-middle if face == "upper" else middle) * across
+    mesh = strip_mesh((8, 3, 2))
+    gauge = {"at": [1.3e-3, 0.4e-3], "face": face, "direction": along.tolist(), "length": 4e-3}
+    found = strains_of(mesh, bent(mesh.points, middle), g=gauge)["g"][0]
+    assert found == pytest.approx(exact, rel=1e-9)
+
+
+def test_rotation_is_no_strain():
+    mesh = strip_mesh()
+    turn, stretch = np.radians(20.0), 1.001
+    rotation = np.array([[np.cos(turn), 0.0, np.sin(turn)], [0.0, 1.0, 0.0], [-np.sin(turn), 0.0, np.cos(turn)]])
+    moved = mesh.points @ rotation.T * stretch - mesh.points
+    small, finite = strains_of(mesh, moved, g={"at": [0.0, 0.0]})["g"]
+    assert finite == pytest.approx(stretch - 1.0) and small < -0.05
+
+
+def test_ends_beyond_a_plane_of_symmetry_are_mirrored():
+    mesh = board_mesh(size=1e-3)
+    displacement = np.column_stack([2e-3 * mesh.points[:, 0], 5e-3 * mesh.points[:, 1], np.zeros(len(mesh.points))])
+    gauges = {"x": {"at": [0.0, 0.0]}, "y": {"at": [3e-3, 0.0], "direction": [0.0, 1.0]}}
+    found = strains_of(mesh, displacement, ("x", "y"), **gauges)
+    assert [found["x"][0], found["y"][0]] == pytest.approx([2e-3, 5e-3])
+
+
+def test_gauge_beyond_the_edge_is_refused():
+    with pytest.raises(LoadError, match=r"gauges.g: the end at = \(0.01\d*, 0, 0\) m lies outside the mesh"):
+        strains_of(strip_mesh(), np.zeros_like(strip_mesh().points), g={"at": [9.9e-3, 0.0]})
+
+
+def test_what_is_fitted_to_the_board_keeps_the_numbers_of_the_whole_mesh():
+    mesh = board_mesh(size=1e-3)
+    upper = mesh.in_parts("board_patch".__eq__)
+    given = TypeAdapter(Fittings).validate_python(
+        {"watch": {"a": {"at": [2e-3, 2e-3, 0.0]}}, "gauges": {"g": {"at": [1e-3, 1e-3], "face": "upper"}}}
+    )
+    table = fitted_to(mesh, upper, given, False)
+    assert mesh.points[table.points.nodes[0]] == pytest.approx([2e-3, 2e-3, 0.0])
+    assert upper[table.points.cells].all()
+    assert mesh.points[table.points.gauges.nodes][:, 2].max() == 0.0
+
+
+SPRINGS = {"screws": {"on": "mounting_holes", "hold": ["x", "y"], "bedding": {"z": 2e11}}}
+FITTED = {
+    "watch": {"edge": {"at": [BOARD_X - 3e-3, 1e-3, 0.0]}},
+    "gauges": {"middle": {"at": [0.0, 1e-3]}, "slant": {"at": [5e-3, 3e-3], "face": "upper", "direction": [1.0, 2.0]}},
+    "masses": {"coil": {"mass": 2e-4, "at": [6e-3, 0.0, -0.5 * BOARD_Z], "footprint": [2e-3, 3e-3]}},
+}
+PEAK, PULSE, END = 14709.975, 5e-5, 1e-4
+
+
+def outputs_of(folder: Path) -> tuple[dict, dict[str, np.ndarray]]:
+    with np.load(folder / "history.npz") as arrays:
+        return json.loads((folder / "result.json").read_text()), dict(arrays)
+
+
+def dropped(folder: Path, kinematics: str, supports: dict) -> tuple[dict, dict[str, np.ndarray]]:
+    """The board as that of a drop without a package."""
+    shock = {"peak_acceleration": PEAK, "pulse_duration": PULSE, "duration": END, "modes": 3, "gravity": "off"}
+    shock |= {"numerics": {"kinematics": kinematics, "history_samples": 50, "field_samples": 2}}
+    shock |= {"numerics": shock["numerics"] | {"step_fraction": 0.5}}
+    tables = {"mode": "dns", "meshes": [str(folder / "board.msh")], "shock": shock, "output": str(folder / "drop")}
+    tables |= {"materials": {"board": STEEL}, "supports": supports} | FITTED
+    request = INPUT.validate_python(tables)
+    request.output.mkdir()
+    run(MPI.COMM_SELF, request)
+    return outputs_of(request.output)
+
+
+def as_structure(folder: Path, kinematics: str, supports: dict) -> tuple[dict, dict[str, np.ndarray]]:
+    """The same mesh as a structure of two layers, its planes of symmetry held by supports."""
+    layer = {"material": "steel", "thickness": 0.5 * BOARD_Z}
+    body = {"length": 2 * BOARD_X, "width": 2 * BOARD_Y, "cells": [1, 1], "symmetry": ["x", "y"]}
+    body |= {"layers": {"board": layer, "board_patch": layer}}
+    dynamics = {"duration": END, "modes": 3, "kinematics": kinematics}
+    dynamics |= {"numerics": {"history_samples": 50, "field_samples": 2, "step_fraction": 0.5}}
+    load = {"kind": "input_g", "peak": PEAK, "duration": PULSE, "direction": [0.0, 0.0, -1.0]}
+    tables = {"mode": "structure", "solver": "explicit", "mesh": str(folder / "box.msh"), "structure": body}
+    tables |= {"materials": {"steel": STEEL}, "supports": supports, "loads": {"drop": load}, "dynamics": dynamics}
+    request = INPUT.validate_python(tables | FITTED | {"output": str(folder / "structure")})
+    request.output.mkdir()
+    run_structure(MPI.COMM_SELF, request)
+    return outputs_of(request.output)
+
+
+@pytest.mark.parametrize(("kinematics", "sprung"), [("small", False), ("small", True), ("corotational", True)])
+def test_drop_of_a_board_is_that_of_the_same_structure(tmp_path, kinematics, sprung):
+    mesh = board_mesh(size=1e-3, layers=2, patch_layers=1)
+    write_msh(mesh, tmp_path / "board.msh")
+    mesh.facets["x_min"], mesh.facets["y_min"] = mesh.facets["symmetry_x"], mesh.facets["symmetry_y"]
+    write_msh(mesh, tmp_path / "box.msh")
+    supports = SPRINGS if sprung else {"screws": {"on": "mounting_holes", "hold": ["x", "y", "z"]}}
+    (drop, first), (structure, second) = (work(tmp_path, kinematics, supports) for work in (dropped, as_structure))
+    for name in ("displacement@edge", "gauge@middle", "gauge@slant", "reaction@screws"):
+        assert np.abs(first[name] - second[name]).max() < 1e-6 * np.abs(second[name]).max(), name
+    found, wanted = drop["metrics"], structure["metrics"]
+    compared = [name for name in wanted if name.startswith(("peak_strain@", "peak_strain_rate@", "peak_acceleration@"))]
+    compared += ["second_peak_acceleration@edge", "first_frequency", "third_frequency"]
+    assert len(compared) == 9
+    for name in compared:
+        assert found[name]["value"] == pytest.approx(wanted[name]["value"], rel=1e-6), name
+    assert drop["model"]["model_mass"] == pytest.approx(structure["model"]["model_mass"])
+    assert 1500.0 * 0.5 < found["response_at_first_frequency"]["value"] < 1500.0 * 2.0
+    assert drop["health"]["energy_balance_error"]["ok"]

@@ -1,0 +1,64 @@
+"""Strain gauges in a report: what they read, and when."""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from matplotlib import pyplot
+
+from reflowshock.workflow.case.text import number
+from reflowshock.workflow.report.curves import MICRO, MILLI, STYLE, svg
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from reflowshock.fem.problem.fittings import StrainGauge
+
+Histories = Mapping[str, Mapping[str, "NDArray"]]
+
+
+def gauge_table(gauges: "Mapping[str, StrainGauge]", metrics: Mapping[str, Any], lengths: Mapping[str, float]) -> dict:
+    """Return what each gauge reads at most; empty without any.
+
+    Args:
+        gauges: name -> gauge.
+        metrics: of the run.
+        lengths: of the gauges in the model [m].
+    """
+    rows = []
+    for name, gauge in gauges.items():
+        rate = metrics.get(f"peak_strain_rate@{name}")
+        rows.append(
+            [
+                name,
+                gauge.face,
+                in_mm(gauge.at),
+                ", ".join(number(along) for along in gauge.direction),
+                number(lengths[name] / MILLI),
+                f"{metrics[f'peak_strain@{name}']['value'] / MICRO:.0f}",
+                "samples too far apart" if rate is None else number(rate["value"]),
+            ]
+        )
+    head = ["gauge", "face", "x, y [mm]", "direction", "length [mm]", "peak strain [µm/m]", "peak strain rate [1/s]"]
+    return {"head": head, "rows": rows} if rows else {}
+
+
+def in_mm(place: tuple[float, ...]) -> str:
+    """Write a place in millimetres."""
+    return ", ".join(number(value / MILLI) for value in place)
+
+
+def gauge_curves(histories: Histories, gauges: "Mapping[str, StrainGauge]", styles: Mapping[str, dict]) -> str:
+    """Draw the strain of every gauge; empty without any."""
+    if not gauges:
+        return ""
+    with pyplot.rc_context(STYLE):
+        figure, axes = pyplot.subplots(
+            len(gauges), 1, figsize=(9.2, 2.2 * len(gauges)), squeeze=False, sharex=True, constrained_layout=True
+        )
+        for axis, name in zip(axes[:, 0], gauges, strict=True):
+            for run, history in histories.items():
+                axis.plot(history["time"] / MILLI, history[f"gauge@{name}"] / MICRO, **styles[run])
+            axis.set_ylabel(f"strain of {name} [µm/m]")
+        axes[0, 0].legend(frameon=False)
+        axes[-1, 0].set_xlabel("time [ms]")
+        return svg(figure)

@@ -1,0 +1,56 @@
+"""Response spectra of what shakes a body, and its natural modes."""
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib import pyplot
+
+from reflowshock.workflow.report.curves import STYLE, svg
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from reflowshock.fem.loads.pulse import Pulse
+
+GRAVITY = 9.80665
+SAMPLES = 4000  # of an input, for its spectrum
+LEAST = 20.0  # samples in a period of the spectrum's highest frequency
+
+
+def spectrum_curves(pulses: "Mapping[str, Pulse]", duration: float) -> str:
+    """Draw the response spectrum of inputs over the duration [s] of a run; empty without any."""
+    from reflowshock.fem.output.response_spectrum import QUALITY, spectrum_frequencies
+
+    if not pulses:
+        return ""
+    frequencies = spectrum_frequencies(1.0 / duration, SAMPLES / (LEAST * duration))
+    with pyplot.rc_context(STYLE):
+        figure, axis = pyplot.subplots(figsize=(9.2, 2.8), constrained_layout=True)
+        for name, pulse in pulses.items():
+            axis.loglog(frequencies, spectrum(pulse, duration, frequencies), label=name)
+        axis.set(xlabel="natural frequency [Hz]", ylabel=f"peak acceleration, Q = {QUALITY:g} [G]")
+        axis.legend(frameon=False)
+        return svg(figure)
+
+
+def spectrum(pulse: "Pulse", duration: float, frequencies: "NDArray[np.float64]") -> "NDArray[np.float64]":
+    """Return the response `(k,)` [G] of masses with some frequencies `(k,)` [Hz] to the first part [s] of a pulse."""
+    from reflowshock.fem.output.response_spectrum import response_spectrum
+
+    step = duration / SAMPLES
+    values = np.array([pulse.value(k * step) for k in range(SAMPLES + 1)])
+    return response_spectrum(values, step, frequencies) / GRAVITY
+
+
+def mode_table(modes: Sequence[Mapping]) -> dict:
+    """Natural frequencies, and how much of the mass moves with each mode when the supports are shaken."""
+    rows = [
+        [
+            f"{mode['mode']}",
+            f"{mode['frequency']:.2f}",
+            *(f"{100 * mode['mass_fraction'][axis]:.1f} %" for axis in "xyz"),
+        ]
+        for mode in modes
+    ]
+    return {"head": ["mode", "frequency [Hz]", "mass along x", "along y", "along z"], "rows": rows}
