@@ -63,7 +63,7 @@ def test_a_plan_in_any_environment(place, name):
 def test_a_run_of_a_user_without_anything(place):
     """Neither a locale nor a home; where the test may become another user, one whose kernels nobody has compiled."""
     root, out = os.geteuid() == 0, "Gehäuse [x] ü"
-    environment = ENVIRONMENTS["C"] | {"TMPDIR": str(place), "HOME": "/nonexistent", "NUMBA_OPT": "0"}  # quicker
+    environment = ENVIRONMENTS["C"] | {"TMPDIR": str(place), "HOME": "/nonexistent"}
     done = command(place, "run", "case.toml", "--out", out, environment=environment, before=NOBODY if root else [])
     assert (done.returncode, done.stderr.decode()) == (0, "")
     assert is_plain(done.stdout)
