@@ -103,3 +103,27 @@ class Fittings(Parameters):
     masses: dict[str, PointMass] = Field(default_factory=dict)
     watch: dict[str, WatchPoint] = Field(default_factory=dict)
     gauges: dict[str, StrainGauge] = Field(default_factory=dict)
+
+
+class Neighbour(Parameters):
+    """A further package on the board of a drop, coarse: it loads and stiffens the board, and its joints are not judged.
+
+    ``at`` is its centre in x, y. Each of its ``rows`` x ``columns`` joints is a square post of side ``post`` and height
+    ``standoff``. ``substrate`` and ``die`` are length, width and thickness. Materials are those of the same roles. With
+    a plane of symmetry its mirror image is there as well.
+    """
+
+    at: Annotated[tuple[float, float], Quantity("mm")]
+    rows: int = Field(ge=1, le=100)
+    columns: int = Field(ge=1, le=100)
+    pitch: Annotated[float, Quantity("mm")] = Field(gt=0)
+    post: Annotated[float, Quantity("mm")] = Field(gt=0)
+    standoff: Annotated[float, Quantity("mm")] = Field(gt=0)
+    substrate: Annotated[tuple[PositiveLength, PositiveLength, PositiveLength], Quantity("mm")]
+    die: Annotated[tuple[PositiveLength, PositiveLength, PositiveLength], Quantity("mm")]
+
+
+class BoardFittings(Fittings):
+    """What the board of a drop has besides, further packages among them."""
+
+    packages: dict[str, Neighbour] = Field(default_factory=dict)

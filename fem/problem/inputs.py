@@ -8,7 +8,7 @@ from pydantic import Field, TypeAdapter
 from reflowshock.fem.materials.kinematics import Kinematics
 from reflowshock.fem.materials.parameters import Material
 from reflowshock.fem.materials.roles import Materials
-from reflowshock.fem.problem.fittings import Fittings
+from reflowshock.fem.problem.fittings import BoardFittings
 from reflowshock.fem.problem.shock import Ranks, Shock, ShockNumerics
 from reflowshock.fem.problem.structure import DynamicsNumerics, LayerCoupling, SolverName, StructureProblem
 from reflowshock.parameters import Parameters
@@ -51,7 +51,7 @@ class CoolingInput(PackageInput):
     change: float
 
 
-class RunInput(PackageInput, Fittings):
+class RunInput(PackageInput, BoardFittings):
     """A package on a board, dropped.
 
     ``checkpoints`` is a folder from which a run continues, ``cooling`` the file of the state in which it begins. A run

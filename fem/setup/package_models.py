@@ -12,6 +12,7 @@ from reflowshock.fem.division.divide import divide
 from reflowshock.fem.division.division import Rules
 from reflowshock.fem.division.fine_joints import copied_joints, joint_of, read_package
 from reflowshock.fem.division.fitted import FittedTable, fitted_to
+from reflowshock.fem.division.neighbours import with_neighbours
 from reflowshock.fem.division.record import coupling_record
 from reflowshock.fem.division.tables import JointTables, joined, model_inputs
 from reflowshock.fem.division.whole import Whole, on_springs, survey
@@ -44,7 +45,7 @@ def divided_package(world: MPI.Comm, request: RunInput) -> Divided[JointTables]:
 def divided_on_one_rank(request: RunInput) -> Divided[JointTables]:
     """Read, check and divide all meshes; errors as ``read_package``, ``division.checks``."""
     shock, numerics = request.shock, request.shock.numerics
-    whole = joined(read_package(request))
+    whole = joined(with_neighbours(read_package(request), request.packages))
     fitted = fitted_board(whole, request)
     plain = survey(whole.mesh, request.materials, treatment_of(request))
     found = on_springs(plain, whole.mesh, fitted, request.supports)
@@ -149,7 +150,7 @@ def elastic_package(request: RunInput) -> tuple[Model[JointTables], float]:
     meshes = (request.meshes[0], request.coarse_joints) if request.coarse_joints else request.meshes
     shock = request.shock.model_copy(update={"coupling": coupling, "method": "direct"})
     alone = request.model_copy(update={"shock": shock, "meshes": meshes, "watch": {}, "gauges": {}})
-    whole = joined(read_package(alone))
+    whole = joined(with_neighbours(read_package(alone), request.packages))
     given = model_inputs(whole, "dns", held_by(alone), shock.joint_layer, fitted_board(whole, alone))["dns"]
     tables, local = given.tables, distribute(MPI.COMM_SELF, given.mesh)
     pieces = make_pieces(local, tables, request.materials, request.formulation)

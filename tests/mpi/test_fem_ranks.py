@@ -24,12 +24,24 @@ SHOCK = {
     "numerics": {"mass_scaled": ["copper"], "history_samples": 50, "field_samples": 2},
 }
 
-# A gauge across the models' interface, one whose middle lies on a plane of symmetry, and a mass on the board.
+# A gauge across the models' interface, one whose middle lies on a plane of symmetry, a mass and another package.
 FITTED = {
     "watch": {"edge": {"at": [8e-3, 4e-3, 0.0]}},
     "gauges": {
         "near": {"at": [3.2e-3, 1e-3], "direction": [2.0, 1.0], "length": 3e-3},
         "middle": {"at": [0.0, 6e-3], "face": "upper"},
+    },
+    "packages": {
+        "pmic": {
+            "at": [10e-3, 2e-3],
+            "rows": 1,
+            "columns": 2,
+            "pitch": 1e-3,
+            "post": 0.5e-3,
+            "standoff": 0.3e-3,
+            "substrate": [2e-3, 1e-3, 0.4e-3],
+            "die": [1e-3, 0.8e-3, 0.3e-3],
+        }
     },
     "masses": {"coil": {"mass": 1e-5, "at": [7e-3, 0.0, 0.0], "footprint": [4e-3, 2e-3]}},
 }

@@ -1,17 +1,21 @@
 """What is fitted to a board: gauges in exact fields; a drop against the same board as a structure."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from mpi4py import MPI
 from pydantic import TypeAdapter
+from scipy.spatial import cKDTree
 
 from reflowshock.fem.division.fitted import fitted, fitted_to
+from reflowshock.fem.division.neighbours import with_neighbours
+from reflowshock.fem.elements.element import element_geometry
 from reflowshock.fem.errors import LoadError
-from reflowshock.fem.mesh.mesh import MeshData
-from reflowshock.fem.problem.fittings import Fittings
+from reflowshock.fem.mesh.mesh import MeshData, merge_nodes
+from reflowshock.fem.problem.fittings import Fittings, Neighbour
 from reflowshock.fem.problem.inputs import INPUT
 from reflowshock.fem.run.package import run
 from reflowshock.fem.run.structure import run_structure
@@ -101,30 +105,32 @@ def outputs_of(folder: Path) -> tuple[dict, dict[str, np.ndarray]]:
         return json.loads((folder / "result.json").read_text()), dict(arrays)
 
 
-def dropped(folder: Path, kinematics: str, supports: dict) -> tuple[dict, dict[str, np.ndarray]]:
+def dropped(folder: Path, kinematics: str, supports: dict, **more) -> tuple[dict, dict[str, np.ndarray]]:
     """The board as that of a drop without a package."""
     shock = {"peak_acceleration": PEAK, "pulse_duration": PULSE, "duration": END, "modes": 3, "gravity": "off"}
     shock |= {"numerics": {"kinematics": kinematics, "history_samples": 50, "field_samples": 2}}
     shock |= {"numerics": shock["numerics"] | {"step_fraction": 0.5}}
     tables = {"mode": "dns", "meshes": [str(folder / "board.msh")], "shock": shock, "output": str(folder / "drop")}
-    tables |= {"materials": {"board": STEEL}, "supports": supports} | FITTED
+    tables |= {"materials": {"board": STEEL}, "supports": supports} | FITTED | more
     request = INPUT.validate_python(tables)
     request.output.mkdir()
     run(MPI.COMM_SELF, request)
     return outputs_of(request.output)
 
 
-def as_structure(folder: Path, kinematics: str, supports: dict) -> tuple[dict, dict[str, np.ndarray]]:
+def as_structure(
+    folder: Path, kinematics: str, supports: dict, parts=("board", "board_patch"), **more
+) -> tuple[dict, dict[str, np.ndarray]]:
     """The same mesh as a structure of two layers, its planes of symmetry held by supports."""
     layer = {"material": "steel", "thickness": 0.5 * BOARD_Z}
     body = {"length": 2 * BOARD_X, "width": 2 * BOARD_Y, "cells": [1, 1], "symmetry": ["x", "y"]}
-    body |= {"layers": {"board": layer, "board_patch": layer}}
+    body |= {"layers": dict.fromkeys(parts, layer)}
     dynamics = {"duration": END, "modes": 3, "kinematics": kinematics}
     dynamics |= {"numerics": {"history_samples": 50, "field_samples": 2, "step_fraction": 0.5}}
     load = {"kind": "input_g", "peak": PEAK, "duration": PULSE, "direction": [0.0, 0.0, -1.0]}
     tables = {"mode": "structure", "solver": "explicit", "mesh": str(folder / "box.msh"), "structure": body}
     tables |= {"materials": {"steel": STEEL}, "supports": supports, "loads": {"drop": load}, "dynamics": dynamics}
-    request = INPUT.validate_python(tables | FITTED | {"output": str(folder / "structure")})
+    request = INPUT.validate_python(tables | FITTED | more | {"output": str(folder / "structure")})
     request.output.mkdir()
     run_structure(MPI.COMM_SELF, request)
     return outputs_of(request.output)
@@ -149,3 +155,38 @@ def test_drop_of_a_board_is_that_of_the_same_structure(tmp_path, kinematics, spr
     assert drop["model"]["model_mass"] == pytest.approx(structure["model"]["model_mass"])
     assert 1500.0 * 0.5 < found["response_at_first_frequency"]["value"] < 1500.0 * 2.0
     assert drop["health"]["energy_balance_error"]["ok"]
+
+
+GLUED = {  # on two posts, whose edges are lines of the board
+    "at": [7.5e-3, 4.5e-3], "rows": 1, "columns": 2, "pitch": 2e-3, "post": 1e-3, "standoff": 0.4e-3,
+    "substrate": [5e-3, 3e-3, 0.5e-3], "die": [3e-3, 1e-3, 0.3e-3],
+}  # fmt: skip
+
+
+def test_neighbour_is_tied_as_if_it_were_one_body_with_the_board(tmp_path):
+    """Where its lines are lines of the board's mesh: modes, mass and motion are those of one mesh of both."""
+    neighbour = Neighbour(**GLUED)
+    mesh = board_mesh(size=1e-3, layers=2, patch_layers=1)
+    write_msh(mesh, tmp_path / "board.msh")
+    both = with_neighbours(mesh, {"pmic": neighbour})
+    volume = 2 * 1e-6 * 0.4e-3 + 15e-6 * 0.5e-3 + 3e-6 * 0.3e-3
+    own = both.in_parts(lambda name: name.endswith("_pmic"))
+    assert element_geometry(both.points, both.cells[own]).volume.sum() == pytest.approx(volume)
+    feet = both.facet_nodes("slave@pmic")
+    distance, below = cKDTree(mesh.points).query(both.points[feet])
+    assert distance.max() < 1e-12
+    glued, _ = merge_nodes(both, feet, below.astype(np.int32))
+    sides = {"x_min": glued.facets["symmetry_x"], "y_min": glued.facets["symmetry_y"]}
+    kept = {name: some for name, some in glued.facets.items() if "@" not in name}
+    write_msh(replace(glued, facets=kept | sides), tmp_path / "box.msh")
+    supports = {"screws": {"on": "mounting_holes", "hold": ["x", "y", "z"]}}
+    roles = dict.fromkeys(("board", "solder", "substrate", "die"), STEEL)
+    given, parts = {"gauges": {"below": {"at": [6e-3, 4e-3]}}}, ("board", "board_patch", *glued.part_names[2:])
+    drop, first = dropped(tmp_path, "small", supports, packages={"pmic": GLUED}, materials=roles, **given)
+    structure, second = as_structure(tmp_path, "small", supports, parts, **given)
+    assert drop["model"]["model_mass"] == pytest.approx(structure["model"]["model_mass"])
+    assert drop["metrics"]["first_frequency"]["value"] == pytest.approx(
+        structure["metrics"]["first_frequency"]["value"], rel=1e-6
+    )
+    for name in ("displacement@edge", "gauge@below"):
+        assert np.abs(first[name] - second[name]).max() < 1e-6 * np.abs(second[name]).max(), name

@@ -23,10 +23,27 @@ def longest_duration(case: "BoardDropCase") -> float:
 
 
 def first_mode(case: "BoardDropCase") -> tuple[float, float]:
-    """Return length [m] and angular frequency [rad/s] of the board as a beam that is pinned at its holes."""
+    """Return length [m] and angular frequency [rad/s] of the board as a beam that is pinned at its holes.
+
+    What is fitted to it counts as if all of it were at its middle, where it makes it slowest.
+    """
     board, (young_x, young_y, _) = case.board, case.materials.board.engineering_constants.young
     holes = board.holes
     spans = ((board.length - 2.0 * holes.inset_x, young_x), (board.width - 2.0 * holes.inset_y, young_y))
     length, young = max(spans)
-    stiffness = young * board.thickness * board.thickness / 12.0 / case.materials.board.density
+    density = case.materials.board.density + 2.0 * fitted_mass(case) / (board.length * board.width * board.thickness)
+    stiffness = young * board.thickness * board.thickness / 12.0 / density
     return length, (math.pi / length) ** 2 * math.sqrt(stiffness)
+
+
+def fitted_mass(case: "BoardDropCase") -> float:
+    """Return the mass of lumped masses and further packages [kg], mirror images included; at most, if on a plane."""
+    images = 4.0 if case.board.symmetry == "quarter" else 1.0
+    roles = case.materials
+    packages = sum(
+        item.rows * item.columns * item.post**2 * item.standoff * roles.solder.density
+        + math.prod(item.substrate) * roles.substrate.density
+        + math.prod(item.die) * roles.die.density
+        for item in case.packages.values()
+    )
+    return images * (packages + sum(item.mass for item in case.masses.values()))

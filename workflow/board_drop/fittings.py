@@ -1,16 +1,18 @@
-"""What is fitted to the board of a drop: places off it, supports that do not go with the shock."""
+"""What cannot be fitted to the board of a drop: beside it, over something else, or with its shock."""
 
+import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from reflowshock.fem.problem.attachment_checks import fitting_problems
-from reflowshock.fem.problem.fittings import Fittings, Place
+from reflowshock.fem.problem.attachment_checks import fitting_problems, inside
+from reflowshock.fem.problem.fittings import BoardFittings, Neighbour, Place
 from reflowshock.fem.problem.structure import Holes, Layer, Structure
 from reflowshock.problem import Problem
 
 if TYPE_CHECKING:
     from reflowshock.workflow.package.case import BoardDropCase
 
+ROUNDING = 1e-9
 PACKAGE = "package"  # name of the acceleration of the package's centre
 
 
@@ -45,7 +47,9 @@ def drawn_board(case: "BoardDropCase") -> DrawnBoard:
 
 def problems(case: "BoardDropCase") -> Iterator[Problem]:
     """Find what cannot be fitted to the board, and supports that do not go with the shock."""
-    yield from fitting_problems(case, drawn_board(case))
+    board = drawn_board(case)
+    yield from fitting_problems(case, board)
+    yield from neighbour_problems(case, board)
     for table in ("watch", "gauges"):
         if PACKAGE in getattr(case, table):
             yield Problem(f"{table}.{PACKAGE}", "has the name of what is told of the package itself", PACKAGE)
@@ -58,6 +62,57 @@ def problems(case: "BoardDropCase") -> Iterator[Problem]:
         yield Problem("shock.coupling.scheme", message, "local_steps", "held_velocity, impulse, auto")
 
 
+def neighbour_problems(case: "BoardDropCase", board: DrawnBoard) -> Iterator[Problem]:
+    """Find further packages that cannot be, or not where they are: off the board, over a hole or another package."""
+    package = case.package.substrate
+    taken = {"package": ((0.0, 0.0), (package.length, package.width))}
+    for name, item in case.packages.items():
+        key = f"packages.{name}"
+        yield from _layers(key, item)
+        for other, (centre, sides) in taken.items():
+            gaps = [
+                abs(a - b) - 0.5 * (c + d) for a, b, c, d in zip(item.at, centre, item.substrate, sides, strict=False)
+            ]
+            if max(gaps) < 0.0:
+                yield Problem(f"{key}.at", f"overlaps {other}", None, f"{in_mm(-max(gaps))} farther away")
+        taken[key] = item.at, (item.substrate[0], item.substrate[1])
+        for x in (-0.5, 0.5):
+            for y in (-0.5, 0.5):
+                corner = (item.at[0] + x * item.substrate[0], item.at[1] + y * item.substrate[1], 0.0)
+                yield from inside(f"{key}.at", corner, board)
+        yield from _beside_holes(f"{key}.at", item, board)
+    if case.packages and case.cooled:
+        message = "does not know further packages, whose stress of cooling is left out"
+        yield Problem("thermal.effects.residual_stress", message, "on", "off, or no packages")
+
+
+def _layers(key: str, item: Neighbour) -> Iterator[Problem]:
+    """Find posts that overlap or do not stand below the substrate, and a die that is larger than it."""
+    if item.post > item.pitch:
+        yield Problem(f"{key}.post", "is wider than the pitch", in_mm(item.post), f"<= {in_mm(item.pitch)}")
+    for axis, count, outer, inner in zip("xy", (item.columns, item.rows), item.substrate, item.die, strict=False):
+        array = (count - 1) * item.pitch + item.post
+        if max(array, inner) > outer * (1.0 + ROUNDING):
+            message = f"is smaller along {axis} than its joints or its die"
+            yield Problem(f"{key}.substrate", message, in_mm(outer), f">= {in_mm(max(array, inner))}")
+
+
+def _beside_holes(key: str, item: Neighbour, board: DrawnBoard) -> Iterator[Problem]:
+    """Find a package over a mounting hole."""
+    assert board.holes is not None
+    centre = [
+        0.5 * spacing if x >= 0.0 else -0.5 * spacing for x, spacing in zip(item.at, board.holes.spacing, strict=True)
+    ]
+    gaps = [max(abs(a - b) - 0.5 * side, 0.0) for a, b, side in zip(item.at, centre, item.substrate, strict=False)]
+    if math.hypot(*gaps) < 0.5 * board.holes.diameter:
+        yield Problem(key, "lies over a mounting hole", None, f">= {in_mm(0.5 * board.holes.diameter)} from its axis")
+
+
+def in_mm(length: float) -> str:
+    """Write a length in millimetres."""
+    return f"{1e3 * length:.4g} mm"
+
+
 def given(case: "BoardDropCase") -> dict:
     """Return what is fitted as the package fem reads it."""
-    return case.model_dump(mode="json", include=set(Fittings.model_fields))
+    return case.model_dump(mode="json", include=set(BoardFittings.model_fields))

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from reflowshock.fem.materials.roles import Materials
-from reflowshock.fem.problem.fittings import Fittings
+from reflowshock.fem.problem.fittings import BoardFittings
 from reflowshock.fem.problem.shock import Shock
 from reflowshock.fem.problem.thermal import Thermal
 from reflowshock.meshing.board.parameters import Board, Package, Warpage
@@ -76,7 +76,7 @@ def package_pipeline(heated: bool, dropped: bool) -> Pipeline:
         ("solder_mesh/assembly.msh", "solder_mesh/joints.msh", "solder_mesh/quality.json"),
     )
     surface = Stage("surface", GIVEN, ("reflow",), ("surface/surfaces.json",))
-    moved = ("shock", "materials", *Fittings.model_fields, *COOLED)
+    moved = ("shock", "materials", *BoardFittings.model_fields, *COOLED)
     shock = Stage("shock", moved, ("solder_mesh",), (), without=JUDGED_BY)
     stages = (geometry, reflow, surface, solder_mesh, *((shock,) if dropped else ()))
     follows = tuple(stage.name for stage in stages)
@@ -132,7 +132,7 @@ class PackageCase(Case):
         return given_surfaces.files(self.package)
 
 
-class BoardDropCase(PackageCase, Fittings):
+class BoardDropCase(PackageCase, BoardFittings):
     """A package on a board: its joints reflowed, then the board dropped."""
 
     ranks_key = "shock.ranks.total"

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from reflowshock.workflow.board_drop.board_deflection import decided, expected_deflection
-from reflowshock.workflow.board_drop.duration import longest_duration
+from reflowshock.workflow.board_drop.duration import first_mode, longest_duration
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.convergence.packages import package_study
 from reflowshock.workflow.pipeline.reader import read_case
@@ -68,7 +68,14 @@ def test_impossible_shock_is_said(tmp_path, pulse):
     assert [word for word in FAULTS[pulse] if word not in text] == [], text
 
 
+PMIC = 'packages.pmic={{at=["{}", "0 mm"], rows={}, columns=2, pitch="1 mm", post="0.5 mm", standoff="0.3 mm"'
+PMIC += ', substrate=["3 mm", "2 mm", "0.4 mm"], die=["{}", "1 mm", "0.3 mm"]}}'
 FITTED = {
+    PMIC.format("10 mm", 2, "2 mm").replace('"0 mm"', '"3 mm"').replace("0.5 mm", "2 mm"): ["pmic.post", "wider than"],
+    PMIC.format("10 mm", 2, "4 mm").replace('"0 mm"', '"3 mm"'): ["pmic.substrate", "smaller along x than its joints"],
+    PMIC.format("3 mm", 2, "2 mm").replace('"0 mm"', '"3 mm"'): ["pmic.at", "overlaps package"],
+    PMIC.format("10 mm", 2, "2 mm"): ["pmic.at", "outside the meshed body"],
+    PMIC.format("15 mm", 2, "2 mm").replace('"0 mm"', '"9 mm"'): ["pmic.at", "lies over a mounting hole"],
     'watch.a.at=["21 mm", "0 mm", "0 mm"]': ["watch.a.at", "lies 0.001 m outside the meshed body"],
     'watch.a={at=["0 mm", "0 mm", "0 mm"], direction=[0, 0, 0]}': ["watch.a.direction", "has no length"],
     'watch.package.at=["0 mm", "0 mm", "0 mm"]': ["watch.package", "what is told of the package itself"],
@@ -131,6 +138,15 @@ def test_an_automatic_duration_is_at_most_a_period_after_the_pulse():
         _ = case.shock.decided_duration
     given = read_case(SMALL_CASE, ["shock.duration=0.2 ms"])
     assert longest_duration(given) == given.shock.decided_duration == 2e-4
+
+
+def test_what_is_fitted_to_the_board_makes_it_slower():
+    bare, pmic = read_case(SMALL_CASE, ["masses={}"]), PMIC.format("10 mm", 2, "2 mm").replace('"0 mm"', '"3 mm"')
+    heavy = read_case(SMALL_CASE, ["masses={}", pmic])
+    substrate, die = heavy.materials.substrate.density, heavy.materials.die.density
+    mass = 4.0 * (4 * 0.25e-6 * 0.3e-3 * heavy.materials.solder.density + 2.4e-9 * substrate + 0.6e-9 * die)
+    share = 2.0 * mass / (40e-3 * 30e-3 * 1e-3 * bare.materials.board.density)
+    assert first_mode(bare)[1] / first_mode(heavy)[1] == pytest.approx(np.sqrt(1.0 + share))
 
 
 @pytest.mark.parametrize("text", ["automatic", "0 ms", "3", '"-1 ms"'])
