@@ -1,56 +1,125 @@
-"""One joint between patches of board and substrate: what its measures lose where boxes ignore its pads.
+"""One joint between patches of board and substrate by the program's own meshes: does what it bears converge?
 
-    python benchmarks/imprinted_pads.py --out imprinted_pads.json [--halved]
+    PYTHONPATH=. python benchmarks/imprinted_pads.py [TABLE ...]  (one core; writes results/imprinted_pads.json)
 
 The scene of ``tests/support/imprinted_patch.py`` in static equilibrium, elastic or with solder that yields (deformation
-plasticity, which is what J2 gives under a load in proportion), by the program's own elements, meshes and ties.
+plasticity, which is what J2 gives under a load in proportion), by the program's own elements, meshes and ties. Tables:
+``meshes``  tied to boxes that ignore the pads; in columns; in columns, boxes shifted by half an element
+``halved``  every element of the imprinted mesh 1, 2/3 and 1/2 times as long, elastic and yielding
+``turned``  the motion turned against the mesh
 """
 
 import argparse
 import json
+import os
+from math import hypot, radians
 from pathlib import Path
 from time import process_time
 
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
 from reflowshock.fem.elements.element import critical_steps, element_geometry
 from reflowshock.meshing.core.hexahedra import scaled_jacobian
-from tests.support.imprinted_patch import IMPRINTED, MESHES, Mesh, Problem, ends, half_of, patch
+from reflowshock.workflow.convergence.errors import richardson
+from tests.support.imprinted_patch import IMPRINTED, LAYER, MESHES, PADS, Mesh, Problem, ends, half_of, patch
+
+RESULTS = Path(__file__).parent / "results" / "imprinted_pads.json"
+LAYERS = (0.5 * LAYER, LAYER, 2.0 * LAYER)
+SIZES = (1.0, 2.0 / 3.0, 0.5)
+ANGLES = (0.0, 30.0, 45.0)
+PRINTED = ("axial_force", "shear_force", "bending_moment", "von_mises:25um", "plastic_work:25um")
+Measures = dict[str, float]
 
 
-def measured(mesh: Mesh) -> dict:
-    """Return what a mesh is like, and its measures elastic and with solder that yields."""
-    start = process_time()
-    whole, joint = patch(mesh)
-    own = whole.mesh
-    counts = {name: int((own.part == number).sum()) for number, name in enumerate(own.part_names)}
-    if mesh.joint["core"] % 2 == 0 and not mesh.shift:  # then y = 0 is a line of the mesh
+def solved(mesh: Mesh, yields: bool, angle: float | None = None) -> Measures:
+    """Return the measures of both ends, ``<measure>@<end>``."""
+    whole, _ = patch(mesh)
+    if angle is None and mesh.joint["core"] % 2 == 0 and not mesh.shift:  # then y = 0 is a line of the mesh
         whole = half_of(whole)
-        own = whole.mesh
-    found = {
-        "elements": counts,
+    problem = Problem(whole, yields, turned=angle)
+    found = ends(problem, problem.solve(), LAYERS)
+    return {f"{name}@{end}": value for end, values in found for name, value in values.items()}
+
+
+def described(mesh: Mesh) -> dict:
+    """Return what a mesh is like."""
+    whole, joint = patch(mesh)
+    own, elements = whole.mesh, Problem(whole, False).elements
+    steps = critical_steps(elements, element_geometry(own.points, own.cells).nodal_volume)
+    parts = {name: own.part == number for number, name in enumerate(own.part_names)}
+    return {
+        "elements": {name: int(cells.sum()) for name, cells in parts.items()},
         "scaled_jacobian": min(float(scaled_jacobian(joint.points, cells).min()) for cells in joint.cells.values()),
         "solder_volume_error": joint.volume_error,
         "contact_area_error": joint.record["contact_area_error"],
+        "critical_steps": {name: float(steps[cells].min()) for name, cells in parts.items()},
     }
+
+
+def meshes() -> dict:
+    """Return what each mesh is like, and its measures."""
+    return {
+        name: described(mesh) | {"elastic": solved(mesh, False), "yielding": solved(mesh, True)}
+        for name, mesh in MESHES.items()
+    }
+
+
+def halved() -> dict:
+    """Return measures of three meshes, how far each is from the next, and what they tend to.
+
+    Moments are told over the section force times the pad's radius.
+    """
+    result = {}
     for name, yields in (("elastic", False), ("yielding", True)):
-        problem = Problem(whole, yields)
-        found[name] = dict(ends(problem, problem.solve()))
-    steps = critical_steps(problem.elements, element_geometry(own.points, own.cells).nodal_volume)
-    smallest = {name: float(steps[own.part == number].min()) for number, name in enumerate(own.part_names)}
-    return found | {"critical_steps": smallest, "seconds": process_time() - start}
+        rows = {f"{size:.3g}": _timed(size, yields) for size in SIZES}
+        values = [row["values"] for row in rows.values()]
+        limits = {key: richardson(SIZES, [row[key] for row in values], None) for key in values[0]}
+        result[name] = rows | {
+            "changes": [_changes(coarse, fine) for coarse, fine in ((values[0], values[1]), (values[0], values[2]))],
+            "limits": {key: {"value": found[0], "order": found[1]} for key, found in limits.items() if found},
+        }
+        for told in result[name]["changes"]:
+            print(f"{name:9} " + "  ".join(f"{key} {told[key]:+.1%}" for key in told if key.split("@")[0] in PRINTED))
+    return result
+
+
+def turned() -> dict:
+    """Return measures under motions at angles, and how far they are from those along x."""
+    rows = {f"{angle:g}": solved(IMPRINTED, False, radians(angle)) for angle in ANGLES}
+    first = next(iter(rows.values()))
+    changes = {angle: _changes(row, first) for angle, row in rows.items()}
+    for angle, told in changes.items():
+        print(f"{angle:>3} deg " + "  ".join(f"{key} {told[key]:+.2%}" for key in told if key.split("@")[0] in PRINTED))
+    return {"values": rows, "changes": changes}
+
+
+def _timed(size: float, yields: bool) -> dict:
+    begin = process_time()
+    values = solved(IMPRINTED.times(size), yields)
+    return {"seconds": process_time() - begin, "values": values}
+
+
+def _changes(coarse: Measures, fine: Measures) -> Measures:
+    """Return relative differences of a coarse to a fine mesh; of moments over force times radius."""
+    radius = 0.5 * PADS["diameter"]
+    scale = {end: hypot(fine[f"axial_force@{end}"], fine[f"shear_force@{end}"]) for end in ("board", "package")}
+    over = fine | {f"bending_moment@{end}": radius * force for end, force in scale.items()}
+    return {key: (coarse[key] - value) / over[key] for key, value in fine.items() if over[key]}
+
+
+TABLES = {"meshes": meshes, "halved": halved, "turned": turned}
 
 
 def main() -> None:
-    """Compute all meshes and write their measures."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--out", type=Path)
-    parser.add_argument("--halved", action="store_true", help="also the imprinted mesh with every element halved")
-    options = parser.parse_args()
-    meshes = MESHES | ({"imprinted, halved": IMPRINTED.halved()} if options.halved else {})
-    results = {name: measured(mesh) for name, mesh in meshes.items()}
-    text = json.dumps(results, indent=1)
-    print(text)
-    if options.out:
-        options.out.write_text(text + "\n", encoding="utf-8")
+    """Compute tables and write them."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("tables", nargs="*", metavar="TABLE", help=f"of {', '.join(TABLES)}; all without")
+    chosen = parser.parse_args().tables or list(TABLES)
+    RESULTS.parent.mkdir(exist_ok=True)
+    found = json.loads(RESULTS.read_text()) if RESULTS.exists() else {}
+    for name in chosen:
+        found[name] = TABLES[name]()
+        RESULTS.write_text(json.dumps(found, indent=1))
 
 
 if __name__ == "__main__":

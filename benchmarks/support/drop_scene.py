@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from reflowshock.meshing.board.assembly import write_assembly
 from reflowshock.meshing.board.displaced_assembly import prescribed, write_displaced_assembly
 from reflowshock.meshing.board.package_side import PackageSide
 from reflowshock.meshing.board.pads import PadSite, pad_table
+from reflowshock.meshing.joint.column import columns_of
 from reflowshock.meshing.joint.joints_file import write_joints
 from reflowshock.meshing.joint.solder_mesh import JointMesh, mesh_coarse_joint, mesh_joint
 from reflowshock.meshing.surface.closed_surface import ClosedSurface
@@ -22,7 +24,7 @@ from reflowshock.workflow.package.case import BoardDropCase
 from reflowshock.workflow.pipeline.reader import read_case
 from tests.support.fem_models import write_msh
 
-CASE = Path(__file__).parents[2] / "cases" / "bga_drop" / "case.toml"
+CASES = Path(__file__).parents[2] / "cases"
 HEIGHTS = np.linspace(0.0, 1.0, 25)  # of the sections between which a barrel is a cone
 SHIFT = 1e-6  # of an element's edge: enough that no element is a box, too little to matter otherwise
 Mesher = Callable[..., JointMesh]
@@ -41,16 +43,19 @@ class DropScene:
     folder: Path
 
     @classmethod
-    def write(cls, folder: Path, overrides: tuple[str, ...] = ()) -> "DropScene":
-        """Mesh the case ``bga_drop`` with other values, ``key=value`` each."""
-        case = read_case(CASE, ("shock.numerics.mass_scaled=[]", *overrides))
+    def write(cls, folder: Path, overrides: tuple[str, ...] = (), name: str = "bga_drop") -> "DropScene":
+        """Mesh a case with other values, ``key=value`` each."""
+        case = read_case(CASES / name / "case.toml", ("shock.numerics.mass_scaled=[]", *overrides))
         assert isinstance(case, BoardDropCase)
         write_assembly(case.package, case.board, folder / "flat.msh")
         displacement = prescribed(case.package, case.warpage)
         side = write_displaced_assembly(folder / "flat.msh", displacement, folder / "assembly.msh")
         (folder / "flat.msh").unlink()
-        for name, mesher in (("joints.msh", mesh_joint), ("coarse_joints.msh", mesh_coarse_joint)):
-            write_joints([joint(case, site, mesher, side) for site in sites(case)], folder / name)
+        own = {site.name: columns_of(site, case.package, case.board, side) for site in sites(case)}
+        fine = [joint(case, site, partial(mesh_joint, columns=own[site.name]), side) for site in sites(case)]
+        write_joints(fine, folder / "joints.msh")
+        coarse = [joint(case, site, mesh_coarse_joint, side) for site in sites(case)]
+        write_joints(coarse, folder / "coarse_joints.msh")
         return cls(case, folder)
 
     def without_boxes(self, folder: Path) -> "DropScene":

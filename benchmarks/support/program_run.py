@@ -1,5 +1,7 @@
 """A run of the program on one rank, window by window, so that several can be measured in turns."""
 
+from collections.abc import Sequence
+from dataclasses import replace
 from time import process_time
 
 import numpy as np
@@ -21,9 +23,10 @@ class ProgramRun:
         elements: Elements of each model.
         setup: Processor seconds until it could start.
         history: Its samples.
+        others: Samples of what other inputs watch of the same motion.
     """
 
-    def __init__(self, request: RunInput) -> None:
+    def __init__(self, request: RunInput, others: Sequence[RunInput] = ()) -> None:
         """Build the models."""
         begin = process_time()
         problem = PackageDrop.read(MPI.COMM_SELF, request)
@@ -34,6 +37,15 @@ class ProgramRun:
         self.elements = {role: len(model.body.local.cells) for role, model in models.items()}
         self.setup = process_time() - begin
         self.history = make_history(comms.world, problem, models, steps)
+        self.others = []
+        for other in (PackageDrop.read(MPI.COMM_SELF, item) for item in others):
+            watched = {role: replace(model, tables=other.divided.tables[role]) for role, model in models.items()}
+            self.others.append(make_history(comms.world, other, watched, steps))
+
+    def sample(self) -> None:
+        """Take a sample of each history."""
+        for history in (self.history, *self.others):
+            history.sample(self.participants)
 
     def window(self) -> None:
         """Go on by one window."""
@@ -52,12 +64,12 @@ class ProgramRun:
 
     def to_end(self) -> tuple[dict[str, np.ndarray], float]:
         """Go to the end with samples; return them and the processor seconds of all windows."""
-        self.history.sample(self.participants)
+        self.sample()
         seconds = 0.0
         for window in range(1, self.plan.windows + 1):
             begin = process_time()
             self.window()
             seconds += process_time() - begin
             if window % self.plan.stride == 0 or window == self.plan.windows:
-                self.history.sample(self.participants)
+                self.sample()
         return self.history.arrays(), seconds

@@ -57,7 +57,8 @@ class Factorisation:
         self._solver.solve(right, solution)
 
     def free(self) -> None:
-        """Give the factor's memory back."""
+        """Give the factor's memory back, which PETSc keeps as long as anything refers to the factor."""
+        self._factor.destroy()
         self._solver.destroy()
 
 

@@ -77,9 +77,9 @@ class Imprint(Parameters):
     """
 
     size: Length | None = Field(None, gt=0)
-    rings: int = Field(4, ge=1, le=32)
-    first_layer: Length = Field(3.0e-5, gt=0)
-    growth: float = Field(1.5, ge=1.01, le=3.0)
+    rings: int = Field(5, ge=1, le=32)
+    first_layer: Length = Field(1.5e-5, gt=0)
+    growth: float = Field(1.65, ge=1.01, le=3.0)
 
 
 class Package(Parameters):

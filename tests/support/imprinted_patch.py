@@ -2,12 +2,13 @@
 
 The patches are 3 x 3 mm, the board 1 mm, the substrate 0.4 mm thick; a cylinder of solder of radius 0.24 and height
 0.30 mm stands between two copper discs. The substrate is held at its sides x = -+1.5 mm, the board at x = -1.5 mm; its
-other side moves 6 um outwards and 6 um away.
+other side moves 6 um outwards and 6 um away. Turned about the joint's axis, the same motion is that of all sides, in
+proportion to the distance from one.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import product
+from itertools import pairwise, product
 
 import numpy as np
 import scipy.sparse
@@ -21,7 +22,6 @@ from reflowshock.fem.cell_shape import HEXAHEDRON
 from reflowshock.fem.division.split import part_of
 from reflowshock.fem.division.tables import joined
 from reflowshock.fem.division.whole import Whole
-from reflowshock.fem.elements.element import element_geometry
 from reflowshock.fem.elements.mesh_elements import elements_of
 from reflowshock.fem.elements.stress import von_mises
 from reflowshock.fem.forces.force_assembled import AssembledElements
@@ -29,11 +29,12 @@ from reflowshock.fem.materials.elasticity import role_of_part
 from reflowshock.fem.materials.library import COPPER, FR4
 from reflowshock.fem.materials.parameters import Isotropic, JohnsonCook, Material
 from reflowshock.fem.mesh.mesh import MeshData, append
+from reflowshock.fem.mesh.pad_layer import octant_volumes
 from reflowshock.fem.model.factorisation import Factorisation
 from reflowshock.fem.statics.hencky import HenckyElements
 from reflowshock.meshing.board.package_side import PackageSide, StructuredFace, underside
 from reflowshock.meshing.board.pads import pad_table
-from reflowshock.meshing.board.parameters import Warpage
+from reflowshock.meshing.board.parameters import Imprint, JointNumerics, Warpage
 from reflowshock.meshing.joint.column import columns_of
 from reflowshock.meshing.joint.joint_mesh import JointMesh
 from reflowshock.meshing.joint.solder_mesh import mesh_joint
@@ -42,9 +43,11 @@ Floats = NDArray[np.float64]
 SIDE, STRETCH, LIFT = 3.0 * MM, 6.0e-6, 6.0e-6
 LAYER = 25.0e-6
 SAME = 1e-9  # m
+UP = np.array([0.0, 0.0, 1.0])
 HARDENING = JohnsonCook(A=40e6, B=1e9, n=1.0)
 SOLDER = Isotropic(density=7440.0, young_modulus=44.6e9, poisson_ratio=0.40)
-CONVERGED = 1e-9
+CONVERGED, NEAR = 1e-8, 1e-3  # of the forces: what is left out of balance, in the end and on the way
+SHARES = (0.25, 0.5, 0.75, 1.0)
 JOINT = "A1"
 TODAY = {"core": 3, "rings": 1, "layers": 6}
 CHEAPEST = {"core": 4, "rings": 2, "layers": 10, "pad_layer": LAYER, "copper_layers": 2}
@@ -61,17 +64,17 @@ class Mesh:
     layers: tuple[int, int] = (4, 2)
     shift: float = 0.0
 
-    def halved(self) -> "Mesh":
-        """Halve every element."""
-        own, imprint = self.joint, self.imprint
-        names = [name for name in ("core", "rings", "layers", "copper_layers") if name in own]
-        finer = own | {name: 2 * own[name] for name in names}
-        finer |= {"pad_layers": 2 * own.get("pad_layers", 2)} if "pad_layer" in own else {}
+    def times(self, size: float) -> "Mesh":
+        """Make every element so many times as long."""
+        numerics, imprint = JointNumerics.model_validate(self.joint), self.imprint
+        names = ["core", "rings", "layers", "copper_layers", *(["pad_layers"] if numerics.pad_layer else [])]
+        counts = {name: round(getattr(numerics, name) / size) for name in names}
         if imprint is not None:
-            growth = 1.0 + 0.5 * (imprint.get("growth", 1.5) - 1.0)
-            first = 0.5 * imprint.get("first_layer", 3.0e-5)
-            imprint = imprint | {"rings": 2 * imprint.get("rings", 4), "growth": growth, "first_layer": first}
-        return replace(self, box=0.5 * self.box, joint=finer, imprint=imprint, layers=tuple(2 * n for n in self.layers))
+            own = Imprint.model_validate(imprint)
+            sized = {"growth": 1.0 + size * (own.growth - 1.0), "first_layer": size * own.first_layer}
+            imprint = imprint | sized | {"rings": round(own.rings / size)}
+        layers = tuple(round(count / size) for count in self.layers)
+        return replace(self, box=size * self.box, joint=self.joint | counts, imprint=imprint, layers=layers)
 
 
 def patch(mesh: Mesh) -> tuple[Whole, JointMesh]:
@@ -131,36 +134,50 @@ def data_of(joint: JointMesh) -> MeshData:
 class Problem:
     """The static problem of a mesh with its prescribed motion."""
 
-    def __init__(self, whole: Whole, yields: bool, known: dict[str, Material] | None = None) -> None:
-        """Number the equations; solder yields or does not, unless the materials of all roles are given."""
+    def __init__(
+        self, whole: Whole, yields: bool, known: dict[str, Material] | None = None, turned: float | None = None
+    ) -> None:
+        """Number the equations; solder yields or does not, unless the materials of all roles are given.
+
+        Args:
+            whole: The mesh.
+            yields: Whether solder does.
+            known: Role -> material.
+            turned: Angle [rad] of the motion.
+        """
         mesh = whole.mesh
         solder = SOLDER.model_copy(update={"plasticity": HARDENING}) if yields else SOLDER
         known = known or {"board": FR4, "substrate": FR4, "copper": COPPER, "solder": solder}
         materials = [known[role_of_part(name)] for name in mesh.part_names]
-        self.whole = whole
+        self.whole, self.yields = whole, yields
         self.elements = elements_of(mesh.points, mesh.cells, mesh.part, materials)
         self.hencky = HenckyElements.build(self.elements, materials, np.zeros((len(materials), 3)))
         count = len(mesh.points)
         self.tie = scipy.sparse.kron(whole.tie.matrix(count), scipy.sparse.identity(3), format="csr")
-        self.motion, held = prescribed(mesh)
+        self.motion, held = prescribed(mesh) if turned is None else prescribed_at(mesh, turned)
         free = ~held
         free[whole.tie.slave] = False
         self.free = np.flatnonzero(free.ravel())
 
     def solve(self) -> Floats:
-        """Find the displacement ``(n, 3)`` [m] by Newton's method."""
-        place, scale = self._spread(self.motion), None
+        """Find the displacement ``(n, 3)`` [m] by Newton's method, in shares of the motion where solder yields."""
+        shares = SHARES if self.yields else (1.0,)
+        place = self._spread(shares[0] * self.motion)
+        for share, following in pairwise((*shares, 1.0)):
+            place = self._balanced(place, CONVERGED if share == 1.0 else NEAR) * (following / share)
+        return place
+
+    def _balanced(self, place: Floats, tolerance: float) -> Floats:
         for _ in range(30):
             force, tangent = self.hencky.linearised(place)
             rest = (self.tie.T @ force.ravel())[self.free]
-            size = float(np.linalg.norm(rest))
-            scale = scale or size
-            if size <= CONVERGED * scale:
+            error = float(np.linalg.norm(rest) / np.linalg.norm(force))
+            if error <= tolerance:
                 return place
             step = np.zeros(place.size)
             step[self.free] = -solution(self._reduced(tangent), rest)
             place = place + self._spread(step.reshape(-1, 3))
-        raise RuntimeError(f"forces out of balance by {size / scale:.1e}")
+        raise RuntimeError(f"forces out of balance by {error:.1e}")
 
     def _spread(self, values: Floats) -> Floats:
         return (self.tie @ values.ravel()).reshape(-1, 3)
@@ -180,8 +197,10 @@ def solution(matrix: scipy.sparse.csr_matrix, right: Floats) -> Floats:
     factor, (place, vector) = Factorisation(petsc), petsc.createVecs()
     vector.array = right
     factor.solve(vector, place)
+    found = np.array(place.array)
     factor.free()
-    return np.array(place.array)
+    petsc.destroy()
+    return found
 
 
 def prescribed(mesh: MeshData) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
@@ -194,6 +213,14 @@ def prescribed(mesh: MeshData) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     if is_half(mesh):
         components[:, 1] |= mesh.points[:, 1] < SAME
     return motion, components
+
+
+def prescribed_at(mesh: MeshData, angle: float) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Return as ``prescribed`` the motion of all sides at an angle [rad]."""
+    along = np.array([np.cos(angle), np.sin(angle), 0.0])
+    held = np.abs(np.abs(mesh.points[:, :2]) - 0.5 * SIDE).min(axis=1) < SAME
+    share = np.where(held & (mesh.points[:, 2] <= SAME), 0.5 + mesh.points @ along / SIDE, 0.0)
+    return share[:, None] * (STRETCH * along - [0.0, 0.0, LIFT]), np.repeat(held[:, None], 3, axis=1)
 
 
 def half_of(whole: Whole) -> Whole:
@@ -210,8 +237,8 @@ def is_half(mesh: MeshData) -> bool:
     return bool(mesh.points[:, 1].min() > -SAME)
 
 
-def ends(problem: Problem, place: Floats) -> Iterator[tuple[str, dict[str, float]]]:
-    """Yield the measures of both ends: section forces [N, N m], averages over the layer [Pa, J/m^3]."""
+def ends(problem: Problem, place: Floats, layers: Sequence[float] = (LAYER,)) -> Iterator[tuple[str, dict[str, float]]]:
+    """Yield the measures of both ends: section forces [N, N m], averages over layers of a thickness [Pa, J/m^3]."""
     mesh = problem.whole.mesh
     cells = mesh.in_parts(f"solder@{JOINT}".__eq__)
     solder = replace(problem.hencky, elements=problem.elements.subset(cells))
@@ -221,35 +248,25 @@ def ends(problem: Problem, place: Floats) -> Iterator[tuple[str, dict[str, float
     if is_half(mesh):
         force *= [2.0, 0.0, 2.0]
     state, corners = solder.points(place), mesh.points[mesh.cells[cells]]
-    octants = gauss_places(corners)
-    weight = np.repeat(element_geometry(mesh.points, mesh.cells[cells]).volume[:, None] / 8.0, 8, axis=1)
-    stress = von_mises(state.stress.reshape(-1, 6)).reshape(weight.shape)
     plastic = state.plastic_strain
+    stress = von_mises(state.stress.reshape(-1, 6)).reshape(plastic.shape)
     work = HARDENING.A * plastic + HARDENING.B * plastic ** (1.0 + HARDENING.n) / (1.0 + HARDENING.n)
-    for name in ("board", "package"):
+    for name, inward in (("board", UP), ("package", -UP)):
         nodes = mesh.facet_nodes(f"pad_{name}@{JOINT}")
         level = mesh.points[nodes, 2].mean()
         on_pad = force[nodes]
         arm = mesh.points[nodes] - [0.0, 0.0, level]
         moment = np.cross(arm * [1.0, 0.0, 1.0] if is_half(mesh) else arm, on_pad).sum(axis=0)
-        near = np.where(np.abs(octants[..., 2] - level) < LAYER, weight, 0.0)
-        yield (
-            name,
-            {
-                "axial_force": abs(float(on_pad[:, 2].sum())),
-                "shear_force": float(np.linalg.norm(on_pad[:, :2].sum(axis=0))),
-                "bending_moment": float(np.linalg.norm(moment[:2])),
-                "layer_von_mises": float((near * stress).sum() / near.sum()),
-                "layer_plastic_work": float((near * work).sum() / near.sum()),
-            },
-        )
-
-
-def gauss_places(corners: Floats) -> Floats:
-    """Return the places ``(m, 8, 3)`` [m] of the integration points of hexahedra, as ``HenckyElements`` orders them."""
-    signs = np.array([[i, j, k] for k in (-1, 1) for j in (-1, 1) for i in (-1, 1)], dtype=float)
-    shapes = 0.125 * np.prod(1.0 + signs[:, None, :] * signs[None, :, :] / np.sqrt(3.0), axis=2)
-    return np.einsum("ga,mai->mgi", shapes, corners)
+        found = {
+            "axial_force": abs(float(on_pad[:, 2].sum())),
+            "shear_force": float(np.linalg.norm(on_pad[:, :2].sum(axis=0))),
+            "bending_moment": float(np.linalg.norm(moment[:2])),
+        }
+        for layer in layers:
+            near = octant_volumes(corners, np.array([0.0, 0.0, level]), inward, layer)
+            found[f"von_mises:{1e6 * layer:g}um"] = float(np.average(stress, weights=near))
+            found[f"plastic_work:{1e6 * layer:g}um"] = float(np.average(work, weights=near))
+        yield name, found
 
 
 IMPRINTED = Mesh(0.25 * MM, CHEAPEST, {"size": 1.0 * MM})

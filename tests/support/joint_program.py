@@ -198,9 +198,9 @@ class ProgramPatch:
         self.motion: Motion = self.participant.motion
         self.measures = Measures(patch, self.body)
 
-    def run(self, samples: int) -> list[dict[str, float]]:
-        """Go to the end; return the measures at about so many times."""
-        windows, found = self.plan.windows, []
+    def run(self, samples: int, share: float = 1.0) -> list[dict[str, float]]:
+        """Go through a share of the course; return the measures at about so many times."""
+        windows, found = round(share * self.plan.windows), []
         stride = max(1, windows // samples)
         for window in range(1, windows + 1):
             self.participant.begin_window()

@@ -20,7 +20,7 @@ REFINED = (2.0, 1.5, 1.0, 0.75, 0.5, 0.4, 0.25)  # sizes of elements over those 
 TWO_MODELS = (2.0, 1.5, 1.0, 0.75, 0.5)  # the same with two models
 ALONE, FINEST = (1.5, 1.0, 0.75), 0.5  # of board or joints alone, against the finest of them
 FINE = (1, 3)  # most stressed joints that are fine
-SAME_MESH = "all x 1"  # one model on the mesh of the case
+SAME_MESH = "all x 1"  # the mesh of the case
 GRAIN = 0.05  # of sizes that are chosen between the measured ones
 SPACINGS, FINEST_SPACING = (2.0, 1.5, 1.25), 1.0  # of particles, over that of the case
 MESH, BOARD, JOINTS = "element size", "element size of board and package", "element size of joints"
@@ -55,15 +55,21 @@ def package_study(case: PackageCase) -> ConvergenceStudy:
 
 
 def _dropped(case: BoardDropCase) -> ConvergenceStudy:
-    """Meshes by one model, in implicit steps where all is linear; then what two models on the case's mesh lose."""
-    whole = _one_model(case)
+    """Meshes; then what other couplings on the case's mesh lose.
+
+    Where all is linear, meshes are varied by one model in implicit steps. One that yields or turns takes small explicit
+    steps everywhere: there two models vary them, the critical joint alone fine.
+    """
+    linear = _is_linear(case)
+    whole = _one_model(case) if linear else _fine(1)
     parts = [
         _board(case, whole).apart(FINEST),
         _joints(case, whole).apart(FINEST),
         _particles(case, whole, SPACINGS).apart(FINEST_SPACING),
     ]
-    parameters = (_mesh(case, whole), _critical(case), *(parameter for parameter, _ in parts))
-    choices = (*(finest for _, finest in parts), *_couplings(case))
+    meshes = (_mesh(case, whole), _critical(case)) if linear else (_mesh(case, whole),)
+    parameters = (*meshes, *(parameter for parameter, _ in parts))
+    choices = (*(finest for _, finest in parts), *_couplings(case, whole))
     if case.shock.duration == "auto":  # runs are compared over the same time
         given = {"shock.duration": from_si(longest_duration(case), "ms", digits=6)}
         parameters = tuple(parameter.under(given) for parameter in parameters)
@@ -104,14 +110,16 @@ def _is_linear(case: BoardDropCase) -> bool:
 
 
 def _one_model(case: BoardDropCase, solver: str = "") -> Settings:
-    """One model with all joints fine, copper at its true mass; in implicit steps, unless something is not linear."""
-    chosen = solver or ("implicit" if _is_linear(case) else "explicit")
-    return {
+    """One model with all joints fine, to the end; where all is linear, in implicit steps, copper at its true mass."""
+    implicit = _is_linear(case)
+    settings = {
         "shock.numerics.modes": '["dns"]',
-        "shock.numerics.dns_solver": chosen,
+        "shock.numerics.dns_solver": solver or ("implicit" if implicit else "explicit"),
         "shock.identical_joints": "false",
-        **TRUE_MASS,
     }
+    if case.shock.numerics.dns_duration is not None:
+        settings["shock.numerics.dns_duration"] = from_si(longest_duration(case), "ms", digits=6)
+    return settings | TRUE_MASS if implicit else settings
 
 
 def _mesh(case: BoardDropCase, whole: Settings) -> Parameter:
@@ -219,9 +227,11 @@ def _length(value: float) -> str:
     return from_si(value, "mm", digits=4)
 
 
-def _couplings(case: BoardDropCase) -> Iterator[StudyRun]:
-    """Two models, or one in explicit steps, on the mesh of the case; also against one model on that mesh."""
+def _couplings(case: BoardDropCase, whole: Settings) -> Iterator[StudyRun]:
+    """Two models, or one in explicit steps, on the mesh of the case; also against the run that varies that mesh."""
     for name, settings in (_two_models(case) | _explicit(case)).items():
+        if settings == whole:
+            continue
         if settings != _fine(1):  # which is on the way of all meshes
             yield StudyRun(name, "coupling", settings)
         yield StudyRun(f"{name}: alone", "coupling, same mesh", settings, None, SAME_MESH)
@@ -242,9 +252,9 @@ def _two_models(case: BoardDropCase) -> dict[str, Settings]:
 
 
 def _explicit(case: BoardDropCase) -> dict[str, Settings]:
-    """One model in explicit steps, where the meshes were varied in implicit ones; name -> settings."""
+    """One model in explicit steps; name -> settings."""
     if not _is_linear(case):
-        return {}
+        return {"one model": _one_model(case)}
     explicit, scaled = _one_model(case, "explicit"), case.shock.numerics.mass_scaled
     if not scaled:
         return {"explicit": explicit}

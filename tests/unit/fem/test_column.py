@@ -23,7 +23,7 @@ def test_columns_take_the_place_of_boxes(whole):
     counts = {name: int(np.sum(mesh.part == number)) for number, name in enumerate(mesh.part_names)}
     assert (counts["board"], counts["substrate"]) == (4 * (144 - 16), 2 * (144 - 16))
     assert whole.moved < 1e-15
-    assert len(mesh.facets_of("board_bottom")) == 112
+    assert len(mesh.facets_of("board_bottom")) == 128
     assert not any(name.startswith(("column_", "board_bottom@")) for name in mesh.facets)
 
 
@@ -67,7 +67,7 @@ def test_neighbouring_columns_share_their_face():
     mesh = neighbours()
     whole = joined(mesh)
     number = {name: k for k, name in enumerate(whole.mesh.part_names)}
-    for part, shared in (("board_column", 5 * 9), ("substrate_column", 5 * 6)):
+    for part, shared in (("board_column", 5 * 8), ("substrate_column", 5 * 6)):
         nodes = [np.unique(whole.mesh.cells[whole.mesh.part == number[f"{part}@{joint}"]]) for joint in ("A4", "B4")]
         assert len(np.intersect1d(*nodes)) == shared
     inside = np.abs(whole.mesh.points[whole.tie.slave, 1] - 1.0 * MM) < 1e-9
@@ -84,5 +84,5 @@ def test_faces_on_a_plane_of_symmetry_are_held_there():
     whole = joined(mesh)
     held = whole.mesh.facets["symmetry_y"]
     column = np.unique(whole.mesh.cells[whole.mesh.in_parts("board_column@B4".__eq__)])
-    assert np.sum(np.isin(held, column).all(axis=1)) == 4 * 8
+    assert np.sum(np.isin(held, column).all(axis=1)) == 4 * 7
     assert (np.abs(whole.mesh.points[held, 1]) < 1e-12).all()

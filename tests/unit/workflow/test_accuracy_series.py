@@ -126,19 +126,30 @@ def test_elements_of_imprinted_pads_follow_their_size():
     imprinted = case_of("bga_drop", "scale=quick", *settings, "package.imprint={}")
     (half,) = (run for run in package_study(imprinted).runs if run.name == "all x 0.5")
     wanted = {"joint_numerics.core": "8", "joint_numerics.layers": "20", "joint_numerics.pad_layers": "4",
-              "joint_numerics.copper_layers": "4", "imprint.rings": "8", "imprint.first_layer": "0.015 mm",
-              "imprint.growth": "1.25"}  # fmt: skip
+              "joint_numerics.copper_layers": "4", "imprint.rings": "10", "imprint.first_layer": "0.0075 mm",
+              "imprint.growth": "1.325"}  # fmt: skip
     assert {key: half.settings[f"package.{key}"] for key in wanted} == wanted
     case = case_of(
         "bga_drop", "scale=quick", *settings, "package.imprint={}", *(f"{k}={v}" for k, v in half.settings.items())
     )
-    assert case.package.imprint.growth == 1.25
+    assert case.package.imprint.growth == 1.325
 
 
 def test_solder_that_yields_has_no_implicit_steps_nor_local_ones():
     runs = package_study(case_of("bga_drop", "scale=quick", "materials.solder=SAC405")).runs
     assert not any(run.settings.get("shock.numerics.dns_solver") == "implicit" for run in runs)
     assert not any(run.settings.get("shock.coupling.scheme") == "local_steps" for run in runs)
+
+
+def test_meshes_of_what_yields_are_varied_by_two_models():
+    """One model takes small steps everywhere; it is a choice, to the end of the shock also where it is cut short."""
+    study = package_study(case_of("jedec_bga", "scale=quick"))
+    runs = {run.name: run for run in study.runs}
+    assert all(run.settings["shock.coupling.critical_joints"] == "1" for run in study.parameters[0].runs)
+    assert "1 fine" not in runs
+    assert runs["one model: alone"].against == SAME_MESH
+    assert runs["one model"].settings["shock.numerics.dns_duration"] == "0.4 ms"
+    assert all(run.settings["shock.numerics.modes"] == '["two_scale"]' for run in study.parameters[0].runs)
 
 
 def test_a_package_is_judged_by_its_critical_joint(package, tmp_path):

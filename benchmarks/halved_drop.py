@@ -1,0 +1,110 @@
+"""A drop in which solder flows: what its critical joint bears on meshes with elements twice, once and half as long.
+
+    PYTHONPATH=. python benchmarks/halved_drop.py [SIZE ...]  (one core; writes results/halved_drop.json)
+
+A quarter of the 4 x 4 package of ``cases/jedec_bga`` on a board of 50 x 30 mm, held near its corners, under a half sine
+that is short and strong enough to bend it, and its corner joint beyond yield, in 0.15 ms. The corner joint is fine, in
+columns of board and substrate; the others are coarse. Elements of all follow their size as in the command ``accuracy``.
+"""
+
+import argparse
+import json
+import os
+import tempfile
+from math import hypot
+from pathlib import Path
+
+os.environ["OMP_NUM_THREADS"] = os.environ["NUMBA_NUM_THREADS"] = "1"
+
+import numpy as np
+
+from benchmarks.support.drop_scene import CASES, DropScene
+from benchmarks.support.program_run import ProgramRun
+from reflowshock.workflow.convergence.errors import richardson
+from reflowshock.workflow.convergence.packages import package_study
+from reflowshock.workflow.pipeline.reader import read_case
+
+RESULTS = Path(__file__).parent / "results" / "halved_drop.json"
+NAME, JOINT = "jedec_bga", "A4"
+SCENE = ("scale=quick", "board.holes.inset_x='3 mm'", "shock.numerics.kinematics=corotational")
+SHOCK = {
+    "service_condition": None,
+    "peak_acceleration": 6000 * 9.80665,
+    "pulse_duration": 1e-4,
+    "duration": 1.5e-4,
+    "history_samples": 150,
+    "mass_scaled": ["copper"],
+}
+LAYERS = (25e-6, 12.5e-6, 50e-6)
+ENDS = ("board", "package")
+SIZES = (2.0, 1.0, 0.5)
+AVERAGES = ("von_mises", "plastic_strain", "plastic_work")
+RESULTANTS = {"axial_force": [0], "shear_force": [1, 2], "torsion": [3], "bending_moment": [4, 5]}
+Measures = dict[str, float]
+
+
+def scene_at(size: float, folder: Path) -> DropScene:
+    """Mesh the scene with elements so many times as long."""
+    run = package_study(read_case(CASES / NAME / "case.toml", SCENE)).parameters[0].at(size)
+    sized = (f"{key}={value}" for key, value in run.settings.items() if key.startswith(("board.", "package.")))
+    return DropScene.write(folder, (*SCENE, *sized), NAME)
+
+
+def measured(size: float) -> dict:
+    """Run the drop on a mesh; return the peaks of the fine joint's measures, <measure>@<end>."""
+    with tempfile.TemporaryDirectory() as folder:
+        scene, coupling = scene_at(size, Path(folder)), {"fine_joints": [JOINT]}
+        first, *others = (scene.request("two_scale", coupling, SHOCK | {"joint_layer": layer}) for layer in LAYERS)
+        run = ProgramRun(first, others)
+    arrays, seconds = run.to_end()
+    joint = list(arrays["joints"]).index(JOINT)
+    values = {}
+    for end in ENDS:
+        values[f"peel@{end}"] = float(arrays[f"peel_{end}"][:, joint].max())
+        section = arrays[f"section_{end}"][:, joint]
+        for name, parts in RESULTANTS.items():
+            values[f"{name}@{end}"] = float(np.linalg.norm(section[:, parts], axis=1).max())
+        for layer, history in zip(LAYERS, (run.history, *run.others), strict=True):
+            found = history.arrays()
+            for name in AVERAGES:
+                values[f"{name}:{1e6 * layer:g}um@{end}"] = float(found[f"{name}_{end}"][:, joint].max())
+    return {
+        "seconds": seconds,
+        "elements": run.elements,
+        "window_ns": 1e9 * run.plan.window,
+        "substeps": run.plan.substeps,
+        "values": values,
+    }
+
+
+def changes(coarse: Measures, fine: Measures) -> Measures:
+    """Return relative differences of a mesh to a finer one; of resultants over the section force (times radius)."""
+    scale = {}
+    for end in ENDS:
+        force = hypot(fine[f"axial_force@{end}"], fine[f"shear_force@{end}"])
+        radius = (fine[f"axial_force@{end}"] / fine[f"peel@{end}"] / np.pi) ** 0.5
+        scale |= {f"{name}@{end}": force for name in ("axial_force", "shear_force")}
+        scale |= {f"{name}@{end}": force * radius for name in ("torsion", "bending_moment")}
+    return {key: float((coarse[key] - value) / scale.get(key, value)) for key, value in fine.items()}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("sizes", nargs="*", type=float, help=f"of elements; without, {SIZES}")
+    chosen = parser.parse_args().sizes or SIZES
+    RESULTS.parent.mkdir(exist_ok=True)
+    found = json.loads(RESULTS.read_text()) if RESULTS.exists() else {"meshes": {}}
+    for size in chosen:
+        found["meshes"][f"{size:g}"] = measured(size)
+        print(f"{size:g}", json.dumps(found["meshes"][f"{size:g}"]), flush=True)
+        sizes = sorted(map(float, found["meshes"]), reverse=True)
+        values = [found["meshes"][f"{size:g}"]["values"] for size in sizes]
+        found["changes"] = {f"{size:g}": changes(value, values[-1]) for size, value in zip(sizes, values, strict=True)}
+        limits = {key: richardson(sizes[-3:], [value[key] for value in values[-3:]], None) for key in values[0]}
+        found["orders"] = {key: limit[1] for key, limit in limits.items() if limit}
+        RESULTS.write_text(json.dumps(found, indent=1))
+    print(json.dumps({key: found[key] for key in ("changes", "orders")}, indent=1))
+
+
+if __name__ == "__main__":
+    main()
