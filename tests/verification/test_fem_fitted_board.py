@@ -197,7 +197,7 @@ def test_neighbour_is_tied_as_if_it_were_one_body_with_the_board(tmp_path):
     volume = 2 * 1e-6 * 0.4e-3 + 15e-6 * 0.5e-3 + 3e-6 * 0.3e-3
     own = both.in_parts(lambda name: name.endswith("_pmic"))
     assert element_geometry(both.points, both.cells[own]).volume.sum() == pytest.approx(volume)
-    feet = both.facet_nodes("slave@pmic")
+    feet = both.facet_nodes("slave@neighbour_pmic")
     distance, below = cKDTree(mesh.points).query(both.points[feet])
     assert distance.max() < 1e-12
     glued, _ = merge_nodes(both, feet, below.astype(np.int32))
