@@ -40,7 +40,8 @@ COOLED = (
 QUICK = ("scale=quick",)
 COARSE_DROP = ("drop.particles_per_edge=7",)
 COARSE_BOARD = (
-    "structure.cells=[12,8]", "dynamics.duration=0.5 ms", "dynamics.modes=3", "dynamics.numerics.field_samples=4",
+    "scale=linear", "structure.cells=[12,8]", "dynamics.duration=0.5 ms", "dynamics.modes=3",
+    "dynamics.numerics.field_samples=4",
     "dynamics.numerics.implicit_step=2.5 us",
 )  # fmt: skip
 CASES = {

@@ -10,6 +10,7 @@ from tests.support.warm_start import warm_command
 
 CASES = Path(__file__).resolve().parents[2] / "cases"
 COARSE_BOARD = (
+    "scale=linear",
     "structure.cells=[12,8]", "dynamics.duration=0.5 ms", "dynamics.modes=3", "dynamics.numerics.field_samples=4",
     "dynamics.numerics.implicit_step=2.5 us",
 )  # fmt: skip

@@ -101,6 +101,8 @@ TOLD = "error: "  # begins what a program says of an error that it knows
 LAST_LINES = 15
 LAUNCHER = "REFLOWSHOCK_MPI_LAUNCHER"  # variable: what starts MPI ranks, e.g. "srun --mpi=pmix" within a job of Slurm
 MPIRUN = "mpirun"
+# Open MPI binds the ranks of each run to the first cores, so that runs side by side would share these.
+UNBOUND = ("--bind-to", "none")
 QUIET = ("--mca", "orte_execute_quiet", "1")  # of Open MPI 4; 5 has no option --quiet, and lets this one pass
 
 # In front of a command: the system sends the signal when the process that starts it ends, however that happens.
@@ -129,7 +131,7 @@ def mpi_command(ranks: int, program: Sequence[str], oversubscribe: bool) -> list
         program: program and arguments.
         oversubscribe: whether there may be more ranks than cores.
     """
-    launcher = shlex.split(os.environ.get(LAUNCHER, "")) or [MPIRUN]
+    launcher = shlex.split(os.environ.get(LAUNCHER, "")) or [MPIRUN, *UNBOUND]
     if Path(launcher[0]).name != MPIRUN:
         return [*launcher, "-n", str(ranks), *program]
     command = [*launcher, *QUIET, "-n", str(ranks)]

@@ -15,7 +15,8 @@ from reflowshock.workflow.pipeline.schema import case_schema
 from reflowshock.workflow.store.folders import locked
 from tests.support.workflow_command import command_line
 
-CASE = Path(__file__).resolve().parents[3] / "cases" / "bga_drop" / "case.toml"
+CASES = Path(__file__).resolve().parents[3] / "cases"
+CASE = CASES / "bga_drop" / "case.toml"
 
 
 @pytest.fixture
@@ -37,7 +38,7 @@ def test_a_new_case_is_complete_and_equal_to_its_template(call, tmp_path):
     code, _, _ = call("new", "mine")
     assert code == 0
     path = tmp_path / "mine.toml"
-    mine, template = display_values(read_case(path)), display_values(read_case(CASE))
+    mine, template = (display_values(read_case(file)) for file in (path, CASES / "jedec_bga/case.toml"))
     assert mine == template | {"case.name": "mine"}
     given = [key for key, _ in flat(tomllib.loads(path.read_text())) if not key.startswith("scales.")]
     assert set(given) == set(mine)

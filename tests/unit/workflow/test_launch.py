@@ -9,15 +9,15 @@ import time
 import psutil
 import pytest
 
-from reflowshock.workflow.process.launch import QUIET, LaunchError, launch, mpi_command
+from reflowshock.workflow.process.launch import QUIET, UNBOUND, LaunchError, launch, mpi_command
 
 
 def test_mpi_command(monkeypatch):
     monkeypatch.setattr(os, "geteuid", lambda: 1000)
-    assert mpi_command(2, ["program"], oversubscribe=False) == ["mpirun", *QUIET, "-n", "2", "program"]
+    assert mpi_command(2, ["program"], oversubscribe=False) == ["mpirun", *UNBOUND, *QUIET, "-n", "2", "program"]
     monkeypatch.setattr(os, "geteuid", lambda: 0)
     assert mpi_command(3, ["program"], oversubscribe=True) == [
-        "mpirun", *QUIET, "-n", "3", "--allow-run-as-root", "--oversubscribe", "program",
+        "mpirun", *UNBOUND, *QUIET, "-n", "3", "--allow-run-as-root", "--oversubscribe", "program",
     ]  # fmt: skip
 
 
