@@ -3,6 +3,7 @@
 Tests that change a shared run work on copies of it.
 """
 
+import os
 import shutil
 import subprocess
 from pathlib import Path
@@ -13,6 +14,18 @@ from reflowshock.workflow.process.kernel_cache import keep_kernels_by_source
 from tests.support.shared_run import shared_run
 
 keep_kernels_by_source()
+os.environ |= {"OMPI_MCA_mpi_yield_when_idle": "1"}  # workers share the cores: ranks that wait leave them to others
+
+# Two workers begin with these: one compiles kernels while the other needs none. Then what takes long comes first.
+ORDER = (
+    "tests/verification/test_effects.py", "tests/unit/test_code.py", "tests/unit/workflow/", "tests/pipeline/",
+    "tests/faults/", "tests/mpi/", "tests/stability/", "cases/hard/", "tests/",
+)  # fmt: skip
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Sort files, which workers are given in this order."""
+    items.sort(key=lambda item: next((k for k, begin in enumerate(ORDER) if item.nodeid.startswith(begin)), len(ORDER)))
 
 
 @pytest.fixture(scope="session")

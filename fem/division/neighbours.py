@@ -33,15 +33,15 @@ def with_neighbours(mesh: MeshData, neighbours: Mapping[str, Neighbour]) -> Mesh
     for name, item in neighbours.items():
         own = neighbour_mesh(name, item)
         mesh = append([mesh, own])
-        below = facets_below(mesh, own.points[own.facet_nodes(f"slave@{name}")])
+        below = facets_below(mesh, own.points[own.facet_nodes(f"slave@neighbour_{name}")])
         if not len(below):
             raise MeshError(f"packages.{name}: there is no board below it")
-        mesh = replace(mesh, facets=mesh.facets | {f"master@{name}": below})
+        mesh = replace(mesh, facets=mesh.facets | {f"master@neighbour_{name}": below})
     return mesh
 
 
 def neighbour_mesh(name: str, item: Neighbour) -> MeshData:
-    """Return a package as a mesh of its own, its posts' lower faces as the facet set ``slave@NAME``."""
+    """Return a package as a mesh of its own, its posts' lower faces as the facet set ``slave@neighbour_NAME``."""
     posts = [post_edges(item, *axis) for axis in zip(item.at, (item.columns, item.rows), strict=True)]
     lines = [grid_lines(posts[k], (item.at[k], item.substrate[k], item.die[k]), item.pitch) for k in range(2)]
     heights = np.cumsum([0.0, item.standoff, item.substrate[2], item.die[2]])
@@ -57,7 +57,7 @@ def neighbour_mesh(name: str, item: Neighbour) -> MeshData:
     kept = np.choose(part, [in_post, True, in_die])
     names = tuple(f"{layer}_{name}" for layer in LAYERS)
     feet = cells[kept & (part == 0)][:, [0, 1, 3, 2]]
-    mesh = MeshData(points, cells[kept], part[kept], names, {f"slave@{name}": feet})
+    mesh = MeshData(points, cells[kept], part[kept], names, {f"slave@neighbour_{name}": feet})
     return without_unused_nodes(mesh)[0]
 
 

@@ -2,8 +2,8 @@
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import meshio
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,6 +11,9 @@ from reflowshock.fem.cell_shape import HEXAHEDRON, SHAPES, CellShape
 from reflowshock.fem.elements.tetrahedron import EDGES
 from reflowshock.fem.errors import MeshError
 from reflowshock.fem.mesh.mesh import MeshData, append, without_unused_nodes
+
+if TYPE_CHECKING:
+    import meshio
 
 # Three neighbours of each vertex, right-handed.
 OF_HEXAHEDRON = np.array(
@@ -33,6 +36,8 @@ def read_mesh(path: Path) -> MeshData:
         MeshError: The file has no cells of a known shape, several shapes, a cell in no or several volumes, or one
             that no element can be made of (``mesh_quality``).
     """
+    import meshio
+
     mesh = meshio.read(path, file_format="gmsh")
     shape = shape_in_file(mesh, path)
     blocks = [index for index, block in enumerate(mesh.cells) if block.type == shape.name]
@@ -51,7 +56,7 @@ def read_mesh(path: Path) -> MeshData:
     return without_unused_nodes(data)[0]
 
 
-def shape_in_file(mesh: meshio.Mesh, path: Path) -> CellShape:
+def shape_in_file(mesh: "meshio.Mesh", path: Path) -> CellShape:
     """Return the one shape of the cells in a file; see ``read_mesh`` for the errors."""
     found = {block.type for block in mesh.cells if block.dim == 3}
     known = {shape.name: shape for shape in SHAPES.values()}
@@ -61,7 +66,7 @@ def shape_in_file(mesh: meshio.Mesh, path: Path) -> CellShape:
     return known[found.pop()]
 
 
-def part_of_block(mesh: meshio.Mesh, index: int, names: tuple[str, ...], path: Path) -> NDArray[np.int64]:
+def part_of_block(mesh: "meshio.Mesh", index: int, names: tuple[str, ...], path: Path) -> NDArray[np.int64]:
     """Return the part of each cell of one block; see ``read_mesh`` for the errors."""
     owners = [k for k, name in enumerate(names) if len(mesh.cell_sets[name][index])]
     if len(owners) != 1:

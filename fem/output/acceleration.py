@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import butter, sosfiltfilt
 
 from reflowshock.fem.loads.pulse import STANDARD_GRAVITY, Pulse
 from reflowshock.fem.problem.filters import LowPass
@@ -62,6 +61,8 @@ def low_passed(values: NDArray[np.float64], step: float, low_pass: LowPass) -> N
     Raises:
         ValueError: There are fewer than two samples in a period of the filter's corner.
     """
+    from scipy.signal import butter, sosfiltfilt
+
     order, corner = low_pass.passes
     if 2.0 * corner * step >= 1.0:
         raise ValueError(f"{1.0 / step:.4g} samples a second are too few for a filter with {low_pass.label}")

@@ -4,7 +4,6 @@ import json
 from dataclasses import dataclass
 from typing import Any
 
-import meshio
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
@@ -106,6 +105,8 @@ def write_fields(
     mesh: MeshData, cooling: Cooling, fields: dict[str, NDArray[np.float64]], request: CoolingInput
 ) -> None:
     """Write ``residual.vtu``: displacement since solidification, and per cell stress [Pa], plastic strain, part."""
+    import meshio
+
     cells = [("hexahedron", mesh.cells[:, np.argsort(TENSOR_ORDER)])]
     data = {name: [values] for name, values in (fields | {"part": mesh.part}).items()}
     meshio.Mesh(mesh.points, cells, {"displacement": cooling.displacement}, data).write(request.output / "residual.vtu")

@@ -2,7 +2,6 @@
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 QUALITY = 10.0  # Q = 1 / (2 zeta), that of most specifications
 PER_OCTAVE = 12
@@ -30,6 +29,8 @@ def response_spectrum(
     Returns:
         ``(k,)`` [m/s^2].
     """
+    from scipy.signal import lfilter
+
     ratio = 0.5 / quality
     peaks = np.empty(len(frequencies))
     for k, frequency in enumerate(frequencies):

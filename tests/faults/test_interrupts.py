@@ -50,7 +50,8 @@ def whom(process: subprocess.Popen, choice: random.Random) -> list[psutil.Proces
     return [choice.choice([psutil.Process(process.pid), *children])]
 
 
-@pytest.mark.parametrize("number", [0, *(pytest.param(number, marks=pytest.mark.long) for number in range(1, COUNT))])
+@pytest.mark.long  # a part of the run, broken off: tests/pipeline/test_pipeline.py
+@pytest.mark.parametrize("number", range(COUNT))
 def test_a_run_that_was_broken_off_goes_on_to_the_same_answer(undisturbed, tmp_path, number):
     choice = random.Random(f"{SEED} {number}")
     expected, seconds = undisturbed

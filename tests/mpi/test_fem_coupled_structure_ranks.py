@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from tests.support.fem_bars import bar_layers, write_bar
-from tests.support.fem_program import run_program
+from tests.support.fem_program import run_programs
 
 LAYERS = bar_layers(("FR4", 6e-3, 6, (2, 2)), ("FR4", 1e-3, 4, (3, 3)), ("FR4", 6e-3, 6, (2, 2)))
 TABLES = {
@@ -20,14 +20,16 @@ TABLES = {
 }
 
 
-def history(directory: Path, ranks: int, scheme: str, placement: str) -> dict[str, np.ndarray]:
+def request(directory: Path, ranks: int, scheme: str, placement: str) -> Path:
     coupling = {"scheme": scheme, "placement": placement}
     numerics = {"history_samples": 20, "field_samples": 2}
     dynamics = {"duration": 1e-5, "ranks": ranks, "coupling": coupling, "numerics": numerics}
-    request = write_bar(directory, 2e-3, LAYERS, 1e-5, **TABLES, dynamics=dynamics)
-    (directory / "input.json").write_text(request.model_dump_json())
-    done = run_program(directory / "input.json", ranks)
-    assert done.returncode == 0, done.stderr
+    bar = write_bar(directory, 2e-3, LAYERS, 1e-5, **TABLES, dynamics=dynamics)
+    (directory / "input.json").write_text(bar.model_dump_json())
+    return directory / "input.json"
+
+
+def history(directory: Path, placement: str) -> dict[str, np.ndarray]:
     result = json.loads((directory / "out" / "result.json").read_text())
     assert result["model"]["placement"] == placement
     assert set(result["model"]["models"]) == {"macro", "meso"}
@@ -37,9 +39,10 @@ def history(directory: Path, ranks: int, scheme: str, placement: str) -> dict[st
 
 @pytest.mark.parametrize("scheme", [pytest.param("held_velocity", marks=pytest.mark.long), "local_steps"])
 def test_placements_give_what_one_rank_gives(tmp_path, scheme):
-    one = history(tmp_path / "one", 1, scheme, "shared")
-    for placement, ranks in (("shared", 2), ("disjoint", 3)):
-        other = history(tmp_path / placement, ranks, scheme, placement)
+    runs = {"one": (1, "shared"), "two": (2, "shared"), "three": (3, "disjoint")}
+    run_programs([(ranks, request(tmp_path / name, ranks, scheme, way)) for name, (ranks, way) in runs.items()])
+    one, *others = (history(tmp_path / name, way) for name, (_, way) in runs.items())
+    for other in others:
         for name in one.keys() - {"balance", "interface"}:  # differences of the others
             scale = one["internal" if name == "hourglass" else name]  # of full elements it is a small difference
             assert np.abs(one[name] - other[name]).max() <= 1e-8 * np.abs(scale).max(), name

@@ -7,7 +7,7 @@ import numpy as np
 
 from reflowshock.fem.output.watch_joints import FLOWS
 from tests.support.fem_models import write_small_assembly
-from tests.support.fem_program import run_program
+from tests.support.fem_program import run_programs
 
 SHOCK = {
     "peak_acceleration": 2e7,
@@ -17,23 +17,27 @@ SHOCK = {
 }
 
 
-def run(meshes: list[Path], mode: str, macro: int, meso: int) -> tuple[dict[str, np.ndarray], dict]:
-    """Return history and result of a run on some ranks."""
-    output = meshes[0].parent / f"{mode}_{macro}_{meso}"
+def request(meshes: list[Path], macro: int, meso: int) -> Path:
+    """Write the input of a run on some ranks, beside the meshes."""
+    output = meshes[0].parent / f"{macro}_{meso}"
     shock = SHOCK | {"ranks": {"total": macro + meso, "placement": "disjoint", "macro": macro}}
-    request = {"mode": mode, "meshes": [str(path) for path in meshes], "shock": shock, "output": str(output)}
-    path = meshes[0].parent / "input.json"
-    path.write_text(json.dumps(request | {"materials": {"solder": "SAC405"}}))
-    done = run_program(path, macro + meso)
-    assert done.returncode == 0, done.stderr
+    scene = {"mode": "two_scale", "meshes": [str(path) for path in meshes], "shock": shock, "output": str(output)}
+    path = output.with_suffix(".json")
+    path.write_text(json.dumps(scene | {"materials": {"solder": "SAC405"}}))
+    return path
+
+
+def outcome(output: Path) -> tuple[dict[str, np.ndarray], dict]:
+    """Return history and result of a run."""
     with np.load(output / "history.npz") as arrays:
         return dict(arrays), json.loads((output / "result.json").read_text())
 
 
 def test_flow_is_the_same_on_more_ranks(tmp_path):
     meshes = write_small_assembly(tmp_path)
-    expected, result = run(meshes, "two_scale", 1, 1)
-    found, other = run(meshes, "two_scale", 1, 2)
+    inputs = [(1 + meso, request(meshes, 1, meso)) for meso in (1, 2)]
+    run_programs(inputs)
+    (expected, result), (found, other) = (outcome(path.with_suffix("")) for _, path in inputs)
     for name in (*FLOWS, "plastic_strain_max", "von_mises_max", "plastic", "section_board", "section_package"):
         scale = np.abs(expected[name]).max()
         assert scale > 0.0

@@ -42,7 +42,7 @@ def start(directory: Path, mode: str, output: Path) -> subprocess.Popen:
     request = {"mode": mode, "meshes": meshes, "shock": SHOCK, "output": str(output)} | fitted
     path = directory / f"{output.name}.json"
     path.write_text(json.dumps(request | {"checkpoints": str(directory / f"{mode}.checkpoints")}))
-    command = ["mpirun", "--allow-run-as-root", "--oversubscribe", "--mca", "mpi_yield_when_idle", "1", "-n", "2"]
+    command = ["mpirun", "--allow-run-as-root", "--oversubscribe", "-n", "2"]
     return subprocess.Popen(
         [*command, sys.executable, "-m", "reflowshock.fem", str(path)],
         cwd=ROOT,

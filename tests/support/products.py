@@ -5,10 +5,17 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from reflowshock.workflow.case.run import Findings, Run
+from reflowshock.workflow.jobs.batch import show_products
+from reflowshock.workflow.pipeline.reader import read_case
 from reflowshock.workflow.pipeline.stage_runner import run_stage
+from reflowshock.workflow.store.folders import locked
 from reflowshock.workflow.store.point import Point
 from reflowshock.workflow.store.product import seal
 from reflowshock.workflow.store.store import Store
+from tests.support.workflow_command import SMALL_CASE
+
+POINT = Point({}, read_case(SMALL_CASE))
+OTHER = Point({}, read_case(SMALL_CASE, ["shock.peak_acceleration=1000 G"]))
 
 
 def make(
@@ -35,3 +42,12 @@ def record_of(product: Path, **entries: object) -> None:
     product.mkdir(parents=True, exist_ok=True)
     entries.pop("sha256", None)
     seal(product, {"seconds": 1.0, "core_seconds": 1.0, "metrics": {}, "health": {}, "effects": {}} | entries)
+
+
+def shown_run(folder: Path) -> Store:
+    """Return the store of a run folder that shows all products of the shortened case."""
+    store = Store(folder, one_run=True)
+    with locked(store.folder, "run", "small"):
+        make(store, POINT, POINT.case.pipeline.names)
+        show_products(store, POINT)
+    return store

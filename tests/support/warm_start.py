@@ -1,53 +1,83 @@
-"""The command without its start-up: a server that has loaded the program forks a process for each command.
+"""Commands without their start-up: a server that has loaded the libraries forks a process for each.
 
-What a start of its own may change (environments, signals, a first word) is tested with `python -m reflowshock`.
+The Snakemake and the stages that such a command starts are forked, too: the Python that it calls asks the server. What
+a start of its own may change (environments, signals, a first word) is tested with `python -m reflowshock`.
 """
 
 import atexit
+import gc
 import json
 import os
+import runpy
+import select
+import signal
+import socket
 import subprocess
 import sys
 import tempfile
 from functools import cache
+from importlib import import_module
 from pathlib import Path
 
+from tests.support.warm_client import ask
+
 ROOT = Path(__file__).resolve().parents[2]
+# What commands and stages load; not MPI, nor what loads it: a process that has begun it cannot be forked.
+LIBRARIES = (
+    "gmsh", "matplotlib.pyplot", "meshio", "numba", "pandas", "pyvista", "scipy.sparse.linalg", "scipy.spatial",
+    "snakemake.cli", "reflowshock.workflow.cli", "reflowshock.workflow.run", "reflowshock.workflow.status",
+)  # fmt: skip
+# A Python that lets the server fork what it is to run, and is Python where that is something else.
+CLIENT = """#!{python} -IS
+import os, sys
+words = sys.argv[1:]
+if words[:2] != ["-m", "snakemake"] and words[:3] != ["-m", "reflowshock", "stage"]:
+    os.execv({python!r}, [{python!r}, *words])
+sys.path.append({support!r})
+from warm_client import ask
+code = ask({address!r}, words[1:], (0, 1, 2))
+if code < 0:
+    os.kill(os.getpid(), -code)
+sys.exit(code)
+"""
 
 
 def warm_command(*arguments: str, cwd: Path | None = None) -> subprocess.CompletedProcess:
     """Run a command of the program to its end, as `python -m reflowshock` would."""
-    with tempfile.TemporaryDirectory() as folder:
-        files = [f"{folder}/stdout", f"{folder}/stderr"]
-        request = {"arguments": arguments, "files": files, "cwd": str(cwd or Path.cwd()), "env": dict(os.environ)}
-        server = _server()
-        try:
-            server.stdin.write(json.dumps(request) + "\n")
-            server.stdin.flush()
-            code = int(server.stdout.readline())
-        except BaseException:  # a test that was broken off: its answer would be taken for that of the next
-            server.kill()
-            _server.cache_clear()
-            raise
-        return subprocess.CompletedProcess(arguments, code, *(Path(file).read_text() for file in files))
+    with tempfile.TemporaryFile("w+") as out, tempfile.TemporaryFile("w+") as err, open(os.devnull) as nothing:
+        streams = [file.fileno() for file in (nothing, out, err)]
+        code = ask(str(_server() / "socket"), ["reflowshock", *arguments], streams, cwd and str(cwd))
+        said = [file.seek(0) or file.read() for file in (out, err)]
+    return subprocess.CompletedProcess(arguments, code, *said)
 
 
 @cache
-def _server() -> subprocess.Popen:
-    line = [sys.executable, "-m", "tests.support.warm_start"]
-    server = subprocess.Popen(line, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, cwd=ROOT)
+def _server() -> Path:
+    """Start a server that ends with this process; return its folder."""
+    folder = tempfile.TemporaryDirectory()
+    place, support = Path(folder.name), Path(__file__).parent
+    client = CLIENT.format(python=sys.executable, support=str(support), address=str(place / "socket"))
+    (place / "python").write_text(client)
+    (place / "python").chmod(0o755)
+    with socket.socket(socket.AF_UNIX) as listener:
+        listener.bind(str(place / "socket"))
+        listener.listen()
+        line = [sys.executable, "-m", "tests.support.warm_start", str(place / "python"), str(listener.fileno())]
+        server = subprocess.Popen(line, stdin=subprocess.PIPE, cwd=ROOT, pass_fds=[listener.fileno()])
+    atexit.register(folder.cleanup)
     atexit.register(server.communicate)
-    return server
+    return place
 
 
-def serve() -> None:
-    """Plan a case, which loads most of the program; fork for each request on standard input; print each exit code."""
+def serve(client: str, listener: socket.socket) -> None:
+    """Load libraries and plan a case, which loads most of the program; fork for each request until the input ends."""
     from reflowshock.workflow.process.environment import prepare
 
     prepare()
+    for library in LIBRARIES:
+        import_module(library)
     from rich.console import Console
 
-    from reflowshock.workflow import cli, run, status  # noqa: F401
     from reflowshock.workflow.pipeline.reader import read_case
     from reflowshock.workflow.plan import show_plan
     from reflowshock.workflow.store.point import Point
@@ -55,28 +85,57 @@ def serve() -> None:
 
     case = read_case(ROOT / "tests/pipeline/small.toml", oversubscribe=True)
     show_plan(Store(Path("nowhere"), one_run=True), Point({}, case), Console(quiet=True))
-    for line in sys.stdin:
-        process = os.fork()
-        if process == 0:
-            become(json.loads(line))
-        print(os.waitstatus_to_exitcode(os.waitpid(process, 0)[1]), flush=True)
+    gc.freeze()  # to look at what is loaded would copy its memory
+    while listener in select.select([listener, sys.stdin], [], [])[0]:
+        connection, _ = listener.accept()
+        if os.fork() == 0:
+            listener.close()
+            answer(connection, client)
+        connection.close()
+        while os.waitid(os.P_ALL, 0, os.WEXITED | os.WNOHANG | os.WNOWAIT):
+            os.wait()
 
 
-def become(request: dict) -> None:
-    """Be the command of a request, to its end."""
-    from reflowshock.__main__ import main
+def answer(connection: socket.socket, client: str) -> None:
+    """Fork what is asked for, end it when nobody waits for it any longer, and send how it ended."""
+    _, streams, _, _ = socket.recv_fds(connection, 1, 3)
+    request = json.loads(connection.makefile().readline())
+    process = os.fork()
+    if process == 0:
+        connection.close()
+        become(request, streams, client)
+    over = os.pidfd_open(process)
+    if over not in select.select([over, connection], [], [])[0]:
+        os.kill(process, signal.SIGTERM)
+    code = os.waitstatus_to_exitcode(os.waitpid(process, 0)[1])
+    connection.sendall(f"{code}\n".encode())
+    os._exit(0)
+
+
+def become(request: dict, streams: list[int], client: str) -> None:
+    """Be the process of a request, to its end."""
+    import numba
 
     os.chdir(request["cwd"])
     os.environ.clear()
-    os.environ.update(request["env"])
-    for number, name in enumerate([os.devnull, *request["files"]]):
-        file = os.open(name, os.O_RDWR | os.O_CREAT)
-        os.dup2(file, number)
-        os.close(file)
-    sys.argv = ["reflowshock", *request["arguments"]]
-    main()
-    sys.exit(0)
+    os.environ.update(request["environment"])
+    numba.core.config.reload_config()
+    for number, stream in enumerate(streams):
+        os.dup2(stream, number)
+        os.close(stream)
+    sys.argv = request["words"]
+    if request["words"][:2] != ["reflowshock", "stage"]:  # which starts ranks, and they load MPI
+        sys.executable = client
+    code: str | int | None = None
+    try:
+        runpy.run_module(request["words"][0], run_name="__main__", alter_sys=True)
+    except SystemExit as end:
+        code = end.code
+    atexit._run_exitfuncs()
+    for stream in (sys.stdout, sys.stderr):
+        stream.flush()
+    os._exit(int(code or 0))  # to free what the server has loaded takes longer than most commands
 
 
 if __name__ == "__main__":
-    serve()
+    serve(sys.argv[1], socket.socket(fileno=int(sys.argv[2])))

@@ -15,12 +15,15 @@ from reflowshock.fem.division.neighbours import with_neighbours
 from reflowshock.fem.elements.element import element_geometry
 from reflowshock.fem.errors import LoadError
 from reflowshock.fem.mesh.mesh import MeshData, merge_nodes
+from reflowshock.fem.model.factorisation import Factorisation
+from reflowshock.fem.model.global_matrix import Equations
 from reflowshock.fem.problem.fittings import Fittings, Neighbour
 from reflowshock.fem.problem.inputs import INPUT
 from reflowshock.fem.run.package import run
 from reflowshock.fem.run.structure import run_structure
+from reflowshock.fem.setup.structure_models import build_structure
 from tests.support.fem_models import BOARD_X, BOARD_Y, BOARD_Z, board_mesh, write_msh
-from tests.support.fem_structures import STEEL, THICKNESS, strip_mesh
+from tests.support.fem_structures import LENGTH, STEEL, THICKNESS, WIDTH, strip_mesh, structure_input
 
 CURVATURE = np.array([3.0, -1.0, 2.0])  # [1/m] of w in xx, yy, xy
 
@@ -55,6 +58,28 @@ def test_gauge_on_a_bent_plate(face, slant):
     gauge = {"at": [1.3e-3, 0.4e-3], "face": face, "direction": along.tolist(), "length": 4e-3}
     found = strains_of(mesh, bent(mesh.points, middle), g=gauge)["g"][0]
     assert found == pytest.approx(exact, rel=1e-9)
+
+
+def test_gauges_on_a_cantilever_read_the_moment_at_their_middles(tmp_path):
+    """A force at its tip: strain F (L - x) c / (E I) at the distance c from the neutral line; solved at rest."""
+    force, mesh = 2.0, strip_mesh((20, 2, 2))
+    steel = STEEL | {"poisson_ratio": 0.0}
+    places = {"root": (-6e-3, "upper"), "middle": (0.7e-3, "lower")}
+    gauges = {name: {"at": [x, 0.0], "face": face} for name, (x, face) in places.items()}
+    request = structure_input(tmp_path, mesh, materials={"steel": steel}, gauges=gauges, watch={})
+    model, _ = build_structure(MPI.COMM_SELF, request, [1.0])
+    equations, load = Equations.of(MPI.COMM_SELF, model.body), np.zeros((len(model.body.mass), 3))
+    tip = model.body.local.points[:, 0] > 0.5 * LENGTH - 1e-9
+    load[tip, 2] = force / tip.sum()
+    solution, displacement = equations.vector(load), np.zeros_like(load)
+    Factorisation(equations.stiffness()).solve(equations.vector(load), solution)
+    equations.spread(solution, displacement)
+    table = model.tables.fitted.points.gauges
+    stretches = np.zeros((2, 3))
+    np.add.at(stretches, table.gauge, table.weight * displacement[model.body.local.locate(table.nodes)])
+    for found, (x, face) in zip(table.strains(stretches, False), places.values(), strict=True):
+        bending = force * (0.5 * LENGTH - x) * 0.5 * THICKNESS / (STEEL["young_modulus"] * WIDTH * THICKNESS**3 / 12)
+        assert found == pytest.approx(-bending if face == "upper" else bending, rel=2e-3)
 
 
 def test_rotation_is_no_strain():
@@ -172,7 +197,7 @@ def test_neighbour_is_tied_as_if_it_were_one_body_with_the_board(tmp_path):
     volume = 2 * 1e-6 * 0.4e-3 + 15e-6 * 0.5e-3 + 3e-6 * 0.3e-3
     own = both.in_parts(lambda name: name.endswith("_pmic"))
     assert element_geometry(both.points, both.cells[own]).volume.sum() == pytest.approx(volume)
-    feet = both.facet_nodes("slave@pmic")
+    feet = both.facet_nodes("slave@neighbour_pmic")
     distance, below = cKDTree(mesh.points).query(both.points[feet])
     assert distance.max() < 1e-12
     glued, _ = merge_nodes(both, feet, below.astype(np.int32))

@@ -1,43 +1,27 @@
 """Surfaces and meshes of all joints of an array: real ones, bridged ones, and identical ones to compare with."""
 
-from collections.abc import Sequence
-from dataclasses import replace
+import itertools
+import logging
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from reflowshock.workflow.board_drop.fine_joints import needs_coarse_joints
 from reflowshock.workflow.board_drop.identical_joints import PREFIX, identical_sphere
 from reflowshock.workflow.case.run import Run
 from reflowshock.workflow.package.case import BoardDropCase, PackageCase
-from reflowshock.workflow.process.products import write_json
-
-if TYPE_CHECKING:
-    from reflowshock.meshing.board.package_side import PackageSide
-    from reflowshock.meshing.board.pads import PadSite
-    from reflowshock.meshing.joint.joint_mesh import JointMesh
-    from reflowshock.meshing.surface.closed_surface import ClosedSurface
-
-import itertools
-import logging
-import math
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
-
-import numpy as np
-
-if TYPE_CHECKING:
-    from reflowshock.meshing.board.package_side import PackageSide
-    from reflowshock.meshing.board.pads import PadSite
-    from reflowshock.meshing.joint.joint_mesh import JointMesh
-    from reflowshock.meshing.surface.closed_surface import ClosedSurface
-
-from typing import TYPE_CHECKING
-
-from reflowshock.workflow.process.products import read_json
+from reflowshock.workflow.process.products import read_json, write_json
 from reflowshock.workflow.reflow.joints import refuse_joints_without_mesh
 
 if TYPE_CHECKING:
+    from reflowshock.meshing.board.package_side import PackageSide
+    from reflowshock.meshing.board.pads import PadSite
+    from reflowshock.meshing.joint.joint_mesh import JointMesh
+    from reflowshock.meshing.surface.closed_surface import ClosedSurface
     from reflowshock.particles.steps.shape import JointShape
 
 

@@ -16,29 +16,19 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from reflowshock.particles.parameters.solder import Solder
 from reflowshock.workflow.reflow.forecast import LoadStep
 from reflowshock.workflow.reflow.rigid_balance import RigidBalance
 
 if TYPE_CHECKING:
-    from reflowshock.fem.statics.state import HeatedState, HeatedStructure
+    from reflowshock.fem.statics.state import HeatedState, HeatedStructure, RigidModes
     from reflowshock.particles.core.geometry import JointGeometry
-
-from typing import TYPE_CHECKING
-
-from reflowshock.particles.parameters.solder import Solder
-
-if TYPE_CHECKING:
-    from reflowshock.fem.statics.state import RigidModes
-    from reflowshock.particles.core.geometry import JointGeometry
-
 
 LONGEST_MOTION = 0.1  # of the smallest gap, in one exchange
 SAMPLES = 41  # heights at which a package that floats is tried
-
+MOST_EXCHANGES = 40
 
 Floats = NDArray[np.float64]
-
-MOST_EXCHANGES = 40
 
 
 class NotInBalance(RuntimeError):

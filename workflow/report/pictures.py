@@ -60,6 +60,7 @@ def draw_joints(grid: pyvista.UnstructuredGrid, parts: list[str], marked: str, t
     """
     grid.points = grid.points / MILLI
     grid["von Mises [MPa]"] = grid.cell_data["von_mises"] / MEGA
+    parts = ["" if is_neighbour(name) else name for name in parts]
     plotter = new_plotter((1800, 1000))
     plotter.add_mesh(
         _of_role(grid, parts, "solder"),
@@ -114,6 +115,11 @@ def render_board(series: list[Path], history: dict, parts: list[str], picture: P
     plotter.camera.zoom(1.5)
     save(plotter, picture)
     return f"The board at {1e3 * time:.3f} ms, deflection drawn {factor:g} times as large; grey: at rest."
+
+
+def is_neighbour(part: str) -> bool:
+    """Whether a part belongs to a package whose joints are not meshed: `<role>_<name>`, of no joint."""
+    return part.startswith(("solder_", "substrate_", "die_")) and "@" not in part
 
 
 def _of_role(grid: pyvista.UnstructuredGrid, parts: list[str], role: str) -> pyvista.UnstructuredGrid:

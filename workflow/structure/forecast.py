@@ -5,29 +5,19 @@ from dataclasses import dataclass
 from math import ceil
 from typing import TYPE_CHECKING, Any
 
-from reflowshock.problem import Problem
-from reflowshock.workflow.case.forecast import BYTES_OF_ELEMENT, Size, too_many_steps
-from reflowshock.workflow.case.text import short
-from reflowshock.workflow.structure.case import StructureCase
-
-if TYPE_CHECKING:
-    from reflowshock.fem.estimates.solver_cost import SolverForecast
-
-from typing import TYPE_CHECKING
-
 from rich.console import RenderableType
 from rich.table import Table
 
-from reflowshock.workflow.case.text import duration
+from reflowshock.problem import Problem
+from reflowshock.workflow.case.forecast import BYTES_OF_ELEMENT, Size, too_many_steps
+from reflowshock.workflow.case.text import duration, short
 from reflowshock.workflow.process.terminal import new_table
+from reflowshock.workflow.structure.case import StructureCase
 
 if TYPE_CHECKING:
-    from reflowshock.fem.estimates.solver_cost import SolverCost
-
+    from reflowshock.fem.estimates.solver_cost import SolverCost, SolverForecast
 
 MEGA = 1.0e6
-
-
 SECONDS_TO_START = 4.0  # until the ranks of a solver have loaded their libraries and kernels
 
 

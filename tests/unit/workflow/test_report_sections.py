@@ -13,6 +13,7 @@ from reflowshock.workflow.package_report import shock as residual
 from reflowshock.workflow.package_report.gallery import array_map
 from reflowshock.workflow.package_report.joint_records import joint_records
 from reflowshock.workflow.package_report.joints import headline
+from reflowshock.workflow.report.pictures import is_neighbour
 from tests.support.chain_products import BOW, MICRO, MILLI, bowed_structure, interface
 
 NAMES = ["A3", "A4", "B3", "B4"]
@@ -48,6 +49,20 @@ def test_warpage_is_drawn(structure):
     joints = [{"x": x, "y": y} for x, y in zip(X, Y, strict=True)]
     for drawing in (warpage.warpage_maps(structure, joints), warpage.profiles(structure)):
         assert drawing.startswith("<svg")
+
+
+def test_neighbours_are_told_from_the_package_by_their_parts():
+    parts = [
+        "solder@A1",
+        "substrate",
+        "substrate_column@A1",
+        "die",
+        "copper_board",
+        "board_patch",
+        "die_pmic",
+        "solder_u2",
+    ]
+    assert [name for name in parts if is_neighbour(name)] == ["die_pmic", "solder_u2"]
 
 
 def test_captions_of_the_gallery_are_narrower_than_a_joint():

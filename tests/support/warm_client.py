@@ -1,0 +1,20 @@
+"""Asks the server of `warm_start` for a process: loads little, since each Snakemake and each stage begins with it."""
+
+import json
+import os
+import socket
+from collections.abc import Sequence
+
+
+def ask(address: str, words: Sequence[str], streams: Sequence[int], cwd: str | None = None) -> int:
+    """Have a module run with its arguments and these standard streams, until it has ended or this process ends.
+
+    Returns:
+        Its exit code, or minus the signal that ended it.
+    """
+    request = {"words": words, "cwd": cwd or os.getcwd(), "environment": dict(os.environ)}
+    with socket.socket(socket.AF_UNIX) as connection:
+        connection.connect(address)
+        socket.send_fds(connection, [b"\n"], streams)
+        connection.sendall(json.dumps(request).encode() + b"\n")
+        return int(connection.makefile().readline())
