@@ -92,9 +92,9 @@ class History:
         return result
 
     def arrays(self, names: Collection[str] | None = None) -> dict[str, NDArray]:
-        """Return all samples as arrays, by name, or the arrays of these names alone; on rank 0."""
+        """Return all samples as arrays, by name, or those of these names that there are; on rank 0."""
         if names is not None:
-            return columns([{name: row[name] for name in names} for row in self._rows])
+            return columns([{name: row[name] for name in names if name in row} for row in self._rows])
         return columns(self._rows) | self._watch.labels
 
     def write(self, directory: Path) -> None:

@@ -1,18 +1,21 @@
-"""When a shock is over: its joints' largest stress has passed, and half a swing of the board brought no larger one."""
+"""When a shock is over: its joints' largest stress has passed, and half a swing of the board brought no larger one.
+
+Solder that has yielded hardens with every swing, and its von Mises stress with it: only peel stress is looked at then.
+"""
 
 import numpy as np
 from numpy.typing import NDArray
 
-from reflowshock.fem.output.ranking import ENDS, PEEL, VON_MISES, Arrays
+from reflowshock.fem.output.ranking import ENDS, PEEL, PLASTIC_WORK, VON_MISES, Arrays, Measure, ranking_measure
 
-HISTORIES = tuple(f"{measure.history}_{end}" for measure in (PEEL, VON_MISES) for end in ENDS)
-WATCHED = ("time", "board_centre", *HISTORIES)
+HISTORIES = tuple(f"{measure.history}_{end}" for measure in (PEEL, VON_MISES, PLASTIC_WORK) for end in ENDS)
+WATCHED = ("time", "board_centre", *HISTORIES)  # plastic work only where solder may yield
 SAME = 0.99  # of the largest stress: what reaches it later is not a higher peak
 SMALL = 0.1  # of the largest deflection: a return to zero from less is no swing
 
 
 def is_settled(history: Arrays) -> bool:
-    """Whether the largest peel and von Mises stress of all joints is older than half a swing of the board.
+    """Whether the largest stress of all joints is older than half a swing of the board.
 
     Half a swing is the time from the start until the board's centre first returns through its place: at least half of
     the first mode's period, since the pulse takes its time.
@@ -21,10 +24,15 @@ def is_settled(history: Arrays) -> bool:
         history: ``WATCHED``: ``time (k,)`` [s], ``board_centre (k, 3)`` [m], stresses ``(k, joints)`` [Pa].
     """
     time, half = history["time"], half_swing(history["time"], history["board_centre"][:, 2])
-    if half is None or not history[HISTORIES[0]].size:
+    if half is None or not PEEL.worse(history).size:
         return False
-    latest = max(float(time[_first_largest(history[name])]) for name in HISTORIES)
+    latest = max(float(time[_first_largest(measure.worse(history))]) for measure in judged(history))
     return bool(time[-1] - latest >= half)
+
+
+def judged(history: Arrays) -> tuple[Measure, ...]:
+    """Return the measures whose peaks are to pass."""
+    return (PEEL,) if ranking_measure(history) is PLASTIC_WORK else (PEEL, VON_MISES)
 
 
 def half_swing(time: NDArray[np.float64], deflection: NDArray[np.float64]) -> float | None:
