@@ -1,6 +1,6 @@
 """A drop in which solder flows: what its critical joint bears on meshes with elements twice, once and half as long.
 
-    PYTHONPATH=. python benchmarks/halved_drop.py [SIZE ...]  (one core; writes results/halved_drop.json)
+    PYTHONPATH=. python benchmarks/halved_drop.py [SIZE ...]  (half an hour on one core; halved_drop.json)
 
 A quarter of the 4 x 4 package of ``cases/jedec_bga`` on a board of 50 x 30 mm, held near its corners, under a half sine
 that is short and strong enough to bend it, and its corner joint beyond yield, in 0.15 ms. The corner joint is fine, in
