@@ -31,7 +31,7 @@ def compare_histories(two_scale: Path, dns: Path, fine: Collection[str] | None =
         ``critical_joint_peel_error``, with flow ``critical_joint_work_error``,
         ``die_displacement_error`` and ``board_displacement_error`` (their centres), ``board_strain_error``; with
         ``fine`` also ``critical_joint_coarse``: 1 if the critical joint is not among them; of a DNS that ends early
-        ``compared_duration`` [s].
+        ``compared_duration`` [s] and ``compared_stress``, the critical joint's peak until then over that of the run.
 
     A reference that ends early is compared with over the time that it has; the critical joint is then that of the
     two-scale run.
@@ -60,7 +60,10 @@ def joint_errors(
 ) -> dict[str, float | str]:
     """Return the errors of the joints' histories, both ends together."""
     count = len(reference["time"])
-    critical = critical_joint(reference if count == len(ours["time"]) else ours)
+    whole = count == len(ours["time"])
+    critical = critical_joint(reference if whole else ours)
+    stress = VON_MISES.worse(ours)[:, critical]
+    seen = {} if whole or not stress.any() else {"compared_stress": float(stress[:count].max() / stress.max())}
 
     def error(measure: Measure, joint: int) -> float:
         names = [f"{measure.history}_{end}" for end in ENDS]
@@ -78,5 +81,6 @@ def joint_errors(
         ),
         "critical_joint_peel_error": error(PEEL, critical),
         **flow,
+        **seen,
         **({} if fine is None else {"critical_joint_coarse": float(names[critical] not in fine)}),
     }

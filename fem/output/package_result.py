@@ -34,6 +34,7 @@ from reflowshock.fem.problem.inputs import RunInput
 from reflowshock.fem.problem.shock import Shock
 
 FORCE_RESIDUAL_LIMIT = 1e-10
+NO_FORCE = 1e-6  # [N], a quarter of a small joint's weight
 SECTION_RESIDUAL_LIMIT = 1e-6
 SAMPLES = 4000  # of an input, for its spectrum
 METHODS = {"direct": "direct acceleration input", "large_mass": "large mass at the mounting holes"}
@@ -197,11 +198,14 @@ def flow_metrics(arrays: Mapping[str, NDArray]) -> dict[str, Any]:
 
 
 def section_residual(arrays: Mapping[str, NDArray]) -> float:
-    """Return by how much both sections of a joint miss its inertia at most, over the largest section force."""
+    """Return by how much both sections of a joint miss its inertia at most, over the largest section force.
+
+    Forces below ``NO_FORCE`` count as that: before the first wave has come there is rounding alone.
+    """
     if not len(arrays["joints"]):
         return 0.0
     largest = max(float(np.abs(arrays[f"section_{end}"][..., :3]).max()) for end in ENDS)
-    return float(arrays["section_imbalance"].max()) / largest if largest > 0.0 else 0.0
+    return float(arrays["section_imbalance"].max()) / max(largest, NO_FORCE)
 
 
 def effects(request: RunInput, summary: dict[str, Any], neglected_strain: float) -> dict[str, Any]:

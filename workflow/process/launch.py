@@ -101,6 +101,7 @@ TOLD = "error: "  # begins what a program says of an error that it knows
 LAST_LINES = 15
 LAUNCHER = "REFLOWSHOCK_MPI_LAUNCHER"  # variable: what starts MPI ranks, e.g. "srun --mpi=pmix" within a job of Slurm
 MPIRUN = "mpirun"
+ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}  # of a rank
 # Open MPI binds the ranks of each run to the first cores, so that runs side by side would share these.
 UNBOUND = ("--bind-to", "none")
 QUIET = ("--mca", "orte_execute_quiet", "1")  # of Open MPI 4; 5 has no option --quiet, and lets this one pass
@@ -158,7 +159,7 @@ def launch(command: Sequence[str], on_line: Callable[[str], None], log: Path, pa
     if shutil.which(program) is None:
         raise LaunchError(f"{program} is not installed")
     # What it writes is read here, not on a terminal: in UTF-8, whatever the terminal has.
-    environment = own_environment(os.environ) | {"OMP_NUM_THREADS": "1", "PYTHONIOENCODING": "utf-8:backslashreplace"}
+    environment = own_environment(os.environ) | ONE_THREAD | {"PYTHONIOENCODING": "utf-8:backslashreplace"}
     with log.open("w", encoding="utf-8") as errors:
         process = subprocess.Popen(
             [*END_WITH_PARENT, *command],

@@ -17,6 +17,7 @@ HEADLINE = (
 )
 COMPARISON = (
     ("compared_duration", "time covered by both; the DNS ends before the shock"),
+    ("compared_stress", "largest stress of the critical joint in that time, over that of the whole shock"),
     ("critical_joint", "critical joint (of the DNS where it covers the whole shock)"),
     ("critical_joint_stress_error", "von Mises history of its layers, relative L2"),
     ("worst_joint_stress_error", "the same, worst joint that is fine in both"),
