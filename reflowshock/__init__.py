@@ -2,7 +2,7 @@
 
     import reflowshock
 
-    case = reflowshock.Case.load("cases/jedec_bga/case.toml", {"shock.peak_acceleration": "1000 G"})
+    case = reflowshock.Case.load("cases/bga_drop/case.toml", {"shock.peak_acceleration": "1000 G"})
     print(case.plan())
     run = case.run("runs/first")  # or, later: reflowshock.Run.open("runs/first")
     run.metrics["peel_stress"], run.joints, run.history["two_scale"]["time"], run.surface("A10")

@@ -80,7 +80,7 @@ def interruptible(what: str) -> Iterator[None]:
 @app.command()
 def new(
     name: Annotated[str, typer.Argument(help="name of the case; the file is NAME.toml")],
-    template: Annotated[str, typer.Option(help="case to start from")] = "jedec_bga",
+    template: Annotated[str, typer.Option(help="case to start from")] = "bga_drop",
 ) -> None:
     """Write a complete, commented case file."""
     from reflowshock.workflow.pipeline.template import write_new_case

@@ -38,7 +38,7 @@ def test_a_new_case_is_complete_and_equal_to_its_template(call, tmp_path):
     code, _, _ = call("new", "mine")
     assert code == 0
     path = tmp_path / "mine.toml"
-    mine, template = (display_values(read_case(file)) for file in (path, CASES / "jedec_bga/case.toml"))
+    mine, template = (display_values(read_case(file)) for file in (path, CASE))
     assert mine == template | {"case.name": "mine"}
     given = [key for key, _ in flat(tomllib.loads(path.read_text())) if not key.startswith("scales.")]
     assert set(given) == set(mine)
