@@ -17,7 +17,7 @@ from reflowshock.fem.elements.element import Elements
 from reflowshock.fem.forces.energy import Energy
 from reflowshock.fem.forces.force_assembled import AssembledElements
 from reflowshock.fem.forces.force_congruent import CongruentElements, in_rows, is_box
-from reflowshock.fem.forces.force_corotational import CorotationalBoxes
+from reflowshock.fem.forces.force_corotational import corotational_term
 from reflowshock.fem.forces.force_nonlinear import NonlinearElements
 from reflowshock.fem.kernels.nonlinear import Path
 from reflowshock.fem.kernels.plasticity import FIRST_YIELD, plastic_constants
@@ -81,7 +81,7 @@ def force_terms(
     path = own & ~linear & ~turning
     terms = linear_terms(elements.subset(linear))
     if turning.any():
-        terms.append(CorotationalBoxes.build(elements, np.flatnonzero(turning)))
+        terms.append(corotational_term(elements, np.flatnonzero(turning)))
     if path.any():
         finite = kinematics != "small"
         terms.append(NonlinearElements.build(elements, np.flatnonzero(path), plastic, Path(finite, step)))

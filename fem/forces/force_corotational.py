@@ -3,6 +3,9 @@
 The linear stiffness of a shape, diagonalised by its symmetry (``force_congruent``), acts in the frame of each box's
 mean rotation (``kernels.box_rotation``). The force is the exact derivative of an energy and needs no path. What it
 leaves out is of second order in the strain, (U - 1)^2 / 2: a strain of 1 % is wrong by 5e-5.
+
+Boxes stand in rows of equal ones, whose neighbours share work, or in blocks of any shapes: on the graded board of
+jedec_bga, with three boxes a row, blocks are 2.3 times as fast; from 24 boxes a row on, rows are.
 """
 
 from dataclasses import dataclass, field
@@ -13,10 +16,18 @@ from numpy.typing import NDArray
 from reflowshock.fem.elements.element import Elements, element_stiffness
 from reflowshock.fem.errors import InvertedElementError
 from reflowshock.fem.forces.energy import Energy
-from reflowshock.fem.forces.force_congruent import arranged, parity_blocks
-from reflowshock.fem.kernels.box_rotation import UPRIGHT, add_turned_row_forces, row_energies
+from reflowshock.fem.forces.force_congruent import aligned, arranged, parity_blocks
+from reflowshock.fem.forces.nonlinear_blocks import arrange
+from reflowshock.fem.kernels.box_rotation import (
+    UPRIGHT,
+    add_turned_block_forces,
+    add_turned_row_forces,
+    block_energies,
+    row_energies,
+)
 from reflowshock.fem.kernels.box_rows import PAD, read_lines, subtract_lines
 
+SHORT_ROWS = 8  # boxes of a row, in the mean, below which blocks of any shapes are faster
 NORMAL = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))
 # Parity and entries (00 01 02 11 12 22) of the blocks that resist the modes xy, xz, yz, xyz.
 HIGHER = ((7, (0, 1, 2, 3, 4, 5)), (1, (3, 4, 5)), (2, (0, 2, 5)), (4, (0, 1, 3)), (6, (0,)), (5, (3,)), (3, (5,)))
@@ -73,8 +84,7 @@ class CorotationalBoxes:
         read_lines(self.nodes, self.axes, displacement, self.lines[0])
         row = add_turned_row_forces(self.rows, self.scales, self.constants, *self.lines)
         if row != UPRIGHT:
-            place = ", ".join(f"{value:.6g}" for value in self.points[self.nodes[self.rows[row, 0]]])
-            raise InvertedElementError(f"an element in the row that begins near ({place}) m is turned inside out")
+            raise inverted("the row", self.points[self.nodes[self.rows[row, 0]]])
         subtract_lines(self.nodes, self.axes, self.lines[1], force)
 
     def energy(self, displacement: NDArray[np.float64]) -> Energy:
@@ -82,6 +92,68 @@ class CorotationalBoxes:
         read_lines(self.nodes, self.axes, displacement, self.lines[0])
         mean, higher = row_energies(self.rows, self.scales, self.constants, self.lines[0])
         return Energy(strain=mean, hourglass=higher) if self.hourglass else Energy(strain=mean + higher)
+
+
+@dataclass(frozen=True, slots=True)
+class CorotationalBlocks:
+    """Boxes that turn, sixteen of any shapes side by side: for meshes whose rows of equal boxes are short.
+
+    Attributes:
+        points: ``(n, 3)`` [m].
+        cells: ``(nb, 8, 16)`` int32, see ``kernels.box_rotation.add_turned_block_forces``.
+        filled: ``(nb,)`` int32 boxes of each block.
+        constants: ``(nb, 480)`` of each lane: ``box_constants``, then scales as of ``CorotationalBoxes``.
+        hourglass: Whether the energy of the higher modes counts as that of hourglass control.
+        numbers: ``(ne,)`` the boxes' numbers among all elements of the rank.
+        history: Empty.
+    """
+
+    points: NDArray[np.float64]
+    cells: NDArray[np.int32]
+    filled: NDArray[np.int32]
+    constants: NDArray[np.float64]
+    hourglass: bool
+    numbers: NDArray[np.int64]
+    history: dict[str, NDArray] = field(default_factory=dict)
+
+    @classmethod
+    def build(cls, everything: Elements, chosen: NDArray[np.int64]) -> "CorotationalBlocks":
+        """Put the ``chosen (ne,)`` elements, boxes (``force_congruent.is_box``), into blocks."""
+        elements = aligned(everything.subset(chosen))
+        lanes = arrange(elements)
+        shapes = elements.subset(lanes.shape)
+        size = np.ptp(shapes.points[shapes.cells], axis=1)
+        cells = np.ascontiguousarray(elements.cells[lanes.element].transpose(0, 2, 1), dtype=np.int32)
+        of_shape = np.column_stack([box_constants(shapes, size), -0.25 / size])
+        constants = np.ascontiguousarray(of_shape[lanes.place[lanes.pattern]].transpose(0, 2, 1))
+        flat = constants.reshape(len(cells), -1)
+        return cls(elements.points, cells, lanes.filled, flat, elements.kind.hourglass, chosen)
+
+    def add(self, displacement: NDArray[np.float64], force: NDArray[np.float64]) -> None:
+        """Subtract the internal force; errors as ``CorotationalBoxes.add``."""
+        block = add_turned_block_forces(self.cells, self.filled, self.constants, displacement, force)
+        if block != UPRIGHT:
+            raise inverted("a block", self.points[self.cells[block, 0, 0]])
+
+    def energy(self, displacement: NDArray[np.float64]) -> Energy:
+        """Return the strain energy."""
+        mean, higher = block_energies(self.cells, self.filled, self.constants, displacement)
+        return Energy(strain=mean, hourglass=higher) if self.hourglass else Energy(strain=mean + higher)
+
+
+Corotational = CorotationalBoxes | CorotationalBlocks
+
+
+def corotational_term(everything: Elements, chosen: NDArray[np.int64]) -> Corotational:
+    """Return the term of the ``chosen (ne,)`` elements, boxes: in rows, unless these are short."""
+    rows = CorotationalBoxes.build(everything, chosen)
+    return rows if len(chosen) >= SHORT_ROWS * len(rows.rows) else CorotationalBlocks.build(everything, chosen)
+
+
+def inverted(what: str, start: NDArray[np.float64]) -> InvertedElementError:
+    """Return the error of a row or block of boxes that begins at a point ``(3,)`` [m]."""
+    place = ", ".join(f"{value:.6g}" for value in start)
+    return InvertedElementError(f"an element in {what} that begins near ({place}) m is turned inside out")
 
 
 def box_constants(shapes: Elements, size: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -1,4 +1,4 @@
-"""Numba kernels of rows of equal elastic boxes that turn by any angle and strain little.
+"""Numba kernels of elastic boxes that turn by any angle and strain little: in rows of equal ones, or each by itself.
 
 The mean deformation of a box, F = R U, has the stretch U = 1 + E. The higher modes q_k of its eight nodes are seen from
 the frame that turns with it, q^_k = R^T q_k. In this frame the strain energy is that of the linear box,
@@ -10,9 +10,9 @@ Q^ = H q^ and M = T U,
 is the force on F, R Q^_k the force on q_k; [w]x is the matrix of the cross product. It is there because a change of F
 turns the frame by omega, (tr(U) 1 - U) omega = axial(R^T dF - dF^T R). Energy and both momenta are kept.
 
-Rows, lines and faces are those of ``kernels.box_rows``, modes those of ``force_congruent``. Sixteen boxes of a row
-stand side by side as in ``kernels.lanes``. Slots of the workspace ``w``, in units of lanes: component c of the mode of
-parity p at 3 p + c, then F and R as ``kernels.nonlinear.rotate`` has them.
+Rows, lines and faces are those of ``kernels.box_rows``, modes those of ``force_congruent``. Sixteen boxes of a row, or
+sixteen of any shapes, stand side by side as in ``kernels.lanes``. Slots of the workspace ``w``, in units of lanes:
+component c of the mode of parity p at 3 p + c, then F and R as ``kernels.nonlinear.rotate`` has them.
 """
 
 import numpy as np
@@ -25,9 +25,11 @@ from reflowshock.fem.kernels.lanes import (
     applied,
     cofactor_symmetric,
     full,
+    gather_lanes,
     nine,
     put_nine,
     put_three,
+    scatter_lanes,
     three,
     times,
     transposed,
@@ -36,6 +38,7 @@ from reflowshock.fem.kernels.nonlinear import rotate, stretch
 
 DEFORMATION, ROTATION, TURNED_SLOTS = (LANES * k for k in (24, 33, 42))
 WIDTH = COLUMNS + LANES
+SCALE = 27 * LANES  # where the scales of sixteen boxes follow on their constants
 UPRIGHT = -1  # no box is turned inside out
 X, Y, Z, XY, XZ, YZ, XYZ = (3 * LANES * p for p in (1, 2, 4, 3, 5, 6, 7))  # slots of the modes, by their parity
 
@@ -66,16 +69,43 @@ def add_faces(w, start, count, faces):
 
 
 @njit(**LANE_OPTIONS)
+def transform_corners(w):
+    """Replace the values of three components at eight corners by their Walsh-Hadamard transform."""
+    for bit in (1, 2, 4):
+        for corner in range(8):
+            if corner & bit:
+                continue
+            for c in range(3):
+                low, high = w[LANES * (3 * corner + c) :], w[LANES * (3 * (corner + bit) + c) :]
+                for lane in range(LANES):
+                    a, b = low[lane], high[lane]
+                    low[lane], high[lane] = a + b, a - b
+
+
+@njit(**LANE_OPTIONS)
+def deformation(w, lane, scale):
+    """Write F of a lane; ``scale`` (3) [1/m] turns modes into gradients, -1 / (4 h) along each direction."""
+    x, y, z = three(w, X + lane), three(w, Y + lane), three(w, Z + lane)
+    f = (
+        1.0 + scale[0] * x[0], scale[1] * y[0], scale[2] * z[0],
+        scale[0] * x[1], 1.0 + scale[1] * y[1], scale[2] * z[1],
+        scale[0] * x[2], scale[1] * y[2], 1.0 + scale[2] * z[2],
+    )  # fmt: skip
+    put_nine(w, DEFORMATION + lane, f)
+
+
+@njit(**LANE_OPTIONS)
 def write_deformation(w, scale):
-    """Write F; ``scale (3,)`` [1/m] turns modes into gradients, -1 / (4 h) along each direction."""
+    """Write F of sixteen equal boxes."""
     for lane in range(LANES):
-        x, y, z = three(w, X + lane), three(w, Y + lane), three(w, Z + lane)
-        f = (
-            1.0 + scale[0] * x[0], scale[1] * y[0], scale[2] * z[0],
-            scale[0] * x[1], 1.0 + scale[1] * y[1], scale[2] * z[1],
-            scale[0] * x[2], scale[1] * y[2], 1.0 + scale[2] * z[2],
-        )  # fmt: skip
-        put_nine(w, DEFORMATION + lane, f)
+        deformation(w, lane, scale)
+
+
+@njit(**LANE_OPTIONS)
+def write_own_deformation(w, k):
+    """Write F of sixteen boxes; ``k (480,)`` as in ``add_turned_block_forces``."""
+    for lane in range(LANES):
+        deformation(w, lane, three(k, SCALE + lane))
 
 
 @njit(**LANE_OPTIONS)
@@ -123,45 +153,62 @@ def spin(u, moment):
 
 
 @njit(**LANE_OPTIONS)
+def turned_forces(w, lane, scale, k):
+    """Replace the modes of a lane by the forces on them, given F and R."""
+    r = nine(w, ROTATION + lane)
+    back = transposed(r)
+    u = stretch(r, nine(w, DEFORMATION + lane))
+    t = full(stress(k, u))
+    a, b = applied(back, three(w, XY + lane)), applied(back, three(w, XZ + lane))
+    c, d = applied(back, three(w, YZ + lane)), applied(back, three(w, XYZ + lane))
+    fa, fb, fc, fd = resistance(k, a, b, c, d)
+    m = times(t, full(u))
+    moment = add_cross(add_cross((m[7] - m[5], m[2] - m[6], m[3] - m[1]), a, fa), b, fb)
+    x, y, z = spin(u, add_cross(add_cross(moment, c, fc), d, fd))
+    p = times(r, (t[0], t[1] + z, t[2] - y, t[3] - z, t[4], t[5] + x, t[6] + y, t[7] - x, t[8]))
+    put_three(w, X + lane, (scale[0] * p[0], scale[0] * p[3], scale[0] * p[6]))
+    put_three(w, Y + lane, (scale[1] * p[1], scale[1] * p[4], scale[1] * p[7]))
+    put_three(w, Z + lane, (scale[2] * p[2], scale[2] * p[5], scale[2] * p[8]))
+    put_three(w, XY + lane, applied(r, fa))
+    put_three(w, XZ + lane, applied(r, fb))
+    put_three(w, YZ + lane, applied(r, fc))
+    put_three(w, XYZ + lane, applied(r, fd))
+    put_three(w, lane, (0.0, 0.0, 0.0))
+
+
+@njit(**LANE_OPTIONS)
 def replace_by_forces(w, scale, k):
-    """Replace the modes of sixteen boxes by the forces on them, given F and R."""
+    """Replace the modes of sixteen equal boxes by the forces on them, given F and R."""
     for lane in range(LANES):
-        r = nine(w, ROTATION + lane)
-        back = transposed(r)
-        u = stretch(r, nine(w, DEFORMATION + lane))
-        t = full(stress(k, u))
-        a, b = applied(back, three(w, XY + lane)), applied(back, three(w, XZ + lane))
-        c, d = applied(back, three(w, YZ + lane)), applied(back, three(w, XYZ + lane))
-        fa, fb, fc, fd = resistance(k, a, b, c, d)
-        m = times(t, full(u))
-        moment = add_cross(add_cross((m[7] - m[5], m[2] - m[6], m[3] - m[1]), a, fa), b, fb)
-        x, y, z = spin(u, add_cross(add_cross(moment, c, fc), d, fd))
-        p = times(r, (t[0], t[1] + z, t[2] - y, t[3] - z, t[4], t[5] + x, t[6] + y, t[7] - x, t[8]))
-        put_three(w, X + lane, (scale[0] * p[0], scale[0] * p[3], scale[0] * p[6]))
-        put_three(w, Y + lane, (scale[1] * p[1], scale[1] * p[4], scale[1] * p[7]))
-        put_three(w, Z + lane, (scale[2] * p[2], scale[2] * p[5], scale[2] * p[8]))
-        put_three(w, XY + lane, applied(r, fa))
-        put_three(w, XZ + lane, applied(r, fb))
-        put_three(w, YZ + lane, applied(r, fc))
-        put_three(w, XYZ + lane, applied(r, fd))
-        put_three(w, lane, (0.0, 0.0, 0.0))
+        turned_forces(w, lane, scale, k)
+
+
+@njit(**LANE_OPTIONS)
+def replace_by_own_forces(w, k):
+    """Replace the modes of sixteen boxes by the forces on them; ``k (480,)`` as in ``add_turned_block_forces``."""
+    for lane in range(LANES):
+        turned_forces(w, lane, three(k, SCALE + lane), own_constants(k, lane))
+
+
+@njit(**LANE_OPTIONS)
+def own_constants(k, lane):
+    """Return the 27 constants of a lane."""
+    return nine(k, lane) + nine(k, 9 * LANES + lane) + nine(k, 18 * LANES + lane)
 
 
 @njit(cache=True)
-def box_energies(w, k, count):
-    """Return the energies [J] of the mean strains and of the higher modes of the first ``count`` boxes."""
-    mean = higher = 0.0
-    for lane in range(count):
-        r = nine(w, ROTATION + lane)
-        u, back = stretch(r, nine(w, DEFORMATION + lane)), transposed(r)
-        t = stress(k, u)
-        mean += 0.5 * (t[0] * (u[0] - 1.0) + t[1] * (u[1] - 1.0) + t[2] * (u[2] - 1.0))
-        mean += t[3] * u[3] + t[4] * u[4] + t[5] * u[5]
-        a, b = applied(back, three(w, XY + lane)), applied(back, three(w, XZ + lane))
-        c, d = applied(back, three(w, YZ + lane)), applied(back, three(w, XYZ + lane))
-        fa, fb, fc, fd = resistance(k, a, b, c, d)
-        for i in range(3):
-            higher += 0.5 * (a[i] * fa[i] + b[i] * fb[i] + c[i] * fc[i] + d[i] * fd[i])
+def box_energies(w, lane, k):
+    """Return the energies [J] of the mean strains and of the higher modes of a lane."""
+    higher, r = 0.0, nine(w, ROTATION + lane)
+    u, back = stretch(r, nine(w, DEFORMATION + lane)), transposed(r)
+    t = stress(k, u)
+    mean = 0.5 * (t[0] * (u[0] - 1.0) + t[1] * (u[1] - 1.0) + t[2] * (u[2] - 1.0))
+    mean += t[3] * u[3] + t[4] * u[4] + t[5] * u[5]
+    a, b = applied(back, three(w, XY + lane)), applied(back, three(w, XZ + lane))
+    c, d = applied(back, three(w, YZ + lane)), applied(back, three(w, XYZ + lane))
+    fa, fb, fc, fd = resistance(k, a, b, c, d)
+    for i in range(3):
+        higher += 0.5 * (a[i] * fa[i] + b[i] * fb[i] + c[i] * fc[i] + d[i] * fd[i])
     return mean, higher
 
 
@@ -220,7 +267,53 @@ def row_energies(rows, scales, constants, displacement):
             repeat_last(w, count - start)
             write_deformation(w, scales[shape])
             rotate(w[DEFORMATION:])
-            energies = box_energies(w, constants[shape], min(LANES, count - start))
+            for lane in range(min(LANES, count - start)):
+                energies = box_energies(w, lane, constants[shape])
+                mean += energies[0]
+                higher += energies[1]
+    return mean, higher
+
+
+@njit(cache=True)
+def add_turned_block_forces(cells, filled, constants, displacement, force):
+    """Subtract the internal force of boxes of any shapes.
+
+    Args:
+        cells: ``(nb, 8, 16)`` int32 nodes, bit d of a corner's number is its side in direction d; lanes past the last
+            box repeat it.
+        filled: ``(nb,)`` int32 boxes of each block.
+        constants: ``(nb, 480)`` of each lane what ``force_corotational.box_constants`` returns, then its scales [1/m].
+        displacement: ``(n, 3)`` [m].
+        force: ``(n, 3)`` [N], added to.
+
+    Returns:
+        ``UPRIGHT``, or the first block with a box that is turned inside out; then the force is not complete.
+    """
+    w = np.zeros(TURNED_SLOTS)
+    for b in range(len(cells)):
+        gather_lanes(cells[b], displacement, w)
+        transform_corners(w)
+        write_own_deformation(w, constants[b])
+        if not rotate(w[DEFORMATION:]):
+            return b
+        replace_by_own_forces(w, constants[b])
+        transform_corners(w)
+        scatter_lanes(cells[b], filled[b], w, force)
+    return UPRIGHT
+
+
+@njit(cache=True)
+def block_energies(cells, filled, constants, displacement):
+    """Return the energies [J] of the mean strains and of the higher modes; arguments as above, no box inside out."""
+    w = np.zeros(TURNED_SLOTS)
+    mean = higher = 0.0
+    for b in range(len(cells)):
+        gather_lanes(cells[b], displacement, w)
+        transform_corners(w)
+        write_own_deformation(w, constants[b])
+        rotate(w[DEFORMATION:])
+        for lane in range(filled[b]):
+            energies = box_energies(w, lane, own_constants(constants[b], lane))
             mean += energies[0]
             higher += energies[1]
     return mean, higher

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from reflowshock.fem.elements.element import Elements
 from reflowshock.fem.elements.kind import Geometry
 from reflowshock.fem.forces.force import ForceTerm
-from reflowshock.fem.forces.force_corotational import CorotationalBoxes
+from reflowshock.fem.forces.force_corotational import Corotational
 from reflowshock.fem.forces.force_nonlinear import NonlinearElements
 from reflowshock.fem.mesh.tie import Tie
 from reflowshock.fem.parallel.exchange import SharedNodes
@@ -52,6 +52,6 @@ class Body:
     def turns(self) -> bool:
         """Return whether rotations of elements on this rank are more than small."""
         return any(
-            isinstance(term, CorotationalBoxes) or (isinstance(term, NonlinearElements) and term.finite)
+            isinstance(term, Corotational) or (isinstance(term, NonlinearElements) and term.finite)
             for term in self.terms
         )

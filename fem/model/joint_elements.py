@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reflowshock.fem.elements.hexahedron import HEXAHEDRON
-from reflowshock.fem.forces.force_corotational import CorotationalBoxes
+from reflowshock.fem.forces.force_corotational import Corotational, corotational_term
 from reflowshock.fem.forces.force_nonlinear import NonlinearElements, PointValues
 from reflowshock.fem.kernels.nonlinear import Path
 from reflowshock.fem.kernels.plasticity import NEVER_YIELDS
@@ -44,7 +44,7 @@ class TurningBoxes:
 
     def __init__(self, body: Body, chosen: NDArray[np.integer]) -> None:
         """Take elements ``chosen (k,)`` of a body, corotational boxes of it."""
-        self._boxes = CorotationalBoxes.build(body.elements, np.asarray(chosen))
+        self._boxes = corotational_term(body.elements, np.asarray(chosen))
         self._points = ElasticHexahedra(body, chosen, finite=True)
         self._displacement = np.zeros_like(body.local.points)
 
@@ -90,7 +90,7 @@ class JointElements:
         left = np.ones(len(chosen), dtype=bool)
         self._nonlinear: list[tuple[NDArray[np.intp], FollowingElements | TurningBoxes]] = []
         for term in body.terms:
-            if isinstance(term, NonlinearElements | CorotationalBoxes):
+            if isinstance(term, NonlinearElements | Corotational):
                 place = positions(term.numbers, chosen)
                 rows = np.flatnonzero(place >= 0)
                 left[rows] = False

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reflowshock.fem.elements.stress import element_stress, mean_strain, symmetric, voigt, von_mises
-from reflowshock.fem.forces.force_corotational import CorotationalBoxes
+from reflowshock.fem.forces.force_corotational import Corotational
 from reflowshock.fem.forces.force_nonlinear import NonlinearElements
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.parallel.local_mesh import positions
@@ -32,7 +32,7 @@ class StressRecovery:
                 rows = np.flatnonzero(place >= 0)
                 self._stored.append((term, rows, place[rows]))
                 self._finite[rows] = term.finite
-            elif isinstance(term, CorotationalBoxes):
+            elif isinstance(term, Corotational):
                 self._turning |= positions(term.numbers, chosen) >= 0
         self._finite |= self._turning
 

@@ -11,7 +11,7 @@ from reflowshock.fem.elements.element import Elements, element_kind, element_sti
 from reflowshock.fem.errors import InvertedElementError
 from reflowshock.fem.forces.force import force_terms
 from reflowshock.fem.forces.force_congruent import CongruentElements
-from reflowshock.fem.forces.force_corotational import CorotationalBoxes
+from reflowshock.fem.forces.force_corotational import CorotationalBlocks, CorotationalBoxes, corotational_term
 from reflowshock.fem.forces.force_nonlinear import NonlinearElements
 from reflowshock.fem.kernels.hexahedron import CENTRE_DERIVATIVES
 from reflowshock.fem.materials.elasticity import elasticity_matrix
@@ -33,8 +33,10 @@ def boxes(counts: tuple[int, int, int], formulation: str = "incompatible_modes",
     return Elements(points, cells[kept], material, MATERIALS, np.ones(kept.sum()), element_kind(8, formulation))
 
 
-def term_of(elements: Elements) -> CorotationalBoxes:
-    return CorotationalBoxes.build(elements, np.arange(len(elements.cells)))
+@pytest.fixture(params=[CorotationalBoxes, CorotationalBlocks], ids=["rows", "blocks"])
+def term_of(request):
+    """Return what makes a term of either arrangement of all elements."""
+    return lambda elements: request.param.build(elements, np.arange(len(elements.cells)))
 
 
 def force_of(term, displacement: np.ndarray) -> np.ndarray:
@@ -67,7 +69,7 @@ def gently(elements: Elements, size: float, seed: int = 0) -> np.ndarray:
 
 @pytest.mark.parametrize("counts", [(1, 1, 1), (9, 2, 3), (2, 17, 3), (3, 2, 33), (16, 1, 1)])
 @pytest.mark.parametrize("formulation", FORMULATIONS)
-def test_energy_and_its_derivative(counts, formulation):
+def test_energy_and_its_derivative(term_of, counts, formulation):
     elements = boxes(counts, formulation, share=0.8)
     term, displacement = term_of(elements), turned(elements.points, gently(elements, 0.02))
     energy = term.energy(displacement)
@@ -83,7 +85,7 @@ def test_energy_and_its_derivative(counts, formulation):
 
 
 @pytest.mark.parametrize("formulation", FORMULATIONS)
-def test_small_motions_are_linear_and_large_turns_are_free(formulation):
+def test_small_motions_are_linear_and_large_turns_are_free(term_of, formulation):
     elements = boxes((7, 3, 2), formulation)
     term, linear, displacement = term_of(elements), CongruentElements.build(elements), gently(elements, 1e-7)
     exact = force_of(linear, displacement)
@@ -92,7 +94,7 @@ def test_small_motions_are_linear_and_large_turns_are_free(formulation):
     assert np.abs(force_of(term, turned(elements.points, 0.0 * displacement))).max() < 1e-12 * scale
 
 
-def test_a_turned_body_has_turned_forces_without_net_force_or_moment():
+def test_a_turned_body_has_turned_forces_without_net_force_or_moment(term_of):
     elements = boxes((5, 4, 3))
     term, displacement = term_of(elements), gently(elements, 0.05)
     force, other = force_of(term, displacement), force_of(term, turned(elements.points, displacement))
@@ -103,7 +105,7 @@ def test_a_turned_body_has_turned_forces_without_net_force_or_moment():
     assert np.abs(arms.sum(axis=0)).max() < 1e-12 * np.abs(arms).max()
 
 
-def test_error_against_finite_strain_falls_with_the_square_of_the_strain():
+def test_error_against_finite_strain_falls_with_the_square_of_the_strain(term_of):
     elements = boxes((4, 3, 2), "one_point")
     errors = []
     for size in (1e-2, 2.5e-3):
@@ -116,7 +118,7 @@ def test_error_against_finite_strain_falls_with_the_square_of_the_strain():
     assert np.log(errors[0] / errors[1]) / np.log(4.0) > 1.8
 
 
-def test_what_is_inside_out_is_told():
+def test_what_is_inside_out_is_told(term_of):
     elements = boxes((3, 2, 2))
     displacement = np.zeros_like(elements.points)
     displacement[:, 0] = -2.0 * elements.points[:, 0]
@@ -124,11 +126,20 @@ def test_what_is_inside_out_is_told():
         force_of(term_of(elements), displacement)
 
 
+def test_rows_are_for_meshes_that_have_long_ones():
+    side = np.linspace(0.0, 1e-3, 9)
+    points, cells = grid(side, side, np.linspace(0.0, 1e-4, 3))
+    even = Elements(points, cells, np.zeros(len(cells), np.int32), MATERIALS, np.ones(len(cells)), element_kind(8))
+    graded = replace(even, points=points + 0.5 * points**2 / 1e-3)
+    for elements, kind in ((even, CorotationalBoxes), (graded, CorotationalBlocks)):
+        assert isinstance(corotational_term(elements, np.arange(len(cells))), kind)
+
+
 def test_only_elastic_boxes_turn_without_a_path():
     elements = boxes((4, 3, 2), "one_point")
     materials = [FR4, SAC405]
     terms = force_terms(elements, materials, "corotational")
-    assert [type(term) for term in terms] == [CorotationalBoxes, NonlinearElements]
+    assert [type(term) for term in terms] == [CorotationalBlocks, NonlinearElements]
     numbers = np.concatenate([term.numbers for term in terms])
     np.testing.assert_array_equal(np.sort(numbers), np.arange(len(elements.cells)))
     assert not np.isin(elements.material[terms[0].numbers], 1).any()
