@@ -69,7 +69,8 @@ def _cool(run: Run[BoardDropCase], folder: Path, request: dict) -> None:
     thermal = run.case.thermal
     assert thermal is not None
     cooling = {name: request[name] for name in SCENE if name in request}
-    cooling |= {"mode": "cooling", "change": thermal.final - thermal.solidification}
+    shock = request["shock"] | {"modes": 0}  # natural modes are those of the first mode of the run alone
+    cooling |= {"shock": shock, "mode": "cooling", "change": thermal.final - thermal.solidification}
     files = digest_of_files(
         *(Path(name) for name in (*request["meshes"], *filter(None, [request.get("coarse_joints")])))
     )
