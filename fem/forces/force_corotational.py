@@ -90,8 +90,7 @@ class CorotationalBoxes:
     def energy(self, displacement: NDArray[np.float64]) -> Energy:
         """Return the strain energy."""
         read_lines(self.nodes, self.axes, displacement, self.lines[0])
-        mean, higher = row_energies(self.rows, self.scales, self.constants, self.lines[0])
-        return Energy(strain=mean, hourglass=higher) if self.hourglass else Energy(strain=mean + higher)
+        return accounted(row_energies(self.rows, self.scales, self.constants, self.lines[0]), self.hourglass)
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,8 +136,7 @@ class CorotationalBlocks:
 
     def energy(self, displacement: NDArray[np.float64]) -> Energy:
         """Return the strain energy."""
-        mean, higher = block_energies(self.cells, self.filled, self.constants, displacement)
-        return Energy(strain=mean, hourglass=higher) if self.hourglass else Energy(strain=mean + higher)
+        return accounted(block_energies(self.cells, self.filled, self.constants, displacement), self.hourglass)
 
 
 Corotational = CorotationalBoxes | CorotationalBlocks
@@ -148,6 +146,12 @@ def corotational_term(everything: Elements, chosen: NDArray[np.int64]) -> Corota
     """Return the term of the ``chosen (ne,)`` elements, boxes: in rows, unless these are short."""
     rows = CorotationalBoxes.build(everything, chosen)
     return rows if len(chosen) >= SHORT_ROWS * len(rows.rows) else CorotationalBlocks.build(everything, chosen)
+
+
+def accounted(energies: tuple[float, float], hourglass: bool) -> Energy:
+    """Return the energies of mean strains and higher modes [J], the latter as that of hourglass control or not."""
+    mean, higher = energies
+    return Energy(strain=mean, hourglass=higher) if hourglass else Energy(strain=mean + higher)
 
 
 def inverted(what: str, start: NDArray[np.float64]) -> InvertedElementError:

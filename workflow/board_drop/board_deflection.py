@@ -10,11 +10,11 @@ import numpy as np
 
 from reflowshock.effect import Decision
 from reflowshock.fem.estimates.drop_effects import Deflection, SolderPlasticity, called_for
-from reflowshock.fem.materials.kinematics import Kinematics
 from reflowshock.workflow.board_drop.duration import first_mode, longest_duration
 
 if TYPE_CHECKING:
     from reflowshock.fem.materials.parameters import Material
+    from reflowshock.fem.materials.roles import Materials
     from reflowshock.fem.problem.shock import Shock
     from reflowshock.workflow.package.case import BoardDropCase
 
@@ -55,14 +55,14 @@ def first_mode_peak(omega: float, velocity: Callable[[float], float], duration: 
     return float(np.abs(swing).max()) / omega
 
 
-def expected_peel(case: "BoardDropCase") -> float:
+def expected_peel(case: "BoardDropCase", deflection: Deflection) -> float:
     """Return about the peel stress of the outermost joints [Pa]: under a package much stiffer than the board.
 
     A board bent by a curvature K under a stiff plate on springs, k a unit of area, is apart from it by d: with
     D d^(4) + k d = 0, and d^(2) = K, d^(3) = 0 at the plate's edge, p = k d = K sqrt(k D) there. A joint's stiffness is
     that of its solder in series with what its pads are pressed into, E d / (1 - nu^2) each, with their diameter d.
     """
-    package, materials, deflection = case.package, case.materials, expected_deflection(case)
+    package, materials = case.package, case.materials
     diameter = 2.0 * min(package.board_pad.wetted_radius, package.package_pad.wetted_radius)
     area = math.pi / 4.0 * diameter**2
     parts = materials.board, materials.substrate, materials.solder
@@ -74,25 +74,19 @@ def expected_peel(case: "BoardDropCase") -> float:
     return curvature * math.sqrt(bending / compliance) * package.pitch / area
 
 
-def decide_kinematics(case: "BoardDropCase") -> tuple[Kinematics, str]:
-    """Return the kinematics that the deflection of the board calls for, and why; errors as ``expected_deflection``."""
-    return called_for(expected_deflection(case).largest / case.board.thickness, case.cooled)
-
-
 def decided(case: "BoardDropCase") -> "BoardDropCase":
     """Return the case with the duration, the kinematics and the solder that its scene calls for.
 
     Raises:
         PulseError: the table of the pulse cannot be read.
     """
-    update: dict[str, Any] = {"duration": longest_duration(case)}
-    if case.shock.numerics.kinematics == "auto":
-        update["numerics"] = case.shock.numerics.model_copy(update={"kinematics": decide_kinematics(case)[0]})
-    changes: dict[str, Any] = {"shock": case.shock.model_copy(update=update)}
-    if case.materials.solder.plasticity is not None and not DropScene(case).yielding["on"]:
-        elastic = case.materials.solder.model_copy(update={"plasticity": None})
-        changes["materials"] = case.materials.model_copy(update={"solder": elastic})
-    return case.model_copy(update=changes)
+    scene, numerics = DropScene(case), case.shock.numerics
+    update: dict[str, Any] = {"duration": scene.duration}
+    if numerics.kinematics == "auto":
+        kinematics, _ = called_for(scene.expected.largest / scene.thickness, scene.cooled)
+        update["numerics"] = numerics.model_copy(update={"kinematics": kinematics})
+    shock = case.shock.model_copy(update=update)
+    return case.model_copy(update={"shock": shock, "materials": scene.decided_materials})
 
 
 @dataclass(frozen=True)
@@ -109,7 +103,15 @@ class DropScene:
     @property
     def materials(self) -> "Mapping[str, Material]":
         """Role -> material, as the scene calls for it."""
-        return decided(self.case).materials.by_role
+        return self.decided_materials.by_role
+
+    @cached_property
+    def decided_materials(self) -> "Materials":
+        """The materials; the solder is elastic where it does not yield."""
+        given = self.case.materials
+        if given.solder.plasticity is None or self.yielding["on"]:
+            return given
+        return given.model_copy(update={"solder": given.solder.model_copy(update={"plasticity": None})})
 
     @property
     def thickness(self) -> float:
@@ -132,7 +134,7 @@ class DropScene:
     def yielding(self) -> Decision:
         """Whether solder yields that can."""
         switch, cooled = self.shock.numerics.plasticity, self.cooled
-        stress = expected_peel(self.case) if switch == "auto" else 0.0
+        stress = expected_peel(self.case, self.expected) if switch == "auto" else 0.0
         return SolderPlasticity.called_for(switch, self.case.materials.by_role, stress, cooled)
 
     @property
