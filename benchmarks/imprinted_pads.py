@@ -9,8 +9,6 @@ plasticity, which is what J2 gives under a load in proportion), by the program's
 ``turned``  the motion turned against the mesh
 """
 
-import argparse
-import json
 import os
 from math import hypot, radians
 from pathlib import Path
@@ -18,6 +16,7 @@ from time import process_time
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
+from benchmarks.support.tables import write_tables
 from reflowshock.fem.elements.element import critical_steps, element_geometry
 from reflowshock.meshing.core.hexahedra import scaled_jacobian
 from reflowshock.workflow.convergence.errors import richardson
@@ -110,17 +109,5 @@ def _changes(coarse: Measures, fine: Measures) -> Measures:
 TABLES = {"meshes": meshes, "halved": halved, "turned": turned}
 
 
-def main() -> None:
-    """Compute tables and write them."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("tables", nargs="*", metavar="TABLE", help=f"of {', '.join(TABLES)}; all without")
-    chosen = parser.parse_args().tables or list(TABLES)
-    RESULTS.parent.mkdir(exist_ok=True)
-    found = json.loads(RESULTS.read_text()) if RESULTS.exists() else {}
-    for name in chosen:
-        found[name] = TABLES[name]()
-        RESULTS.write_text(json.dumps(found, indent=1))
-
-
 if __name__ == "__main__":
-    main()
+    write_tables(__doc__.splitlines()[0], TABLES, RESULTS)

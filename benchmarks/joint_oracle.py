@@ -13,8 +13,6 @@ A row has its differences to the first row of its table: at rest of the measure 
 absolute value. Plastic measures are those of the solder within 25 um of either pad unless they say otherwise.
 """
 
-import argparse
-import json
 import os
 from collections.abc import Callable
 from pathlib import Path
@@ -22,6 +20,7 @@ from time import process_time
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
+from benchmarks.support.tables import write_tables
 from tests.support.joint_oracle import Patch, equilibrium, haversine, steps_in_time
 from tests.support.joint_patch import QUADRATIC, TRILINEAR, UM, JointPatch, mesh_patch
 from tests.support.joint_program import Course, ProgramPatch, box_mesh, matching_mesh
@@ -118,17 +117,6 @@ def measured(rows: dict[str, Callable[[], Measures]]) -> dict[str, dict]:
     return table
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("tables", nargs="*", metavar="TABLE", help=f"of {', '.join(TABLES)}; all without")
-    chosen = parser.parse_args().tables or list(TABLES)
-    RESULTS.parent.mkdir(exist_ok=True)
-    found = json.loads(RESULTS.read_text()) if RESULTS.exists() else {}
-    for name in chosen:
-        print(name)
-        found[name] = measured(TABLES[name]())
-        RESULTS.write_text(json.dumps(found, indent=1))
-
-
 if __name__ == "__main__":
-    main()
+    computed = {name: lambda rows=rows: measured(rows()) for name, rows in TABLES.items()}
+    write_tables(__doc__.splitlines()[0], computed, RESULTS)

@@ -125,6 +125,13 @@ def _draw_histories(axes, mode: str, history: dict, critical_joint: str) -> None
     axes[1, 1].set_ylabel(f"von Mises of the layers of {critical_joint} [MPa]")
 
 
+def stacked(count: int, height: float):
+    """Return a figure with ``count`` axes below each other, each ``height`` [in] high, and these axes."""
+    size = (9.2, height * count)
+    figure, axes = pyplot.subplots(count, 1, figsize=size, squeeze=False, sharex=True, constrained_layout=True)
+    return figure, axes[:, 0]
+
+
 def svg(figure) -> str:
     """Return a figure as an SVG element, and close it."""
     stream = io.StringIO()

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 from matplotlib import pyplot
 
 from reflowshock.workflow.case.text import number
-from reflowshock.workflow.report.curves import MICRO, MILLI, STYLE, svg
+from reflowshock.workflow.report.curves import MICRO, MILLI, STYLE, stacked, svg
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -52,13 +52,11 @@ def gauge_curves(histories: Histories, gauges: "Mapping[str, StrainGauge]", styl
     if not gauges:
         return ""
     with pyplot.rc_context(STYLE):
-        figure, axes = pyplot.subplots(
-            len(gauges), 1, figsize=(9.2, 2.2 * len(gauges)), squeeze=False, sharex=True, constrained_layout=True
-        )
-        for axis, name in zip(axes[:, 0], gauges, strict=True):
+        figure, axes = stacked(len(gauges), 2.2)
+        for axis, name in zip(axes, gauges, strict=True):
             for run, history in histories.items():
                 axis.plot(history["time"] / MILLI, history[f"gauge@{name}"] / MICRO, **styles[run])
             axis.set_ylabel(f"strain of {name} [µm/m]")
-        axes[0, 0].legend(frameon=False)
-        axes[-1, 0].set_xlabel("time [ms]")
+        axes[0].legend(frameon=False)
+        axes[-1].set_xlabel("time [ms]")
         return svg(figure)

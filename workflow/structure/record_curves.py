@@ -6,7 +6,7 @@ from typing import Any
 from matplotlib import pyplot
 from numpy.typing import NDArray
 
-from reflowshock.workflow.report.curves import MILLI, STYLE, svg
+from reflowshock.workflow.report.curves import MILLI, STYLE, stacked, svg
 from reflowshock.workflow.report.spectra import GRAVITY, spectrum_curves
 from reflowshock.workflow.structure.case import StructureCase
 from reflowshock.workflow.structure.records import recorded
@@ -26,10 +26,8 @@ def acceleration_curves(case: StructureCase, histories: Histories, styles: Mappi
     if not names:
         return ""
     with pyplot.rc_context(STYLE):
-        figure, axes = pyplot.subplots(
-            len(names), 1, figsize=(9.2, 2.8 * len(names)), squeeze=False, sharex=True, constrained_layout=True
-        )
-        for axis, name in zip(axes[:, 0], names, strict=True):
+        figure, axes = stacked(len(names), 2.8)
+        for axis, name in zip(axes, names, strict=True):
             for reference in case.references.values():
                 if isinstance(reference, Record) and reference.watch == name:
                     course = recorded(case, reference, float(next(iter(histories.values()))["time"][-1]))
@@ -37,8 +35,8 @@ def acceleration_curves(case: StructureCase, histories: Histories, styles: Mappi
             for solver, found in courses.items():
                 axis.plot(found[name].time / MILLI, found[name].filtered / GRAVITY, **styles[solver])
             axis.set(ylabel=f"acceleration of {name} [G]")
-        axes[0, 0].legend(frameon=False)
-        axes[-1, 0].set_xlabel("time [ms]")
+        axes[0].legend(frameon=False)
+        axes[-1].set_xlabel("time [ms]")
         return svg(figure)
 
 
