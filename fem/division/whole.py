@@ -12,7 +12,7 @@ from reflowshock.fem.elements.hexahedron import HEXAHEDRON
 from reflowshock.fem.elements.mesh_elements import elements_of
 from reflowshock.fem.errors import StepError
 from reflowshock.fem.estimates.estimate import BOARD_ADVANTAGE, UPDATES_PER_SECOND
-from reflowshock.fem.estimates.solver_cost import COROTATIONAL_RATE, NONLINEAR_RATE
+from reflowshock.fem.estimates.solver_cost import NONLINEAR_RATE, TURNING_BOX_RATE, TURNING_RATE
 from reflowshock.fem.forces.force_congruent import is_box
 from reflowshock.fem.materials.elasticity import materials_of_parts, role_of_part
 from reflowshock.fem.materials.kinematics import Kinematics
@@ -101,17 +101,16 @@ def survey(mesh: MeshData, materials: Materials | Mapping[str, Material], treatm
         scaled |= mesh.in_parts(lambda name: COLUMN in name)
     elastic = np.array([material.plasticity is None for material in assigned])[mesh.part]
     linear = elastic & (treatment.kinematics == "small")
-    path_cost = UPDATES_PER_SECOND / NONLINEAR_RATE[elements.kind.name]
     box = is_box(mesh.points[mesh.cells])
-    turning = elastic & box & (treatment.kinematics == "corotational")
-    by_path = np.where(turning, UPDATES_PER_SECOND / COROTATIONAL_RATE, path_cost)
+    turning = elastic & (treatment.kinematics == "corotational") & (elements.kind.nodes == HEXAHEDRON.nodes)
+    rate = np.where(turning, np.where(box, TURNING_BOX_RATE, TURNING_RATE), NONLINEAR_RATE[elements.kind.name])
     return Survey(
         role=role,
         plain_step=step,
         factor=mass_factors(step, scaled, treatment),
         mass=elements.density * geometry.volume,
         linear=linear,
-        cost=np.where(linear, np.where(box, 1.0, BOARD_ADVANTAGE), BOARD_ADVANTAGE * by_path),
+        cost=np.where(linear, np.where(box, 1.0, BOARD_ADVANTAGE), BOARD_ADVANTAGE * UPDATES_PER_SECOND / rate),
     )
 
 

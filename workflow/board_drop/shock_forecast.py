@@ -304,14 +304,14 @@ def _levels(case: "BoardDropCase", parts: Parts, window: float) -> tuple[tuple[i
 def relative_cost(case: "BoardDropCase", part: str) -> float:
     """Return the cost of an element of a part over that of an elastic one: what yields or turns has a path."""
     from reflowshock.fem.estimates.estimate import UPDATES_PER_SECOND
-    from reflowshock.fem.estimates.solver_cost import COROTATIONAL_RATE, NONLINEAR_RATE
+    from reflowshock.fem.estimates.solver_cost import NONLINEAR_RATE, TURNING_BOX_RATE, TURNING_RATE
 
     numerics = case.shock.numerics
     elastic = material_of(case, part).plasticity is None
     if elastic and numerics.kinematics == "small":
         return 1.0
-    if elastic and numerics.kinematics == "corotational" and role_of(part) in BOXES and not part.endswith(COLUMN):
-        return UPDATES_PER_SECOND / COROTATIONAL_RATE
+    if elastic and numerics.kinematics == "corotational":
+        return UPDATES_PER_SECOND / (TURNING_BOX_RATE if role_of(part) in BOXES else TURNING_RATE)
     return UPDATES_PER_SECOND / NONLINEAR_RATE[numerics.formulation]
 
 
