@@ -1,7 +1,7 @@
 """Commands without their start-up: a server that has loaded the libraries forks a process for each.
 
-The Snakemake, the stages and the MPI ranks that such a command starts are forked, too: the Python that it calls asks the
-server. What a start of its own may change (environments, signals, a first word) is tested with `python -m reflowshock`.
+The Snakemake, the stages and the MPI ranks that it starts are forked, too: the Python that it calls asks the server.
+What a start of its own may change (environments, signals, a first word) is tested with `python -m reflowshock`.
 """
 
 import atexit
