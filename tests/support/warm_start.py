@@ -24,11 +24,12 @@ from tests.support.warm_client import ask
 ROOT = Path(__file__).resolve().parents[2]
 # What commands, stages and ranks load; not MPI, nor what loads it: a process that has begun it cannot be forked.
 LIBRARIES = (
-    "ffcx", "gmsh", "matplotlib.pyplot", "meshio", "numba", "pandas", "pyvista", "scipy.sparse.linalg", "scipy.spatial",
-    "snakemake.cli", "ufl", "reflowshock.fem.elements.element", "reflowshock.fem.kernels.box_rows",
-    "reflowshock.fem.kernels.levels", "reflowshock.fem.kernels.nonlinear", "reflowshock.fem.mesh.mesh",
-    "reflowshock.fem.problem.inputs", "reflowshock.workflow.cli", "reflowshock.workflow.reflow.joints",
-    "reflowshock.workflow.run", "reflowshock.workflow.status",
+    "ffcx", "gmsh", "matplotlib.backends.backend_svg", "matplotlib.pyplot", "meshio", "numba", "pandas",
+    "pyvista.plotting", "scipy.signal", "scipy.sparse.linalg", "scipy.spatial", "snakemake.cli", "ufl",
+    "reflowshock.fem.elements.element", "reflowshock.fem.kernels.box_rows", "reflowshock.fem.kernels.levels",
+    "reflowshock.fem.kernels.nonlinear", "reflowshock.fem.mesh.mesh", "reflowshock.fem.problem.inputs",
+    "reflowshock.workflow.cli", "reflowshock.workflow.reflow.joints", "reflowshock.workflow.run",
+    "reflowshock.workflow.status",
 )  # fmt: skip
 MODULES = ("snakemake", "reflowshock", "reflowshock.fem", "reflowshock.workflow.reflow", "tests.support.on_ranks")
 # A Python that lets the server fork what it is to run, and is Python where that is something else.
@@ -86,6 +87,7 @@ def serve(client: str, listener: socket.socket) -> None:
     prepare()
     for library in LIBRARIES:
         import_module(library)
+    import numba
     from rich.console import Console
 
     from reflowshock.workflow.pipeline.reader import read_case
@@ -95,6 +97,7 @@ def serve(client: str, listener: socket.socket) -> None:
 
     case = read_case(ROOT / "tests/pipeline/small.toml", oversubscribe=True)
     show_plan(Store(Path("nowhere"), one_run=True), Point({}, case), Console(quiet=True))
+    numba.njit(lambda value: value)(0)  # what the first kernel of a process has Numba load
     gc.freeze()  # to look at what is loaded would copy its memory
     while listener in select.select([listener, sys.stdin], [], [])[0]:
         connection, _ = listener.accept()
