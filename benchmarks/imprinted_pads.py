@@ -4,7 +4,7 @@
 
 The scene of ``tests/support/imprinted_patch.py`` in static equilibrium, elastic or with solder that yields (deformation
 plasticity, which is what J2 gives under a load in proportion), by the program's own elements, meshes and ties. Tables:
-``meshes``  tied to boxes that ignore the pads; in columns; in columns, boxes shifted by half an element
+``meshes``  tied to boxes that ignore the pads; in columns; in columns, boxes shifted by half an element; free-form
 ``halved``  every element of the imprinted mesh 1, 2/3 and 1/2 times as long, elastic and yielding
 ``turned``  the motion turned against the mesh
 """
@@ -33,7 +33,7 @@ Measures = dict[str, float]
 def solved(mesh: Mesh, yields: bool, angle: float | None = None) -> Measures:
     """Return the measures of both ends, ``<measure>@<end>``."""
     whole, _ = patch(mesh)
-    if angle is None and mesh.joint["core"] % 2 == 0 and not mesh.shift:  # then y = 0 is a line of the mesh
+    if angle is None and mesh.joint["core"] % 2 == 0 and not mesh.shift and mesh.swept:  # then y = 0 is a line of it
         whole = half_of(whole)
     problem = Problem(whole, yields, turned=angle)
     found = ends(problem, problem.solve(), LAYERS)

@@ -3,7 +3,8 @@
 The joints' file has the columns (``board_column@..``, ``substrate_column@..``) and those of their faces that may touch
 a box (``column_board@..``, ``column_package@..``). The boxes in their place go. Columns side by side share nodes; what
 is left of their faces is tied to the boxes that are left. Where lines and planes of the boxes are among those of the
-column, whose face is the finer one, constant stress passes exactly.
+column, whose face is the finer one, constant stress passes exactly. Joints with another mesh than their column's are
+tied to it (``slave@foot@..``, ``slave@head@..``).
 """
 
 from collections.abc import Mapping
@@ -32,7 +33,7 @@ def with_columns(mesh: MeshData) -> MeshData:
     """Give the columns of fine joints their place among the boxes, and name what is to be tied as ``tie_joints`` asks.
 
     Raises:
-        MeshError: The boxes do not make exactly the room that a column needs.
+        MeshError: The boxes do not make exactly the room that a column needs, or columns side by side do not fit.
     """
     columns = [mesh.part_names[part] for part in np.unique(mesh.part) if COLUMN in mesh.part_names[part]]
     if not columns:
@@ -110,14 +111,38 @@ def faces_named(mesh: MeshData, walls: NDArray[np.int32]) -> MeshData:
     bottom = [some for name, some in mesh.facets.items() if name.startswith("board_bottom@")]
     facets["board_bottom"] = np.concatenate([mesh.facets_of("board_bottom"), *bottom])
     outer = np.sort(boundary_facets(mesh.cells), axis=1)
-    faces = np.concatenate([some for name, some in mesh.facets.items() if name.startswith(FACES)])
-    faces = faces[in_rows(np.sort(faces, axis=1), outer)]
+    own = {name: some for name, some in mesh.facets.items() if name.startswith(FACES)}
+    faces, column = np.concatenate(list(own.values())), np.repeat(list(own), [len(some) for some in own.values()])
+    outside = in_rows(np.sort(faces, axis=1), outer)
+    faces, column = faces[outside], column[outside]
     corners = mesh.points[faces]
     for axis, plane in enumerate(SYMMETRY):
         if len(mesh.facets_of(plane)):
             flat = (np.abs(corners[:, :, axis]) < SAME * np.ptp(corners)).all(axis=1)
             facets[plane] = np.concatenate([facets[plane], faces[flat]])
-    return replace(mesh, facets=facets | {SLAVES: faces[touch(corners, mesh.points[walls])], MASTERS: walls})
+    held = touch(corners, mesh.points[walls])
+    check_neighbours(corners[~held], column[~held])
+    return replace(mesh, facets=facets | {SLAVES: faces[held], MASTERS: walls})
+
+
+def check_neighbours(corners: NDArray[np.float64], column: NDArray[np.str_]) -> None:
+    """Check that no free facets ``(nf, 4, 3)`` of columns ``(nf,)`` lie on each other, where nothing would hold them.
+
+    Raises:
+        MeshError: Columns side by side do not share the nodes of their common face.
+    """
+    for name in np.unique(column):
+        own = column == name
+        if own.all() or not (met := touch(corners[own], corners[~own])).any():
+            continue
+        middle = corners[own][met][:1].mean(axis=1)
+        other = column[~own][closest_facets(middle, corners[~own])[0][0]]
+        first, second = (some.partition("@")[2] for some in (name, other))
+        raise MeshError(
+            f"the columns of {first} and {second} touch with {np.sum(met)} faces that do not fit together, near"
+            f" ({', '.join(f'{value:.6g}' for value in middle[0])}) m: mesh both joints with the same"
+            " package.joint_numerics and package.imprint"
+        )
 
 
 def in_rows(facets: NDArray[np.int32], outer: NDArray[np.int32]) -> NDArray[np.bool_]:

@@ -162,7 +162,7 @@ def _numerics(board: Board) -> Iterator[Problem]:
 
 
 def _imprint(package: Package) -> Iterator[Problem]:
-    """Columns lie apart, inside the substrate, around their pads; their joints are swept between copper pads."""
+    """Columns lie apart, inside the substrate, around their pads; their joints stand between copper pads."""
     size = package.column_size
     if size is None:
         return

@@ -73,7 +73,8 @@ class Imprint(Parameters):
     The column goes through board and substrate. From the pad's edge ``rings`` of elements, each ``growth`` times as
     wide as the one inside it, reach out to a square of side ``size`` (the pitch, if none is given). Its layers are as
     high as ``first_layer`` at the pad and grow with the depth z, h = first_layer + (growth - 1) z. Its sides are tied
-    to structured boxes, which should be a quarter of its side long: larger ones make the joint too stiff.
+    to structured boxes, which should be a quarter of its side long: larger ones make the joint too stiff. Joints that
+    cannot be swept (voids, arms) have the same columns and are tied to their pads, which adds 1 % to what they bear.
     """
 
     size: Length | None = Field(None, gt=0)

@@ -59,6 +59,11 @@ def attempts(surface: ClosedSurface, numerics: JointNumerics, place: Placing) ->
     one_piece = len(pieces_of(surface)) == 1
     if one_piece and all(len(pieces_of(surface, pad)) == 1 for pad in (BOARD_PAD, PACKAGE_PAD)):
         yield from _swept(surface, numerics, place)
+    yield from free_form(surface, numerics, place)
+
+
+def free_form(surface: ClosedSurface, numerics: JointNumerics, place: Placing) -> Iterator[Attempt]:
+    """List the ways to mesh a body of any shape."""
     element = 2.0 * pad_planes(surface).gap / numerics.layers
     for share in FREE_FORM_SIZES:
         for cut in (False, True):

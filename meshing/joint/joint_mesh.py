@@ -15,7 +15,7 @@ from reflowshock.meshing.board.pad_planes import PadPlanes
 from reflowshock.meshing.board.pads import PadSite, has_rim
 from reflowshock.meshing.core.hexahedra import quad_areas, scaled_jacobian, shortest_lengths, volumes
 from reflowshock.meshing.core.quadratic_tetrahedra import QuadraticTetrahedra, tetrahedra_quality
-from reflowshock.meshing.joint.column import Column, grow_column
+from reflowshock.meshing.joint.column import Column, ColumnMesh, column_pad, grow_column
 from reflowshock.meshing.joint.solder import Solder, WettedFace
 from reflowshock.meshing.surface.closed_surface import ClosedSurface, pad_planes
 
@@ -98,10 +98,14 @@ class JointMesh:
 
 @dataclass(frozen=True, slots=True)
 class _Pad:
-    """A copper pad: name of its joint, radius [m], nodes (k, r) of circles outwards beyond its solder, if any."""
+    """A copper pad: name of its joint, radius [m], nodes (k, r) of circles outwards beyond its solder, if any.
+
+    ``swept`` says whether its solder is: its mesh is then a butterfly.
+    """
 
     name: str
     radius: float
+    swept: bool
     rims: np.ndarray = field(default_factory=lambda: np.empty((0, 0), dtype=np.int64))
 
 
@@ -122,7 +126,7 @@ class CopperPads:
         thickness: of each [m].
         layers: of elements.
         edge: wanted length of elements beyond the solder [m].
-        columns: of board and substrate, where swept solder stands in some.
+        columns: of board and substrate, where the joint stands in some.
     """
 
     thickness: float
@@ -143,8 +147,6 @@ def build_joint(solder: Solder, sites: Sequence[PadSite], copper: CopperPads | N
     Raises:
         JointMeshError: a scaled Jacobian is too small.
     """
-    if copper and solder.tetrahedra:
-        copper = replace(copper, columns=())
     own, pads = solder.points, []
     for face in solder.faces:
         pad = _pad_of(solder, face, sites, place)
@@ -210,7 +212,8 @@ def _pad_of(solder: Solder, face: WettedFace, sites: Sequence[PadSite], place: J
     """Find the pad that a face lies on."""
     centre = place(solder.points[face.rim]).mean(axis=0)
     site = min(sites, key=lambda site: math.dist((site.x, site.y), centre[:2]))
-    return _Pad(site.name, site.pad_radius_board if face.side == "board" else site.pad_radius_package)
+    radius = site.pad_radius_board if face.side == "board" else site.pad_radius_package
+    return _Pad(site.name, radius, solder.tetrahedra is None)
 
 
 def _rim(solder: Solder, face: WettedFace, pad_radius: float, edge: float) -> np.ndarray:
@@ -242,7 +245,12 @@ def _add_pad(parts: _Parts, face: WettedFace, pad: _Pad, copper: CopperPads | No
         for column in copper.columns:
             if column.side == face.side:
                 del facets[f"{end}@{pad.name}"]
-                _add_column(parts, column, pad.name, (beyond, rim))
+                if pad.swept and len(rim) == 4 * column.numerics.core:
+                    _add_column(parts, column, pad.name, (beyond, rim))
+                else:
+                    facets[f"slave@{end}@{pad.name}"] = beyond
+                    top = _add_tied_column(parts, column, pad, (beyond, rim), face)
+                    parts.facets[f"master@{end}@{pad.name}"] = top
     parts.facets |= {name: faces[:, ::-1] if board else faces for name, faces in facets.items()}
 
 
@@ -261,7 +269,19 @@ def _add_copper(
     return levels[-1][local], levels[-1][np.searchsorted(nodes, rim)]
 
 
-def _add_column(parts: _Parts, column: Column, name: str, face: tuple[np.ndarray, np.ndarray]) -> None:
+def _add_tied_column(
+    parts: _Parts, column: Column, pad: _Pad, end: tuple[np.ndarray, np.ndarray], face: WettedFace
+) -> np.ndarray:
+    """Add the column under a pad with another mesh, given its outer and its wetted face; return what the pad is on."""
+    quads, rim = end
+    wetted, all_of_it = (quad_areas(parts.points, some).sum() for some in (face.quads, quads))
+    points, section = column_pad(column, parts.points[rim], math.sqrt(wetted / all_of_it), len(pad.rims))
+    first = len(parts.points)
+    parts.points = np.vstack([parts.points, points])
+    return _add_column(parts, column, pad.name, (first + section.quads, first + section.rim)).top
+
+
+def _add_column(parts: _Parts, column: Column, name: str, face: tuple[np.ndarray, np.ndarray]) -> ColumnMesh:
     """Continue the outer face of a pad, its quads and its outline; what may be tied is ``column_<side>@<joint>``."""
     mesh = grow_column(column, parts.points, *face)
     parts.points = np.vstack([parts.points, mesh.points])
@@ -271,6 +291,7 @@ def _add_column(parts: _Parts, column: Column, name: str, face: tuple[np.ndarray
     parts.facets[f"column_{column.side}@{name}"] = np.vstack(tied)
     if free:
         parts.facets[free] = mesh.end
+    return mesh
 
 
 def _check_quality(points: np.ndarray, cells: dict[str, np.ndarray]) -> None:

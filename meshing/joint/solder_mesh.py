@@ -108,6 +108,8 @@ def mesh_coarse_or_fine(
 ) -> JointMesh:
     """Mesh a joint by few hexahedra; where they cannot follow its shape, its fine mesh stands for them and says why.
 
+    It then is tied to boxes, too, so it is meshed again where columns continue its pads.
+
     Args:
         surface: closed surface in the joint's own frame.
         fine: its fine mesh.
@@ -118,7 +120,8 @@ def mesh_coarse_or_fine(
     try:
         return mesh_coarse_joint(surface, site, package, side)
     except JointMeshError as error:
-        return replace(fine, tetrahedra=None, record=fine.record | {"fine_instead": str(error)})
+        alone = fine if package.imprint is None else mesh_joint(surface, site, package, side)
+        return replace(alone, tetrahedra=None, record=alone.record | {"fine_instead": str(error)})
 
 
 def _mesh(

@@ -33,8 +33,11 @@ class Butterfly:
     rim: np.ndarray
 
 
-def butterfly(core: int, rings: int) -> Butterfly:
-    """Build the section with core x core quads inside ``rings`` rings of 4 core quads each; without, it fills all."""
+def butterfly(core: int, rings: int, opening: float = 1.0, beyond: int = 0) -> Butterfly:
+    """Build the section with core x core quads inside ``rings`` rings of 4 core quads each; without, it fills all.
+
+    It fills the disc up to the radius ``opening``; ``beyond`` rings more go from there to the unit circle.
+    """
     outline = _core_outline(core)
     inner = _core_points(core, CORE_DIAGONAL, CORE_SIDE) if rings else _core_points(core, 1.0, 1.0)
     if not rings:
@@ -42,11 +45,13 @@ def butterfly(core: int, rings: int) -> Butterfly:
     angles = -0.75 * np.pi + 0.5 * np.pi * np.arange(4 * core) / core
     circle = np.column_stack([np.cos(angles), np.sin(angles)])
     layers = [inner[outline] + share * (circle - inner[outline]) for share in np.arange(1, rings + 1) / rings]
-    ids = [outline] + [len(inner) + ring * len(outline) + np.arange(len(outline)) for ring in range(rings)]
+    inside = opening * np.vstack([inner, *layers])
+    wider = [radius * circle for radius in np.linspace(opening, 1.0, beyond + 1)[1:]]
+    ids = [outline] + [len(inner) + ring * len(outline) + np.arange(len(outline)) for ring in range(rings + beyond)]
     quads = [_core_quads(core)] + [
         np.column_stack([low, high, np.roll(high, -1), np.roll(low, -1)]) for low, high in pairwise(ids)
     ]
-    return Butterfly(np.vstack([inner, *layers]), np.vstack(quads), ids[-1])
+    return Butterfly(np.vstack([inside, *wider]), np.vstack(quads), ids[-1])
 
 
 def circumradius(sides: int) -> float:
@@ -134,7 +139,7 @@ def solder_levels(
     cuts = np.clip(heights, END * planes.gap, (1.0 - END) * planes.gap)
     points = np.empty((layers + 1, len(section.points), 3))
     for level, cut in enumerate(cuts):
-        points[level, :, :2] = _section_nodes(cut_segments(straight, surface.triangles, cut), section)
+        points[level, :, :2] = section_nodes(cut_segments(straight, surface.triangles, cut), section)
     points[:, :, 2] = heights[:, None]
     cells = layer_cells(section.quads, len(section.points), layers)
 
@@ -181,7 +186,7 @@ def layer_cells(quads: np.ndarray, nodes: int, layers: int) -> np.ndarray:
     return np.vstack([np.hstack([quads + k * nodes, quads + (k + 1) * nodes]) for k in range(layers)]).astype(np.int32)
 
 
-def _section_nodes(segments: np.ndarray, section: Butterfly) -> np.ndarray:
+def section_nodes(segments: np.ndarray, section: Butterfly) -> np.ndarray:
     """Section nodes at one height, (n, 2) [m]: the unit disc stretched to the outline (s, 2, 2) along each angle."""
     centre, area = section_centroid(segments), section_area(segments)
     angles = _angles(section.points[section.rim])

@@ -8,6 +8,7 @@ proportion to the distance from one.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import pairwise, product
 
 import numpy as np
@@ -33,11 +34,13 @@ from reflowshock.fem.mesh.pad_layer import octant_volumes
 from reflowshock.fem.model.factorisation import Factorisation
 from reflowshock.fem.statics.hencky import HenckyElements
 from reflowshock.meshing.board.package_side import PackageSide, StructuredFace, underside
-from reflowshock.meshing.board.pads import pad_table
-from reflowshock.meshing.board.parameters import Imprint, JointNumerics, Warpage
-from reflowshock.meshing.joint.column import columns_of
-from reflowshock.meshing.joint.joint_mesh import JointMesh
+from reflowshock.meshing.board.pads import PadSite, pad_table
+from reflowshock.meshing.board.parameters import Imprint, JointNumerics, Package, Warpage
+from reflowshock.meshing.joint.attempts import first_good, free_form
+from reflowshock.meshing.joint.column import Column, columns_of
+from reflowshock.meshing.joint.joint_mesh import CopperPads, JointMesh, JointPlace, build_joint
 from reflowshock.meshing.joint.solder_mesh import mesh_joint
+from reflowshock.meshing.surface.closed_surface import ClosedSurface
 
 Floats = NDArray[np.float64]
 SIDE, STRETCH, LIFT = 3.0 * MM, 6.0e-6, 6.0e-6
@@ -56,13 +59,14 @@ PADS = {"diameter": 0.48 * MM, "mask_opening": 0.58 * MM, "definition": "NSMD"}
 
 @dataclass(frozen=True, slots=True)
 class Mesh:
-    """How the patch is meshed: boxes as long as ``box`` [m], shifted; fields of ``package``."""
+    """How the patch is meshed: boxes as long as ``box`` [m], shifted; fields of ``package``; swept or free-form."""
 
     box: float
     joint: dict
     imprint: dict | None = None
     layers: tuple[int, int] = (4, 2)
     shift: float = 0.0
+    swept: bool = True
 
     def times(self, size: float) -> "Mesh":
         """Make every element so many times as long."""
@@ -91,10 +95,21 @@ def patch(mesh: Mesh) -> tuple[Whole, JointMesh]:
     at_rest = StructuredFace(lines, lines, np.zeros((len(lines), len(lines), 3)))
     side = PackageSide(float(levels[0]), at_rest, tuple((float(level), at_rest) for level in levels[1:]))
     site = pad_table(own, below, Warpage())[0]
-    joint = mesh_joint(barrel(site.gap, 0.0), site, own, side, columns_of(site, own, below, side))
+    how = mesh_joint if mesh.swept else free_form_joint
+    joint = how(barrel(site.gap, 0.0), site, own, side, columns_of(site, own, below, side))
     depths = below.thickness * (np.arange(mesh.layers[0] + 1) / mesh.layers[0] - 1.0)
     pieces = [boxes("board", lines, depths), boxes("substrate", lines, levels), data_of(joint)]
     return joined(append(pieces)), joint
+
+
+def free_form_joint(
+    surface: ClosedSurface, site: PadSite, whole: Package, side: PackageSide, columns: tuple[Column, ...]
+) -> JointMesh:
+    """Mesh a joint as ``mesh_joint`` does where no sweep serves, although one would."""
+    copper = CopperPads(whole.copper.thickness, whole.joint_numerics.copper_layers, columns=columns)
+    place = JointPlace.of(surface, site, side, copper.thickness)
+    build = partial(build_joint, sites=[site], copper=copper, place=place)
+    return first_good(surface, free_form(surface, whole.joint_numerics, place), site.name, build)
 
 
 def box_lines(mesh: Mesh) -> Floats:
@@ -276,4 +291,6 @@ MESHES = {
     "tied, 0.25 mm": replace(TIED, box=0.25 * MM),
     "imprinted": IMPRINTED,
     "imprinted, boxes shifted": replace(IMPRINTED, shift=0.5),
+    "free-form, tied, 0.5 mm": replace(TIED, joint=CHEAPEST, swept=False),
+    "free-form, imprinted": replace(IMPRINTED, swept=False),
 }

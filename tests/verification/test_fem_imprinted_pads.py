@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.support.imprinted_patch import IMPRINTED, TIED, Problem, ends, half_of, patch
+from tests.support.imprinted_patch import CHEAPEST, IMPRINTED, TIED, Problem, ends, half_of, patch
 
 MEASURES = ("axial_force", "shear_force", "bending_moment", "von_mises:25um")
 
@@ -40,6 +40,15 @@ def test_elements_two_thirds_as_long_change_little(imprinted):
     assert {name: imprinted[name] / finer[name] - 1.0 for name in MEASURES} == pytest.approx(
         {"axial_force": 0.032, "shear_force": 0.031, "bending_moment": 0.029, "von_mises:25um": 0.027}, abs=0.005
     )
+
+
+def test_a_free_form_joint_in_its_column_bears_what_a_swept_one_does(imprinted):
+    free_form = replace(IMPRINTED, joint=CHEAPEST | {"layers": 7}, swept=False)
+    assert measures(free_form) == pytest.approx(imprinted, rel=0.03)
+    tied = measures(replace(free_form, box=TIED.box, imprint=None))
+    excess = {name: tied[name] / imprinted[name] - 1.0 for name in MEASURES}
+    assert excess["axial_force"] > 0.25
+    assert min(excess[name] for name in ("shear_force", "bending_moment", "von_mises:25um")) > 0.7
 
 
 def test_a_tie_to_boxes_that_ignore_the_pad_is_too_stiff(imprinted):

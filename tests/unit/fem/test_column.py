@@ -11,6 +11,7 @@ from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.mesh import append, boundary_facets
 from tests.support.imprinted_patch import IMPRINTED, Mesh, Problem, boxes, data_of, patch
 from tests.unit.meshing.test_column import MM, standing
+from tests.unit.meshing.test_tied_column import hollow
 
 GRADIENT = 1e-3 * np.array([[1.0, -0.4, 0.7], [0.3, -0.8, 0.2], [-0.6, 0.9, 0.5]])
 
@@ -51,12 +52,10 @@ def test_boxes_that_leave_no_room_for_a_column_are_refused():
         patch(mesh)
 
 
-def neighbours(first=-2.5):
+def neighbours(first=-2.5, upper=None, **lower):
     """Two joints side by side between boxes of board and of a bowed substrate, from y = first [mm] on."""
-    joints, side = [], None
-    for name in ("A4", "B4"):
-        mesh, side = standing(name)
-        joints.append(data_of(mesh))
+    joint, side = standing("B4", **lower)
+    joints = [data_of(upper or standing("A4")[0]), data_of(joint)]
     lines = np.linspace(-2.5, 2.5, 21) * MM
     levels = (0.34 + np.array([0.0, 0.2, 0.4])) * MM
     along = lines[lines > first * MM - 1e-12]
@@ -76,6 +75,25 @@ def test_neighbouring_columns_share_their_face():
     x = whole.mesh.points[whole.tie.slave[inside], 0] / MM
     assert np.abs(x - 1.5).min() > 0.4  # of the common face only its ends are tied
     assert whole.moved < 1e-9
+
+
+def test_a_joint_with_a_void_shares_the_face_of_its_neighbour_and_stands_on_its_column():
+    mesh = neighbours(upper=hollow()[0])
+    whole = joined(mesh)
+    columns = [np.unique(whole.mesh.cells[whole.mesh.in_parts(f"board_column@{name}".__eq__)]) for name in ("A4", "B4")]
+    assert len(np.intersect1d(*columns)) == 5 * 8
+    copper = np.unique(whole.mesh.cells[whole.mesh.in_parts("copper_board@A4".__eq__)])
+    tied = np.isin(whole.tie.slave, copper)
+    assert tied.sum() == len(np.unique(mesh.facets["slave@foot@A4"]))
+    assert np.isin(whole.tie.master[tied], columns[0]).all()
+    assert whole.moved < 1e-6 * MM
+
+
+def test_neighbours_with_other_rims_are_refused():
+    finer = {"core": 5, "rings": 2, "layers": 10, "copper_layers": 2}
+    told = r"the columns of A4 and B4 touch with \d+ faces that do not fit together, near \(0\.001\d+, 0\.001, "
+    with pytest.raises(MeshError, match=told):
+        joined(neighbours(joint_numerics=finer))
 
 
 def test_faces_on_a_plane_of_symmetry_are_held_there():
