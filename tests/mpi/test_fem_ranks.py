@@ -190,6 +190,7 @@ def test_missing_mesh_ends_all_ranks(assembly):
     fails(assembly, 2, "nowhere.msh", meshes=["nowhere.msh"])
 
 
+@pytest.mark.long
 def test_joint_beside_the_board_ends_all_ranks(tmp_path):
     joints = small_assembly()[2:]
     joints[0].points[:, 0] += 9e-3
