@@ -2,7 +2,7 @@
 export OMP_NUM_THREADS = 1
 
 PYTHON := .venv/bin/python
-CASE := cases/bga_drop/case.toml
+CASE := cases/jedec_bga/case.toml
 # A worker that dies ends the tests: replaced, xdist would wait for its files for ever.
 PARALLEL := --numprocesses=logical --maxprocesses=8 --dist=loadfile --no-loadscope-reorder --max-worker-restart=0
 

@@ -1,6 +1,6 @@
 """Collector of hard cases for pytest: each combination of the values of a file is a test, its bounds are the asserts.
 
-Without options the first combination of each file is tried, and no random case.
+Without options the first combination of each file is tried, and no random case; where the file is long, by -m long.
 """
 
 from collections.abc import Iterator
@@ -73,6 +73,8 @@ class HardItem(pytest.Item):
         super().__init__(**others)
         self.case = case
         self.add_marker(pytest.mark.timeout(case.deadline, method="thread"))
+        if case.long and not self.config.getoption("every_combination", False):
+            self.add_marker(pytest.mark.long)
 
     def runtest(self) -> None:
         """Try it."""

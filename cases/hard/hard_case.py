@@ -31,7 +31,7 @@ class HardCaseFile(BaseModel):
 
     ``parameters`` are those of the trial; ``vary`` gives lists of values for some of them; ``bounds`` are upper ones of
     absolute values, or lower ones with a sign: "> 0.2". ``expect`` is a part of the error with which the case must be
-    refused. After the deadline a case is taken to hang.
+    refused. After the deadline a case is taken to hang. What is ``long`` is left out of `make test`.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -42,6 +42,7 @@ class HardCaseFile(BaseModel):
     trial: str
     expect: str = ""
     deadline: Annotated[float, Quantity("s")] = Field(DEADLINE, gt=0)
+    long: bool = False
     parameters: dict = {}
     vary: dict = {}
     bounds: dict = {}
@@ -63,6 +64,7 @@ class HardCase:
         bounds: that its measures must keep.
         expect: part of the error with which it must be refused, or "".
         deadline: after which it is taken to hang [s].
+        long: whether `make test` leaves it to `make test-long`.
         may_be_refused: whether it is no miss if the trial refuses it in words.
     """
 
@@ -77,6 +79,7 @@ class HardCase:
     bounds: tuple[Bound, ...]
     expect: str
     deadline: float
+    long: bool = False
     may_be_refused: bool = False
 
 
@@ -112,7 +115,7 @@ def hard_cases(name: str, table: Mapping[str, Any], source: str, folder: Path) -
             given=values,
             parameters=parameters,
             bounds=bounds,
-            **head.model_dump(include={"family", "title", "why", "expect", "deadline"}),
+            **head.model_dump(include={"family", "title", "why", "expect", "deadline", "long"}),
         )
         for tried, values in _combinations(head, problems)
         if (parameters := _parameters(trial, values, folder, problems)) is not None

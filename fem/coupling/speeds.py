@@ -1,8 +1,9 @@
 """What an update of an element costs each rank: the program's own force terms, timed on samples of the mesh.
 
-Elements are of four families, which ``force.force_terms`` computes in four ways: boxes that share stiffnesses, other
-linear ones whose matrices are assembled, those with a path, and boxes that share stiffnesses and turn. A step costs a
-fixed part (calls) and one per element (force, and update of its nodes); two samples of different size tell them apart.
+Elements are of five families, which ``force.force_terms`` computes in five ways: boxes that share stiffnesses, other
+linear ones whose matrices are assembled, those with a path, boxes that turn, and other hexahedra that turn. A step
+costs a fixed part (calls) and one per element (force, and update of its nodes); two samples of different size tell them
+apart.
 """
 
 import time
@@ -21,7 +22,7 @@ from reflowshock.fem.materials.kinematics import Kinematics
 from reflowshock.fem.materials.parameters import Material
 from reflowshock.fem.mesh.mesh import MeshData, without_unused_nodes
 
-FAMILIES = ("box", "assembled", "path", "turning")
+FAMILIES = ("box", "assembled", "path", "turning_box", "turning")
 LARGE, SMALL = 8192, 128  # elements of a sample; the large one is no larger than a rank's share
 BATCHES, BATCH_SECONDS = 24, 0.001  # short: some fall between two turns of another program on the core
 ALIKE = 1.2  # ratio of two speeds below which they may be one, measured twice
@@ -47,7 +48,7 @@ class Kind:
 
 @dataclass(frozen=True, slots=True)
 class StepCost:
-    """Seconds of a step, by family, of one rank ``(4,)`` or of all of them ``(ranks, 4)``.
+    """Seconds of a step, by family, of one rank ``(5,)`` or of all of them ``(ranks, 5)``.
 
     Attributes:
         fixed: Of one step, however many elements.
@@ -63,8 +64,8 @@ def families(mesh: MeshData, kind: Kind) -> NDArray[np.int8]:
     elastic = np.array([material.plasticity is None for material in kind.materials])[mesh.part]
     linear = elastic & (kind.kinematics == "small")
     box = is_box(mesh.points[mesh.cells])
-    turning = elastic & box & (kind.kinematics == "corotational")
-    return np.select([linear & box, linear, turning], [0, 1, 3], 2).astype(np.int8)
+    turning = elastic & (kind.kinematics == "corotational") & (mesh.cells.shape[1] == 8)
+    return np.select([linear & box, linear, turning & box, turning], [0, 1, 3, 4], 2).astype(np.int8)
 
 
 def samples(mesh: MeshData, family: NDArray[np.int8], ranks: int) -> dict[int, tuple[MeshData, MeshData]]:
@@ -88,7 +89,7 @@ def measured_costs(world: MPI.Comm, found: Mapping[int, tuple[MeshData, MeshData
     """Time a small and a large sample of each family on all ranks at the same time, as a run would be; collective.
 
     Returns:
-        ``(ranks, 4)``; zero for families without a sample.
+        ``(ranks, 5)``; zero for families without a sample.
     """
     fixed, element = np.zeros(len(FAMILIES)), np.zeros(len(FAMILIES))
     for number, (small, large, kind) in found.items():

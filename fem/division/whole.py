@@ -12,16 +12,19 @@ from reflowshock.fem.elements.hexahedron import HEXAHEDRON
 from reflowshock.fem.elements.mesh_elements import elements_of
 from reflowshock.fem.errors import StepError
 from reflowshock.fem.estimates.estimate import BOARD_ADVANTAGE, UPDATES_PER_SECOND
-from reflowshock.fem.estimates.solver_cost import COROTATIONAL_RATE, NONLINEAR_RATE
+from reflowshock.fem.estimates.solver_cost import NONLINEAR_RATE, TURNING_BOX_RATE, TURNING_RATE
 from reflowshock.fem.forces.force_congruent import is_box
-from reflowshock.fem.materials.elasticity import materials_of_parts
+from reflowshock.fem.materials.elasticity import materials_of_parts, role_of_part
 from reflowshock.fem.materials.kinematics import Kinematics
 from reflowshock.fem.materials.parameters import Material
 from reflowshock.fem.materials.roles import Materials
+from reflowshock.fem.mesh.column import COLUMN
 from reflowshock.fem.mesh.facet import spring_rates
 from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.mesh.tie import Tie
 from reflowshock.fem.problem.fittings import Support
+
+IN_COLUMN = "column"  # what of board and substrate stands in the columns of fine joints
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,11 +38,19 @@ class Whole:
 
 @dataclass(frozen=True, slots=True)
 class Treatment:
-    """How elements are computed: formulation of hexahedra, kinematics, roles whose masses are scaled."""
+    """How elements are computed.
+
+    Attributes:
+        formulation: Of hexahedra.
+        kinematics: Small, corotational or finite.
+        mass_scaled: Roles whose masses are scaled, or ``IN_COLUMN``.
+        scaled_step: Largest critical step [s] to which they are.
+    """
 
     formulation: str = HEXAHEDRON.name
     kinematics: Kinematics = "small"
     mass_scaled: Sequence[str] = ()
+    scaled_step: float = np.inf
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,19 +96,21 @@ def survey(mesh: MeshData, materials: Materials | Mapping[str, Material], treatm
     geometry = element_geometry(elements.points, elements.cells)
     step = critical_steps(elements, geometry.nodal_volume)
     role = np.array(names)[mesh.part]
+    scaled = mesh.in_parts(lambda name: role_of_part(name) in treatment.mass_scaled)
+    if IN_COLUMN in treatment.mass_scaled:
+        scaled |= mesh.in_parts(lambda name: COLUMN in name)
     elastic = np.array([material.plasticity is None for material in assigned])[mesh.part]
     linear = elastic & (treatment.kinematics == "small")
-    path_cost = UPDATES_PER_SECOND / NONLINEAR_RATE[elements.kind.name]
     box = is_box(mesh.points[mesh.cells])
-    turning = elastic & box & (treatment.kinematics == "corotational")
-    by_path = np.where(turning, UPDATES_PER_SECOND / COROTATIONAL_RATE, path_cost)
+    turning = elastic & (treatment.kinematics == "corotational") & (elements.kind.nodes == HEXAHEDRON.nodes)
+    rate = np.where(turning, np.where(box, TURNING_BOX_RATE, TURNING_RATE), NONLINEAR_RATE[elements.kind.name])
     return Survey(
         role=role,
         plain_step=step,
-        factor=mass_factors(role, step, treatment.mass_scaled),
+        factor=mass_factors(step, scaled, treatment),
         mass=elements.density * geometry.volume,
         linear=linear,
-        cost=np.where(linear, np.where(box, 1.0, BOARD_ADVANTAGE), BOARD_ADVANTAGE * by_path),
+        cost=np.where(linear, np.where(box, 1.0, BOARD_ADVANTAGE), BOARD_ADVANTAGE * UPDATES_PER_SECOND / rate),
     )
 
 
@@ -113,14 +126,18 @@ def on_springs(survey: Survey, mesh: MeshData, table: FittedTable | None, suppor
     return replace(survey, plain_step=2.0 / np.sqrt((2.0 / survey.plain_step) ** 2 + faster))
 
 
-def mass_factors(role: NDArray[np.str_], step: NDArray[np.float64], scaled: Sequence[str]) -> NDArray[np.float64]:
-    """Return the factor ``(ne,)`` on the density that raises the critical steps ``(ne,)`` of some roles to the others'.
+def mass_factors(step: NDArray[np.float64], scaled: NDArray[np.bool_], treatment: Treatment) -> NDArray[np.float64]:
+    """Return the factor ``(ne,)`` on the density that raises critical steps to the others', or as far as wanted.
+
+    Args:
+        step: ``(ne,)`` critical steps [s].
+        scaled: ``(ne,)`` whose mass is scaled.
+        treatment: As what, and how far.
 
     Raises:
-        StepError: Every role is mass scaled.
+        StepError: Every element is mass scaled, to no step in particular.
     """
-    chosen = np.isin(role, scaled)
-    target = float(step[~chosen].min(initial=np.inf))
+    target = min(float(step[~scaled].min(initial=np.inf)), treatment.scaled_step)
     if not np.isfinite(target):
-        raise StepError(f"numerics.mass_scaled = {tuple(scaled)} leaves no role to take the step from")
-    return np.where(chosen, np.maximum(1.0, (target / step) ** 2), 1.0)
+        raise StepError(f"numerics.mass_scaled = {tuple(treatment.mass_scaled)} leaves no role to take the step from")
+    return np.where(scaled, np.maximum(1.0, (target / step) ** 2), 1.0)

@@ -2,8 +2,8 @@
 
 A term is linear unless its material yields or the kinematics are finite. Linear boxes of equal shape and material share
 one stiffness and are computed in rows along lines of nodes (``force_congruent``); other linear elements are assembled
-into blocks of 3 x 3 (``force_assembled``). Boxes that stay elastic turn by any angle at a fifth of the linear speed
-(``force_corotational``).
+into blocks of 3 x 3 (``force_assembled``). Hexahedra that stay elastic turn by any angle without a path
+(``force_corotational``), boxes at a fifth of their linear speed.
 """
 
 from collections.abc import Mapping, Sequence
@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from reflowshock.fem.elements.element import Elements
 from reflowshock.fem.forces.energy import Energy
 from reflowshock.fem.forces.force_assembled import AssembledElements
-from reflowshock.fem.forces.force_congruent import CongruentElements, in_rows, is_box
-from reflowshock.fem.forces.force_corotational import corotational_term
+from reflowshock.fem.forces.force_congruent import CongruentElements, in_rows
+from reflowshock.fem.forces.force_corotational import corotational_terms
 from reflowshock.fem.forces.force_nonlinear import NonlinearElements
 from reflowshock.fem.kernels.nonlinear import Path
 from reflowshock.fem.kernels.plasticity import FIRST_YIELD, plastic_constants
@@ -77,11 +77,10 @@ def force_terms(
     plastic = np.array([plastic_constants(material) for material in materials])
     elastic = own & ~np.isfinite(plastic[elements.material, FIRST_YIELD])
     linear = elastic if kinematics == "small" else np.zeros_like(elastic)
-    turning = elastic & is_box(elements.points[elements.cells]) if kinematics == "corotational" else ~own & own
+    turning = elastic if kinematics == "corotational" and elements.cells.shape[1] == 8 else np.zeros_like(elastic)
     path = own & ~linear & ~turning
     terms = linear_terms(elements.subset(linear))
-    if turning.any():
-        terms.append(corotational_term(elements, np.flatnonzero(turning)))
+    terms += corotational_terms(elements, turning)
     if path.any():
         finite = kinematics != "small"
         terms.append(NonlinearElements.build(elements, np.flatnonzero(path), plastic, Path(finite, step)))

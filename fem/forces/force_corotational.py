@@ -1,8 +1,9 @@
-"""Internal force of elastic boxes that turn by any angle and strain little, at a few times the cost of linear ones.
+"""Internal force of elastic hexahedra that turn by any angle and strain little, at a few times the cost of linear ones.
 
-The linear stiffness of a shape, diagonalised by its symmetry (``force_congruent``), acts in the frame of each box's
-mean rotation (``kernels.box_rotation``). The force is the exact derivative of an energy and needs no path. What it
-leaves out is of second order in the strain, (U - 1)^2 / 2: a strain of 1 % is wrong by 5e-5.
+The linear stiffness of an element acts in the frame of its mean rotation: of boxes diagonalised by their symmetry
+(``force_congruent``, ``kernels.box_rotation``), of other hexahedra as mean strain and hourglass part
+(``kernels.turned_hexahedron``). The force is the exact derivative of an energy and needs no path. What it leaves out is
+of second order in the strain, (U - 1)^2 / 2: a strain of 1 % is wrong by 5e-5.
 
 Boxes stand in rows of equal ones, whose neighbours share work, or in blocks of any shapes: on the graded board of
 jedec_bga, with three boxes a row, blocks are 2.3 times as fast; from 24 boxes a row on, rows are.
@@ -13,11 +14,12 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from reflowshock.fem.elements.element import Elements, element_stiffness
+from reflowshock.fem.elements.element import Elements, element_geometry, element_stiffness
+from reflowshock.fem.elements.one_point import hourglass_control
 from reflowshock.fem.errors import InvertedElementError
 from reflowshock.fem.forces.energy import Energy
-from reflowshock.fem.forces.force_congruent import aligned, arranged, parity_blocks
-from reflowshock.fem.forces.nonlinear_blocks import arrange
+from reflowshock.fem.forces.force_congruent import SIGNS, aligned, arranged, is_box, parity_blocks
+from reflowshock.fem.forces.nonlinear_blocks import SYMMETRIC, arrange, elastic_constants
 from reflowshock.fem.kernels.box_rotation import (
     UPRIGHT,
     add_turned_block_forces,
@@ -26,11 +28,16 @@ from reflowshock.fem.kernels.box_rotation import (
     row_energies,
 )
 from reflowshock.fem.kernels.box_rows import PAD, read_lines, subtract_lines
+from reflowshock.fem.kernels.turned_hexahedron import add_turned_forces, turned_energies
 
 SHORT_ROWS = 8  # boxes of a row, in the mean, below which blocks of any shapes are faster
 NORMAL = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))
 # Parity and entries (00 01 02 11 12 22) of the blocks that resist the modes xy, xz, yz, xyz.
 HIGHER = ((7, (0, 1, 2, 3, 4, 5)), (1, (3, 4, 5)), (2, (0, 2, 5)), (4, (0, 1, 3)), (6, (0,)), (5, (3,)), (3, (5,)))
+
+# Parities of the modes xy, xz, yz, xyz; their places and signs among the amplitudes of ``one_point``.
+HOURGLASS_PARITY, AMPLITUDES, HANDEDNESS = [3, 5, 6, 7], [2, 1, 0, 3], np.array([1.0, 1.0, 1.0, -1.0])
+MODES, PAIRS = np.arange(4), np.triu_indices(4, 1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,10 +146,60 @@ class CorotationalBlocks:
         return accounted(block_energies(self.cells, self.filled, self.constants, displacement), self.hourglass)
 
 
-Corotational = CorotationalBoxes | CorotationalBlocks
+@dataclass(frozen=True, slots=True)
+class CorotationalHexahedra:
+    """Hexahedra of any shapes that turn, sixteen side by side.
+
+    Attributes:
+        points: ``(n, 3)`` [m].
+        cells: ``(nb, 8, 16)`` int32, see ``kernels.turned_hexahedron.add_turned_forces``.
+        filled: ``(nb,)`` int32 elements of each block.
+        constants: ``(nb, 1920)`` of each lane, see ``hexahedron_constants``.
+        hourglass: Whether the energy of the hourglass part counts as that of hourglass control.
+        numbers: ``(ne,)`` the elements' numbers among all of the rank.
+        history: Empty.
+    """
+
+    points: NDArray[np.float64]
+    cells: NDArray[np.int32]
+    filled: NDArray[np.int32]
+    constants: NDArray[np.float64]
+    hourglass: bool
+    numbers: NDArray[np.int64]
+    history: dict[str, NDArray] = field(default_factory=dict)
+
+    @classmethod
+    def build(cls, everything: Elements, chosen: NDArray[np.int64]) -> "CorotationalHexahedra":
+        """Put the ``chosen (ne,)`` elements into blocks."""
+        elements = everything.subset(chosen)
+        lanes = arrange(elements)
+        cells = np.ascontiguousarray(elements.cells[lanes.element].transpose(0, 2, 1), dtype=np.int32)
+        constants = lanes.spread(hexahedron_constants(elements.subset(lanes.shape))[:, None])[lanes.pattern, 0]
+        return cls(elements.points, cells, lanes.filled, constants, elements.kind.hourglass, chosen)
+
+    def add(self, displacement: NDArray[np.float64], force: NDArray[np.float64]) -> None:
+        """Subtract the internal force; errors as ``CorotationalBoxes.add``."""
+        block = add_turned_forces(self.cells, self.filled, self.constants, displacement, force)
+        if block != UPRIGHT:
+            raise inverted("a block", self.points[self.cells[block, 0, 0]])
+
+    def energy(self, displacement: NDArray[np.float64]) -> Energy:
+        """Return the strain energy."""
+        return accounted(turned_energies(self.cells, self.filled, self.constants, displacement), self.hourglass)
 
 
-def corotational_term(everything: Elements, chosen: NDArray[np.int64]) -> Corotational:
+Corotational = CorotationalBoxes | CorotationalBlocks | CorotationalHexahedra
+
+
+def corotational_terms(everything: Elements, chosen: NDArray[np.bool_]) -> list[Corotational]:
+    """Return the terms of the ``chosen (ne,)`` elements, hexahedra: of boxes and of others."""
+    box = is_box(everything.points[everything.cells])
+    boxes, others = np.flatnonzero(chosen & box), np.flatnonzero(chosen & ~box)
+    terms: list[Corotational] = [corotational_boxes(everything, boxes)] if len(boxes) else []
+    return [*terms, CorotationalHexahedra.build(everything, others)] if len(others) else terms
+
+
+def corotational_boxes(everything: Elements, chosen: NDArray[np.int64]) -> CorotationalBoxes | CorotationalBlocks:
     """Return the term of the ``chosen (ne,)`` elements, boxes: in rows, unless these are short."""
     rows = CorotationalBoxes.build(everything, chosen)
     return rows if len(chosen) >= SHORT_ROWS * len(rows.rows) else CorotationalBlocks.build(everything, chosen)
@@ -173,3 +230,26 @@ def box_constants(shapes: Elements, size: NDArray[np.float64]) -> NDArray[np.flo
     rows, columns = np.transpose((*NORMAL, (3, 3), (4, 4), (5, 5)))
     blocks = parity_blocks(element_stiffness(shapes))
     return np.column_stack([elasticity[:, rows, columns], *(blocks[:, parity, entries] for parity, entries in HIGHER)])
+
+
+def hexahedron_constants(shapes: Elements) -> NDArray[np.float64]:
+    """Return what ``kernels.turned_hexahedron`` needs of each shape: ``(ns, 120)``.
+
+    V C [J], b_p [1/m] of p = 1 to 7, c_k [m], and H [N/m] on the amplitudes, which ``hourglass_control`` has as
+    multiples of the transformed ones.
+
+    Args:
+        shapes: An element of each shape.
+    """
+    corners = shapes.points[shapes.cells]
+    geometry = element_geometry(shapes.points, shapes.cells)
+    rigidity = geometry.volume[:, None] * elastic_constants(shapes.elasticity)[shapes.material]
+    gradient = np.einsum("pa,saj->spj", SIGNS[1:], geometry.gradient) / 8.0
+    transformed = np.einsum("ka,saj->skj", SIGNS[HOURGLASS_PARITY], corners - corners[:, :1])
+    _, stiffness = hourglass_control(corners, shapes.elasticity, shapes.material)
+    tensor = stiffness.reshape(-1, 4, 3, 4, 3)[:, AMPLITUDES][:, :, :, AMPLITUDES]
+    tensor = np.einsum("k,skilj,l->skilj", HANDEDNESS, tensor, HANDEDNESS, optimize=True) / 8.0
+    blocks = tensor.transpose(0, 1, 3, 2, 4)
+    own, pairs = blocks[:, MODES, MODES][..., SYMMETRIC[0], SYMMETRIC[1]], blocks[:, PAIRS[0], PAIRS[1]]
+    flat = (values.reshape(len(corners), -1) for values in (gradient, transformed, own, pairs))
+    return np.column_stack([rigidity, *flat])

@@ -71,15 +71,16 @@ def add_faces(w, start, count, faces):
 @njit(**LANE_OPTIONS)
 def transform_corners(w):
     """Replace the values of three components at eight corners by their Walsh-Hadamard transform."""
-    for bit in (1, 2, 4):
-        for corner in range(8):
-            if corner & bit:
-                continue
-            for c in range(3):
-                low, high = w[LANES * (3 * corner + c) :], w[LANES * (3 * (corner + bit) + c) :]
-                for lane in range(LANES):
-                    a, b = low[lane], high[lane]
-                    low[lane], high[lane] = a + b, a - b
+    for component in range(3):
+        v = w[LANES * component :]
+        for lane in range(LANES):
+            a, b = v[lane] + v[X + lane], v[lane] - v[X + lane]
+            c, d = v[Y + lane] + v[XY + lane], v[Y + lane] - v[XY + lane]
+            e, f = v[Z + lane] + v[XZ + lane], v[Z + lane] - v[XZ + lane]
+            g, h = v[YZ + lane] + v[XYZ + lane], v[YZ + lane] - v[XYZ + lane]
+            a, b, c, d, e, f, g, h = a + c, b + d, a - c, b - d, e + g, f + h, e - g, f - h
+            v[lane], v[X + lane], v[Y + lane], v[XY + lane] = a + e, b + f, c + g, d + h
+            v[Z + lane], v[XZ + lane], v[YZ + lane], v[XYZ + lane] = a - e, b - f, c - g, d - h
 
 
 @njit(**LANE_OPTIONS)

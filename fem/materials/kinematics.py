@@ -1,8 +1,8 @@
 """Kinematics of elements, and what they leave out of a run, in words.
 
 Small ones take rotations and strains as small. Corotational ones take rotations of any size and, where a material is
-elastic and elements are boxes, small strains in the frame that turns: a fraction of the cost of finite ones, which take
-rotations and strains of any size. Materials that yield are computed alike in both.
+elastic and elements are hexahedra, small strains in the frame that turns: a fraction of the cost of finite ones, which
+take rotations and strains of any size. Materials that yield are computed alike in both.
 """
 
 from typing import Literal

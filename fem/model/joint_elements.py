@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reflowshock.fem.elements.hexahedron import HEXAHEDRON
-from reflowshock.fem.forces.force_corotational import Corotational, corotational_term
+from reflowshock.fem.forces.force_corotational import Corotational
 from reflowshock.fem.forces.force_nonlinear import NonlinearElements, PointValues
 from reflowshock.fem.kernels.nonlinear import Path
 from reflowshock.fem.kernels.plasticity import NEVER_YIELDS
@@ -39,18 +39,18 @@ class ElasticHexahedra:
         return self._term.points(*self._place)
 
 
-class TurningBoxes:
-    """Boxes that turn and strain little: their own force; points as elements with finite strains have them."""
+class TurningElements:
+    """Hexahedra that turn and strain little: their own force; points as elements with finite strains have them."""
 
-    def __init__(self, body: Body, chosen: NDArray[np.integer]) -> None:
-        """Take elements ``chosen (k,)`` of a body, corotational boxes of it."""
-        self._boxes = corotational_term(body.elements, np.asarray(chosen))
+    def __init__(self, body: Body, term: Corotational, chosen: NDArray[np.integer]) -> None:
+        """Take elements ``chosen (k,)`` of a body, some of those of a term."""
+        self._own = term.build(body.elements, np.asarray(chosen))
         self._points = ElasticHexahedra(body, chosen, finite=True)
         self._displacement = np.zeros_like(body.local.points)
 
     def add(self, displacement: NDArray[np.float64], force: NDArray[np.float64]) -> None:
         """Subtract the internal force ``(n, 3)`` [N] at a displacement ``(n, 3)`` [m]."""
-        self._boxes.add(displacement, force)
+        self._own.add(displacement, force)
         self._displacement[...] = displacement
 
     def points(self) -> PointValues:
@@ -88,16 +88,17 @@ class JointElements:
         self._body, self._size = body, len(chosen)
         self._levels = levels_of(body.terms)
         left = np.ones(len(chosen), dtype=bool)
-        self._nonlinear: list[tuple[NDArray[np.intp], FollowingElements | TurningBoxes]] = []
+        self._nonlinear: list[tuple[NDArray[np.intp], FollowingElements | TurningElements]] = []
         for term in body.terms:
-            if isinstance(term, NonlinearElements | Corotational):
-                place = positions(term.numbers, chosen)
-                rows = np.flatnonzero(place >= 0)
-                left[rows] = False
-                if len(rows) and isinstance(term, NonlinearElements):
-                    self._nonlinear.append((rows, FollowingElements(term, place[rows])))
-                elif len(rows):
-                    self._nonlinear.append((rows, TurningBoxes(body, chosen[rows])))
+            if not isinstance(term, NonlinearElements | Corotational):
+                continue
+            place = positions(term.numbers, chosen)
+            rows = np.flatnonzero(place >= 0)
+            left[rows] = False
+            if len(rows) and isinstance(term, NonlinearElements):
+                self._nonlinear.append((rows, FollowingElements(term, place[rows])))
+            elif len(rows) and isinstance(term, Corotational):
+                self._nonlinear.append((rows, TurningElements(body, term, chosen[rows])))
         self._linear = [
             (k, rows, ElasticHexahedra(body, chosen[rows]))
             for k in np.unique(level[chosen])

@@ -114,7 +114,8 @@ class ShockNumerics(Parameters):
     formulations; those that yield are seven to eight times cheaper with one point, a few per cent stronger in bending.
     Kinematics that are ``auto`` are corotational where the board's deflection calls for it. Solder whose material can
     yield does so if ``plasticity`` is on, and if it is ``auto`` where half its yield stress is expected.
-    ``mass_scaled`` are roles, such as copper, whose density is raised to the step of the others; the added mass is a
+    ``mass_scaled`` are roles, such as copper, whose density is raised to the step of the others, at most to
+    ``mass_scaled_step``; ``column`` stands for board and substrate in the columns of fine joints. The added mass is a
     metric with a limit.
     ``dns_duration`` ends the DNS before the shock does: the modes are compared over the time that both have.
     """
@@ -127,7 +128,8 @@ class ShockNumerics(Parameters):
     kinematics: Literal["auto"] | Kinematics = "small"
     plasticity: Switch = "on"
     formulation: Literal["incompatible_modes", "one_point"] = "incompatible_modes"
-    mass_scaled: tuple[Literal["board", "substrate", "die", "copper", "solder"], ...] = ()
+    mass_scaled: tuple[Literal["board", "substrate", "die", "copper", "solder", "column"], ...] = ()
+    mass_scaled_step: Annotated[float | None, Quantity("ns")] = Field(None, gt=0)
     history_samples: int = Field(600, ge=2)
     field_samples: int = Field(12, ge=2)
     energy_balance_limit: float = Field(0.02, gt=0)

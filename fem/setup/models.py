@@ -59,7 +59,8 @@ class Divided(Generic[TablesT_co]):
 
 def treatment_of(request: RunInput | StructureInput) -> Treatment:
     """Return how a run computes its elements."""
-    return Treatment(request.formulation, request.kinematics, request.numerics.mass_scaled)
+    step = request.numerics.mass_scaled_step if isinstance(request, RunInput) else None
+    return Treatment(request.formulation, request.kinematics, request.numerics.mass_scaled, step or np.inf)
 
 
 def divided_on_root(world: MPI.Comm, divided: Callable[[], Divided[TablesT_co]]) -> Divided[TablesT_co]:

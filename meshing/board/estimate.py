@@ -114,7 +114,9 @@ def _column_estimates(
         levels = column_levels(thickness, boxes, imprint)
         section = _section(numerics) + 4 * numerics.core * (rim_count(pad, edge) + imprint.rings)
         cells = joints * section * (len(levels) - 1)
-        found[f"{name}_column"] = PartEstimate(cells, (edge, edge, float(np.diff(levels).min())))
+        beyond = 0.5 * (package.column_size - pad.diameter)  # from the pad's edge to the nearest side
+        ring = beyond / float(np.sum(imprint.growth ** np.arange(imprint.rings)))
+        found[f"{name}_column"] = PartEstimate(cells, (edge, min(edge, ring), float(np.diff(levels).min())))
         site = pad_table(package, board, FLAT)[0]
         place = [_cells_between(axis, at, package.column_size) for axis, at in ((plan.x, site.x), (plan.y, site.y))]
         taken = joints * place[0] * place[1] * boxes

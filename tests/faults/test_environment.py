@@ -1,12 +1,15 @@
 """The command where it is hard: no home, no locale, folders that cannot be written to, odd names, small limits."""
 
 import os
+import shutil
 import subprocess
 import sys
 import tempfile
 from pathlib import Path
 
 import pytest
+
+from reflowshock.workflow.process.kernel_cache import VARIABLE
 
 ROOT = Path(__file__).resolve().parents[2]
 TITLE = "Lötstelle [/x] [ ] [bold]b $\\\\frac{$ :smile: <b> 焊"  # in TOML, which reads \\ as one
@@ -60,10 +63,20 @@ def test_a_plan_in_any_environment(place, name):
     assert written.get(name, "Lötstelle".encode()) in done.stdout
 
 
-def test_a_run_of_a_user_without_anything(place):
-    """Neither a locale nor a home; where the test may become another user, one whose kernels nobody has compiled."""
+@pytest.mark.parametrize("kernels", ["given", pytest.param("to be compiled", marks=pytest.mark.long)])
+def test_a_run_of_a_user_without_anything(place, kernels):
+    """Neither a locale nor a home nor, where the test may become another user, kernels: these are long to compile.
+
+    That they are then kept in a temporary folder is tested beside `kernel_cache`.
+    """
     root, out = os.geteuid() == 0, "Gehäuse [x] ü"
     environment = ENVIRONMENTS["C"] | {"TMPDIR": str(place), "HOME": "/nonexistent"}
+    if kernels == "given":
+        shutil.copytree(os.environ[VARIABLE], place / "kernels")
+        for folder, _, names in os.walk(place / "kernels"):
+            for path in (Path(folder), *(Path(folder, name) for name in names)):
+                path.chmod(0o777)
+        environment[VARIABLE] = str(place / "kernels")
     done = command(place, "run", "case.toml", "--out", out, environment=environment, before=NOBODY if root else [])
     assert (done.returncode, done.stderr.decode()) == (0, "")
     assert is_plain(done.stdout)

@@ -1,10 +1,5 @@
 """Ranks must not change the force of step levels, nor may copies of a node differ in a bit."""
 
-import os
-import subprocess
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 from mpi4py import MPI
@@ -14,8 +9,8 @@ from reflowshock.fem.loads.load import NodalForces, half_sine_drop
 from reflowshock.fem.loads.pulse import HalfSine
 from reflowshock.fem.materials.roles import Materials
 from tests.support.fem_levels import joint_on_board, levelled
+from tests.support.fem_program import run_warm
 
-ROOT = Path(__file__).resolve().parents[2]
 RATIOS, WINDOWS = (4, 3, 3), 20
 
 
@@ -52,18 +47,10 @@ def alone() -> np.ndarray:
     return displacement[np.argsort(nodes)]
 
 
-@pytest.mark.parametrize("ranks", [2, 4])
+@pytest.mark.parametrize("ranks", [pytest.param(2, marks=pytest.mark.long), 4])
 def test_displacements_are_the_same_on_more_ranks(alone, tmp_path, ranks):
     path = tmp_path / "moved.npy"
-    code = f"from tests.mpi.test_fem_level_ranks import write_march; write_march({str(path)!r})"
-    done = subprocess.run(
-        ["mpirun", "--allow-run-as-root", "--oversubscribe", "-n", str(ranks), sys.executable, "-c", code],
-        cwd=ROOT,
-        env=os.environ | {"PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"},
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
+    script = tmp_path / "script.py"
+    script.write_text(f"from tests.mpi.test_fem_level_ranks import write_march; write_march({str(path)!r})")
+    run_warm([str(script)], ranks)
     assert np.abs(np.load(path) - alone).max() <= 1e-10 * np.abs(alone).max()

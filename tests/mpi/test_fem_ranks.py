@@ -1,9 +1,6 @@
 """Ranks must not change results, and an error on one rank must end all of them."""
 
 import json
-import os
-import subprocess
-import sys
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,9 +10,8 @@ import pytest
 
 from reflowshock.fem.mesh.mesh import append
 from tests.support.fem_models import board_mesh, package_mesh, small_assembly, write_msh, write_small_assembly
-from tests.support.fem_program import run_program, run_programs
+from tests.support.fem_program import run_program, run_programs, run_python, run_warm
 
-ROOT = Path(__file__).resolve().parents[2]
 SHOCK = {
     "peak_acceleration": 14709.975,
     "pulse_duration": 5e-4,
@@ -177,16 +173,7 @@ def test_ranks_that_carry_both_models_do_not_wait_for_large_messages(tmp_path):
         "channel.receive(values)\n"
         "assert (values == 7.0).all()\n"
     )
-    done = subprocess.run(
-        ["mpirun", "--allow-run-as-root", "--oversubscribe", "-n", "2", sys.executable, str(script)],
-        cwd=ROOT,
-        env=os.environ | {"PYTHONPATH": str(ROOT)},
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
+    run_warm([str(script)], 2)
 
 
 def fails(directory: Path, ranks: int, message: str, **changes) -> None:
@@ -203,6 +190,7 @@ def test_missing_mesh_ends_all_ranks(assembly):
     fails(assembly, 2, "nowhere.msh", meshes=["nowhere.msh"])
 
 
+@pytest.mark.long
 def test_joint_beside_the_board_ends_all_ranks(tmp_path):
     joints = small_assembly()[2:]
     joints[0].points[:, 0] += 9e-3
@@ -228,13 +216,6 @@ def test_crash_of_one_rank_ends_all(assembly, tmp_path):
         "sys.exit(program.main(MPI.COMM_WORLD, sys.argv[1:]))\n"
     )
     path = write_input(tmp_path / "input.json", assembly, mode="two_scale", output=str(tmp_path))
-    done = subprocess.run(
-        ["mpirun", "--allow-run-as-root", "-n", "2", sys.executable, str(script), str(path)],
-        env=os.environ | {"PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"},
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=False,
-    )
+    done = run_python([str(script), str(path)], 2)
     assert done.returncode != 0
     assert "broken rank" in done.stderr

@@ -16,11 +16,13 @@ from mpi4py import MPI
 from reflowshock.fem.parallel.checkpoint import Checkpoints
 from reflowshock.fem.parallel.portable import Same, State
 from tests.support.fem_models import write_small_assembly
+from tests.support.fem_program import MPIRUN
+from tests.support.warm_start import warm_python
 
 ROOT = Path(__file__).resolve().parents[2]
 SHOCK = {
     "service_condition": "B",
-    "duration": 2e-5,
+    "duration": 1e-5,
     "gravity": "on",
     "damping": {"stiffness_coefficient": 1e-10, "mass_coefficient": 10.0},
     "ranks": {"placement": "disjoint"},
@@ -35,16 +37,15 @@ def assembly(tmp_path_factory) -> Path:
     return directory
 
 
-def start(directory: Path, mode: str, output: Path) -> subprocess.Popen:
+def start(directory: Path, mode: str, output: Path, python: str = sys.executable) -> subprocess.Popen:
     meshes = [str(directory / "assembly.msh"), str(directory / "joints.msh")]
     gauge, watch = {"at": [9e-3, 2e-3]}, {"at": [0.0, 0.0, -1e-3]}
     fitted = {"gauges": {"far": gauge}, "watch": {"under": watch}}
     request = {"mode": mode, "meshes": meshes, "shock": SHOCK, "output": str(output)} | fitted
     path = directory / f"{output.name}.json"
     path.write_text(json.dumps(request | {"checkpoints": str(directory / f"{mode}.checkpoints")}))
-    command = ["mpirun", "--allow-run-as-root", "--oversubscribe", "-n", "2"]
     return subprocess.Popen(
-        [*command, sys.executable, "-m", "reflowshock.fem", str(path)],
+        [*MPIRUN, "2", python, "-m", "reflowshock.fem", str(path)],
         cwd=ROOT,
         env=os.environ | {"OMP_NUM_THREADS": "1"},
         stdout=subprocess.DEVNULL,
@@ -77,10 +78,10 @@ def test_killed_run_continues_to_the_same_bits(assembly):
     process = start(assembly, mode, broken)
     kill_after_some_checkpoints(process, folder, 8)
     assert not (broken / "history.npz").exists()
-    finish(start(assembly, mode, broken))
+    finish(start(assembly, mode, broken, warm_python()))
     assert json.loads((broken / "result.json").read_text())["continued_from"] > 0
     shutil.rmtree(folder)
-    finish(start(assembly, mode, whole))
+    finish(start(assembly, mode, whole, warm_python()))
     with np.load(whole / "history.npz") as expected, np.load(broken / "history.npz") as found:
         assert set(expected) == set(found)
         for name in expected:

@@ -15,6 +15,8 @@ from reflowshock.workflow.pipeline.reader import read_case
 from tests.support.workflow_command import SMALL_CASE
 
 COOLED = (
+    "shock.pulse_duration=0.01 ms",
+    "shock.duration=0.012 ms",
     "shock.ranks.total=1",
     "thermal.effects.residual_stress=on",
     "thermal.effects.flexible=off",

@@ -12,6 +12,7 @@ import pytest
 
 from reflowshock.workflow.jobs.checks import PLUGIN
 from tests.support.one_node_slurm import NoSlurm, OneNode, one_node_slurm
+from tests.support.warm_start import warm_command
 from tests.support.workflow_command import wait_until
 
 STRUCTURE = Path(__file__).parent / "structure.toml"
@@ -70,9 +71,9 @@ def test_stages_are_jobs_with_ranks_and_products_those_of_a_local_run(slurm, tmp
     assert [said.count(f"ok     {stage}") for stage in ("geometry", "shock", "comparison", "report")] == [1] * 4
     assert not list((tmp_path / "jobs").rglob("*.partial"))
 
-    local = [*line[: line.index("--executor")], "--oversubscribe"]
+    local = [*line[line.index("run") : line.index("--executor")], "--oversubscribe"]
     local[local.index("--out") + 1] = str(tmp_path / "local")
-    here = run(slurm, local)
+    here = warm_command(*local)
     assert here.returncode == 0, here.stdout + here.stderr
     assert metrics(tmp_path / "jobs") == metrics(tmp_path / "local")
 

@@ -81,7 +81,7 @@ def write_whole(folder, the_package, the_board, warpage):
 @pytest.mark.parametrize(
     "changes",
     [
-        {"rows": 1, "columns": 1},
+        pytest.param({"rows": 1, "columns": 1}, marks=pytest.mark.long),
         {"rows": 3, "columns": 3, "depopulated": ("B2",)},
         {"rows": 1, "columns": 4, "joint_numerics": {"layers": 2}},
     ],
@@ -119,9 +119,21 @@ def assemblies(draw):
     return the_package, the_board
 
 
-@settings(max_examples=6, deadline=None)
+@settings(max_examples=2, deadline=None)
 @given(assemblies())
 def test_random_assemblies_are_refused_or_upright(tmp_path_factory, parameters):
+    check_assembly(tmp_path_factory, parameters)
+
+
+@pytest.mark.long
+@settings(max_examples=20, deadline=None)
+@given(assemblies())
+def test_more_random_assemblies_are_refused_or_upright(tmp_path_factory, parameters):
+    check_assembly(tmp_path_factory, parameters)
+
+
+def check_assembly(tmp_path_factory, parameters):
+    """Assert that an assembly is refused, or meshed with as many elements as was said."""
     the_package, the_board = parameters
     if problems(the_package, the_board, Warpage()):
         return

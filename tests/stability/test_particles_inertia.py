@@ -1,4 +1,7 @@
-"""Drops on a wall with inertia from a violent start, a cube: they come to rest as the cap, at any viscosity."""
+"""Drops on a wall with inertia from a violent start, a cube: they come to rest as the cap, at any viscosity.
+
+What is long here has its like in `cases/hard`, where each file's first case is not.
+"""
 
 import numpy as np
 import pytest
@@ -37,7 +40,7 @@ def test_a_drop_comes_to_rest_as_the_cap(degrees):
     assert energy[-1] == pytest.approx(energy.min(), rel=1e-3)
 
 
-@pytest.mark.parametrize("viscosity", [1e-3, 10.0])
+@pytest.mark.parametrize("viscosity", [pytest.param(1e-3, marks=pytest.mark.long), 10.0])
 def test_thin_and_thick_liquids(viscosity):
     """At the least viscosity the drop still swings when the process ends."""
     metrics, energy = spread(5, viscosity=viscosity, end=2.5e-3)
@@ -45,9 +48,8 @@ def test_thin_and_thick_liquids(viscosity):
     assert energy.max() == energy[0]
 
 
-@pytest.mark.parametrize(
-    "wall", [pytest.param({"wall": "no-slip"}, marks=pytest.mark.long), {"wall": "slip", "slip_length": 5e-5}]
-)
+@pytest.mark.long
+@pytest.mark.parametrize("wall", [{"wall": "no-slip"}, {"wall": "slip", "slip_length": 5e-5}])
 def test_walls_that_hold_the_liquid_do_not_change_the_rest(wall):
     metrics, _ = spread(5, **wall)
     assert abs(metrics["height_error"]) < 0.015

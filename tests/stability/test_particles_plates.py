@@ -40,7 +40,7 @@ def test_gap_squeezed_by_40_percent_in_10_steps():
 
 
 def test_gap_pulled_until_the_neck_ruptures():
-    gaps = np.arange(0.35e-3, 1.1e-3, 0.05e-3)
+    gaps = np.arange(0.35e-3, 1.1e-3, 0.075e-3)
     shapes = follow(gaps)
     waist = [shape.metrics["waist"][0] for shape in shapes]
     assert (np.diff(waist) < 0.0)[1:].all()

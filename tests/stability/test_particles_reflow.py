@@ -32,13 +32,13 @@ def check(shape, verdict):
 @pytest.mark.parametrize(
     ("gap", "board", "package", "volume", "verdict"),
     [
-        (0.22, 0.24, 0.24, BALL, "overflow"),
-        (0.45, 0.24, 0.24, BALL, "ok"),
+        pytest.param(0.22, 0.24, 0.24, BALL, "overflow", marks=pytest.mark.long),
+        pytest.param(0.45, 0.24, 0.24, BALL, "ok", marks=pytest.mark.long),
         (0.45, 0.24, 0.24, cylinder(0.5, 0.45e-3), "ok"),
-        (0.80, 0.24, 0.24, cylinder(1.3, 0.80e-3), "ok"),
-        (0.31, 0.30, 0.20, BALL, "ok"),
+        pytest.param(0.80, 0.24, 0.24, cylinder(1.3, 0.80e-3), "ok", marks=pytest.mark.long),
+        pytest.param(0.31, 0.30, 0.20, BALL, "ok", marks=pytest.mark.long),
         (0.31, 0.12, 0.24, BALL, "overflow"),
-        (0.31, 0.24, 0.24, cylinder(3.0, 0.31e-3), "overflow"),
+        pytest.param(0.31, 0.24, 0.24, cylinder(3.0, 0.31e-3), "overflow", marks=pytest.mark.long),
     ],
     ids=["squeezed", "stretched", "deep neck", "slender", "unequal discs", "tiny disc", "three times too much"],
 )
@@ -50,7 +50,7 @@ def test_extreme_joints(gap, board, package, volume, verdict):
     check_energy_falls(shape.history["energy"])
 
 
-@pytest.mark.parametrize("limit", [5.0, 20.0, 100.0])
+@pytest.mark.parametrize("limit", [5.0, pytest.param(20.0, marks=pytest.mark.long), 100.0])
 @pytest.mark.parametrize("spacing", [1e-4, 5e-5])
 def test_time_steps_far_beyond_the_capillary_limit(limit, spacing):
     """An explicit surface tension breaks at 4 times the limit."""
@@ -93,7 +93,7 @@ def test_too_little_solder_for_any_neck_stays_on_the_board_and_is_open():
 def test_inertia_never_gains_energy(properties):
     """With inertia and no viscosity from a violent start: the energy falls, that of the motion included."""
     values = {"physical": {}, "paper": {"surface_tension": 4.985, "viscosity": 0.227}}[properties]
-    numerics = SolderNumerics(spacing=7e-5, time_step_limit=5)
+    numerics = SolderNumerics(spacing=1e-4, time_step_limit=5)
     solder = Solder(volume=BALL, numerics=numerics, effects=SolderEffects(inertia="on"), **values)
     geometry = JointGeometry(0.31e-3, RADIUS, RADIUS)
     flow, rule = start_joint(geometry, solder)
@@ -110,7 +110,7 @@ def test_inertia_never_gains_energy(properties):
     assert energy[-1] == pytest.approx(energy.min(), rel=1e-4)
 
 
-@pytest.mark.parametrize("degrees", [30, 148])
+@pytest.mark.parametrize("degrees", [pytest.param(30, marks=pytest.mark.long), 148])
 def test_extreme_contact_angles(degrees):
     """A cube that spreads to a film of a third of its height, and one that almost rolls off its wall."""
     numerics = SolderNumerics(time_step_limit=100)

@@ -46,7 +46,7 @@ FAULTS = [
         lambda patch: flip(patch, Wetting, "force"),
         marks=pytest.mark.long,
     ),
-    ("reflow_bond", "bond 1, contact angle 120 deg", lambda patch: flip(patch, Gravity, "force")),
+    ("reflow_bond", "bond 1, contact angle 60 deg", lambda patch: flip(patch, Gravity, "force")),
     ("reflow_swing", "amplitude 0.05, parameters paper", double_step),
     ("remesh_warped", "corner 0.1 mm", flip_shear),
     ("remesh_barrel", "bulge 0.1 mm", forget_volume),

@@ -1,4 +1,8 @@
-"""The fem program, and scripts, on several ranks."""
+"""The fem program, and scripts, on several ranks.
+
+Ranks are forked from a process that has loaded libraries, see `warm_start`. `run_python` starts them in full: for tests
+of what ends ranks.
+"""
 
 import json
 import os
@@ -6,51 +10,45 @@ import subprocess
 import sys
 from pathlib import Path
 
+from tests.support.warm_start import warm_python
+
 ROOT = Path(__file__).resolve().parents[2]
-MPIRUN = ["mpirun", "--allow-run-as-root", "--oversubscribe", "-n"]
+# Not bound: ranks of runs side by side would share the first cores.
+MPIRUN = ["mpirun", "--bind-to", "none", "--allow-run-as-root", "--oversubscribe", "-n"]
 
 
 def run_program(path: Path, ranks: int) -> subprocess.CompletedProcess:
     """Run ``python -m fem`` on an input file."""
-    return run_python(["-m", "reflowshock.fem", str(path)], ranks)
-
-
-# Runs inputs one after the other, each on the first ranks; the others sleep meanwhile.
-IN_TURN = """
-import sys, time
-from mpi4py import MPI
-from reflowshock.fem.run.program import main
-world = MPI.COMM_WORLD
-for count, path in zip(map(int, sys.argv[1::2]), sys.argv[2::2]):
-    comm = world.Split(0 if world.rank < count else MPI.UNDEFINED)
-    if comm != MPI.COMM_NULL and main(comm, [path]):
-        world.Abort(1)
-    done = world.Ibarrier()
-    while not done.Test():
-        time.sleep(0.02)
-"""
+    return run_python(["-m", "reflowshock.fem", str(path)], ranks, python=warm_python())
 
 
 def run_programs(inputs: list[tuple[int, Path]]) -> None:
     """Run the fem program on several inputs, each with its number of ranks, in one start of all ranks."""
     words = [str(word) for one in inputs for word in one]
-    done = run_python(["-c", IN_TURN, *words], max(ranks for ranks, _ in inputs), timeout=400.0)
+    run_warm(words, max(ranks for ranks, _ in inputs))
+
+
+def run_warm(words: list[str], ranks: int) -> subprocess.CompletedProcess:
+    """Run what `on_ranks` runs, to a good end."""
+    line = ["-m", "tests.support.on_ranks", *words]
+    done = run_python(line, ranks, timeout=400.0, python=warm_python())
     assert done.returncode == 0, done.stderr
+    return done
 
 
 def run_script(text: str, directory: Path, ranks: int) -> dict:
     """Run a script that is given the directory and prints its results as JSON."""
     script = directory / "script.py"
     script.write_text(text)
-    done = run_python([str(script), str(directory)], ranks)
-    assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout)
+    return json.loads(run_warm([str(script), str(directory)], ranks).stdout)
 
 
-def run_python(arguments: list[str], ranks: int, timeout: float = 120.0) -> subprocess.CompletedProcess:
+def run_python(
+    arguments: list[str], ranks: int, timeout: float = 120.0, python: str = sys.executable
+) -> subprocess.CompletedProcess:
     """Run Python on several ranks, with this tree's packages."""
     return subprocess.run(
-        [*MPIRUN, str(ranks), sys.executable, *arguments],
+        [*MPIRUN, str(ranks), python, *arguments],
         cwd=ROOT,
         env=os.environ | {"PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"},
         capture_output=True,

@@ -1,7 +1,7 @@
 """Commands without their start-up: a server that has loaded the libraries forks a process for each.
 
-The Snakemake and the stages that such a command starts are forked, too: the Python that it calls asks the server. What
-a start of its own may change (environments, signals, a first word) is tested with `python -m reflowshock`.
+The Snakemake, the stages and the MPI ranks that it starts are forked, too: the Python that it calls asks the server.
+What a start of its own may change (environments, signals, a first word) is tested with `python -m reflowshock`.
 """
 
 import atexit
@@ -22,16 +22,21 @@ from pathlib import Path
 from tests.support.warm_client import ask
 
 ROOT = Path(__file__).resolve().parents[2]
-# What commands and stages load; not MPI, nor what loads it: a process that has begun it cannot be forked.
+# What commands, stages and ranks load; not MPI, nor what loads it: a process that has begun it cannot be forked.
 LIBRARIES = (
-    "gmsh", "matplotlib.pyplot", "meshio", "numba", "pandas", "pyvista", "scipy.sparse.linalg", "scipy.spatial",
-    "snakemake.cli", "reflowshock.workflow.cli", "reflowshock.workflow.run", "reflowshock.workflow.status",
+    "ffcx", "gmsh", "matplotlib.backends.backend_svg", "matplotlib.pyplot", "meshio", "numba", "pandas",
+    "pyvista.plotting", "scipy.signal", "scipy.sparse.linalg", "scipy.spatial", "snakemake.cli", "ufl",
+    "reflowshock.fem.elements.element", "reflowshock.fem.kernels.box_rows", "reflowshock.fem.kernels.levels",
+    "reflowshock.fem.kernels.nonlinear", "reflowshock.fem.mesh.mesh", "reflowshock.fem.problem.inputs",
+    "reflowshock.workflow.cli", "reflowshock.workflow.reflow.joints", "reflowshock.workflow.run",
+    "reflowshock.workflow.status",
 )  # fmt: skip
+MODULES = ("snakemake", "reflowshock", "reflowshock.fem", "reflowshock.workflow.reflow", "tests.support.on_ranks")
 # A Python that lets the server fork what it is to run, and is Python where that is something else.
 CLIENT = """#!{python} -IS
 import os, sys
 words = sys.argv[1:]
-if words[:2] != ["-m", "snakemake"] and words[:3] != ["-m", "reflowshock", "stage"]:
+if words[:1] != ["-m"] or words[1] not in {modules!r}:
     os.execv({python!r}, [{python!r}, *words])
 sys.path.append({support!r})
 from warm_client import ask
@@ -51,12 +56,18 @@ def warm_command(*arguments: str, cwd: Path | None = None) -> subprocess.Complet
     return subprocess.CompletedProcess(arguments, code, *said)
 
 
+def warm_python() -> str:
+    """Return the path of a Python that has the server fork what it knows, in place of a start."""
+    return str(_server() / "python")
+
+
 @cache
 def _server() -> Path:
     """Start a server that ends with this process; return its folder."""
     folder = tempfile.TemporaryDirectory()
     place, support = Path(folder.name), Path(__file__).parent
-    client = CLIENT.format(python=sys.executable, support=str(support), address=str(place / "socket"))
+    names = {"python": sys.executable, "support": str(support), "address": str(place / "socket"), "modules": MODULES}
+    client = CLIENT.format(**names)
     (place / "python").write_text(client)
     (place / "python").chmod(0o755)
     with socket.socket(socket.AF_UNIX) as listener:
@@ -76,6 +87,7 @@ def serve(client: str, listener: socket.socket) -> None:
     prepare()
     for library in LIBRARIES:
         import_module(library)
+    import numba
     from rich.console import Console
 
     from reflowshock.workflow.pipeline.reader import read_case
@@ -85,6 +97,7 @@ def serve(client: str, listener: socket.socket) -> None:
 
     case = read_case(ROOT / "tests/pipeline/small.toml", oversubscribe=True)
     show_plan(Store(Path("nowhere"), one_run=True), Point({}, case), Console(quiet=True))
+    numba.njit(lambda value: value)(0)  # what the first kernel of a process has Numba load
     gc.freeze()  # to look at what is loaded would copy its memory
     while listener in select.select([listener, sys.stdin], [], [])[0]:
         connection, _ = listener.accept()
@@ -124,8 +137,7 @@ def become(request: dict, streams: list[int], client: str) -> None:
         os.dup2(stream, number)
         os.close(stream)
     sys.argv = request["words"]
-    if request["words"][:2] != ["reflowshock", "stage"]:  # which starts ranks, and they load MPI
-        sys.executable = client
+    sys.executable = client
     code: str | int | None = None
     try:
         runpy.run_module(request["words"][0], run_name="__main__", alter_sys=True)
@@ -134,6 +146,8 @@ def become(request: dict, streams: list[int], client: str) -> None:
     atexit._run_exitfuncs()
     for stream in (sys.stdout, sys.stderr):
         stream.flush()
+    if "mpi4py.MPI" in sys.modules:
+        sys.modules["mpi4py.MPI"].Finalize()
     os._exit(int(code or 0))  # to free what the server has loaded takes longer than most commands
 
 

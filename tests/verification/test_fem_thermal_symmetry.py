@@ -34,7 +34,11 @@ def solved(folder: Path, symmetry: str, copper: dict, thermal: Thermal) -> tuple
     return pads, structure.solve(473.15, -5e-5, wrenches, np.zeros(len(structure.rigid_modes.names)))
 
 
-@pytest.mark.parametrize(("copper", "thermal"), [({}, Thermal()), (PLATE, MOVED)], ids=["floating", "moved, plates"])
+@pytest.mark.parametrize(
+    ("copper", "thermal"),
+    [({}, Thermal()), pytest.param(PLATE, MOVED, marks=pytest.mark.long)],
+    ids=["floating", "moved, plates"],
+)
 def test_a_quarter_stands_for_the_whole(tmp_path, copper, thermal):
     pads, quarter = solved(tmp_path, "quarter", copper, thermal)
     all_pads, whole = solved(tmp_path, "full", copper, thermal)

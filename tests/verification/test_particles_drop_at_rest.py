@@ -30,7 +30,9 @@ def test_laplace_pressure_of_a_cube_that_becomes_a_sphere():
     assert abs(metrics["volume_drift"][0]) < 1e-6
 
 
-@pytest.mark.parametrize(("receding", "advancing"), [(30.0, 60.0), (60.0, 120.0), (110.0, 130.0)])
+@pytest.mark.parametrize(
+    ("receding", "advancing"), [pytest.param(30.0, 60.0, marks=pytest.mark.long), (60.0, 120.0), (110.0, 130.0)]
+)
 def test_a_wall_with_hysteresis(receding, advancing):
     """A cube that spreads becomes the cap of the advancing angle; else its line stands between both angles."""
     angles = {"receding_angle": np.radians(receding), "advancing_angle": np.radians(advancing)}

@@ -64,7 +64,7 @@ def test_drops_that_become_one_keep_their_momentum():
     assert body.volumes @ body.velocity == pytest.approx(0.5 * body.volumes.sum() * np.array([0.3, 0.0, 0.1]))
 
 
-@pytest.mark.parametrize("radii", [(0.5e-3, 0.5e-3), (0.5e-3, 0.35e-3)])
+@pytest.mark.parametrize("radii", [pytest.param((0.5e-3, 0.5e-3), marks=pytest.mark.long), (0.5e-3, 0.35e-3)])
 def test_two_free_drops_become_one_sphere(radii):
     solder = solder_of(1e-4)
     flows = touching_balls(radii, solder)

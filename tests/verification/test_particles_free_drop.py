@@ -45,21 +45,32 @@ def check_conservation(result):
     assert np.diff(history["energy"]).max() < 0.0
 
 
-def test_second_mode_converges_in_space():
-    """Small amplitude, Ohnesorge number 0.02: second order; at 4 shells Reid's period within 0.5 %, decay within 5 %.
+def second_mode_errors(shells, decay_rate):
+    """Errors of the period at small amplitude, Ohnesorge number 0.02, with so many shells: less and less, as they must.
 
-    What the time step adds to the period, (omega dt)^2 / 3, is subtracted.
+    What the time step adds to the period, (omega dt)^2 / 3, is subtracted. The decay rate is judged with the last.
     """
     decay, period = exact(0.02)
     from_time_step = (2.0 * np.pi / 80) ** 2 / 3.0
-    shells, errors = np.array([2, 3, 4]), []
+    errors = []
     for count in shells:
         result = solve_free_drop(drop(0.02, count), amplitude=0.02, periods=1.5, steps_per_period=80)
         errors.append(abs(result.metrics["period"][0] / period - 1.0 - from_time_step))
         check_conservation(result)
     assert -np.polyfit(np.log(shells), np.log(errors), 1)[0] > 1.5, errors
-    assert errors[-1] < 5e-3
-    assert result.metrics["decay_rate"][0] == pytest.approx(decay, rel=0.05)
+    assert result.metrics["decay_rate"][0] == pytest.approx(decay, rel=decay_rate)
+    return errors
+
+
+def test_second_mode_converges_in_space():
+    """Second order. Reid's period within 0.5 %: in the next test, and with half a drop on a wall."""
+    second_mode_errors(np.array([2, 3]), 0.05)
+
+
+@pytest.mark.long
+def test_second_mode_of_four_shells():
+    """Second order, Reid's period within 0.5 %, decay within 5 %."""
+    assert second_mode_errors(np.array([2, 3, 4]), 0.05)[-1] < 5e-3
 
 
 def test_second_mode_converges_in_time():

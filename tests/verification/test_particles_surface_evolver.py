@@ -19,7 +19,7 @@ SMALLEST, *BETWEEN, LARGEST = REFERENCE["drops"]
 
 @pytest.mark.parametrize(
     "evolver",
-    [SMALLEST, *(pytest.param(row, marks=pytest.mark.long) for row in BETWEEN), LARGEST],
+    [SMALLEST, *(pytest.param(row, marks=pytest.mark.long) for row in (*BETWEEN, LARGEST))],
     ids=lambda row: f"{row['volume']}",
 )
 def test_five_volumes_on_a_pad(evolver):

@@ -28,7 +28,8 @@ def metrics(name, symmetry):
 
 
 @pytest.mark.parametrize(
-    ("scene", "symmetry"), [("uniform wall", "half"), ("uniform wall", "quarter"), ("pad", "quarter")]
+    ("scene", "symmetry"),
+    [pytest.param("uniform wall", "half", marks=pytest.mark.long), ("uniform wall", "quarter"), ("pad", "quarter")],
 )
 def test_a_part_of_a_drop_is_the_whole(scene, symmetry):
     whole, part = metrics(scene, "none"), metrics(scene, symmetry)

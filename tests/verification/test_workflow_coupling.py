@@ -46,7 +46,7 @@ def exact_height(load):
     return float(np.interp(-load, [-force(gap) for gap in gaps], gaps))
 
 
-@pytest.mark.parametrize("count", [1, 4])
+@pytest.mark.parametrize("count", [pytest.param(1, marks=pytest.mark.long), 4])
 def test_a_rigid_package_on_joints_comes_to_the_height_of_one(tmp_path, count):
     """Four joints that are alike are one reflow, and bear four times the weight at the same height."""
     load = 5e-5

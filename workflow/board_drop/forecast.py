@@ -1,6 +1,5 @@
 """Sizes, time steps and cost of a run, from its parameters alone."""
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
@@ -117,8 +116,8 @@ def step_problems(case: BoardDropCase) -> Iterator[Problem]:
     case = decided(case)
 
     with np.errstate(all="ignore"):
-        steps = [part.critical_step for part in forecast_parts(case).values() if not part.mass_scaled]
-        step = damped_critical_step(min(steps), case.shock.damping.coefficients[1]) if steps else math.inf
+        smallest = min(part.scaled_step for part in forecast_parts(case).values())
+        step = damped_critical_step(smallest, case.shock.damping.coefficients[1])
     yield from (found := list(too_many_steps("shock.duration", longest_duration(case), step, "explicit")))
     if not found and "two_scale" in case.shock.numerics.modes:
         yield from shorter_than_window(case)

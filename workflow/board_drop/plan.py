@@ -33,8 +33,8 @@ def _sizes(case: PackageCase, outlook: PackageForecast) -> Table:
     step = {name: level for level in (outlook.shock.levels if outlook.shock else ()) for name in level.parts}
     for name, part in outlook.parts.items():
         remark = f"{short(step[name].step)}, {step[name].count} per window" if name in step else ""
-        if part.mass_scaled:
-            remark += "; mass scaled to the smallest step of the others"
+        if part.scaled_step > part.critical_step:
+            remark += f"; mass scaled to a critical step of {short(part.scaled_step)}"
         table.add_row(name, f"{part.elements}", short(part.critical_step), remark)
     total = sum(part.elements for part in outlook.parts.values())
     table.add_row("all", f"{total}", "", "", style="bold")

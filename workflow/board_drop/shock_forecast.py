@@ -1,5 +1,6 @@
 """Scheme, levels, time steps and cost of a shock, from the parameters of its case alone."""
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -16,7 +17,8 @@ if TYPE_CHECKING:
 
 MACRO = "board"  # role of the parts whose elements the window follows
 BOXES = ("board", "substrate", "die")  # roles whose elements are boxes
-COLUMN = "_column"  # ends the names of parts of board and substrate around fine joints
+IN_COLUMN = "column"  # what ``shock.numerics.mass_scaled`` calls them
+COLUMN = f"_{IN_COLUMN}"  # ends the names of parts of board and substrate around fine joints
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,13 +28,13 @@ class PartForecast:
     Attributes:
         elements: its hexahedra.
         critical_step: of the smallest one [s].
-        mass_scaled: whether it follows the step of the others.
+        scaled_step: the same with its mass scaled to the step of the others [s].
         cost: of an update over that of an assembled elastic element.
     """
 
     elements: int
     critical_step: float
-    mass_scaled: bool
+    scaled_step: float
     cost: float
 
 
@@ -133,13 +135,13 @@ def _forecasts(case: "BoardDropCase", estimates: "Mapping[str, PartEstimate]") -
     from reflowshock.fem.estimates.estimate import box_critical_step
 
     scaled = case.shock.numerics.mass_scaled
+    step = {name: box_critical_step(material_of(case, name), np.array(of.smallest)) for name, of in estimates.items()}
+    heavier = {name for name in step if role_of(name) in scaled or (name.endswith(COLUMN) and IN_COLUMN in scaled)}
+    others = min((step[name] for name in step if name not in heavier), default=min(step.values()))
+    target = min(others, case.shock.numerics.mass_scaled_step or math.inf)
+    raised = step | {name: max(step[name], target) for name in heavier}
     return {
-        name: PartForecast(
-            part.elements,
-            box_critical_step(material_of(case, name), np.array(part.smallest)),
-            role_of(name) in scaled,
-            relative_cost(case, name),
-        )
+        name: PartForecast(part.elements, step[name], raised[name], relative_cost(case, name))
         for name, part in estimates.items()
     }
 
@@ -199,13 +201,12 @@ def _slow(case: "BoardDropCase", parts: Parts) -> frozenset[str]:
 
 
 def _plan(case: "BoardDropCase", parts: Parts):
-    """Return the windows of a mesh; scaled masses follow the smallest step of the others, so they do not limit it."""
+    """Return the windows of a mesh."""
     from reflowshock.fem.estimates.estimate import damped_critical_step, window_plan
 
     shock, numerics = case.shock, case.shock.numerics
     macro = min(parts[name].critical_step for name in _slow(case, parts) & parts.keys())
-    limiting = [part.critical_step for part in parts.values() if not part.mass_scaled]
-    meso = min(limiting, default=macro)
+    meso = min(part.scaled_step for part in parts.values())
     macro, meso = (damped_critical_step(step, shock.damping.coefficients[1]) for step in (macro, meso))
     return window_plan(macro, meso, numerics.step_fraction, longest_duration(case), numerics.history_samples)
 
@@ -284,8 +285,7 @@ def _levels(case: "BoardDropCase", parts: Parts, window: float) -> tuple[tuple[i
     from reflowshock.fem.estimates.estimate import BOARD_ADVANTAGE
     from reflowshock.fem.mesh.tie import Tie
 
-    scaled_to = min(part.critical_step for part in parts.values() if not part.mass_scaled)
-    steps = np.array([scaled_to if part.mass_scaled else part.critical_step for part in parts.values()])
+    steps = np.array([part.scaled_step for part in parts.values()])
     box = np.array([is_box(name) for name in parts])
     cost = np.array([part.elements * part.cost for part in parts.values()]) * np.where(box, 1.0, BOARD_ADVANTAGE)
     coupling = case.shock.coupling
@@ -304,14 +304,14 @@ def _levels(case: "BoardDropCase", parts: Parts, window: float) -> tuple[tuple[i
 def relative_cost(case: "BoardDropCase", part: str) -> float:
     """Return the cost of an element of a part over that of an elastic one: what yields or turns has a path."""
     from reflowshock.fem.estimates.estimate import UPDATES_PER_SECOND
-    from reflowshock.fem.estimates.solver_cost import COROTATIONAL_RATE, NONLINEAR_RATE
+    from reflowshock.fem.estimates.solver_cost import NONLINEAR_RATE, TURNING_BOX_RATE, TURNING_RATE
 
     numerics = case.shock.numerics
     elastic = material_of(case, part).plasticity is None
     if elastic and numerics.kinematics == "small":
         return 1.0
-    if elastic and numerics.kinematics == "corotational" and role_of(part) in BOXES and not part.endswith(COLUMN):
-        return UPDATES_PER_SECOND / COROTATIONAL_RATE
+    if elastic and numerics.kinematics == "corotational":
+        return UPDATES_PER_SECOND / (TURNING_BOX_RATE if role_of(part) in BOXES else TURNING_RATE)
     return UPDATES_PER_SECOND / NONLINEAR_RATE[numerics.formulation]
 
 

@@ -3,15 +3,13 @@
 from pathlib import Path
 from textwrap import fill
 
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
-
 from reflowshock.workflow import __version__
 from reflowshock.workflow.case.case import CASES, Case
 from reflowshock.workflow.convergence import tables
 from reflowshock.workflow.convergence.known import is_of, own_accuracy
 from reflowshock.workflow.convergence.measured import FILE, Accuracy, Measurement, read_accuracy
 from reflowshock.workflow.convergence.tables import compared, every_run, front
-from reflowshock.workflow.report.curves import STYLE, pyplot, svg
+from reflowshock.workflow.report.curves import STYLE, plain_ticks, pyplot, svg
 from reflowshock.workflow.report.template import write_page
 
 COLOURS = ("#0b5fa5", "#d1495b", "#2a7d4f", "#7a5ea8", "#e09f3e", "#5f6c7b", "#1b998b", "#8c564b")
@@ -124,21 +122,14 @@ def figure(accuracy: Accuracy):
         for axis, cost, label in zip(axes, ("seconds", "core_seconds"), ("wall time [s]", "core-seconds"), strict=True):
             axis.set(xscale="log", yscale="log", xlabel=label)
             _panel(axis, accuracy, cost)
-            _plain(axis.xaxis)
-        _plain(axes[0].yaxis)
+            plain_ticks(axis.xaxis)
+        plain_ticks(axes[0].yaxis)
         axes[0].set_ylabel(fill(f"error [%]: {accuracy.errors[accuracy.judged]}", WIDTH))
         hours = axes[1].secondary_xaxis("top", functions=(lambda s: s / 3600.0, lambda h: h * 3600.0))
         hours.set_xlabel("core-hours")
-        _plain(hours.xaxis)
+        plain_ticks(hours.xaxis)
         drawing.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=4, frameon=False)
     return drawing
-
-
-def _plain(axis) -> None:
-    """Write plain numbers, 1, 2 and 5 of each decade."""
-    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axis.set_minor_formatter(NullFormatter())
 
 
 def _panel(axis, accuracy: Accuracy, cost: str) -> None:

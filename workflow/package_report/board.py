@@ -72,7 +72,8 @@ def watch_curves(case: BoardDropCase, histories: Histories) -> str:
             courses = drop_accelerations(history, pulse, low_pass, case.watch)
             for (left, right), name in zip(axes, case.watch, strict=True):
                 left.plot(history["time"] / MILLI, history[f"displacement@{name}"][:, 2] / MILLI, **MODE_STYLE[mode])
-                left.set_ylabel(f"{name}: deflection [mm]")
+                left.set_ylabel("deflection [mm]")
+                left.set_title(name, loc="left")
                 if name in courses:
                     course = courses[name]
                     right.plot(course.time / MILLI, course.filtered / GRAVITY, **MODE_STYLE[mode])

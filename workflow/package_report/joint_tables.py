@@ -79,7 +79,7 @@ def ranked_joints(
     for column in ranked(history):
         name = str(history["joints"][column])
         forces = np.stack([history[f"section_{end}"][:, column] for end in ENDS])
-        row = int(np.argmax(measure.worse(history)[:, column]))
+        row = int(np.argmax(PEEL.worse(history)[:, column]))
         rows.append(
             [
                 name,
@@ -105,7 +105,7 @@ def ranked_joints(
         f"von Mises of the {layer} at the pad [MPa]",
         *([f"plastic work of the {layer} [kJ/m³]"] if "plastic_work_board" in history else []),
         "pad",
-        "time [ms]",
+        "time of peel stress [ms]",
         "axial force [N]",
         "bending moment [N mm]",
         "outer-fibre stress [MPa]",

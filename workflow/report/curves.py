@@ -7,6 +7,7 @@ import numpy as np
 
 matplotlib.use("Agg")
 from matplotlib import pyplot
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from reflowshock.workflow.process.terminal import visible
 from reflowshock.workflow.report.histories import joint_stress
@@ -91,12 +92,12 @@ def energy_curves(history: dict) -> str:
             if name in history and np.any(history[name]):
                 left.plot(time, history[name] / MILLI, label=name, color=color)
         left.set(xlabel="time [ms]", ylabel="energy [mJ]")
-        left.legend(frameon=False)
+        left.legend(frameon=False, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3)
         largest = max(float(np.max(np.abs(history[name]))) for name in ("external", "kinetic", "internal"))
         right.plot(time, 100.0 * history["balance"] / largest, color="#d1495b", label="balance")
         right.plot(time, 100.0 * history["interface"] / largest, color="#5f6c7b", label="interface")
         right.set(xlabel="time [ms]", ylabel="share of the largest energy [%]")
-        right.legend(frameon=False)
+        right.legend(frameon=False, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
         return svg(figure)
 
 
@@ -123,6 +124,13 @@ def _draw_histories(axes, mode: str, history: dict, critical_joint: str) -> None
     axes[1, 0].set_ylabel("largest board strain under the package [1e-3]")
     axes[1, 1].plot(time, joint_stress(history, critical_joint) / 1.0e6, **style)
     axes[1, 1].set_ylabel(f"von Mises of the layers of {critical_joint} [MPa]")
+
+
+def plain_ticks(axis) -> None:
+    """Write plain numbers at a logarithmic axis, 1, 2 and 5 of each decade: formulas are not set (``STYLE``)."""
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())
 
 
 def stacked(count: int, height: float):

@@ -56,7 +56,8 @@ def gauge_curves(histories: Histories, gauges: "Mapping[str, StrainGauge]", styl
         for axis, name in zip(axes, gauges, strict=True):
             for run, history in histories.items():
                 axis.plot(history["time"] / MILLI, history[f"gauge@{name}"] / MICRO, **styles[run])
-            axis.set_ylabel(f"strain of {name} [µm/m]")
+            axis.set_ylabel("strain [µm/m]")
+            axis.set_title(name, loc="left")
         axes[0].legend(frameon=False)
         axes[-1].set_xlabel("time [ms]")
         return svg(figure)

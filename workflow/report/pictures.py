@@ -75,6 +75,7 @@ def draw_joints(grid: pyvista.UnstructuredGrid, parts: list[str], marked: str, t
     _add_part(plotter, _of_role(grid, parts, "copper"), color="#b87333")
     board = {"color": "#9cc9a7", "show_edges": True, "edge_color": "#5d8f6b", "line_width": 0.5}
     _add_part(plotter, _of_role(grid, parts, "board_patch"), **board)
+    _add_part(plotter, _of_role(grid, parts, "board_column"), **board)
     for role, colour in (("substrate", "#c9a227"), ("die", "#5b6770")):
         outline = _of_role(grid, parts, role).extract_surface(algorithm="dataset_surface").extract_feature_edges(60)
         _add_part(plotter, outline, color=colour, line_width=3)

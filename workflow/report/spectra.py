@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib import pyplot
 
-from reflowshock.workflow.report.curves import STYLE, svg
+from reflowshock.workflow.report.curves import STYLE, plain_ticks, svg
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
 GRAVITY = 9.80665
 SAMPLES = 4000  # of an input, for its spectrum
+LOWEST = 0.1  # periods of the spectrum's lowest frequency in that time, since boards swing more slowly than the pulse
 LEAST = 20.0  # samples in a period of the spectrum's highest frequency
 
 
@@ -24,11 +25,12 @@ def spectrum_curves(pulses: "Mapping[str, Pulse]", duration: float) -> str:
 
     if not pulses:
         return ""
-    frequencies = spectrum_frequencies(1.0 / duration, SAMPLES / (LEAST * duration))
+    frequencies = spectrum_frequencies(LOWEST / duration, SAMPLES / (LEAST * duration))
     with pyplot.rc_context(STYLE):
         figure, axis = pyplot.subplots(figsize=(9.2, 2.8), constrained_layout=True)
         for name, pulse in pulses.items():
-            axis.loglog(frequencies, spectrum(pulse, duration, frequencies), label=name)
+            axis.semilogx(frequencies, spectrum(pulse, duration, frequencies), label=name)
+        plain_ticks(axis.xaxis)
         axis.set(xlabel="natural frequency [Hz]", ylabel=f"peak acceleration, Q = {QUALITY:g} [G]")
         axis.legend(frameon=False)
         return svg(figure)

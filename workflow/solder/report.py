@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib import pyplot
 
 from reflowshock.workflow.case.text import number, percent, quantity
-from reflowshock.workflow.report.curves import MICRO, MILLI, STYLE, svg
+from reflowshock.workflow.report.curves import MICRO, MILLI, STYLE, plain_ticks, svg
 from reflowshock.workflow.report.pictures import embedded, render_stages
 
 if TYPE_CHECKING:
@@ -102,6 +102,7 @@ def history_curve(history: dict) -> str:
         axes[1, 1].semilogy(step, history["time_step"] / MICRO)
         axes[1, 1].set_ylabel("time step [µs]")
         for axis in axes[1]:
+            plain_ticks(axis.yaxis)
             axis.set_xlabel("step")
         return svg(figure)
 

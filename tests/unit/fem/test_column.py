@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 
 from reflowshock.fem.division.tables import joined
-from reflowshock.fem.errors import MeshError
+from reflowshock.fem.division.whole import Treatment, survey
+from reflowshock.fem.errors import MeshError, StepError
 from reflowshock.fem.materials.library import FR4
+from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.mesh import append, boundary_facets
 from tests.support.imprinted_patch import IMPRINTED, Mesh, Problem, boxes, data_of, patch
 from tests.unit.meshing.test_column import MM, standing
@@ -104,3 +106,26 @@ def test_faces_on_a_plane_of_symmetry_are_held_there():
     column = np.unique(whole.mesh.cells[whole.mesh.in_parts("board_column@B4".__eq__)])
     assert np.sum(np.isin(held, column).all(axis=1)) == 4 * 7
     assert (np.abs(whole.mesh.points[held, 1]) < 1e-12).all()
+
+
+def test_masses_of_a_column_are_scaled_to_the_step_of_the_boxes_or_as_far_as_wanted(whole):
+    """Below the wanted step all of the column is heavier, to just that step; nothing else is."""
+    mesh, given = whole.mesh, ("column", "solder", "copper")
+    plain, full = (survey(mesh, Materials(), Treatment(mass_scaled=scaled)) for scaled in ((), given))
+    boxes = mesh.in_parts(lambda name: "@" not in name)
+    assert np.array_equal(full.factor[boxes], np.ones(boxes.sum()))
+    assert full.step.min() == pytest.approx(plain.plain_step[boxes].min(), rel=1e-12)
+    wanted = 0.5 * (plain.plain_step.min() + plain.plain_step[boxes].min())
+    some = survey(mesh, Materials(), Treatment(mass_scaled=given, scaled_step=wanted))
+    assert some.step.min() == pytest.approx(wanted, rel=1e-12)
+    assert np.array_equal(some.factor > 1.0, ~boxes & (plain.plain_step < wanted))
+    assert 0.0 < some.added_mass.sum() < full.added_mass.sum()
+
+
+def test_all_that_is_scaled_has_no_step_but_a_wanted_one(whole):
+    every = ("board", "substrate", "copper", "solder")
+    with pytest.raises(StepError, match="leaves no role to take the step from"):
+        survey(whole.mesh, Materials(), Treatment(mass_scaled=every))
+    assert survey(whole.mesh, Materials(), Treatment(mass_scaled=every, scaled_step=1e-8)).step.min() >= 1e-8 * (
+        1 - 1e-12
+    )

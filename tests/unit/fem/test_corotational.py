@@ -1,4 +1,4 @@
-"""Boxes that turn: against the linear element, against a plain twin of the formula, and as an energy."""
+"""Hexahedra that turn: against the linear element, against a plain twin of the formula, and as an energy."""
 
 from dataclasses import replace
 
@@ -7,13 +7,17 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from reflowshock.cases.hard.trials.grids import grid
-from reflowshock.fem.elements.element import Elements, element_kind, element_stiffness
+from reflowshock.fem.elements.element import Elements, element_geometry, element_kind, element_stiffness
 from reflowshock.fem.errors import InvertedElementError
 from reflowshock.fem.forces.force import force_terms
-from reflowshock.fem.forces.force_congruent import CongruentElements
-from reflowshock.fem.forces.force_corotational import CorotationalBlocks, CorotationalBoxes, corotational_term
+from reflowshock.fem.forces.force_assembled import AssembledElements
+from reflowshock.fem.forces.force_corotational import (
+    CorotationalBlocks,
+    CorotationalBoxes,
+    CorotationalHexahedra,
+    corotational_boxes,
+)
 from reflowshock.fem.forces.force_nonlinear import NonlinearElements
-from reflowshock.fem.kernels.hexahedron import CENTRE_DERIVATIVES
 from reflowshock.fem.materials.elasticity import elasticity_matrix
 from reflowshock.fem.materials.library import COPPER, FR4, SAC405
 from reflowshock.fem.model.stress_recovery import polar
@@ -33,10 +37,28 @@ def boxes(counts: tuple[int, int, int], formulation: str = "incompatible_modes",
     return Elements(points, cells[kept], material, MATERIALS, np.ones(kept.sum()), element_kind(8, formulation))
 
 
-@pytest.fixture(params=[CorotationalBoxes, CorotationalBlocks], ids=["rows", "blocks"])
-def term_of(request):
-    """Return what makes a term of either arrangement of all elements."""
-    return lambda elements: request.param.build(elements, np.arange(len(elements.cells)))
+@pytest.fixture(params=[CorotationalBoxes, CorotationalBlocks, CorotationalHexahedra], ids=["rows", "blocks", "any"])
+def kind(request):
+    """Each kind of term."""
+    return request.param
+
+
+@pytest.fixture
+def hexahedra(kind):
+    """What makes elements that a kind of term is for: boxes, or distorted ones."""
+
+    def make(counts: tuple[int, int, int], formulation: str = "incompatible_modes", share: float = 1.0) -> Elements:
+        elements = boxes(counts, formulation, share)
+        shift = 0.15 if kind is CorotationalHexahedra else 0.0
+        return replace(elements, points=elements.points + gently(elements, shift, seed=5))
+
+    return make
+
+
+@pytest.fixture
+def term_of(kind):
+    """What makes a term of all elements."""
+    return lambda elements: kind.build(elements, np.arange(len(elements.cells)))
 
 
 def force_of(term, displacement: np.ndarray) -> np.ndarray:
@@ -53,11 +75,11 @@ def turned(points: np.ndarray, displacement: np.ndarray) -> np.ndarray:
 def local_energy(elements: Elements, displacement: np.ndarray) -> float:
     """Return the sum of d . K d / 2, d the displacement seen from the frame of each element's mean rotation."""
     total = 0.0
-    for nodes, stiffness in zip(elements.cells, element_stiffness(elements), strict=True):
+    gradients = element_geometry(elements.points, elements.cells).gradient
+    for nodes, gradient, stiffness in zip(elements.cells, gradients, element_stiffness(elements), strict=True):
         start, moved = elements.points[nodes], (elements.points + displacement)[nodes]
         start, moved = start - start.mean(axis=0), moved - moved.mean(axis=0)
-        deformation = moved.T @ CENTRE_DERIVATIVES @ np.linalg.inv(start.T @ CENTRE_DERIVATIVES)
-        rotation, _ = polar(deformation[None])
+        rotation, _ = polar((moved.T @ gradient)[None])
         local = (moved @ rotation[0] - start).ravel()
         total += 0.5 * local @ stiffness @ local
     return total
@@ -69,8 +91,8 @@ def gently(elements: Elements, size: float, seed: int = 0) -> np.ndarray:
 
 @pytest.mark.parametrize("counts", [(1, 1, 1), (9, 2, 3), (2, 17, 3), (3, 2, 33), (16, 1, 1)])
 @pytest.mark.parametrize("formulation", FORMULATIONS)
-def test_energy_and_its_derivative(term_of, counts, formulation):
-    elements = boxes(counts, formulation, share=0.8)
+def test_energy_and_its_derivative(hexahedra, term_of, counts, formulation):
+    elements = hexahedra(counts, formulation, share=0.8)
     term, displacement = term_of(elements), turned(elements.points, gently(elements, 0.02))
     energy = term.energy(displacement)
     exact = local_energy(elements, displacement)
@@ -85,17 +107,17 @@ def test_energy_and_its_derivative(term_of, counts, formulation):
 
 
 @pytest.mark.parametrize("formulation", FORMULATIONS)
-def test_small_motions_are_linear_and_large_turns_are_free(term_of, formulation):
-    elements = boxes((7, 3, 2), formulation)
-    term, linear, displacement = term_of(elements), CongruentElements.build(elements), gently(elements, 1e-7)
+def test_small_motions_are_linear_and_large_turns_are_free(hexahedra, term_of, formulation):
+    elements = hexahedra((7, 3, 2), formulation)
+    term, linear, displacement = term_of(elements), AssembledElements.build(elements), gently(elements, 1e-7)
     exact = force_of(linear, displacement)
     assert np.abs(force_of(term, displacement) - exact).max() < 1e-6 * np.abs(exact).max()
     scale = np.abs(force_of(linear, gently(elements, 1.0))).max()
     assert np.abs(force_of(term, turned(elements.points, 0.0 * displacement))).max() < 1e-12 * scale
 
 
-def test_a_turned_body_has_turned_forces_without_net_force_or_moment(term_of):
-    elements = boxes((5, 4, 3))
+def test_a_turned_body_has_turned_forces_without_net_force_or_moment(hexahedra, term_of):
+    elements = hexahedra((5, 4, 3))
     term, displacement = term_of(elements), gently(elements, 0.05)
     force, other = force_of(term, displacement), force_of(term, turned(elements.points, displacement))
     scale = np.abs(force).max()
@@ -105,8 +127,8 @@ def test_a_turned_body_has_turned_forces_without_net_force_or_moment(term_of):
     assert np.abs(arms.sum(axis=0)).max() < 1e-12 * np.abs(arms).max()
 
 
-def test_error_against_finite_strain_falls_with_the_square_of_the_strain(term_of):
-    elements = boxes((4, 3, 2), "one_point")
+def test_error_against_finite_strain_falls_with_the_square_of_the_strain(hexahedra, term_of):
+    elements = hexahedra((4, 3, 2), "one_point")
     errors = []
     for size in (1e-2, 2.5e-3):
         displacement = turned(elements.points, gently(elements, size))
@@ -118,8 +140,8 @@ def test_error_against_finite_strain_falls_with_the_square_of_the_strain(term_of
     assert np.log(errors[0] / errors[1]) / np.log(4.0) > 1.8
 
 
-def test_what_is_inside_out_is_told(term_of):
-    elements = boxes((3, 2, 2))
+def test_what_is_inside_out_is_told(hexahedra, term_of):
+    elements = hexahedra((3, 2, 2))
     displacement = np.zeros_like(elements.points)
     displacement[:, 0] = -2.0 * elements.points[:, 0]
     with pytest.raises(InvertedElementError, match="turned inside out"):
@@ -132,10 +154,10 @@ def test_rows_are_for_meshes_that_have_long_ones():
     even = Elements(points, cells, np.zeros(len(cells), np.int32), MATERIALS, np.ones(len(cells)), element_kind(8))
     graded = replace(even, points=points + 0.5 * points**2 / 1e-3)
     for elements, kind in ((even, CorotationalBoxes), (graded, CorotationalBlocks)):
-        assert isinstance(corotational_term(elements, np.arange(len(cells))), kind)
+        assert isinstance(corotational_boxes(elements, np.arange(len(cells))), kind)
 
 
-def test_only_elastic_boxes_turn_without_a_path():
+def test_only_elastic_hexahedra_turn_without_a_path():
     elements = boxes((4, 3, 2), "one_point")
     materials = [FR4, SAC405]
     terms = force_terms(elements, materials, "corotational")
@@ -144,5 +166,5 @@ def test_only_elastic_boxes_turn_without_a_path():
     np.testing.assert_array_equal(np.sort(numbers), np.arange(len(elements.cells)))
     assert not np.isin(elements.material[terms[0].numbers], 1).any()
     distorted = elements.points + gently(elements, 0.1)
-    (path,) = force_terms(replace(elements, points=distorted), [FR4, COPPER], "corotational")
-    assert isinstance(path, NonlinearElements)
+    (other,) = force_terms(replace(elements, points=distorted), [FR4, COPPER], "corotational")
+    assert isinstance(other, CorotationalHexahedra)

@@ -78,7 +78,7 @@ def test_facets_lie_at_the_package(two_scale):
         assert area.sum() == pytest.approx(0.4e-3**2)
 
 
-@pytest.mark.parametrize("solver", ["explicit", "implicit"])
+@pytest.mark.parametrize("solver", ["explicit", pytest.param("implicit", marks=pytest.mark.long)])
 def test_dns_that_ends_early_is_the_beginning_of_the_whole(files, two_scale, solver):
     whole = results(files, f"{solver}", "dns", {"dns_solver": solver})
     part = results(files, f"{solver}_part", "dns", {"dns_solver": solver, "dns_duration": 4.6e-6})

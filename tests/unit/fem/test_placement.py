@@ -134,7 +134,7 @@ def model(count: int, steps: int, level: int = 0, ratios: tuple[int, ...] = ()) 
 
 
 def measured(ranks: int, box: float = 1e-7, assembled: float = 4e-7, slow: float = 1.0) -> Measured:
-    element = np.tile([box, assembled, 0.0, 0.0], (ranks, 1)) * np.array([slow] + [1.0] * (ranks - 1))[:, None]
+    element = np.tile([box, assembled, 0.0, 0.0, 0.0], (ranks, 1)) * np.array([slow] + [1.0] * (ranks - 1))[:, None]
     return Measured(StepCost(np.zeros(element.shape), element), 1e-6)
 
 

@@ -76,7 +76,7 @@ def uninterrupted():
     return solve_joint(JOINT, QUASI_STATIC)
 
 
-@pytest.mark.parametrize("end", [signal.SIGTERM, signal.SIGKILL])
+@pytest.mark.parametrize("end", [pytest.param(signal.SIGTERM, marks=pytest.mark.long), signal.SIGKILL])
 def test_a_killed_process_is_continued_to_the_last_bit(tmp_path, uninterrupted, end):
     path = tmp_path / "joint"
     discs = (str(size) for size in (JOINT.gap, JOINT.radius_board, JOINT.radius_package))

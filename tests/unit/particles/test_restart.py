@@ -81,7 +81,7 @@ def carry(checkpoint):
 
 def stand(checkpoint):
     """A drop whose contact line has hysteresis."""
-    drop = Drop(volume=1e-9, receding_angle=1.0, advancing_angle=2.2, particles_per_edge=7)
+    drop = Drop(volume=1e-9, receding_angle=1.0, advancing_angle=2.2, particles_per_edge=5)
     flow, _ = flow_to_rest(drop, SOLDER.model_copy(update={"volume": 1e-9}), checkpoint=checkpoint)
     return [flow.body.points, *(line.state for line in flow.physics.lines)]
 

@@ -47,6 +47,16 @@ def test_copper_at_its_true_mass_takes_a_level_of_its_own():
     assert shock.levels[-1].step <= 0.9 * forecast_parts(read_case(SMALL_CASE))["copper"].critical_step
 
 
+def test_scaled_masses_follow_the_step_of_the_others_or_a_wanted_one():
+    plain = forecast_parts(read_case(SMALL_CASE, ["shock.numerics.mass_scaled=[]"]))
+    scaled = forecast_parts(read_case(SMALL_CASE, ['shock.numerics.mass_scaled=["copper"]']))
+    others = min(part.critical_step for name, part in plain.items() if name != "copper")
+    assert scaled["copper"].scaled_step == others > plain["copper"].scaled_step
+    wanted = ['shock.numerics.mass_scaled=["copper"]', "shock.numerics.mass_scaled_step=6 ns"]
+    assert others > 6e-9
+    assert forecast_parts(read_case(SMALL_CASE, wanted))["copper"].scaled_step == pytest.approx(6e-9)
+
+
 def test_one_level_is_one_ratio():
     assert len(predicted("shock.numerics.mass_scaled=[]", "shock.coupling.levels=1").levels) == 2
 
