@@ -47,7 +47,7 @@ def alone() -> np.ndarray:
     return displacement[np.argsort(nodes)]
 
 
-@pytest.mark.parametrize("ranks", [2, 4])
+@pytest.mark.parametrize("ranks", [pytest.param(2, marks=pytest.mark.long), 4])
 def test_displacements_are_the_same_on_more_ranks(alone, tmp_path, ranks):
     path = tmp_path / "moved.npy"
     script = tmp_path / "script.py"

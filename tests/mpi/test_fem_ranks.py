@@ -85,12 +85,12 @@ SAME = {
     "two scales": (REFERENCE, Scene("two_scale", (1, 2))),
     "one rank carries both models": (REFERENCE, Scene("two_scale", (1, 0), "shared")),
     "two ranks carry both models": (REFERENCE, Scene("two_scale", (1, 1), "shared")),
-    "three ranks carry both models": (REFERENCE, Scene("two_scale", (1, 2), "shared")),
     "local steps": (LOCAL_STEPS, Scene("two_scale", (1, 2), "disjoint", "local_steps")),
     "local steps, both models": (LOCAL_STEPS, Scene("two_scale", (2, 2), "shared", "local_steps")),
     "one model": (Scene("dns", (1, 0), "shared"), Scene("dns", (1, 1))),
 }
 SAME_TOO = {
+    "three ranks carry both models": (REFERENCE, Scene("two_scale", (1, 2), "shared")),
     "two ranks of the board": (REFERENCE, Scene("two_scale", (2, 1))),
     "two ranks of each model": (REFERENCE, Scene("two_scale", (2, 2))),
     "four ranks carry both models": (REFERENCE, Scene("two_scale", (2, 2), "shared")),
@@ -190,6 +190,7 @@ def test_missing_mesh_ends_all_ranks(assembly):
     fails(assembly, 2, "nowhere.msh", meshes=["nowhere.msh"])
 
 
+@pytest.mark.long
 def test_joint_beside_the_board_ends_all_ranks(tmp_path):
     joints = small_assembly()[2:]
     joints[0].points[:, 0] += 9e-3

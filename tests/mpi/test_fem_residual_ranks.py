@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.support.fem_models import write_small_assembly
-from tests.support.fem_program import run_program
+from tests.support.fem_program import run_programs
 
 QUIET = 1e-6  # [m/s^2] of the pulse: what moves is what is out of balance
 SHOCK = {
@@ -20,29 +20,37 @@ SHOCK = {
 }
 
 
-def run(folder: Path, meshes: list[Path], name: str, ranks: int, **more: object) -> dict:
-    """Run the program and return its result."""
+def written(folder: Path, meshes: list[Path], name: str, ranks: int, **more: object) -> tuple[int, Path]:
+    """Return an input, after its number of ranks."""
     shock = SHOCK | {"ranks": {"total": ranks}}
     request = {"meshes": [str(path) for path in meshes], "shock": shock, "output": str(folder / name)}
     path = folder / f"{name}.json"
     path.write_text(json.dumps(request | {"materials": {"solder": "SAC405"}} | more))
-    done = run_program(path, ranks)
-    assert done.returncode == 0, done.stderr
+    return ranks, path
+
+
+def result_of(folder: Path, name: str) -> dict:
     return json.loads((folder / name / "result.json").read_text())
 
 
 @pytest.fixture(scope="module")
-def cooled(tmp_path_factory) -> tuple[Path, list[Path], dict]:
+def cooled(tmp_path_factory) -> tuple[Path, dict]:
+    """Folder of a cooling on two ranks, the same alone, and a shock that begins with it; the cooling's result."""
     folder = tmp_path_factory.mktemp("residual")
     meshes = write_small_assembly(folder)
-    return folder, meshes, run(folder, meshes, "cooling", 2, mode="cooling", change=-192.0)
+    cooling = [
+        written(folder, meshes, name, ranks, mode="cooling", change=-192.0)
+        for name, ranks in (("cooling", 2), ("alone", 1))
+    ]
+    begins = str(folder / "cooling/cooling.npz")
+    run_programs([*cooling, written(folder, meshes, "two_scale", 2, mode="two_scale", cooling=begins)])
+    return folder, result_of(folder, "cooling")
 
 
 def test_cooling_is_the_same_on_more_ranks(cooled):
-    folder, meshes, result = cooled
+    folder, result = cooled
     assert all(check["ok"] for check in result["health"].values())
     assert result["metrics"]["residual_plastic_strain"]["value"] > 1e-3
-    run(folder, meshes, "alone", 1, mode="cooling", change=-192.0)
     here, there = (np.load(folder / name / "cooling.npz")["displacement"] for name in ("cooling", "alone"))
     assert np.abs(here - there).max() < 1e-8 * np.abs(there).max()
     shown = meshio.read(folder / "cooling/residual.vtu")
@@ -51,8 +59,8 @@ def test_cooling_is_the_same_on_more_ranks(cooled):
 
 
 def test_a_coupled_shock_begins_in_balance(cooled):
-    folder, meshes, result = cooled
-    found = run(folder, meshes, "two_scale", 2, mode="two_scale", cooling=str(folder / "cooling/cooling.npz"))
+    folder, result = cooled
+    found = result_of(folder, "two_scale")
     assert found["coupling"]["scheme"] == "held_velocity"
     with np.load(folder / "two_scale/history.npz") as history:
         assert history["von_mises_package"][0] == pytest.approx(result["joints"]["von_mises_package"], rel=1e-9)

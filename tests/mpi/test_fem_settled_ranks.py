@@ -7,7 +7,7 @@ import numpy as np
 
 from reflowshock.fem.output.settled import is_settled
 from tests.support.fem_models import write_small_assembly
-from tests.support.fem_program import run_program
+from tests.support.fem_program import run_programs
 
 LONGEST = 1.2e-4
 NUMERICS = {"mass_scaled": ["copper"], "history_samples": 60, "field_samples": 3, "checkpoint_seconds": 0.02}
@@ -18,28 +18,32 @@ def pulse(time: float) -> float:
     return 1e5 * np.sin(np.pi * time / 1e-5) if time < 1e-5 else -6e4 * np.sin(np.pi * (time - 1e-5) / 2e-5)
 
 
-def run(meshes: list[Path], name: str, ranks: int, checkpoints: str) -> tuple[dict[str, np.ndarray], dict]:
-    """Return history and result of a run that ends when it has settled."""
-    output = meshes[0].parent / name
+def written(meshes: list[Path], name: str, ranks: int) -> Path:
+    """Return the input of a run that ends when it has settled, and continues what is there."""
     folder = meshes[0].parent
     table, shock = folder / "pulse.csv", {"duration": LONGEST, "numerics": NUMERICS, "ranks": {"total": ranks}}
     rows = (f"{time:.9g},{pulse(time):.9g}" for time in np.linspace(0.0, 3e-5, 61))
     table.write_text("\n".join(["time [s],acceleration [m/s^2]", *rows]))
     request = {
-        "mode": "dns", "meshes": [str(path) for path in meshes], "settles": True, "output": str(output),
-        "shock": shock | {"table": str(table)}, "checkpoints": str(folder / checkpoints),
+        "mode": "dns", "meshes": [str(path) for path in meshes], "settles": True, "output": str(folder / name),
+        "shock": shock | {"table": str(table)}, "checkpoints": str(folder / "kept"),
     }  # fmt: skip
-    path = meshes[0].parent / f"{name}.json"
+    path = folder / f"{name}.json"
     path.write_text(json.dumps(request))
-    done = run_program(path, ranks)
-    assert done.returncode == 0, done.stderr
+    return path
+
+
+def found(output: Path) -> tuple[dict[str, np.ndarray], dict]:
+    """Return history and result of a run."""
     with np.load(output / "history.npz") as arrays:
         return dict(arrays), json.loads((output / "result.json").read_text())
 
 
 def test_it_ends_at_the_same_window_after_a_restart_and_on_two_ranks(tmp_path):
     meshes = write_small_assembly(tmp_path)
-    history, result = run(meshes, "one", 1, "kept")
+    runs = {"one": 1, "again": 1, "two": 2}
+    run_programs([(ranks, written(meshes, name, ranks)) for name, ranks in runs.items()])
+    history, result = found(tmp_path / "one")
     end = history["time"][-1]
     assert end < 0.9 * LONGEST and result["metrics"]["simulated_time"]["value"] == end
     assert np.isclose(result["model"]["window"] * result["model"]["windows"], end)
@@ -47,9 +51,9 @@ def test_it_ends_at_the_same_window_after_a_restart_and_on_two_ranks(tmp_path):
     rows = history["time"].shape
     before = {name: values[:-1] for name, values in history.items() if values.shape[:1] == rows}
     assert not is_settled(before)
-    for name, ranks in (("again", 1), ("two", 2)):
-        found, other = run(meshes, name, ranks, "kept")
+    for name in ("again", "two"):
+        continued, other = found(tmp_path / name)
         assert other["continued_from"] > 0
         assert other["model"]["windows"] == result["model"]["windows"]
         scale = np.abs(history["von_mises_board"]).max()
-        assert np.abs(found["von_mises_board"] - history["von_mises_board"]).max() <= 1e-8 * scale
+        assert np.abs(continued["von_mises_board"] - history["von_mises_board"]).max() <= 1e-8 * scale

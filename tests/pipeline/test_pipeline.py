@@ -90,7 +90,7 @@ def test_plan_says_which_value_changed_and_what_reruns(first_run):
 @pytest.mark.parametrize(
     "setting",
     [
-        "shock.pulse_duration=0.01 ms",
+        pytest.param("shock.pulse_duration=0.01 ms", marks=pytest.mark.long),
         pytest.param("package.joint_numerics.layers=5", marks=pytest.mark.long),
         pytest.param("board.thickness=1.1 mm", marks=pytest.mark.long),
         "solder.gravity=0 m/s^2",

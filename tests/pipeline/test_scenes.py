@@ -69,7 +69,7 @@ def test_from_case_file_to_report(tmp_path, name, setting, own):
     ids=["free", "wall"],
 )
 def test_two_drops_from_case_file_to_report(tmp_path, place):
-    result = run("coalescence", tmp_path, "drops.spacing=0.11 mm", "gravity=off", *place)
+    result = run("coalescence", tmp_path, "drops.spacing=0.13 mm", "gravity=off", *place)
     summary = json.loads((tmp_path / "summary.json").read_text())
     assert summary["metrics"]["drops_left"]["value"] == 1
     assert abs(summary["metrics"]["volume_drift"]["value"]) < 1e-6

@@ -21,9 +21,12 @@ SAMPLES = {
     "fast": Pair(40, 10.0, 1.5),
     "thin": Pair(12, 3.0, 2, height=3, thinnest=0.2),
 }
+HARDEST = ("stiff", "curved", "fast", "thin")
 
 
-@pytest.mark.parametrize("sample", SAMPLES)
+@pytest.mark.parametrize(
+    "sample", [name if name in HARDEST else pytest.param(name, marks=pytest.mark.long) for name in SAMPLES]
+)
 @pytest.mark.parametrize("scheme", ["held_velocity", "impulse", "gravouil_combescure", "local_steps"])
 def test_window_does_not_grow(scheme, sample):
     coupled = SAMPLES[sample].coupled(SCHEMES[scheme])
@@ -42,7 +45,7 @@ def test_scheme_as_printed_grows(sample):
     assert SAMPLES[sample].printed().spectral_radius() > 1.0 + 1e-3
 
 
-@pytest.mark.parametrize("scheme", ["held_velocity", "impulse", "local_steps"])
+@pytest.mark.parametrize("scheme", ["held_velocity", pytest.param("impulse", marks=pytest.mark.long), "local_steps"])
 def test_energy_does_not_drift_over_many_windows(scheme):
     """1e4 windows after the push, no damping; benchmarks/coupling_stability.py takes 1e5."""
     coupled = Pair(3, 3.0, 2, layers=3).coupled(SCHEMES[scheme])

@@ -81,7 +81,7 @@ def write_whole(folder, the_package, the_board, warpage):
 @pytest.mark.parametrize(
     "changes",
     [
-        {"rows": 1, "columns": 1},
+        pytest.param({"rows": 1, "columns": 1}, marks=pytest.mark.long),
         {"rows": 3, "columns": 3, "depopulated": ("B2",)},
         {"rows": 1, "columns": 4, "joint_numerics": {"layers": 2}},
     ],
