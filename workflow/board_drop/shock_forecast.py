@@ -143,7 +143,9 @@ def _forecasts(case: "BoardDropCase", estimates: "Mapping[str, PartEstimate]") -
     target = min(others, case.shock.numerics.mass_scaled_step or math.inf)
     raised = step | {name: max(step[name], target) for name in heavier}
     return {
-        name: PartForecast(part.elements, step[name], raised[name], relative_cost(case, name), is_linear_part(case, name))
+        name: PartForecast(
+            part.elements, step[name], raised[name], relative_cost(case, name), is_linear_part(case, name)
+        )
         for name, part in estimates.items()
     }
 
