@@ -5,7 +5,8 @@
 All act on a cube of 40^3 hexahedra, sides in turns, medians of processor seconds. dolfinx assembles the plain trilinear
 form of linear elasticity with 2 x 2 x 2 Gauss points and the best flags of its compiler; ours have incompatible modes,
 which do not lock in bending: equal work for a user, not equal numbers.
-- ``congruent`` knows that the elements are boxes of one shape; ``turning`` are the same in corotational kinematics.
+- ``congruent`` knows that the elements are boxes of one shape; ``turning`` are the same in corotational kinematics,
+  ``turning_any`` elements of any shape.
 - ``assembled`` and ``petsc_baij`` multiply by the matrix of a cube whose inner nodes were moved by up to 20 % of an
   edge.
 - ``yielding`` returns to the yield surface of a rate-dependent solder at nearly every point in every call, at a strain
@@ -39,7 +40,7 @@ from reflowshock.fem.mesh.mesh import MeshData
 
 KINDS = ("incompatible_modes", "one_point")
 PLASTIC = [f"{name}_{kind}_small" for name in ("below_yield", "yielding") for kind in KINDS]
-BARS = {"congruent": 8.0, "assembled": 4.0} | dict.fromkeys(PLASTIC, 1.5)
+BARS = {"congruent": 8.0, "assembled": 4.0, "turning": 8.0, "turning_any": 4.0} | dict.fromkeys(PLASTIC, 1.5)
 BYTES = {"congruent": 400.0, "assembled": 2000.0}
 STRAINS = {"below_yield": 1e-5, "yielding": 1e-2}
 STEP, RATE = 1e-8, 100.0  # [s], [1/s]
@@ -60,7 +61,7 @@ def linear(elements: Elements) -> Callable[[], object]:
 
 
 def turning(elements: Elements) -> Callable[[], object]:
-    """Return a call of the force of elastic boxes that are strained by 1e-3 and turned by 0.1."""
+    """Return a call of the force of elastic hexahedra that are strained by 1e-3 and turned by 0.1."""
     (term,) = force_terms(elements, [STEEL], "corotational")
     turn = np.array([[np.cos(0.1), -np.sin(0.1), 0.0], [np.sin(0.1), np.cos(0.1), 0.0], [0.0, 0.0, 1.0]])
     moved = elements.points + random_displacement(elements.points, 1e-3)
@@ -150,7 +151,7 @@ def sides() -> tuple[dict[str, Callable[[], object]], dict[str, int]]:
     }
     plastic_elements = {kind: elements_of(boxes, kind, SOLDER) for kind in KINDS}
     works = {name: linear(elements) for name, elements in linear_elements.items()}
-    works["turning"] = turning(linear_elements["congruent"])
+    works |= {"turning": turning(linear_elements["congruent"]), "turning_any": turning(linear_elements["assembled"])}
     counts = {name: len(elements.cells) for name, elements in linear_elements.items()}
     for kind, elements in plastic_elements.items():
         for kinematics in ("small", "finite"):
