@@ -85,12 +85,12 @@ SAME = {
     "two scales": (REFERENCE, Scene("two_scale", (1, 2))),
     "one rank carries both models": (REFERENCE, Scene("two_scale", (1, 0), "shared")),
     "two ranks carry both models": (REFERENCE, Scene("two_scale", (1, 1), "shared")),
-    "three ranks carry both models": (REFERENCE, Scene("two_scale", (1, 2), "shared")),
     "local steps": (LOCAL_STEPS, Scene("two_scale", (1, 2), "disjoint", "local_steps")),
     "local steps, both models": (LOCAL_STEPS, Scene("two_scale", (2, 2), "shared", "local_steps")),
     "one model": (Scene("dns", (1, 0), "shared"), Scene("dns", (1, 1))),
 }
 SAME_TOO = {
+    "three ranks carry both models": (REFERENCE, Scene("two_scale", (1, 2), "shared")),
     "two ranks of the board": (REFERENCE, Scene("two_scale", (2, 1))),
     "two ranks of each model": (REFERENCE, Scene("two_scale", (2, 2))),
     "four ranks carry both models": (REFERENCE, Scene("two_scale", (2, 2), "shared")),

@@ -17,6 +17,7 @@ from reflowshock.workflow.stages import stage_function
 from reflowshock.workflow.store.folders import locked
 from reflowshock.workflow.store.store import Store
 from reflowshock.workflow.study.command import read_points_of, run_study
+from tests.support.warm_start import warm_python
 from tests.support.workflow_command import wait_until
 
 CASE = Path(__file__).resolve().parents[2] / "cases" / "sessile_drop" / "case.toml"
@@ -32,7 +33,7 @@ def untimed(record: dict) -> dict:
     return {name: value for name, value in record["metrics"].items() if name not in TIMES}
 
 
-def test_a_study_is_computed_once_and_survives_a_kill(tmp_path):
+def test_a_study_is_computed_once_and_survives_a_kill(tmp_path, monkeypatch):
     path, store = tmp_path / "study.toml", Store(tmp_path / "store")
     path.write_text(STUDY)
     study = read_points_of(path)
@@ -44,6 +45,7 @@ def test_a_study_is_computed_once_and_survives_a_kill(tmp_path):
     process.send_signal(signal.SIGKILL)
     assert psutil.wait_procs([process, *children], timeout=60)[1] == []
 
+    monkeypatch.setattr(sys, "executable", warm_python())
     kept = reflow.stat().st_mtime_ns
     assert not run_study(study, store, Machine(cores=2))
     assert reflow.stat().st_mtime_ns == kept

@@ -50,7 +50,7 @@ def test_both_solvers_of_a_board_from_case_file_to_report(tmp_path):
     assert "references.first_mode.at_most: 350 Hz -> 300 Hz" in plan
 
 
-@pytest.mark.parametrize("name", SHORT)
+@pytest.mark.parametrize("name", ["cantilever", pytest.param("bar_wave", marks=pytest.mark.long)])
 def test_motion_against_its_exact_solution(name, tmp_path):
     result = command("run", name, tmp_path, *SHORT[name], until="comparison")
     assert result.returncode == 0, result.stdout + result.stderr

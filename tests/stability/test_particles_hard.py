@@ -35,7 +35,7 @@ def test_a_film_and_a_ball_that_hardly_touches(degrees, count):
     check(flow, run, sessile_meridian(VOLUME, angle, GAMMA), 0.015)
 
 
-@pytest.mark.parametrize("degrees", [60.0, 120.0])
+@pytest.mark.parametrize("degrees", [pytest.param(60.0, marks=pytest.mark.long), 120.0])
 def test_bond_number_five(degrees):
     angle, gravity = np.radians(degrees), 5.0 * GAMMA / (DENSITY * VOLUME ** (2 / 3))
     flow, run = solve_drop(Solder(volume=VOLUME, pad_contact_angle=angle, gravity=gravity, numerics=NUMERICS), 7)

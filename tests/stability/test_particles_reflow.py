@@ -110,7 +110,8 @@ def test_inertia_never_gains_energy(properties):
     assert energy[-1] == pytest.approx(energy.min(), rel=1e-4)
 
 
-@pytest.mark.parametrize("degrees", [pytest.param(30, marks=pytest.mark.long), 148])
+@pytest.mark.long
+@pytest.mark.parametrize("degrees", [30, 148])
 def test_extreme_contact_angles(degrees):
     """A cube that spreads to a film of a third of its height, and one that almost rolls off its wall."""
     numerics = SolderNumerics(time_step_limit=100)
