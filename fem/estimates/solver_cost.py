@@ -32,7 +32,7 @@ NONLINEAR_RATE = {
     "tetrahedron": 1.3e7,
     "tetrahedron_quadratic": 4.5e6,
 }
-TURNING_BOX_RATE, TURNING_RATE = 1.4e7, 1.2e7  # elastic and corotational: boxes of graded meshes, any hexahedra
+TURNING_BOX_RATE, TURNING_RATE = 2.0e7, 1.2e7  # elastic and corotational: boxes of graded meshes, any hexahedra
 FACTOR_RATE = 3.0e9  # operations per second of the factorisation
 SOLVE_RATE = 6.0e8  # entries of the factor per second of a solution
 ASSEMBLY_SECONDS = 2.0e-5  # [s] an equation

@@ -45,27 +45,32 @@ X, Y, Z, XY, XZ, YZ, XYZ = (3 * LANES * p for p in (1, 2, 4, 3, 5, 6, 7))  # slo
 
 @njit(**LANE_OPTIONS)
 def read_modes(faces, start, w):
-    """Write the modes of sixteen boxes of a row from the face values ``(3, 4, COLUMNS)`` at its nodes."""
-    for c in range(3):
-        for k in range(4):
-            values = faces[c, k, FIRST + start : FIRST + start + LANES + 1]
-            even, odd = w[LANES * (6 * k + c) :], w[LANES * (6 * k + 3 + c) :]
-            for lane in range(LANES):
-                even[lane] = values[lane] + values[lane + 1]
-                odd[lane] = values[lane] - values[lane + 1]
+    """Write the modes of sixteen boxes of a row from the face values ``(12 * WIDTH,)`` at its nodes."""
+    for k in range(4):
+        values, modes = faces[k * WIDTH + FIRST + start :], w[6 * LANES * k :]
+        for lane in range(LANES):
+            a, b = values[lane], values[lane + 1]
+            c, d = values[4 * WIDTH + lane], values[4 * WIDTH + lane + 1]
+            e, f = values[8 * WIDTH + lane], values[8 * WIDTH + lane + 1]
+            put_three(modes, lane, (a + b, c + d, e + f))
+            put_three(modes, 3 * LANES + lane, (a - b, c - d, e - f))
 
 
 @njit(**LANE_OPTIONS)
 def add_faces(w, start, count, faces):
     """Add the forces of the first ``count`` boxes to the face values at a row's nodes."""
-    for c in range(3):
-        for k in range(4):
-            values = faces[c, k, FIRST + start : FIRST + start + LANES + 1]
-            even, odd = w[LANES * (6 * k + c) :], w[LANES * (6 * k + 3 + c) :]
-            for lane in range(count):
-                values[lane] += even[lane] + odd[lane]
-            for lane in range(count):
-                values[lane + 1] += even[lane] - odd[lane]
+    for k in range(4):
+        values, modes = faces[k * WIDTH + FIRST + start :], w[6 * LANES * k :]
+        for lane in range(count):
+            a, b = three(modes, lane), three(modes, 3 * LANES + lane)
+            values[lane] += a[0] + b[0]
+            values[4 * WIDTH + lane] += a[1] + b[1]
+            values[8 * WIDTH + lane] += a[2] + b[2]
+        for lane in range(count):
+            a, b = three(modes, lane), three(modes, 3 * LANES + lane)
+            values[lane + 1] += a[0] - b[0]
+            values[4 * WIDTH + lane + 1] += a[1] - b[1]
+            values[8 * WIDTH + lane + 1] += a[2] - b[2]
 
 
 @njit(**LANE_OPTIONS)
@@ -84,29 +89,16 @@ def transform_corners(w):
 
 
 @njit(**LANE_OPTIONS)
-def deformation(w, lane, scale):
-    """Write F of a lane; ``scale`` (3) [1/m] turns modes into gradients, -1 / (4 h) along each direction."""
-    x, y, z = three(w, X + lane), three(w, Y + lane), three(w, Z + lane)
-    f = (
-        1.0 + scale[0] * x[0], scale[1] * y[0], scale[2] * z[0],
-        scale[0] * x[1], 1.0 + scale[1] * y[1], scale[2] * z[1],
-        scale[0] * x[2], scale[1] * y[2], 1.0 + scale[2] * z[2],
-    )  # fmt: skip
-    put_nine(w, DEFORMATION + lane, f)
-
-
-@njit(**LANE_OPTIONS)
-def write_deformation(w, scale):
-    """Write F of sixteen equal boxes."""
+def write_deformation(k, w):
+    """Write F of sixteen boxes; the scales in ``k`` turn modes into gradients, -1 / (4 h) along each direction."""
     for lane in range(LANES):
-        deformation(w, lane, scale)
-
-
-@njit(**LANE_OPTIONS)
-def write_own_deformation(w, k):
-    """Write F of sixteen boxes; ``k (480,)`` as in ``add_turned_block_forces``."""
-    for lane in range(LANES):
-        deformation(w, lane, three(k, SCALE + lane))
+        scale, x, y, z = three(k, SCALE + lane), three(w, X + lane), three(w, Y + lane), three(w, Z + lane)
+        f = (
+            1.0 + scale[0] * x[0], scale[1] * y[0], scale[2] * z[0],
+            scale[0] * x[1], 1.0 + scale[1] * y[1], scale[2] * z[1],
+            scale[0] * x[2], scale[1] * y[2], 1.0 + scale[2] * z[2],
+        )  # fmt: skip
+        put_nine(w, DEFORMATION + lane, f)
 
 
 @njit(**LANE_OPTIONS)
@@ -154,47 +146,82 @@ def spin(u, moment):
 
 
 @njit(**LANE_OPTIONS)
-def turned_forces(w, lane, scale, k):
-    """Replace the modes of a lane by the forces on them, given F and R."""
-    r = nine(w, ROTATION + lane)
-    back = transposed(r)
-    u = stretch(r, nine(w, DEFORMATION + lane))
-    t = full(stress(k, u))
-    a, b = applied(back, three(w, XY + lane)), applied(back, three(w, XZ + lane))
-    c, d = applied(back, three(w, YZ + lane)), applied(back, three(w, XYZ + lane))
-    fa, fb, fc, fd = resistance(k, a, b, c, d)
-    m = times(t, full(u))
-    moment = add_cross(add_cross((m[7] - m[5], m[2] - m[6], m[3] - m[1]), a, fa), b, fb)
-    x, y, z = spin(u, add_cross(add_cross(moment, c, fc), d, fd))
-    p = times(r, (t[0], t[1] + z, t[2] - y, t[3] - z, t[4], t[5] + x, t[6] + y, t[7] - x, t[8]))
-    put_three(w, X + lane, (scale[0] * p[0], scale[0] * p[3], scale[0] * p[6]))
-    put_three(w, Y + lane, (scale[1] * p[1], scale[1] * p[4], scale[1] * p[7]))
-    put_three(w, Z + lane, (scale[2] * p[2], scale[2] * p[5], scale[2] * p[8]))
-    put_three(w, XY + lane, applied(r, fa))
-    put_three(w, XZ + lane, applied(r, fb))
-    put_three(w, YZ + lane, applied(r, fc))
-    put_three(w, XYZ + lane, applied(r, fd))
-    put_three(w, lane, (0.0, 0.0, 0.0))
+def resist(k, w):
+    """Replace the higher modes of sixteen boxes by Q^, and write their moments to the slots of mode 0, given R."""
+    for lane in range(LANES):
+        back = transposed(nine(w, ROTATION + lane))
+        a, b = applied(back, three(w, XY + lane)), applied(back, three(w, XZ + lane))
+        c, d = applied(back, three(w, YZ + lane)), applied(back, three(w, XYZ + lane))
+        fa, fb, fc, fd = resistance(own_constants(k, lane), a, b, c, d)
+        moment = add_cross(add_cross((0.0, 0.0, 0.0), a, fa), b, fb)
+        put_three(w, lane, add_cross(add_cross(moment, c, fc), d, fd))
+        put_three(w, XY + lane, fa)
+        put_three(w, XZ + lane, fb)
+        put_three(w, YZ + lane, fc)
+        put_three(w, XYZ + lane, fd)
 
 
 @njit(**LANE_OPTIONS)
-def replace_by_forces(w, scale, k):
-    """Replace the modes of sixteen equal boxes by the forces on them, given F and R."""
+def write_stress(k, w):
+    """Replace F of sixteen boxes by P, given R and the moments of their higher modes."""
     for lane in range(LANES):
-        turned_forces(w, lane, scale, k)
+        r, higher = nine(w, ROTATION + lane), three(w, lane)
+        u = stretch(r, nine(w, DEFORMATION + lane))
+        t = full(stress(nine(k, lane), u))
+        m = times(t, full(u))
+        x, y, z = spin(u, (m[7] - m[5] + higher[0], m[2] - m[6] + higher[1], m[3] - m[1] + higher[2]))
+        p = times(r, (t[0], t[1] + z, t[2] - y, t[3] - z, t[4], t[5] + x, t[6] + y, t[7] - x, t[8]))
+        put_nine(w, DEFORMATION + lane, p)
 
 
 @njit(**LANE_OPTIONS)
-def replace_by_own_forces(w, k):
-    """Replace the modes of sixteen boxes by the forces on them; ``k (480,)`` as in ``add_turned_block_forces``."""
+def write_linear_forces(k, w):
+    """Write the forces on the constant and linear modes of sixteen boxes, given P."""
     for lane in range(LANES):
-        turned_forces(w, lane, three(k, SCALE + lane), own_constants(k, lane))
+        p, scale = nine(w, DEFORMATION + lane), three(k, SCALE + lane)
+        put_three(w, lane, (0.0, 0.0, 0.0))
+        put_three(w, X + lane, (scale[0] * p[0], scale[0] * p[3], scale[0] * p[6]))
+        put_three(w, Y + lane, (scale[1] * p[1], scale[1] * p[4], scale[1] * p[7]))
+        put_three(w, Z + lane, (scale[2] * p[2], scale[2] * p[5], scale[2] * p[8]))
+
+
+@njit(**LANE_OPTIONS)
+def turn_higher(w):
+    """Turn Q^ of sixteen boxes."""
+    for lane in range(LANES):
+        r = nine(w, ROTATION + lane)
+        put_three(w, XY + lane, applied(r, three(w, XY + lane)))
+        put_three(w, XZ + lane, applied(r, three(w, XZ + lane)))
+        put_three(w, YZ + lane, applied(r, three(w, YZ + lane)))
+        put_three(w, XYZ + lane, applied(r, three(w, XYZ + lane)))
+
+
+@njit(cache=True)
+def replace_by_forces(k, w):
+    """Replace the modes of sixteen boxes by the forces on them, given F and R; ``k (480,)`` as in ``spread_shape``.
+
+    In several short loops that are written out: with too many accesses, or calls too large to be inlined, the compiler
+    makes no vectors of them, and the force takes three times as long.
+    """
+    resist(k, w)
+    write_stress(k, w)
+    write_linear_forces(k, w)
+    turn_higher(w)
 
 
 @njit(**LANE_OPTIONS)
 def own_constants(k, lane):
     """Return the 27 constants of a lane."""
     return nine(k, lane) + nine(k, 9 * LANES + lane) + nine(k, 18 * LANES + lane)
+
+
+@njit(cache=True)
+def spread_shape(constants, scale, k):
+    """Give sixteen lanes ``k (480,)`` the constants (27) and scales (3) of one shape."""
+    for i in range(27):
+        k[LANES * i : LANES * (i + 1)] = constants[i]
+    for i in range(3):
+        k[SCALE + LANES * i : SCALE + LANES * (i + 1)] = scale[i]
 
 
 @njit(cache=True)
@@ -236,19 +263,21 @@ def add_turned_row_forces(rows, scales, constants, displacement, force):
         ``UPRIGHT``, or the first row with a box that is turned inside out; then the force is not complete.
     """
     faces, forces, w = np.zeros((3, 4, WIDTH)), np.zeros((3, 4, WIDTH)), np.zeros(TURNED_SLOTS)
+    k = np.empty(SCALE + 3 * LANES)
     for r in range(len(rows)):
         starts, count, shape = rows[r, :4], rows[r, 4], rows[r, 5]
+        spread_shape(constants[shape], scales[shape], k)
         for c in range(3):
             transform_lines(displacement[c], starts, count + 1, faces[c])
         forces[:, :, FIRST : FIRST + count + 1] = 0.0
         for start in range(0, count, LANES):
-            read_modes(faces, start, w)
+            read_modes(faces.reshape(-1), start, w)
             repeat_last(w, count - start)
-            write_deformation(w, scales[shape])
+            write_deformation(k, w)
             if not rotate(w[DEFORMATION:]):
                 return r
-            replace_by_forces(w, scales[shape], constants[shape])
-            add_faces(w, start, min(LANES, count - start), forces)
+            replace_by_forces(k, w)
+            add_faces(w, start, min(LANES, count - start), forces.reshape(-1))
         for c in range(3):
             add_transform(forces[c], starts, count + 1, force[c])
     return UPRIGHT
@@ -257,16 +286,17 @@ def add_turned_row_forces(rows, scales, constants, displacement, force):
 @njit(cache=True)
 def row_energies(rows, scales, constants, displacement):
     """Return the energies [J] of the mean strains and of the higher modes; arguments as above, no box inside out."""
-    faces, w = np.zeros((3, 4, WIDTH)), np.zeros(TURNED_SLOTS)
+    faces, w, k = np.zeros((3, 4, WIDTH)), np.zeros(TURNED_SLOTS), np.empty(SCALE + 3 * LANES)
     mean = higher = 0.0
     for r in range(len(rows)):
         starts, count, shape = rows[r, :4], rows[r, 4], rows[r, 5]
+        spread_shape(constants[shape], scales[shape], k)
         for c in range(3):
             transform_lines(displacement[c], starts, count + 1, faces[c])
         for start in range(0, count, LANES):
-            read_modes(faces, start, w)
+            read_modes(faces.reshape(-1), start, w)
             repeat_last(w, count - start)
-            write_deformation(w, scales[shape])
+            write_deformation(k, w)
             rotate(w[DEFORMATION:])
             for lane in range(min(LANES, count - start)):
                 energies = box_energies(w, lane, constants[shape])
@@ -294,10 +324,10 @@ def add_turned_block_forces(cells, filled, constants, displacement, force):
     for b in range(len(cells)):
         gather_lanes(cells[b], displacement, w)
         transform_corners(w)
-        write_own_deformation(w, constants[b])
+        write_deformation(constants[b], w)
         if not rotate(w[DEFORMATION:]):
             return b
-        replace_by_own_forces(w, constants[b])
+        replace_by_forces(constants[b], w)
         transform_corners(w)
         scatter_lanes(cells[b], filled[b], w, force)
     return UPRIGHT
@@ -311,7 +341,7 @@ def block_energies(cells, filled, constants, displacement):
     for b in range(len(cells)):
         gather_lanes(cells[b], displacement, w)
         transform_corners(w)
-        write_own_deformation(w, constants[b])
+        write_deformation(constants[b], w)
         rotate(w[DEFORMATION:])
         for lane in range(filled[b]):
             energies = box_energies(w, lane, own_constants(constants[b], lane))

@@ -30,12 +30,14 @@ class PartForecast:
         critical_step: of the smallest one [s].
         scaled_step: the same with its mass scaled to the step of the others [s].
         cost: of an update over that of an assembled elastic element.
+        linear: whether its force is linear in the displacement.
     """
 
     elements: int
     critical_step: float
     scaled_step: float
     cost: float
+    linear: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,7 +143,9 @@ def _forecasts(case: "BoardDropCase", estimates: "Mapping[str, PartEstimate]") -
     target = min(others, case.shock.numerics.mass_scaled_step or math.inf)
     raised = step | {name: max(step[name], target) for name in heavier}
     return {
-        name: PartForecast(part.elements, step[name], raised[name], relative_cost(case, name))
+        name: PartForecast(
+            part.elements, step[name], raised[name], relative_cost(case, name), is_linear_part(case, name)
+        )
         for name, part in estimates.items()
     }
 
@@ -190,8 +194,8 @@ def implicit_seconds(case: "BoardDropCase") -> float | None:
 
 
 def is_linear(parts: Parts) -> bool:
-    """Whether no element has a path."""
-    return all(part.cost == 1.0 for part in parts.values())
+    """Whether the forces of all elements are linear."""
+    return all(part.linear for part in parts.values())
 
 
 def _slow(case: "BoardDropCase", parts: Parts) -> frozenset[str]:
@@ -232,14 +236,21 @@ def _direct(case: "BoardDropCase", parts: Parts):
     """Return windows and seconds of a DNS."""
     from reflowshock.fem.estimates.estimate import predict_seconds
 
-    plan, board = _plan(case, parts), parts[MACRO].elements
+    plan, board = _plan(case, parts), _in_boxes(MACRO, parts[MACRO])
     work = sum(part.elements * part.cost for name, part in parts.items() if name != MACRO)
     return plan, predict_seconds(board, [(work, plan.substeps)], plan, case.shock.ranks)[1]
 
 
+def _in_boxes(name: str, part: PartForecast) -> float:
+    """Return the cost of an update of a part's elements in that of linear boxes of a board."""
+    from reflowshock.fem.estimates.estimate import BOARD_ADVANTAGE
+
+    return part.elements * (1.0 if is_box(name) and part.linear else BOARD_ADVANTAGE * part.cost)
+
+
 def _coupled(case: "BoardDropCase", parts: Parts) -> tuple[tuple[str, str], tuple[LevelForecast, ...], float]:
     """Return scheme, levels and seconds of a two-scale run."""
-    from reflowshock.fem.estimates.estimate import BOARD_ADVANTAGE, predict_seconds
+    from reflowshock.fem.estimates.estimate import predict_seconds
 
     plan, scheme = _plan(case, parts), forecast_scheme(case, parts)
     if scheme[0] == "local_steps":
@@ -254,7 +265,7 @@ def _coupled(case: "BoardDropCase", parts: Parts) -> tuple[tuple[str, str], tupl
         cost = sum(part.elements * part.cost for part in here.values())
         levels.append(LevelForecast(tuple(here), plan.window / count, count, elements, cost))
     work = [(level.cost, level.count) for level in levels[1:]]
-    boxes = sum(parts[name].elements * (1.0 if is_box(name) else BOARD_ADVANTAGE) for name in levels[0].parts)
+    boxes = sum(_in_boxes(name, parts[name]) for name in levels[0].parts)
     return scheme, tuple(levels), predict_seconds(boxes, work, plan, case.shock.ranks)[0]
 
 
@@ -302,17 +313,21 @@ def _levels(case: "BoardDropCase", parts: Parts, window: float) -> tuple[tuple[i
 
 
 def relative_cost(case: "BoardDropCase", part: str) -> float:
-    """Return the cost of an element of a part over that of an elastic one: what yields or turns has a path."""
+    """Return the cost of an element of a part over that of a linear one."""
     from reflowshock.fem.estimates.estimate import UPDATES_PER_SECOND
     from reflowshock.fem.estimates.solver_cost import NONLINEAR_RATE, TURNING_BOX_RATE, TURNING_RATE
 
     numerics = case.shock.numerics
-    elastic = material_of(case, part).plasticity is None
-    if elastic and numerics.kinematics == "small":
+    if is_linear_part(case, part):
         return 1.0
-    if elastic and numerics.kinematics == "corotational":
+    if material_of(case, part).plasticity is None and numerics.kinematics == "corotational":
         return UPDATES_PER_SECOND / (TURNING_BOX_RATE if role_of(part) in BOXES else TURNING_RATE)
     return UPDATES_PER_SECOND / NONLINEAR_RATE[numerics.formulation]
+
+
+def is_linear_part(case: "BoardDropCase", part: str) -> bool:
+    """Whether elements of a part neither yield nor turn."""
+    return case.shock.numerics.kinematics == "small" and material_of(case, part).plasticity is None
 
 
 def role_of(part: str) -> str:

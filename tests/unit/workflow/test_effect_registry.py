@@ -14,6 +14,7 @@ from reflowshock.fem.estimates.drop_effects import (
     called_for,
     stiffened,
 )
+from reflowshock.fem.problem.structure import KINDS
 from reflowshock.workflow.board_drop.board_deflection import decided
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.cli import app
@@ -26,7 +27,7 @@ from tests.support.workflow_command import SMALL_CASE
 
 CASES = Path(__file__).parents[3] / "cases"
 FILES = [*sorted(CASES.glob("*/case.toml")), SMALL_CASE]
-LOADS = {"input_g", "pressure", "prescribed_motion", "point_force", "initial_velocity"}
+LOADS = {"input_g", "initial_velocity", *(kind.effect for kind in KINDS)}
 METHOD = {*LOADS, "hourglass_stiffness"}  # and the formulation
 SLOW = "shock.peak_acceleration=2 G"
 HEATED = CASES / "hu_bga_drop/case.toml"
@@ -77,7 +78,7 @@ def test_every_effect_of_a_plan_is_in_the_registry(path):
 def test_what_yields_turns_or_is_fine_costs_and_what_is_coarse_saves():
     case = read_case(CASES / "bga_drop/case.toml", (), True)
     shares = cost_shares(case, kind_of(case).forecast(case).effects)
-    assert shares["finite_rotation"] > 1.0 and shares["plasticity"] > 1.0
+    assert shares["finite_rotation"] > 0.1 and shares["plasticity"] > 1.0
     assert shares["mass_scaling"] < 0.0 < shares["identical_joints"]
     assert 0.0 < shares["gravity_in_the_shock"] < 0.1
     assert set(measured()) - {"damping_stiffness"} <= set(registry())
