@@ -131,12 +131,16 @@ def check_neighbours(corners: NDArray[np.float64], column: NDArray[np.str_]) -> 
     Raises:
         MeshError: Columns side by side do not share the nodes of their common face.
     """
+    centre = corners.mean(axis=1)
     for name in np.unique(column):
         own = column == name
-        if own.all() or not (met := touch(corners[own], corners[~own])).any():
+        low, high = corners[own].min(axis=(0, 1)), corners[own].max(axis=(0, 1))
+        slack = TOLERANCE * (high - low).max()
+        near = ~own & ((centre > low - slack) & (centre < high + slack)).all(axis=1)
+        if not near.any() or not (met := touch(corners[own], corners[near])).any():
             continue
-        middle = corners[own][met][:1].mean(axis=1)
-        other = column[~own][closest_facets(middle, corners[~own])[0][0]]
+        middle = centre[own][met][:1]
+        other = column[near][closest_facets(middle, corners[near])[0][0]]
         first, second = (some.partition("@")[2] for some in (name, other))
         raise MeshError(
             f"the columns of {first} and {second} touch with {np.sum(met)} faces that do not fit together, near"

@@ -19,6 +19,7 @@ CORNERS = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 TOLERANCE = 0.02  # of the facet's size: distance of a slave from its facet
 CANDIDATES = 9  # facets whose centres are nearest: a node and all its neighbours on a structured face
 NEWTON_STEPS = 12
+SINGULAR = 1e-9  # of the trace: where the sides of a trapezium meet, far outside it, no step is determined
 EXACT = 1e-12
 
 
@@ -148,6 +149,7 @@ def project(
         residual = points - np.einsum("ma,mai->mi", bilinear(xi), corners)
         tangent = np.einsum("mad,mai->mid", bilinear_derivatives(xi), corners)
         normal = np.einsum("mid,mie->mde", tangent, tangent)
+        normal += SINGULAR * np.trace(normal, axis1=1, axis2=2)[:, None, None] * np.eye(2)
         step = np.linalg.solve(normal, np.einsum("mid,mi->md", tangent, residual)[:, :, None])[:, :, 0]
         xi = np.clip(xi + step, -3.0, 3.0)  # far candidates need no answer, only a finite one
     xi = np.clip(xi, -1.0, 1.0)

@@ -28,6 +28,14 @@ def test_point_off_a_facet_has_its_distance():
     assert facet.tolist() == [0, 0]
 
 
+def test_a_point_where_the_sides_of_a_trapezium_meet_has_its_distance():
+    """There the bilinear map has no inverse."""
+    trapezium = np.array([[[0.0, -1, 0], [2, -2, 0], [2, 2, 0], [0, 1, 0]]])
+    _, xi, distance = closest_facets(np.array([[-2.0, 0.0, 0.0], [-9.0, 0.0, 0.0]]), np.repeat(trapezium, 2, axis=0))
+    assert distance == pytest.approx([2.0, 9.0])
+    assert xi[:, 0] == pytest.approx(-1.0)
+
+
 def test_linear_fields_and_net_forces_carry_over_exactly():
     mesh, tie, moved = tie_joints(append(small_assembly()))
     assert moved < 1e-15
