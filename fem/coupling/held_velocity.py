@@ -151,23 +151,24 @@ class Driven(Continued):
 
         Inside the window the interface falls as all else does, and ends where the macro model's is.
         """
-        motion, count = self.motion, self.plan.substeps
+        motion, counted = self.motion, self._counted
         self._channels.velocities.receive(motion.velocity)
-        given, impulse = motion.velocity[self._interface], np.zeros((len(self._counted), 3))
-        acceleration = motion.window_acceleration(motion.time)
-        falls = motion.step * np.outer(np.arange(count) - 0.5 * (count - 1), acceleration)
-        sums = [motion.force[self._counted].sum(axis=0)]
-        add_impulse(self._counted, motion.force, 0.5 * motion.step, impulse)
-        for fall in falls:
-            motion.velocity[self._interface] = given + fall
+        given, acceleration = motion.velocity[self._interface], motion.window_acceleration(motion.time)
+        lags = motion.step * (np.arange(self.plan.substeps) - 0.5 * (self.plan.substeps - 1))
+        ends = 0.5 * motion.step * np.ones(2)  # a substep's work is that of the mean force
+        weights = np.column_stack([np.convolve(np.ones(len(lags)), ends), np.convolve(lags, ends)])
+        impulse, lagging = np.zeros((2, len(counted), 3))
+        add_impulse(counted, motion.force, weights[0, 0], impulse)
+        add_impulse(counted, motion.force, weights[0, 1], lagging)
+        for lag, (weight, lagging_weight) in zip(lags, weights[1:], strict=True):
+            if acceleration.any():  # else the interface keeps its velocity
+                motion.velocity[self._interface] = given + lag * acceleration
             motion.advance()
             motion.update_force()
-            add_impulse(self._counted, motion.force, motion.step, impulse)
-            sums.append(motion.force[self._counted].sum(axis=0))
-        add_impulse(self._counted, motion.force, -0.5 * motion.step, impulse)
+            add_impulse(counted, motion.force, weight, impulse)
+            add_impulse(counted, motion.force, lagging_weight, lagging)
         motion.velocity[self._interface] = given
-        mean = 0.5 * motion.step * (np.array(sums[1:]) + np.array(sums[:-1]))
-        return -float(np.sum(impulse * motion.velocity[self._counted]) + np.sum(mean * falls))
+        return -float(np.sum(impulse * motion.velocity[counted]) + lagging.sum(axis=0) @ acceleration)
 
     def finish_window(self) -> None:
         """Do nothing: the window is done."""
