@@ -40,7 +40,7 @@ from reflowshock.fem.mesh.mesh import MeshData
 
 KINDS = ("incompatible_modes", "one_point")
 PLASTIC = [f"{name}_{kind}_small" for name in ("below_yield", "yielding") for kind in KINDS]
-BARS = {"congruent": 8.0, "assembled": 4.0, "turning": 8.0, "turning_any": 4.0} | dict.fromkeys(PLASTIC, 1.5)
+BARS = {"congruent": 8.0, "assembled": 4.0, "turning": 8.0, "turning_any": 2.0} | dict.fromkeys(PLASTIC, 1.5)
 BYTES = {"congruent": 400.0, "assembled": 2000.0}
 STRAINS = {"below_yield": 1e-5, "yielding": 1e-2}
 STEP, RATE = 1e-8, 100.0  # [s], [1/s]
