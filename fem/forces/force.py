@@ -3,7 +3,7 @@
 A term is linear unless its material yields or the kinematics are finite. Linear boxes of equal shape and material share
 one stiffness and are computed in rows along lines of nodes (``force_congruent``); other linear elements are assembled
 into blocks of 3 x 3 (``force_assembled``). Hexahedra that stay elastic turn by any angle without a path
-(``force_corotational``), boxes at a fifth of their linear speed.
+(``force_corotational``), boxes at a quarter of their linear speed.
 """
 
 from collections.abc import Mapping, Sequence

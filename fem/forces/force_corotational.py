@@ -10,6 +10,7 @@ jedec_bga, with three boxes a row, blocks are 2.3 times as fast; from 24 boxes a
 """
 
 from dataclasses import dataclass, field
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -101,63 +102,19 @@ class CorotationalBoxes:
 
 
 @dataclass(frozen=True, slots=True)
-class CorotationalBlocks:
-    """Boxes that turn, sixteen of any shapes side by side: for meshes whose rows of equal boxes are short.
+class TurningBlocks:
+    """Hexahedra that turn, sixteen of any shapes side by side; subclasses say of what kind.
 
     Attributes:
         points: ``(n, 3)`` [m].
-        cells: ``(nb, 8, 16)`` int32, see ``kernels.box_rotation.add_turned_block_forces``.
-        filled: ``(nb,)`` int32 boxes of each block.
-        constants: ``(nb, 480)`` of each lane: ``box_constants``, then scales as of ``CorotationalBoxes``.
-        hourglass: Whether the energy of the higher modes counts as that of hourglass control.
-        numbers: ``(ne,)`` the boxes' numbers among all elements of the rank.
-        history: Empty.
-    """
-
-    points: NDArray[np.float64]
-    cells: NDArray[np.int32]
-    filled: NDArray[np.int32]
-    constants: NDArray[np.float64]
-    hourglass: bool
-    numbers: NDArray[np.int64]
-    history: dict[str, NDArray] = field(default_factory=dict)
-
-    @classmethod
-    def build(cls, everything: Elements, chosen: NDArray[np.int64]) -> "CorotationalBlocks":
-        """Put the ``chosen (ne,)`` elements, boxes (``force_congruent.is_box``), into blocks."""
-        elements = aligned(everything.subset(chosen))
-        lanes = arrange(elements)
-        shapes = elements.subset(lanes.shape)
-        size = np.ptp(shapes.points[shapes.cells], axis=1)
-        cells = np.ascontiguousarray(elements.cells[lanes.element].transpose(0, 2, 1), dtype=np.int32)
-        of_shape = np.column_stack([box_constants(shapes, size), -0.25 / size])
-        constants = np.ascontiguousarray(of_shape[lanes.place[lanes.pattern]].transpose(0, 2, 1))
-        flat = constants.reshape(len(cells), -1)
-        return cls(elements.points, cells, lanes.filled, flat, elements.kind.hourglass, chosen)
-
-    def add(self, displacement: NDArray[np.float64], force: NDArray[np.float64]) -> None:
-        """Subtract the internal force; errors as ``CorotationalBoxes.add``."""
-        block = add_turned_block_forces(self.cells, self.filled, self.constants, displacement, force)
-        if block != UPRIGHT:
-            raise inverted("a block", self.points[self.cells[block, 0, 0]])
-
-    def energy(self, displacement: NDArray[np.float64]) -> Energy:
-        """Return the strain energy."""
-        return accounted(block_energies(self.cells, self.filled, self.constants, displacement), self.hourglass)
-
-
-@dataclass(frozen=True, slots=True)
-class CorotationalHexahedra:
-    """Hexahedra of any shapes that turn, sixteen side by side.
-
-    Attributes:
-        points: ``(n, 3)`` [m].
-        cells: ``(nb, 8, 16)`` int32, see ``kernels.turned_hexahedron.add_turned_forces``.
+        cells: ``(nb, 8, 16)`` int32, see ``forces``.
         filled: ``(nb,)`` int32 elements of each block.
-        constants: ``(nb, 1920)`` of each lane, see ``hexahedron_constants``.
-        hourglass: Whether the energy of the hourglass part counts as that of hourglass control.
+        constants: ``(nb, 16 m)`` of each lane the m entries of ``constants_of``.
+        hourglass: Whether the energy of the higher modes counts as that of hourglass control.
         numbers: ``(ne,)`` the elements' numbers among all of the rank.
         history: Empty.
+        forces: Kernel that subtracts the force.
+        energies: Kernel of the energies of mean strains and higher modes.
     """
 
     points: NDArray[np.float64]
@@ -167,25 +124,67 @@ class CorotationalHexahedra:
     hourglass: bool
     numbers: NDArray[np.int64]
     history: dict[str, NDArray] = field(default_factory=dict)
+    forces: ClassVar[Any]
+    energies: ClassVar[Any]
+
+    @staticmethod
+    def ordered(elements: Elements) -> Elements:
+        """Return the elements with their nodes in the order that the kernels want: as they are."""
+        return elements
+
+    @staticmethod
+    def constants_of(shapes: Elements) -> NDArray[np.float64]:
+        """Return what the kernels need of an element of each shape: ``(ns, m)``."""
+        raise NotImplementedError
 
     @classmethod
-    def build(cls, everything: Elements, chosen: NDArray[np.int64]) -> "CorotationalHexahedra":
+    def build(cls, everything: Elements, chosen: NDArray[np.int64]) -> Self:
         """Put the ``chosen (ne,)`` elements into blocks."""
-        elements = everything.subset(chosen)
+        elements = cls.ordered(everything.subset(chosen))
         lanes = arrange(elements)
         cells = np.ascontiguousarray(elements.cells[lanes.element].transpose(0, 2, 1), dtype=np.int32)
-        constants = lanes.spread(hexahedron_constants(elements.subset(lanes.shape))[:, None])[lanes.pattern, 0]
+        constants = lanes.spread(cls.constants_of(elements.subset(lanes.shape))[:, None])[lanes.pattern, 0]
         return cls(elements.points, cells, lanes.filled, constants, elements.kind.hourglass, chosen)
 
     def add(self, displacement: NDArray[np.float64], force: NDArray[np.float64]) -> None:
         """Subtract the internal force; errors as ``CorotationalBoxes.add``."""
-        block = add_turned_forces(self.cells, self.filled, self.constants, displacement, force)
+        block = self.forces(self.cells, self.filled, self.constants, displacement, force)
         if block != UPRIGHT:
             raise inverted("a block", self.points[self.cells[block, 0, 0]])
 
     def energy(self, displacement: NDArray[np.float64]) -> Energy:
         """Return the strain energy."""
-        return accounted(turned_energies(self.cells, self.filled, self.constants, displacement), self.hourglass)
+        return accounted(self.energies(self.cells, self.filled, self.constants, displacement), self.hourglass)
+
+
+class CorotationalBlocks(TurningBlocks):
+    """Boxes (``force_congruent.is_box``), for meshes whose rows of equal boxes are short."""
+
+    __slots__ = ()
+    forces, energies = staticmethod(add_turned_block_forces), staticmethod(block_energies)
+
+    @staticmethod
+    def ordered(elements: Elements) -> Elements:
+        """Return the boxes with bit d of a local index the side in direction d."""
+        return aligned(elements)
+
+    @staticmethod
+    def constants_of(shapes: Elements) -> NDArray[np.float64]:
+        """Return ``box_constants``, then scales as of ``CorotationalBoxes``: ``(ns, 30)``."""
+        size = np.ptp(shapes.points[shapes.cells], axis=1)
+        return np.column_stack([box_constants(shapes, size), -0.25 / size])
+
+
+class CorotationalHexahedra(TurningBlocks):
+    """Hexahedra of any shapes."""
+
+    __slots__ = ()
+    forces, energies = staticmethod(add_turned_forces), staticmethod(turned_energies)
+
+    @staticmethod
+    def constants_of(shapes: Elements) -> NDArray[np.float64]:
+        """Return ``hexahedron_constants``: ``(ns, 120)``."""
+        return hexahedron_constants(shapes)
 
 
 Corotational = CorotationalBoxes | CorotationalBlocks | CorotationalHexahedra

@@ -188,7 +188,7 @@ def add_turned_forces(cells, filled, constants, displacement, force):
     Args:
         cells: ``(nb, 8, 16)`` int32 nodes in tensor order; lanes past the last element repeat it.
         filled: ``(nb,)`` int32 elements of each block.
-        constants: ``(np, 1920)`` of each lane the entries above.
+        constants: ``(nb, 1920)`` of each lane the entries above.
         displacement: ``(n, 3)`` [m].
         force: ``(n, 3)`` [N], added to.
 
