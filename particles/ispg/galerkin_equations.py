@@ -22,7 +22,7 @@ from reflowshock.particles.ispg.lagged_cholesky import LaggedCholesky, Tolerance
 
 # Of a spacing or of a particle's volume in a step: errors of the solves that are not worth an iteration.
 NEGLIGIBLE = 1e-9
-MOMENTUM_TOLERANCE, VOLUME_TOLERANCE = 1e-8, 1e-6
+MOMENTUM_TOLERANCE, VOLUME_TOLERANCE = 1e-7, 1e-5
 
 
 @dataclass(frozen=True, slots=True)

@@ -35,6 +35,8 @@ from reflowshock.particles.steps.time_step import LARGEST_DISPLACEMENT
 SUPPORT = 1.5
 # Of the frequency sqrt(gamma / (rho h^3)).
 SMOOTHING = 1.0
+# Of the largest velocity of a rigid motion: more than this across a wall is none that it admits.
+ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +69,8 @@ class Past:
         points: `(n, 3)` where it took the particles [m].
         coefficients: `(n, 3)` of the velocity [m/s].
         gradient: `(n, 3, 3)` of the velocity at the particles [1/s].
-        masses: `(n,)` of the particles [kg].
+        masses: `(n,)` of the coefficients [kg].
+        momenta: `(6,)` linear [kg m/s] and angular about the origin [kg m^2/s]; None before the first step.
         history: its displacement and change of the coefficients.
         losses: of all steps.
     """
@@ -76,6 +79,7 @@ class Past:
     coefficients: Floats
     gradient: Floats
     masses: Floats
+    momenta: Floats | None
     history: BackwardDifference
     losses: Losses
 
@@ -84,7 +88,9 @@ class Past:
         """A body that starts with its velocity."""
         count = len(body.points)
         start = BackwardDifference.start(count)
-        return cls(body.points, body.velocity, np.zeros((count, 3, 3)), np.zeros(count), start, losses or Losses())
+        return cls(
+            body.points, body.velocity, np.zeros((count, 3, 3)), np.zeros(count), None, start, losses or Losses()
+        )
 
     def kinetic_energy(self) -> float:
         """Of the coefficients [J]."""
@@ -194,6 +200,8 @@ class PreparedIspgStep:
         predicted = replace(body, points=base.points + base.time_step * guess)
         enclosed, slope = predicted.volume()
         equations = self.equations(predicted, base.time_step)
+        lost = self._lost_momentum(equations.masses)
+        past, base = replace(past, coefficients=past.coefficients + lost), replace(base, velocity=base.velocity + lost)
         force = self.physics.force(predicted) + base.time_step * (equations.stiffness @ guess)
         pressure = body.pressure
         start = equations.predict(base.velocity, force, pressure)
@@ -202,9 +210,10 @@ class PreparedIspgStep:
         pressure = pressure + change
         velocity, gradient = equations.space.values(coefficients)
         points = base.points + base.time_step * velocity
+        momenta = rigid_momenta(rigid_motions(points), equations.masses, coefficients)
         history = BackwardDifference(points - body.points, coefficients - past.coefficients, time_step)
         losses = self._losses(equations, base, coefficients, time_step)
-        self.solver.past = Past(points, coefficients, gradient, equations.masses, history, losses)
+        self.solver.past = Past(points, coefficients, gradient, equations.masses, momenta, history, losses)
         return Motion(
             velocity=velocity,
             transport=history.displacement / time_step,
@@ -213,6 +222,24 @@ class PreparedIspgStep:
             twists={},
             iterations=self.solver.factors.iterations,
         )
+
+    def _lost_momentum(self, masses: Floats) -> Floats:
+        """Velocity `(n, 3)` [m/s] that gives back the momenta of the last step along rigid motions that walls admit.
+
+        Shifted particles and their new masses would change them: a drop would slide away on a wall with free slip.
+        """
+        body, momenta = self.body, self.past.momenta
+        motions = rigid_motions(body.points)
+        admitted = [
+            np.allclose(self.physics.admit(body, motion), motion, rtol=0.0, atol=ROUNDING * np.abs(motion).max())
+            for motion in motions
+        ]
+        if momenta is None or not any(admitted):
+            return np.zeros_like(body.points)
+        motions = motions[admitted]
+        missing = momenta[admitted] - rigid_momenta(motions, masses, self.past.coefficients)
+        inertia = np.array([rigid_momenta(motions, masses, motion) for motion in motions])
+        return np.tensordot(np.linalg.solve(inertia, missing), motions, axes=1)
 
     def _guess(self, base: Base) -> Floats:
         """Velocity of the prediction `(n, 3)` [m/s]: the last one, as far as a step may go."""
@@ -256,6 +283,17 @@ class PreparedIspgStep:
             smoothing=before.smoothing + time_step * now.smoothing,
             integration=before.integration + float(equations.masses @ (change - kinetic)),
         )
+
+
+def rigid_motions(points: Floats) -> Floats:
+    """Translations along and rotations about the axes through the origin at points `(n, 3)` [m], `(6, n, 3)`."""
+    axes = [np.broadcast_to(axis, points.shape) for axis in np.eye(3)]
+    return np.array([*axes, *(np.cross(axis, points) for axis in axes)])
+
+
+def rigid_momenta(motions: Floats, masses: Floats, velocity: Floats) -> Floats:
+    """Momenta `(k,)` of a velocity `(n, 3)` [m/s] along rigid motions `(k, n, 3)`; masses `(n,)` [kg]."""
+    return np.tensordot(motions, masses[:, None] * velocity, axes=2)
 
 
 def _by_particle(basis: sparse.csr_matrix) -> sparse.csr_matrix:

@@ -15,8 +15,8 @@ Apply = Callable[[Floats], Floats]
 MAX_ITERATIONS = 500
 # Of the norm of the right-hand side: more than this is no solution.
 RESIDUAL_LIMIT = 1e-4
-# Factors cost as much as some twenty iterations.
-MANY_ITERATIONS = 12
+# Factors cost as much as some fifty iterations.
+MANY_ITERATIONS = 25
 # Of the mean of the diagonal, added to it in the factors only: pressures from particle to particle hardly show.
 SHIFT = 1e-6
 
