@@ -15,12 +15,11 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from reflowshock.fem.elements.element import Elements, element_geometry, element_stiffness
-from reflowshock.fem.elements.one_point import hourglass_control
+from reflowshock.fem.elements.element import Elements, element_stiffness
 from reflowshock.fem.errors import InvertedElementError
 from reflowshock.fem.forces.energy import Energy
-from reflowshock.fem.forces.force_congruent import SIGNS, aligned, arranged, is_box, parity_blocks
-from reflowshock.fem.forces.nonlinear_blocks import SYMMETRIC, arrange, elastic_constants
+from reflowshock.fem.forces.force_congruent import aligned, arranged, is_box, parity_blocks
+from reflowshock.fem.forces.nonlinear_blocks import arrange, hexahedron_constants
 from reflowshock.fem.kernels.box_rotation import (
     UPRIGHT,
     add_turned_block_forces,
@@ -35,10 +34,6 @@ SHORT_ROWS = 8  # boxes of a row, in the mean, below which blocks of any shapes 
 NORMAL = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))
 # Parity and entries (00 01 02 11 12 22) of the blocks that resist the modes xy, xz, yz, xyz.
 HIGHER = ((7, (0, 1, 2, 3, 4, 5)), (1, (3, 4, 5)), (2, (0, 2, 5)), (4, (0, 1, 3)), (6, (0,)), (5, (3,)), (3, (5,)))
-
-# Parities of the modes xy, xz, yz, xyz; their places and signs among the amplitudes of ``one_point``.
-HOURGLASS_PARITY, AMPLITUDES, HANDEDNESS = [3, 5, 6, 7], [2, 1, 0, 3], np.array([1.0, 1.0, 1.0, -1.0])
-MODES, PAIRS = np.arange(4), np.triu_indices(4, 1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -229,26 +224,3 @@ def box_constants(shapes: Elements, size: NDArray[np.float64]) -> NDArray[np.flo
     rows, columns = np.transpose((*NORMAL, (3, 3), (4, 4), (5, 5)))
     blocks = parity_blocks(element_stiffness(shapes))
     return np.column_stack([elasticity[:, rows, columns], *(blocks[:, parity, entries] for parity, entries in HIGHER)])
-
-
-def hexahedron_constants(shapes: Elements) -> NDArray[np.float64]:
-    """Return what ``kernels.turned_hexahedron`` needs of each shape: ``(ns, 120)``.
-
-    V C [J], b_p [1/m] of p = 1 to 7, c_k [m], and H [N/m] on the amplitudes, which ``hourglass_control`` has as
-    multiples of the transformed ones.
-
-    Args:
-        shapes: An element of each shape.
-    """
-    corners = shapes.points[shapes.cells]
-    geometry = element_geometry(shapes.points, shapes.cells)
-    rigidity = geometry.volume[:, None] * elastic_constants(shapes.elasticity)[shapes.material]
-    gradient = np.einsum("pa,saj->spj", SIGNS[1:], geometry.gradient) / 8.0
-    transformed = np.einsum("ka,saj->skj", SIGNS[HOURGLASS_PARITY], corners - corners[:, :1])
-    _, stiffness = hourglass_control(corners, shapes.elasticity, shapes.material)
-    tensor = stiffness.reshape(-1, 4, 3, 4, 3)[:, AMPLITUDES][:, :, :, AMPLITUDES]
-    tensor = np.einsum("k,skilj,l->skilj", HANDEDNESS, tensor, HANDEDNESS, optimize=True) / 8.0
-    blocks = tensor.transpose(0, 1, 3, 2, 4)
-    own, pairs = blocks[:, MODES, MODES][..., SYMMETRIC[0], SYMMETRIC[1]], blocks[:, PAIRS[0], PAIRS[1]]
-    flat = (values.reshape(len(corners), -1) for values in (gradient, transformed, own, pairs))
-    return np.column_stack([rigidity, *flat])
