@@ -87,8 +87,17 @@ class CorotationalBoxes:
         read_lines(self.nodes, self.axes, displacement, self.lines[0])
         row = add_turned_row_forces(self.rows, self.scales, self.constants, *self.lines)
         if row != UPRIGHT:
-            raise inverted("the row", self.points[self.nodes[self.rows[row, 0]]])
+            raise self.inverted(row, displacement)
         subtract_lines(self.nodes, self.axes, self.lines[1], force)
+
+    @property
+    def arrays(self) -> dict[str, tuple[NDArray, ...]]:
+        """Return its entry of ``kernels.levels.ForceArrays``."""
+        return {"turning_rows": (self.nodes, self.axes, self.rows, self.scales, self.constants, self.lines)}
+
+    def inverted(self, row: int, displacement: NDArray[np.float64]) -> InvertedElementError:
+        """Return the error of a row with a box that is turned inside out."""
+        return inverted("the row", self.points[self.nodes[self.rows[row, 0]]])
 
     def energy(self, displacement: NDArray[np.float64]) -> Energy:
         """Return the strain energy."""
@@ -110,6 +119,7 @@ class TurningBlocks:
         history: Empty.
         forces: Kernel that subtracts the force.
         energies: Kernel of the energies of mean strains and higher modes.
+        entry: Of ``kernels.levels.ForceArrays``.
     """
 
     points: NDArray[np.float64]
@@ -121,6 +131,7 @@ class TurningBlocks:
     history: dict[str, NDArray] = field(default_factory=dict)
     forces: ClassVar[Any]
     energies: ClassVar[Any]
+    entry: ClassVar[str]
 
     @staticmethod
     def ordered(elements: Elements) -> Elements:
@@ -145,7 +156,16 @@ class TurningBlocks:
         """Subtract the internal force; errors as ``CorotationalBoxes.add``."""
         block = self.forces(self.cells, self.filled, self.constants, displacement, force)
         if block != UPRIGHT:
-            raise inverted("a block", self.points[self.cells[block, 0, 0]])
+            raise self.inverted(block, displacement)
+
+    @property
+    def arrays(self) -> dict[str, tuple[NDArray, ...]]:
+        """Return its entry of ``kernels.levels.ForceArrays``."""
+        return {self.entry: (self.cells, self.filled, self.constants)}
+
+    def inverted(self, block: int, displacement: NDArray[np.float64]) -> InvertedElementError:
+        """Return the error of a block with an element that is turned inside out."""
+        return inverted("a block", self.points[self.cells[block, 0, 0]])
 
     def energy(self, displacement: NDArray[np.float64]) -> Energy:
         """Return the strain energy."""
@@ -157,6 +177,7 @@ class CorotationalBlocks(TurningBlocks):
 
     __slots__ = ()
     forces, energies = staticmethod(add_turned_block_forces), staticmethod(block_energies)
+    entry = "turning_boxes"
 
     @staticmethod
     def ordered(elements: Elements) -> Elements:
@@ -175,6 +196,7 @@ class CorotationalHexahedra(TurningBlocks):
 
     __slots__ = ()
     forces, energies = staticmethod(add_turned_forces), staticmethod(turned_energies)
+    entry = "turning"
 
     @staticmethod
     def constants_of(shapes: Elements) -> NDArray[np.float64]:

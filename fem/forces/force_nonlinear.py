@@ -11,6 +11,7 @@ is twelve times as fast as the fully integrated one. Its hourglass forces yield 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,7 +55,7 @@ class NonlinearElements:
     Attributes:
         elements: The elements.
         numbers: ``(ne,)`` their numbers among all elements of the rank.
-        finite: Whether rotations and strains are finite.
+        path: Kinematics and step.
         lanes: Their order.
         blocks: What the kernel works on.
         kernel: Subtracts the force at a displacement; returns ``FINE`` or the block with an inverted element.
@@ -63,7 +64,7 @@ class NonlinearElements:
 
     elements: Elements
     numbers: NDArray[np.int64]
-    finite: bool
+    path: Path
     lanes: Lanes
     blocks: AnyBlocks
     kernel: Callable[[NDArray[np.float64], NDArray[np.float64]], int]
@@ -95,7 +96,12 @@ class NonlinearElements:
             blocks = gradient_blocks(elements, lanes, plastic, finite)
             kernel = partial(add_gradient_force, blocks, tuple(range(elements.kind.nodes)), path)
         history = {name: getattr(blocks, kept) for name, kept in HISTORY.items() if hasattr(blocks, kept)}
-        return cls(elements, chosen, finite, lanes, blocks, kernel, history)
+        return cls(elements, chosen, path, lanes, blocks, kernel, history)
+
+    @property
+    def finite(self) -> bool:
+        """Return whether rotations and strains are finite."""
+        return self.path.finite
 
     def add(self, displacement: NDArray[np.float64], force: NDArray[np.float64]) -> None:
         """Subtract the internal force; the path goes on by a step.
@@ -105,7 +111,12 @@ class NonlinearElements:
         """
         block = self.kernel(displacement, force)
         if block != FINE:
-            raise self._inverted(self.lanes.element[block], displacement)
+            raise self.inverted(block, displacement)
+
+    @property
+    def arrays(self) -> dict[str, Any]:
+        """Return its entries of ``kernels.levels.ForceArrays``; none where it has no place there."""
+        return {"one_point": self.blocks, "path": self.path} if isinstance(self.blocks, OnePointBlocks) else {}
 
     def energy(self, displacement: NDArray[np.float64]) -> Energy:
         """Return the energies at the latest ``add``."""
@@ -170,9 +181,9 @@ class NonlinearElements:
         for name, values in self.history.items():
             by_lane(values)[...] = by_lane(other.history[name])[block[order], lane[order]]
 
-    def _inverted(self, places: NDArray[np.int64], displacement: NDArray[np.float64]) -> InvertedElementError:
-        """Return the error that names the worst of some elements."""
-        elements = self.elements
+    def inverted(self, block: int, displacement: NDArray[np.float64]) -> InvertedElementError:
+        """Return the error that names the worst element of a block."""
+        elements, places = self.elements, self.lanes.element[block]
         cells = elements.cells[places]
         lowest = elements.kind.geometry((elements.points + displacement)[cells]).lowest
         worst = int(np.argmin(lowest))
