@@ -1,4 +1,4 @@
-"""Command line: new, plan, run, accuracy, status, report, verify, clean, study, effects, stress-test, schema."""
+"""Command line: new, import, plan, run, accuracy, status, report, verify, clean, study, effects, schema and others."""
 
 import json
 import shutil
@@ -87,6 +87,36 @@ def new(
 
     path = write_new_case(name, template)
     console.print(f"wrote {path}; next: reflowshock plan {path}")
+
+
+@app.command("import")
+def import_board(
+    board: Annotated[
+        Path, typer.Argument(metavar="BOARD", help="KiCad (.kicad_pcb), IPC-2581 (.xml), CSV, or a folder of Gerber X2")
+    ],
+    component: Annotated[
+        str | None, typer.Option(metavar="U8", help="component whose joints are computed; without: show what is there")
+    ] = None,
+    name: Annotated[str | None, typer.Option(help="name of the case [default: board and component]")] = None,
+    thickness: Annotated[
+        str | None, typer.Option(help='of the board, where the file does not say it: "1.6 mm"')
+    ] = None,
+    ball: Annotated[str | None, typer.Option(help="diameter of a solder ball [default: 0.6 of the pitch]")] = None,
+    holes: Annotated[str | None, typer.Option(help="smallest diameter of mounting holes [default: 2 mm]")] = None,
+) -> None:
+    """Write a case file for a component of a board from ECAD."""
+    from reflowshock.workflow.ecad.command import read_layout, show_layout, write_case
+    from reflowshock.workflow.ecad.layout import EcadError
+
+    try:
+        if component is None:
+            show_layout(read_layout(board), console)
+            return
+        path = write_case(board, component, name, {"--thickness": thickness, "--ball": ball, "--holes": holes})
+    except EcadError as error:
+        print_error(str(error))
+        raise typer.Exit(2) from error
+    console.print(f"wrote {path}; put in what is ASSUMED, then: reflowshock plan {path}")
 
 
 @app.command()

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from reflowshock.fem.dynamics.central_difference import ExplicitMotion
 from reflowshock.fem.dynamics.participant import Continued
 from reflowshock.fem.estimates.estimate import WindowPlan
+from reflowshock.fem.kernels.levels import Interface
 from reflowshock.fem.kernels.motion import add_impulse, add_rows
 from reflowshock.fem.loads.load import Load
 from reflowshock.fem.model.body import Body
@@ -145,6 +146,9 @@ class Driven(Continued):
         self.interface_work = 0.0
         self._interface, self._counted = local_interface(body), counted_interface(body)
         self._zero = np.zeros((len(body.mass), 3))
+        self._lags = plan.step * (np.arange(plan.substeps) - 0.5 * (plan.substeps - 1))
+        ends = 0.5 * plan.step * np.ones(2)  # a substep's work is that of the mean force
+        self._weights = np.column_stack([np.convolve(np.ones(plan.substeps), ends), np.convolve(self._lags, ends)])
 
     def follow(self) -> float:
         """Take m substeps at the received velocity of the interface; return the work that came in across it [J].
@@ -154,20 +158,14 @@ class Driven(Continued):
         motion, counted = self.motion, self._counted
         self._channels.velocities.receive(motion.velocity)
         given, acceleration = motion.velocity[self._interface], motion.window_acceleration(motion.time)
-        lags = motion.step * (np.arange(self.plan.substeps) - 0.5 * (self.plan.substeps - 1))
-        ends = 0.5 * motion.step * np.ones(2)  # a substep's work is that of the mean force
-        weights = np.column_stack([np.convolve(np.ones(len(lags)), ends), np.convolve(lags, ends)])
-        impulse, lagging = np.zeros((2, len(counted), 3))
-        add_impulse(counted, motion.force, weights[0, 0], impulse)
-        add_impulse(counted, motion.force, weights[0, 1], lagging)
-        for lag, (weight, lagging_weight) in zip(lags, weights[1:], strict=True):
-            if acceleration.any():  # else the interface keeps its velocity
-                motion.velocity[self._interface] = given + lag * acceleration
-            motion.advance()
-            motion.update_force()
-            add_impulse(counted, motion.force, weight, impulse)
-            add_impulse(counted, motion.force, lagging_weight, lagging)
+        change, impulses = np.outer(self._lags, acceleration), np.zeros((2, len(counted), 3))
+        for weight, sum_so_far in zip(self._weights[0], impulses, strict=True):
+            add_impulse(counted, motion.force, weight, sum_so_far)
+        motion.take_steps(
+            self.plan.substeps, Interface(self._interface, counted, given, change, self._weights, impulses)
+        )
         motion.velocity[self._interface] = given
+        impulse, lagging = impulses
         return -float(np.sum(impulse * motion.velocity[counted]) + lagging.sum(axis=0) @ acceleration)
 
     def finish_window(self) -> None:
