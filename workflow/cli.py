@@ -11,6 +11,7 @@ from typing import Annotated
 import typer
 
 from reflowshock.workflow import __version__
+from reflowshock.workflow.compare.command import compare
 from reflowshock.workflow.jobs.executor import JOBS, ExecutorName, executor_for
 from reflowshock.workflow.pipeline.points import read_case_of_run
 from reflowshock.workflow.pipeline.reader import read_case
@@ -28,6 +29,8 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     add_completion=False,
 )
+
+app.command()(compare)
 
 CasePath = Annotated[Path, typer.Argument(metavar="CASE", help="case file (TOML)")]
 Settings = Annotated[

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from reflowshock.workflow.report.page_data import PageData
 
 MOST_TRIANGLES = 100_000  # of a scene
-MOST_VALUES = 1_500_000  # vertices times frames: what keeps a page below 12 MB
+MOST_VALUES = 1_200_000  # vertices times frames: what keeps a page below 12 MB
 FINEST = 65_535  # steps of a value or a coordinate
 COARSER = 1.3  # by which the cells grow that merge vertices
 HEXAHEDRON = np.array([[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]])

@@ -91,7 +91,8 @@ class Viewer {
     const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
     this.framed = this.groups.filter((group) => group.state === 0 || (!solid && group.state === 1));
     this.follows = solid;
-    for (const { points } of this.framed.length ? this.framed : this.groups) {
+    const written = Float32Array.from(this.scene.labels.flatMap((label) => label.at));
+    for (const { points } of [...(this.framed.length ? this.framed : this.groups), { points: written }]) {
       for (let k = 0; k < points.length; k++) {
         low[k % 3] = Math.min(low[k % 3], points[k]);
         high[k % 3] = Math.max(high[k % 3], points[k]);
@@ -211,7 +212,7 @@ class Viewer {
     const up = [-eye[2] * right[1], eye[2] * right[0], flat / length];
     const reach = (axis) => 0.5 * this.extent.reduce((sum, one, k) => sum + Math.abs(one * axis[k]), 0);
     const half = Math.tan((15 * Math.PI) / 180), aspect = Math.max((this.canvasBox.clientWidth || 900) / VIEW_HEIGHT, 0.5);
-    return 1.06 * Math.max(reach(up) / half, reach(right) / (half * aspect)) + reach(eye);
+    return 1.06 * Math.max(reach(up) / half, reach(right) / (half * 0.86 * aspect)) + reach(eye);
   }
 
   toolbar() {
