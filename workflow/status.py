@@ -24,7 +24,7 @@ FIGURES = {
         "critical_joint", "peel_stress", "layer_von_mises", "layer_plastic_work",
         "shape_effect_on_peak_stress", "residual_stress_largest",
         "peak_board_strain", "deflection_over_thickness", "step_ratio", "critical_joint_stress_error",
-        "die_displacement_error", "two_scale_dns_time_ratio", "first_frequency", "steps", "energy_balance_error",
+        "die_displacement_error", "two_scale_dns_core_ratio", "first_frequency", "steps", "energy_balance_error",
     ),
     "comparison": (
         "displacement_difference", "strain_difference", "wave_speed_error", "transmitted_velocity_error",

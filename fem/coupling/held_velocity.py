@@ -5,7 +5,7 @@ macro: a_n = (F_ext + F_c - F_int) / (M + M_interface) -> v^{n+1/2}, U^{n+1}; th
 model, which takes m substeps with it WHILE the macro model computes F_int(U^{n+1}); F_c = -(K u)_c comes back last.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -127,6 +127,11 @@ class WindowMotion(ExplicitMotion):
             return now
         before = self.window_acceleration(max(time - self._substeps * self.step, 0.0))
         return now + 0.5 * (self._substeps - 1) * (now - before)
+
+    def accelerations(self, times: Sequence[float]) -> Sequence[NDArray[np.float64]]:
+        """Return the same at the ends of all substeps of a window: but for the last one it does not change."""
+        first, last = self.body_acceleration(times[0]), self.body_acceleration(times[-1])
+        return [*[first] * (len(times) - 1), last]
 
     def window_acceleration(self, time: float) -> NDArray[np.float64]:
         """Return the sum of the loads' accelerations ``(3,)`` [m/s^2] as the window of a time [s] begins."""

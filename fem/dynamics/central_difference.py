@@ -130,13 +130,17 @@ class ExplicitMotion(Motion):
         ends = [self.time]
         for _ in range(count):
             ends.append(ends[-1] + self.step)
-        accelerations = np.array([self.gravity, *map(self.body_acceleration, ends[1:])])
+        accelerations = np.array([self.gravity, *self.accelerations(ends[1:])])
         tie = self.body.tie
         arrays = StepArrays(
             self._state, self.mobility, self.counted_mass, tie.slave, tie.master, tie.weight, self.slave_force
         )
         self._body_work += self._at_once.take(self, arrays, interface or no_interface(count), accelerations)
         self.gravity = accelerations[-1]
+
+    def accelerations(self, times: Sequence[float]) -> Sequence[NDArray[np.float64]]:
+        """Return ``body_acceleration`` at the ends [s] of the steps of a window."""
+        return [self.body_acceleration(time) for time in times]
 
     def _take_each(self, count: int, interface: Interface | None) -> None:
         """Take steps one by one."""

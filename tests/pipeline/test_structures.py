@@ -71,6 +71,7 @@ def test_two_scales_of_a_bar_from_case_file_to_report(tmp_path):
     errors = {"wave_speed_error", "transmitted_velocity_error", "reflected_velocity_error"}
     assert set(summary["health"]) >= errors | {f"dns_{name}" for name in errors} | {"two_scale_displacement_error"}
     assert summary["metrics"]["two_scale_dns_time_ratio"]["value"] > 0.0
+    assert summary["metrics"]["two_scale_dns_core_ratio"]["value"] > 0.0
     result = json.loads((tmp_path / "shock" / "explicit" / "result.json").read_text())
     assert result["coupling"]["scheme"] == "local_steps" and result["model"]["substeps"] > 4
     page = (tmp_path / "report.html").read_text()

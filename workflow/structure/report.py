@@ -39,7 +39,7 @@ Histories = Mapping[str, Mapping[str, NDArray]]
 
 HEADLINE = (
     "first_frequency", "peak_acceleration", "second_peak_acceleration", "peak_displacement", "displacement_range",
-    "peak_strain", "displacement_difference", "strain_difference", "two_scale_dns_time_ratio",
+    "peak_strain", "displacement_difference", "strain_difference", "two_scale_dns_core_ratio",
     "two_scale_displacement_error", "wave_speed_error", "transmitted_velocity_error", "reflected_velocity_error",
     "tip_deflection_error", "swing_frequency_error", "energy_balance_error",
 )  # fmt: skip

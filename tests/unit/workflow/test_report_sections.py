@@ -208,9 +208,9 @@ def test_costs_stand_beside_the_published_ones():
         "metrics": {},
         "coupling": {"levels": [{"step": 80e-9}, {"step": 10e-9}], "placement": {"chosen": "shared by 2"}},
     }
-    table = cost.table({"two_scale": ours, "dns": dns}, {"two_scale_dns_time_ratio": {"value": 0.25, "unit": ""}})
+    table = cost.table({"two_scale": ours, "dns": dns}, {"two_scale_dns_core_ratio": {"value": 0.25, "unit": ""}})
     rows = {row[0]: row[1:] for row in table["rows"]}
-    assert rows["time over the DNS"] == ["1", "0.250", "1.0", "0.285"]
+    assert rows["core time over the DNS"] == ["1", "0.250", "1.0", "0.285"]
     assert rows["time of the windows"][:2] == ["3.3 min", "50.0 s"]
     assert rows["hexahedra"][1] == "900 macro + 200 meso"
     assert rows["time step"] == ["10 ns", "80 ns, 10 ns", "–", "–"]
