@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -96,7 +97,7 @@ def answers(runs: Sequence[ComparedRun]) -> dict:
     rows = [
         [
             name.replace("_", " "),
-            *_texts([one.get(name) for one in metrics], lambda metric, name=name: _text(name, metric)),
+            *_texts([one.get(name) for one in metrics], partial(_text, name)),
         ]
         for name in names
         if any(name in one for one in metrics)
