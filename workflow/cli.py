@@ -12,6 +12,7 @@ from typing import Annotated
 import typer
 
 from reflowshock.workflow import __version__
+from reflowshock.workflow.compare.command import compare
 from reflowshock.workflow.jobs.executor import JOBS, ExecutorName, executor_for
 from reflowshock.workflow.new_case import import_board, init, new
 from reflowshock.workflow.pipeline.points import read_case_of_run
@@ -30,6 +31,8 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
+
+app.command()(compare)
 
 CasePath = Annotated[Path, typer.Argument(metavar="CASE", help="case file (TOML)")]
 Settings = Annotated[
