@@ -32,8 +32,8 @@ def later_swings(shock: Shock, end: float) -> str:
     if shock.duration != "auto" or any(shock.damping.coefficients):
         return ""
     return (
-        f" The run ends at {1e3 * end:.3g} ms, half a swing after the largest stress. Nothing damps the board, so that later"
-        " swings may bring more: shock.damping damps it, shock.duration follows it further."
+        f" The run ends at {1e3 * end:.3g} ms, half a swing after the largest stress. Nothing damps the board: later"
+        " swings may bring more (shock.damping damps it, shock.duration follows it further)."
     )
 
 
