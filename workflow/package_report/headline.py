@@ -28,7 +28,7 @@ NOTE = (
 
 
 def later_swings(shock: Shock, end: float) -> str:
-    """Say that swings after the end of a run [s] may bring more, where its duration is automatic and nothing damps it."""
+    """Say that swings after the end of a run [s] may bring more, where it ended by itself and nothing damps it."""
     if shock.duration != "auto" or any(shock.damping.coefficients):
         return ""
     return (
